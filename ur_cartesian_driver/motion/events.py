@@ -1,0 +1,96 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What can happen while a goal runs, and what is told about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import TypeAlias
+
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.goal import ZERO6
+from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.state import RobotState
+
+
+class TrajectoryResult(IntEnum):
+    """How the robot program says that a trajectory ended; the numbers on the wire."""
+
+    SUCCESS = 0
+    CANCELED = 1
+    FAILURE = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StateReceived:
+    """An RTDE packet came in."""
+
+    state: RobotState
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrajectoryEnded:
+    """The robot program reported the end of a trajectory."""
+
+    result: TrajectoryResult
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CancelRequested:
+    """Somebody wants the motion to stop."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkLost:
+    """A connection that the motion needs is gone; the reason is a clause for the error text."""
+
+    link: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tick:
+    """Time passed; sent at least every 20 ms so that bounds hold when nothing else happens."""
+
+
+Event: TypeAlias = StateReceived | TrajectoryEnded | CancelRequested | LinkLost | Tick
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Progress:
+    """Where a running motion is: poses and twists of the TCP in the robot's base."""
+
+    #: Index of the waypoint the tool is on its way to.
+    waypoint: int
+    #: Part of the planned time that is done, 0 to 1.
+    fraction: float
+    desired_pose: Pose
+    desired_twist: Vector6 = ZERO6
+    actual_pose: Pose
+    actual_twist: Vector6 = ZERO6
+    actual_q: Vector6 = ZERO6
+    #: Expected time of the desired pose from the start of the motion [s].
+    time: float = 0.0
+    #: Expected time to the end at the present speed scaling [s]; infinity when it stands still.
+    time_remaining: float = 0.0
+    speed_scaling: float = 1.0
+    points_received: int = 0
+    #: Motion time of the points on the robot's side that are not begun yet [s].
+    buffered: float = 0.0
+    #: The controller's clock [s].
+    timestamp: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """How a goal ended: one code, one sentence, and what was done."""
+
+    code: ErrorCode
+    text: str
+    report: tuple[str, ...] = ()
+
+    @property
+    def succeeded(self) -> bool:
+        """Tell whether the goal was reached (or passed all checks, when only these were asked)."""
+        return self.code is ErrorCode.SUCCESSFUL

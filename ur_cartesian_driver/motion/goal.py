@@ -1,0 +1,151 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What was asked: a goal as it came, in the frame in which it came.
+
+A goal may be nonsense; ``planning.validate`` finds that out and says where. Only a plan
+(:mod:`~ur_cartesian_driver.motion.plan`) is known to be sound.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector3, Vector6
+
+ZERO6: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class SegmentType(IntEnum):
+    """How the tool gets to a point; the numbers of ``MotionSegment.type``."""
+
+    AUTO = 0
+    LINEAR = 1
+    JOINT = 2
+    CIRCULAR = 3
+    PROCESS = 4
+    OPTIMIZED_LINEAR = 5
+    OPTIMIZED_JOINT = 6
+
+
+class ArcMode(IntEnum):
+    """What the orientation does on an arc; the numbers of URScript's ``movec``."""
+
+    UNCONSTRAINED = 0
+    FIXED = 1
+
+
+class ExecutionMode(IntEnum):
+    """Which way of execution was asked for; the numbers of the action's ``execution``."""
+
+    AUTO = 0
+    PRIMITIVES = 1
+    SPLINE = 2
+    SERVO = 3
+
+
+class OutputKind(IntEnum):
+    """Which output an :class:`IOCommand` switches."""
+
+    STANDARD_DIGITAL = 0
+    CONFIGURABLE_DIGITAL = 1
+    TOOL_DIGITAL = 2
+    STANDARD_ANALOG = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Posture:
+    """The joint positions [rad] to be near to, by joint name; empty = no preference."""
+
+    names: tuple[str, ...] = ()
+    values: tuple[float, ...] = ()
+
+    def __bool__(self) -> bool:
+        """Tell whether there is any preference (also a malformed one)."""
+        return bool(self.names or self.values)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Waypoint:
+    """One point of a goal, in the frame of the goal."""
+
+    #: When to be there, from the start of the motion [s].
+    time: float = 0.0
+    pose: Pose
+    #: Linear [m/s] and angular [rad/s] velocity at the point.
+    twist: Vector6 = ZERO6
+    #: Linear [m/s^2] and angular [rad/s^2] acceleration at the point.
+    acceleration: Vector6 = ZERO6
+    jerk: Vector6 = ZERO6
+    posture: Posture = Posture()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Segment:
+    """
+    The motion that ends at the waypoint of the same index; its blend lies around that waypoint.
+
+    Units by type: LINEAR, CIRCULAR, PROCESS m/s and m/s^2 of the tool (rad/s, rad/s^2 for a pure
+    rotation); JOINT rad/s and rad/s^2 of the leading axis; OPTIMIZED_* fractions in (0, 1].
+    """
+
+    type: SegmentType = SegmentType.AUTO
+    #: Distance from the waypoint at which the corner may be left [m].
+    blend_radius: float = 0.0
+    #: 0 = from the times, else the default.
+    velocity: float = 0.0
+    acceleration: float = 0.0
+    #: A pose on the arc, CIRCULAR only.
+    via: Pose | None = None
+    via_posture: Posture = Posture()
+    arc_mode: ArcMode = ArcMode.UNCONSTRAINED
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class IOCommand:
+    """Switch an output when the tool passes a waypoint."""
+
+    waypoint: int
+    #: Time after the waypoint [s].
+    offset: float
+    output: OutputKind
+    pin: int
+    value: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerance:
+    """
+    Largest deviations by axis: 0 = the default, negative = unchecked, positive = the limit.
+
+    Position [m] in the frame of the goal, orientation [rad] as the rotation vector of the error in
+    the controlled frame, twist [m/s, rad/s] and acceleration [m/s^2, rad/s^2].
+    """
+
+    position: Vector3 = (0.0, 0.0, 0.0)
+    orientation: Vector3 = (0.0, 0.0, 0.0)
+    twist: Vector6 = ZERO6
+    acceleration: Vector6 = ZERO6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Goal:
+    """A Cartesian trajectory and how to execute it."""
+
+    waypoints: tuple[Waypoint, ...]
+    #: Empty, or one for each waypoint.
+    segments: tuple[Segment, ...] = ()
+    #: The frame of the goal in the robot's base.
+    T_base_frame: Pose = IDENTITY
+    frame_id: str = ''
+    controlled_frame: str = ''
+    #: How long ago the stamp of the goal was when it was received [s]; None = no stamp.
+    age: float | None = None
+    path_tolerance: Tolerance = Tolerance()
+    goal_tolerance: Tolerance = Tolerance()
+    #: How much later than planned the end may come [s]: 0 = the default, negative = without end.
+    goal_time_tolerance: float = 0.0
+    execution: ExecutionMode = ExecutionMode.AUTO
+    io_commands: tuple[IOCommand, ...] = ()
+    keep_open: bool = False

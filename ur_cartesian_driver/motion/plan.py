@@ -1,0 +1,85 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the driver is going to do: primitives, the tool path they mean, and a report of the choices.
+
+A plan is made by ``planning`` after every check has passed, and is immutable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.primitive import Joints, Primitive
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReferencePath:
+    """
+    The planned path of the TCP in the robot's base, as samples that are joined by straight lines.
+
+    A straight segment needs only its ends; arcs, joint moves and blends are sampled finely
+    enough that the chords stay within a few micrometres of the curve. Row 0 is the start.
+    """
+
+    #: (m, 7) x y z [m], unit quaternion x y z w.
+    poses: NDArray[np.float64]
+    #: (m,) the index of the goal's point to which the sample belongs (the one it leads to).
+    point: NDArray[np.int32]
+    #: (m,) expected time from the start of the motion [s] at full speed, not decreasing.
+    time: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        """Check the shapes and make the arrays read-only."""
+        m = len(self.poses)
+        if self.poses.shape != (m, 7) or self.point.shape != (m,) or self.time.shape != (m,):
+            raise ValueError(
+                f'reference path shapes differ: {self.poses.shape}, {self.point.shape}, '
+                f'{self.time.shape}')
+        for array in (self.poses, self.point, self.time):
+            array.setflags(write=False)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannedSegment:
+    """One primitive and what is expected of it."""
+
+    primitive: Primitive
+    #: Index of the waypoint at its end.
+    waypoint: int
+    #: Path length of the tool [m] and its turn [rad], corner to corner.
+    length: float
+    angle: float
+    #: Expected time at full speed [s].
+    duration: float
+    #: Joint positions predicted at its end [rad].
+    joints: Joints
+    #: One line for people: what and why.
+    note: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Plan:
+    """A goal that passed all checks, ready to be executed from the state it was planned for."""
+
+    goal: Goal
+    segments: tuple[PlannedSegment, ...]
+    reference: ReferencePath
+    #: Joint positions of the start [rad].
+    start: Joints
+    #: What was ignored, slowed or changed, and what a reader should know about the whole.
+    remarks: tuple[str, ...] = field(default=())
+
+    @property
+    def duration(self) -> float:
+        """Expected time of the whole motion at full speed [s]."""
+        return sum(segment.duration for segment in self.segments)
+
+    @property
+    def report(self) -> tuple[str, ...]:
+        """One line for each segment, then the remarks."""
+        return tuple(segment.note for segment in self.segments) + self.remarks

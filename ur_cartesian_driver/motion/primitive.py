@@ -1,0 +1,122 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the robot is told: the motion primitives of the trajectory point interface.
+
+One class for each URScript motion. A target is either a :class:`Pose` (of the TCP, in the robot's
+base) or six joint positions [rad]; target and via of an arc may differ in kind. The wire's motion
+type follows from the class and the kinds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from ur_cartesian_driver.motion.goal import ArcMode
+from ur_cartesian_driver.motion.pose import Pose, Vector6
+
+Joints: TypeAlias = Vector6
+Target: TypeAlias = Pose | Joints
+
+#: Defaults of the trajectory point interface, for the leading axis [rad/s, rad/s^2] or the tool.
+DEFAULT_VELOCITY = 1.04
+DEFAULT_ACCELERATION = 1.4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoveJ:
+    """
+    Straight line in joint space.
+
+    ``q_near`` (with a pose target only) chooses the joint solution. ``duration`` [s] > 0 counts
+    instead of velocity [rad/s] and acceleration [rad/s^2] of the leading axis.
+    """
+
+    target: Target
+    q_near: Joints | None = None
+    velocity: float = DEFAULT_VELOCITY
+    acceleration: float = DEFAULT_ACCELERATION
+    duration: float = 0.0
+    blend_radius: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoveL:
+    """
+    Straight line of the tool; velocity [m/s] and acceleration [m/s^2] of the tool.
+
+    A joint target means the pose it leads to. ``q_near`` travels along, the robot ignores it.
+    """
+
+    target: Target
+    q_near: Joints | None = None
+    velocity: float = DEFAULT_VELOCITY
+    acceleration: float = DEFAULT_ACCELERATION
+    duration: float = 0.0
+    blend_radius: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoveP:
+    """Straight legs joined by circular fillets at constant tool speed; takes no duration."""
+
+    target: Target
+    q_near: Joints | None = None
+    velocity: float = DEFAULT_VELOCITY
+    acceleration: float = DEFAULT_ACCELERATION
+    blend_radius: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoveC:
+    """Circular arc through ``via`` to ``target``; takes no duration."""
+
+    target: Target
+    via: Target
+    velocity: float = DEFAULT_VELOCITY
+    acceleration: float = DEFAULT_ACCELERATION
+    blend_radius: float = 0.0
+    mode: ArcMode = ArcMode.UNCONSTRAINED
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OptimoveJ:
+    """Joint motion with limited jerk; velocity and acceleration are fractions in (0, 1]."""
+
+    target: Target
+    q_near: Joints | None = None
+    velocity: float = 0.3
+    acceleration: float = 0.3
+    blend_radius: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OptimoveL:
+    """Straight tool motion with limited jerk; velocity and acceleration in (0, 1]."""
+
+    target: Target
+    q_near: Joints | None = None
+    velocity: float = 0.3
+    acceleration: float = 0.3
+    blend_radius: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spline:
+    """
+    A joint spline segment: cubic without, quintic with accelerations.
+
+    :param target: joint positions [rad] at the end.
+    :param velocities: joint velocities [rad/s] at the end.
+    :param accelerations: joint accelerations [rad/s^2] at the end.
+    :param duration: [s].
+    """
+
+    target: Joints
+    velocities: Vector6
+    accelerations: Vector6 | None = None
+    duration: float
+
+
+Primitive: TypeAlias = MoveJ | MoveL | MoveP | MoveC | OptimoveJ | OptimoveL | Spline

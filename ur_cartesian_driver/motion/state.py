@@ -1,0 +1,123 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the robot reports: a snapshot of its state, and the names of its modes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+
+from ur_cartesian_driver.motion.goal import ZERO6
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector6
+
+
+class RobotMode(IntEnum):
+    """State of the arm's power; numbers of the controller."""
+
+    NO_CONTROLLER = -1
+    DISCONNECTED = 0
+    CONFIRM_SAFETY = 1
+    BOOTING = 2
+    POWER_OFF = 3
+    POWER_ON = 4
+    IDLE = 5
+    BACKDRIVE = 6
+    RUNNING = 7
+    UPDATING_FIRMWARE = 8
+
+
+class SafetyMode(IntEnum):
+    """State of the safety system; numbers of the controller."""
+
+    NORMAL = 1
+    REDUCED = 2
+    PROTECTIVE_STOP = 3
+    RECOVERY = 4
+    SAFEGUARD_STOP = 5
+    SYSTEM_EMERGENCY_STOP = 6
+    ROBOT_EMERGENCY_STOP = 7
+    VIOLATION = 8
+    FAULT = 9
+    VALIDATE_JOINT_ID = 10
+    UNDEFINED_SAFETY_MODE = 11
+    AUTOMATIC_MODE_SAFEGUARD_STOP = 12
+    SYSTEM_THREE_POSITION_ENABLING_STOP = 13
+    TP_THREE_POSITION_ENABLING_STOP = 14
+    IMMI_EMERGENCY_STOP = 15
+    IMMI_SAFEGUARD_STOP = 16
+    PROFISAFE_WAITING_FOR_PARAMETERS = 17
+    PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP = 18
+    PROFISAFE_SAFEGUARD_STOP = 19
+    PROFISAFE_EMERGENCY_STOP = 20
+    SAFETY_API_SAFEGUARD_STOP = 22
+
+
+class RuntimeState(IntEnum):
+    """State of the robot program; numbers of the controller."""
+
+    STOPPING = 0
+    STOPPED = 1
+    PLAYING = 2
+    PAUSING = 3
+    PAUSED = 4
+    RESUMING = 5
+
+
+class RobotStatus(IntFlag):
+    """Bits of RTDE's ``robot_status_bits``."""
+
+    POWER_ON = 1 << 0
+    PROGRAM_RUNNING = 1 << 1
+    TEACH_BUTTON_PRESSED = 1 << 2
+    POWER_BUTTON_PRESSED = 1 << 3
+
+
+class SafetyStatus(IntFlag):
+    """Bits of RTDE's ``safety_status_bits``."""
+
+    NORMAL_MODE = 1 << 0
+    REDUCED_MODE = 1 << 1
+    PROTECTIVE_STOPPED = 1 << 2
+    RECOVERY_MODE = 1 << 3
+    SAFEGUARD_STOPPED = 1 << 4
+    SYSTEM_EMERGENCY_STOPPED = 1 << 5
+    ROBOT_EMERGENCY_STOPPED = 1 << 6
+    EMERGENCY_STOPPED = 1 << 7
+    VIOLATION = 1 << 8
+    FAULT = 1 << 9
+    STOPPED_DUE_TO_SAFETY = 1 << 10
+    THREE_POSITION_ENABLING_STOP = 1 << 11
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotState:
+    """
+    One RTDE packet: joints in rad and rad/s, poses of the TCP in the robot's base.
+
+    Twists are linear [m/s] and angular [rad/s] of the TCP in base axes.
+    """
+
+    #: The controller's clock [s].
+    timestamp: float
+    actual_q: Vector6
+    actual_qd: Vector6 = ZERO6
+    target_q: Vector6 = ZERO6
+    target_qd: Vector6 = ZERO6
+    actual_tcp_pose: Pose = IDENTITY
+    actual_tcp_twist: Vector6 = ZERO6
+    target_tcp_pose: Pose = IDENTITY
+    target_tcp_twist: Vector6 = ZERO6
+    #: Force [N] and torque [Nm] at the TCP in base axes.
+    actual_tcp_wrench: Vector6 = ZERO6
+    #: The active TCP in the flange frame.
+    T_flange_tcp: Pose = IDENTITY
+    #: What the controller really runs at, and the pendant's slider, both 0 to 1.
+    speed_scaling: float = 1.0
+    target_speed_fraction: float = 1.0
+    robot_mode: RobotMode = RobotMode.RUNNING
+    safety_mode: SafetyMode = SafetyMode.NORMAL
+    runtime_state: RuntimeState = RuntimeState.STOPPED
+    robot_status: RobotStatus = RobotStatus.POWER_ON
+    safety_status: SafetyStatus = SafetyStatus.NORMAL_MODE
+    #: How many points of the running trajectory the robot program has begun; 0 = none, or unknown.
+    points_begun: int = 0
