@@ -1,0 +1,10 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Driver for Universal Robots arms that carries out Cartesian trajectories."""
+
+from pkgutil import extend_path
+
+# The generated modules (msg, srv, action) are made by the build and installed, while these may be
+# used from the source tree (an editable install, `python -m` in a checkout). This joins the two
+# directories into the one package that they are.
+__path__ = extend_path(__path__, __name__)
