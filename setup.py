@@ -162,7 +162,7 @@ setup(
     license=text('license'),
     license_files=['LICENSE'],
     maintainer=text('maintainer'),
-    maintainer_email=PACKAGE.find('maintainer').get('email'),
+    maintainer_email=PACKAGE.findall('maintainer')[0].get('email'),
     classifiers=[
         'Operating System :: POSIX :: Linux',
         'Programming Language :: Python :: 3.11',

@@ -1,0 +1,49 @@
+# Everything from a fresh clone: `make demo`, `make test` and `make bench` set up what they need.
+
+VENV ?= .venv
+PYTEST_ARGS ?= -n 2
+bin := $(VENV)/bin
+stamp := $(VENV)/.installed
+
+# ROS 2 by default talks to every computer of the network. Stay on this one, in a domain of one's own.
+export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+ifndef ROS_DOMAIN_ID
+ROS_DOMAIN_ID := $(shell echo $$(( $$$$ % 100 + 1 )))
+endif
+export ROS_DOMAIN_ID
+# What another environment, activated or sourced, may have left behind.
+unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME
+unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH
+
+.PHONY: help setup demo test lint bench clean
+
+help:  ## Show this list
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 8
+
+setup: $(stamp)  ## Make .venv with ROS 2, the tools and this package (PYTHON=python3.12 chooses one)
+
+# Modules of the package count at once; only what is built or installed asks for another set-up.
+$(stamp): $(wildcard msg/* srv/* action/* cmake/*) CMakeLists.txt setup.py package.xml \
+		pyproject.toml requirements-dev.txt scripts/setup.sh
+	@echo 'Setting up $(VENV): about a minute the first time.'
+	VENV=$(VENV) scripts/setup.sh
+	@touch $@
+
+demo: $(stamp)  ## Simulated robot, driver and a client that moves it; draws the path
+	$(bin)/ur-cartesian demo
+
+test: lint  ## Lint, then all tests (PYTEST_ARGS='-k name' chooses)
+	$(bin)/pytest $(PYTEST_ARGS)
+
+lint: $(stamp)  ## ruff, mypy, the rules for imports, spelling
+	$(bin)/ruff check
+	$(bin)/mypy
+	$(bin)/lint-imports
+	$(bin)/codespell
+
+bench: $(stamp)  ## Measure, and print a table
+	$(bin)/python benchmark/run.py
+
+clean:  ## Remove all that was built or installed here
+	rm -rf $(VENV) build install log dist *.egg-info .*_cache .hypothesis
+	find . -name __pycache__ -prune -exec rm -rf {} +

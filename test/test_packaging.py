@@ -1,0 +1,169 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What is installed is complete, and the files that describe it agree with each other."""
+
+import ast
+import importlib
+from importlib import metadata, resources
+from pathlib import Path
+import re
+import sys
+from xml.etree import ElementTree
+
+import pytest
+
+from ur_cartesian_driver.resources import share_path
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+NAME = 'ur_cartesian_driver'
+needs_checkout = pytest.mark.skipif(
+    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has this file')
+
+EXECUTABLES = ['driver', 'demo', 'send', 'sim', 'validate', 'where']
+LAUNCH_ARGUMENTS = {
+    'driver.launch.py': {
+        'ur_type', 'robot_ip', 'reverse_ip', 'headless_mode', 'tf_prefix', 'reverse_port',
+        'script_sender_port', 'trajectory_port', 'script_command_port', 'namespace', 'config_file',
+    },
+    'simulated_robot.launch.py': {'ur_type', 'robot_ip', 'polyscope', 'tf_prefix', 'namespace'},
+}
+
+
+def package_xml():
+    return ElementTree.parse(share_path() / 'package.xml').getroot()
+
+
+def cmake_lists():
+    return (CHECKOUT / 'CMakeLists.txt').read_text()
+
+
+def test_the_version_is_that_of_package_xml():
+    assert metadata.version(NAME) == package_xml().findtext('version')
+
+
+@needs_checkout
+def test_cmake_has_the_version_of_package_xml():
+    version = package_xml().findtext('version')
+    assert f'project({NAME} VERSION {version})' in cmake_lists()
+
+
+@needs_checkout
+def test_the_changelog_has_a_place_for_what_comes_next():
+    assert '\nForthcoming\n-----------\n' in (CHECKOUT / 'CHANGELOG.rst').read_text()
+
+
+@needs_checkout
+def test_every_interface_file_is_built():
+    named = set(re.findall(r'"((?:msg|srv|action)/\w+\.\w+)"', cmake_lists()))
+    there = {f'{path.parent.name}/{path.name}'
+             for kind in ('msg', 'srv', 'action') for path in (CHECKOUT / kind).iterdir()}
+    assert named == there
+
+
+def prefix_with_executables():
+    """Return lib/ur_cartesian_driver of the installation that the package comes from."""
+    generated = Path(importlib.import_module(f'{NAME}.msg').__file__)
+    for parent in generated.parents:
+        if (parent / 'lib' / NAME).is_dir():
+            return parent / 'lib' / NAME
+    raise AssertionError(f'no lib/{NAME} above {generated}')
+
+
+def test_the_executables_of_ros2_run_are_installed():
+    assert sorted(path.name for path in prefix_with_executables().iterdir()) == sorted(EXECUTABLES)
+
+
+@pytest.mark.parametrize('name', EXECUTABLES)
+def test_an_executable_calls_a_function_that_exists(name):
+    tree = ast.parse((prefix_with_executables() / name).read_text())
+    (imported,) = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    assert callable(getattr(importlib.import_module(imported.module), imported.names[0].name))
+
+
+@pytest.mark.parametrize('command', EXECUTABLES[1:])
+def test_the_command_line_has_the_command_of_an_executable(command, capsys):
+    main = importlib.import_module(f'{NAME}.cli').main
+    with pytest.raises(SystemExit) as exit_:
+        main([command, '--help'])
+    assert exit_.value.code == 0
+    assert command in capsys.readouterr().out
+
+
+def test_console_scripts_and_executables_call_the_same_functions():
+    scripts = {script.name: script.value
+               for script in metadata.distribution(NAME).entry_points.select(
+                   group='console_scripts')}
+    if not scripts:
+        pytest.skip('console scripts come with pip; this is an installation by colcon')
+    assert scripts == {
+        'ur-cartesian-driver': f'{NAME}.ros.node:main', 'ur-cartesian': f'{NAME}.cli:main'}
+    for name, command in (('driver', 'ur-cartesian-driver'), ('sim', 'ur-cartesian')):
+        module, function = scripts[command].split(':')
+        source = (prefix_with_executables() / name).read_text()
+        assert f'from {module} import {function}' in source
+
+
+def test_pytest_finds_the_fixtures_for_users():
+    (plugin,) = metadata.distribution(NAME).entry_points.select(group='pytest11')
+    assert plugin.value == f'{NAME}.pytest_plugin'
+    assert f'{NAME}.pytest_plugin' in sys.modules
+
+
+def test_files_that_are_not_python_are_installed_with_the_package():
+    package = resources.files(NAME)
+    assert package.joinpath('py.typed').is_file()
+    assert any(path.name.endswith('.script') for path in package.joinpath('program').iterdir())
+
+
+@pytest.mark.parametrize('path', [
+    'config/driver.yaml', 'launch/driver.launch.py', 'msg/CartesianTrajectory.msg', 'package.xml'])
+def test_data_files_are_found(path):
+    assert (share_path() / path).is_file()
+
+
+def calls(tree, name):
+    return [node for node in ast.walk(tree)
+            if isinstance(node, ast.Call) and ast.unparse(node.func) == name]
+
+
+@pytest.mark.parametrize('name', LAUNCH_ARGUMENTS)
+def test_a_launch_file_compiles_and_has_its_arguments(name):
+    path = share_path() / 'launch' / name
+    tree = ast.parse(path.read_text(), filename=str(path))
+    compile(tree, str(path), 'exec')
+    declared = calls(tree, 'DeclareLaunchArgument')
+    assert {ast.literal_eval(call.args[0]) for call in declared} == LAUNCH_ARGUMENTS[name]
+    for call in declared:
+        assert 'description' in {keyword.arg for keyword in call.keywords}, ast.unparse(call)
+
+
+def test_the_launch_file_of_the_simulator_knows_the_arguments_of_the_other():
+    tree = ast.parse((share_path() / 'launch' / 'simulated_robot.launch.py').read_text())
+    known = LAUNCH_ARGUMENTS['driver.launch.py']
+    strings = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)}
+    assert {'ur_type', 'robot_ip', 'headless_mode', 'reverse_port'} <= strings & known
+    assert {s for s in strings if str(s).endswith('_port')} <= known
+
+
+def test_a_launch_file_starts_an_executable_that_is_installed():
+    for path in sorted((share_path() / 'launch').glob('*.launch.py')):
+        started = [keyword.value for node in ast.walk(ast.parse(path.read_text()))
+                   if isinstance(node, ast.Call) for keyword in node.keywords
+                   if keyword.arg == 'executable']
+        assert started, path.name
+        assert {ast.literal_eval(value) for value in started} <= set(EXECUTABLES)
+
+
+def test_ros_packages_that_pip_installs_are_dependencies_of_the_ros_package():
+    required = {re.match(r'[\w-]+', line)[0] for line in metadata.requires(NAME) or []
+                if 'extra ==' not in line}
+    if not required:
+        pytest.skip('requirements come with pip; this is an installation by colcon')
+    ros = {name.removeprefix('ros-jazzy-').replace('-', '_')
+           for name in required if name.startswith('ros-jazzy-')}
+    depends = {element.text for kind in ('depend', 'exec_depend')
+               for element in package_xml().iter(kind)}
+    assert ros - depends == set()
+    # Not on PyPI; the driver does without them there.
+    assert depends - ros == {'launch', 'launch_ros', 'tf2_ros', 'pinocchio', 'python3-matplotlib',
+                             'python3-numpy', 'python3-yaml'}
