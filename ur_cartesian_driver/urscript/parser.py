@@ -1,0 +1,533 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Tokens to syntax tree: recursive descent, one method per rule.
+
+The language is free of lines: a statement ends where its expression cannot go on, so
+`a = 1 b = 2` are two statements and an operator at the end of a line continues it. Lines matter
+in three places only: a call or an index opens its bracket on the line of what it applies to, the
+value of `return` stands on its line, and so do the texts of a label. Inside brackets not even that.
+
+    program     = ("def" | "sec") NAME "(" ")" ":" block "end"
+    block       = { statement }
+    statement   = function | if | switch | while | "break" | "continue" | return | "halt" | "pause"
+                | "enter_critical" | "exit_critical" | "join" unary | "kill" unary
+                | label | assignment | call
+    function    = ("def" | "thread") NAME "(" [ parameter { "," parameter } ] ")" ":" block "end"
+    parameter   = NAME [ "=" expression ]
+    if          = "if" expression ":" block { "elif" expression ":" block }
+                  [ "else" ":" block ] "end"
+    switch      = "switch" expression ":" { "case" expression ":" block [ "end" ] }
+                  [ "default" ":" block [ "end" ] ] "end"
+    while       = "while" expression ":" block "end"
+    return      = "return" [ expression ]
+    label       = "$" NUMBER STRING { STRING }
+    assignment  = [ "global" | "local" ] target "=" expression
+    target      = NAME { "[" expression [ "," expression ] "]" | "." NAME }
+    call        = postfix that ends in a call | "run" NAME "(" ")"
+    expression  = conjunction { ( "or" | "xor" ) conjunction }
+    conjunction = inversion { "and" inversion }
+    inversion   = "not" inversion | comparison
+    comparison  = sum { ( "==" | "!=" | "<" | "<=" | ">" | ">=" ) sum }
+    sum         = product { ( "+" | "-" ) product }
+    product     = unary { ( "*" | "/" | "%" ) unary }
+    unary       = ( "-" | "+" ) unary | "run" NAME "(" ")" | postfix
+    postfix     = primary { "(" arguments ")" | "[" expression [ "," expression ] "]" | "." NAME }
+    arguments   = [ argument { "," argument } ]
+    argument    = [ NAME "=" ] expression
+    primary     = NUMBER | STRING | "True" | "False" | "None" | NAME | "(" expression ")"
+                | "[" [ expression { "," expression } ] "]"
+                | "p" "[" expression { "," expression } "]"
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Literal, TypedDict, TypeVar
+
+from ur_cartesian_driver.urscript import syntax as tree
+from ur_cartesian_driver.urscript.errors import CompileError
+from ur_cartesian_driver.urscript.scanner import Kind, scan, syntax_error, Token
+
+#: Blocks, brackets and signs inside one another.
+MAX_NESTING = 50
+#: Operators of one precedence in a row; each makes the tree one node deeper.
+MAX_CHAIN = 100
+
+CONSTANTS = {'True': True, 'true': True, 'False': False, 'false': False, 'None': None}
+
+T = TypeVar('T')
+
+
+class Place(TypedDict):
+    """The position arguments of a node."""
+
+    line: int
+    column: int
+
+
+def parse(text: str) -> tree.Program:
+    """
+    Parse one program, with any blank lines and comments around it.
+
+    :raises CompileError: at the first token that fits no rule.
+    """
+    parser = Parser(text)
+    try:
+        return parser.program()
+    except RecursionError:
+        raise parser.error('the program is nested too deeply') from None
+
+
+def place(token: Token) -> Place:
+    """Return the position of a token as arguments of a node."""
+    return Place(line=token.line, column=token.column)
+
+
+class Parser:
+    """Reads the tokens of one text from left to right."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._tokens = scan(text)
+        self._next = 0
+        self._nesting = 0
+        self._brackets = 0
+        self._loops = 0
+
+    # Tokens
+
+    @property
+    def _token(self) -> Token:
+        return self._tokens[self._next]
+
+    @property
+    def _previous(self) -> Token:
+        return self._tokens[self._next - 1]
+
+    def _advance(self) -> Token:
+        token = self._token
+        if token.kind is not Kind.END:
+            self._next += 1
+        return token
+
+    def _at(self, *texts: str) -> bool:
+        """Tell whether the next token is one of these keywords or symbols."""
+        return self._token.kind in (Kind.KEYWORD, Kind.SYMBOL) and self._token.text in texts
+
+    def _match(self, *texts: str) -> Token | None:
+        return self._advance() if self._at(*texts) else None
+
+    def _expect(self, text: str) -> Token:
+        if not self._at(text):
+            raise self.error(f'{text!r} is missing before {self._found()}')
+        return self._advance()
+
+    def _expect_kind(self, kind: Kind) -> Token:
+        if self._token.kind is not kind:
+            raise self.error(f'a {kind.value} is missing before {self._found()}')
+        return self._advance()
+
+    def _found(self) -> str:
+        token = self._token
+        return token.kind.value if token.kind is Kind.END else repr(token.text)
+
+    def _same_line(self) -> bool:
+        """Tell whether the next token stands on the line of the one before it."""
+        return self._token.line == self._previous.line
+
+    def error(self, reason: str, token: Token | None = None) -> CompileError:
+        """Return a syntax error at a token, by default the next one."""
+        at = token or self._token
+        return syntax_error(self._text, at.line, at.column, reason)
+
+    @contextmanager
+    def _nested(self) -> Iterator[None]:
+        """Bound the depth of what is inside something else."""
+        self._nesting += 1
+        if self._nesting > MAX_NESTING:
+            raise self.error(f'more than {MAX_NESTING} levels inside one another')
+        yield
+        self._nesting -= 1
+
+    def _list(self, item: Callable[[], T], close: str) -> tuple[T, ...]:
+        """Read `item { "," item }` up to the closing bracket; nothing at all is fine too."""
+        items: list[T] = []
+        self._brackets += 1
+        with self._nested():
+            if not self._at(close):
+                items.append(item())
+                while self._match(','):
+                    items.append(item())
+        self._brackets -= 1
+        self._expect(close)
+        return tuple(items)
+
+    # Programs, functions and blocks
+
+    def program(self) -> tree.Program:
+        """("def" | "sec") NAME "(" ")" ":" block "end"."""
+        start = self._token
+        kind: Literal['def', 'sec']
+        if self._match('def'):
+            kind = 'def'
+        elif self._match('sec'):
+            kind = 'sec'
+        else:
+            raise self.error("a program begins with 'def' or 'sec'")
+        name = self._expect_kind(Kind.NAME).text
+        for symbol in '():':
+            self._expect(symbol)
+        body = self._block('end')
+        self._expect('end')
+        if self._token.kind is not Kind.END:
+            raise self.error('there is text after the end of the program')
+        return tree.Program(name=name, kind=kind, body=body, **place(start))
+
+    def _block(self, *closing: str) -> tree.Block:
+        """{ statement }, up to one of the keywords that close it."""
+        statements: list[tree.Statement] = []
+        with self._nested():
+            while not self._at(*closing):
+                if self._token.kind is Kind.END:
+                    raise self.error("an 'end' is missing")
+                statements.append(self._statement())
+        return tuple(statements)
+
+    def _function(self) -> tree.Function:
+        """("def" | "thread") NAME "(" [ parameter { "," parameter } ] ")" ":" block "end"."""
+        kind: Literal['def', 'thread'] = 'def' if self._advance().text == 'def' else 'thread'
+        name = self._expect_kind(Kind.NAME)
+        self._expect('(')
+        parameters = self._list(self._parameter, ')')
+        if len({parameter.name for parameter in parameters}) < len(parameters):
+            raise self.error('two parameters have the same name', name)
+        if kind == 'thread' and parameters:
+            raise self.error('a thread takes no parameters', name)
+        self._expect(':')
+        loops, self._loops = self._loops, 0
+        body = self._block('end')
+        self._loops = loops
+        self._expect('end')
+        return tree.Function(
+            name=name.text, kind=kind, parameters=parameters, body=body, **place(name)
+        )
+
+    def _parameter(self) -> tree.Parameter:
+        """NAME [ "=" expression ]."""
+        name = self._expect_kind(Kind.NAME)
+        default = self._expression() if self._match('=') else None
+        return tree.Parameter(name=name.text, default=default, **place(name))
+
+    # Statements
+
+    def _statement(self) -> tree.Statement:
+        """Choose the rule by the first token."""
+        token = self._token
+        rule = {
+            'def': self._function, 'thread': self._function, 'if': self._if,
+            'switch': self._switch, 'while': self._while, 'return': self._return,
+            'break': self._jump, 'continue': self._jump, 'halt': self._word,
+            'pause': self._word, 'enter_critical': self._word, 'exit_critical': self._word,
+            'join': self._thread_control, 'kill': self._thread_control, '$': self._label,
+        }.get(token.text)  # fmt: skip
+        if rule and token.kind in (Kind.KEYWORD, Kind.SYMBOL):
+            return rule()
+        return self._assignment_or_call()
+
+    def _if(self) -> tree.If:
+        """"if" expression ":" block { "elif" ... } [ "else" ":" block ] "end"."""
+        start = self._token
+        branches: list[tree.Branch] = []
+        while keyword := self._match('if') if not branches else self._match('elif'):
+            condition = self._expression()
+            self._expect(':')
+            body = self._block('elif', 'else', 'end')
+            branches.append(tree.Branch(condition=condition, body=body, **place(keyword)))
+        otherwise = self._else('else') if self._at('else') else ()
+        self._expect('end')
+        return tree.If(branches=tuple(branches), otherwise=otherwise, **place(start))
+
+    def _else(self, keyword: str) -> tree.Block:
+        """("else" | "default") ":" block."""
+        self._expect(keyword)
+        self._expect(':')
+        return self._block('end')
+
+    def _switch(self) -> tree.Switch:
+        """"switch" expression ":" { "case" ... } [ "default" ... ] "end"."""
+        start = self._advance()
+        subject = self._expression()
+        self._expect(':')
+        cases: list[tree.Branch] = []
+        ends: bool | None = None
+        while keyword := self._match('case'):
+            value = self._expression()
+            self._expect(':')
+            body = self._block('case', 'default', 'end')
+            cases.append(tree.Branch(condition=value, body=body, **place(keyword)))
+            ends = self._case_has_end(start) if ends is None else ends
+            if ends:
+                self._expect('end')
+        otherwise: tree.Block = ()
+        if self._at('default'):
+            otherwise = self._else('default')
+            if self._case_has_end(start) if ends is None else ends:
+                self._expect('end')
+        self._expect('end')
+        return tree.Switch(
+            subject=subject, cases=tuple(cases), otherwise=otherwise, **place(start)
+        )
+
+    def _case_has_end(self, switch: Token) -> bool:
+        """
+        Tell from the end of the first case whether cases have an `end` of their own.
+
+        Both styles occur. An `end` before another `end` could be either; then it belongs to the
+        switch if it stands in the column of the switch.
+        """
+        if not self._at('end'):
+            return False
+        following = self._tokens[self._next + 1]
+        if following.kind is not Kind.KEYWORD or following.text not in ('case', 'default', 'end'):
+            return False
+        return following.text != 'end' or self._token.column != switch.column
+
+    def _while(self) -> tree.While:
+        """"while" expression ":" block "end"."""
+        start = self._advance()
+        condition = self._expression()
+        self._expect(':')
+        self._loops += 1
+        body = self._block('end')
+        self._loops -= 1
+        self._expect('end')
+        return tree.While(condition=condition, body=body, **place(start))
+
+    def _return(self) -> tree.Return:
+        """"return" [ expression ]; a value stands on the line of the keyword."""
+        start = self._advance()
+        value = self._expression() if self._same_line() and self._starts_expression() else None
+        return tree.Return(value=value, **place(start))
+
+    def _starts_expression(self) -> bool:
+        if self._token.kind in (Kind.KEYWORD, Kind.SYMBOL):
+            return self._at('(', '[', '-', '+', 'not', 'run', *CONSTANTS)
+        return self._token.kind is not Kind.END
+
+    def _jump(self) -> tree.Statement:
+        """"break" | "continue", inside a loop."""
+        token = self._advance()
+        if not self._loops:
+            raise self.error(f'{token.text!r} stands outside a loop', token)
+        return (tree.Break if token.text == 'break' else tree.Continue)(**place(token))
+
+    def _word(self) -> tree.Statement:
+        """"halt" | "pause" | "enter_critical" | "exit_critical"."""
+        token = self._advance()
+        if token.text == 'halt':
+            return tree.Halt(**place(token))
+        if token.text == 'pause':
+            return tree.Pause(**place(token))
+        return tree.Critical(enter=token.text == 'enter_critical', **place(token))
+
+    def _thread_control(self) -> tree.Statement:
+        """("join" | "kill") unary."""
+        token = self._advance()
+        handle = self._unary()
+        return (tree.Join if token.text == 'join' else tree.Kill)(handle=handle, **place(token))
+
+    def _label(self) -> tree.Label:
+        """"$" NUMBER STRING { STRING }, on one line."""
+        start = self._advance()
+        number = self._expect_kind(Kind.NUMBER)
+        text = self._expect_kind(Kind.STRING).text
+        while self._token.kind is Kind.STRING and self._same_line():
+            self._advance()
+        return tree.Label(number=int(number.number), text=text, **place(start))
+
+    def _assignment_or_call(self) -> tree.Statement:
+        """[ "global" | "local" ] target "=" expression | call."""
+        start = self._token
+        qualifier: Literal['', 'global', 'local'] = ''
+        if self._match('global'):
+            qualifier = 'global'
+        elif self._match('local'):
+            qualifier = 'local'
+        target = self._unary()
+        if qualifier and not isinstance(target, tree.Name):
+            raise self.error(f'{qualifier!r} is followed by a name and a value', start)
+        if self._at('='):
+            return self._assignment(target, qualifier, start)
+        if qualifier:
+            raise self.error(f"'=' is missing before {self._found()}")
+        if not isinstance(target, tree.Call | tree.MethodCall | tree.Run):
+            raise self.error('a statement is an assignment or a call', start)
+        return tree.CallStatement(call=target, **place(start))
+
+    def _assignment(
+        self, target: tree.Expression, qualifier: Literal['', 'global', 'local'], start: Token
+    ) -> tree.Assign:
+        """Read the value; what stands before "=" must be a name or a place inside one."""
+        base: tree.Expression = target
+        while isinstance(base, tree.Index | tree.Field):
+            base = base.target
+        if not isinstance(base, tree.Name):
+            raise self.error('only a variable or a part of one can be assigned to', start)
+        self._expect('=')
+        value = self._expression()
+        assert isinstance(target, tree.Name | tree.Index | tree.Field)
+        return tree.Assign(target=target, value=value, qualifier=qualifier, **place(start))
+
+    # Expressions, loosest binding first
+
+    def _expression(self) -> tree.Expression:
+        """Read conjunction { ( "or" | "xor" ) conjunction }."""
+        left = self._conjunction()
+        for token in self._operators('or', 'xor'):
+            right = self._conjunction()
+            left = tree.Logical(operator=token.text, left=left, right=right, **place(token))
+        return left
+
+    def _conjunction(self) -> tree.Expression:
+        """Read inversion { "and" inversion }."""
+        left = self._inversion()
+        for token in self._operators('and'):
+            right = self._inversion()
+            left = tree.Logical(operator=token.text, left=left, right=right, **place(token))
+        return left
+
+    def _inversion(self) -> tree.Expression:
+        """"not" inversion | comparison."""
+        if token := self._match('not'):
+            with self._nested():
+                operand = self._inversion()
+            return tree.Unary(operator='not', operand=operand, **place(token))
+        return self._comparison()
+
+    def _comparison(self) -> tree.Expression:
+        """Read sum { ( "==" | "!=" | "<" | "<=" | ">" | ">=" ) sum }."""
+        left = self._sum()
+        for token in self._operators('==', '!=', '<', '<=', '>', '>='):
+            right = self._sum()
+            left = tree.Binary(operator=token.text, left=left, right=right, **place(token))
+        return left
+
+    def _sum(self) -> tree.Expression:
+        """Read product { ( "+" | "-" ) product }."""
+        left = self._product()
+        for token in self._operators('+', '-'):
+            right = self._product()
+            left = tree.Binary(operator=token.text, left=left, right=right, **place(token))
+        return left
+
+    def _product(self) -> tree.Expression:
+        """Read unary { ( "*" | "/" | "%" ) unary }."""
+        left = self._unary()
+        for token in self._operators('*', '/', '%'):
+            right = self._unary()
+            left = tree.Binary(operator=token.text, left=left, right=right, **place(token))
+        return left
+
+    def _operators(self, *texts: str) -> Iterator[Token]:
+        """Yield the operators of one chain, which is bounded as it makes a tree as deep."""
+        for _ in range(MAX_CHAIN):
+            token = self._match(*texts)
+            if token is None:
+                return
+            yield token
+        if self._at(*texts):
+            raise self.error(f'more than {MAX_CHAIN} operators in a row')
+
+    def _unary(self) -> tree.Expression:
+        """("-" | "+") unary | "run" NAME "(" ")" | postfix."""
+        if token := self._match('-', '+'):
+            with self._nested():
+                operand = self._unary()
+            return tree.Unary(operator=token.text, operand=operand, **place(token))
+        if self._match('run'):
+            name = self._expect_kind(Kind.NAME)
+            self._expect('(')
+            self._expect(')')
+            return tree.Run(thread=name.text, **place(name))
+        return self._postfix()
+
+    def _postfix(self) -> tree.Expression:
+        """Read primary { "(" arguments ")" | "[" indices "]" | "." NAME }."""
+        value = self._primary()
+        for _ in range(MAX_CHAIN):
+            if self._at('.'):
+                value = self._field(value)
+            elif self._at('(') and self._applies() and isinstance(value, tree.Name | tree.Field):
+                value = self._call(value)
+            elif self._at('[') and self._applies():
+                value = self._index(value)
+            else:
+                return value
+        raise self.error(f'more than {MAX_CHAIN} calls, indices or fields in a row')
+
+    def _applies(self) -> bool:
+        """Tell whether a bracket belongs to what stands before it."""
+        return self._brackets > 0 or self._same_line()
+
+    def _field(self, target: tree.Expression) -> tree.Field:
+        """"." NAME."""
+        self._advance()
+        name = self._expect_kind(Kind.NAME)
+        return tree.Field(target=target, name=name.text, **place(name))
+
+    def _call(self, callee: tree.Name | tree.Field) -> tree.Call | tree.MethodCall:
+        """"(" [ argument { "," argument } ] ")", positional arguments first."""
+        position = Place(line=callee.line, column=callee.column)
+        self._advance()
+        arguments = self._list(self._argument, ')')
+        named = [argument for argument in arguments if argument.name is not None]
+        if any(argument.name is None for argument in arguments[len(arguments) - len(named) :]):
+            raise self.error('a positional argument stands after a named one', self._previous)
+        if isinstance(callee, tree.Name):
+            return tree.Call(function=callee.identifier, arguments=arguments, **position)
+        return tree.MethodCall(
+            target=callee.target, method=callee.name, arguments=arguments, **position
+        )
+
+    def _argument(self) -> tree.Argument:
+        """[ NAME "=" ] expression."""
+        start = self._token
+        following = self._tokens[min(self._next + 1, len(self._tokens) - 1)]
+        name = None
+        if start.kind is Kind.NAME and following.kind is Kind.SYMBOL and following.text == '=':
+            name = start.text
+            self._advance()
+            self._advance()
+        return tree.Argument(name=name, value=self._expression(), **place(start))
+
+    def _index(self, target: tree.Expression) -> tree.Expression:
+        """"[" expression [ "," expression ] "]"; six after the name p are a pose."""
+        start = self._advance()
+        items = self._list(self._expression, ']')
+        if isinstance(target, tree.Name) and target.identifier == 'p' and len(items) == 6:
+            return tree.PoseLiteral(items=items, line=target.line, column=target.column)
+        if len(items) not in (1, 2):
+            raise self.error('an index has one or two parts, a pose p[...] has six', start)
+        return tree.Index(target=target, indices=items, **place(start))
+
+    def _primary(self) -> tree.Expression:
+        """NUMBER | STRING | constant | NAME | "(" expression ")" | "[" items "]"."""
+        token = self._token
+        if token.kind is Kind.NUMBER:
+            return tree.Constant(value=self._advance().number, **place(token))
+        if token.kind is Kind.STRING:
+            return tree.Constant(value=self._advance().text, **place(token))
+        if token.kind is Kind.NAME:
+            return tree.Name(identifier=self._advance().text, **place(token))
+        if self._at(*CONSTANTS):
+            return tree.Constant(value=CONSTANTS[self._advance().text], **place(token))
+        if self._match('['):
+            return tree.ListLiteral(items=self._list(self._expression, ']'), **place(token))
+        if self._match('('):
+            items = self._list(self._expression, ')')
+            if len(items) != 1:
+                raise self.error('brackets hold one expression', token)
+            return items[0]
+        raise self.error(f'a value is missing before {self._found()}')
