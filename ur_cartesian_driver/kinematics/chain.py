@@ -182,7 +182,6 @@ def pinocchio_model(arm: Arm) -> Any:
             joint, pinocchio.JointModelRZ(), link * _turn_z(pinocchio, geometry.theta[i]), name,
             np.array([torque[i]]), np.array([arm.model.max_joint_speed[i]]),
             np.array([limits[i][0]]), np.array([limits[i][1]]))
-        model.appendBodyToJoint(joint, pinocchio.Inertia.Zero(), pinocchio.SE3.Identity())
         link = pinocchio.SE3(
             pinocchio.utils.rotate('x', geometry.alpha[i]),
             np.array([geometry.a[i], 0.0, geometry.d[i]]))
