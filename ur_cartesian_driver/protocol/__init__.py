@@ -1,0 +1,9 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The robot's wire protocols: bytes to messages and back, one module for each interface.
+
+Nothing here opens a socket, reads a clock or logs. Bytes that come in go to a decoder's ``feed``,
+which returns messages (``b''`` is the end of the stream); messages that go out become bytes. Both
+ends of every connection are covered, because the simulated controller is the other end.
+"""

@@ -1,0 +1,223 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What all wire formats share: fixed-point numbers and bounded buffers.
+
+Every number on the robot program's sockets is a big-endian int32, most of them a value times
+1,000,000. A value that does not fit raises here, before a byte is sent; the robot would see a
+wrapped number and move there.
+
+A stream is cut into records (of one size), frames (with their size in front) or lines. Each buffer
+holds at most one incomplete unit, of a bounded size, so a peer that sends nonsense cannot make us
+grow. A stream that ends inside a unit is an error, because something was lost.
+"""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+
+#: What a value is multiplied by before it is rounded to an integer.
+FIXED_POINT = 1_000_000
+
+INT32_MIN = -(2 ** 31)
+INT32_MAX = 2 ** 31 - 1
+
+#: Longest piece of a stream that an error text quotes [bytes].
+_QUOTED = 48
+
+
+def to_fixed(value: float, field: str, scale: int = FIXED_POINT) -> int:
+    """
+    Return the int32 that stands for a value, ties rounded away from zero.
+
+    :param field: the name for the error text.
+    :raises LocalProtocolError: the value is not finite or does not fit.
+    """
+    scaled = value * scale
+    # Written so that NaN fails. The rounding below moves a number by half a unit at most.
+    if not INT32_MIN - 0.5 < scaled < INT32_MAX + 0.5:
+        raise out_of_range(value, field, scale)
+    whole = int(scaled)
+    # The difference is exact, while adding 0.5 first would round 0.49999999999999994 up.
+    rest = scaled - whole
+    if rest >= 0.5:
+        return whole + 1
+    return whole - 1 if rest <= -0.5 else whole
+
+
+def from_fixed(raw: int, scale: int = FIXED_POINT) -> float:
+    """Return the value that an int32 stands for."""
+    return raw / scale
+
+
+def out_of_range(value: float, field: str, scale: int = FIXED_POINT) -> LocalProtocolError:
+    """Return the error for a value that no int32 can stand for."""
+    return LocalProtocolError(
+        f'{field} is {value!r}, but only finite numbers from {INT32_MIN / scale!r} to '
+        f'{INT32_MAX / scale!r} can be sent to the robot.')
+
+
+def checked_int32(value: int, field: str) -> int:
+    """
+    Return an integer that is sent as it is.
+
+    :raises LocalProtocolError: the value does not fit.
+    """
+    if not INT32_MIN <= value <= INT32_MAX:
+        raise LocalProtocolError(
+            f'{field} is {value}, but only integers from {INT32_MIN} to {INT32_MAX} can be sent '
+            'to the robot.')
+    return value
+
+
+def quote(data: bytes) -> str:
+    """Return bytes as hexadecimal digits for an error text, cut when they are many."""
+    text = data[:_QUOTED].hex()
+    return f'{text}... ({len(data)} bytes)' if len(data) > _QUOTED else text or 'no bytes'
+
+
+def checked_size(data: bytes, size: int, what: str) -> bytes:
+    """
+    Return a record of one fixed size.
+
+    :raises RemoteProtocolError: the record has another size.
+    """
+    if len(data) != size:
+        raise RemoteProtocolError(
+            f'A {what} has {size} bytes, but {len(data)} came: {quote(data)}.')
+    return data
+
+
+class RecordBuffer:
+    """Cuts a stream into records of one size."""
+
+    def __init__(self, size: int, what: str) -> None:
+        """
+        Start empty.
+
+        :param size: bytes in a record.
+        :param what: what a record is, for error texts.
+        """
+        self._size = size
+        self._what = what
+        self._rest = b''
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """
+        Take bytes from the stream (none at all = its end) and return the complete records.
+
+        :raises RemoteProtocolError: the stream ended inside a record.
+        """
+        if not data:
+            if self._rest:
+                raise cut_off(self._what, self._rest)
+            return []
+        data = self._rest + data
+        end = len(data) - len(data) % self._size
+        self._rest = data[end:]
+        return [data[i:i + self._size] for i in range(0, end, self._size)]
+
+
+class FrameBuffer:
+    """
+    Cuts a stream into frames that start with their own total size, big-endian.
+
+    ::
+
+        bytes            content
+        0 .. width-1     size of the whole frame, this number included
+        width .. size-1  the rest
+
+    """
+
+    def __init__(self, width: int, smallest: int, largest: int, what: str) -> None:
+        """
+        Start empty.
+
+        :param width: bytes of the size field.
+        :param smallest: least size of a frame [bytes].
+        :param largest: greatest size that is believed [bytes]; it bounds the memory.
+        :param what: what the frames are, for error texts.
+        """
+        self._width = width
+        self._bounds = (smallest, largest)
+        self._what = what
+        self._buffer = bytearray()
+
+    def feed(self, data: bytes) -> list[bytes]:
+        """
+        Take bytes from the stream (none at all = its end) and return the complete frames.
+
+        :raises RemoteProtocolError: a size is impossible, or the stream ended inside a frame.
+        """
+        if not data:
+            if self._buffer:
+                raise cut_off(self._what, bytes(self._buffer))
+            return []
+        self._buffer += data
+        frames = []
+        start = 0
+        while (size := self._size_at(start)) and start + size <= len(self._buffer):
+            frames.append(bytes(self._buffer[start:start + size]))
+            start += size
+        del self._buffer[:start]
+        return frames
+
+    def _size_at(self, start: int) -> int:
+        """Return the size of the frame that starts there; 0 = not known yet."""
+        head = self._buffer[start:start + self._width]
+        if len(head) < self._width:
+            return 0
+        size = int.from_bytes(head, 'big')
+        smallest, largest = self._bounds
+        if not smallest <= size <= largest:
+            raise RemoteProtocolError(
+                f'A {self._what} says that it has {size} bytes, but only {smallest} to {largest} '
+                f'are possible: {quote(bytes(self._buffer[start:]))}.')
+        return size
+
+
+class LineBuffer:
+    """
+    Cuts a stream into lines of text; a carriage return before the line feed is dropped.
+
+    Bytes that are not UTF-8 appear as backslash escapes: an odd character in a text for people is
+    no reason to give up a connection.
+    """
+
+    def __init__(self, limit: int = 65536) -> None:
+        """
+        Start empty.
+
+        :param limit: longest line that is believed [bytes]; it bounds the memory.
+        """
+        self._limit = limit
+        self._rest = b''
+
+    def feed(self, data: bytes) -> list[str]:
+        """
+        Take bytes from the stream (none at all = its end) and return the complete lines.
+
+        :raises RemoteProtocolError: a line is too long, or the stream ended inside a line.
+        """
+        if not data:
+            if self._rest:
+                raise cut_off('line', self._rest)
+            return []
+        *lines, self._rest = (self._rest + data).split(b'\n')
+        for line in (*lines, self._rest):
+            if len(line) > self._limit:
+                self._rest = b''
+                raise RemoteProtocolError(
+                    f'A line is longer than {self._limit} bytes: {quote(line)}.')
+        return [decode_text(line.removesuffix(b'\r')) for line in lines]
+
+
+def decode_text(data: bytes) -> str:
+    """Return a text from the wire; bytes that are not UTF-8 become backslash escapes."""
+    return data.decode('utf-8', 'backslashreplace')
+
+
+def cut_off(what: str, rest: bytes) -> RemoteProtocolError:
+    """Return the error for a stream that ended too early."""
+    return RemoteProtocolError(f'The stream ended inside a {what}: {quote(rest)}.')

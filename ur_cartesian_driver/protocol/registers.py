@@ -1,0 +1,118 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which RTDE register means what, between the driver and the robot program.
+
+The numbers 24 and up are those that the controller keeps for external clients; the lower ones
+belong to fieldbuses. The servo numbers are those of the manufacturer's guide to buffered
+``servoj``, so a program after that guide can be driven too.
+
+=================  ==========  =========  ====================================================
+direction          kind        number     meaning
+=================  ==========  =========  ====================================================
+to the program     int         24         desired mode (:class:`ServoMode`)
+to the program     int         25         sequence number, changes with every message
+to the program     int         26         external error (:class:`ExternalError`)
+to the program     int         27         synchronization (:class:`SyncState`)
+to the program     double      24 - 29    joint positions [rad]
+to the program     double      30 - 35    greatest distance of the arm from them [rad]
+to the program     double      46         time of these joint positions [s]
+from the program   int         24         actual mode
+from the program   int         25         the last sequence number that was read
+from the program   int         26         points of the running trajectory that were begun
+from the program   double      24         lag: motion time in the buffer [s]
+=================  ==========  =========  ====================================================
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class InputInteger(IntEnum):
+    """Integer registers that the driver writes."""
+
+    DESIRED_MODE = 24
+    SEQUENCE_ID = 25
+    EXTERNAL_ERROR = 26
+    EXTERNAL_SYNC_STATE = 27
+
+
+class InputDouble(IntEnum):
+    """Double registers that the driver writes; the first two are the first of six."""
+
+    DESIRED_JOINT_POSITIONS = 24
+    MAX_JOINT_DIVERGENCE_THRESHOLDS = 30
+    STATE_TIME = 46
+
+
+class OutputInteger(IntEnum):
+    """Integer registers that the robot program writes."""
+
+    ACTUAL_MODE = 24
+    LAST_SEQUENCE_ID = 25
+    #: How many points of the running trajectory the program has begun; 0 = none.
+    POINTS_BEGUN = 26
+
+
+class OutputDouble(IntEnum):
+    """Double registers that the robot program writes."""
+
+    LAG_TIME = 24
+
+
+class ServoMode(IntEnum):
+    """Desired and actual mode of the buffered servo."""
+
+    IDLE = 0
+    TEACH = 1
+    SERVO = 2
+
+
+class SyncState(IntEnum):
+    """Who follows whom."""
+
+    WAITING_TO_CONNECT = 0
+    NONE = 1
+    EXTERNAL_TO_ROBOT = 2
+    ROBOT_TO_EXTERNAL = 3
+
+
+class ExternalError(IntEnum):
+    """What the driver has to report."""
+
+    NONE = 0
+    HALT = 1
+
+
+#: See :class:`OutputInteger`.
+POINTS_BEGUN = OutputInteger.POINTS_BEGUN
+
+
+def field(register: InputInteger | InputDouble | OutputInteger | OutputDouble,
+          offset: int = 0) -> str:
+    """
+    Return the name of a register in an RTDE recipe.
+
+    :param offset: 0 to 5 within a group of six.
+    """
+    direction = 'input' if isinstance(register, InputInteger | InputDouble) else 'output'
+    kind = 'int' if isinstance(register, InputInteger | OutputInteger) else 'double'
+    return f'{direction}_{kind}_register_{register + offset}'
+
+
+def six_fields(register: InputDouble) -> tuple[str, ...]:
+    """Return the names of a group of six registers, joint by joint."""
+    return tuple(field(register, joint) for joint in range(6))
+
+
+#: The input recipe of the buffered servo, in this order.
+SERVO_INPUTS = (
+    field(InputInteger.DESIRED_MODE), field(InputInteger.SEQUENCE_ID),
+    field(InputInteger.EXTERNAL_ERROR), field(InputInteger.EXTERNAL_SYNC_STATE),
+    *six_fields(InputDouble.DESIRED_JOINT_POSITIONS),
+    *six_fields(InputDouble.MAX_JOINT_DIVERGENCE_THRESHOLDS), field(InputDouble.STATE_TIME))
+#: What the buffered servo reports, to be added to an output recipe.
+SERVO_OUTPUTS = (
+    field(OutputInteger.ACTUAL_MODE), field(OutputInteger.LAST_SEQUENCE_ID),
+    field(OutputDouble.LAG_TIME))

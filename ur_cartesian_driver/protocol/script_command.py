@@ -1,0 +1,413 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The script command interface: single commands to the robot program beside the motion.
+
+A command is 28 big-endian int32, 112 bytes: word 0 the number, then the arguments, then zeros.
+All scaled by 1,000,000 but the words marked raw.
+
+==  =========================  =================================================================
+0   command                    words 1 ..
+==  =========================  =================================================================
+0   ZERO_FTSENSOR
+1   SET_PAYLOAD                1 mass [kg], 2-4 centre of gravity [m]
+2   SET_TOOL_VOLTAGE           1 voltage [V]: 0, 12 or 24
+3   START_FORCE_MODE           1-6 task frame, 7-12 selection (0, 1), 13-18 wrench [N, Nm],
+                               19 type (1-3), 20-25 limits, 26 damping, 27 gain scaling
+4   END_FORCE_MODE
+5   START_TOOL_CONTACT
+6   END_TOOL_CONTACT
+7   SET_FRICTION_COMPENSATION  1 on (0, 1; raw)
+8   FT_RTDE_INPUT_ENABLE       1 on (0, 1; raw), 2 mass of the sensor [kg], 3-5 its offset [m],
+                               6-8 its centre of gravity [m]
+9   SET_GRAVITY                1-3 acceleration [m/s^2], pointing away from the earth
+10  SET_TCP_OFFSET             1-6 pose of the TCP in the flange
+11  SET_FRICTION_SCALES        1-6 viscous, 7-12 Coulomb, limited to [0, 1]
+12  SET_TARGET_PAYLOAD         1 mass [kg], 2-4 centre of gravity [m], 5-10 inertia
+                               xx yy zz xy xz yz [kg m^2], 11 transition time [s]
+==  =========================  =================================================================
+
+Only tool contact answers: one int32, 0 = contact was made, 1 = it was ended before.
+
+Poses are ``x y z rx ry rz`` [m, rad] here, as the robot writes them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+import struct
+from typing import ClassVar, TypeAlias
+
+from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.goal import ZERO6
+from ur_cartesian_driver.motion.pose import Vector3, Vector6
+from ur_cartesian_driver.protocol.framing import (
+    checked_size,
+    FIXED_POINT,
+    from_fixed,
+    quote,
+    RecordBuffer,
+    to_fixed,
+)
+
+
+class ScriptCommand(IntEnum):
+    """Word 0."""
+
+    ZERO_FTSENSOR = 0
+    SET_PAYLOAD = 1
+    SET_TOOL_VOLTAGE = 2
+    START_FORCE_MODE = 3
+    END_FORCE_MODE = 4
+    START_TOOL_CONTACT = 5
+    END_TOOL_CONTACT = 6
+    SET_FRICTION_COMPENSATION = 7
+    FT_RTDE_INPUT_ENABLE = 8
+    SET_GRAVITY = 9
+    SET_TCP_OFFSET = 10
+    SET_FRICTION_SCALES = 11
+    SET_TARGET_PAYLOAD = 12
+
+
+class ToolContactResult(IntEnum):
+    """What the robot program answers to START_TOOL_CONTACT."""
+
+    SUCCESS = 0
+    CANCELED = 1
+
+
+COMMAND_WORDS = 28
+COMMAND_SIZE = 4 * COMMAND_WORDS
+_COMMAND = struct.Struct('>28i')
+_RESULT = struct.Struct('>i')
+
+#: Software version: major, minor, bugfix.
+Version: TypeAlias = tuple[int, int, int]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZeroFtSensor:
+    """Take the present force as zero."""
+
+    command: ClassVar = ScriptCommand.ZERO_FTSENSOR
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetPayload:
+    """Set mass [kg] and centre of gravity [m] (in the flange) of what the flange carries."""
+
+    command: ClassVar = ScriptCommand.SET_PAYLOAD
+    mass: float
+    cog: Vector3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetToolVoltage:
+    """Set the voltage at the tool connector: 0, 12 or 24 V."""
+
+    command: ClassVar = ScriptCommand.SET_TOOL_VOLTAGE
+    voltage: int
+
+    def __post_init__(self) -> None:
+        """Check the voltage."""
+        if self.voltage not in (0, 12, 24):
+            raise LocalProtocolError(f'voltage is {self.voltage} V, but it must be 0, 12 or 24.')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartForceMode:
+    """
+    Be compliant in some axes of the task frame.
+
+    :param task_frame: pose in the base.
+    :param selection: which axes are compliant.
+    :param wrench: force [N] and torque [Nm] that is sought in these.
+    :param type: 1 to 3, how the task frame is transformed.
+    :param limits: speed [m/s, rad/s] in compliant axes, deviation [m, rad] in the others.
+    :param damping: 0 to 1.
+    :param gain_scaling: 0 to 2; has no effect on CB3.
+    """
+
+    command: ClassVar = ScriptCommand.START_FORCE_MODE
+    task_frame: Vector6
+    selection: tuple[bool, bool, bool, bool, bool, bool]
+    wrench: Vector6
+    type: int
+    limits: Vector6
+    damping: float = 0.025
+    gain_scaling: float = 0.5
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        _check_range('type', self.type, 1, 3)
+        _check_range('damping', self.damping, 0, 1)
+        _check_range('gain_scaling', self.gain_scaling, 0, 2)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EndForceMode:
+    """End force mode."""
+
+    command: ClassVar = ScriptCommand.END_FORCE_MODE
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StartToolContact:
+    """Watch for a contact of the tool; it answers with a :class:`ToolContactResult`."""
+
+    command: ClassVar = ScriptCommand.START_TOOL_CONTACT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EndToolContact:
+    """Stop watching for a contact."""
+
+    command: ClassVar = ScriptCommand.END_TOOL_CONTACT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetFrictionCompensation:
+    """Turn friction compensation for torque control on or off."""
+
+    command: ClassVar = ScriptCommand.SET_FRICTION_COMPENSATION
+    enabled: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FtRtdeInputEnable:
+    """Take forces from RTDE's ``external_force_torque``; describes that sensor."""
+
+    command: ClassVar = ScriptCommand.FT_RTDE_INPUT_ENABLE
+    enabled: bool
+    sensor_mass: float = 0.0
+    sensor_offset: Vector3 = (0.0, 0.0, 0.0)
+    sensor_cog: Vector3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetGravity:
+    """Set the acceleration [m/s^2] that holds the base up: it points away from the earth."""
+
+    command: ClassVar = ScriptCommand.SET_GRAVITY
+    gravity: Vector3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetTcpOffset:
+    """Set the active TCP: its pose in the flange."""
+
+    command: ClassVar = ScriptCommand.SET_TCP_OFFSET
+    offset: Vector6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetFrictionScales:
+    """Scale the friction compensation of each joint; what lies outside [0, 1] is limited."""
+
+    command: ClassVar = ScriptCommand.SET_FRICTION_SCALES
+    viscous: Vector6
+    coulomb: Vector6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetTargetPayload:
+    """Set mass [kg], centre of gravity [m] and inertia [kg m^2], reached in a time [s]."""
+
+    command: ClassVar = ScriptCommand.SET_TARGET_PAYLOAD
+    mass: float
+    cog: Vector3 = (0.0, 0.0, 0.0)
+    inertia: Vector6 = ZERO6
+    transition_time: float = 0.0
+
+
+Command: TypeAlias = (
+    ZeroFtSensor | SetPayload | SetToolVoltage | StartForceMode | EndForceMode | StartToolContact
+    | EndToolContact | SetFrictionCompensation | FtRtdeInputEnable | SetGravity | SetTcpOffset
+    | SetFrictionScales | SetTargetPayload)
+
+#: Software from which a command works: CB3 and e-Series software 3 to 5, PolyScope X.
+MINIMUM_VERSIONS: Mapping[ScriptCommand, tuple[Version, Version]] = {
+    ScriptCommand.SET_FRICTION_COMPENSATION: ((5, 23, 0), (10, 10, 0)),
+    ScriptCommand.SET_FRICTION_SCALES: ((5, 25, 1), (10, 12, 1)),
+}
+
+
+def encode(command: Command, robot_version: Version | None = None) -> bytes:
+    """
+    Return the 112 bytes of a command.
+
+    :param robot_version: the robot's software, to refuse what it does not know; None = unknown.
+    :raises LocalProtocolError: a value cannot be sent, or the software is too old.
+    """
+    if robot_version is not None:
+        _check_version(command.command, robot_version)
+    words = _words(command)
+    return _COMMAND.pack(command.command, *words, *(0,) * (COMMAND_WORDS - 1 - len(words)))
+
+
+def decode(data: bytes) -> Command:
+    """
+    Return the command of 112 bytes; words beyond its arguments are not looked at.
+
+    :raises RemoteProtocolError: size, number or an argument is impossible.
+    """
+    number, *words = _COMMAND.unpack(checked_size(data, COMMAND_SIZE, 'script command'))
+    try:
+        return _READERS[ScriptCommand(number)](words, [from_fixed(word) for word in words])
+    except (ValueError, LocalProtocolError) as error:
+        raise RemoteProtocolError(f'A script command is wrong: {error} {quote(data)}') from None
+
+
+class CommandDecoder:
+    """Reads script commands: the robot's side."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._records = RecordBuffer(COMMAND_SIZE, 'script command')
+
+    def feed(self, data: bytes) -> list[Command]:
+        """
+        Take bytes (none at all = the end) and return the commands in them.
+
+        :raises RemoteProtocolError: a command is wrong, or the stream ended inside one.
+        """
+        return [decode(record) for record in self._records.feed(data)]
+
+
+def encode_result(result: ToolContactResult) -> bytes:
+    """Return the 4 bytes with which the robot program answers START_TOOL_CONTACT."""
+    return _RESULT.pack(result)
+
+
+class ResultDecoder:
+    """Reads the answers to START_TOOL_CONTACT."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._records = RecordBuffer(_RESULT.size, 'tool contact result')
+
+    def feed(self, data: bytes) -> list[ToolContactResult]:
+        """
+        Take bytes (none at all = the end) and return the results in them.
+
+        :raises RemoteProtocolError: a number is no result, or the stream ended inside one.
+        """
+        return [_result(record) for record in self._records.feed(data)]
+
+
+def _result(record: bytes) -> ToolContactResult:
+    (number,) = _RESULT.unpack(record)
+    try:
+        return ToolContactResult(number)
+    except ValueError:
+        raise RemoteProtocolError(
+            f'{number} is not a tool contact result (0 or 1): {quote(record)}.') from None
+
+
+def _words(command: Command) -> list[int]:
+    """Return the words after the number."""
+    match command:
+        case SetPayload():
+            return [to_fixed(command.mass, 'mass'), *_fixed_all(command.cog, 'cog')]
+        case SetToolVoltage():
+            return [to_fixed(command.voltage, 'voltage')]
+        case StartForceMode():
+            return [
+                *_fixed_all(command.task_frame, 'task_frame'),
+                *(FIXED_POINT * bool(selected) for selected in command.selection),
+                *_fixed_all(command.wrench, 'wrench'), to_fixed(command.type, 'type'),
+                *_fixed_all(command.limits, 'limits'), to_fixed(command.damping, 'damping'),
+                to_fixed(command.gain_scaling, 'gain_scaling')]
+        case SetFrictionCompensation():
+            return [int(command.enabled)]
+        case FtRtdeInputEnable():
+            return [
+                int(command.enabled), to_fixed(command.sensor_mass, 'sensor_mass'),
+                *_fixed_all(command.sensor_offset, 'sensor_offset'),
+                *_fixed_all(command.sensor_cog, 'sensor_cog')]
+        case SetGravity():
+            return _fixed_all(command.gravity, 'gravity')
+        case SetTcpOffset():
+            return _fixed_all(command.offset, 'offset')
+        case SetFrictionScales():
+            # URCL limits these where it refuses other values; the bytes shall be the same.
+            return [*_fixed_all([min(max(v, 0.0), 1.0) for v in command.viscous], 'viscous'),
+                    *_fixed_all([min(max(v, 0.0), 1.0) for v in command.coulomb], 'coulomb')]
+        case SetTargetPayload():
+            return [
+                to_fixed(command.mass, 'mass'), *_fixed_all(command.cog, 'cog'),
+                *_fixed_all(command.inertia, 'inertia'),
+                to_fixed(command.transition_time, 'transition_time')]
+    return []
+
+
+#: The raw and the scaled words after the number -> the command.
+_READERS: Mapping[ScriptCommand, Callable[[list[int], list[float]], Command]] = {
+    ScriptCommand.ZERO_FTSENSOR: lambda _, v: ZeroFtSensor(),
+    ScriptCommand.SET_PAYLOAD: lambda _, v: SetPayload(mass=v[0], cog=_three(v[1:4])),
+    ScriptCommand.SET_TOOL_VOLTAGE: lambda _, v: SetToolVoltage(voltage=_whole(v[0], 'voltage')),
+    ScriptCommand.START_FORCE_MODE: lambda _, v: StartForceMode(
+        task_frame=_six(v[0:6]), selection=_flags(v[6:12]), wrench=_six(v[12:18]),
+        type=_whole(v[18], 'type'), limits=_six(v[19:25]), damping=v[25], gain_scaling=v[26]),
+    ScriptCommand.END_FORCE_MODE: lambda _, v: EndForceMode(),
+    ScriptCommand.START_TOOL_CONTACT: lambda _, v: StartToolContact(),
+    ScriptCommand.END_TOOL_CONTACT: lambda _, v: EndToolContact(),
+    ScriptCommand.SET_FRICTION_COMPENSATION:
+        lambda raw, _: SetFrictionCompensation(enabled=raw[0] != 0),
+    ScriptCommand.FT_RTDE_INPUT_ENABLE: lambda raw, v: FtRtdeInputEnable(
+        enabled=raw[0] != 0, sensor_mass=v[1], sensor_offset=_three(v[2:5]),
+        sensor_cog=_three(v[5:8])),
+    ScriptCommand.SET_GRAVITY: lambda _, v: SetGravity(gravity=_three(v[0:3])),
+    ScriptCommand.SET_TCP_OFFSET: lambda _, v: SetTcpOffset(offset=_six(v[0:6])),
+    ScriptCommand.SET_FRICTION_SCALES: lambda _, v: SetFrictionScales(
+        viscous=_six(v[0:6]), coulomb=_six(v[6:12])),
+    ScriptCommand.SET_TARGET_PAYLOAD: lambda _, v: SetTargetPayload(
+        mass=v[0], cog=_three(v[1:4]), inertia=_six(v[4:10]), transition_time=v[10]),
+}
+
+
+def _check_version(command: ScriptCommand, version: Version) -> None:
+    if command not in MINIMUM_VERSIONS:
+        return
+    polyscope_5, polyscope_x = MINIMUM_VERSIONS[command]
+    needed = polyscope_x if version >= (10, 0, 0) else polyscope_5
+    if version < needed:
+        raise LocalProtocolError(
+            f'{command.name} needs software {_dotted(polyscope_5)} or {_dotted(polyscope_x)}, but '
+            f'the robot runs {_dotted(version)}; update the robot.')
+
+
+def _dotted(version: Version) -> str:
+    return '.'.join(str(part) for part in version)
+
+
+def _check_range(name: str, value: float, low: float, high: float) -> None:
+    if not low <= value <= high:
+        raise LocalProtocolError(f'{name} is {value!r}, but it must lie within {low} and {high}.')
+
+
+def _fixed_all(values: Sequence[float], field: str) -> list[int]:
+    return [to_fixed(value, f'{field}[{i}]') for i, value in enumerate(values)]
+
+
+def _whole(value: float, field: str) -> int:
+    if value != int(value):
+        raise LocalProtocolError(f'{field} is {value!r}, but it must be a whole number.')
+    return int(value)
+
+
+def _three(values: Sequence[float]) -> Vector3:
+    x, y, z = values
+    return (x, y, z)
+
+
+def _six(values: Sequence[float]) -> Vector6:
+    a, b, c, d, e, f = values
+    return (a, b, c, d, e, f)
+
+
+def _flags(values: Sequence[float]) -> tuple[bool, bool, bool, bool, bool, bool]:
+    a, b, c, d, e, f = (value != 0.0 for value in values)
+    return (a, b, c, d, e, f)

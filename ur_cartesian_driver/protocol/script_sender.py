@@ -1,0 +1,52 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+r"""
+The script sender: how the External Control URCap fetches the robot program.
+
+::
+
+    robot -> driver   request_program\n                 (16 bytes)
+    driver -> robot   the program, and one more \n
+
+The connection stays open and the robot may ask again. The reply carries no length; the reader
+finds the end by the marker that the program contains.
+"""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.motion.errors import RemoteProtocolError
+from ur_cartesian_driver.protocol.framing import cut_off, quote
+
+#: What the robot sends.
+REQUEST = b'request_program\n'
+
+
+class RequestDecoder:
+    """Counts the requests that the robot sends."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._rest = b''
+
+    def feed(self, data: bytes) -> int:
+        """
+        Take bytes from the robot (none at all = its end) and return how many requests they ended.
+
+        :raises RemoteProtocolError: something else was sent, or the stream ended inside a request.
+        """
+        if not data:
+            if self._rest:
+                raise cut_off('program request', self._rest)
+            return 0
+        data = self._rest + data
+        count, rest = divmod(len(data), len(REQUEST))
+        if data != REQUEST * count + REQUEST[:rest]:
+            raise RemoteProtocolError(
+                f'Expected {REQUEST!r}, but the robot sent {quote(data)}.')
+        self._rest = data[count * len(REQUEST):]
+        return count
+
+
+def reply(program: str) -> bytes:
+    """Return the bytes that answer a request."""
+    return program.encode() + b'\n'
