@@ -38,7 +38,7 @@ test: lint  ## Lint, then all tests (PYTEST_ARGS='-k name' chooses)
 lint: $(stamp)  ## ruff, mypy, the rules for imports, spelling
 	$(bin)/ruff check
 	$(bin)/mypy
-	$(bin)/lint-imports
+	$(bin)/lint-imports --no-logo
 	$(bin)/codespell
 
 bench: $(stamp)  ## Measure, and print a table

@@ -16,9 +16,8 @@ fail() { printf 'setup: %s\n' "$*" >&2; exit 1; }
 unset _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME
 unset AMENT_PREFIX_PATH CMAKE_PREFIX_PATH
 
-is_supported() {
-  "$1" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12))' 2>/dev/null
-}
+version() { "$1" -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null || true; }
+is_supported() { case $(version "$1") in 3.11 | 3.12) ;; *) return 1 ;; esac; }
 
 find_python() {
   local candidate
@@ -34,12 +33,14 @@ find_python() {
     "or name it: PYTHON=/path/to/python3.12 make setup."
 }
 
-if ! is_supported "$venv/bin/python"; then
+if ! is_supported "$venv/bin/python" ||
+    [ "$(version "${PYTHON:-$venv/bin/python}")" != "$(version "$venv/bin/python")" ]; then
   python=$(find_python)
   rm -rf "$venv"
   "$python" -m venv "$venv" ||
     fail "$python could not make $venv. On Debian and Ubuntu its package python3-venv is needed."
 fi
+venv=$(cd "$venv" && pwd)
 python=$venv/bin/python
 for tool in cc c++ make; do
   command -v "$tool" >/dev/null ||
@@ -57,4 +58,4 @@ install() { "$venv/bin/uv" pip install --quiet --python "$python" "$@"; }
 "$python" -c 'import tomllib
 print(*tomllib.load(open("pyproject.toml", "rb"))["build-system"]["requires"], sep="\n")' |
   install --requirement requirements-dev.txt --requirement -
-PATH=$PWD/$venv/bin:$PATH install --no-build-isolation --editable '.[collision,plot,test]'
+PATH=$venv/bin:$PATH install --no-build-isolation --editable '.[collision,plot,test]'

@@ -10,6 +10,9 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.goal import ArcMode, ExecutionMode, OutputKind, SegmentType
+from ur_cartesian_driver.motion.state import RobotMode, SafetyMode
 from ur_cartesian_driver.msg import (
     CartesianPosture,
     CartesianTolerance,
@@ -108,13 +111,26 @@ def test_error_codes_are_distinct_and_without_gaps():
     (MotionSegment, 'ARC_', range(2)),
     (IOCommand, '.*_(DIGITAL|ANALOG)$', range(4)),
     (FollowCartesianTrajectory.Goal, 'EXECUTION_', range(4)),
-    (DriverStatus, 'ROBOT_MODE_', range(-2, 9)),
-    (DriverStatus, 'SAFETY_MODE_', range(14)),
     (DriverStatus, '(?!ROBOT_MODE_|SAFETY_MODE_)', range(7)),
     (ServoState, '', range(5)),
 ])
 def test_constants_of_a_choice_count_up(message, pattern, values):
     assert sorted(constants(message, pattern).values()) == list(values)
+
+
+@pytest.mark.parametrize(('enum', 'message', 'prefix', 'only_in_the_message'), [
+    (ErrorCode, FollowCartesianTrajectory.Result, '', {}),
+    (ExecutionMode, FollowCartesianTrajectory.Goal, 'EXECUTION_', {}),
+    (SegmentType, MotionSegment, '(?!ARC_)', {}),
+    (ArcMode, MotionSegment, 'ARC_', {}),
+    (OutputKind, IOCommand, '(?=.*_(DIGITAL|ANALOG)$)', {}),
+    (RobotMode, DriverStatus, 'ROBOT_MODE_', {'UNKNOWN': -2}),
+    (SafetyMode, DriverStatus, 'SAFETY_MODE_', {'UNKNOWN': 0}),
+])
+def test_our_own_types_use_the_numbers_of_the_messages(enum, message, prefix, only_in_the_message):
+    numbers = {re.sub(f'^{prefix}', '', name): value
+               for name, value in constants(message, prefix).items()}
+    assert numbers == {member.name: member.value for member in enum} | only_in_the_message
 
 
 def test_a_message_left_alone_asks_for_the_usual():
