@@ -42,7 +42,7 @@ _DECIMAL = re.compile(r'[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?')
 
 
 def _wrong_type(wanted: str, value: Value) -> RuntimeException:
-    return RuntimeException(f'Type error: {wanted} is needed, not a {type_name(value)}')
+    return RuntimeException(f'Type error: {wanted} is needed, not {type_name(value)}')
 
 
 def _number(value: Value) -> int | float:

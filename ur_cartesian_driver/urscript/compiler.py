@@ -418,7 +418,7 @@ class _Compiler:
             runtime.thread.location = here
             if not isinstance(found[0], values.RemoteObject):
                 kind = values.type_name(found[0])
-                raise RuntimeException(f'Type error: a {kind} has no method {node.method!r}', *here)
+                raise RuntimeException(f'Type error: {kind} has no method {node.method!r}', *here)
             try:
                 return found[0].call(node.method, found[1:])
             except Exception as error:

@@ -5,8 +5,7 @@ Tokens to syntax tree: recursive descent, one method per rule.
 
 The language is free of lines: a statement ends where its expression cannot go on, so
 `a = 1 b = 2` are two statements and an operator at the end of a line continues it. Lines matter
-in three places only: a call or an index opens its bracket on the line of what it applies to, the
-value of `return` stands on its line, and so do the texts of a label. Inside brackets not even that.
+in two places only: the value of `return` stands on its line, and so do the texts of a label.
 
     program     = ("def" | "sec") NAME "(" ")" ":" block "end"
     block       = { statement }
@@ -93,7 +92,6 @@ class Parser:
         self._tokens = scan(text)
         self._next = 0
         self._nesting = 0
-        self._brackets = 0
         self._loops = 0
 
     # Tokens
@@ -154,13 +152,11 @@ class Parser:
     def _list(self, item: Callable[[], T], close: str) -> tuple[T, ...]:
         """Read `item { "," item }` up to the closing bracket; nothing at all is fine too."""
         items: list[T] = []
-        self._brackets += 1
         with self._nested():
             if not self._at(close):
                 items.append(item())
                 while self._match(','):
                     items.append(item())
-        self._brackets -= 1
         self._expect(close)
         return tuple(items)
 
@@ -363,7 +359,8 @@ class Parser:
         if qualifier:
             raise self.error(f"'=' is missing before {self._found()}")
         if not isinstance(target, tree.Call | tree.MethodCall | tree.Run):
-            raise self.error('a statement is an assignment or a call', start)
+            at = self._token if self._same_line() else start
+            raise self.error('a statement is an assignment or a call', at)
         return tree.CallStatement(call=target, **place(start))
 
     def _assignment(
@@ -459,17 +456,13 @@ class Parser:
         for _ in range(MAX_CHAIN):
             if self._at('.'):
                 value = self._field(value)
-            elif self._at('(') and self._applies() and isinstance(value, tree.Name | tree.Field):
+            elif self._at('(') and isinstance(value, tree.Name | tree.Field):
                 value = self._call(value)
-            elif self._at('[') and self._applies():
+            elif self._at('['):
                 value = self._index(value)
             else:
                 return value
         raise self.error(f'more than {MAX_CHAIN} calls, indices or fields in a row')
-
-    def _applies(self) -> bool:
-        """Tell whether a bracket belongs to what stands before it."""
-        return self._brackets > 0 or self._same_line()
 
     def _field(self, target: tree.Expression) -> tree.Field:
         """"." NAME."""
@@ -513,7 +506,7 @@ class Parser:
         return tree.Index(target=target, indices=items, **place(start))
 
     def _primary(self) -> tree.Expression:
-        """NUMBER | STRING | constant | NAME | "(" expression ")" | "[" items "]"."""
+        """Read NUMBER | STRING | constant | NAME | "(" expression ")" | "[" items "]"."""
         token = self._token
         if token.kind is Kind.NUMBER:
             return tree.Constant(value=self._advance().number, **place(token))

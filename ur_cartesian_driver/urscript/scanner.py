@@ -4,7 +4,7 @@
 Text to tokens.
 
 Newlines are white space; a token knows its line, and the parser looks at lines only in the few
-places where the language does (after a bare `return`, before the bracket of a call).
+places where the language does.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ from typing import NamedTuple
 
 from ur_cartesian_driver.urscript.errors import CompileError
 
-KEYWORDS = frozenset(
-    'and break case continue def default elif else end enter_critical exit_critical false False '
-    'global halt if join kill local None not or pause return run sec switch thread true True '
-    'while xor'.split()
-)
+KEYWORDS = frozenset({
+    'and', 'break', 'case', 'continue', 'def', 'default', 'elif', 'else', 'end', 'enter_critical',
+    'exit_critical', 'false', 'False', 'global', 'halt', 'if', 'join', 'kill', 'local', 'None',
+    'not', 'or', 'pause', 'return', 'run', 'sec', 'switch', 'thread', 'true', 'True', 'while',
+    'xor',
+})  # fmt: skip
 
 #: Longest first, so that `<=` is not read as `<`.
 SYMBOLS = ('==', '!=', '<=', '>=', *'+-*/%<>=()[],:.$')

@@ -101,8 +101,12 @@ def _declare(scope: Scope) -> None:
             scope.functions[node.name] = inner
             _declare(inner)
         elif isinstance(node, tree.Assign) and isinstance(node.target, tree.Name):
-            if scope.definition is None or node.qualifier == 'global':
-                scope.globals.setdefault(node.target.identifier, len(scope.globals))
+            _declare_global(scope, node, node.target.identifier)
+
+
+def _declare_global(scope: Scope, node: tree.Assign, name: str) -> None:
+    if scope.definition is None or node.qualifier == 'global':
+        scope.globals.setdefault(name, len(scope.globals))
 
 
 def _assign_locals(scope: Scope) -> None:

@@ -122,7 +122,7 @@ def make_pose(items: Sequence[Value]) -> Pose:
     """Return the value of `p[items]`."""
     for item in items:
         if not is_number(item):
-            raise RuntimeException(f'Type error: a pose cannot hold a {type_name(item)}')
+            raise RuntimeException(f'Type error: a pose cannot hold {type_name(item)}')
     return Pose(*(float(item) for item in items))
 
 
@@ -345,7 +345,7 @@ def _set_in_matrix(matrix: Matrix, key: tuple[Value, ...], value: Value) -> None
 
 def _fields(container: Value, name: str) -> dict[str, Value]:
     if type(container) is not Struct:
-        raise RuntimeException(f'Type error: a {type_name(container)} has no field {name!r}')
+        raise RuntimeException(f'Type error: {type_name(container)} has no field {name!r}')
     if name not in container.fields:
         raise RuntimeException(f'the struct has no field {name!r}')
     return container.fields
@@ -353,9 +353,9 @@ def _fields(container: Value, name: str) -> dict[str, Value]:
 
 def _items(container: Value, key: tuple[Value, ...]) -> Value:
     if type(container) is not list and type(container) is not Pose:
-        raise RuntimeException(f'Type error: a {type_name(container)} cannot be indexed')
+        raise RuntimeException(f'Type error: {type_name(container)} cannot be indexed')
     if len(key) != 1:
-        raise RuntimeException(f'Type error: a {type_name(container)} has one index, not two')
+        raise RuntimeException(f'Type error: {type_name(container)} has one index, not two')
     return container
 
 
@@ -364,7 +364,7 @@ def _position(index: Value, length: int) -> int:
     if type(index) is float and index.is_integer():
         index = int(index)
     if type(index) is not int:
-        raise RuntimeException(f'Type error: an index is an int, not a {type_name(index)}')
+        raise RuntimeException(f'Type error: an index is an int, not {type_name(index)}')
     if not 0 <= index < length:
         raise RuntimeException(f'Index out of range: {index} is not within 0..{length - 1}')
     return index
