@@ -1,0 +1,18 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Plan, execute and stop Cartesian motions of one robot, from plain Python.
+
+::
+
+    with Driver(DriverConfig(robot_ip='192.168.56.101', ur_type='ur5e')) as driver:
+        driver.wait_ready(timeout=10.0)
+        outcome = driver.execute(Goal(waypoints=(Waypoint(pose=..., time=3.0),)))
+        print(outcome.code.name, outcome.text)
+"""
+
+from ur_cartesian_driver.driver.api import Driver, Motion
+from ur_cartesian_driver.driver.config import DriverConfig, DriverStatus
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+
+__all__ = ['ConnectionState', 'Driver', 'DriverConfig', 'DriverStatus', 'Motion']

@@ -1,0 +1,356 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The Python API: plan, execute and stop motions of one robot, with no ROS running."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import replace
+import itertools
+import logging
+import threading
+from types import TracebackType
+
+from ur_cartesian_driver.driver import channel, host
+from ur_cartesian_driver.driver.channel import (
+    CancelMotion,
+    Configure,
+    GeometryKnown,
+    Heartbeat,
+    LogLine,
+    MotionEnded,
+    MotionProgress,
+    Notice,
+    Request,
+    ResendProgram,
+    Shutdown,
+    StartMotion,
+    StatusChanged,
+)
+from ur_cartesian_driver.driver.config import DriverConfig, DriverStatus
+from ur_cartesian_driver.execution import Order
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.errors import (
+    code_of,
+    DriverError,
+    ErrorCode,
+    GoalRefused,
+    RobotNotReady,
+)
+from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.protocol.trajectory import encode_points
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+
+LOG = logging.getLogger('ur_cartesian_driver')
+
+OnProgress = Callable[[Progress], None]
+
+
+class Motion:
+    """A running motion; its outcome comes whatever happens to the robot."""
+
+    def __init__(self, driver: Driver, number: int, on_progress: OnProgress | None) -> None:
+        """Be made by :meth:`Driver.start`."""
+        self._driver = driver
+        self._future: Future[Outcome] = Future()
+        self._on_progress = on_progress
+        self.number = number
+        #: The newest report, None before the first.
+        self.progress: Progress | None = None
+
+    def cancel(self) -> None:
+        """Ask the arm to stop; the outcome follows when it stands. May be called twice."""
+        self._driver._send(CancelMotion(motion=self.number))
+
+    def done(self) -> bool:
+        """Tell whether the outcome is there."""
+        return self._future.done()
+
+    def result(self, timeout: float | None = None) -> Outcome:
+        """
+        Wait for the outcome.
+
+        :raises TimeoutError: it did not come within ``timeout`` [s]; the motion goes on.
+        """
+        return self._future.result(timeout)
+
+    def add_done_callback(self, callback: Callable[[Outcome], None]) -> None:
+        """Call back with the outcome, from the driver's reader thread or at once."""
+        self._future.add_done_callback(lambda future: callback(future.result()))
+
+    def _report(self, progress: Progress) -> None:
+        self.progress = progress
+        if self._on_progress is not None:
+            self._on_progress(progress)
+
+    def _end(self, outcome: Outcome) -> None:
+        if not self._future.done():
+            self._future.set_result(outcome)
+
+
+class Driver:
+    """
+    One robot. Thread-safe; open it, or use it as a context manager.
+
+    Callbacks run on the driver's own reader thread: keep them short.
+    """
+
+    def __init__(self, config: DriverConfig, options: PlanningOptions | None = None, *,
+                 auto_heartbeat: bool = True) -> None:
+        """
+        Prepare a driver; nothing is connected before :meth:`open`.
+
+        :param auto_heartbeat: tell the robot loop that the owner lives for as long as this
+            process does; an owner that can hang (a ROS executor) calls :meth:`heartbeat` itself.
+        :raises ValueError: ``ur_type`` is unknown.
+        """
+        self.config = config
+        self.options = options if options is not None else PlanningOptions()
+        self._arm = Arm(robot_model(config.ur_type))
+        self._auto_heartbeat = auto_heartbeat
+        self._host: host.Host | None = None
+        self._status = DriverStatus()
+        self._status_listeners: list[Callable[[DriverStatus], None]] = []
+        self._ready = threading.Event()
+        self._motions: dict[int, Motion] = {}
+        self._numbers = itertools.count(1)
+        # Guards the pipe (several threads send), the running motions and opening and closing.
+        self._lock = threading.RLock()
+        self._closed = threading.Event()
+        self._threads: list[threading.Thread] = []
+
+    def __enter__(self) -> Driver:
+        """Open."""
+        self.open()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 traceback: TracebackType | None) -> None:
+        """Close."""
+        self.close()
+
+    # ---- life ---------------------------------------------------------------------------------
+
+    def open(self) -> None:
+        """Start the robot loop and return; it connects, and connects again, by itself."""
+        with self._lock:
+            if self._host is not None:
+                return
+            self._closed.clear()
+            self._host = host.start(self.config.robot_loop)
+            self._send(Configure(config=self.config))
+            self._start_thread('driver reader', self._read)
+            if self._auto_heartbeat:
+                self._start_thread('driver heartbeat', self._beat)
+
+    def close(self) -> None:
+        """Stop a running motion and end the robot loop and all threads. May be called twice."""
+        with self._lock:
+            if self._host is None or self._closed.is_set():
+                return
+            self._closed.set()
+            self._send(Shutdown())
+        for thread in self._threads:
+            if thread is not threading.current_thread():
+                thread.join()
+        with self._lock:
+            self._host.join()
+            self._host, self._threads = None, []
+        self._abandon('the driver was closed')
+
+    def heartbeat(self) -> None:
+        """Say that the owner is alive; see ``node_timeout``."""
+        self._send(Heartbeat())
+
+    # ---- what is known ------------------------------------------------------------------------
+
+    @property
+    def status(self) -> DriverStatus:
+        """How far the connection is."""
+        return self._status
+
+    @property
+    def state(self) -> RobotState | None:
+        """The newest robot state; None before the first and when the robot is lost."""
+        running = self._host
+        if running is None or self._closed.is_set():
+            return None
+        try:
+            return running.memory.read()
+        except ValueError:  # closed at this moment
+            return None
+
+    @property
+    def arm(self) -> Arm:
+        """The arm's kinematics: the robot's own once it has told them, else the model's."""
+        return self._arm
+
+    def add_status_listener(self, callback: Callable[[DriverStatus], None]) -> None:
+        """Call back with each new status, and with the present one now."""
+        self._status_listeners.append(callback)
+        callback(self._status)
+
+    def wait_ready(self, timeout: float) -> None:
+        """
+        Wait until a goal can run.
+
+        :raises RobotNotReady: it takes longer than ``timeout`` [s]; the text says what is needed.
+        """
+        if not self._ready.wait(timeout):
+            status = self._status
+            raise RobotNotReady(status.message or f'The connection is {status.state.name}.')
+
+    # ---- motion -------------------------------------------------------------------------------
+
+    def plan(self, goal: Goal) -> Plan:
+        """
+        Check a goal and choose its primitives, from where the robot stands now; nothing moves.
+
+        :raises GoalRefused: with the reason.
+        """
+        state = self.state
+        if state is None:
+            raise RobotNotReady(self._status.message or 'The robot does not report its state.')
+        return plan(goal, state, self.arm, self.options)
+
+    def start(self, plan: Plan, on_progress: OnProgress | None = None) -> Motion:
+        """
+        Execute a plan and return at once.
+
+        :raises RobotNotReady: the robot program is not connected, or a motion is running.
+        :raises LocalProtocolError: a value of the plan does not fit into a message.
+        """
+        points = encode_points(segment.primitive for segment in plan.segments)
+        with self._lock:
+            if self._motions:
+                raise RobotNotReady('A motion is running; wait for its end or cancel it.')
+            if self._status.state is not ConnectionState.READY:
+                raise RobotNotReady(
+                    self._status.message or f'The connection is {self._status.state.name}.')
+            motion = Motion(self, next(self._numbers), on_progress)
+            self._motions[motion.number] = motion
+        self._send(StartMotion(motion=motion.number, order=order_of(plan), points=points))
+        return motion
+
+    def execute(self, goal: Goal, on_progress: OnProgress | None = None,
+                timeout: float | None = None) -> Outcome:
+        """
+        Check, plan, run and wait; a refusal is an outcome too.
+
+        :raises TimeoutError: no outcome within ``timeout`` [s]; the motion was cancelled.
+        """
+        try:
+            motion = self.start(self.plan(goal), on_progress)
+        except GoalRefused as refusal:
+            return Outcome(code=code_of(refusal), text=str(refusal))
+        try:
+            return motion.result(timeout)
+        except BaseException:  # also Ctrl-C: nobody waits for this motion any more
+            motion.cancel()
+            raise
+
+    def stop(self) -> None:
+        """Stop whatever moves."""
+        for motion in list(self._motions.values()):
+            motion.cancel()
+
+    def resend_robot_program(self) -> None:
+        """Upload the robot program again; the way on after somebody stopped it."""
+        self._send(ResendProgram())
+
+    # ---- inside -------------------------------------------------------------------------------
+
+    def _start_thread(self, name: str, target: Callable[[], None]) -> None:
+        thread = threading.Thread(target=target, name=name, daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def _send(self, request: Request) -> None:
+        data = channel.pack(request)
+        with self._lock:
+            if self._host is not None:
+                try:
+                    self._host.pipe.sendall(data)
+                except OSError:
+                    pass  # the loop is gone; the reader thread sees that and says so
+
+    def _beat(self) -> None:
+        while not self._closed.wait(self.config.node_timeout / 4.0):
+            self.heartbeat()
+
+    def _read(self) -> None:
+        """Serve notices; when the loop dies, tell everybody and start another one."""
+        while True:
+            assert self._host is not None
+            notice = channel.receive(self._host.pipe)
+            if notice is not None:
+                self._handle(notice)
+            elif self._closed.is_set():
+                return
+            else:
+                self._restart()
+
+    def _restart(self) -> None:
+        """Replace a robot loop that died; its sockets are closed, so the arm is stopping."""
+        LOG.error('the robot loop ended unexpectedly and is started again')
+        with self._lock:
+            if self._host is None or self._closed.is_set():
+                return
+            self._host.join()
+            self._host = host.start(self.config.robot_loop)
+            self._send(Configure(config=replace(self.config)))
+        self._set_status(DriverStatus(last_error='The robot loop ended unexpectedly.'))
+        self._abandon('the robot loop ended unexpectedly, the robot program stops the arm')
+
+    def _handle(self, notice: Notice | Request) -> None:
+        match notice:
+            case MotionProgress(motion=number, progress=progress):
+                if number in self._motions:
+                    self._motions[number]._report(progress)
+            case MotionEnded(motion=number, outcome=outcome):
+                with self._lock:
+                    motion = self._motions.pop(number, None)
+                if motion is not None:
+                    motion._end(outcome)
+            case StatusChanged(status=status):
+                self._set_status(status)
+            case GeometryKnown(geometry=geometry):
+                self._arm = Arm(self._arm.model, geometry)
+            case LogLine(level=level, text=text):
+                LOG.log(level, text)
+
+    def _set_status(self, status: DriverStatus) -> None:
+        self._status = status
+        if status.state is ConnectionState.READY:
+            self._ready.set()
+        else:
+            self._ready.clear()
+        for listener in list(self._status_listeners):
+            listener(status)
+
+    def _abandon(self, reason: str) -> None:
+        with self._lock:
+            motions, self._motions = self._motions, {}
+        for motion in motions.values():
+            motion._end(Outcome(code=ErrorCode.CONNECTION_LOST,
+                                text=f'{reason[:1].upper()}{reason[1:]}.'))
+
+
+def order_of(plan: Plan) -> Order:
+    """Return what of a plan the robot loop needs."""
+    goal = plan.goal
+    times = goal.waypoints[-1].time
+    return Order(
+        points=len(plan.segments), reference=plan.reference, duration=plan.duration,
+        due=times if times > 0.0 else None, T_base_frame=goal.T_base_frame,
+        path_tolerance=goal.path_tolerance, goal_tolerance=goal.goal_tolerance,
+        goal_time_tolerance=goal.goal_time_tolerance, report=plan.report)
+
+
+__all__ = ['Driver', 'DriverError', 'Motion', 'order_of']

@@ -1,0 +1,139 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The pipe between the owner of a driver and the robot loop.
+
+Each message is one of the dataclasses below, pickled, behind its length. Both ends are this
+package and the pipe is a pair of sockets that nobody else can reach, which is what makes pickle
+the right choice here, and it moves the arrays of a large plan as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+import pickle
+import socket
+import struct
+from typing import TypeAlias
+
+from ur_cartesian_driver.driver.config import DriverConfig, DriverStatus
+from ur_cartesian_driver.execution import Order
+from ur_cartesian_driver.kinematics.robots import Geometry
+from ur_cartesian_driver.motion.events import Outcome, Progress
+
+LENGTH = struct.Struct('>I')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Configure:
+    """The first message: how to reach the robot."""
+
+    config: DriverConfig
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StartMotion:
+    """Run these points (84 bytes each)."""
+
+    motion: int
+    order: Order
+    points: bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CancelMotion:
+    """Stop the motion, if it is the one that runs."""
+
+    motion: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ResendProgram:
+    """Upload the robot program (again)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Heartbeat:
+    """The owner is alive."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shutdown:
+    """Stop the arm and end."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StatusChanged:
+    """The connection changed."""
+
+    status: DriverStatus
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GeometryKnown:
+    """The robot told its calibrated geometry."""
+
+    geometry: Geometry
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionProgress:
+    """Where a motion is."""
+
+    motion: int
+    progress: Progress
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionEnded:
+    """How a motion ended."""
+
+    motion: int
+    outcome: Outcome
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogLine:
+    """Something worth a line in the owner's log; the levels are those of ``logging``."""
+
+    level: int
+    text: str
+
+
+Request: TypeAlias = (
+    Configure | StartMotion | CancelMotion | ResendProgram | Heartbeat | Shutdown)
+Notice: TypeAlias = StatusChanged | GeometryKnown | MotionProgress | MotionEnded | LogLine
+
+
+def pack(message: Request | Notice) -> bytes:
+    """Return a message as bytes, its length first."""
+    body = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+    return LENGTH.pack(len(body)) + body
+
+
+def unpack(body: bytes) -> Request | Notice:
+    """Return the message of the bytes behind a length."""
+    message: Request | Notice = pickle.loads(body)  # noqa: S301 - see the module's description
+    return message
+
+
+def receive(pipe: socket.socket) -> Request | Notice | None:
+    """Wait for the next message on a blocking socket; None at the end of the pipe."""
+    head = _read(pipe, LENGTH.size)
+    if head is None:
+        return None
+    body = _read(pipe, LENGTH.unpack(head)[0])
+    return None if body is None else unpack(body)
+
+
+def _read(pipe: socket.socket, size: int) -> bytes | None:
+    parts = bytearray()
+    while len(parts) < size:
+        try:
+            part = pipe.recv(min(size - len(parts), 1 << 20))
+        except OSError:
+            return None
+        if not part:
+            return None
+        parts += part
+    return bytes(parts)

@@ -1,0 +1,120 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where the robot loop runs: in a process of its own, or in a thread. Nothing else knows which.
+
+The process is started afresh (not forked: the owner may be a ROS node full of threads) and gets
+two open descriptors, the pipe and the shared memory. When it dies its sockets close and the robot
+program stops the arm; when the owner dies the pipe ends and it stops the arm itself.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+import subprocess
+import sys
+import threading
+from typing import Protocol
+
+from ur_cartesian_driver.driver import snapshot
+from ur_cartesian_driver.driver.robot_loop import serve
+
+#: How long the robot loop may need to stop the arm and end, before it is ended [s].
+PATIENCE = 5.0
+
+
+class Host(Protocol):
+    """Something that runs a robot loop."""
+
+    #: The owner's end of the pipe, blocking.
+    pipe: socket.socket
+    #: The owner's view of the newest robot state.
+    memory: snapshot.StateMemory
+
+    def join(self) -> None:
+        """Wait for the end of the loop (the pipe is closed) and release everything."""
+
+
+def start(robot_loop: str) -> Host:
+    """Start a robot loop in a ``process`` or a ``thread``."""
+    return ProcessHost() if robot_loop == 'process' else ThreadHost()
+
+
+class ProcessHost:
+    """The loop in a process of its own."""
+
+    def __init__(self) -> None:
+        """Start the process."""
+        self.pipe, theirs = socket.socketpair()
+        descriptor = snapshot.create()
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, '-m', __name__, str(theirs.fileno()), str(descriptor)],
+                pass_fds=(theirs.fileno(), descriptor), env=_environment(),
+                stdin=subprocess.DEVNULL,
+                # Ctrl-C is for the owner, which then ends us in order.
+                start_new_session=True)
+            self.memory = snapshot.StateMemory(descriptor)
+        finally:
+            theirs.close()
+            os.close(descriptor)
+
+    @property
+    def pid(self) -> int:
+        """Return the process's id."""
+        return self._process.pid
+
+    def join(self) -> None:
+        """Wait for the end of the process."""
+        try:
+            self._process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self.memory.close()
+        self.pipe.close()
+
+
+class ThreadHost:
+    """The loop in a thread of the owner's process."""
+
+    def __init__(self) -> None:
+        """Start the thread."""
+        self.pipe, theirs = socket.socketpair()
+        descriptor = snapshot.create()
+        self.memory = snapshot.StateMemory(descriptor)
+        self._thread = threading.Thread(
+            target=self._run, args=(theirs, descriptor), name='robot loop', daemon=True)
+        self._thread.start()
+
+    @staticmethod
+    def _run(pipe: socket.socket, descriptor: int) -> None:
+        try:
+            asyncio.run(serve(pipe, descriptor))
+        finally:
+            os.close(descriptor)
+
+    def join(self) -> None:
+        """Wait for the end of the thread."""
+        self._thread.join(PATIENCE)
+        self.memory.close()
+        self.pipe.close()
+
+
+def _environment() -> dict[str, str]:
+    """Return an environment in which the process finds this very package."""
+    path = os.pathsep.join(entry for entry in sys.path if entry)
+    return {**os.environ, 'PYTHONPATH': path}
+
+
+def main() -> None:
+    """Run the loop in this process; the arguments are the two descriptors."""
+    pipe, descriptor = (int(argument) for argument in sys.argv[1:])
+    with socket.socket(fileno=pipe) as connection:
+        asyncio.run(serve(connection, descriptor))
+
+
+if __name__ == '__main__':
+    main()

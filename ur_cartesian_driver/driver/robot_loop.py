@@ -1,0 +1,237 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The robot loop: one asyncio loop that owns the sockets and the machine of the running goal.
+
+It never imports ROS. It runs in a process of its own, where nothing that the owner does (receiving
+a goal of 100,000 points holds Python's interpreter lock for seconds) can delay a message that the
+robot waits for, or in a thread; either way it is joined to its owner by one pipe for messages and
+by shared memory for the newest robot state, see :mod:`~ur_cartesian_driver.driver.host`.
+
+When the pipe ends or the owner falls silent the arm is stopped: our sockets close, and the robot
+program brakes and ends when they do.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+
+from ur_cartesian_driver.driver.channel import (
+    CancelMotion,
+    Configure,
+    GeometryKnown,
+    Heartbeat,
+    LENGTH,
+    LogLine,
+    MotionEnded,
+    MotionProgress,
+    Notice,
+    pack,
+    Request,
+    ResendProgram,
+    Shutdown,
+    StartMotion,
+    StatusChanged,
+    unpack,
+)
+from ur_cartesian_driver.driver.config import DriverConfig, DriverStatus
+from ur_cartesian_driver.driver.snapshot import StateMemory
+from ur_cartesian_driver.execution import (
+    Command,
+    Finish,
+    Report,
+    SendControl,
+    SendPoints,
+    StopProgram,
+    TrajectoryMachine,
+)
+from ur_cartesian_driver.kinematics.robots import Geometry
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.events import (
+    CancelRequested,
+    Event,
+    Outcome,
+    StateReceived,
+    Tick,
+)
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.protocol.trajectory import POINT_SIZE
+from ur_cartesian_driver.robot.link import LinkSettings, LinkStatus, RobotLink
+
+#: How often time alone is looked at [s].
+TICK = 0.02
+
+
+class RobotLoop:
+    """Joins the link to the robot, the machine of the running goal and the pipe to the owner."""
+
+    def __init__(self, config: DriverConfig, memory: StateMemory,
+                 notify: asyncio.StreamWriter) -> None:
+        """Prepare; :meth:`run` does the work."""
+        self._config = config
+        self._memory = memory
+        self._pipe = notify
+        self._machine: TrajectoryMachine | None = None
+        self._motion = 0
+        self._points = memoryview(b'')
+        self._last_heartbeat = 0.0
+        self._link = RobotLink(
+            link_settings(config), on_event=self.handle_event, on_status=self._status_changed,
+            on_geometry=self._geometry_known, on_log=self._log)
+
+    async def run(self, requests: asyncio.StreamReader) -> None:
+        """Serve until the owner shuts down, hangs up or falls silent."""
+        self._last_heartbeat = asyncio.get_running_loop().time()
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                link = tasks.create_task(self._link.run())
+                ticks = tasks.create_task(self._tick())
+                await self._serve(requests)
+                link.cancel()
+                ticks.cancel()
+        finally:
+            self._end_motion('the driver was shut down')
+            self._link.close()
+            self._memory.clear()
+
+    async def _serve(self, requests: asyncio.StreamReader) -> None:
+        """Handle requests until there are no more."""
+        while True:
+            try:
+                (size,) = LENGTH.unpack(await requests.readexactly(LENGTH.size))
+                request = unpack(await requests.readexactly(size))
+            except (asyncio.IncompleteReadError, ConnectionError):
+                return
+            if isinstance(request, Shutdown) or not self._handle_request(request):
+                return
+
+    def _handle_request(self, request: Request | Notice) -> bool:
+        """Carry out a request; False for one that makes no sense here."""
+        self._last_heartbeat = self._now()
+        match request:
+            case StartMotion():
+                self._start(request)
+            case CancelMotion(motion=motion):
+                if motion == self._motion:
+                    self.handle_event(CancelRequested())
+            case ResendProgram():
+                self._link.upload_program()
+            case Heartbeat():
+                pass
+            case _:
+                return False
+        return True
+
+    def _start(self, request: StartMotion) -> None:
+        """Start a motion, or refuse it with the reason."""
+        reason = self._link.not_ready()
+        if self._machine is not None:
+            reason = 'another motion is running'
+        if reason:
+            self._notify(MotionEnded(motion=request.motion, outcome=Outcome(
+                code=ErrorCode.ROBOT_NOT_READY, text=reason)))
+            return
+        self._motion, self._points = request.motion, memoryview(request.points)
+        self._machine = TrajectoryMachine(
+            request.order, feedback_period=1.0 / self._config.feedback_rate)
+        self._link.set_busy(True)
+        self._carry_out(self._machine.start(self._now()))
+
+    # ---- events of the robot ------------------------------------------------------------------
+
+    def handle_event(self, event: Event) -> None:
+        """Feed the machine, and do what it answers."""
+        if isinstance(event, StateReceived):
+            self._memory.write(event.state)
+        if self._machine is not None:
+            self._carry_out(self._machine.step(event, self._now()))
+
+    def _carry_out(self, commands: list[Command]) -> None:
+        for command in commands:
+            match command:
+                case SendControl(action=action, count=count):
+                    self._link.send_control(action, count)
+                case SendPoints(first=first, end=end):
+                    self._link.send_points(bytes(self._points[first * POINT_SIZE:end * POINT_SIZE]))
+                case StopProgram(reason=reason):
+                    self._link.stop_program(reason)
+                case Report(progress=progress):
+                    self._notify(MotionProgress(motion=self._motion, progress=progress))
+                case Finish(outcome=outcome):
+                    self._finish(outcome)
+
+    def _finish(self, outcome: Outcome) -> None:
+        motion, self._motion, self._machine = self._motion, 0, None
+        self._points = memoryview(b'')
+        self._link.set_busy(False)
+        self._notify(MotionEnded(motion=motion, outcome=outcome))
+
+    def _end_motion(self, reason: str) -> None:
+        if self._machine is not None:
+            self._finish(Outcome(code=ErrorCode.CANCELLED, text=f'{reason}.'))
+
+    async def _tick(self) -> None:
+        """Let time pass where nothing else happens, and watch the owner."""
+        while True:
+            await asyncio.sleep(TICK)
+            self.handle_event(Tick())
+            if self._now() - self._last_heartbeat > self._config.node_timeout:
+                self._last_heartbeat = self._now()
+                if self._machine is not None:
+                    self._log(logging.ERROR, 'the owner of the driver was silent for '
+                              f'{self._config.node_timeout:g} s: the arm is stopped')
+                    self.handle_event(CancelRequested())
+
+    # ---- the owner ----------------------------------------------------------------------------
+
+    def _status_changed(self, link: LinkStatus) -> None:
+        if not link.has_state:
+            self._memory.clear()
+        self._notify(StatusChanged(status=DriverStatus(
+            state=link.state, message=link.message, last_error=link.last_error,
+            robot_model=link.robot_model, polyscope_version=link.polyscope_version,
+            program_running=link.program_connected, calibration_known=link.calibration_known,
+            ports=link.ports)))
+
+    def _geometry_known(self, geometry: Geometry) -> None:
+        self._notify(GeometryKnown(geometry=geometry))
+
+    def _log(self, level: int, text: str) -> None:
+        self._notify(LogLine(level=level, text=text))
+
+    def _notify(self, notice: Notice) -> None:
+        if not self._pipe.is_closing():
+            self._pipe.write(pack(notice))
+
+    def _now(self) -> float:
+        return asyncio.get_running_loop().time()
+
+
+def link_settings(config: DriverConfig) -> LinkSettings:
+    """Return what of the configuration the link needs."""
+    return LinkSettings(**{name: getattr(config, name) for name in LinkSettings.__slots__})
+
+
+async def serve(pipe: socket.socket, descriptor: int) -> None:
+    """
+    Run a robot loop until its owner ends it.
+
+    :param pipe: our end of the pair of sockets; the first message on it is the configuration.
+    :param descriptor: the shared memory.
+    """
+    reader, writer = await asyncio.open_connection(sock=pipe)
+    memory = StateMemory(descriptor)
+    try:
+        (size,) = LENGTH.unpack(await reader.readexactly(LENGTH.size))
+        first = unpack(await reader.readexactly(size))
+        if isinstance(first, Configure):
+            await RobotLoop(first.config, memory, writer).run(reader)
+        if not writer.is_closing():
+            await writer.drain()
+    except (asyncio.IncompleteReadError, ConnectionError):
+        pass  # the owner is gone, and with it everybody who could be told
+    finally:
+        writer.close()
+        memory.close()

@@ -1,0 +1,51 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a machine wants done; the owner of the sockets does it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.protocol.reverse import TrajectoryAction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SendControl:
+    """Send a trajectory action on the reverse socket."""
+
+    action: TrajectoryAction
+    count: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SendPoints:
+    """Send the points ``first`` up to, not including, ``end`` on the trajectory socket."""
+
+    first: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopProgram:
+    """End the robot program, whatever it does: the arm must not go on by itself."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Report:
+    """Tell where the motion is."""
+
+    progress: Progress
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finish:
+    """The goal has ended."""
+
+    outcome: Outcome
+
+
+Command: TypeAlias = SendControl | SendPoints | StopProgram | Report | Finish

@@ -1,0 +1,415 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+One goal on its way through the robot program, as a table.
+
+The machine is fed with events and the time and answers with commands; it sends nothing itself. An
+event is first turned into a signal (:class:`Signal`), then :data:`TRANSITIONS` says what that
+signal means in the present state: the next state and how the goal ends, if it does.
+
+* **MOVING**: the robot program runs points. The result SUCCESS leads to SETTLING; whatever stops
+  the arm by itself (safety, program, connection) ends the goal at once, because nothing that we
+  could send would be read; a reason of ours to stop (cancel, tolerance) leads to STOPPING.
+* **SETTLING**: the program says that the last point is reached. The arm has to be inside the goal
+  tolerance and at rest, within the goal's time tolerance.
+* **STOPPING**: CANCEL is on the wire. The program brakes, discards the points that it has not run
+  and answers CANCELED. A SUCCESS in this state means that the last point was reached before the
+  program read the CANCEL; it is no answer, CANCELED still follows.
+* **HALTING**: the program has answered; the arm is coming to rest.
+* **ENDED**: the outcome is out. Later events mean nothing.
+
+Everything has a bound: an answer that does not come in STOPPING or HALTING ends the goal after
+:data:`STOP_BOUND` by ending the robot program. Only MOVING has none, because a speed slider at
+zero is not an error; there, RTDE packets that stop coming are reported as a lost connection.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import auto, Enum
+from math import inf
+from types import MappingProxyType
+
+from ur_cartesian_driver.execution.commands import (
+    Command,
+    Finish,
+    Report,
+    SendControl,
+    SendPoints,
+    StopProgram,
+)
+from ur_cartesian_driver.execution.flow import Window
+from ur_cartesian_driver.execution.monitor import deviation, PathTracker, speed, violation
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.events import (
+    CancelRequested,
+    Event,
+    LinkLost,
+    Outcome,
+    Progress,
+    StateReceived,
+    Tick,
+    TrajectoryEnded,
+    TrajectoryResult,
+)
+from ur_cartesian_driver.motion.goal import Tolerance
+from ur_cartesian_driver.motion.plan import ReferencePath
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyStatus
+from ur_cartesian_driver.protocol.reverse import TrajectoryAction
+
+#: Longest time from CANCEL to the answer and to standstill [s]: the arm brakes within a second
+#: from full speed, and discarding the points in flight takes 0.5 s at most.
+STOP_BOUND = 3.0
+#: Joint speed below which the arm is at rest [rad/s].
+REST_SPEED = 1e-3
+#: How long the arm may need from the program's SUCCESS to rest inside its goal tolerance, when
+#: the goal does not say [s].
+DEFAULT_GOAL_TIME_TOLERANCE = 1.0
+
+
+class State(Enum):
+    """Where a goal is."""
+
+    MOVING = auto()
+    SETTLING = auto()
+    STOPPING = auto()
+    HALTING = auto()
+    ENDED = auto()
+
+
+class Signal(Enum):
+    """What an event means to a goal."""
+
+    SUCCESS = auto()
+    CANCELED = auto()
+    FAILURE = auto()
+    CANCEL = auto()
+    VIOLATION = auto()
+    PROTECTIVE_STOP = auto()
+    EMERGENCY_STOP = auto()
+    PROGRAM_STOPPED = auto()
+    CONNECTION_LOST = auto()
+    SETTLED = auto()
+    AT_REST = auto()
+    LATE = auto()
+
+
+#: What ends a goal in every state but ENDED, and the code it ends with.
+STOPS: Mapping[Signal, ErrorCode] = MappingProxyType({
+    Signal.PROTECTIVE_STOP: ErrorCode.PROTECTIVE_STOP,
+    Signal.EMERGENCY_STOP: ErrorCode.EMERGENCY_STOP,
+    Signal.PROGRAM_STOPPED: ErrorCode.PROGRAM_STOPPED,
+    Signal.CONNECTION_LOST: ErrorCode.CONNECTION_LOST,
+})
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """The next state, and the code of the outcome where it is decided here."""
+
+    state: State
+    code: ErrorCode | None = None
+
+
+def _ends(code: ErrorCode) -> Step:
+    return Step(State.ENDED, code)
+
+
+_STOPS = {signal: _ends(code) for signal, code in STOPS.items()}
+
+
+def _stays(state: State, *signals: Signal) -> dict[Signal, Step]:
+    return {signal: Step(state) for signal in signals}
+
+
+#: What each signal means in each state. SETTLED, AT_REST and LATE are about the state they are
+#: given for, so they are not possible in the others.
+TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
+    State.MOVING: {
+        **_STOPS,
+        Signal.SUCCESS: Step(State.SETTLING),
+        Signal.CANCELED: _ends(ErrorCode.EXECUTION_FAILED),
+        Signal.FAILURE: _ends(ErrorCode.EXECUTION_FAILED),
+        Signal.CANCEL: Step(State.STOPPING, ErrorCode.CANCELLED),
+        Signal.VIOLATION: Step(State.STOPPING, ErrorCode.PATH_TOLERANCE_VIOLATED),
+    },
+    State.SETTLING: {
+        **_STOPS,
+        **_stays(State.SETTLING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
+        Signal.CANCEL: _ends(ErrorCode.CANCELLED),
+        Signal.SETTLED: _ends(ErrorCode.SUCCESSFUL),
+        Signal.LATE: _ends(ErrorCode.GOAL_TOLERANCE_VIOLATED),
+    },
+    State.STOPPING: {
+        **_STOPS,
+        **_stays(State.STOPPING, Signal.SUCCESS, Signal.FAILURE, Signal.CANCEL),
+        Signal.CANCELED: Step(State.HALTING),
+        Signal.LATE: _ends(ErrorCode.EXECUTION_FAILED),
+    },
+    State.HALTING: {
+        **_STOPS,
+        **_stays(State.HALTING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, Signal.CANCEL),
+        Signal.AT_REST: Step(State.ENDED),
+        Signal.LATE: _ends(ErrorCode.EXECUTION_FAILED),
+    },
+    State.ENDED: {},
+})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Order:
+    """What of a plan the machine needs; small to send to another process."""
+
+    points: int
+    reference: ReferencePath
+    #: Expected time at full speed [s].
+    duration: float
+    #: When the last point is due [s]; None where the goal names no times.
+    due: float | None = None
+    T_base_frame: Pose = IDENTITY
+    path_tolerance: Tolerance = field(default_factory=Tolerance)
+    goal_tolerance: Tolerance = field(default_factory=Tolerance)
+    #: 0 = the default, negative = without end [s].
+    goal_time_tolerance: float = 0.0
+    report: tuple[str, ...] = ()
+
+
+class TrajectoryMachine:
+    """The table above for one goal; see the module's description."""
+
+    def __init__(self, order: Order, *, feedback_period: float = 0.04) -> None:
+        """
+        Take an order; nothing happens before :meth:`start`.
+
+        :param feedback_period: time between two progress reports [s].
+        """
+        self.order = order
+        self.state = State.MOVING
+        self._tracker = PathTracker(order.reference)
+        self._window = Window(order.points)
+        self._feedback_period = feedback_period
+        self._next_report = -inf
+        self._latest: RobotState | None = None
+        #: Time since the start in which the controller's own clock ran [s].
+        self._scaled_time = 0.0
+        self._deadline = inf
+        self._code: ErrorCode | None = None
+        self._text = ''
+
+    def start(self, now: float) -> list[Command]:
+        """Return the commands that start the motion: START, then the first points."""
+        return [SendControl(action=TrajectoryAction.START, count=self.order.points),
+                *self._release(0)]
+
+    def step(self, event: Event, now: float) -> list[Command]:
+        """
+        Return what to do after an event.
+
+        :param now: time of a steady clock [s].
+        """
+        if self.state is State.ENDED:
+            return []
+        commands: list[Command] = []
+        if isinstance(event, StateReceived):
+            commands += self._observe(event.state, now)
+        signal, text = self._signal(event, now)
+        if signal is not None:
+            commands += self._apply(signal, text, now)
+        return commands
+
+    # ---- from events to signals ---------------------------------------------------------------
+
+    def _signal(self, event: Event, now: float) -> tuple[Signal | None, str]:
+        """Return what the event means, with a clause for the outcome's text."""
+        match event:
+            case TrajectoryEnded(result=result):
+                return _RESULTS[result]
+            case CancelRequested():
+                return Signal.CANCEL, 'the client cancelled the goal'
+            case LinkLost(link='program', reason=reason):
+                return Signal.PROGRAM_STOPPED, f'the robot program hung up: {reason}'
+            case LinkLost(link=link, reason=reason):
+                return Signal.CONNECTION_LOST, f'the {link} connection was lost: {reason}'
+            case StateReceived(state=state):
+                return stop_in(state) or self._judge(state, now)
+            case Tick():
+                return self._late(now)
+        raise TypeError(f'unknown event {event!r}')
+
+    def _judge(self, state: RobotState, now: float) -> tuple[Signal | None, str]:
+        """Return what a packet of a robot that runs means in the present state."""
+        at_rest = max(map(abs, state.actual_qd)) < REST_SPEED
+        if self.state is State.MOVING:
+            return self._path_violation(state)
+        if self.state is State.SETTLING and at_rest and self._goal_error(state) is None:
+            return Signal.SETTLED, ''
+        if self.state is State.HALTING and at_rest:
+            return Signal.AT_REST, ''
+        return self._late(now)
+
+    def _path_violation(self, state: RobotState) -> tuple[Signal | None, str]:
+        error = deviation(self._tracker.pose(), state.actual_tcp_pose, self.order.T_base_frame)
+        clause = violation(error, self.order.path_tolerance)
+        if clause is None:
+            return None, ''
+        return Signal.VIOLATION, f'on the way to point {self._tracker.waypoint()} {clause}'
+
+    def _goal_error(self, state: RobotState) -> str | None:
+        error = deviation(self._tracker.pose(), state.actual_tcp_pose, self.order.T_base_frame)
+        return violation(error, self.order.goal_tolerance)
+
+    def _late(self, now: float) -> tuple[Signal | None, str]:
+        if now < self._deadline:
+            return None, ''
+        if self.state is State.SETTLING:
+            missing = self._goal_error(self._latest) if self._latest is not None else None
+            return Signal.LATE, missing or 'the arm did not come to rest'
+        return Signal.LATE, (f'the robot did not confirm the stop within {STOP_BOUND:g} s, '
+                             'its program was ended')
+
+    # ---- from signals to commands -------------------------------------------------------------
+
+    def _apply(self, signal: Signal, text: str, now: float) -> list[Command]:
+        step = TRANSITIONS[self.state][signal]
+        before, self.state = self.state, step.state
+        if step.code is not None:
+            self._code, self._text = step.code, text
+        if step.state is before:
+            return []
+        return _ENTER[step.state](self, signal, now)
+
+    def _enter_settling(self, signal: Signal, now: float) -> list[Command]:
+        self._tracker.finish()
+        tolerance = self._time_tolerance()
+        self._deadline = inf if tolerance < 0.0 else now + tolerance
+        late = 0.0 if self.order.due is None else self._scaled_time - self.order.due
+        if 0.0 <= tolerance < late:
+            self._code = ErrorCode.GOAL_TOLERANCE_VIOLATED
+            self._text = (f'the last point was reached {late:.3f} s after its time '
+                          f'{self.order.due:.3f} s, goal_time_tolerance is {tolerance:.3f} s')
+            self.state = State.ENDED
+            return self._finish()
+        return []
+
+    def _enter_stopping(self, signal: Signal, now: float) -> list[Command]:
+        self._deadline = now + STOP_BOUND
+        return [SendControl(action=TrajectoryAction.CANCEL, count=self._window.sent)]
+
+    def _enter_halting(self, signal: Signal, now: float) -> list[Command]:
+        self._deadline = now + STOP_BOUND
+        return []
+
+    def _enter_ended(self, signal: Signal, now: float) -> list[Command]:
+        commands: list[Command] = []
+        if signal is Signal.PROTECTIVE_STOP or signal is Signal.LATE and self._unconfirmed():
+            # A protective stop only pauses the program, and then it reads no socket: without this
+            # the old motion would go on when somebody unlocks the arm.
+            commands.append(StopProgram(reason=self._text))
+        return commands + self._finish()
+
+    def _unconfirmed(self) -> bool:
+        return self._code is ErrorCode.EXECUTION_FAILED
+
+    def _finish(self) -> list[Command]:
+        code = self._code if self._code is not None else ErrorCode.EXECUTION_FAILED
+        text = self._sentence(code)
+        report = [self._progress_report()] if self._latest is not None else []
+        return [*report, Finish(outcome=Outcome(code=code, text=text, report=self.order.report))]
+
+    def _sentence(self, code: ErrorCode) -> str:
+        if code is ErrorCode.SUCCESSFUL:
+            return (f'All {self.order.points} points were executed in '
+                    f'{self._scaled_time:.3f} s.')
+        where = f'on the way to point {self._tracker.waypoint()}'
+        text = self._text if where in self._text else f'{self._text} ({where})'
+        return text[:1].upper() + text[1:] + '.'
+
+    # ---- observing ----------------------------------------------------------------------------
+
+    def _observe(self, state: RobotState, now: float) -> list[Command]:
+        """Take a packet: time, place on the path, points to send, progress to report."""
+        before, self._latest = self._latest, state
+        if before is None or self.state is not State.MOVING:
+            passed = 0.0
+        else:
+            passed = max(0.0, state.timestamp - before.timestamp)
+            self._scaled_time += passed * state.speed_scaling
+        if self.state is State.MOVING:
+            reach = 2.0 * passed * speed(state.actual_tcp_twist)
+            self._tracker.update(state.actual_tcp_pose, reach, state.points_begun)
+        commands = self._release(max(state.points_begun, self._tracker.waypoint()))
+        if now >= self._next_report:
+            self._next_report = now + self._feedback_period
+            commands.append(self._progress_report())
+        return commands
+
+    def _release(self, begun: int) -> list[Command]:
+        if self.state is not State.MOVING:
+            return []
+        first, end = self._window.release(begun)
+        return [SendPoints(first=first, end=end)] if end > first else []
+
+    def _progress_report(self) -> Report:
+        state, order = self._latest, self.order
+        assert state is not None
+        time = self._tracker.time()
+        scaling = state.speed_scaling
+        remaining = max(0.0, order.duration - time)
+        buffered_from = min(self._window.sent, order.points)
+        rows = order.reference.point.searchsorted(buffered_from - 1, side='right') - 1
+        return Report(progress=Progress(
+            waypoint=self._tracker.waypoint(),
+            fraction=1.0 if order.duration <= 0.0 else min(1.0, time / order.duration),
+            desired_pose=self._tracker.pose(),
+            desired_twist=state.target_tcp_twist,
+            actual_pose=state.actual_tcp_pose,
+            actual_twist=state.actual_tcp_twist,
+            actual_q=state.actual_q,
+            time=time,
+            time_remaining=remaining / scaling if scaling > 0.0 else (inf if remaining else 0.0),
+            speed_scaling=scaling,
+            points_received=order.points,
+            buffered=max(0.0, float(order.reference.time[max(rows, 0)]) - time),
+            timestamp=state.timestamp))
+
+    def _time_tolerance(self) -> float:
+        return self.order.goal_time_tolerance or DEFAULT_GOAL_TIME_TOLERANCE
+
+
+def stop_in(state: RobotState) -> tuple[Signal, str] | None:
+    """Return why the robot cannot go on by itself, or None when it can."""
+    safety = state.safety_status
+    emergency = (SafetyStatus.EMERGENCY_STOPPED | SafetyStatus.ROBOT_EMERGENCY_STOPPED
+                 | SafetyStatus.SYSTEM_EMERGENCY_STOPPED)
+    if safety & emergency:
+        return Signal.EMERGENCY_STOP, 'an emergency stop cut the power of the arm'
+    if safety & SafetyStatus.PROTECTIVE_STOPPED:
+        return Signal.PROTECTIVE_STOP, 'the robot made a protective stop'
+    if safety & (SafetyStatus.VIOLATION | SafetyStatus.FAULT):
+        return Signal.PROTECTIVE_STOP, (
+            f'the safety system reports {state.safety_mode.name.lower()}')
+    if state.robot_mode is not RobotMode.RUNNING:
+        return Signal.PROGRAM_STOPPED, (
+            f'the arm left the mode RUNNING and is in {state.robot_mode.name}')
+    if state.runtime_state in (RuntimeState.STOPPING, RuntimeState.STOPPED):
+        return Signal.PROGRAM_STOPPED, 'the robot program was stopped'
+    return None
+
+
+_RESULTS: Mapping[TrajectoryResult, tuple[Signal, str]] = MappingProxyType({
+    TrajectoryResult.SUCCESS: (Signal.SUCCESS, ''),
+    TrajectoryResult.CANCELED: (
+        Signal.CANCELED, 'the robot program cancelled the trajectory by itself'),
+    TrajectoryResult.FAILURE: (
+        Signal.FAILURE, 'the robot program reported a failure; its log on the pendant says why'),
+})
+
+_ENTER: Mapping[State, Callable[[TrajectoryMachine, Signal, float], list[Command]]] = (
+    MappingProxyType({
+        State.SETTLING: TrajectoryMachine._enter_settling,
+        State.STOPPING: TrajectoryMachine._enter_stopping,
+        State.HALTING: TrajectoryMachine._enter_halting,
+        State.ENDED: TrajectoryMachine._enter_ended,
+    }))

@@ -1,0 +1,7 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The robot's side: the URScript program, and what fills it with the constants of the protocol."""
+
+from ur_cartesian_driver.program.render import as_program, ProgramSettings, render
+
+__all__ = ['ProgramSettings', 'as_program', 'render']

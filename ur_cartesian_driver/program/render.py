@@ -1,0 +1,129 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Fills the robot program with addresses and with the constants of the protocol.
+
+Every number that both sides must agree on lives once, in an enum of
+:mod:`ur_cartesian_driver.protocol`; the head of the program is written from there. Lines of the
+program that start with ``#!`` are instructions for this module:
+
+``#! constants``
+    the constants stand here.
+``#! if FEATURE`` ... ``#! end``
+    kept only where the controller's software has the feature, because a controller refuses a
+    program that names a function which it does not know.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+from importlib.resources import files
+
+from ur_cartesian_driver.motion.errors import LocalProtocolError
+from ur_cartesian_driver.motion.events import TrajectoryResult
+from ur_cartesian_driver.protocol import registers, reverse, script_command, trajectory
+from ur_cartesian_driver.protocol.framing import FIXED_POINT
+
+PROGRAM_NAME = 'ur_cartesian_driver'
+
+#: The first software of the CB3/e-Series line and of PolyScope X that has a feature.
+FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
+    'optimove': ((5, 21, 0), (10, 8, 0)),
+    'target_payload': ((5, 10, 0), (10, 0, 0)),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProgramSettings:
+    """What differs from one installation to the next."""
+
+    #: The address at which the robot reaches the driver.
+    host: str
+    reverse_port: int
+    trajectory_port: int
+    script_command_port: int
+    #: Software of the controller: major, minor, bugfix.
+    version: tuple[int, int, int] = (5, 21, 0)
+    #: Deceleration of the leading axis for every stop [rad/s^2].
+    stop_deceleration: float = 4.0
+    #: How long the program waits for the next trajectory point [s].
+    point_timeout: float = 0.5
+
+    def __post_init__(self) -> None:
+        """Refuse a host that would not survive inside a quoted string."""
+        if not self.host or not all(c.isalnum() or c in '.-_:' for c in self.host):
+            raise LocalProtocolError(
+                f'reverse_ip: {self.host!r} is no host name or address; set it to the address '
+                'at which the robot reaches this computer.')
+
+
+def render(settings: ProgramSettings) -> str:
+    """
+    Return the program's text for the script sender: header and node, without a ``def`` around.
+
+    :raises LocalProtocolError: an instruction in the program is unknown (a defect of ours).
+    """
+    text = files('ur_cartesian_driver.program').joinpath('driver.script').read_text('ascii')
+    return '\n'.join(_lines(text, settings)) + '\n'
+
+
+def as_program(text: str) -> str:
+    """Return the text as a program that can be uploaded: indented, in a ``def`` of our name."""
+    body = ''.join(f'\t{line}\n' if line else '\n' for line in text.splitlines())
+    return f'def {PROGRAM_NAME}():\n{body}end\n'
+
+
+def has_feature(feature: str, version: tuple[int, int, int]) -> bool:
+    """Tell whether the controller's software knows a feature of :data:`FEATURES`."""
+    classic, polyscope_x = FEATURES[feature]
+    return version >= (polyscope_x if version[0] >= 10 else classic)
+
+
+def _lines(text: str, settings: ProgramSettings) -> Iterator[str]:
+    """Yield the program's lines, instructions carried out."""
+    keep = True
+    for line in text.splitlines():
+        match line.split():
+            case ['#!', 'constants']:
+                yield from constants(settings)
+            case ['#!', 'if', feature] if feature in FEATURES:
+                keep = has_feature(feature, settings.version)
+            case ['#!', 'end']:
+                keep = True
+            case ['#!', *rest]:
+                raise LocalProtocolError(f'driver.script: unknown instruction {rest}')
+            case _ if keep:
+                yield line
+
+
+def constants(settings: ProgramSettings) -> Iterator[str]:
+    """Yield one assignment for each constant of the program."""
+    yield f'DRIVER_HOST = "{settings.host}"'
+    yield f'REVERSE_PORT = {settings.reverse_port}'
+    yield f'TRAJECTORY_PORT = {settings.trajectory_port}'
+    yield f'COMMAND_PORT = {settings.script_command_port}'
+    yield f'STOP_DECELERATION = {settings.stop_deceleration}'
+    yield f'POINT_TIMEOUT = {settings.point_timeout}'
+    # PolyScope X takes twice as many reads in a step as its predecessors.
+    yield f'DISCARDED_PER_STEP = {20 if settings.version[0] >= 10 else 10}'
+    yield f'MULT_JOINTSTATE = {FIXED_POINT}'
+    yield f'MULT_TIME = {FIXED_POINT}'
+    yield f'REVERSE_FIELDS = {reverse.MESSAGE_FIELDS}'
+    yield f'POINT_FIELDS = {trajectory.POINT_FIELDS}'
+    yield f'COMMAND_FIELDS = {script_command.COMMAND_FIELDS}'
+    yield f'STREAM_LENGTH = {2**31 - 1}'
+    yield f'REGISTER_POINTS_BEGUN = {int(registers.POINTS_BEGUN)}'
+    yield from _enum('MODE', reverse.ControlMode)
+    yield from _enum('TRAJECTORY', reverse.TrajectoryAction)
+    yield from _enum('MOTION', trajectory.MotionType)
+    yield from _enum('RESULT', TrajectoryResult)
+    yield from _enum('COMMAND', script_command.CommandId)
+    # Where a field of a point stands in the list that the robot reads, its length first.
+    yield from _enum('POINT', trajectory.PointField, offset=1)
+
+
+def _enum(prefix: str, members: type[IntEnum], offset: int = 0) -> Iterator[str]:
+    for name, member in members.__members__.items():  # aliases too
+        yield f'{prefix}_{name} = {member.value + offset}'

@@ -1,0 +1,198 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+TCP endpoints: one that dials and redials, one that listens for the robot program.
+
+Both call back on the event loop and never block it. Why a connection ended is always told as a
+clause that fits into a sentence ("the robot closed the connection", ...): a user who reads that a
+goal ended wants to know who hung up.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+import socket
+
+OnData = Callable[[bytes], None]
+OnClosed = Callable[[str], None]
+
+#: Pauses between two attempts to connect [s]; the last one repeats.
+BACK_OFF = (0.1, 0.2, 0.5, 1.0, 2.0)
+CONNECT_TIMEOUT = 2.0
+
+
+class Connection(asyncio.Protocol):
+    """One TCP connection, either way."""
+
+    def __init__(self, on_data: OnData, on_closed: OnClosed,
+                 on_open: Callable[[Connection], None] | None = None) -> None:
+        """
+        Set the callbacks; all of them run on the event loop.
+
+        :param on_data: bytes came in.
+        :param on_closed: the connection is gone, and why; called once.
+        :param on_open: the connection is there.
+        """
+        self._on_data, self._on_closed, self._on_open = on_data, on_closed, on_open
+        self._transport: asyncio.Transport | None = None
+        self._reason = ''
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """Switch off Nagle's delay: every message is one small segment that should go now."""
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+        sock = transport.get_extra_info('socket')
+        sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if self._on_open is not None:
+            self._on_open(self)
+
+    def data_received(self, data: bytes) -> None:
+        """Pass the bytes on."""
+        self._on_data(data)
+
+    def eof_received(self) -> bool:
+        """Let the transport close: nobody here speaks on half a connection."""
+        self._reason = self._reason or 'the other side closed the connection'
+        return False
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Tell why."""
+        reason = self._reason or (f'{exc}' if exc is not None else 'we closed the connection')
+        self._transport = None
+        self._on_closed(reason)
+
+    @property
+    def is_open(self) -> bool:
+        """Tell whether bytes can be sent."""
+        return self._transport is not None and not self._transport.is_closing()
+
+    @property
+    def unsent(self) -> int:
+        """Return how many bytes wait because the other side does not read [bytes]."""
+        return 0 if self._transport is None else self._transport.get_write_buffer_size()
+
+    @property
+    def local_address(self) -> str:
+        """Return our address on this connection."""
+        assert self._transport is not None
+        return str(self._transport.get_extra_info('sockname')[0])
+
+    def send(self, data: bytes) -> bool:
+        """Send bytes; False when the connection is gone."""
+        if self._transport is None or self._transport.is_closing():
+            return False
+        self._transport.write(data)
+        return True
+
+    def close(self, reason: str = '') -> None:
+        """Close after what was sent has gone out; ``reason`` is what ``on_closed`` is told."""
+        self._reason = self._reason or reason
+        if self._transport is not None:
+            self._transport.close()
+
+    def abort(self, reason: str) -> None:
+        """Close at once, whatever is still unsent."""
+        self._reason = self._reason or reason
+        if self._transport is not None:
+            self._transport.abort()
+
+
+async def dial(host: str, port: int, on_data: OnData, on_closed: OnClosed) -> Connection:
+    """
+    Connect once.
+
+    :raises OSError: nobody answers, with a text that names host and port.
+    """
+    loop = asyncio.get_running_loop()
+    try:
+        async with asyncio.timeout(CONNECT_TIMEOUT):
+            _, connection = await loop.create_connection(
+                lambda: Connection(on_data, on_closed), host, port)
+    except TimeoutError:
+        raise OSError(f'{host} port {port} does not answer within {CONNECT_TIMEOUT:g} s') from None
+    except OSError as error:
+        raise OSError(f'{host} port {port}: {error.strerror or error}') from error
+    return connection
+
+
+class Listener:
+    """
+    A TCP port on which the robot program calls; one caller at a time.
+
+    A second caller is turned away as long as the first is there, as the robot program has no use
+    for two, and a caller that is not allowed never gets through.
+    """
+
+    def __init__(self, name: str, *, on_open: Callable[[Connection], None], on_data: OnData,
+                 on_closed: OnClosed, on_refused: Callable[[str], None]) -> None:
+        """
+        Describe the port.
+
+        :param name: what the parameter of the port is called, for texts.
+        :param on_refused: a caller was turned away, and why.
+        """
+        self.name = name
+        self.port = 0
+        self.connection: Connection | None = None
+        self._on_open, self._on_data, self._on_closed = on_open, on_data, on_closed
+        self._on_refused = on_refused
+        self._server: asyncio.Server | None = None
+        self._allowed: frozenset[str] = frozenset()
+
+    async def open(self, host: str, port: int, allowed: frozenset[str]) -> None:
+        """
+        Listen.
+
+        :param port: 0 = any free one; :attr:`port` tells which.
+        :param allowed: addresses that may call; empty = all.
+        :raises OSError: the port is taken; the text names the parameter to change.
+        """
+        self._allowed = allowed
+        try:
+            self._server = await asyncio.get_running_loop().create_server(
+                self._accept, host, port, backlog=4, reuse_address=True)
+        except OSError as error:
+            raise OSError(
+                f'cannot listen on {host} port {port} ({error.strerror or error}): another '
+                f'driver may use it; set {self.name} to a free port or to 0') from error
+        self.port = int(self._server.sockets[0].getsockname()[1])
+
+    def close(self) -> None:
+        """Close the port and its connection."""
+        if self._server is not None:
+            self._server.close()
+            self._server = None
+        if self.connection is not None:
+            self.connection.abort('the driver closed the connection')
+
+    def _accept(self) -> Connection:
+        connection = Connection(self._on_data, self._ended, self._opened)
+        return connection
+
+    def _opened(self, connection: Connection) -> None:
+        assert connection._transport is not None
+        peer = str(connection._transport.get_extra_info('peername')[0])
+        if self._allowed and peer not in self._allowed:
+            self._turn_away(connection, f'{self.name}: {peer} may not connect; add it to '
+                                        'allowed_peers if it is the robot')
+        elif self.connection is not None:
+            self._turn_away(connection, f'{self.name}: {peer} was turned away, the robot program '
+                                        'is connected already')
+        else:
+            self.connection = connection
+            self._on_open(connection)
+
+    def _turn_away(self, connection: Connection, text: str) -> None:
+        connection._on_data = _ignore
+        connection._on_closed = _ignore
+        connection.abort(text)
+        self._on_refused(text)
+
+    def _ended(self, reason: str) -> None:
+        self.connection = None
+        self._on_closed(reason)
+
+
+def _ignore(_: object) -> None:
+    """Take no notice."""
