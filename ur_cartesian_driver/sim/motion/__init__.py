@@ -1,0 +1,13 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The motion generator of the simulated controller: from motion calls to one target per cycle.
+
+Pure and deterministic: no clock, no sockets. :class:`MotionGenerator` is the door; profiles are
+functions of time, geometry is a function of a path parameter, and servo laws integrate speeds.
+"""
+
+from ur_cartesian_driver.sim.motion.generator import MotionGenerator
+from ur_cartesian_driver.sim.motion.moves import MotionError, MotionFault, MotionWarning, Move
+
+__all__ = ['MotionError', 'MotionFault', 'MotionGenerator', 'MotionWarning', 'Move']

@@ -1,0 +1,557 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+From motion calls to one target per control cycle.
+
+A call (``movel`` ...) says what to do and returns a :class:`Move` at once; ``step`` does one cycle
+of it. The caller polls ``Move.returned`` and may make its next call in the same frame, then the
+motion goes on without an idle cycle.
+
+Time is dilated, never the path: by the speed scaling that comes in, and where a joint would be
+faster than it can or closer to its limit than it can brake for. Tool motions are solved by inverse
+kinematics each cycle, from the solution before; where there is none the arm creeps up to the place
+and stops there with a fault.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf, sqrt
+from typing import NamedTuple, TypeAlias
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.inverse import nearest
+from ur_cartesian_driver.motion.pose import (
+    conjugate,
+    IDENTITY,
+    multiply,
+    Pose,
+    rotation_vector_from_quaternion,
+    Vector6,
+)
+from ur_cartesian_driver.sim.motion.moves import MotionError, MotionFault, MotionWarning, Move
+from ur_cartesian_driver.sim.motion.paths import Arc, JointLine, Leg, Line, Place
+from ur_cartesian_driver.sim.motion.servo import JointSpeed, JointStop, Servo, ToolSpeed, ToolStop
+from ur_cartesian_driver.sim.motion.track import from_rest, joined, Law, Track
+
+_Motion: TypeAlias = Track | JointSpeed | JointStop | Servo | ToolSpeed | ToolStop
+_Speeding = JointSpeed | Servo | ToolSpeed
+_Stop = JointStop | ToolStop
+
+# Assumptions, the robot's numbers are not published:
+#: What optimove's fractions are of [rad/s^2] and [rad/s^3]; also bounds servoj.
+MAX_JOINT_ACCELERATION = 40.0
+MAX_JOINT_JERK = 400.0
+#: How hard a joint can brake before the end of its range [rad/s^2].
+LIMIT_BRAKING = 10.0
+#: How hard the arm brakes when servoj set-points stay away [rad/s^2].
+SERVO_BRAKING = 15.0
+#: Joint travel per tool travel [rad/m, rad/rad] beyond which the arm counts as singular.
+SINGULAR_RATE = 1000.0
+#: Still this long [s]: steady.
+STEADY_AFTER = 0.5
+
+# Cycles are shortened this often before a place counts as out of reach.
+_ATTEMPTS = 12
+_WITHIN = 1.0 + 1e-6
+# Joint changes below this are rounding [rad].
+_NO_CHANGE = 1e-9
+# As near to its limit a joint is the reason why there is no solution [rad].
+_AT_LIMIT = 0.02
+# Blends that touch do not overlap [m].
+_TOUCHING = 1e-9
+_STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_OPTIMOVE_SAMPLES = 8
+
+# Error codes of waypoints that were skipped, by the kind of move: C171 and its argument.
+_SKIPPED = {'movej': 4, 'optimovej': 4, 'movel': 11, 'optimovel': 11, 'movec': 0, 'movep': 9}
+
+
+class _Start(NamedTuple):
+    """Where a leg begins: joint positions [rad], and T_base_tcp."""
+
+    q: Vector6
+    pose: Pose
+
+
+class _Call(NamedTuple):
+    """A call of a path motion, to be resolved where the leg begins."""
+
+    name: str
+    leg: Callable[[_Start], Leg]
+    law: Callable[[Leg, _Start], Law]
+    radius: float
+    move: Move
+
+
+class MotionGenerator:
+    """
+    The target of the arm, one control cycle after the other.
+
+    ``q``, ``qd``, ``qdd`` [rad, rad/s, rad/s^2], ``T_base_tcp`` and ``tcp_twist`` (base axes,
+    [m/s, rad/s]) are the targets of the last cycle. Speeds are those over the cycle: differences
+    of positions, so that they always fit these.
+
+    ``warnings`` collects what the controller has to report; it takes them out. After a ``fault``
+    the arm stands until ``clear_fault``.
+
+    :param cycle: [s].
+    :param q: where the arm stands [rad].
+    """
+
+    def __init__(self, arm: Arm, cycle: float, q: Vector6) -> None:
+        """Stand still at ``q`` with the flange as TCP."""
+        self.arm = arm
+        self.cycle = cycle
+        self.fault: MotionFault | None = None
+        self.warnings: list[MotionWarning] = []
+        self._T_flange_tcp = self._used_tcp = self._T_tcp_flange = IDENTITY
+        self._speeds = arm.model.max_joint_speed
+        self._limits = arm.model.position_limits
+        self._scale = 1.0
+        self._motion: _Motion | None = None
+        self._move: Move | None = None
+        #: What waits until the arm stands.
+        self._then: _Call | None = None
+        #: Whether the last leg is a movep's.
+        self._circular = False
+        #: What was before a waypoint that may be skipped.
+        self._overlapping: tuple[Track | None, bool, str] | None = None
+        self.teleport(q)
+
+    @property
+    def T_flange_tcp(self) -> Pose:
+        """The tool centre point. A change takes effect on the next call, not on a running one."""
+        return self._T_flange_tcp
+
+    @T_flange_tcp.setter
+    def T_flange_tcp(self, pose: Pose) -> None:
+        self._T_flange_tcp = pose
+        self.T_base_tcp = self._forward(self.q)
+
+    @property
+    def moving(self) -> bool:
+        """Whether the target moved in the last cycle or is about to."""
+        return self._motion is not None or self.qd != _STILL
+
+    @property
+    def steady(self) -> bool:
+        """Whether the target has stood still for half a second."""
+        return self._still_for >= STEADY_AFTER - 0.5 * self.cycle
+
+    # -- calls -------------------------------------------------------------------------------
+
+    def movej(self, q: Vector6, a: float = 1.4, v: float = 1.05, t: float = 0.0,
+              r: float = 0.0) -> Move:
+        """Go straight in joint space; a, v of the leading axis [rad/s^2, rad/s], r [m]."""
+        return self._follow('movej', self._joint_leg(q), Law(acceleration=a, speed=v, time=t), r)
+
+    def movel(self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, t: float = 0.0,
+              r: float = 0.0) -> Move:
+        """Go straight with the tool; a, v [m/s^2, m/s; for rotations rad], t [s], r [m]."""
+        return self._follow('movel', lambda start: Line(start.pose, T_base_tcp),
+                            Law(acceleration=a, speed=v, time=t), r)
+
+    def movep(self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, r: float = 0.0) -> Move:
+        """
+        Go straight at constant tool speed, through circular fillets.
+
+        The speed holds until the fillet: if no other motion follows, the arm brakes within it,
+        harder than ``a`` where it has to.
+        """
+        return self._follow('movep', lambda start: Line(start.pose, T_base_tcp),
+                            _constant(a, v, r), r)
+
+    def movec(self, via: Pose, to: Pose, a: float = 1.2, v: float = 0.25, r: float = 0.0,
+              mode: int = 0) -> Move:
+        """
+        Go on a circle; mode 1 keeps the orientation fixed to the tangent.
+
+        :raises MotionError: the three points do not lie on a circle.
+        """
+        return self._follow('movec', lambda start: Arc(start.pose, via.position, to, mode == 1),
+                            Law(acceleration=a, speed=v), r)
+
+    def optimovej(self, q: Vector6, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
+        """Like movej with limited jerk; a, v fractions in (0, 1] of what the joints can do."""
+        _check_fractions('optimovej', a, v, r)
+        return self._follow('optimovej', self._joint_leg(q),
+                            lambda leg, start: self._optimal(leg, start, a, v), r)
+
+    def optimovel(self, T_base_tcp: Pose, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
+        """Like movel with limited jerk; a, v fractions in (0, 1] of what the joints can do."""
+        _check_fractions('optimovel', a, v, r)
+        return self._follow('optimovel', lambda start: Line(start.pose, T_base_tcp),
+                            lambda leg, start: self._optimal(leg, start, a, v), r)
+
+    def servoj(self, q: Vector6, t: float, lookahead_time: float = 0.1,
+               gain: float = 300.0) -> Move:
+        """Be drawn to ``q`` for ``t`` scaled seconds."""
+        servo = Servo(self.q, self._nominal_joint_speed(), q, t, lookahead_time, gain,
+                      MAX_JOINT_ACCELERATION)
+        return self._take_over(servo)
+
+    def speedj(self, qd: Vector6, a: float, t: float | None = None) -> Move:
+        """Change to joint speeds [rad/s] and hold them; return after ``t`` or when reached."""
+        return self._take_over(JointSpeed(self.q, self._nominal_joint_speed(), qd, a, t))
+
+    def speedl(self, twist: Vector6, a: float, t: float | None = None,
+               a_rot: float | None = None) -> Move:
+        """Change to a tool speed (base axes [m/s, rad/s]) and hold it."""
+        motion = self._motion
+        now = motion.twist if isinstance(motion, ToolSpeed) else self._unscaled(self.tcp_twist)
+        return self._take_over(ToolSpeed(
+            self.T_base_tcp, now, twist, a, a if a_rot is None else a_rot, t))
+
+    def stopj(self, a: float) -> Move:
+        """Brake in joint space at ``a`` [rad/s^2]; in real time, the path is not kept."""
+        return self._take_over(JointStop(self.q, self._real_joint_speed(), a))
+
+    def stopl(self, a: float, a_rot: float | None = None) -> Move:
+        """Brake along the tool's tangent; in real time."""
+        twist = self.tcp_twist if self._motion is not None else _STILL
+        return self._take_over(ToolStop(
+            self.T_base_tcp, twist, a, a if a_rot is None else a_rot))
+
+    def halt_hard(self) -> None:
+        """Stay where the target is (the power is cut); a running call returns as aborted."""
+        self._abort()
+        self._motion = None
+        self._stand()
+
+    def clear_fault(self) -> None:
+        """Allow motion again; the call that failed goes on from where the arm stands."""
+        self.fault = None
+
+    def teleport(self, q: Vector6) -> None:
+        """Stand at ``q`` [rad] without having moved there."""
+        self.q, self.qd, self.qdd = q, _STILL, _STILL
+        self.T_base_tcp = self._forward(q)
+        self.tcp_twist = _STILL
+        self._motion = self._move = self._then = self._overlapping = None
+        self._still_for = inf
+
+    # -- one cycle ---------------------------------------------------------------------------
+
+    def step(self, scale: float) -> None:
+        """Do one cycle at ``scale`` (0 to 1) of the speed: path unchanged, 0 is a pause."""
+        self._overlapping = None
+        self._scale = scale
+        if self.fault is not None:
+            self._stand()
+            return
+        if isinstance(self._motion, _Speeding) and self._motion.over:
+            self._motion = self._run_out(self._motion)
+        motion = self._motion
+        if motion is None:
+            self._stand()
+            return
+        reached = self._attempt(motion, self.cycle if motion.real_time else scale * self.cycle)
+        if reached is None:
+            self._stand()
+            return
+        self._go(*reached)
+        self._report(motion)
+
+    def _attempt(self, motion: _Motion, h: float) -> tuple[Vector6, Place] | None:
+        """Advance by ``h`` seconds or as far as the joints can follow; None: not at all."""
+        place: Place = self.q
+        for _ in range(_ATTEMPTS):
+            place, state = motion.preview(h)
+            q = self._joints(place)
+            if q is None:
+                h *= 0.5
+                continue
+            ratio = self._overspeed(q)
+            if ratio <= _WITHIN or (ratio < inf and isinstance(motion, JointStop)):
+                motion.accept(state)
+                return q, place
+            if ratio == inf or self._is_singular(q, place):
+                break
+            h /= ratio
+        if isinstance(motion, ToolStop):
+            # No straight line left: brake in joint space.
+            stop = self._motion = JointStop(self.q, self.qd, motion.acceleration)
+            return self._attempt(stop, self.cycle)
+        self.fault = self._why_not(place)
+        return None
+
+    def _joints(self, place: Place) -> Vector6 | None:
+        if not isinstance(place, Pose):
+            return place
+        return nearest(self.arm, place @ self._T_tcp_flange, self.q)
+
+    def _overspeed(self, q: Vector6) -> float:
+        """
+        Return by which factor the way to ``q`` is too long for one cycle; inf: no way.
+
+        A joint may be as fast as its limit says, and no faster than it can still brake before
+        the end of its range: v^2 = 2 a x.
+        """
+        worst = 0.0
+        for new, old, fastest, (low, high) in zip(
+                q, self.q, self._speeds, self._limits, strict=True):
+            way = abs(new - old)
+            if way < _NO_CHANGE:
+                continue
+            room = high - old if new > old else old - low
+            allowed = fastest * self.cycle
+            if 2.0 * LIMIT_BRAKING * room < fastest * fastest:
+                if room <= _NO_CHANGE:
+                    return inf
+                allowed = min(allowed, room, sqrt(2.0 * LIMIT_BRAKING * room) * self.cycle)
+            worst = max(worst, way / allowed)
+        return worst
+
+    def _is_singular(self, q: Vector6, place: Place) -> bool:
+        if not isinstance(place, Pose):
+            return False
+        way = place.distance_to(self.T_base_tcp) + place.angle_to(self.T_base_tcp)
+        return _lead(q, self.q) > SINGULAR_RATE * way
+
+    def _why_not(self, place: Place) -> MotionFault:
+        for i, (q, (low, high)) in enumerate(zip(self.q, self._limits, strict=True)):
+            if q - low < _AT_LIMIT or high - q < _AT_LIMIT:
+                return MotionFault(code=191, argument=1, text=(
+                    f'Joint position limit: joint {i} stands at {q:.4f} rad and would leave '
+                    f'[{low:.4f}, {high:.4f}].'))
+        q_next = self._joints(place)
+        if q_next is None:
+            return MotionFault(code=154, argument=0, text=(
+                'Position in singularity: the path goes on where there is no inverse kinematics '
+                'solution.'))
+        return MotionFault(code=204, argument=7, text=(
+            'Robot approaching singularity: acceleration threshold failed, joint '
+            f'{_leading(q_next, self.q)} would have to turn at once.'))
+
+    def _go(self, q: Vector6, place: Place) -> None:
+        """Make it the target."""
+        pose = place if isinstance(place, Pose) and self._tcp_kept else self._forward(q)
+        rate = 1.0 / self.cycle
+        self.tcp_twist = _twist(self.T_base_tcp, pose, rate)
+        qd = _rate(q, self.q, rate)
+        self.qdd = _rate(qd, self.qd, rate)
+        self.q, self.qd, self.T_base_tcp = q, qd, pose
+        self._still_for = 0.0 if _lead(qd, _STILL) > _NO_CHANGE else self._still_for + self.cycle
+
+    def _stand(self) -> None:
+        self.qdd = _rate(_STILL, self.qd, 1.0 / self.cycle)
+        self.qd = self.tcp_twist = _STILL
+        self._still_for += self.cycle
+
+    def _report(self, motion: _Motion) -> None:
+        """Let the call return when it may, and what waited for rest begin."""
+        move = self._move
+        if isinstance(motion, Track):
+            if move is not None and motion.may_return(self.cycle):
+                move.returned = True
+            if motion.finished:
+                self._motion = None
+        elif isinstance(self._motion, _Stop):
+            if self._motion.over:
+                self._motion = None
+                self._come_to_rest()
+        elif move is not None and motion.over:
+            move.returned = True
+
+    def _come_to_rest(self) -> None:
+        if self._move is not None:
+            self._move.returned = True
+        if self._then is not None:
+            call, self._then = self._then, None
+            try:
+                self._begin(call)
+            except MotionError as error:
+                self.fault = MotionFault(code=171, argument=0, text=str(error))
+
+    def _run_out(self, motion: JointSpeed | Servo | ToolSpeed) -> _Motion:
+        """Brake, because nobody has called again in time."""
+        if isinstance(motion, ToolSpeed):
+            return ToolStop(self.T_base_tcp, self.tcp_twist, motion.acceleration,
+                            motion.acceleration_rot)
+        a = SERVO_BRAKING if isinstance(motion, Servo) else motion.acceleration
+        return JointStop(self.q, self._real_joint_speed(), a)
+
+    # -- beginning a motion ------------------------------------------------------------------
+
+    def _joint_leg(self, q: Vector6) -> Callable[[_Start], Leg]:
+        return lambda start: JointLine(start.q, q, self._forward)
+
+    def _follow(self, name: str, leg: Callable[[_Start], Leg],
+                law: Law | Callable[[Leg, _Start], Law], radius: float) -> Move:
+        chosen = (lambda _leg, _start: law) if isinstance(law, Law) else law
+        call = _Call(name, leg, chosen, radius, Move())
+        self._begin(call)
+        return call.move
+
+    def _begin(self, call: _Call) -> None:
+        self._skip_overlapping()
+        motion = self._motion
+        if isinstance(motion, Track) and motion.tip.radius > 0.0 and motion.tip.call.returned:
+            self._join(motion, call)
+        elif motion is None:
+            self._set_out(call)
+        else:
+            # A path begins at rest or in a blend, nowhere else: brake first.
+            self._take_over(JointStop(self.q, self._real_joint_speed(), SERVO_BRAKING))
+            self._move = call.move
+            self._then = call
+            if self._motion is None:
+                self._come_to_rest()
+
+    def _set_out(self, call: _Call) -> None:
+        """Begin from rest."""
+        self._use_tcp()
+        start = _Start(self.q, self.T_base_tcp)
+        leg = call.leg(start)
+        track = from_rest(leg, call.law(leg, start), call.radius, call.move)
+        room = _length(start.pose, leg) - call.radius
+        self._run(None, track, call, room)
+
+    def _join(self, track: Track, call: _Call) -> None:
+        """Go on from a leg whose blend is about to begin or has begun."""
+        before = track.tip
+        pose = before.leg.pose(before.leg.length)
+        q = (before.leg.end if isinstance(before.leg, JointLine) else self._joints(pose)) or self.q
+        if not self._tcp_kept:
+            pose = self._forward(q)
+        start = _Start(q, pose)
+        leg = call.leg(start)
+        law = call.law(leg, start)
+        circular = call.name == 'movep' and self._circular
+        blended, whole = joined(track, leg, law, call.radius, call.move, circular)
+        if not whole:
+            self.warnings.append(MotionWarning(code=197, argument=0, text=(
+                f'{call.name}: no blend around the waypoint before, the arm stops there.')))
+        room = _length(pose, leg) - call.radius - (before.radius if call.radius > 0.0 else 0.0)
+        self._run(track, blended, call, room)
+
+    def _run(self, before: Track | None, track: Track, call: _Call, room: float) -> None:
+        """
+        Follow a track.
+
+        A waypoint whose blend reaches into the one before (``room`` [m] is missing) is skipped
+        if the program goes on at once; if nothing follows, the arm goes there.
+        """
+        overlapping = call.radius > 0.0 and room < -_TOUCHING
+        self._overlapping = (before, self._circular, call.name) if overlapping else None
+        self._circular = call.name == 'movep'
+        self._motion, self._move = track, call.move
+        call.move.returned = overlapping or track.may_return(self.cycle)
+        if before is None and track.pieces[0].profile.duration <= 0.0:
+            self._motion, call.move.returned = None, True
+
+    def _skip_overlapping(self) -> None:
+        """Forget a waypoint that overlaps, now that another motion follows at once."""
+        if self._overlapping is None:
+            return
+        self._motion, self._circular, name = self._overlapping
+        self._overlapping = None
+        self.warnings.append(MotionWarning(code=171, argument=_SKIPPED[name], text=(
+            f'Overlapping blends in a {name}, a waypoint was skipped.')))
+
+    def _take_over(self, motion: _Motion) -> Move:
+        """Run a motion without a path from now on."""
+        self._abort()
+        self._use_tcp()
+        self._motion, self._move = motion, Move()
+        if isinstance(motion, _Stop) and motion.over:
+            self._motion, self._move.returned = None, True
+        elif isinstance(motion, _Speeding) and motion.duration is not None:
+            self._move.returned = motion.over
+        return self._move
+
+    def _abort(self) -> None:
+        if self._move is not None and not self._move.returned:
+            self._move.returned = self._move.aborted = True
+        self._then = self._overlapping = None
+
+    # -- kinematics --------------------------------------------------------------------------
+
+    def _forward(self, q: Vector6) -> Pose:
+        return self.arm.forward(q) @ self._T_flange_tcp
+
+    def _use_tcp(self) -> None:
+        self._T_tcp_flange = self._T_flange_tcp.inverse()
+        self._used_tcp = self._T_flange_tcp
+
+    @property
+    def _tcp_kept(self) -> bool:
+        return self._used_tcp is self._T_flange_tcp
+
+    def _real_joint_speed(self) -> Vector6:
+        return _STILL if self._motion is None else self.qd
+
+    def _nominal_joint_speed(self) -> Vector6:
+        """Return the joint speed as it would be without speed scaling."""
+        if isinstance(self._motion, JointSpeed | Servo):
+            return self._motion.qd
+        return self._unscaled(self._real_joint_speed())
+
+    def _unscaled(self, speed: Vector6) -> Vector6:
+        if self._motion is None or self._scale <= 0.0:
+            return _STILL
+        return _rate(speed, _STILL, 1.0 / self._scale)
+
+    def _optimal(self, leg: Leg, start: _Start, a: float, v: float) -> Law:
+        """Return the fastest law of a leg that no joint minds, times the fractions."""
+        places = [leg.at(leg.length * i / _OPTIMOVE_SAMPLES) for i in range(_OPTIMOVE_SAMPLES + 1)]
+        step = leg.length / _OPTIMOVE_SAMPLES or 1.0
+        q, speed, acceleration = start.q, inf, inf
+        for place in places[1:]:
+            after = place if not isinstance(place, Pose) else nearest(
+                self.arm, place @ self._T_tcp_flange, q)
+            if after is None:
+                break
+            rates = [abs(x - y) / step for x, y in zip(after, q, strict=True)]
+            speed = min([speed, *(limit / rate for limit, rate in zip(
+                self._speeds, rates, strict=True) if rate > 0.0)])
+            acceleration = min([acceleration, *(
+                MAX_JOINT_ACCELERATION / rate for rate in rates if rate > 0.0)])
+            q = after
+        if speed == inf:
+            speed, acceleration = 1.0, 1.0
+        jerk = acceleration * MAX_JOINT_JERK / MAX_JOINT_ACCELERATION
+        return Law(acceleration=a * acceleration, speed=v * speed, jerk=jerk)
+
+
+def _constant(a: float, v: float, r: float) -> Law:
+    # To stand in the waypoint without having slowed down before the fillet: v^2 = 2 b r.
+    braking = max(a, v * v / (2.0 * r)) if r > 0.0 else None
+    return Law(acceleration=a, speed=v, braking=braking)
+
+
+def _check_fractions(name: str, a: float, v: float, r: float) -> None:
+    for word, value in (('acceleration', a), ('velocity', v)):
+        if not 0.0 < value <= 1.0:
+            raise MotionError(f'{name}: {word} is {value:g}, it must be a fraction in (0, 1].')
+    if r < 0.0:
+        raise MotionError(f'{name}: the blend radius is {r:g} m, it must not be negative.')
+
+
+def _length(start: Pose, leg: Leg) -> float:
+    """Return how far the waypoint is from the start [m]."""
+    return start.distance_to(leg.pose(leg.length))
+
+
+def _lead(a: Vector6, b: Vector6) -> float:
+    return max(abs(a[0] - b[0]), abs(a[1] - b[1]), abs(a[2] - b[2]),
+               abs(a[3] - b[3]), abs(a[4] - b[4]), abs(a[5] - b[5]))
+
+
+def _leading(a: Vector6, b: Vector6) -> int:
+    return max(range(6), key=lambda i: abs(a[i] - b[i]))
+
+
+def _rate(a: Vector6, b: Vector6, f: float) -> Vector6:
+    return ((a[0] - b[0]) * f, (a[1] - b[1]) * f, (a[2] - b[2]) * f,
+            (a[3] - b[3]) * f, (a[4] - b[4]) * f, (a[5] - b[5]) * f)
+
+
+def _twist(before: Pose, after: Pose, rate: float) -> Vector6:
+    """Return the mean twist between two poses, base axes."""
+    (ax, ay, az), (bx, by, bz) = before.position, after.position
+    wx, wy, wz = rotation_vector_from_quaternion(
+        multiply(after.quaternion, conjugate(before.quaternion)))
+    return ((bx - ax) * rate, (by - ay) * rate, (bz - az) * rate,
+            wx * rate, wy * rate, wz * rate)

@@ -1,0 +1,43 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What callers and generator tell each other: calls under way, faults, warnings, errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+class MotionError(Exception):
+    """A motion call makes no sense; nothing has moved. The text is for the program's user."""
+
+
+@dataclass(slots=True)
+class Move:
+    """
+    One motion call under way.
+
+    ``returned`` becomes true when the script call may return: the waypoint is reached, the next
+    cycle enters its blend, the stop has ended, the time is over. The arm may go on moving.
+    ``aborted`` says that it returned because something else took over.
+    """
+
+    returned: bool = False
+    aborted: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionFault:
+    """Why the arm stopped by itself: a robot error code ``C<code>A<argument>`` and its text."""
+
+    code: int
+    argument: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MotionWarning:
+    """A robot error code of warning level; the motion goes on."""
+
+    code: int
+    argument: int
+    text: str

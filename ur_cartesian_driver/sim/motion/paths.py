@@ -1,0 +1,355 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The geometry of motion: where the arm is at a path parameter, with no notion of time.
+
+A leg runs from 0 to its ``length``: joint lines in radians of the leading axis, lines and arcs of
+the tool in metres (in radians where the rotation is the larger number). A corner runs from 0 to 1
+and replaces the end of one leg and the beginning of the next. A place is six joint positions or a
+pose of the TCP in the base.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import atan2, cos, hypot, pi, sin, sqrt, tan
+from typing import Protocol, TypeAlias
+
+from ur_cartesian_driver.motion.pose import (
+    conjugate,
+    distance,
+    multiply,
+    Pose,
+    quaternion_from_rotation_vector,
+    Vector3,
+    Vector6,
+)
+from ur_cartesian_driver.sim.motion.moves import MotionError
+
+Place: TypeAlias = Vector6 | Pose
+
+# Three points of an arc nearer than this [m], or in line within this sine, make no circle.
+_COINCIDENT = 1e-6
+_COLLINEAR = 1e-6
+# Where a leg leaves a sphere: samples until it is outside, then steps to find the border.
+_SAMPLES = 24
+_REFINEMENTS = 50
+_ON_BORDER = 1e-12
+# Legs that go straight on, or straight back, have no circular fillet [rad].
+_STRAIGHT = 1e-6
+
+
+class Path(Protocol):
+    """What both legs and corners can do."""
+
+    def at(self, s: float) -> Place:
+        """Return the place at the path parameter."""
+        ...
+
+
+class Leg(Protocol):
+    """The way to one waypoint."""
+
+    @property
+    def length(self) -> float:
+        """The largest path parameter."""
+        ...
+
+    def at(self, s: float) -> Place:
+        """Return the place, the exact waypoint from ``length`` on."""
+        ...
+
+    def pose(self, s: float) -> Pose:
+        """Return T_base_tcp."""
+        ...
+
+
+class JointLine:
+    """
+    A straight line in joint space [rad]; all joints share the path parameter.
+
+    :param forward: joint positions to T_base_tcp.
+    """
+
+    def __init__(self, start: Vector6, end: Vector6,
+                 forward: Callable[[Vector6], Pose]) -> None:
+        """Take the leading axis: the one with the longest way."""
+        self.start, self.end, self._forward = start, end, forward
+        self._way = tuple(b - a for a, b in zip(start, end, strict=True))
+        self.length = max(abs(way) for way in self._way)
+
+    def at(self, s: float) -> Vector6:
+        """Return the joint positions [rad]."""
+        if s >= self.length:
+            return self.end
+        f = s / self.length
+        a, w = self.start, self._way
+        return (a[0] + f * w[0], a[1] + f * w[1], a[2] + f * w[2],
+                a[3] + f * w[3], a[4] + f * w[4], a[5] + f * w[5])
+
+    def pose(self, s: float) -> Pose:
+        """Return T_base_tcp."""
+        return self._forward(self.at(s))
+
+
+class Line:
+    """
+    A straight line of the tool with the shortest rotation.
+
+    Its length is the distance [m] or the angle [rad], whichever number is larger: the robot has
+    one speed for both, which neither may exceed.
+    """
+
+    def __init__(self, start: Pose, end: Pose) -> None:
+        """Measure the way."""
+        self.start, self.end = start, end
+        self.distance = start.distance_to(end)
+        self.length = max(self.distance, start.angle_to(end))
+
+    def at(self, s: float) -> Pose:
+        """Return T_base_tcp."""
+        return self.end if s >= self.length else self.start.interpolate(self.end, s / self.length)
+
+    pose = at
+
+
+class Arc:
+    """
+    A circle through three points.
+
+    Unconstrained, the orientation turns the shortest way from start to end, whatever it is at
+    ``via``, and counts in the length as on a line. Fixed, it stays as it is relative to the
+    tangent, and the end's orientation is ignored; the length is that of the arc.
+
+    :raises MotionError: the three points do not lie on a circle.
+    """
+
+    def __init__(self, start: Pose, via: Vector3, end: Pose, fixed: bool) -> None:
+        """Find centre, axes and angle of the arc."""
+        a, b = _minus(via, start.position), _minus(end.position, start.position)
+        n = _cross(a, b)
+        _check_circle(a, b, n)
+        # The centre of the circle through 0, a, b: (|a|^2 b - |b|^2 a) x n / 2|n|^2.
+        aa, bb, nn = _dot(a, a), _dot(b, b), _dot(n, n)
+        offset = _times(_cross(_minus(_times(b, aa), _times(a, bb)), n), 0.5 / nn)
+        self.centre = _plus(start.position, offset)
+        self.radius = _norm(offset)
+        self.normal = _times(n, 1.0 / sqrt(nn))
+        self._x = _times(offset, -1.0 / self.radius)
+        self._y = _cross(self.normal, self._x)
+        self.angle = self._angle_of(end.position)
+        self.start, self._fixed = start, fixed
+        self.end = self._place(self.angle) if fixed else end
+        self.length = self.radius * self.angle
+        if not fixed:
+            self.length = max(self.length, start.angle_to(end))
+
+    def at(self, s: float) -> Pose:
+        """Return T_base_tcp."""
+        return self.end if s >= self.length else self._place(self.angle * s / self.length)
+
+    pose = at
+
+    def _angle_of(self, point: Vector3) -> float:
+        # The normal is such that start, via, end come in this order with growing angle.
+        r = _minus(point, self.centre)
+        return atan2(_dot(r, self._y), _dot(r, self._x)) % (2.0 * pi)
+
+    def _place(self, angle: float) -> Pose:
+        position = _plus(self.centre, _plus(
+            _times(self._x, self.radius * cos(angle)), _times(self._y, self.radius * sin(angle))))
+        if self._fixed:
+            turn = quaternion_from_rotation_vector(_times(self.normal, angle))
+            return Pose(position, multiply(turn, self.start.quaternion))
+        fraction = angle / self.angle
+        return Pose(position, self.start.interpolate(self.end, fraction).quaternion)
+
+
+class JointCorner:
+    """
+    Two joint legs at once: one brakes to the waypoint while the next one sets out.
+
+    q(u) = q1(s1(u)) + q2(s2(u)) - q_waypoint with s1 = L1 - r1 (1 - u)^2 and s2 = r2 u^2: both
+    legs are left and met on their tangent, a parabola between straight lines.
+    """
+
+    def __init__(self, before: JointLine, tail: float, after: JointLine, head: float) -> None:
+        """Blend the last ``tail`` of one leg with the first ``head`` of the next."""
+        self._before, self._after, self._tail, self._head = before, after, tail, head
+        self.entry_rate, self.exit_rate = 2.0 * tail, 2.0 * head
+
+    def at(self, u: float) -> Vector6:
+        """Return the joint positions [rad]."""
+        if u >= 1.0:
+            return self._after.at(self._head)
+        a = self._before.at(self._before.length - self._tail * (1.0 - u) ** 2)
+        b = self._after.at(self._head * u * u)
+        w = self._before.end
+        return (a[0] + b[0] - w[0], a[1] + b[1] - w[1], a[2] + b[2] - w[2],
+                a[3] + b[3] - w[3], a[4] + b[4] - w[4], a[5] + b[5] - w[5])
+
+
+class ToolCorner:
+    """
+    The same of two poses: positions add, rotations follow each other.
+
+    p = p1 + p2 - p_waypoint, R = R1 R_waypoint^-1 R2. Between straight lines the position runs on
+    the parabola with the waypoint as its control point, inside the corner.
+    """
+
+    def __init__(self, before: Leg, tail: float, after: Leg, head: float) -> None:
+        """Blend the last ``tail`` of one leg with the first ``head`` of the next."""
+        self._before, self._after, self._tail, self._head = before, after, tail, head
+        self._waypoint = before.pose(before.length)
+        self.entry_rate, self.exit_rate = 2.0 * tail, 2.0 * head
+
+    def at(self, u: float) -> Pose:
+        """Return T_base_tcp."""
+        if u >= 1.0:
+            return self._after.pose(self._head)
+        a = self._before.pose(self._before.length - self._tail * (1.0 - u) ** 2)
+        b = self._after.pose(self._head * u * u)
+        back = conjugate(self._waypoint.quaternion)
+        return Pose(_minus(_plus(a.position, b.position), self._waypoint.position),
+                    multiply(a.quaternion, multiply(back, b.quaternion)))
+
+
+class Fillet:
+    """
+    A circular arc tangent to two straight legs at equal distances d from the waypoint.
+
+    Where the direction turns by phi its radius is d / tan(phi/2): d itself in a right angle.
+    The orientation is that of :class:`ToolCorner`, the position runs evenly.
+    """
+
+    def __init__(self, before: Line, tail: float, after: Line, head: float) -> None:
+        """Blend the last ``tail`` of one line with the first ``head`` of the next."""
+        self._turn = ToolCorner(before, tail, after, head)
+        entry = before.pose(before.length - tail).position
+        waypoint = before.end.position
+        into = _unit(_minus(waypoint, entry))
+        onwards = _unit(_minus(after.end.position, waypoint))
+        self.angle = fillet_angle(before, after)
+        self.radius = distance(entry, waypoint) / tan(0.5 * self.angle)
+        inwards = _unit(_minus(onwards, _times(into, _dot(onwards, into))))
+        self.centre = _plus(entry, _times(inwards, self.radius))
+        self._x, self._y = _times(inwards, -1.0), into
+        arc = self.radius * self.angle
+        self.entry_rate = arc * before.length / before.distance
+        self.exit_rate = arc * after.length / after.distance
+
+    def at(self, u: float) -> Pose:
+        """Return T_base_tcp."""
+        turned = self._turn.at(u)
+        if u >= 1.0:
+            return turned
+        phi = self.angle * u
+        return Pose(_plus(self.centre, _plus(
+            _times(self._x, self.radius * cos(phi)), _times(self._y, self.radius * sin(phi)))),
+            turned.quaternion)
+
+
+Corner: TypeAlias = JointCorner | ToolCorner | Fillet
+
+
+def fillet_angle(before: Line, after: Line) -> float:
+    """Return by how much the direction turns [rad]."""
+    a = _unit(_minus(before.end.position, before.start.position))
+    b = _unit(_minus(after.end.position, after.start.position))
+    return 2.0 * atan2(_norm(_minus(a, b)), _norm(_plus(a, b)))
+
+
+def corner(before: Leg, tail: float, after: Leg, head: float, circular: bool) -> Corner:
+    """
+    Join two legs: joint lines in joint space, all others in the tool's space.
+
+    :param circular: by a circle, where both are lines that meet at an angle.
+    """
+    if isinstance(before, JointLine) and isinstance(after, JointLine):
+        return JointCorner(before, tail, after, head)
+    if (circular and isinstance(before, Line) and isinstance(after, Line)
+            and _STRAIGHT < fillet_angle(before, after) < pi - _STRAIGHT):
+        return Fillet(before, tail, after, head)
+    return ToolCorner(before, tail, after, head)
+
+
+def head_within(leg: Leg, radius: float) -> float | None:
+    """Return the parameter at which the tool is ``radius`` [m] from the leg's beginning."""
+    if isinstance(leg, Line):
+        return leg.length * radius / leg.distance if leg.distance > radius else None
+    return _leave(leg.pose, radius, leg.length)
+
+
+def tail_within(leg: Leg, radius: float) -> float | None:
+    """Return how much before the end (as parameter) the tool is ``radius`` [m] from the end."""
+    if isinstance(leg, Line):
+        return head_within(leg, radius)
+    return _leave(lambda s: leg.pose(leg.length - s), radius, leg.length)
+
+
+def _leave(pose: Callable[[float], Pose], radius: float, length: float) -> float | None:
+    """Return the first parameter at which the pose is ``radius`` [m] from its origin."""
+    origin = pose(0.0).position
+    low, f_low = 0.0, -radius
+    for i in range(1, _SAMPLES + 1):
+        high = length * i / _SAMPLES
+        f_high = distance(pose(high).position, origin) - radius
+        if f_high > 0.0:
+            break
+        low, f_low = high, f_high
+    else:
+        return None
+    # Regula falsi with the Illinois correction: the stale end counts half.
+    side = 0
+    for _ in range(_REFINEMENTS):
+        middle = (low * f_high - high * f_low) / (f_high - f_low)
+        f = distance(pose(middle).position, origin) - radius
+        if abs(f) < _ON_BORDER:
+            return middle
+        if f < 0.0:
+            low, f_low = middle, f
+            f_high, side = (0.5 * f_high if side < 0 else f_high), -1
+        else:
+            high, f_high = middle, f
+            f_low, side = (0.5 * f_low if side > 0 else f_low), 1
+    return 0.5 * (low + high)
+
+
+def _check_circle(a: Vector3, b: Vector3, n: Vector3) -> None:
+    sides = _norm(a), _norm(b), _norm(_minus(b, a))
+    if min(sides) < _COINCIDENT:
+        raise MotionError(
+            'movec needs three different points: start, via and target; two of them are '
+            f'{min(sides):.2g} m apart. A full circle takes two arcs.')
+    if _norm(n) < _COLLINEAR * sides[0] * sides[1]:
+        raise MotionError(
+            'movec: start, via and target lie on one straight line, which is no circle; '
+            'use movel or move the via point aside.')
+
+
+def _plus(a: Vector3, b: Vector3) -> Vector3:
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+def _minus(a: Vector3, b: Vector3) -> Vector3:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def _times(a: Vector3, f: float) -> Vector3:
+    return (a[0] * f, a[1] * f, a[2] * f)
+
+
+def _dot(a: Vector3, b: Vector3) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Vector3, b: Vector3) -> Vector3:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def _norm(a: Vector3) -> float:
+    return hypot(a[0], a[1], a[2])
+
+
+def _unit(a: Vector3) -> Vector3:
+    return _times(a, 1.0 / _norm(a))

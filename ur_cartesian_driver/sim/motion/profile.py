@@ -1,0 +1,219 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where on a path at which time: trapezoids, timed moves, ramps and S-curves.
+
+A profile is a chain of phases of constant jerk (zero for all but the S-curve). Its parameter has
+whatever unit the path has: metres, radians of the leading axis, or none. All profiles end at
+rest, except :func:`ramp`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import sqrt
+
+_BISECTIONS = 80
+#: A timed move spends these shares of its time on speeding up and on braking.
+TIMED_RAMP = 1.0 / 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Phase:
+    """Constant jerk from ``time`` on: position, speed and acceleration hold at its beginning."""
+
+    time: float
+    position: float
+    speed: float
+    acceleration: float
+    jerk: float
+
+    def position_after(self, t: float) -> float:
+        return self.position + t * (
+            self.speed + t * (self.acceleration / 2.0 + t * self.jerk / 6.0))
+
+    def speed_after(self, t: float) -> float:
+        return self.speed + t * (self.acceleration + t * self.jerk / 2.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """
+    Progress ``s(t)`` from 0 at time 0 to ``length`` at ``duration`` [s], never backwards.
+
+    :param phases: in the order of time; the first one begins at 0.
+    """
+
+    length: float
+    duration: float
+    phases: tuple[_Phase, ...]
+
+    def at(self, time: float) -> float:
+        """Return the progress; 0 before the beginning, ``length`` from the end on."""
+        if time >= self.duration:
+            return self.length
+        phase = self._phase(max(time, 0.0))
+        return min(max(phase.position_after(max(time, 0.0) - phase.time), 0.0), self.length)
+
+    def speed(self, time: float) -> float:
+        """Return ds/dt within [0, duration]; never negative."""
+        time = min(max(time, 0.0), self.duration)
+        phase = self._phase(time)
+        return max(phase.speed_after(time - phase.time), 0.0)
+
+    def time_at(self, progress: float) -> float:
+        """Return the (first) time at which the progress is reached; bisection of ``s(t)``."""
+        if progress <= 0.0:
+            return 0.0
+        if progress >= self.length:
+            return self.duration
+        low, high = 0.0, self.duration
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            if middle in (low, high):
+                break
+            if self.at(middle) < progress:
+                low = middle
+            else:
+                high = middle
+        return high
+
+    def _phase(self, time: float) -> _Phase:
+        found = self.phases[0]
+        for phase in self.phases[1:]:
+            if phase.time > time:
+                break
+            found = phase
+        return found
+
+
+def _chain(length: float, speed: float,
+           phases: Iterable[tuple[float, float, float]]) -> Profile:
+    """Join phases given as (duration, acceleration at the beginning, jerk)."""
+    time = position = 0.0
+    chain: list[_Phase] = []
+    for duration, acceleration, jerk in phases:
+        phase = _Phase(time, position, speed, acceleration, jerk)
+        chain.append(phase)
+        time += duration
+        position = phase.position_after(duration)
+        speed = phase.speed_after(duration)
+    return Profile(length, time, tuple(chain))
+
+
+def trapezoid(length: float, acceleration: float, speed: float, start_speed: float = 0.0,
+              braking: float | None = None) -> Profile:
+    """
+    Accelerate, cruise, brake to rest.
+
+    From rest, T = d/v + v/a when d > v^2/a, else the triangle T = 2 sqrt(d/a). In general the
+    peak u follows from (u^2 - v0^2)/2a + u^2/2b = d. Who comes too fast to stop in time brakes
+    as hard as it takes.
+
+    :param braking: b, when it differs from the acceleration.
+    """
+    b = braking or acceleration
+    if length <= 0.0:
+        return Profile(0.0, 0.0, (_Phase(0.0, 0.0, 0.0, 0.0, 0.0),))
+    if start_speed * start_speed >= 2.0 * b * length:
+        return _chain(length, start_speed, [
+            (2.0 * length / start_speed, -start_speed * start_speed / (2.0 * length), 0.0)])
+    reachable = sqrt((2.0 * length + start_speed**2 / acceleration)
+                     / (1.0 / acceleration + 1.0 / b))
+    rate = acceleration if start_speed <= speed else -b
+    peak = min(speed, reachable)
+    up, down = (peak - start_speed) / rate, peak / b
+    cruise = (length - 0.5 * (start_speed + peak) * up - 0.5 * peak * down) / peak
+    return _chain(length, start_speed,
+                  [(up, rate, 0.0), (max(cruise, 0.0), 0.0, 0.0), (down, -b, 0.0)])
+
+
+def timed_cruise(length: float, duration: float, start_speed: float = 0.0) -> float:
+    """
+    Return the cruising speed c of :func:`timed`.
+
+    With ramps of x and y seconds, d = v0 x/2 + c (T - x/2 - y/2). y = T/3; x = T/3 too, or less
+    where a fast start would otherwise leave no way for the rest.
+    """
+    x, y = _timed_ramps(length, duration, start_speed)
+    return (length - 0.5 * start_speed * x) / (duration - 0.5 * (x + y))
+
+
+def timed(length: float, duration: float, start_speed: float = 0.0) -> Profile:
+    """
+    Arrive at rest after exactly ``duration`` [s]: a third each to speed up, cruise and brake.
+
+    The robot documents only that a time counts more than speed and acceleration; thirds are our
+    choice. From rest: c = 1.5 d/T, a = 4.5 d/T^2.
+    """
+    if length <= 0.0:
+        return Profile(0.0, duration, (_Phase(0.0, 0.0, 0.0, 0.0, 0.0),))
+    x, y = _timed_ramps(length, duration, start_speed)
+    c = timed_cruise(length, duration, start_speed)
+    return _chain(length, start_speed, [
+        (x, (c - start_speed) / x, 0.0), (duration - x - y, 0.0, 0.0), (y, -c / y, 0.0)])
+
+
+def _timed_ramps(length: float, duration: float, start_speed: float) -> tuple[float, float]:
+    ramp_time = TIMED_RAMP * duration
+    if start_speed <= 0.0:
+        return ramp_time, ramp_time
+    return min(ramp_time, length / start_speed), ramp_time
+
+
+def ramp(length: float, start_speed: float, end_speed: float) -> Profile:
+    """Change the speed evenly over the length: T = 2 d / (v0 + v1)."""
+    duration = 2.0 * length / (start_speed + end_speed)
+    return _chain(length, start_speed,
+                  [(duration, (end_speed - start_speed) / duration, 0.0)])
+
+
+def s_curve(length: float, acceleration: float, speed: float, jerk: float,
+            start_speed: float = 0.0) -> Profile:
+    """
+    Accelerate, cruise, brake to rest with limited jerk.
+
+    A change of speed by w takes T = w/a + a/j when w >= a^2/j, else 2 sqrt(w/j), and covers the
+    mean speed times T. The highest cruising speed that fits is found by bisection.
+    """
+    if length <= 0.0:
+        return trapezoid(length, acceleration, speed)
+
+    def distance(cruise: float) -> float:
+        return (_s_distance(start_speed, cruise, acceleration, jerk)
+                + _s_distance(cruise, 0.0, acceleration, jerk))
+
+    if start_speed > 0.0 and distance(min(start_speed, speed)) > length:
+        return trapezoid(length, acceleration, speed, start_speed)
+    peak = speed
+    if distance(speed) > length:
+        low, high = min(start_speed, speed), speed
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if distance(middle) <= length else (low, middle)
+        peak = low
+    cruise = max(length - distance(peak), 0.0) / peak
+    return _chain(length, start_speed, [
+        *_s_ramp(start_speed, peak, acceleration, jerk), (cruise, 0.0, 0.0),
+        *_s_ramp(peak, 0.0, acceleration, jerk)])
+
+
+def _s_times(change: float, acceleration: float, jerk: float) -> tuple[float, float]:
+    """Return the times of rising (and of falling), and of constant acceleration."""
+    if change >= acceleration * acceleration / jerk:
+        rise = acceleration / jerk
+        return rise, change / acceleration - rise
+    return sqrt(change / jerk), 0.0
+
+
+def _s_distance(start: float, end: float, acceleration: float, jerk: float) -> float:
+    rise, hold = _s_times(abs(end - start), acceleration, jerk)
+    return 0.5 * (start + end) * (2.0 * rise + hold)
+
+
+def _s_ramp(start: float, end: float, acceleration: float,
+            jerk: float) -> list[tuple[float, float, float]]:
+    rise, hold = _s_times(abs(end - start), acceleration, jerk)
+    j = jerk if end >= start else -jerk
+    return [(rise, 0.0, j), (hold, j * rise, 0.0), (rise, j * rise, -j)]

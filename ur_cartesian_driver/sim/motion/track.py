@@ -1,0 +1,237 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Legs and corners strung together, each with its profile: what the arm follows.
+
+The robot knows one move ahead at most: the next call comes when the arm enters the blend. So each
+leg is planned to end at rest in its waypoint; a call that comes in time cuts the leg at the border
+of the blend and puts corner and next leg in the place of the rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf, sqrt
+from typing import Any
+
+from ur_cartesian_driver.motion.pose import distance
+from ur_cartesian_driver.sim.motion.moves import Move
+from ur_cartesian_driver.sim.motion.paths import corner, head_within, Leg, Path, Place, tail_within
+from ur_cartesian_driver.sim.motion.profile import (
+    Profile,
+    ramp,
+    s_curve,
+    timed,
+    timed_cruise,
+    trapezoid,
+)
+
+# Ends of pieces nearer than this are reached [s]: sums of cycles miss them by rounding.
+_ROUNDING = 1e-9
+# Speeds and ways below this are none, in the units of any leg.
+_NOTHING = 1e-9
+# What is left after a corner is driven at most this much faster than the mean, to be in time.
+_CATCH_UP = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Law:
+    """
+    How a move wants its leg to be driven, in the leg's unit (rad or m) per second.
+
+    :param time: [s], counts instead of speed and acceleration unless 0.
+    :param jerk: bounded, for an S-curve; None = trapezoid.
+    :param braking: at the end, where it differs from the acceleration.
+    """
+
+    acceleration: float
+    speed: float
+    time: float = 0.0
+    jerk: float | None = None
+    braking: float | None = None
+
+    def profile(self, length: float, start_speed: float = 0.0) -> Profile:
+        """Return the profile of a way, to rest."""
+        if self.time > 0.0:
+            return timed(length, self.time, start_speed)
+        if self.jerk is not None:
+            return s_curve(length, self.acceleration, self.speed, self.jerk, start_speed)
+        return trapezoid(length, self.acceleration, self.speed, start_speed, self.braking)
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """
+    One path under one profile.
+
+    :param offset: path parameter at which the profile begins.
+    :param stop: time of the profile at which the next piece takes over.
+    :param halt: whether a cycle has to end exactly there.
+    """
+
+    path: Path
+    profile: Profile
+    offset: float
+    stop: float
+    halt: bool = False
+
+    def at(self, time: float) -> Place:
+        """Return the place; the exact end of the path at the end of the profile."""
+        if time >= self.profile.duration:
+            return self.path.at(inf)
+        return self.path.at(self.offset + self.profile.at(time))
+
+
+@dataclass(frozen=True, slots=True)
+class Tip:
+    """
+    The last leg of a track and what a follower must know of it.
+
+    :param entry: time of its profile at which its blend begins; its end without a blend.
+    """
+
+    leg: Leg
+    law: Law
+    radius: float
+    entry: float
+    call: Move
+
+
+@dataclass(slots=True)
+class Track:
+    """
+    Pieces to follow and how far the arm is: time [s] in the profile of piece ``index``.
+
+    The last piece is always the leg of ``tip``.
+    """
+
+    pieces: tuple[Piece, ...]
+    tip: Tip
+    index: int = 0
+    time: float = 0.0
+    real_time = False
+
+    def preview(self, h: float) -> tuple[Place, tuple[int, float]]:
+        """Return the place after ``h`` more seconds [s of the profile]."""
+        i, t = self.index, self.time
+        while True:
+            piece = self.pieces[i]
+            left = piece.stop - t
+            if h < left - _ROUNDING:
+                t += h
+                break
+            last = i + 1 == len(self.pieces)
+            if last or (piece.halt and left > _ROUNDING):
+                t = piece.stop
+                break
+            h, i, t = max(h - left, 0.0), i + 1, 0.0
+        return self.pieces[i].at(t), (i, t)
+
+    def accept(self, state: Any) -> None:
+        """Go to a state that ``preview`` returned."""
+        self.index, self.time = state
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last waypoint is reached."""
+        return self.index + 1 == len(self.pieces) and self.time >= self.pieces[-1].stop
+
+    def may_return(self, cycle: float) -> bool:
+        """Return whether one more cycle enters the blend, or the waypoint is reached."""
+        if self.index + 1 < len(self.pieces):
+            return False
+        if self.tip.radius > 0.0:
+            return self.time + cycle >= self.tip.entry - _ROUNDING
+        return self.finished
+
+
+def from_rest(leg: Leg, law: Law, radius: float, call: Move) -> Track:
+    """Return the track of one leg, begun and ended at rest."""
+    profile = law.profile(leg.length)
+    piece = Piece(leg, profile, 0.0, profile.duration)
+    return Track((piece,), Tip(leg, law, radius, _entry(piece, leg, radius), call))
+
+
+def joined(track: Track, leg: Leg, law: Law, radius: float, call: Move,
+           circular: bool) -> tuple[Track, bool]:
+    """
+    Return the track with one more leg, blended where that is possible, and whether it is.
+
+    The corner begins at the blend radius, or where the arm is if the call comes late, and ends as
+    far behind the waypoint. It is not blended when the arm already stands, or when the new leg
+    does not leave the blend: then the arm stops at the waypoint. (Both legs share the speed
+    through the corner, and a short one would be driven by the other's.)
+    """
+    last, tip, ahead = track.pieces[-1], track.tip, track.pieces[track.index:-1]
+    now = track.time if track.index + 1 == len(track.pieces) else 0.0
+    leave = max(now, tip.entry)
+    tail = tip.leg.length - last.offset - last.profile.at(leave)
+    speed = last.profile.speed(leave)
+    head = None
+    if speed > _NOTHING and tail > _NOTHING:
+        reach = distance(tip.leg.pose(tip.leg.length - tail).position,
+                         tip.leg.pose(inf).position)
+        head = head_within(leg, min(reach, tip.radius))
+    if head is None:
+        rest = from_rest(leg, law, radius, call)
+        pieces = (*ahead, replace(last, halt=True), *rest.pieces)
+        return Track(pieces, rest.tip, 0, track.time), False
+    turn = corner(tip.leg, tail, leg, head, circular)
+    through, after = _corner_profiles(
+        (turn.entry_rate, turn.exit_rate), speed, last.profile.duration - leave, tip.law, law,
+        head, leg.length - head)
+    end = Piece(leg, after, head, after.duration)
+    pieces = (*ahead, replace(last, stop=leave),
+              Piece(turn, through, 0.0, through.duration), end)
+    new_tip = Tip(leg, law, radius, _entry(end, leg, radius), call)
+    return Track(pieces, new_tip, 0, track.time), True
+
+
+def _entry(piece: Piece, leg: Leg, radius: float) -> float:
+    """Return the time at which the leg comes within the radius [m] of its end."""
+    if radius <= 0.0:
+        return piece.stop
+    tail = tail_within(leg, radius)
+    if tail is None:
+        return 0.0
+    return piece.profile.time_at(leg.length - tail - piece.offset)
+
+
+def _corner_profiles(rates: tuple[float, float], speed: float, remaining: float, before: Law,
+                     after: Law, head: float, rest: float) -> tuple[Profile, Profile]:
+    """
+    Return the profiles of the corner (0 to 1) and of the rest of the leg behind it.
+
+    The corner's rate changes evenly from that of the entry to that of the next leg's cruising
+    speed, where three bounds allow: it does not grow beyond what keeps both legs' parts within
+    their accelerations (r1'' = 2 r1 u'^2 <= a, so u'^2 <= a / 2r), and the rest of the leg must
+    suffice to brake. A trapezoid enters with v <= sqrt(2 a r), which fulfils the first anyway.
+
+    Times are kept in sum: what the move before had left until it would have stood in its
+    waypoint is added to the time of the next one.
+
+    :param rates: path units of the legs per unit of the corner's parameter, at entry and exit.
+    :param speed: at the entry; ``remaining`` [s]: until the rest in the waypoint.
+    :param head: the new leg's way within the corner; ``rest``: behind it.
+    """
+    entry_rate, exit_rate = rates
+    u0 = speed / entry_rate
+    time = after.time + remaining
+    whole = head + rest
+    if after.time > 0.0:
+        cruise = timed_cruise(whole + head, time, u0 * exit_rate)
+        acceleration, stoppable = 4.5 * whole / after.time**2, inf
+    else:
+        cruise, acceleration = after.speed, after.acceleration
+        stoppable = sqrt(2.0 * (after.braking or acceleration) * rest)
+    allowed = sqrt(min(_acceleration(before) / entry_rate, acceleration / exit_rate))
+    u1 = min(cruise / exit_rate, stoppable / exit_rate, max(u0, allowed))
+    through = ramp(1.0, u0, u1)
+    if after.time > 0.0:
+        least = time * rest / (whole + head) / _CATCH_UP
+        after = replace(after, time=max(time - through.duration, least))
+    return through, after.profile(rest, u1 * exit_rate)
+
+
+def _acceleration(law: Law) -> float:
+    return inf if law.time > 0.0 else max(law.acceleration, law.braking or 0.0)
