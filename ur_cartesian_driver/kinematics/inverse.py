@@ -17,7 +17,7 @@ Newton iteration on the real one.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import atan2, ceil, copysign, cos, hypot, inf, pi, remainder, sin, sqrt, tau
+from math import atan2, ceil, copysign, cos, dist, hypot, inf, pi, remainder, sin, sqrt, tau
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +35,9 @@ _SLACK = 1e-9
 _MERGED = 1e-13
 # Sine of wrist 2 below which the axes 4 and 6 are one line and only their sum counts.
 _WRIST_SINGULAR = 5e-10
+# The same for a start in a calibrated arm, for each metre of misfit: three times the misfit over
+# the length of the wrist. Below it theta6 may be anything.
+_WRIST_DOUBT = 30.0
 # How far a position may lie outside its limit by rounding [rad].
 _LIMIT_ROUNDING = 1e-9
 
@@ -42,12 +45,14 @@ _LIMIT_ROUNDING = 1e-9
 # of steps that may fail to halve the error, and the longest of a joint [rad].
 _EXACT = 1e-24
 _MAX_STEPS = 40
-_MAX_FAILURES = 6
+_MAX_FAILURES = 12
 _LONGEST_STEP = 0.5
 # Two refined solutions closer than this are one [rad].
 _SAME = 1e-5
 # How near to the pose a seed must be to be a start of its own [m, rad].
 _TRACKING = 0.1
+# With a solution this near [rad] no other one is looked for around the seed.
+_CLOSE = 0.02
 # A start that is farther by this than the best refined solution cannot win [rad]: refinement
 # moves it by the calibration, some hundredths, unless the arm is singular there.
 _HOPELESS = 0.5
@@ -61,12 +66,17 @@ def solutions(arm: Arm, T_base_flange: Pose, seed: Joints | None = None) -> list
     """
     Return every joint solution [rad], each angle within (-pi, pi], whatever the limits are.
 
+    Of a calibrated arm a solution may be missed within about a degree of a singularity, where
+    the ideal arm says little about the real one; not the one next to the seed.
+
     :param seed: where the axes of wrist 1 and wrist 3 are one line, wrist 3 is taken from here
         (else it is 0). For a calibrated arm a seed near the pose is one more start of the search.
     """
     starts = _starts(arm, T_base_flange, seed)
     if not arm.calibrated:
         return starts
+    if seed is not None and _is_near(arm.forward(seed), T_base_flange):
+        starts.append(seed)
     found: list[Joints] = []
     for start in starts:
         q = _refine(arm, T_base_flange, start)
@@ -81,18 +91,21 @@ def nearest(arm: Arm, T_base_flange: Pose, q_near: Joints) -> Joints | None:
 
     Nearest of all branches and of all full turns of each joint, by the sum of squares.
     """
-    limits = arm.model.position_limits
     starts = _starts(arm, T_base_flange, q_near)
-    if not arm.calibrated:
-        return _closest([_turned(q, q_near, limits) for q in starts], q_near)
+    # By the distance without limits, which never is longer than that within them.
+    ranked = sorted((_distance_by_turns(q, q_near), q) for q in starts)
+    allowance = _HOPELESS if arm.calibrated else 0.0
     best, least = None, inf
-    for distance, start in sorted((_distance(q, q_near, around=tau), q) for q in starts):
-        if distance > least + _HOPELESS:
+    for distance, start in ranked:
+        if distance > least + allowance:
             break
-        refined = _refine(arm, T_base_flange, start)
-        q = _turned(refined, q_near, limits) if refined is not None else None
-        if q is not None and _distance(q, q_near) < least:
-            best, least = q, _distance(q, q_near)
+        q = _settle(arm, T_base_flange, start, q_near)
+        if q is not None and dist(q, q_near) < least:
+            best, least = q, dist(q, q_near)
+    if arm.calibrated and least > _CLOSE and _is_near(arm.forward(q_near), T_base_flange):
+        # Near a singularity the starts may have missed the one that is next to q_near.
+        q = _settle(arm, T_base_flange, q_near, q_near)
+        best = _closest([best, q], q_near)
     return best
 
 
@@ -150,11 +163,12 @@ class _Wrist(NamedTuple):
 
 
 def _starts(arm: Arm, T_base_flange: Pose, seed: Joints | None) -> list[Joints]:
-    """Return the solutions of the ideal arm; for a calibrated arm also those it just misses."""
+    """Return the solutions of the ideal arm; for a calibrated arm also what it just misses."""
     shape = shape_of(arm)
     wrist_3 = 0.0 if seed is None else seed[5] + shape.offsets[5]
     # A calibrated arm may reach where the ideal one does not: there both roots are worth a try.
-    doubt = 10.0 * shape.misfit * abs(shape.a2 + shape.a3)
+    # (r + dr)^2 is about r^2 + 2 r dr, and the misfit is a mean: allow three times as much.
+    doubt = 6.0 * shape.misfit * abs(shape.a2 + shape.a3)
     o1, o2, o3, o4, o5, o6 = shape.offsets
     starts = []
     for wrist in _wrists(shape, T_base_flange, wrist_3, doubt):
@@ -163,8 +177,6 @@ def _starts(arm: Arm, T_base_flange: Pose, seed: Joints | None) -> list[Joints]:
                 _wrap(wrist.theta1 - o1), _wrap(theta2 - o2), _wrap(theta3 - o3),
                 _wrap(wrist.theta234 - theta2 - theta3 - o4),
                 _wrap(wrist.theta5 - o5), _wrap(wrist.theta6 - o6)))
-    if arm.calibrated and seed is not None and _is_near(arm.forward(seed), T_base_flange):
-        starts.append(_six(_wrap(angle) for angle in seed))
     return starts
 
 
@@ -195,6 +207,8 @@ def _wrists(shape: Shape, T_base_flange: Pose, wrist_3: float, doubt: float) -> 
             wrists: tuple[tuple[float, float], ...] = ((theta5, wrist_3),)
         else:
             wrists = ((theta5, theta6), (-theta5, theta6 + pi))
+            if s5 < _WRIST_DOUBT * shape.misfit:
+                wrists += ((theta5, theta6 + 0.5 * pi), (theta5, theta6 - 0.5 * pi))
         for theta5, theta6 in wrists:
             # The axis y of frame 5 is that of the flange before theta6; axis 5 is opposite to it.
             s6, c6 = sin(theta6), cos(theta6)
@@ -223,8 +237,7 @@ def _roots(square: float, doubt: float) -> tuple[float, ...]:
     """Return the square roots, positive one first; both also where their existence is in doubt."""
     if square < -max(doubt, _SLACK):
         return ()
-    if square < doubt:
-        square = doubt
+    square = max(square, 0.25 * doubt)
     if square < _MERGED:
         return (0.0,)
     root = sqrt(square)
@@ -232,6 +245,12 @@ def _roots(square: float, doubt: float) -> tuple[float, ...]:
 
 
 # --- The calibrated arm ----------------------------------------------------------------------
+
+def _settle(arm: Arm, T_base_flange: Pose, start: Joints, q_near: Joints) -> Joints | None:
+    """Return the solution that a start leads to, turned towards q_near within the limits."""
+    q = _refine(arm, T_base_flange, start) if arm.calibrated else start
+    return None if q is None else _turned(q, q_near, arm.model.position_limits)
+
 
 def _refine(arm: Arm, T_base_flange: Pose, start: Joints) -> Joints | None:
     """
@@ -311,14 +330,14 @@ def _same(a: Joints, b: Joints) -> bool:
     return all(abs(remainder(x - y, tau)) < _SAME for x, y in zip(a, b, strict=True))
 
 
-def _distance(a: Joints, b: Joints, around: float = inf) -> float:
-    """Return the Euclidean distance; with ``around`` full turns do not count."""
-    return sqrt(sum([remainder(x - y, around) ** 2 for x, y in zip(a, b, strict=True)]))
+def _distance_by_turns(a: Joints, b: Joints) -> float:
+    """Return the Euclidean distance when full turns do not count [rad]."""
+    return hypot(*[remainder(x - y, tau) for x, y in zip(a, b, strict=True)])
 
 
 def _closest(candidates: Sequence[Joints | None], q_near: Joints) -> Joints | None:
     possible = [q for q in candidates if q is not None]
-    return min(possible, key=lambda q: _distance(q, q_near), default=None)
+    return min(possible, key=lambda q: dist(q, q_near), default=None)
 
 
 def _turned(q: Joints, wanted: Joints, limits: Limits, q_before: Joints | None = None

@@ -45,7 +45,7 @@ class Shape:
     d5: float
     d6: float
     offsets: Vector6
-    #: By how much the real flange lies off, root mean square of the samples [m, rad]; 0 = exact.
+    #: How far from there the real flange is, root mean square [m]; 0 for a nominal arm.
     misfit: float
 
 
@@ -82,7 +82,8 @@ def _fit(arm: Arm, lengths: NDArray[np.float64]
             _twist(ideal.forward(q + offsets), target)
             for q, target in zip(samples, targets, strict=True)])
         step = np.linalg.lstsq(rows, errors, rcond=None)[0]
-        misfit = sqrt(float(np.sum((errors - rows @ step) ** 2)) / _SAMPLES)
+        left = (errors - rows @ step).reshape(_SAMPLES, 6)[:, :3]
+        misfit = sqrt(float(np.sum(left ** 2)) / _SAMPLES)
         lengths, offsets = lengths + step[:6], offsets + step[6:]
     return lengths, offsets, misfit
 
