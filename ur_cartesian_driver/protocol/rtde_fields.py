@@ -1,0 +1,107 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The names and types of everything that RTDE can stream, as one table.
+
+A controller of an older software knows fewer; it answers ``NOT_FOUND``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+from types import MappingProxyType
+
+
+class DataType(Enum):
+    """A type by its name on the wire, with its codes for ``struct`` (big-endian, unpadded)."""
+
+    BOOL = '?'
+    UINT8 = 'B'
+    UINT32 = 'I'
+    UINT64 = 'Q'
+    INT32 = 'i'
+    DOUBLE = 'd'
+    VECTOR3D = 'ddd'
+    VECTOR6D = 'dddddd'
+    VECTOR6INT32 = 'iiiiii'
+    VECTOR6UINT32 = 'IIIIII'
+
+    @property
+    def codes(self) -> str:
+        """Return one struct code for each number."""
+        return self.value
+
+    @property
+    def length(self) -> int:
+        """Return how many numbers it holds; 1 = not a vector."""
+        return len(self.value)
+
+
+def _registers(direction: str) -> dict[str, DataType]:
+    """Return the general purpose registers of one direction."""
+    return {
+        f'{direction}_bit_registers0_to_31': DataType.UINT32,
+        f'{direction}_bit_registers32_to_63': DataType.UINT32,
+        **{f'{direction}_bit_register_{i}': DataType.BOOL for i in range(64, 128)},
+        **{f'{direction}_int_register_{i}': DataType.INT32 for i in range(48)},
+        **{f'{direction}_double_register_{i}': DataType.DOUBLE for i in range(48)},
+    }
+
+
+def _table(names: Mapping[DataType, str]) -> dict[str, DataType]:
+    return {name: data_type for data_type, text in names.items() for name in text.split()}
+
+
+#: What a client may write.
+INPUT_TYPES: Mapping[str, DataType] = MappingProxyType({
+    **_table({
+        DataType.UINT32: 'speed_slider_mask',
+        DataType.DOUBLE: 'speed_slider_fraction standard_analog_output_0 standard_analog_output_1',
+        DataType.UINT8: """
+            standard_digital_output_mask standard_digital_output configurable_digital_output_mask
+            configurable_digital_output tool_digital_output_mask tool_digital_output
+            standard_analog_output_mask standard_analog_output_type""",
+        DataType.VECTOR6D: 'external_force_torque',
+    }),
+    **_registers('input'),
+})
+
+#: What a client may read; the input registers can be read back.
+OUTPUT_TYPES: Mapping[str, DataType] = MappingProxyType({
+    **_table({
+        DataType.DOUBLE: """
+            timestamp actual_execution_time target_execution_time speed_scaling
+            target_speed_fraction actual_momentum actual_main_voltage actual_robot_voltage
+            actual_robot_current standard_analog_input0 standard_analog_input1
+            standard_analog_output0 standard_analog_output1 io_current
+            actual_robot_energy_consumed actual_robot_braking_energy_dissipated
+            euromap67_24V_voltage euromap67_24V_current tool_analog_input0 tool_analog_input1
+            tool_output_current tool_temperature tcp_force_scalar joint_position_deviation_ratio
+            collision_detection_ratio payload""",
+        DataType.VECTOR6D: """
+            target_q target_qd target_qdd target_current target_moment actual_q actual_qd
+            actual_current actual_current_window actual_current_as_torque joint_control_output
+            actual_TCP_pose actual_TCP_speed actual_TCP_force target_TCP_pose target_TCP_speed
+            tcp_offset actual_TCP_acceleration target_TCP_acceleration joint_temperatures
+            actual_joint_voltage ft_raw_wrench wrench_calc_from_currents payload_inertia
+            target_base_acceleration target_base_wrench""",
+        DataType.VECTOR3D: """
+            actual_tool_accelerometer elbow_position elbow_velocity payload_cog target_gravity""",
+        DataType.VECTOR6INT32: 'joint_mode',
+        DataType.UINT64: """
+            actual_digital_input_bits actual_configurable_digital_input_bits
+            actual_digital_output_bits actual_configurable_digital_output_bits control_step""",
+        DataType.INT32: """
+            robot_mode safety_mode safety_status encoder0_raw encoder1_raw tool_output_voltage
+            time_scale_source""",
+        DataType.UINT32: """
+            runtime_state robot_status_bits safety_status_bits analog_io_types
+            euromap67_input_bits euromap67_output_bits tool_mode tool_analog_input_types
+            script_control_line""",
+        DataType.UINT8: """
+            tool_output_mode tool_digital_output0_mode tool_digital_output1_mode""",
+    }),
+    **_registers('input'),
+    **_registers('output'),
+})
