@@ -21,13 +21,15 @@ from ur_cartesian_driver.urscript.values import (
     INT_MAX,
     INT_MIN,
     is_number,
-    make_list as make_list_value,
     Matrix,
     Pose,
     Struct,
     to_text,
     type_name,
     Value,
+)
+from ur_cartesian_driver.urscript.values import (
+    make_list as make_list_value,
 )
 
 #: The controller refuses to make longer strings.

@@ -124,6 +124,12 @@ def sequence(parts: Sequence[Code], finish: Callable[[Frame, list[Value]], Value
     def plain(frame: Frame) -> Value:
         return finish(frame, [run(frame) for run in runs])
 
+    def plain_one(frame: Frame) -> Value:
+        return finish(frame, [first(frame)])
+
+    def plain_two(frame: Frame) -> Value:
+        return finish(frame, [first(frame), second(frame)])
+
     def steps(frame: Frame) -> Steps:
         found = []
         for part in parts:
@@ -131,7 +137,9 @@ def sequence(parts: Sequence[Code], finish: Callable[[Frame, list[Value]], Value
             found.append(value)
         return finish(frame, found)
 
-    return _either(plain, steps, parts)
+    first, second = (*runs, plain, plain)[:2]
+    chosen = {1: plain_one, 2: plain_two}.get(len(runs), plain)
+    return _either(chosen, steps, parts)
 
 
 def _either(plain: Run, steps: Run, parts: Sequence[Code]) -> Code:
@@ -274,9 +282,13 @@ class _Compiler:
         if left.suspends or right.suspends:
             return self._positioned(node, [left, right], lambda frame, found: operate(*found))
 
+        on_floats = values.ON_FLOATS.get(node.operator, operate)
+
         def run(frame: Frame) -> Value:
             a, b = run_left(frame), run_right(frame)
             try:
+                if type(a) is float and type(b) is float:
+                    return on_floats(a, b)
                 return operate(a, b)
             except RuntimeException as error:
                 raise error.at(node.line, node.column) from None
@@ -304,9 +316,27 @@ class _Compiler:
 
     def _index(self, node: tree.Index) -> Code:
         parts = [self._expression(node.target), *map(self._expression, node.indices)]
+        if len(parts) == 2 and not any(part.suspends for part in parts):
+            return self._item(node, *parts)
         return self._positioned(
             node, parts, lambda frame, found: values.get_part(found[0], tuple(found[1:]))
         )
+
+    @staticmethod
+    def _item(node: tree.Index, target: Code, index: Code) -> Code:
+        """Compile the common `list[int]`, quick where nothing is wrong."""
+        run_target, run_index = target.run, index.run
+
+        def run(frame: Frame) -> Value:
+            container, place = run_target(frame), run_index(frame)
+            if type(container) is list and type(place) is int and 0 <= place < len(container):
+                return container[place]
+            try:
+                return values.get_part(container, (place,))
+            except RuntimeException as error:
+                raise error.at(node.line, node.column) from None
+
+        return Code(run, False, 1 + target.weight + index.weight)
 
     # Calls
 
@@ -324,6 +354,7 @@ class _Compiler:
         arguments = [self._owned(argument.value) for argument in bound.values()]
         procedure = self._procedures[id(callee)]
         runtime = self._runtime
+        here = (node.line, node.column)
 
         def new_frame(frame: Frame, found: list[Value]) -> Frame:
             new = procedure.template.copy()
@@ -337,8 +368,9 @@ class _Compiler:
         def enter() -> Thread:
             thread = runtime.thread
             if thread.depth >= MAX_CALL_DEPTH:
-                raise too_deep(node.line, node.column)
+                raise too_deep(*here)
             thread.depth += 1
+            thread.location = here
             return thread
 
         def plain(frame: Frame) -> Value:
@@ -585,7 +617,8 @@ class _Compiler:
 
         def plain(frame: Frame) -> Any:
             for condition, body in runs:
-                if truth(condition(frame)):
+                value = condition(frame)
+                if value is True or (value is not False and truth(value)):
                     return body(frame)
             return run_otherwise(frame)
 
@@ -594,7 +627,8 @@ class _Compiler:
                 run = condition.run
                 if truth((yield from run(frame)) if condition.suspends else run(frame)):
                     return (yield from body.run(frame)) if body.suspends else body.run(frame)
-            return (yield from run_otherwise(frame)) if otherwise.suspends else run_otherwise(frame)
+            run = run_otherwise
+            return (yield from run(frame)) if otherwise.suspends else run(frame)
 
         return _either(plain, steps, [*conditions, *bodies, otherwise])
 
@@ -611,7 +645,7 @@ class _Compiler:
             for value, body in cases:
                 run = value.run
                 found = (yield from run(frame)) if value.suspends else run(frame)
-                if values.equal(wanted, found):
+                if wanted == found:
                     return (yield from body.run(frame)) if body.suspends else body.run(frame)
             run = otherwise.run
             return (yield from run(frame)) if otherwise.suspends else run(frame)

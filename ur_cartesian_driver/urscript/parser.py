@@ -168,7 +168,8 @@ class Parser:
         kind: Literal['def', 'sec']
         if self._match('def'):
             kind = 'def'
-        elif self._match('sec'):
+        elif start.kind is Kind.NAME and start.text == 'sec':
+            self._advance()
             kind = 'sec'
         else:
             raise self.error("a program begins with 'def' or 'sec'")
@@ -465,9 +466,12 @@ class Parser:
         raise self.error(f'more than {MAX_CHAIN} calls, indices or fields in a row')
 
     def _field(self, target: tree.Expression) -> tree.Field:
-        """"." NAME."""
+        """"." NAME, where a keyword is a name too."""
         self._advance()
-        name = self._expect_kind(Kind.NAME)
+        name = self._token
+        if name.kind not in (Kind.NAME, Kind.KEYWORD):
+            raise self.error(f'a name is missing before {self._found()}')
+        self._advance()
         return tree.Field(target=target, name=name.text, **place(name))
 
     def _call(self, callee: tree.Name | tree.Field) -> tree.Call | tree.MethodCall:

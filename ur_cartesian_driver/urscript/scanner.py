@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 from ur_cartesian_driver.urscript.errors import CompileError
 
+#: `sec` is none: it is also a field of what `time()` returns.
 KEYWORDS = frozenset({
     'and', 'break', 'case', 'continue', 'def', 'default', 'elif', 'else', 'end', 'enter_critical',
     'exit_critical', 'false', 'False', 'global', 'halt', 'if', 'join', 'kill', 'local', 'None',
-    'not', 'or', 'pause', 'return', 'run', 'sec', 'switch', 'thread', 'true', 'True', 'while',
-    'xor',
+    'not', 'or', 'pause', 'return', 'run', 'switch', 'thread', 'true', 'True', 'while', 'xor',
 })  # fmt: skip
 
 #: Longest first, so that `<=` is not read as `<`.

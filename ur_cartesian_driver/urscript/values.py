@@ -20,6 +20,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 import math
+import operator
 from typing import Any, NamedTuple, TypeGuard
 
 from ur_cartesian_driver.urscript.errors import RuntimeException
@@ -91,6 +92,9 @@ def type_name(value: Value) -> str:
     return names.get(type(value), type(value).__name__)
 
 
+_NUMBERS = frozenset({int, float})
+
+
 def is_number(value: Value) -> TypeGuard[int | float]:
     """Tell whether a value is an int or a float; a bool is neither."""
     return type(value) is float or type(value) is int
@@ -126,7 +130,7 @@ def make_pose(items: Sequence[Value]) -> Pose:
     return Pose(*(float(item) for item in items))
 
 
-# Truth, equality and order
+# Truth and order
 
 
 def truth(value: Value) -> bool:
@@ -138,14 +142,10 @@ def truth(value: Value) -> bool:
     return value is not None
 
 
-def equal(a: Value, b: Value) -> bool:
-    """Compare any two values; lists, poses, matrices and structs by their content."""
-    return bool(a == b)
-
-
 def _ordering(symbol: str, holds: Callable[[Any, Any], bool]) -> Callable[[Value, Value], bool]:
     def compare(a: Value, b: Value) -> bool:
-        if (is_number(a) and is_number(b)) or (type(a) is str and type(b) is str):
+        kind_a, kind_b = type(a), type(b)
+        if (kind_a in _NUMBERS and kind_b in _NUMBERS) or (kind_a is str and kind_b is str):
             return holds(a, b)
         raise _unsupported(symbol, a, b)
 
@@ -161,7 +161,7 @@ def _unsupported(symbol: str, a: Value, b: Value) -> RuntimeException:
     )
 
 
-def _checked(result: Value) -> Value:
+def _checked(result: int | float) -> int | float:
     """Return a number that has been computed, if it fits into 32 bits."""
     if type(result) is int and not INT_MIN <= result <= INT_MAX:
         raise RuntimeException(f'Integer overflow: {result} does not fit into 32 bits')
@@ -189,10 +189,9 @@ def _arithmetic(
 
     def operate(a: Value, b: Value) -> Value:
         kind_a, kind_b = type(a), type(b)
-        if kind_a is float and (kind_b is float or kind_b is int):
-            return compute(a, b)
-        if is_number(a) and is_number(b):
-            return _checked(compute(a, b))
+        if kind_a in _NUMBERS and kind_b in _NUMBERS:
+            result = compute(a, b)
+            return _checked(result) if type(result) is int else result
         if kind_a is Matrix or kind_b is Matrix:
             return on_matrices(a, b)
         if kind_a is list and kind_b is list:
@@ -208,9 +207,9 @@ def _arithmetic(
         raise _unsupported(symbol, a, b)
 
     def on_items(a: Value, b: Value) -> int | float:
-        if is_number(a) and is_number(b):
-            result: int | float = _checked(compute(a, b))
-            return result
+        if type(a) in _NUMBERS and type(b) in _NUMBERS:
+            result = compute(a, b)
+            return _checked(result) if type(result) is int else result
         raise _unsupported(symbol, a, b)
 
     def on_matrices(a: Value, b: Value) -> Value:
@@ -272,18 +271,24 @@ def identity(value: Value) -> Value:
 
 
 BINARY: dict[str, Callable[[Value, Value], Value]] = {
-    '+': _arithmetic('+', lambda a, b: a + b),
-    '-': _arithmetic('-', lambda a, b: a - b),
-    '*': _arithmetic('*', lambda a, b: a * b),
+    '+': _arithmetic('+', operator.add),
+    '-': _arithmetic('-', operator.sub),
+    '*': _arithmetic('*', operator.mul),
     '/': _arithmetic('/', _divide),
     '%': _arithmetic('%', _remainder),
-    '==': equal,
-    '!=': lambda a, b: not equal(a, b),
-    '<': _ordering('<', lambda a, b: a < b),
-    '<=': _ordering('<=', lambda a, b: a <= b),
-    '>': _ordering('>', lambda a, b: a > b),
-    '>=': _ordering('>=', lambda a, b: a >= b),
+    '==': operator.eq,
+    '!=': operator.ne,
+    '<': _ordering('<', operator.lt),
+    '<=': _ordering('<=', operator.le),
+    '>': _ordering('>', operator.gt),
+    '>=': _ordering('>=', operator.ge),
 }
+
+#: What BINARY comes to for two floats, where nothing can go wrong.
+ON_FLOATS: dict[str, Callable[[Value, Value], Value]] = {
+    '+': operator.add, '-': operator.sub, '*': operator.mul, '==': operator.eq,
+    '!=': operator.ne, '<': operator.lt, '<=': operator.le, '>': operator.gt, '>=': operator.ge,
+}  # fmt: skip
 
 UNARY: dict[str, Callable[[Value], Value]] = {
     '-': negate,
