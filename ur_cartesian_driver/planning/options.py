@@ -1,0 +1,83 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the planner may decide by itself, and the bounds within which it does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import Literal, TypeAlias
+
+Choice: TypeAlias = Literal['refuse', 'slow']
+PostureChoice: TypeAlias = Literal['refuse', 'movej']
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanningOptions:
+    """
+    The parameters of planning; the defaults are those of ``config/driver.yaml``.
+
+    :raises ValueError: an option is not in its range.
+    """
+
+    #: Longest list of points that is accepted.
+    max_points: int = 20_000
+    #: How old ``header.stamp`` may be at the receipt [s].
+    stamp_tolerance: float = 1.0
+    #: How far the robot may stand from a first point at time 0 [m], [rad].
+    start_tolerance_position: float = 0.001
+    start_tolerance_angle: float = 0.01
+    #: Longest way of the tool to the first point [m]; 0 = without bound.
+    max_approach_distance: float = 0.5
+    #: Largest speed of the TCP [m/s]; 0 = without bound.
+    max_tool_speed: float = 0.25
+    #: What happens to a goal whose times need more speed than the limits allow.
+    on_too_fast: Choice = 'refuse'
+    #: What happens to a straight move or an arc that cannot arrive in the posture asked for.
+    on_posture_change: PostureChoice = 'refuse'
+    #: Whether the kinematics is the robot's own; if not, arcs are never sent as joint positions.
+    calibration_known: bool = True
+    #: Prefix of the joint names in postures.
+    tf_prefix: str = ''
+
+    #: Speeds and accelerations where the goal says nothing: tool [m/s], [m/s^2] ...
+    linear_velocity: float = 0.1
+    linear_acceleration: float = 0.5
+    #: ... its rotation [rad/s], [rad/s^2] ...
+    angular_velocity: float = 0.5
+    angular_acceleration: float = 1.0
+    #: ... leading axis of joint moves [rad/s], [rad/s^2] ...
+    joint_velocity: float = 0.5
+    joint_acceleration: float = 1.0
+    #: ... and parts of the robot's limits in OPTIMIZED moves, (0, 1].
+    optimized_velocity: float = 0.3
+    optimized_acceleration: float = 0.3
+
+    #: Largest accelerations that a time may lead to [m/s^2], [rad/s^2], [rad/s^2].
+    max_linear_acceleration: float = 10.0
+    max_angular_acceleration: float = 40.0
+    max_joint_acceleration: float = 40.0
+    #: The longest time that the wire carries, (2^31 - 1) us.
+    max_segment_time: float = 2147.483647
+
+    def __post_init__(self) -> None:
+        """Check the ranges."""
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if isinstance(value, float) and (not isfinite(value) or value < 0.0):
+                raise ValueError(f'{name} is {value}; it must be finite and not negative')
+        for name in ('linear_velocity', 'linear_acceleration', 'angular_velocity',
+                     'angular_acceleration', 'joint_velocity', 'joint_acceleration',
+                     'optimized_velocity', 'optimized_acceleration'):
+            if getattr(self, name) == 0.0:
+                raise ValueError(f'{name} is 0; it must be positive')
+        for name in ('optimized_velocity', 'optimized_acceleration'):
+            if getattr(self, name) > 1.0:
+                raise ValueError(f'{name} is {getattr(self, name)}; it must not exceed 1')
+        if self.on_too_fast not in ('refuse', 'slow'):
+            raise ValueError(f"on_too_fast is {self.on_too_fast!r}; it must be 'refuse' or 'slow'")
+        if self.on_posture_change not in ('refuse', 'movej'):
+            raise ValueError(
+                f"on_posture_change is {self.on_posture_change!r}; it must be 'refuse' or 'movej'")
+        if self.max_points < 1:
+            raise ValueError(f'max_points is {self.max_points}; it must be at least 1')

@@ -1,0 +1,293 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The curves that the robot's motions trace: lines, arcs and joint lines.
+
+A path maps ``u`` in [0, 1] to poses of the TCP in the robot's base, with ``u`` proportional to
+the quantity that leads the motion (length of a line or an arc, travel of the joints). Corner to
+corner: what a blend makes of the corner is the business of :mod:`~.corner`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import asin, atan2, ceil, hypot, pi, sqrt
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.goal import ArcMode
+from ur_cartesian_driver.motion.pose import (
+    distance,
+    multiply,
+    Pose,
+    Quaternion,
+    quaternion_from_rotation_vector,
+    slerp,
+    Vector3,
+)
+from ur_cartesian_driver.motion.primitive import Joints
+
+#: Below these two poses are the same, and a motion between them none: the resolution of the wire.
+SAME_POSITION = 1e-6
+SAME_ANGLE = 1e-6
+#: Least height of the via above the chord [m] at which three points still make a circle.
+LEAST_ARC_HEIGHT = 1e-5
+#: Chord error of sampled arcs and of sampled joint lines [m].
+ARC_CHORD_ERROR = 5e-6
+CURVE_CHORD_ERROR = 20e-6
+#: Largest turn between two samples [rad].
+TURN_PER_SAMPLE = pi / 18.0
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """The tool on a straight line, its orientation along the shortest rotation."""
+
+    start: Pose
+    end: Pose
+    length: float
+    angle: float
+
+    @classmethod
+    def between(cls, start: Pose, end: Pose) -> Line:
+        """Return the line from one pose to another."""
+        return cls(start, end, start.distance_to(end), start.angle_to(end))
+
+    @property
+    def samples(self) -> int:
+        """Into how many pieces to cut it so that chords follow it: 1 unless it turns."""
+        return max(1, ceil(self.angle / TURN_PER_SAMPLE))
+
+    def pose(self, u: float) -> Pose:
+        """Return the pose at ``u``."""
+        return self.start.interpolate(self.end, u)
+
+    def trim(self, radius: float) -> float:
+        """Return the ``u`` at which the line has left a ball of that radius around its start."""
+        return min(1.0, radius / self.length) if self.length > 0.0 else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """
+    The tool on a circular arc.
+
+    The position turns about ``axis`` through ``center`` by ``sweep`` in (0, 2 pi). The orientation
+    goes from the start's to the end's by the shortest rotation (UNCONSTRAINED) or turns along
+    with the tangent (FIXED), as the modes of URScript's ``movec``.
+    """
+
+    start: Pose
+    end: Pose
+    center: Vector3
+    axis: Vector3
+    radius: float
+    sweep: float
+    mode: ArcMode
+    #: Where the via lies, (0, 1).
+    u_via: float
+
+    @classmethod
+    def through(cls, start: Pose, via: Vector3, end: Pose, mode: ArcMode) -> Arc:
+        """
+        Return the arc from start through a position [m] to the end's position.
+
+        In mode FIXED the end's orientation is replaced by that with which the arc arrives.
+
+        :raises ValueError: the three positions make no circle; the text is a clause that says why.
+        """
+        center, axis, radius = _circle(start.position, via, end.position)
+        e1 = _scale(_minus(start.position, center), 1.0 / radius)
+        e2 = _cross(axis, e1)
+        sweep = _angle_on(e1, e2, _minus(end.position, center))
+        if mode is ArcMode.FIXED:
+            turn = quaternion_from_rotation_vector(_scale(axis, sweep))
+            end = Pose(end.position, multiply(turn, start.quaternion))
+        u_via = _angle_on(e1, e2, _minus(via, center)) / sweep
+        return cls(start, end, center, axis, radius, sweep, mode, u_via)
+
+    @property
+    def length(self) -> float:
+        """Length of the arc [m]."""
+        return self.radius * self.sweep
+
+    @property
+    def angle(self) -> float:
+        """Turn of the tool along the arc [rad]; beyond pi where the tool follows the tangent."""
+        return self.sweep if self.mode is ArcMode.FIXED else self.start.angle_to(self.end)
+
+    @property
+    def samples(self) -> int:
+        """Into how many pieces to cut it so that chords follow it."""
+        step = sqrt(8.0 * ARC_CHORD_ERROR / self.radius)
+        return max(1, ceil(self.sweep / step), ceil(self.angle / TURN_PER_SAMPLE))
+
+    def pose(self, u: float) -> Pose:
+        """Return the pose at ``u``."""
+        turn = quaternion_from_rotation_vector(_scale(self.axis, u * self.sweep))
+        swing = Pose(self.center, turn) @ Pose(_minus(self.start.position, self.center))
+        return Pose(swing.position, self._orientation(turn, u))
+
+    def trim(self, radius: float) -> float:
+        """Return the ``u`` at which the arc has left a ball of that radius around its start."""
+        return min(1.0, 2.0 * asin(min(1.0, 0.5 * radius / self.radius)) / self.sweep)
+
+    def _orientation(self, turn: Quaternion, u: float) -> Quaternion:
+        if self.mode is ArcMode.FIXED:
+            return multiply(turn, self.start.quaternion)
+        return slerp(self.start.quaternion, self.end.quaternion, u)
+
+
+@dataclass(frozen=True, slots=True)
+class JointLine:
+    """All joints in step on a straight line in joint space; the tool goes where that leads."""
+
+    arm: Arm
+    T_flange_tcp: Pose
+    q_start: Joints
+    q_end: Joints
+    start: Pose
+    end: Pose
+    length: float
+    #: Into how many pieces to cut it so that chords follow it.
+    samples: int
+    #: The largest ratio of the tool's speed to its mean speed along the way.
+    unevenness: float
+
+    @classmethod
+    def between(cls, arm: Arm, T_flange_tcp: Pose, q_start: Joints, q_end: Joints) -> JointLine:
+        """Return the joint line from one configuration to another."""
+        # A point at most `reach` from all axes of rotation leaves its chord by at most
+        # reach delta^2 / 8 when the joints together turn by delta.
+        reach = arm.model.reach + hypot(*T_flange_tcp.position)
+        step = sqrt(8.0 * CURVE_CHORD_ERROR / reach)
+        samples = max(1, ceil(sum(abs(b - a) for a, b in zip(q_start, q_end, strict=True)) / step))
+        q = np.linspace(q_start, q_end, samples + 1)
+        chords = np.linalg.norm(np.diff(tcp_rows(arm, T_flange_tcp, q)[:, :3], axis=0), axis=1)
+        length = float(chords.sum())
+        unevenness = samples * float(chords.max()) / length if length > 0.0 else 1.0
+        return cls(arm, T_flange_tcp, q_start, q_end, arm.forward(q_start) @ T_flange_tcp,
+                   arm.forward(q_end) @ T_flange_tcp, length, samples, unevenness)
+
+    @property
+    def angle(self) -> float:
+        """Turn of the tool from the start to the end [rad], the shortest."""
+        return self.start.angle_to(self.end)
+
+    @property
+    def travel(self) -> Joints:
+        """How far each joint turns [rad], all >= 0."""
+        a, b, c, d, e, f = (abs(y - x) for x, y in zip(self.q_start, self.q_end, strict=True))
+        return (a, b, c, d, e, f)
+
+    def joints(self, u: float) -> Joints:
+        """Return the joint positions at ``u``."""
+        a, b = self.q_start, self.q_end
+        return (a[0] + u * (b[0] - a[0]), a[1] + u * (b[1] - a[1]), a[2] + u * (b[2] - a[2]),
+                a[3] + u * (b[3] - a[3]), a[4] + u * (b[4] - a[4]), a[5] + u * (b[5] - a[5]))
+
+    def pose(self, u: float) -> Pose:
+        """Return the pose at ``u``."""
+        return self.arm.forward(self.joints(u)) @ self.T_flange_tcp
+
+    def rows(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the poses (n, 7) at many ``u`` (n,)."""
+        q_start, q_end = np.array(self.q_start), np.array(self.q_end)
+        q = q_start + np.outer(u, q_end - q_start)
+        return tcp_rows(self.arm, self.T_flange_tcp, q)
+
+    def trim(self, radius: float) -> float:
+        """Return the first ``u`` at which the tool has left a ball of that radius."""
+        step = 1.0 / max(16, self.samples)
+        u = step
+        while u < 1.0 and self.pose(u).distance_to(self.start) < radius:
+            u += step
+        low, high = u - step, min(1.0, u)
+        for _ in range(30):
+            middle = 0.5 * (low + high)
+            inside = self.pose(middle).distance_to(self.start) < radius
+            low, high = (middle, high) if inside else (low, middle)
+        return high
+
+    def reversed(self) -> JointLine:
+        """Return the same line from its end to its start."""
+        return replace(self, q_start=self.q_end, q_end=self.q_start, start=self.end,
+                       end=self.start)
+
+
+Path: TypeAlias = Line | Arc | JointLine
+
+
+def trim_end(path: Path, radius: float) -> float:
+    """Return the ``u`` at which a path comes into a ball of that radius [m] around its end."""
+    if isinstance(path, JointLine):
+        return 1.0 - path.reversed().trim(radius)
+    return 1.0 - path.trim(radius)
+
+
+def tcp_rows(arm: Arm, T_flange_tcp: Pose, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return ``T_base_tcp`` (n, 7) of joint positions (n, 6) [rad]."""
+    flange = arm.forward_rows(q)
+    ax, ay, az, aw = flange[:, 3:].T
+    x, y, z = T_flange_tcp.position
+    bx, by, bz, bw = T_flange_tcp.quaternion
+    # v + 2 u x (u x v + w v), and the product of the quaternions, as in motion.pose.
+    tx, ty, tz = 2.0 * (ay * z - az * y), 2.0 * (az * x - ax * z), 2.0 * (ax * y - ay * x)
+    return np.stack((
+        flange[:, 0] + x + aw * tx + ay * tz - az * ty,
+        flange[:, 1] + y + aw * ty + az * tx - ax * tz,
+        flange[:, 2] + z + aw * tz + ax * ty - ay * tx,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz), axis=1)
+
+
+def same(a: Pose, b: Pose) -> bool:
+    """Tell whether two poses are the same within the resolution of the wire."""
+    return a.distance_to(b) <= SAME_POSITION and a.angle_to(b) <= SAME_ANGLE
+
+
+def _circle(a: Vector3, b: Vector3, c: Vector3) -> tuple[Vector3, Vector3, float]:
+    """Return center, axis (unit) and radius of the circle that goes a, b, c in this order."""
+    ab, ac = _minus(b, a), _minus(c, a)
+    chord = hypot(*ac)
+    for name, apart in (('the start and the end', chord), ('the start and the via', hypot(*ab)),
+                        ('the via and the end', distance(b, c))):
+        if apart < LEAST_ARC_HEIGHT:
+            raise ValueError(f'{name} of the arc coincide ({1e3 * apart:.3f} mm apart)')
+    normal = _cross(ab, ac)
+    area = hypot(*normal)
+    if area / max(chord, hypot(*ab), distance(b, c)) < LEAST_ARC_HEIGHT:
+        raise ValueError('the start, the via and the end of the arc lie on one straight line')
+    # Circumcenter seen from a: ((|ab|^2 ac - |ac|^2 ab) x (ab x ac)) / (2 |ab x ac|^2).
+    ab2, ac2 = hypot(*ab) ** 2, chord ** 2
+    mixed = _minus(_scale(ac, ab2), _scale(ab, ac2))
+    offset = _scale(_cross(mixed, normal), 0.5 / area ** 2)
+    center = (a[0] + offset[0], a[1] + offset[1], a[2] + offset[2])
+    return center, _scale(normal, 1.0 / area), hypot(*offset)
+
+
+def _angle_on(e1: Vector3, e2: Vector3, v: Vector3) -> float:
+    """Return the angle of a vector in the plane of e1 and e2, in (0, 2 pi]."""
+    angle = atan2(_dot(e2, v), _dot(e1, v))
+    return angle if angle > 0.0 else angle + 2.0 * pi
+
+
+def _minus(a: Vector3, b: Vector3) -> Vector3:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def _scale(a: Vector3, s: float) -> Vector3:
+    return (s * a[0], s * a[1], s * a[2])
+
+
+def _dot(a: Vector3, b: Vector3) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Vector3, b: Vector3) -> Vector3:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])

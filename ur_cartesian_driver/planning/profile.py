@@ -1,0 +1,111 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Speed over the way: accelerate, cruise, brake, and what follows from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+
+#: With a time the robot keeps its profile to itself; taken is a third each for accelerating,
+#: cruising and braking.
+RAMP_SHARE = 1.0 / 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """
+    One motion of a length [m, rad, ...] that enters, cruises and leaves at given speeds.
+
+    Both ramps have the same acceleration. Nothing may be faster than the cruise.
+    """
+
+    length: float
+    enter: float
+    cruise: float
+    leave: float
+    acceleration: float
+
+    @property
+    def duration(self) -> float:
+        """Return the time it takes [s]."""
+        if self.length <= 0.0:
+            return 0.0
+        way_in, way_out = self._way(self.enter), self._way(self.leave)
+        return ((self.length - way_in - way_out) / self.cruise
+                + (2.0 * self.cruise - self.enter - self.leave) / self.acceleration)
+
+    def time_at(self, way: float) -> float:
+        """Return the time after which that much of the length is done [s]."""
+        if way <= 0.0 or self.length <= 0.0:
+            return 0.0
+        if way >= self.length:
+            return self.duration
+        way_in, way_out = self._way(self.enter), self._way(self.leave)
+        if way < way_in:
+            return self._ramp(self.enter, way)
+        if way > self.length - way_out:
+            return self.duration - self._ramp(self.leave, self.length - way)
+        return (self.cruise - self.enter) / self.acceleration + (way - way_in) / self.cruise
+
+    def knots(self) -> tuple[float, ...]:
+        """Return the ways at which the time curve bends, ends left out, as fractions in (0, 1)."""
+        if self.length <= 0.0:
+            return ()
+        a, b = self._way(self.enter) / self.length, self._way(self.leave) / self.length
+        # The halves of the ramps keep straight lines between the knots near the parabola.
+        return tuple(f for f in (0.25 * a, a, 1.0 - b, 1.0 - 0.25 * b) if 0.0 < f < 1.0)
+
+    def _way(self, speed: float) -> float:
+        """Return the way between a speed and the cruise: (v^2 - u^2) / 2a."""
+        return (self.cruise + speed) * (self.cruise - speed) / (2.0 * self.acceleration)
+
+    def _ramp(self, speed: float, way: float) -> float:
+        """Return the time for the first part of a ramp from a speed: s = u t + a t^2 / 2."""
+        a = self.acceleration
+        return (sqrt(speed * speed + 2.0 * a * way) - speed) / a
+
+
+def trapezoid(length: float, velocity: float, acceleration: float, stands_before: bool,
+              stands_after: bool) -> Profile:
+    """
+    Return the fastest profile within a speed and an acceleration.
+
+    From rest to rest T = d/v + v/a if d > v^2/a, else the triangle T = 2 sqrt(d/a). Where it does
+    not stand it comes in, or goes out, at its cruise speed.
+    """
+    ramps = stands_before + stands_after
+    peak = sqrt(2.0 * acceleration * length / ramps) if ramps else velocity
+    return _between(length, min(velocity, peak), acceleration, stands_before, stands_after)
+
+
+def timed(length: float, duration: float, stands_before: bool, stands_after: bool) -> Profile:
+    """Return the profile of a motion for which the robot is told the time."""
+    cruise = length / duration * peak_factor(stands_before, stands_after)
+    acceleration = max(cruise, 1e-12) / (RAMP_SHARE * duration)
+    return _between(length, cruise, acceleration, stands_before, stands_after)
+
+
+def peak_factor(stands_before: bool, stands_after: bool) -> float:
+    """Return how much faster than its mean a timed motion gets: 1.5 from rest to rest."""
+    return 1.0 / (1.0 - 0.5 * RAMP_SHARE * (stands_before + stands_after))
+
+
+def cruise_for(length: float, duration: float, acceleration: float,
+               ramps: int) -> float | None:
+    """
+    Return the cruise speed that takes exactly a duration, None if the acceleration is too low.
+
+    Each of the ramps (0 to 2) costs the way v^2 / 2a, so v T = d + n v^2 / 2a, of which the
+    smaller root counts.
+    """
+    root = duration * duration - 2.0 * ramps * length / acceleration
+    if root < 0.0:
+        return None
+    return 2.0 * length / (duration + sqrt(root))
+
+
+def _between(length: float, cruise: float, acceleration: float, stands_before: bool,
+             stands_after: bool) -> Profile:
+    return Profile(length, 0.0 if stands_before else cruise, cruise,
+                   0.0 if stands_after else cruise, acceleration)

@@ -1,0 +1,93 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The planned tool path as samples with the time at which each is expected."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.plan import ReferencePath
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.planning.corner import Corner
+from ur_cartesian_driver.planning.path import JointLine
+from ur_cartesian_driver.planning.timing import corner_duration, Leg, Timing
+
+_Row: TypeAlias = tuple[float, ...]
+
+
+def reference_path(start: Pose, legs: Sequence[Leg], timings: Sequence[Timing]) -> ReferencePath:
+    """
+    Return the path that the robot is expected to take, blends included.
+
+    Lines have their ends and the places where they change speed, curves as many samples as keep
+    the chords near (see :mod:`~.path`), and nothing turns by more than 10 degrees from row to row.
+    """
+    rows: list[_Row] = [start.row()]
+    points: list[int] = [legs[0].index]
+    times: list[float] = [0.0]
+    now = 0.0
+    for k, (leg, timing) in enumerate(zip(legs, timings, strict=True)):
+        u = _places(leg, timing)
+        rows.extend(_poses(leg, u))
+        points.extend([leg.index] * len(u))
+        span, way = leg.u_after - leg.u_before, timing.profile.length
+        times.extend(now + timing.profile.time_at(way * (x - leg.u_before) / span)
+                     if span > 0.0 else now for x in u)
+        now += timing.profile.duration
+        if leg.after is not None:
+            lasts = corner_duration(
+                leg.after, _speed(leg, timing), _speed(legs[k + 1], timings[k + 1]))
+            now = _append_corner(leg.after, leg.index, legs[k + 1].index, now, lasts,
+                                 rows, points, times)
+    poses = np.array(rows)
+    _keep_hemisphere(poses)
+    return ReferencePath(poses=poses, point=np.array(points, dtype=np.int32),
+                         time=np.maximum.accumulate(np.array(times)))
+
+
+def _places(leg: Leg, timing: Timing) -> list[float]:
+    """Return the ``u`` of the rows of a leg, the first one left out (it is there already)."""
+    begin, end = leg.u_before, leg.u_after
+    span = max(end - begin, 0.0)
+    n = max(1, round(leg.path.samples * span))
+    places = {begin + span * k / n for k in range(1, n)}
+    places.update(begin + span * f for f in timing.profile.knots())
+    return [*sorted(places), end]
+
+
+def _poses(leg: Leg, places: list[float]) -> list[_Row]:
+    path = leg.path
+    if isinstance(path, JointLine):
+        return [tuple(row) for row in path.rows(np.array(places)).tolist()]
+    rows: list[_Row] = [path.pose(u).row() for u in places[:-1]]
+    last = path.end if places[-1] == 1.0 else path.pose(places[-1])
+    return [*rows, last.row()]
+
+
+def _speed(leg: Leg, timing: Timing) -> float:
+    """Return the tool's cruise speed [m/s]."""
+    whole = timing.profile.length / max(leg.u_after - leg.u_before, 1e-9)
+    return timing.profile.cruise * leg.path.length / whole
+
+
+def _append_corner(corner: Corner, before: int, after: int, now: float, lasts: float,
+                   rows: list[_Row], points: list[int], times: list[float]) -> float:
+    """Append the rows of a corner; return the time at its end."""
+    n = corner.samples
+    for k in range(1, n + 1):
+        s = k / n
+        rows.append(corner.pose(s).row())
+        points.append(before if s <= 0.5 else after)
+        times.append(now + s * lasts)
+    return now + lasts
+
+
+def _keep_hemisphere(poses: NDArray[np.float64]) -> None:
+    """Turn signs of quaternions (q and -q are one orientation) so that rows do not jump."""
+    dots = np.einsum('ij,ij->i', poses[1:, 3:], poses[:-1, 3:])
+    signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0))
+    poses[1:, 3:] *= signs[:, np.newaxis]

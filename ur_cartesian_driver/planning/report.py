@@ -1,0 +1,99 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a plan says to people: a line for each segment, and what was ignored or changed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import degrees
+
+from ur_cartesian_driver.motion.goal import Goal, SegmentType
+from ur_cartesian_driver.motion.primitive import MoveC, OptimoveJ, Primitive
+from ur_cartesian_driver.planning.timing import Leg, Timing
+from ur_cartesian_driver.planning.validate import is_optimized, is_timed, segment_of
+
+#: How many points a remark lists before it counts the rest.
+_LISTED = 5
+
+
+def note(leg: Leg, timing: Timing, primitive: Primitive, why: Sequence[str]) -> str:
+    """
+    Return the line of one segment.
+
+    :param why: reasons for the choice of the primitive, before the reason for its speed.
+    """
+    asked = SegmentType(leg.segment.type).name
+    parts = [f'point {leg.index}: {asked} -> {_name(primitive)} {_way(leg)} '
+             f'in {_duration(leg, timing)}']
+    if leg.after is not None:
+        parts.append(f'blend {1e3 * leg.after.radius:g} mm')
+    parts.append('because ' + ' and '.join([*why, timing.reason]))
+    return ', '.join(parts)
+
+
+def ignored(goal: Goal) -> list[str]:
+    """Return a remark for everything in a checked goal that has no effect."""
+    remarks: list[str] = []
+    timed = is_timed(goal)
+    points = list(enumerate(goal.waypoints))
+    if timed:
+        _say(remarks, [i for i, p in points if any(p.twist)],
+             'twist is ignored: UR motion commands stop or blend at a point')
+    else:
+        _say(remarks, [i for i, p in points if any(p.twist) and not _takes_twist(goal, i)],
+             'twist is ignored: the segment has a velocity of its own, or no speed of the tool')
+    _say(remarks, [i for i, p in points if any(p.acceleration)],
+         'acceleration is ignored: UR motion commands cannot meet it')
+    _say(remarks, [i for i, p in points if any(p.jerk)],
+         'jerk is ignored: no robot motion takes it')
+    if timed:
+        _say(remarks, [i for i, s in enumerate(goal.segments) if s.acceleration > 0.0 and s.type
+                       in (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)],
+             'the acceleration of the segment is ignored: its time counts')
+    if goal.segments and goal.segments[-1].blend_radius > 0.0:
+        remarks.append(f'point {len(points) - 1}: the blend is ignored: the last point is '
+                       'never blended')
+    return remarks
+
+
+def _takes_twist(goal: Goal, index: int) -> bool:
+    segment = segment_of(goal, index)
+    return (segment.velocity == 0.0 and segment.type != SegmentType.JOINT
+            and not is_optimized(segment.type))
+
+
+def _say(remarks: list[str], points: list[int], what: str) -> None:
+    if not points:
+        return
+    listed = ', '.join(str(i) for i in points[:_LISTED])
+    more = f' and {len(points) - _LISTED} more' if len(points) > _LISTED else ''
+    word = 'point' if len(points) == 1 else 'points'
+    remarks.append(f'{word} {listed}{more}: {what}')
+
+
+def _name(primitive: Primitive) -> str:
+    """Return the robot's name of the motion, with the kinds of its targets."""
+    name = type(primitive).__name__.upper()
+    if isinstance(primitive, MoveC):
+        kinds = ['JOINT' if isinstance(x, tuple) else 'POSE'
+                 for x in (primitive.target, primitive.via)]
+        return name if kinds == ['POSE', 'POSE'] else f'{name}_{"_".join(dict.fromkeys(kinds))}'
+    if name == 'MOVEJ' or isinstance(primitive, OptimoveJ):
+        return f'{name}_POSE'
+    return name
+
+
+def _way(leg: Leg) -> str:
+    turn = degrees(leg.path.angle)
+    return f'{leg.path.length:.3f} m' + (f' and {turn:.1f} degrees' if turn >= 0.05 else '')
+
+
+def _duration(leg: Leg, timing: Timing) -> str:
+    about = 'about ' if is_optimized(leg.kind) else ''
+    if leg.path.length > 1e-6:
+        speed = f'{leg.path.length / max(timing.duration, 1e-9):.3f} m/s on average'
+    else:
+        speed = f'{leg.path.angle / max(timing.duration, 1e-9):.3f} rad/s on average'
+    return f'{about}{timing.duration:.3f} s ({speed})'
+
+

@@ -1,0 +1,422 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Every reason to refuse a goal that can be known without a robot.
+
+:data:`RULES` is the list, in the order in which the rules are tried; each is a small function that
+raises the refusal or returns. What needs the robot (reach, posture, speed) is in :mod:`~.plan`.
+
+The texts name places as the ROS messages do (``trajectory.points[2].pose.orientation``), so that
+a reader finds them in what was sent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from enum import IntEnum
+from math import hypot, isfinite, sqrt
+from typing import TypeAlias, TypeVar
+
+from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import (
+    InvalidGoal,
+    InvalidJoints,
+    NotAvailable,
+    OldHeaderTimestamp,
+)
+from ur_cartesian_driver.motion.goal import (
+    ArcMode,
+    ExecutionMode,
+    Goal,
+    Posture,
+    Segment,
+    SegmentType,
+    Tolerance,
+    Waypoint,
+)
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Quaternion
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.path import Arc, same
+
+#: How far a quaternion's length may be off 1.
+QUATERNION_TOLERANCE = 1e-3
+#: How far ahead a stamp may lie [s].
+LARGEST_DELAY = 60.0
+
+Rule: TypeAlias = Callable[[Goal, PlanningOptions], None]
+_Enum = TypeVar('_Enum', bound=IntEnum)
+
+#: A goal without segments has these.
+PLAIN = Segment()
+
+
+def check(goal: Goal, options: PlanningOptions) -> None:
+    """
+    Refuse what needs no robot to be known wrong.
+
+    :raises GoalRefused: the subclass that fits; its text names point, field, value and bound.
+    """
+    for rule in RULES:
+        rule(goal, options)
+
+
+def point_field(index: int, field: str = '') -> str:
+    """Return the name of a point's field as in the message."""
+    return f'trajectory.points[{index}]' + (f'.{field}' if field else '')
+
+
+def segment_field(index: int, field: str) -> str:
+    """Return the name of a segment's field as in the message."""
+    return f'segments[{index}].{field}'
+
+
+def segment_of(goal: Goal, index: int) -> Segment:
+    """Return the segment that ends at a point, the plain one where the goal has none."""
+    return goal.segments[index] if goal.segments else PLAIN
+
+
+def is_timed(goal: Goal) -> bool:
+    """Tell whether the goal gives times; if not, speeds decide."""
+    return any(waypoint.time != 0.0 for waypoint in goal.waypoints)
+
+
+# -- the rules --------------------------------------------------------------------------------
+
+
+def _number_of_points(goal: Goal, options: PlanningOptions) -> None:
+    count = len(goal.waypoints)
+    if count == 0:
+        raise InvalidGoal('trajectory.points', 'is empty', 'give at least one point')
+    if count > options.max_points:
+        raise InvalidGoal('trajectory.points', f'has {count} points, more than max_points = '
+                          f'{options.max_points}', 'split the goal or raise the parameter')
+
+
+def _number_of_segments(goal: Goal, options: PlanningOptions) -> None:
+    if goal.segments and len(goal.segments) != len(goal.waypoints):
+        raise InvalidGoal(
+            'segments', f'has {len(goal.segments)} entries for {len(goal.waypoints)} points',
+            'give none, or exactly one for each point')
+
+
+def _known_numbers(goal: Goal, options: PlanningOptions) -> None:
+    _known('execution', goal.execution, ExecutionMode)
+    for i, segment in enumerate(goal.segments):
+        _known(segment_field(i, 'type'), segment.type, SegmentType)
+        _known(segment_field(i, 'arc_mode'), segment.arc_mode, ArcMode)
+
+
+def _numbers_of_points(goal: Goal, options: PlanningOptions) -> None:
+    for i, point in enumerate(goal.waypoints):
+        if not _all_finite(point):
+            _name_the_infinite(i, point)
+        _check_unit(point_field(i, 'pose.orientation'), point.pose.quaternion)
+
+
+def _numbers_of_segments(goal: Goal, options: PlanningOptions) -> None:
+    for i, segment in enumerate(goal.segments):
+        for field in ('blend_radius', 'velocity', 'acceleration'):
+            value = getattr(segment, field)
+            _check_finite(segment_field(i, field), (value,))
+            if value < 0.0:
+                raise InvalidGoal(segment_field(i, field),
+                                  f'is {value:g}; it must not be negative')
+        if segment.via is not None:
+            _check_finite(segment_field(i, 'via.position'), segment.via.position)
+            _check_finite(segment_field(i, 'via.orientation'), segment.via.quaternion)
+            _check_unit(segment_field(i, 'via.orientation'), segment.via.quaternion)
+
+
+def _numbers_of_tolerances(goal: Goal, options: PlanningOptions) -> None:
+    for name, tolerance in _tolerances(goal):
+        _check_finite(f'{name}.position_error', tolerance.position)
+        _check_finite(f'{name}.orientation_error', tolerance.orientation)
+        _check_finite(f'{name}.twist_error', tolerance.twist)
+        _check_finite(f'{name}.acceleration_error', tolerance.acceleration)
+    _check_finite('goal_time_tolerance', (goal.goal_time_tolerance,))
+
+
+def _stamp(goal: Goal, options: PlanningOptions) -> None:
+    age = goal.age
+    if age is None:
+        return
+    _check_finite('trajectory.header.stamp', (age,))
+    if age > options.stamp_tolerance:
+        raise OldHeaderTimestamp(
+            f'trajectory.header.stamp lies {age:.3f} s in the past, more than stamp_tolerance = '
+            f'{options.stamp_tolerance:g} s; send 0 for "now", or compare the clocks.')
+    if age < -LARGEST_DELAY:
+        raise InvalidGoal('trajectory.header.stamp', f'lies {-age:.1f} s in the future, more than '
+                          f'{LARGEST_DELAY:g} s', 'send the goal later')
+
+
+def _available(goal: Goal, options: PlanningOptions) -> None:
+    if goal.execution in (ExecutionMode.SPLINE, ExecutionMode.SERVO):
+        raise NotAvailable(
+            'execution', f'is {ExecutionMode(goal.execution).name}, which this version does not '
+            'do', 'set it to PRIMITIVES')
+    if goal.keep_open:
+        raise NotAvailable('keep_open', 'is set, but points cannot be appended in this version',
+                           'send all points at once')
+    if goal.io_commands:
+        raise NotAvailable('io_commands', 'is not empty, but outputs cannot be switched on the '
+                           'way in this version', 'leave it empty')
+    known = ('', options.tf_prefix + 'tool0_controller', options.tf_prefix + 'tool0')
+    if goal.controlled_frame not in known:
+        raise NotAvailable(
+            'trajectory.controlled_frame', f"is '{goal.controlled_frame}', but this version "
+            'moves the active TCP only', 'leave it empty and set the TCP on the robot')
+    for name, tolerance in _tolerances(goal):
+        for field, values in (('twist_error', tolerance.twist),
+                              ('acceleration_error', tolerance.acceleration)):
+            if max(values) > 0.0:
+                raise NotAvailable(f'{name}.{field}', 'is positive, but only position and '
+                                   'orientation are watched in this version', 'set it to 0')
+
+
+def _times(goal: Goal, options: PlanningOptions) -> None:
+    if not is_timed(goal):
+        return
+    before = 0.0
+    for i, point in enumerate(goal.waypoints):
+        if point.time < 0.0 or (i > 0 and point.time <= before):
+            raise InvalidGoal(
+                point_field(i, 'time_from_start'), f'is {point.time:g} s after {before:g} s; '
+                'times must increase from point to point', 'or set all to 0 for speeds')
+        if point.time - before > options.max_segment_time:
+            raise InvalidGoal(
+                point_field(i, 'time_from_start'), f'gives the segment {point.time - before:g} s, '
+                f'more than {options.max_segment_time:.0f} s', 'add points in between')
+        before = point.time
+
+
+def _twist_needs_spline(goal: Goal, options: PlanningOptions) -> None:
+    if goal.execution != ExecutionMode.AUTO or not is_timed(goal):
+        return
+    for i, point in enumerate(goal.waypoints[:-1]):
+        for field, values in (('twist', point.twist), ('acceleration', point.acceleration)):
+            if any(values):
+                raise NotAvailable(
+                    point_field(i, field), 'is not zero in a goal with times; only splines can '
+                    'meet it, and this version does not do them',
+                    'set execution to PRIMITIVES to have it ignored, or set it to 0')
+
+
+def _segment_rules(goal: Goal, options: PlanningOptions) -> None:
+    timed = is_timed(goal)
+    for i, segment in enumerate(goal.segments):
+        if segment is not PLAIN:
+            _speeds(i, segment, timed)
+            _via(i, segment)
+
+
+def _postures(goal: Goal, options: PlanningOptions) -> None:
+    for i, point in enumerate(goal.waypoints):
+        if point.posture:
+            check_posture(point_field(i, 'posture'), point.posture, options.tf_prefix)
+    for i, segment in enumerate(goal.segments):
+        if segment.via_posture:
+            check_posture(segment_field(i, 'via_posture'), segment.via_posture, options.tf_prefix)
+
+
+def _blends(goal: Goal, options: PlanningOptions) -> None:
+    last = len(goal.waypoints) - 1
+    for i in range(1, len(goal.segments)):
+        check_blends_fit(goal, i, goal.waypoints[i - 1].pose.distance_to(goal.waypoints[i].pose),
+                         goal.segments[i - 1].blend_radius,
+                         0.0 if i == last else goal.segments[i].blend_radius)
+
+
+def _ways(goal: Goal, options: PlanningOptions) -> None:
+    for i in range(1, len(goal.waypoints)):
+        start, end = goal.waypoints[i - 1], goal.waypoints[i]
+        segment = segment_of(goal, i)
+        if segment.type == SegmentType.CIRCULAR:
+            # The start's orientation does not matter for the shape.
+            assert segment.via is not None
+            arc_of(i, start.pose, segment.via, end.pose, segment.arc_mode)
+        elif is_straight(segment.type) and same(start.pose, end.pose):
+            # With a posture it may become a joint move: decided with the robot at hand.
+            if not (end.posture and options.on_posture_change == 'movej'):
+                raise no_way(goal, i)
+
+
+#: All rules, in order: later ones may rely on what earlier ones made sure of.
+RULES: tuple[Rule, ...] = (
+    _number_of_points,
+    _number_of_segments,
+    _known_numbers,
+    _numbers_of_points,
+    _numbers_of_segments,
+    _numbers_of_tolerances,
+    _stamp,
+    _available,
+    _times,
+    _twist_needs_spline,
+    _segment_rules,
+    _postures,
+    _blends,
+    _ways,
+)
+
+
+# -- shared with the checks that need the robot -------------------------------------------------
+
+
+def is_straight(kind: SegmentType) -> bool:
+    """Tell whether the tool goes on a straight line."""
+    return kind in (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.PROCESS,
+                    SegmentType.OPTIMIZED_LINEAR)
+
+
+def is_optimized(kind: SegmentType) -> bool:
+    """Tell whether speeds are fractions of the robot's limits."""
+    return kind in (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
+
+
+def check_posture(field: str, posture: Posture, tf_prefix: str) -> None:
+    """
+    Check names and values of a posture.
+
+    :raises InvalidJoints: a name is unknown or doubled, the numbers differ, or a value is not
+        finite.
+    """
+    names, values = posture.names, posture.values
+    if len(names) != len(values):
+        raise InvalidJoints(f'{field} has {len(names)} joint names and {len(values)} values; '
+                            'give one value for each name.')
+    known = [tf_prefix + name for name in JOINT_NAMES]
+    for k, (name, value) in enumerate(zip(names, values, strict=True)):
+        if name not in known:
+            raise InvalidJoints(f"{field}.posture_joint_names[{k}] is '{name}', which is no joint "
+                                f'of this robot; its joints are {", ".join(known)}.')
+        if name in names[:k]:
+            raise InvalidJoints(f"{field}.posture_joint_names[{k}] names '{name}' for the second "
+                                'time; name each joint once.')
+        if not isfinite(value):
+            raise InvalidJoints(f"{field}.posture_joint_values[{k}] ('{name}') is {value}; "
+                                'it must be finite.')
+
+
+def check_blends_fit(goal: Goal, index: int, apart: float, before: float, after: float) -> None:
+    """
+    Check that the blends around both ends of a segment do not overlap.
+
+    The controller skips a waypoint whose blends overlap (C171), so that is never sent.
+
+    :param apart: distance of the two points [m].
+    """
+    # A rounding error may not decide over blends that touch.
+    if before + after > apart * (1.0 + 1e-9) + 1e-9:
+        raise InvalidGoal(
+            segment_field(index if after > 0.0 else index - 1, 'blend_radius'),
+            f'is too large: the blends around points {index - 1} and {index} reach '
+            f'{1e3 * before:g} mm and {1e3 * after:g} mm into a segment of {1e3 * apart:.3f} mm',
+            'make them smaller')
+
+
+def arc_of(index: int, start: Pose, via: Pose, end: Pose, mode: ArcMode) -> Arc:
+    """
+    Return the arc of a CIRCULAR segment.
+
+    :raises InvalidGoal: start, via and end make no circle.
+    """
+    try:
+        return Arc.through(start, via.position, end, mode)
+    except ValueError as error:
+        raise InvalidGoal(segment_field(index, 'via'), f'gives no arc to point {index}: {error}',
+                          'move the via off the line, or use LINEAR') from None
+
+
+def no_way(goal: Goal, index: int) -> InvalidGoal:
+    """Return the refusal of a segment without a motion."""
+    dwell = goal.waypoints[index].time - goal.waypoints[index - 1].time
+    waits = f' for {dwell:g} s' if is_timed(goal) else ''
+    return InvalidGoal(
+        point_field(index), f'is the same as points[{index - 1}]{waits}: there is no way to go, '
+        'and the robot cannot wait at a point', 'remove one of the two, or split the goal there')
+
+
+# -- details ------------------------------------------------------------------------------------
+
+
+def _known(field: str, value: int, kind: type[_Enum]) -> None:
+    try:
+        kind(value)
+    except ValueError:
+        names = ', '.join(f'{member.name} = {member.value}' for member in kind)
+        raise InvalidGoal(field, f'is {value}, which is none of {names}') from None
+
+
+def _all_finite(point: Waypoint) -> bool:
+    # A sum is finite only if every term is, except that huge numbers may add up to infinity:
+    # then the slow check finds nothing and nothing is refused here.
+    pose = point.pose
+    return isfinite(point.time + sum(pose.position) + sum(pose.quaternion) + sum(point.twist)
+                    + sum(point.acceleration) + sum(point.jerk))
+
+
+def _name_the_infinite(index: int, point: Waypoint) -> None:
+    _check_finite(point_field(index, 'time_from_start'), (point.time,))
+    _check_finite(point_field(index, 'pose.position'), point.pose.position)
+    _check_finite(point_field(index, 'pose.orientation'), point.pose.quaternion)
+    for field in ('twist', 'acceleration', 'jerk'):
+        _check_finite(point_field(index, field), getattr(point, field))
+
+
+def _check_finite(field: str, values: Iterable[float]) -> None:
+    for value in values:
+        if not isfinite(value):
+            raise InvalidGoal(field, f'contains {value}; every number must be finite')
+
+
+def _check_unit(field: str, q: Quaternion) -> None:
+    x, y, z, w = q
+    square = x * x + y * y + z * z + w * w
+    if abs(square - 1.0) <= QUATERNION_TOLERANCE:  # |q| is then within half of it
+        return
+    length = sqrt(square) if isfinite(square) else hypot(x, y, z, w)
+    if length == 0.0:
+        raise InvalidGoal(field, 'is zero, which is no orientation',
+                          'send x, y, z, w = 0, 0, 0, 1 for none')
+    if abs(length - 1.0) > QUATERNION_TOLERANCE:
+        raise InvalidGoal(field, f'has length {length:.6g}; a unit quaternion is needed (within '
+                          f'{QUATERNION_TOLERANCE:g})', 'divide it by its length')
+
+
+def _speeds(index: int, segment: Segment, timed: bool) -> None:
+    kind = SegmentType(segment.type)
+    if timed and is_optimized(kind):
+        raise InvalidGoal(
+            segment_field(index, 'type'), f'is {kind.name}, which cannot keep the time of '
+            f'points[{index}]', 'use another type, or set all times to 0')
+    if timed and segment.velocity > 0.0:
+        raise InvalidGoal(
+            segment_field(index, 'velocity'), f'is {segment.velocity:g} in a goal with times; '
+            'either counts, not both', 'set it, or all times, to 0')
+    if is_optimized(kind):
+        for field in ('velocity', 'acceleration'):
+            value = getattr(segment, field)
+            if value > 1.0:
+                raise InvalidGoal(segment_field(index, field), f'is {value:g}; for {kind.name} it '
+                                  'is a fraction in (0, 1]')
+
+
+def _via(index: int, segment: Segment) -> None:
+    kind = SegmentType(segment.type)
+    if kind == SegmentType.CIRCULAR:
+        if segment.via is None:
+            raise InvalidGoal(segment_field(index, 'via'), 'is missing; an arc needs a pose '
+                              'between its ends')
+        return
+    # The identity is what an unset pose of a ROS message looks like.
+    for field, given in (('via', segment.via not in (None, IDENTITY)),
+                         ('via_posture', bool(segment.via_posture)),
+                         ('arc_mode', segment.arc_mode != ArcMode.UNCONSTRAINED)):
+        if given:
+            raise InvalidGoal(segment_field(index, field), f'is set, but the type is {kind.name}',
+                              'set the type to CIRCULAR, or leave it empty')
+
+
+def _tolerances(goal: Goal) -> tuple[tuple[str, Tolerance], tuple[str, Tolerance]]:
+    return ('path_tolerance', goal.path_tolerance), ('goal_tolerance', goal.goal_tolerance)
