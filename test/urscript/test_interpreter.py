@@ -102,10 +102,11 @@ def test_builtins_get_and_give_values_of_the_language() -> None:
 
 def test_a_list_that_a_builtin_keeps_does_not_change_behind_the_program() -> None:
     kept = [1, 2]
-    running = machine('a = give()\nb = a\nb[0] = 9\nsync()\nc = a', give=lambda: kept)
-    frames_until_the_end(running)
-    assert kept == [1, 2]
-    assert running.variables['c'] == [1, 2]
+    running = machine('a = give()\na[0] = 9\nsync()\nb = give()', give=lambda: kept)
+    running.step()
+    kept[1] = 7
+    running.step()
+    assert running.variables == {'a': [9, 2], 'b': [1, 7]}
 
 
 # Threads
@@ -228,6 +229,21 @@ def test_recursion_through_deep_expressions_is_an_error_and_no_crash() -> None:
     assert running.error is not None
     assert running.error.text == 'Function calls are nested too deeply.'
     assert running.error.line > 0
+
+
+def test_a_builtin_that_fails_to_clean_up_leaves_an_error() -> None:
+    def move() -> Generator[None, None, None]:
+        try:
+            yield
+        finally:
+            raise ValueError('stuck')
+
+    running = machine('move()', move=move)
+    running.step()
+    running.stop()
+    assert not running.running
+    assert running.error is not None
+    assert running.error.text == 'move: stuck'
 
 
 # Pause

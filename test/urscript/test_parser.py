@@ -47,9 +47,7 @@ def test_line_ends_of_windows_count_once() -> None:
 
 def test_nodes_stand_where_a_reader_would_point() -> None:
     text = program('  total = first + second(3, k=4)[5].six')
-    places = {
-        (type(node).__name__, node.line, node.column) for node in walk(parse(text).body[0])
-    }
+    places = {(type(node).__name__, node.line, node.column) for node in walk(parse(text).body[0])}
     assert {
         ('Assign', 2, 3),
         ('Name', 2, 3),

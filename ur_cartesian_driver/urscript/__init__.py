@@ -4,7 +4,8 @@
 URScript, the language of the robot's programs, and nothing of the robot.
 
 Text to tokens (`scanner`), to a tree (`syntax`, `parser`), to checked names (`scopes`), to Python
-closures (`compiler`), to threads that run frame by frame (`interpreter`). What a program can do to
+closures (`closures`, `expressions`, `compiler`), to threads that run frame by frame
+(`interpreter`) and compute with `values`. What a program can do to
 a robot are builtins, given by whoever runs it; `builtins` holds those that need no robot.
 """
 

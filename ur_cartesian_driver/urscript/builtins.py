@@ -328,9 +328,7 @@ def core_builtins(seed: int = 0) -> dict[str, Callable[..., Any]]:
         'atan': math.atan, 'cos': math.cos, 'd2r': math.radians, 'r2d': math.degrees,
         'sin': math.sin, 'tan': math.tan,
     }  # fmt: skip
-    table: dict[str, Callable[..., Any]] = {
-        function.__name__: function for function in named
-    }
+    table: dict[str, Callable[..., Any]] = {function.__name__: function for function in named}
     table.update((name, _function_of_float(compute)) for name, compute in of_float.items())
     table.update(pow=pow_, random=random_number)
     return table

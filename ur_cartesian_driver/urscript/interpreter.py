@@ -21,14 +21,8 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from ur_cartesian_driver.urscript import syntax as tree
-from ur_cartesian_driver.urscript.compiler import (
-    compile_program,
-    Procedure,
-    ProgramHalted,
-    Steps,
-    too_deep,
-    UNSET,
-)
+from ur_cartesian_driver.urscript.closures import Procedure, ProgramHalted, Steps, too_deep, UNSET
+from ur_cartesian_driver.urscript.compiler import compile_program
 from ur_cartesian_driver.urscript.errors import CompileError, RuntimeException
 from ur_cartesian_driver.urscript.scopes import Builtin, resolve
 from ur_cartesian_driver.urscript.values import ThreadHandle, Value
@@ -191,6 +185,8 @@ class Machine:
         previous, self._current = self._current, thread
         try:
             thread.steps.close()
+        except RuntimeException as error:  # a builtin failed to clean up
+            self.error = self.error or error
         finally:
             self._current = previous
         if self.on_thread_end is not None:

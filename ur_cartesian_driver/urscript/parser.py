@@ -163,7 +163,7 @@ class Parser:
     # Programs, functions and blocks
 
     def program(self) -> tree.Program:
-        """("def" | "sec") NAME "(" ")" ":" block "end"."""
+        """Read ("def" | "sec") NAME "(" ")" ":" block "end"."""
         start = self._token
         kind: Literal['def', 'sec']
         if self._match('def'):
@@ -183,7 +183,7 @@ class Parser:
         return tree.Program(name=name, kind=kind, body=body, **place(start))
 
     def _block(self, *closing: str) -> tree.Block:
-        """{ statement }, up to one of the keywords that close it."""
+        """Read { statement }, up to one of the keywords that close it."""
         statements: list[tree.Statement] = []
         with self._nested():
             while not self._at(*closing):
@@ -193,7 +193,7 @@ class Parser:
         return tuple(statements)
 
     def _function(self) -> tree.Function:
-        """("def" | "thread") NAME "(" [ parameter { "," parameter } ] ")" ":" block "end"."""
+        """Read ("def" | "thread") NAME "(" [ parameter { "," parameter } ] ")" ":" block "end"."""
         kind: Literal['def', 'thread'] = 'def' if self._advance().text == 'def' else 'thread'
         name = self._expect_kind(Kind.NAME)
         self._expect('(')
@@ -212,7 +212,7 @@ class Parser:
         )
 
     def _parameter(self) -> tree.Parameter:
-        """NAME [ "=" expression ]."""
+        """Read NAME [ "=" expression ]."""
         name = self._expect_kind(Kind.NAME)
         default = self._expression() if self._match('=') else None
         return tree.Parameter(name=name.text, default=default, **place(name))
@@ -220,7 +220,7 @@ class Parser:
     # Statements
 
     def _statement(self) -> tree.Statement:
-        """Choose the rule by the first token."""
+        """Read the statement that the first token announces."""
         token = self._token
         rule = {
             'def': self._function, 'thread': self._function, 'if': self._if,
@@ -234,7 +234,7 @@ class Parser:
         return self._assignment_or_call()
 
     def _if(self) -> tree.If:
-        """"if" expression ":" block { "elif" ... } [ "else" ":" block ] "end"."""
+        """Read "if" expression ":" block { "elif" ... } [ "else" ":" block ] "end"."""
         start = self._token
         branches: list[tree.Branch] = []
         while keyword := self._match('if') if not branches else self._match('elif'):
@@ -247,13 +247,13 @@ class Parser:
         return tree.If(branches=tuple(branches), otherwise=otherwise, **place(start))
 
     def _else(self, keyword: str) -> tree.Block:
-        """("else" | "default") ":" block."""
+        """Read ("else" | "default") ":" block."""
         self._expect(keyword)
         self._expect(':')
         return self._block('end')
 
     def _switch(self) -> tree.Switch:
-        """"switch" expression ":" { "case" ... } [ "default" ... ] "end"."""
+        """Read "switch" expression ":" { "case" ... } [ "default" ... ] "end"."""
         start = self._advance()
         subject = self._expression()
         self._expect(':')
@@ -292,7 +292,7 @@ class Parser:
         return following.text != 'end' or self._token.column != switch.column
 
     def _while(self) -> tree.While:
-        """"while" expression ":" block "end"."""
+        """Read "while" expression ":" block "end"."""
         start = self._advance()
         condition = self._expression()
         self._expect(':')
@@ -303,7 +303,7 @@ class Parser:
         return tree.While(condition=condition, body=body, **place(start))
 
     def _return(self) -> tree.Return:
-        """"return" [ expression ]; a value stands on the line of the keyword."""
+        """Read "return" [ expression ]; a value stands on the line of the keyword."""
         start = self._advance()
         value = self._expression() if self._same_line() and self._starts_expression() else None
         return tree.Return(value=value, **place(start))
@@ -314,14 +314,14 @@ class Parser:
         return self._token.kind is not Kind.END
 
     def _jump(self) -> tree.Statement:
-        """"break" | "continue", inside a loop."""
+        """Read "break" | "continue", inside a loop."""
         token = self._advance()
         if not self._loops:
             raise self.error(f'{token.text!r} stands outside a loop', token)
         return (tree.Break if token.text == 'break' else tree.Continue)(**place(token))
 
     def _word(self) -> tree.Statement:
-        """"halt" | "pause" | "enter_critical" | "exit_critical"."""
+        """Read "halt" | "pause" | "enter_critical" | "exit_critical"."""
         token = self._advance()
         if token.text == 'halt':
             return tree.Halt(**place(token))
@@ -330,13 +330,13 @@ class Parser:
         return tree.Critical(enter=token.text == 'enter_critical', **place(token))
 
     def _thread_control(self) -> tree.Statement:
-        """("join" | "kill") unary."""
+        """Read ("join" | "kill") unary."""
         token = self._advance()
         handle = self._unary()
         return (tree.Join if token.text == 'join' else tree.Kill)(handle=handle, **place(token))
 
     def _label(self) -> tree.Label:
-        """"$" NUMBER STRING { STRING }, on one line."""
+        """Read "$" NUMBER STRING { STRING }, on one line."""
         start = self._advance()
         number = self._expect_kind(Kind.NUMBER)
         text = self._expect_kind(Kind.STRING).text
@@ -345,7 +345,7 @@ class Parser:
         return tree.Label(number=int(number.number), text=text, **place(start))
 
     def _assignment_or_call(self) -> tree.Statement:
-        """[ "global" | "local" ] target "=" expression | call."""
+        """Read [ "global" | "local" ] target "=" expression | call."""
         start = self._token
         qualifier: Literal['', 'global', 'local'] = ''
         if self._match('global'):
@@ -397,7 +397,7 @@ class Parser:
         return left
 
     def _inversion(self) -> tree.Expression:
-        """"not" inversion | comparison."""
+        """Read "not" inversion | comparison."""
         if token := self._match('not'):
             with self._nested():
                 operand = self._inversion()
@@ -439,7 +439,7 @@ class Parser:
             raise self.error(f'more than {MAX_CHAIN} operators in a row')
 
     def _unary(self) -> tree.Expression:
-        """("-" | "+") unary | "run" NAME "(" ")" | postfix."""
+        """Read ("-" | "+") unary | "run" NAME "(" ")" | postfix."""
         if token := self._match('-', '+'):
             with self._nested():
                 operand = self._unary()
@@ -466,7 +466,7 @@ class Parser:
         raise self.error(f'more than {MAX_CHAIN} calls, indices or fields in a row')
 
     def _field(self, target: tree.Expression) -> tree.Field:
-        """"." NAME, where a keyword is a name too."""
+        """Read "." NAME, where a keyword is a name too."""
         self._advance()
         name = self._token
         if name.kind not in (Kind.NAME, Kind.KEYWORD):
@@ -475,7 +475,7 @@ class Parser:
         return tree.Field(target=target, name=name.text, **place(name))
 
     def _call(self, callee: tree.Name | tree.Field) -> tree.Call | tree.MethodCall:
-        """"(" [ argument { "," argument } ] ")", positional arguments first."""
+        """Read "(" [ argument { "," argument } ] ")", positional arguments first."""
         position = Place(line=callee.line, column=callee.column)
         self._advance()
         arguments = self._list(self._argument, ')')
@@ -489,7 +489,7 @@ class Parser:
         )
 
     def _argument(self) -> tree.Argument:
-        """[ NAME "=" ] expression."""
+        """Read [ NAME "=" ] expression."""
         start = self._token
         following = self._tokens[min(self._next + 1, len(self._tokens) - 1)]
         name = None
@@ -500,7 +500,7 @@ class Parser:
         return tree.Argument(name=name, value=self._expression(), **place(start))
 
     def _index(self, target: tree.Expression) -> tree.Expression:
-        """"[" expression [ "," expression ] "]"; six after the name p are a pose."""
+        """Read "[" expression [ "," expression ] "]"; six after the name p are a pose."""
         start = self._advance()
         items = self._list(self._expression, ']')
         if isinstance(target, tree.Name) and target.identifier == 'p' and len(items) == 6:

@@ -79,8 +79,7 @@ def resolve(program: tree.Program, builtins: Mapping[str, Builtin]) -> Scope:
     _declare(root)
     for scope in root.walk():
         _assign_locals(scope)
-    signatures = {name: _signature(builtin) for name, builtin in builtins.items()}
-    _Check(builtins, signatures).block(root, program.body)
+    _Check(builtins).block(root, program.body)
     _spread_suspension(list(root.walk()))
     return root
 
@@ -166,13 +165,8 @@ def bind(definition: tree.Function, call: tree.Call) -> dict[str, tree.Argument]
 class _Check:
     """Walks the program in the order of the text."""
 
-    def __init__(
-        self,
-        builtins: Mapping[str, Builtin],
-        signatures: Mapping[str, inspect.Signature | None],
-    ) -> None:
+    def __init__(self, builtins: Mapping[str, Builtin]) -> None:
         self._builtins = builtins
-        self._signatures = signatures
 
     def block(self, scope: Scope, nodes: Iterable[tree.Node]) -> None:
         """Check nodes and everything below them."""
@@ -208,7 +202,7 @@ class _Check:
         elif call.function in self._builtins:
             if inspect.isgeneratorfunction(self._builtins[call.function]):
                 scope.suspends = True
-            if signature := self._signatures[call.function]:
+            if signature := _signature(self._builtins[call.function]):
                 _check_arguments(call, signature)
         else:
             raise name_not_found(call.function, call.line, call.column)

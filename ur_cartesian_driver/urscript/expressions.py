@@ -1,0 +1,377 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Expressions to closures.
+
+What is stored, passed or returned is copied where it may be stored elsewhere too, since lists are
+values in this language. An error gets the position of the operator, index or call that raised it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+import inspect
+
+from ur_cartesian_driver.urscript import syntax as tree
+from ur_cartesian_driver.urscript import values
+from ur_cartesian_driver.urscript.closures import (
+    Code,
+    either,
+    Frame,
+    MAX_CALL_DEPTH,
+    Procedure,
+    Runtime,
+    sequence,
+    Steps,
+    Thread,
+    too_deep,
+    UNSET,
+)
+from ur_cartesian_driver.urscript.errors import RuntimeException
+from ur_cartesian_driver.urscript.scopes import bind, Builtin, Scope
+from ur_cartesian_driver.urscript.values import Value
+
+
+class ExpressionCompiler:
+    """Compiles the expressions of one function."""
+
+    def __init__(
+        self,
+        scope: Scope,
+        builtins: Mapping[str, Builtin],
+        runtime: Runtime,
+        procedures: Mapping[int, Procedure],
+    ) -> None:
+        self._scope = scope
+        self._builtins = builtins
+        self._runtime = runtime
+        #: By the id of their scope; their bodies need not be there yet.
+        self._procedures = procedures
+
+    def expression(self, node: tree.Expression) -> Code:
+        match node:
+            case tree.Constant():
+                return self._constant(node.value)
+            case tree.Name():
+                return self._name(node)
+            case tree.Unary():
+                return self._unary(node)
+            case tree.Binary():
+                return self._binary(node)
+            case tree.Logical():
+                return self._logical(node)
+            case tree.ListLiteral() | tree.PoseLiteral():
+                make = values.make_list if isinstance(node, tree.ListLiteral) else values.make_pose
+                items = [self.expression(item) for item in node.items]
+                return self._positioned(node, items, lambda frame, found: make(found))
+            case tree.Index():
+                return self._index(node)
+            case tree.Field():
+                key = node.name
+                target = [self.expression(node.target)]
+                return self._positioned(
+                    node, target, lambda frame, found: values.get_part(found[0], key)
+                )
+            case tree.Call():
+                return self._call(node)
+            case tree.MethodCall():
+                return self._method_call(node)
+            case tree.Run():
+                return self._run(node)
+        raise AssertionError(node)
+
+    def owned(self, node: tree.Expression) -> Code:
+        """Compile an expression whose value is about to be stored or handed over."""
+        code = self.expression(node)
+        if self._is_fresh(node):
+            return code
+        run = code.run
+        mutable = (list, values.Matrix, values.Struct)
+
+        def plain(frame: Frame) -> Value:
+            value = run(frame)
+            return values.copy(value) if type(value) in mutable else value
+
+        def steps(frame: Frame) -> Steps:
+            return values.copy((yield from run(frame)))
+
+        return Code(steps if code.suspends else plain, code.suspends, code.weight)
+
+    def _is_fresh(self, node: tree.Expression) -> bool:
+        """Tell whether the value of an expression is stored nowhere else and needs no copy."""
+        if isinstance(node, tree.Call):
+            return self._scope.function(node.function) is not None
+        stored = tree.Name | tree.Index | tree.Field | tree.Unary | tree.MethodCall
+        return not isinstance(node, stored)
+
+    @staticmethod
+    def _positioned(
+        node: tree.Node, parts: Sequence[Code], finish: Callable[[Frame, list[Value]], Value]
+    ) -> Code:
+        """Evaluate parts in sequence; what goes wrong in `finish` went wrong at this node."""
+
+        def positioned(frame: Frame, found: list[Value]) -> Value:
+            try:
+                return finish(frame, found)
+            except RuntimeException as error:
+                raise error.at(node.line, node.column) from None
+
+        return sequence(parts, positioned)
+
+    @staticmethod
+    def _constant(value: Value) -> Code:
+        return Code(lambda frame: value)
+
+    def _name(self, node: tree.Name) -> Code:
+        name = node.identifier
+        slot, is_local = self._slot(name)
+        shared = self._runtime.globals
+
+        def read_local(frame: Frame) -> Value:
+            value = frame[slot]
+            if value is UNSET:
+                raise _unset(node)
+            return value
+
+        def read_global(frame: Frame) -> Value:
+            value = shared[slot]
+            if value is UNSET:
+                raise _unset(node)
+            return value
+
+        return Code(read_local if is_local else read_global)
+
+    def _slot(self, name: str, qualifier: str = '') -> tuple[int, bool]:
+        """Return the slot of a variable and whether it is in the frame."""
+        if name in self._scope.locals and qualifier != 'global':
+            return self._scope.locals[name], True
+        return self._scope.globals[name], False
+
+    def _unary(self, node: tree.Unary) -> Code:
+        operate = values.UNARY[node.operator]
+        operand = self.expression(node.operand)
+        return self._positioned(node, [operand], lambda frame, found: operate(found[0]))
+
+    def _binary(self, node: tree.Binary) -> Code:
+        operate = values.BINARY[node.operator]
+        left, right = self.expression(node.left), self.expression(node.right)
+        run_left, run_right = left.run, right.run
+        if left.suspends or right.suspends:
+            return self._positioned(node, [left, right], lambda frame, found: operate(*found))
+
+        on_floats = values.ON_FLOATS.get(node.operator, operate)
+
+        def run(frame: Frame) -> Value:
+            a, b = run_left(frame), run_right(frame)
+            try:
+                if type(a) is float and type(b) is float:
+                    return on_floats(a, b)
+                return operate(a, b)
+            except RuntimeException as error:
+                raise error.at(node.line, node.column) from None
+
+        return Code(run, False, 1 + left.weight + right.weight)
+
+    def _logical(self, node: tree.Logical) -> Code:
+        left, right = self.expression(node.left), self.expression(node.right)
+        truth = values.truth
+        if node.operator == 'xor':
+            return sequence([left, right], lambda frame, both: truth(both[0]) != truth(both[1]))
+        decisive = node.operator == 'or'
+        run_left, run_right = left.run, right.run
+
+        def plain(frame: Frame) -> bool:
+            return decisive if truth(run_left(frame)) is decisive else truth(run_right(frame))
+
+        def steps(frame: Frame) -> Steps:
+            value = (yield from run_left(frame)) if left.suspends else run_left(frame)
+            if truth(value) is decisive:
+                return decisive
+            return truth((yield from run_right(frame)) if right.suspends else run_right(frame))
+
+        return either(plain, steps, [left, right])
+
+    def _index(self, node: tree.Index) -> Code:
+        parts = [self.expression(node.target), *map(self.expression, node.indices)]
+        if len(parts) == 2 and not any(part.suspends for part in parts):
+            return self._item(node, *parts)
+        return self._positioned(
+            node, parts, lambda frame, found: values.get_part(found[0], tuple(found[1:]))
+        )
+
+    @staticmethod
+    def _item(node: tree.Index, target: Code, index: Code) -> Code:
+        """Compile the common `list[int]`, quick where nothing is wrong."""
+        run_target, run_index = target.run, index.run
+
+        def run(frame: Frame) -> Value:
+            container, place = run_target(frame), run_index(frame)
+            if type(container) is list and type(place) is int and 0 <= place < len(container):
+                return container[place]
+            try:
+                return values.get_part(container, (place,))
+            except RuntimeException as error:
+                raise error.at(node.line, node.column) from None
+
+        return Code(run, False, 1 + target.weight + index.weight)
+
+    # Calls
+
+    def _call(self, node: tree.Call) -> Code:
+        callee = self._scope.function(node.function)
+        if callee is not None:
+            return self._call_function(node, callee)
+        return self._call_builtin(node, self._builtins[node.function])
+
+    def _call_function(self, node: tree.Call, callee: Scope) -> Code:
+        """Bind arguments to slots of a new frame and run the body in it."""
+        procedure = self._procedures[id(callee)]
+        make_frame = self._make_frame(node, callee)
+        make = make_frame.run
+        enter = self._enter(node)
+
+        def plain(frame: Frame) -> Value:
+            new = make(frame)
+            thread = enter()
+            try:
+                for slot, default in procedure.defaults.items():
+                    if new[slot] is UNSET:
+                        new[slot] = default.run(new)
+                procedure.body.run(new)
+            finally:
+                thread.depth -= 1
+            return new[0]
+
+        def steps(frame: Frame) -> Steps:
+            new = (yield from make(frame)) if make_frame.suspends else make(frame)
+            thread = enter()
+            try:
+                for slot, default in procedure.defaults.items():
+                    if new[slot] is UNSET:
+                        run = default.run
+                        new[slot] = (yield from run(new)) if default.suspends else run(new)
+                run = procedure.body.run
+                (yield from run(new)) if procedure.body.suspends else run(new)
+            finally:
+                thread.depth -= 1
+            return new[0]
+
+        suspends = procedure.suspends or make_frame.suspends
+        return Code(steps if suspends else plain, suspends, make_frame.weight)
+
+    def _make_frame(self, node: tree.Call, callee: Scope) -> Code:
+        """Compile the arguments of a call into a new frame of the callee."""
+        assert callee.definition is not None
+        bound = bind(callee.definition, node)
+        slots = [callee.locals[name] for name in bound]
+        arguments = [self.owned(argument.value) for argument in bound.values()]
+        template = self._procedures[id(callee)].template
+
+        def new_frame(frame: Frame, found: list[Value]) -> Frame:
+            new = template.copy()
+            for slot, value in zip(slots, found, strict=True):
+                new[slot] = value
+            return new
+
+        return sequence(arguments, new_frame)
+
+    def _enter(self, node: tree.Call) -> Callable[[], Thread]:
+        """Return what counts a call in the thread that makes it, and bounds their depth."""
+        runtime = self._runtime
+        here = (node.line, node.column)
+
+        def enter() -> Thread:
+            thread = runtime.thread
+            if thread.depth >= MAX_CALL_DEPTH:
+                raise too_deep(*here)
+            thread.depth += 1
+            thread.location = here
+            return thread
+
+        return enter
+
+    def _call_builtin(self, node: tree.Call, builtin: Builtin) -> Code:
+        arguments = [self.owned(argument.value) for argument in node.arguments]
+        names = [argument.name for argument in node.arguments if argument.name is not None]
+        split = len(arguments) - len(names)
+        runtime = self._runtime
+        here = (node.line, node.column)
+
+        def finish(frame: Frame, found: list[Value]) -> Value:
+            runtime.thread.location = here
+            try:
+                if names:
+                    return builtin(*found[:split], **dict(zip(names, found[split:], strict=True)))
+                return builtin(*found)
+            except Exception as error:
+                raise _from_builtin(node, error) from error
+
+        call = sequence(arguments, finish)
+        if inspect.isgeneratorfunction(builtin):
+            return self._suspending(node, call)
+        return call
+
+    def _suspending(self, node: tree.Call | tree.MethodCall, call: Code) -> Code:
+        """Run the generator that a call returns, if it is one, frame by frame."""
+        name = node.function if isinstance(node, tree.Call) else node.method
+
+        def steps(frame: Frame) -> Steps:
+            result = (yield from call.run(frame)) if call.suspends else call.run(frame)
+            if not inspect.isgenerator(result):
+                return result
+            try:
+                return (yield from result)
+            except Exception as error:
+                raise _from_builtin(node, error, name) from error
+
+        return Code(steps, True, call.weight)
+
+    def _method_call(self, node: tree.MethodCall) -> Code:
+        parts = [self.expression(node.target)]
+        parts += [self.owned(argument.value) for argument in node.arguments]
+        runtime = self._runtime
+        here = (node.line, node.column)
+
+        def finish(frame: Frame, found: list[Value]) -> Value:
+            runtime.thread.location = here
+            if not isinstance(found[0], values.RemoteObject):
+                kind = values.type_name(found[0])
+                raise RuntimeException(f'Type error: {kind} has no method {node.method!r}', *here)
+            try:
+                return found[0].call(node.method, found[1:])
+            except Exception as error:
+                raise _from_builtin(node, error, node.method) from error
+
+        return self._suspending(node, sequence(parts, finish))
+
+    def _run(self, node: tree.Run) -> Code:
+        callee = self._scope.function(node.thread)
+        assert callee is not None
+        procedure = self._procedures[id(callee)]
+        runtime = self._runtime
+
+        def run(frame: Frame) -> Value:
+            try:
+                return runtime.spawn(procedure)
+            except RuntimeException as error:
+                raise error.at(node.line, node.column) from None
+
+        return Code(run)
+
+
+def _unset(node: tree.Name) -> RuntimeException:
+    text = f'The variable {node.identifier!r} is read before a value is assigned to it.'
+    return RuntimeException(text, node.line, node.column)
+
+
+def _from_builtin(
+    node: tree.Call | tree.MethodCall, error: Exception, name: str = ''
+) -> RuntimeException | RecursionError:
+    """Turn whatever a builtin raised into a runtime exception at its call."""
+    if isinstance(error, RecursionError):
+        return error
+    if isinstance(error, RuntimeException):
+        return error.at(node.line, node.column)
+    name = node.function if isinstance(node, tree.Call) else name
+    text = f'{name}: {error}' if str(error) else f'{name}: {type(error).__name__}'
+    return RuntimeException(text, node.line, node.column)
