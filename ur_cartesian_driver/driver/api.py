@@ -217,7 +217,8 @@ class Driver:
         state = self.state
         if state is None:
             raise RobotNotReady(self._status.message or 'The robot does not report its state.')
-        return plan(goal, state, self.arm, self.options)
+        options = replace(self.options, calibration_known=self._status.calibration_known)
+        return plan(goal, state, self.arm, options)
 
     def start(self, plan: Plan, on_progress: OnProgress | None = None) -> Motion:
         """
@@ -304,7 +305,7 @@ class Driver:
                 return
             self._host.join()
             self._host = host.start(self.config.robot_loop)
-            self._send(Configure(config=replace(self.config)))
+            self._send(Configure(config=self.config))
         self._set_status(DriverStatus(last_error='The robot loop ended unexpectedly.'))
         self._abandon('the robot loop ended unexpectedly, the robot program stops the arm')
 

@@ -113,20 +113,21 @@ class PathTracker:
 
     def _window(self, reach: float, begun: int) -> tuple[int, int]:
         """Return the rows between which the tool may be."""
-        place = self.place
-        first = place.row
+        points = self.path.point
+        if begun > 0:
+            # The program runs the motion to point begun - 1, or is in the blend that leads to it:
+            # what comes before was passed, perhaps between two packets.
+            passed = int(np.searchsorted(points, begun - 2, side='left')) - 1
+            if passed > self.place.row:
+                self.place = Place(passed, 0.0)
+        first, fraction = self.place.row, self.place.fraction
         here = self._arc[first]
-        if place.fraction > 0.0:
-            here += place.fraction * (self._arc[first + 1] - here)
+        if fraction > 0.0:
+            here += fraction * (self._arc[first + 1] - here)
         end = int(np.searchsorted(self._arc, here + reach + SLACK, side='left'))
         end = min(max(end, first + 1), self.last_row)
         if begun > 0:
-            # The program runs the motion to point begun - 1, or is in the blend that leads to it.
-            end = min(end, int(np.searchsorted(self.path.point, begun - 1, side='right')) - 1)
-            passed = int(np.searchsorted(self.path.point, begun - 2, side='left')) - 1
-            if passed > first:  # points were passed between two packets
-                self.place = Place(passed, 0.0)
-                first = passed
+            end = min(end, int(np.searchsorted(points, begun - 1, side='right')) - 1)
         return first, max(end, first)
 
     def _coordinates(self, pose: Pose, row: int) -> NDArray[np.float64]:

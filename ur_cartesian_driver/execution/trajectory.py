@@ -113,6 +113,9 @@ class Step:
     code: ErrorCode | None = None
 
 
+_PAUSES = frozenset({Signal.PROTECTIVE_STOP, Signal.EMERGENCY_STOP})
+
+
 def _ends(code: ErrorCode) -> Step:
     return Step(State.ENDED, code)
 
@@ -303,9 +306,9 @@ class TrajectoryMachine:
 
     def _enter_ended(self, signal: Signal, now: float) -> list[Command]:
         commands: list[Command] = []
-        if signal is Signal.PROTECTIVE_STOP or signal is Signal.LATE and self._unconfirmed():
-            # A protective stop only pauses the program, and then it reads no socket: without this
-            # the old motion would go on when somebody unlocks the arm.
+        if signal in _PAUSES or (signal is Signal.LATE and self._unconfirmed()):
+            # These stops only pause the program, and then it reads no socket: without this the
+            # old motion would go on when somebody unlocks the arm and plays the program.
             commands.append(StopProgram(reason=self._text))
         return commands + self._finish()
 
@@ -323,6 +326,8 @@ class TrajectoryMachine:
             return (f'All {self.order.points} points were executed in '
                     f'{self._scaled_time:.3f} s.')
         where = f'on the way to point {self._tracker.waypoint()}'
+        if code is ErrorCode.GOAL_TOLERANCE_VIOLATED:
+            where = 'at the last point'
         text = self._text if where in self._text else f'{self._text} ({where})'
         return text[:1].upper() + text[1:] + '.'
 

@@ -78,6 +78,17 @@ class Connection(asyncio.Protocol):
         assert self._transport is not None
         return str(self._transport.get_extra_info('sockname')[0])
 
+    @property
+    def peer_address(self) -> str:
+        """Return the other side's address on this connection."""
+        assert self._transport is not None
+        return str(self._transport.get_extra_info('peername')[0])
+
+    def turn_away(self, text: str) -> None:
+        """Hang up on a caller that nobody wants to hear of again."""
+        self._on_data, self._on_closed = _ignore, _ignore
+        self.abort(text)
+
     def send(self, data: bytes) -> bool:
         """Send bytes; False when the connection is gone."""
         if self._transport is None or self._transport.is_closing():
@@ -164,15 +175,13 @@ class Listener:
             self._server.close()
             self._server = None
         if self.connection is not None:
-            self.connection.abort('the driver closed the connection')
+            self.connection.close('the driver closed the connection')
 
     def _accept(self) -> Connection:
-        connection = Connection(self._on_data, self._ended, self._opened)
-        return connection
+        return Connection(self._on_data, self._ended, self._opened)
 
     def _opened(self, connection: Connection) -> None:
-        assert connection._transport is not None
-        peer = str(connection._transport.get_extra_info('peername')[0])
+        peer = connection.peer_address
         if self._allowed and peer not in self._allowed:
             self._turn_away(connection, f'{self.name}: {peer} may not connect; add it to '
                                         'allowed_peers if it is the robot')
@@ -184,9 +193,7 @@ class Listener:
             self._on_open(connection)
 
     def _turn_away(self, connection: Connection, text: str) -> None:
-        connection._on_data = _ignore
-        connection._on_closed = _ignore
-        connection.abort(text)
+        connection.turn_away(text)
         self._on_refused(text)
 
     def _ended(self, reason: str) -> None:

@@ -1,0 +1,149 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Where the tool is on the path, and what counts as off the path."""
+
+from math import cos, pi, sin
+
+from hypothesis import given, strategies as st
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.execution.monitor import (
+    Deviation,
+    deviation,
+    PathTracker,
+    violation,
+)
+from ur_cartesian_driver.motion.goal import Tolerance
+from ur_cartesian_driver.motion.plan import ReferencePath
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, quaternion_from_rotation_vector
+
+DOWN = quaternion_from_rotation_vector((pi, 0.0, 0.0))
+
+
+def path(*positions, quaternions=None, points=None):
+    quaternions = quaternions or [DOWN] * len(positions)
+    poses = np.array([[*p, *q] for p, q in zip(positions, quaternions, strict=True)])
+    points = points or [max(0, i - 1) for i in range(len(positions))]
+    return ReferencePath(poses=poses, point=np.array(points, dtype=np.int32),
+                         time=np.arange(len(positions), dtype=float))
+
+
+SQUARE = [(0.4, 0.0, 0.2), (0.6, 0.0, 0.2), (0.6, 0.2, 0.2), (0.4, 0.2, 0.2), (0.4, 0.0, 0.2)]
+
+
+def walk(tracker, positions, begun=lambda i: 0, step=0.002):
+    for i, position in enumerate(positions):
+        tracker.update(Pose(position, DOWN), step, begun(i))
+        yield tracker.pose().position
+
+
+def along(corners, n=100):
+    for a, b in zip(corners, corners[1:], strict=False):
+        for i in range(n):
+            f = (i + 1) / n
+            yield tuple(x + f * (y - x) for x, y in zip(a, b, strict=True))
+
+
+def test_a_tool_on_the_path_is_where_the_tracker_says():
+    tracker = PathTracker(path(*SQUARE))
+    for actual, found in zip(along(SQUARE), walk(tracker, along(SQUARE)), strict=True):
+        assert found == pytest.approx(actual, abs=1e-12)
+    assert tracker.place.row == tracker.last_row
+    assert tracker.waypoint() == 3
+
+
+def test_a_tool_beside_the_path_is_compared_with_the_foot_of_the_perpendicular():
+    tracker = PathTracker(path(*SQUARE))
+    shifted = [(x, y, z + 0.001) for x, y, z in along(SQUARE[:2])]
+    for actual, found in zip(shifted, walk(tracker, shifted), strict=True):
+        assert found == pytest.approx((actual[0], actual[1], 0.2), abs=1e-12)
+
+
+def test_a_way_back_over_the_same_line_is_followed_in_order():
+    there_and_back = [(0.4, 0.0, 0.2), (0.6, 0.0, 0.2), (0.4, 0.0, 0.2)]
+    tracker = PathTracker(path(*there_and_back))
+    times = []
+    for _ in walk(tracker, along(there_and_back)):
+        times.append(tracker.time())
+    assert times == sorted(times)
+    assert times[99] == pytest.approx(1.0, abs=0.03)
+    assert times[-1] == pytest.approx(2.0)
+
+
+def test_the_program_s_own_count_keeps_the_tracker_from_running_ahead():
+    there_and_back = [(0.4, 0.0, 0.2), (0.6, 0.0, 0.2), (0.4, 0.0, 0.2)]
+    tracker = PathTracker(path(*there_and_back))
+    for _ in walk(tracker, along(there_and_back[:2]), begun=lambda i: 1, step=1.0):
+        assert tracker.time() <= 1.0
+
+
+def test_the_program_s_own_count_pulls_the_tracker_past_points_that_were_missed():
+    tracker = PathTracker(path(*SQUARE))
+    tracker.update(Pose((0.6, 0.2, 0.2), DOWN), 0.0, 4)
+    assert tracker.pose().position == (0.6, 0.2, 0.2)
+
+
+def test_a_pure_rotation_is_followed():
+    turns = [quaternion_from_rotation_vector((0.0, 0.0, 0.2 * i)) for i in range(6)]
+    tracker = PathTracker(path(*[(0.4, 0.0, 0.2)] * 6, quaternions=turns))
+    for i in range(101):
+        angle = i / 100
+        tracker.update(Pose((0.4, 0.0, 0.2), quaternion_from_rotation_vector((0, 0, angle))), 0.01)
+        assert tracker.time() == pytest.approx(angle / 0.2, abs=1e-3)
+
+
+@given(st.floats(-0.002, 0.002), st.floats(0.01, 0.99))
+def test_the_nearest_place_of_a_circle_is_on_its_radius(offset, part):
+    angles = np.linspace(0.0, 2.0, 401)
+    tracker = PathTracker(path(*[(0.4 + 0.1 * cos(a), 0.1 * sin(a), 0.2) for a in angles]))
+    a = 2.0 * part
+    r = 0.1 + offset
+    tracker.update(Pose((0.4 + r * cos(a), r * sin(a), 0.2), DOWN), 0.3)
+    x, y, _ = tracker.pose().position
+    assert (x - 0.4, y) == pytest.approx((0.1 * cos(a), 0.1 * sin(a)), abs=1e-5)
+
+
+def test_quaternions_of_either_sign_are_the_same_orientation():
+    flipped = tuple(-v for v in DOWN)
+    tracker = PathTracker(path(*SQUARE, quaternions=[DOWN, flipped, DOWN, flipped, DOWN]))
+    tracker.update(Pose((0.5, 0.0, 0.2), flipped), 0.2)
+    assert tracker.time() == pytest.approx(0.5)
+    assert tracker.pose().angle_to(Pose((0, 0, 0), DOWN)) < 1e-9
+
+
+def test_position_is_compared_in_the_frame_of_the_goal():
+    T_base_frame = Pose((1.0, 2.0, 3.0), quaternion_from_rotation_vector((0.0, 0.0, pi / 2)))
+    error = deviation(Pose((0.0, 0.001, 0.0)), IDENTITY, T_base_frame)
+    assert error.position == pytest.approx((0.001, 0.0, 0.0))
+
+
+def test_orientation_is_compared_in_the_axes_of_the_tool():
+    actual = Pose((0, 0, 0), DOWN)
+    turned_about_base_z = quaternion_from_rotation_vector((0.0, 0.0, 0.01))
+    error = deviation(Pose((0, 0, 0), turned_about_base_z) @ actual, actual, IDENTITY)
+    assert error.orientation == pytest.approx((0.0, 0.0, -0.01))
+
+
+@pytest.mark.parametrize('sign', [1.0, -1.0])
+@pytest.mark.parametrize('axis', range(3))
+@pytest.mark.parametrize('quantity', ['position', 'orientation'])
+def test_each_axis_trips_alone_and_is_named(quantity, axis, sign):
+    errors = [0.0, 0.0, 0.0]
+    errors[axis] = sign * 0.0021
+    limits = [-1.0, -1.0, -1.0]
+    limits[axis] = 0.002
+    zero = (0.0, 0.0, 0.0)
+    error = Deviation(**{'position': zero, 'orientation': zero, quantity: tuple(errors)})
+    clause = violation(error, Tolerance(**{quantity: tuple(limits)}))
+    assert f'{quantity} {"xyz"[axis]}' in clause
+    assert '0.002100' in clause and '0.002000' in clause
+    limits[axis] = 0.0022
+    assert violation(error, Tolerance(**{quantity: tuple(limits)})) is None
+
+
+@pytest.mark.parametrize('limit', [0.0, -1.0])
+def test_zero_and_negative_tolerances_check_nothing(limit):
+    error = Deviation(position=(1.0, 1.0, 1.0), orientation=(1.0, 1.0, 1.0))
+    tolerance = Tolerance(position=(limit,) * 3, orientation=(limit,) * 3)
+    assert violation(error, tolerance) is None

@@ -1,0 +1,242 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One goal through the trajectory machine: the table, and what it sends."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.execution import (
+    Finish,
+    Order,
+    Report,
+    SendControl,
+    SendPoints,
+    StopProgram,
+    TrajectoryMachine,
+)
+from ur_cartesian_driver.execution.trajectory import (
+    Signal,
+    State,
+    STOP_BOUND,
+    STOPS,
+    TRANSITIONS,
+)
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.events import (
+    CancelRequested,
+    LinkLost,
+    StateReceived,
+    Tick,
+    TrajectoryEnded,
+    TrajectoryResult,
+)
+from ur_cartesian_driver.motion.goal import Tolerance
+from ur_cartesian_driver.motion.plan import ReferencePath
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyStatus
+from ur_cartesian_driver.protocol.reverse import TrajectoryAction
+
+START, END = (0.4, 0.0, 0.2), (0.6, 0.0, 0.2)
+MOVING = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
+REST = (0.0,) * 6
+
+
+def order(points=1, **changes):
+    positions = np.linspace(START, END, points + 1)
+    poses = np.hstack([positions, np.tile([0.0, 0.0, 0.0, 1.0], (points + 1, 1))])
+    reference = ReferencePath(
+        poses=poses, point=np.maximum(np.arange(points + 1) - 1, 0).astype(np.int32),
+        time=np.linspace(0.0, 2.0, points + 1))
+    return Order(points=points, reference=reference, duration=2.0, report=('line',), **changes)
+
+
+def robot(part=0.0, timestamp=0.0, qd=MOVING, **changes):
+    position = tuple(a + part * (b - a) for a, b in zip(START, END, strict=True))
+    return StateReceived(state=RobotState(
+        timestamp=timestamp, actual_q=REST, actual_qd=qd, actual_tcp_pose=Pose(position),
+        actual_tcp_twist=(0.1, 0.0, 0.0, 0.0, 0.0, 0.0), runtime_state=RuntimeState.PLAYING,
+        **changes))
+
+
+def started(**changes):
+    machine = TrajectoryMachine(order(**changes))
+    machine.start(0.0)
+    machine.step(robot(), 0.0)
+    return machine
+
+
+def brought_to(state):
+    machine = started()
+    if state is State.SETTLING:
+        machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 1.0)
+    if state in (State.STOPPING, State.HALTING):
+        machine.step(CancelRequested(), 1.0)
+    if state is State.HALTING:
+        machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 1.1)
+    if state is State.ENDED:
+        machine.step(TrajectoryEnded(result=TrajectoryResult.FAILURE), 1.0)
+    assert machine.state is state
+    return machine
+
+
+def outcome(commands):
+    (finish,) = [c for c in commands if isinstance(c, Finish)]
+    return finish.outcome
+
+
+def test_a_motion_starts_with_start_and_its_points():
+    commands = TrajectoryMachine(order(points=3)).start(0.0)
+    assert commands == [SendControl(action=TrajectoryAction.START, count=3),
+                        SendPoints(first=0, end=3)]
+
+
+def test_a_motion_that_arrives_succeeds():
+    machine = started()
+    machine.step(robot(1.0, timestamp=2.0), 2.0)
+    assert not [c for c in machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
+                if isinstance(c, Finish)]
+    end = outcome(machine.step(robot(1.0, timestamp=2.01, qd=REST), 2.01))
+    assert end.code is ErrorCode.SUCCESSFUL
+    assert end.report == ('line',)
+    assert '2.000 s' in end.text
+
+
+def test_points_beyond_the_window_wait_for_the_robot():
+    machine = TrajectoryMachine(order(points=2000))
+    assert machine.start(0.0)[1] == SendPoints(first=0, end=500)
+    commands = machine.step(robot(0.0, points_begun=10), 0.1)
+    assert SendPoints(first=500, end=510) in commands
+    machine.step(CancelRequested(), 0.2)
+    assert not [c for c in machine.step(robot(0.0, points_begun=50), 0.3)
+                if isinstance(c, SendPoints)]
+
+
+def test_cancel_brakes_waits_for_the_answer_and_for_rest():
+    machine = started()
+    cancel = SendControl(action=TrajectoryAction.CANCEL, count=1)
+    assert cancel in machine.step(CancelRequested(), 1.0)
+    assert machine.step(CancelRequested(), 1.01) == []
+    machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 1.1)
+    assert not any(isinstance(c, Finish) for c in machine.step(robot(0.3, qd=MOVING), 1.2))
+    assert outcome(machine.step(robot(0.3, qd=REST), 1.3)).code is ErrorCode.CANCELLED
+
+
+def test_a_success_that_overtakes_the_cancel_is_not_its_answer():
+    machine = started()
+    machine.step(CancelRequested(), 1.0)
+    machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 1.01)
+    assert machine.state is State.STOPPING
+    machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 1.02)
+    assert outcome(machine.step(robot(1.0, qd=REST), 1.3)).code is ErrorCode.CANCELLED
+
+
+def test_a_cancel_without_an_answer_ends_the_program_within_the_bound():
+    machine = started()
+    machine.step(CancelRequested(), 1.0)
+    assert machine.step(Tick(), 1.0 + STOP_BOUND - 0.01) == []
+    commands = machine.step(Tick(), 1.0 + STOP_BOUND)
+    assert any(isinstance(c, StopProgram) for c in commands)
+    assert outcome(commands).code is ErrorCode.EXECUTION_FAILED
+
+
+def test_leaving_the_path_stops_the_arm_and_names_point_axis_value_and_limit():
+    machine = started(path_tolerance=Tolerance(position=(0.0, 0.001, 0.0)))
+    off = robot(0.5)
+    pose = off.state.actual_tcp_pose
+    off = StateReceived(state=replace(off.state, actual_tcp_pose=Pose(
+        (pose.position[0], -0.0015, pose.position[2]))))
+    assert any(isinstance(c, SendControl) for c in machine.step(off, 1.0))
+    machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 1.1)
+    end = outcome(machine.step(robot(0.5, qd=REST), 1.2))
+    assert end.code is ErrorCode.PATH_TOLERANCE_VIOLATED
+    assert end.text == ('On the way to point 0 position y is off by 0.001500 m, '
+                        'the tolerance is 0.001000 m.')
+
+
+def test_an_arm_that_does_not_settle_violates_the_goal_tolerance():
+    machine = started(goal_tolerance=Tolerance(position=(0.001, 0.0, 0.0)),
+                      goal_time_tolerance=0.5)
+    machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
+    assert machine.step(robot(0.95, timestamp=2.4, qd=REST), 2.4)[-1:] != []
+    end = outcome(machine.step(robot(0.95, timestamp=2.5, qd=REST), 2.5))
+    assert end.code is ErrorCode.GOAL_TOLERANCE_VIOLATED
+    assert 'Position x' in end.text and 'last point' in end.text
+
+
+def test_a_late_arrival_violates_the_goal_and_names_the_times():
+    machine = started(due=2.0, goal_time_tolerance=0.5)
+    machine.step(robot(1.0, timestamp=2.6), 2.6)
+    end = outcome(machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.6))
+    assert end.code is ErrorCode.GOAL_TOLERANCE_VIOLATED
+    assert '0.600 s' in end.text and '0.500 s' in end.text
+
+
+def test_a_slowed_robot_is_not_late():
+    machine = started(due=2.0, goal_time_tolerance=0.1)
+    for i in range(1, 41):
+        machine.step(robot(i / 40, timestamp=0.1 * i, speed_scaling=0.5), 0.1 * i)
+    machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 4.0)
+    assert outcome(machine.step(robot(1.0, timestamp=4.1, qd=REST), 4.1)).succeeded
+
+
+def test_progress_is_reported_at_its_rate():
+    machine = TrajectoryMachine(order(), feedback_period=0.1)
+    machine.start(0.0)
+    reports = [c for i in range(100)
+               for c in machine.step(robot(i / 200, timestamp=0.01 * i), 0.01 * i)
+               if isinstance(c, Report)]
+    assert len(reports) == 10
+    fractions = [r.progress.fraction for r in reports]
+    assert fractions == sorted(fractions)
+
+
+@pytest.mark.parametrize('state', list(State))
+@pytest.mark.parametrize('signal', list(Signal))
+def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
+    own = {State.SETTLING: {Signal.SETTLED, Signal.LATE}, State.STOPPING: {Signal.LATE},
+           State.HALTING: {Signal.AT_REST, Signal.LATE}, State.MOVING: {Signal.VIOLATION}}
+    judged = {Signal.SETTLED, Signal.AT_REST, Signal.LATE, Signal.VIOLATION}
+    possible = state is not State.ENDED and (
+        signal not in judged or signal in own.get(state, set()))
+    assert (signal in TRANSITIONS[state]) == possible
+
+
+STOPPED_STATES = [
+    pytest.param({'safety_status': SafetyStatus.PROTECTIVE_STOPPED}, Signal.PROTECTIVE_STOP,
+                 id='protective stop'),
+    pytest.param({'safety_status': SafetyStatus.EMERGENCY_STOPPED}, Signal.EMERGENCY_STOP,
+                 id='emergency stop'),
+    pytest.param({'robot_mode': RobotMode.POWER_OFF}, Signal.PROGRAM_STOPPED, id='power off'),
+]
+
+
+@pytest.mark.parametrize('changes, signal', STOPPED_STATES)
+@pytest.mark.parametrize('state', [s for s in State if s is not State.ENDED])
+def test_a_robot_that_stops_by_itself_ends_the_goal_in_every_state(state, changes, signal):
+    machine = brought_to(state)
+    commands = machine.step(robot(0.5, **changes), 1.2)
+    assert outcome(commands).code is STOPS[signal]
+    assert machine.state is State.ENDED
+
+
+@pytest.mark.parametrize('link, code', [('program', ErrorCode.PROGRAM_STOPPED),
+                                        ('RTDE', ErrorCode.CONNECTION_LOST)])
+@pytest.mark.parametrize('state', [s for s in State if s is not State.ENDED])
+def test_a_lost_link_ends_the_goal_in_every_state_and_says_who_hung_up(state, link, code):
+    end = outcome(brought_to(state).step(LinkLost(link=link, reason='it closed'), 1.2))
+    assert end.code is code
+    assert 'it closed' in end.text
+
+
+def test_a_protective_stop_ends_the_program_so_that_the_motion_cannot_resume():
+    commands = started().step(robot(0.5, safety_status=SafetyStatus.PROTECTIVE_STOPPED), 1.0)
+    assert any(isinstance(c, StopProgram) for c in commands)
+
+
+@pytest.mark.parametrize('event', [
+    CancelRequested(), Tick(), robot(0.5), LinkLost(link='RTDE', reason=''),
+    *(TrajectoryEnded(result=result) for result in TrajectoryResult)])
+def test_nothing_happens_after_the_end(event):
+    assert brought_to(State.ENDED).step(event, 9.0) == []

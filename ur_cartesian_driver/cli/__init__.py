@@ -1,0 +1,121 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The command ``ur-cartesian``.
+
+Each command is a function of the parsed arguments that returns the exit status. What needs ROS is
+imported inside the commands that need it, so ``sim`` and ``where`` run without.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+import logging
+import signal
+import sys
+
+from ur_cartesian_driver.cli import commands
+from ur_cartesian_driver.kinematics.robots import MODELS
+from ur_cartesian_driver.motion.errors import DriverError
+
+ACTION = '/ur_cartesian_driver/follow_cartesian_trajectory'
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit status: 0 only if what was asked for happened."""
+    arguments = parser().parse_args(sys.argv[1:] if argv is None else argv)
+    logging.basicConfig(level=logging.WARNING, format='%(levelname)s: %(message)s')
+    # A command that is told to end has to tidy up as after Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    run: Callable[[argparse.Namespace], int] = arguments.run
+    try:
+        return run(arguments)
+    except KeyboardInterrupt:
+        return 130
+    except (DriverError, OSError, ValueError) as error:
+        print(f'ur-cartesian {arguments.command}: {error}', file=sys.stderr)
+        return 1
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of all commands."""
+    top = argparse.ArgumentParser(
+        prog='ur-cartesian', description='Cartesian trajectories for Universal Robots arms.')
+    sub = top.add_subparsers(dest='command', required=True, metavar='COMMAND')
+    _add_demo(sub)
+    _add_sim(sub)
+    _add_send(sub)
+    _add_validate(sub)
+    _add_where(sub)
+    return top
+
+
+Commands = argparse._SubParsersAction  # argparse has no public name for it
+
+
+def _add(sub: Commands[argparse.ArgumentParser], name: str,
+         run: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
+    command = sub.add_parser(
+        name, help=text, description=text[0].upper() + text[1:] + '.',
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter)
+    command.set_defaults(run=run)
+    return command
+
+
+def _add_demo(sub: Commands[argparse.ArgumentParser]) -> None:
+    demo = _add(sub, 'demo', commands.demo,
+                'simulator, driver and a client, each a process, and one goal through them all')
+    demo.add_argument('goal', nargs='?', default='seam',
+                      help='a goal file, or the name of one of config/examples')
+    demo.add_argument('--picture', default='demo.png',
+                      help='where to draw planned and executed path')
+    demo.add_argument('--model', default='ur5e', choices=sorted(MODELS), help='model of the robot')
+
+
+def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
+    sim = _add(sub, 'sim', commands.sim, 'a simulated controller on the ports of a real one')
+    sim.add_argument('--model', default='ur5e', choices=sorted(MODELS), help='model of the robot')
+    sim.add_argument('--host', default='127.0.0.1', help='address to listen on')
+    sim.add_argument('--polyscope', default='', metavar='VERSION',
+                     help='software version, such as 5.21; empty = the newest for the model')
+    for name, port in (('rtde', 30004), ('primary', 30001), ('dashboard', 29999)):
+        sim.add_argument(f'--{name}-port', type=int, default=port, help='0 = any free port')
+    sim.add_argument('--joints', type=_six_numbers, metavar='Q1,...,Q6',
+                     help='joint positions at the start [rad]')
+    sim.add_argument('--power-off', action='store_true', help='start with the arm switched off')
+    sim.add_argument('--local', action='store_true',
+                     help='local control: no scripts over the network')
+
+
+def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
+    send = _add(sub, 'send', commands.send, 'send a goal to a running driver and wait for its end')
+    send.add_argument('file', help='goal in the YAML of `ros2 action send_goal`, - = standard input')
+    send.add_argument('--action', default=ACTION, help='name of the action')
+    send.add_argument('--validate-only', action='store_true', help='plan, but do not move')
+    send.add_argument('--record', metavar='FILE', help='write the feedback as JSON lines')
+
+
+def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
+    validate = _add(sub, 'validate', commands.validate,
+                    'check and plan a goal with neither motion nor robot, and print the plan')
+    validate.add_argument('file', help='goal in the YAML of `ros2 action send_goal`')
+    validate.add_argument('--ur-type', default='ur5e', choices=sorted(MODELS), help='model')
+    validate.add_argument('--joints', type=_six_numbers, metavar='Q1,...,Q6',
+                          help='where the arm stands [rad]; home when left out')
+    validate.add_argument('--max-tool-speed', type=float, default=0.25, help='[m/s]')
+
+
+def _add_where(sub: Commands[argparse.ArgumentParser]) -> None:
+    where = _add(sub, 'where', commands.where,
+                 'print where the robot stands, as a point to paste into a goal')
+    where.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
+    where.add_argument('--rtde-port', type=int, default=30004, help='its RTDE port')
+
+
+def _six_numbers(text: str) -> tuple[float, ...]:
+    """Return six numbers that stand with commas between them."""
+    numbers = tuple(float(part) for part in text.split(','))
+    if len(numbers) != 6:
+        raise argparse.ArgumentTypeError(f'{len(numbers)} numbers; give six, with commas')
+    return numbers

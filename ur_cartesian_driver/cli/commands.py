@@ -1,0 +1,179 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the commands do."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+from pathlib import Path
+import sys
+from typing import Any
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, robot_model
+from ur_cartesian_driver.motion.errors import GoalRefused, RobotNotReady
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.resources import share_path
+from ur_cartesian_driver.robot.probe import read_state
+from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
+
+
+def demo(arguments: argparse.Namespace) -> int:
+    """Run all the processes, one goal, and draw the picture."""
+    from ur_cartesian_driver.cli.demo import run
+
+    return run(goal_file(arguments.goal), arguments.model, Path(arguments.picture))
+
+
+def sim(arguments: argparse.Namespace) -> int:
+    """Run a simulated controller until it is told to end."""
+    config = SimulatorConfig(
+        model=arguments.model, host=arguments.host, polyscope=arguments.polyscope,
+        rtde_port=arguments.rtde_port, primary_port=arguments.primary_port,
+        dashboard_port=arguments.dashboard_port, power='off' if arguments.power_off else 'running',
+        remote_control=not arguments.local,
+        **({'q': arguments.joints} if arguments.joints else {}))
+    robot = SimulatedRobot(config)
+    asyncio.run(_simulate(robot))
+    return 0
+
+
+async def _simulate(robot: SimulatedRobot) -> None:
+    """Say where the simulator listens, then show its state as long as somebody looks."""
+    running = asyncio.ensure_future(robot.run())
+    while robot.ports is None and not running.done():
+        await asyncio.sleep(0.01)
+    if robot.ports is not None:
+        ports = robot.ports
+        print(f'simulated {robot.config.model} on {robot.config.host}: RTDE {ports.rtde}, '
+              f'primary {ports.primary}, dashboard {ports.dashboard}', flush=True)
+    while not running.done():
+        if sys.stdout.isatty():
+            print(f'\r{robot.status_line()}\033[K', end='', flush=True)
+        await asyncio.wait({running}, timeout=0.5)
+    await running
+
+
+def send(arguments: argparse.Namespace) -> int:
+    """Send a goal, show its progress, and wait for its end."""
+    from ur_cartesian_driver.ros import client
+
+    goal = client.load_goal(sys.stdin.read() if arguments.file == '-' else
+                            goal_file(arguments.file))
+    goal.validate_only = goal.validate_only or arguments.validate_only
+    with Recorder(arguments.record) as recorder:
+        status, result = client.send(goal, recorder.take, action=arguments.action)
+    for line in result.report:
+        print(line)
+    print(f'\r\033[K{status}: {result.error_string}')
+    return 0 if status == 'SUCCEEDED' else 1
+
+
+class Recorder:
+    """Shows feedback on the terminal and writes it to a file, one JSON object a line."""
+
+    def __init__(self, path: str | None) -> None:
+        """Take the file's name, None = no file."""
+        self._path = path
+        self._file: Any = None
+
+    def __enter__(self) -> Recorder:
+        """Open the file."""
+        if self._path:
+            self._file = open(self._path, 'w', encoding='utf-8')  # noqa: SIM115 - closed below
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the file."""
+        if self._file is not None:
+            self._file.close()
+
+    def take(self, feedback: Any) -> None:
+        """Take one feedback message."""
+        position = feedback.actual.pose.position
+        line = (f'{100.0 * feedback.progress:5.1f} %  to point {feedback.point_index}  '
+                f'x {position.x:7.3f}  y {position.y:7.3f}  z {position.z:7.3f} m  '
+                f'speed {100.0 * feedback.speed_scaling:3.0f} %')
+        print(f'\r{line}\033[K' if sys.stdout.isatty() else line, end='' if sys.stdout.isatty()
+              else '\n', flush=True)
+        if self._file is not None:
+            self._file.write(json.dumps({
+                'stamp': feedback.header.stamp.sec + 1e-9 * feedback.header.stamp.nanosec,
+                'point': feedback.point_index, 'progress': feedback.progress,
+                'desired': _position(feedback.desired), 'actual': _position(feedback.actual),
+            }) + '\n')
+
+
+def validate(arguments: argparse.Namespace) -> int:
+    """Plan a goal from where the arm is said to stand, and print the plan."""
+    from ur_cartesian_driver.planning import plan, PlanningOptions
+    from ur_cartesian_driver.preview import table
+    from ur_cartesian_driver.ros import client, convert
+
+    arm = Arm(robot_model(arguments.ur_type))
+    state = standing_at(arm, arguments.joints or SimulatorConfig().q)
+    message = client.load_goal(goal_file(arguments.file))
+    try:
+        goal = convert.goal_from_message(message)
+        print(table(plan(goal, state, arm,
+                         PlanningOptions(max_tool_speed=arguments.max_tool_speed))))
+    except GoalRefused as refusal:
+        print(f'refused: {refusal}', file=sys.stderr)
+        return 1
+    return 0
+
+
+def where(arguments: argparse.Namespace) -> int:
+    """Print pose, joints and TCP of a robot."""
+    state = asyncio.run(read_state(arguments.robot_ip, arguments.rtde_port))
+    if state is None:
+        raise RobotNotReady('The robot does not report its state.')
+    print(point_as_yaml(state))
+    return 0
+
+
+def standing_at(arm: Arm, q: tuple[float, ...]) -> RobotState:
+    """Return the state of an arm that stands still, its TCP at the flange."""
+    pose = arm.forward(q)
+    a, b, c, d, e, f = q
+    joints = (a, b, c, d, e, f)
+    return RobotState(timestamp=0.0, actual_q=joints, target_q=joints, actual_tcp_pose=pose,
+                      target_tcp_pose=pose)
+
+
+def point_as_yaml(state: RobotState) -> str:
+    """Return where the robot stands as a point of a goal, in flow style."""
+    x, y, z, qx, qy, qz, qw = state.actual_tcp_pose.row()
+    joints = ', '.join(f'{v:.6f}' for v in state.actual_q)
+    return (
+        '# pose of the active TCP in the frame `base`\n'
+        f'# TCP in the flange: {_pose_text(state.T_flange_tcp)}\n'
+        f'- pose: {{position: {{x: {x:.6f}, y: {y:.6f}, z: {z:.6f}}}, '
+        f'orientation: {{x: {qx:.9f}, y: {qy:.9f}, z: {qz:.9f}, w: {qw:.9f}}}}}\n'
+        f'  posture: {{posture_joint_names: [{", ".join(JOINT_NAMES)}],\n'
+        f'            posture_joint_values: [{joints}]}}')
+
+
+def goal_file(name: str) -> Path:
+    """
+    Return the path of a goal: a file, or the name of an example.
+
+    :raises OSError: neither exists.
+    """
+    for path in (Path(name), share_path() / 'config' / 'examples' / f'{name}.yaml'):
+        if path.is_file():
+            return path
+    examples = sorted(p.stem for p in (share_path() / 'config' / 'examples').glob('*.yaml'))
+    raise OSError(f'{name} is neither a file nor one of the examples {", ".join(examples)}')
+
+
+def _position(point: Any) -> list[float]:
+    position = point.pose.position
+    return [position.x, position.y, position.z]
+
+
+def _pose_text(pose: Pose) -> str:
+    return ' '.join(f'{v:.6f}' for v in pose.rotation_vector())

@@ -1,0 +1,60 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The picture of planned and executed tool path; matplotlib is needed for nothing else."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def draw(record: Path, drawing: Path, title: str) -> None:
+    """
+    Draw recorded feedback.
+
+    :param record: JSON lines with ``stamp``, ``progress``, ``desired`` and ``actual`` [m].
+    :param drawing: the picture; its suffix decides the format.
+    :raises OSError: matplotlib is not installed, or the file cannot be written.
+    """
+    try:
+        import matplotlib
+    except ImportError:
+        raise OSError('no picture without matplotlib; install it (extra `plot`)') from None
+    matplotlib.use('Agg')
+    from matplotlib import pyplot
+
+    rows = [json.loads(line) for line in record.read_text(encoding='utf-8').splitlines()]
+    time = np.array([row['stamp'] for row in rows])
+    time -= time[0]
+    planned, actual = (np.array([row[key] for row in rows]) for key in ('desired', 'actual'))
+    figure = pyplot.figure(figsize=(11.0, 5.0), layout='constrained')
+    figure.suptitle(title)
+    _path(figure.add_subplot(1, 2, 1, projection='3d'), planned, actual)
+    _over_time(figure, time, planned, actual)
+    figure.savefig(drawing, dpi=110)
+    pyplot.close(figure)
+
+
+def _path(axes: Any, planned: np.ndarray, actual: np.ndarray) -> None:
+    axes.plot(*planned.T, color='tab:gray', linewidth=4.0, alpha=0.5, label='planned')
+    axes.plot(*actual.T, color='tab:red', linewidth=1.2, label='executed')
+    axes.scatter(*actual[0], color='tab:green', label='start')
+    axes.set(xlabel='x [m]', ylabel='y [m]', zlabel='z [m]')
+    axes.set_aspect('equal')
+    axes.legend(loc='upper left')
+
+
+def _over_time(figure: Any, time: np.ndarray, planned: np.ndarray, actual: np.ndarray) -> None:
+    speed = np.linalg.norm(np.gradient(actual, axis=0), axis=1) / np.maximum(
+        np.gradient(time), 1e-6)
+    off = 1000.0 * np.linalg.norm(planned - actual, axis=1)
+    upper, lower = figure.add_subplot(2, 2, 2), figure.add_subplot(2, 2, 4)
+    upper.plot(time, speed, color='tab:blue')
+    upper.set(ylabel='tool speed [m/s]')
+    lower.plot(time, off, color='tab:red')
+    lower.set(xlabel='time [s]', ylabel='distance from the plan [mm]')
+    for axes in (upper, lower):
+        axes.grid(alpha=0.3)
