@@ -1,0 +1,145 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The inverse kinematics of an ideal arm in closed form.
+
+It exists because the axes 2, 3 and 4 are parallel. Along these axes one sees shoulder, elbow and
+wrist 1 as a plane triangle; from above, the wrist centre stays at the distance d4 from the
+shoulder. That leaves two shoulders, two wrists and two elbows: up to eight solutions.
+
+All roots are of differences of squares and all angles come from atan2, so that nothing is lost
+where two solutions meet (stretched arm, upright arm, wrist centre above the shoulder); arc cosines
+would lose half of the digits there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import atan2, cos, hypot, pi, remainder, sin, sqrt, tau
+from typing import NamedTuple
+
+from ur_cartesian_driver.kinematics.shape import Shape
+from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion, Vector3
+from ur_cartesian_driver.motion.primitive import Joints
+
+# A square this far below zero counts as zero [m^2]: the flange lies a nanometre out of reach, as
+# the poses do that a robot rounds when it reports its own stretched arm.
+_SLACK = 1e-9
+# Two roots this close are one [m^2]: their joint positions differ by about a microradian.
+_MERGED = 1e-13
+# Sine of wrist 2 below which the axes 4 and 6 are one line and only their sum counts.
+_WRIST_SINGULAR = 2e-10
+# How many times the misfit wrist 3 must be off the axis of wrist 1 for its direction to count.
+_WRIST_DOUBT = 3.0
+
+
+class Wrist(NamedTuple):
+    """A shoulder and a wrist that fit the pose; the elbow is still open."""
+
+    theta1: float
+    theta5: float
+    theta6: float
+    #: theta2 + theta3 + theta4.
+    theta234: float
+    #: Where wrist 1 is from the shoulder, in the plane of the arm: outward and up [m].
+    outward: float
+    up: float
+
+
+def closed_form(shape: Shape, T_base_flange: Pose, wrist_3: float = 0.0, doubt: float = 0.0
+                ) -> list[Joints]:
+    """
+    Return every joint solution [rad], each angle within (-pi, pi].
+
+    :param wrist_3: what wrist 3 is to show where the axes 4 and 6 are one line.
+    :param doubt: how many times its misfit the shape may be wrong. The real arm may reach where
+        the ideal one does not; there both roots are returned, as guesses.
+    """
+    o1, o2, o3, o4, o5, o6 = shape.offsets
+    # (r + dr)^2 - r^2 is about 2 r dr.
+    slack = doubt * 2.0 * shape.misfit * abs(shape.a2 + shape.a3)
+    return [
+        (wrap(wrist.theta1 - o1), wrap(theta2 - o2), wrap(theta3 - o3),
+         wrap(wrist.theta234 - theta2 - theta3 - o4),
+         wrap(wrist.theta5 - o5), wrap(wrist.theta6 - o6))
+        for wrist in wrists(shape, T_base_flange, wrist_3 + o6, slack)
+        for theta2, theta3 in _elbows(shape, wrist.outward, wrist.up, slack)]
+
+
+def wrist_centre(shape: Shape, T_base_flange: Pose) -> Vector3:
+    """Return the point where the axes 5 and 6 meet, from the shoulder [m]."""
+    x, y, z, w = T_base_flange.quaternion
+    px, py, pz = T_base_flange.position
+    d6 = shape.d6
+    return (px - d6 * 2.0 * (x * z + y * w), py - d6 * 2.0 * (y * z - x * w),
+            pz - shape.d1 - d6 * (1.0 - 2.0 * (x * x + y * y)))
+
+
+def wrists(shape: Shape, T_base_flange: Pose, theta6_if_singular: float = 0.0,
+           slack: float = 0.0) -> Iterator[Wrist]:
+    """Solve for all but the elbow: two shoulders, each with two wrists."""
+    r11, r12, r13, r21, r22, r23, r31, r32, _ = rotation_from_quaternion(T_base_flange.quaternion)
+    px, py, pz = wrist_centre(shape, T_base_flange)
+    d4, d5 = shape.d4, shape.d5
+    for outward in _roots(px * px + py * py - d4 * d4, slack):
+        # px s1 - py c1 = d4 and px c1 + py s1 = outward, solved for s1 and c1.
+        s1, c1 = d4 * px + outward * py, outward * px - d4 * py
+        length = hypot(s1, c1)
+        theta1, s1, c1 = atan2(s1, c1), s1 / length, c1 / length
+        # The axes of the flange along axis 2, which is (s1, -c1, 0).
+        along_x, along_y, c5 = s1 * r11 - c1 * r21, s1 * r12 - c1 * r22, s1 * r13 - c1 * r23
+        for theta5, theta6 in _flips(shape, along_x, along_y, c5, theta6_if_singular):
+            # The axis y of frame 5 is that of the flange before theta6; axis 5 is opposite to it.
+            s6, c6 = sin(theta6), cos(theta6)
+            s234 = -(c1 * (s6 * r11 + c6 * r12) + s1 * (s6 * r21 + c6 * r22))
+            c234 = s6 * r31 + c6 * r32
+            yield Wrist(theta1, theta5, theta6, atan2(s234, c234),
+                        outward - d5 * s234, pz + d5 * c234)
+
+
+def _flips(shape: Shape, along_x: float, along_y: float, c5: float, theta6_if_singular: float
+           ) -> Iterator[tuple[float, float]]:
+    """Solve the wrist, from the flange's axes along axis 2: theta5, theta6."""
+    s5 = hypot(along_x, along_y)
+    theta5, theta6 = atan2(s5, c5), atan2(-along_y, along_x)
+    if s5 < _WRIST_SINGULAR:
+        yield theta5, theta6_if_singular
+        return
+    yield theta5, theta6
+    yield -theta5, theta6 + pi
+    if s5 * shape.d5 < _WRIST_DOUBT * shape.misfit:  # then theta6 may be anything
+        yield theta5, theta6 + 0.5 * pi
+        yield theta5, theta6 - 0.5 * pi
+
+
+def _elbows(shape: Shape, outward: float, up: float, slack: float
+            ) -> Iterator[tuple[float, float]]:
+    """Solve the triangle of upper arm, forearm and the way to wrist 1: theta2, theta3."""
+    a2, a3 = shape.a2, shape.a3
+    square = outward * outward + up * up
+    direction = atan2(up, outward)
+    # The law of cosines for half the angle, tan(theta3 / 2)^2 = (1 - cos) / (1 + cos): what the
+    # square lacks to the stretched arm's over what it exceeds the folded arm's by.
+    for folded in _roots(square - (a2 - a3) ** 2, slack)[:1]:
+        for stretched in _roots((a2 + a3) ** 2 - square, slack):
+            theta3 = 2.0 * atan2(stretched, folded)
+            yield direction - atan2(a3 * sin(theta3), a2 + a3 * cos(theta3)), theta3
+            if folded == 0.0:  # pi and -pi are one elbow
+                break
+
+
+def _roots(square: float, slack: float) -> tuple[float, ...]:
+    """Return the square roots, the positive one first; both also where slack decides."""
+    if square < -max(slack, _SLACK):
+        return ()
+    square = max(square, 0.25 * slack)
+    if square < _MERGED:
+        return (0.0,)
+    root = sqrt(square)
+    return (root, -root)
+
+
+def wrap(angle: float) -> float:
+    """Return the angle within (-pi, pi]."""
+    wrapped = remainder(angle, tau)
+    return pi if wrapped <= -pi else wrapped
