@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import degrees
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import (
@@ -207,11 +208,20 @@ class _Planner:
                 assert segment.via is not None
                 via = goal.T_base_frame @ segment.via
                 path = arc_of(i, T_base_tcp, via, target, segment.arc_mode)
+                self._say_fixed(i, path)
             else:
                 path = Line.between(T_base_tcp, target)
             kind, path, trace = self._followed(i, kind, path, q)
         return Leg(index=i, kind=kind, waypoint=goal.waypoints[i], segment=segment, path=path,
                    q_start=q, trace=trace, time=None)
+
+    def _say_fixed(self, i: int, arc: Arc) -> None:
+        """Say where an arc that keeps the orientation to its tangent ends in another than asked."""
+        off = arc.end.angle_to(self.targets[i])
+        if off > self.options.start_tolerance_angle:
+            self.remarks.append(
+                f'point {i}: the orientation of the point is ignored, because arc_mode FIXED '
+                f'keeps it to the tangent; it arrives {degrees(off):.1f} degrees off')
 
     def _joint_way(self, i: int, q: Joints) -> tuple[JointLine, Trace]:
         """Return the joint line to a point, in the posture where one is given."""

@@ -66,29 +66,46 @@ class Profile:
         return (sqrt(speed * speed + 2.0 * a * way) - speed) / a
 
 
-def trapezoid(length: float, velocity: float, acceleration: float, stands_before: bool,
-              stands_after: bool) -> Profile:
+def trapezoid(length: float, velocity: float, acceleration: float, enter: float = 0.0,
+              tail: float = 0.0) -> Profile:
     """
     Return the fastest profile within a speed and an acceleration.
 
-    From rest to rest T = d/v + v/a if d > v^2/a, else the triangle T = 2 sqrt(d/a). Where it does
-    not stand it comes in, or goes out, at its cruise speed.
+    From rest to rest T = d/v + v/a if d > v^2/a, else the triangle T = 2 sqrt(d/a).
+
+    :param enter: the speed to begin with, where that is not more than the velocity.
+    :param tail: how far behind the end it would come to rest; inf = it goes on at its speed. A
+        robot that does not know yet what follows its blend brakes for the waypoint.
     """
-    ramps = stands_before + stands_after
-    peak = sqrt(2.0 * acceleration * length / ramps) if ramps else velocity
-    return _between(length, min(velocity, peak), acceleration, stands_before, stands_after)
+    leave = min(velocity, sqrt(2.0 * acceleration * tail))
+    enter = min(velocity, enter)
+    peak = sqrt(acceleration * length + 0.5 * (enter * enter + leave * leave))
+    return Profile(length, enter, max(enter, leave, min(velocity, peak)), leave, acceleration)
 
 
 def timed(length: float, duration: float, stands_before: bool, stands_after: bool) -> Profile:
     """Return the profile of a motion for which the robot is told the time."""
-    cruise = length / duration * peak_factor(stands_before, stands_after)
+    cruise = length / duration / (1.0 - 0.5 * RAMP_SHARE * (stands_before + stands_after))
     acceleration = max(cruise, 1e-12) / (RAMP_SHARE * duration)
-    return _between(length, cruise, acceleration, stands_before, stands_after)
+    return Profile(length, 0.0 if stands_before else cruise, cruise,
+                   0.0 if stands_after else cruise, acceleration)
 
 
-def peak_factor(stands_before: bool, stands_after: bool) -> float:
-    """Return how much faster than its mean a timed motion gets: 1.5 from rest to rest."""
-    return 1.0 / (1.0 - 0.5 * RAMP_SHARE * (stands_before + stands_after))
+def peak_of(length: float, duration: float) -> tuple[float, float]:
+    """
+    Return the largest speed and acceleration of a motion for which the robot is told the time.
+
+    They are those from rest to rest, 1.5 d/T and 4.5 d/T^2: the robot plans to stop at the
+    waypoint, also where a blend then takes over.
+    """
+    speed = length / duration / (1.0 - RAMP_SHARE)
+    return speed, speed / (RAMP_SHARE * duration)
+
+
+def least_time(length: float, speed: float, acceleration: float) -> float:
+    """Return the shortest time that keeps :func:`peak_of` within both bounds."""
+    return max(length / speed / (1.0 - RAMP_SHARE),
+               sqrt(length / acceleration / (RAMP_SHARE * (1.0 - RAMP_SHARE))))
 
 
 def cruise_for(length: float, duration: float, acceleration: float,
@@ -103,9 +120,3 @@ def cruise_for(length: float, duration: float, acceleration: float,
     if root < 0.0:
         return None
     return 2.0 * length / (duration + sqrt(root))
-
-
-def _between(length: float, cruise: float, acceleration: float, stands_before: bool,
-             stands_after: bool) -> Profile:
-    return Profile(length, 0.0 if stands_before else cruise, cruise,
-                   0.0 if stands_after else cruise, acceleration)

@@ -14,9 +14,12 @@ from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning.corner import Corner
 from ur_cartesian_driver.planning.path import JointLine
-from ur_cartesian_driver.planning.timing import corner_duration, Leg, Timing
+from ur_cartesian_driver.planning.timing import Leg, Timing
 
 _Row: TypeAlias = tuple[float, ...]
+
+#: The fewest pieces of a joint move, for the sake of its times.
+_LEAST_OF_JOINTS = 8
 
 
 def reference_path(start: Pose, legs: Sequence[Leg], timings: Sequence[Timing]) -> ReferencePath:
@@ -39,9 +42,7 @@ def reference_path(start: Pose, legs: Sequence[Leg], timings: Sequence[Timing]) 
                      if span > 0.0 else now for x in u)
         now += timing.profile.duration
         if leg.after is not None:
-            lasts = corner_duration(
-                leg.after, _speed(leg, timing), _speed(legs[k + 1], timings[k + 1]))
-            now = _append_corner(leg.after, leg.index, legs[k + 1].index, now, lasts,
+            now = _append_corner(leg.after, (leg.index, legs[k + 1].index), now, timing.corner,
                                  rows, points, times)
     poses = np.array(rows)
     _keep_hemisphere(poses)
@@ -53,6 +54,9 @@ def _places(leg: Leg, timing: Timing) -> list[float]:
     """Return the ``u`` of the rows of a leg, the first one left out (it is there already)."""
     begin, end = leg.u_before, leg.u_after
     span = max(end - begin, 0.0)
+    if isinstance(leg.path, JointLine):  # evenly: preview finds the joint positions by counting
+        n = max(_LEAST_OF_JOINTS, round(leg.path.samples * span))
+        return [*(begin + span * k / n for k in range(1, n)), end]
     n = max(1, round(leg.path.samples * span))
     places = {begin + span * k / n for k in range(1, n)}
     places.update(begin + span * f for f in timing.profile.knots())
@@ -68,20 +72,14 @@ def _poses(leg: Leg, places: list[float]) -> list[_Row]:
     return [*rows, last.row()]
 
 
-def _speed(leg: Leg, timing: Timing) -> float:
-    """Return the tool's cruise speed [m/s]."""
-    whole = timing.profile.length / max(leg.u_after - leg.u_before, 1e-9)
-    return timing.profile.cruise * leg.path.length / whole
-
-
-def _append_corner(corner: Corner, before: int, after: int, now: float, lasts: float,
+def _append_corner(corner: Corner, indices: tuple[int, int], now: float, lasts: float,
                    rows: list[_Row], points: list[int], times: list[float]) -> float:
     """Append the rows of a corner; return the time at its end."""
     n = corner.samples
     for k in range(1, n + 1):
         s = k / n
         rows.append(corner.pose(s).row())
-        points.append(before if s <= 0.5 else after)
+        points.append(indices[s > 0.5])
         times.append(now + s * lasts)
     return now + lasts
 

@@ -26,18 +26,20 @@ from ur_cartesian_driver.planning.path import Arc, JointLine, Path, SAME_POSITIO
 from ur_cartesian_driver.planning.postures import Trace
 from ur_cartesian_driver.planning.profile import (
     cruise_for,
-    peak_factor,
+    least_time,
+    peak_of,
     Profile,
     timed,
     trapezoid,
 )
-from ur_cartesian_driver.planning.validate import is_optimized, point_field, segment_field
+from ur_cartesian_driver.planning.validate import is_optimized, point_field
 
 #: The lowest speed that the wire carries well enough: it counts in millionths.
 LEAST_SPEED = 1e-5
 #: What an OPTIMIZED move is taken to accelerate with at fraction 1 [rad/s^2]; the robot's own
 #: limits are not published. It only serves to say about how long such a move takes.
-_OPTIMIZED_JOINT_ACCELERATION = 15.0
+_OPTIMIZED_JOINT_ACCELERATION = 40.0
+_TIME_SAYS_SO = 'its time_from_start says so'
 #: Where the robot stands at the first point already, the way there counts as this.
 _NO_WAY = 1e-9
 #: Rounds in which speeds and the times in corners are made to agree.
@@ -92,8 +94,10 @@ class Timing:
     profile: Profile
     #: Expected time, half of each corner included [s].
     duration: float
+    #: Time in the corner after it [s], 0 without one.
+    corner: float = 0.0
     #: Why, as the end of "because ...".
-    reason: str
+    reason: str = ''
     #: What was changed, empty if nothing.
     remark: str = ''
 
@@ -123,7 +127,7 @@ def schedule(legs: Sequence[Leg], options: PlanningOptions, model: RobotModel) -
     for _ in range(_ROUNDS if any(_is_blended(legs[k]) for k in derived) else 1):
         changed = 0.0
         for k in derived:
-            new = _for_time(legs[k], measures[k], _corner_time(legs, timings, measures, k),
+            new = _for_time(legs[k], measures[k], _corner_time(legs, timings, k),
                             options, model)
             changed = max(changed, abs(new.velocity / timings[k].velocity - 1.0))
             timings[k] = new
@@ -135,20 +139,54 @@ def schedule(legs: Sequence[Leg], options: PlanningOptions, model: RobotModel) -
                 point_field(leg.index), f'would be approached at {timing.velocity:.2g} '
                 f'{timing.unit}/s, less than the {LEAST_SPEED:g} that the robot can be told',
                 'give it less time')
-    return [replace(timing, duration=timing.profile.duration
-                    + _corner_time(legs, timings, measures, k))
-            for k, timing in enumerate(timings)]
+    for k in range(1, len(legs)):
+        if legs[k].before is not None and legs[k].time is None:
+            timings[k] = _from_corner(legs, timings, k)
+    return [_whole(legs, timings, k) for k in range(len(legs))]
+
+
+def _from_corner(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> Timing:
+    """
+    Return the timing of a leg that comes out of a corner no faster than both legs accelerate.
+
+    In the corner the way of the first leg ends as r1 (1 - s)^2, that of the second begins as
+    r2 s^2, so s' may grow to sqrt(a / 2r) of either.
+    """
+    before, old = timings[k - 1].profile, timings[k].profile
+    r1 = (1.0 - legs[k - 1].u_after) * before.length / _share(legs[k - 1])
+    r2 = legs[k].u_before * old.length / _share(legs[k])
+    pace = max(before.leave / (2.0 * r1),
+               sqrt(min(before.acceleration / r1, old.acceleration / r2) / 2.0))
+    enter = min(timings[k].velocity, 2.0 * r2 * pace, sqrt(
+        2.0 * old.acceleration * old.length + old.leave ** 2))
+    profile = trapezoid(old.length, timings[k].velocity, old.acceleration, enter,
+                        0.5 * old.leave ** 2 / old.acceleration)
+    return replace(timings[k], profile=profile)
+
+
+def _whole(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> Timing:
+    """Return the timing with its expected duration, half of each corner included."""
+    timing, in_corners = timings[k], _corner_time(legs, timings, k)
+    if timing.wire_time > 0.0 and in_corners > 0.0:
+        # What is sent as a time is kept in sum: corners are shorter, so what is left has longer.
+        left = max(timing.wire_time - in_corners, 0.05 * timing.wire_time)
+        timing = replace(timing, profile=timed(timing.profile.length, left, *_stands(legs[k])))
+    corner = 0.0
+    if legs[k].after is not None:
+        corner = corner_duration(legs[k], timings[k], legs[k + 1], timings[k + 1])
+    return replace(timing, duration=timing.profile.duration + in_corners, corner=corner)
 
 
 def measure(leg: Leg, model: RobotModel) -> tuple[float, str]:
     """
     Return the length of the leading quantity and its unit (m or rad; s for OPTIMIZED moves).
 
-    OPTIMIZED moves are measured by the time that they would take at all joints' limits.
+    OPTIMIZED moves are measured by the time that they would take if some joint were at its limit
+    where the joints turn fastest.
     """
     path = leg.path
     if is_optimized(leg.kind):
-        length, unit = sum(_joint_times(leg, model)), 's'
+        length, unit = _slowest_joint(leg, model), 's'
     elif isinstance(path, JointLine):
         length, unit = max(path.travel), 'rad'
     elif path.length >= path.angle or (isinstance(path, Arc) and path.mode == ArcMode.FIXED):
@@ -170,6 +208,13 @@ def _stands(leg: Leg) -> tuple[bool, bool]:
     return leg.before is None, leg.after is None
 
 
+def _tail(leg: Leg, length: float) -> float:
+    """Return how far behind its end between corners the robot plans to stop, see trapezoid."""
+    if leg.after is not None and leg.kind == SegmentType.PROCESS:
+        return inf
+    return length * (1.0 - leg.u_after)
+
+
 def _share(leg: Leg) -> float:
     """Return the part of the leg between its corners; blends that touch leave nearly nothing."""
     return max(leg.u_after - leg.u_before, 1e-9)
@@ -181,7 +226,7 @@ def _first_guess(leg: Leg, length: float, unit: str, options: PlanningOptions,
         return _by_speed(leg, length, unit, options, model)
     if _takes_time(leg.kind):
         return _by_time(leg, length, unit, options, model)
-    return _for_time(leg, (length, unit), 0.0, options, model, strict=True)
+    return _for_time(leg, (length, unit), 0.0, options, model, strict=False)
 
 
 # -- speeds ---------------------------------------------------------------------------------------
@@ -201,12 +246,11 @@ def _by_speed(leg: Leg, length: float, unit: str, options: PlanningOptions,
     if velocity < wanted:
         remark = (f'point {leg.index}: slowed from {wanted:.3g} to {velocity:.3g} '
                   f'{_speed_unit(unit)} by {limits.name}')
-    way = length * _share(leg)
+    rate = acceleration
     if is_optimized(leg.kind):
-        rate = acceleration * _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed)
-        profile = trapezoid(way, velocity, rate, *_stands(leg))
-    else:
-        profile = trapezoid(way, velocity, acceleration, *_stands(leg))
+        rate *= _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed)
+    profile = trapezoid(length * _share(leg), velocity, rate,
+                        inf if leg.before else 0.0, _tail(leg, length))
     return Timing(velocity=velocity, acceleration=acceleration, wire_time=0.0, unit=unit,
                   profile=profile, duration=profile.duration, reason=reason, remark=remark)
 
@@ -214,23 +258,23 @@ def _by_speed(leg: Leg, length: float, unit: str, options: PlanningOptions,
 def _wanted_speed(leg: Leg, unit: str, options: PlanningOptions) -> tuple[float, str]:
     """Return the speed that the goal asks for, and the words for where it comes from."""
     if leg.segment.velocity > 0.0:
-        return leg.segment.velocity, f'{segment_field(leg.index, "velocity")} says so'
+        return leg.segment.velocity, 'its velocity says so'
     if is_optimized(leg.kind):
-        return options.optimized_velocity, 'that is the default of the driver'
+        return options.optimized_velocity, 'that is the default speed'
     if leg.kind == SegmentType.JOINT:
-        return options.joint_velocity, 'that is the default of the driver'
+        return options.joint_velocity, 'that is the default speed'
     twist = leg.waypoint.twist
     speed = hypot(*twist[:3]) if _moves(leg) else hypot(*twist[3:])
     if speed > 0.0:
-        return speed, "that is the point's twist"
+        return speed, 'its twist says so'
     if not _moves(leg):
-        return options.angular_velocity, 'that is the default of the driver'
+        return options.angular_velocity, 'that is the default speed'
     if unit == 'rad' and leg.kind != SegmentType.LINEAR:
         # One number for both: as rad/s the turn may have more, but never more than the tool may.
         fastest = options.max_tool_speed or options.angular_velocity
         return (max(options.linear_velocity, min(options.angular_velocity, fastest)),
                 'it turns more than it moves')
-    return options.linear_velocity, 'that is the default of the driver'
+    return options.linear_velocity, 'that is the default speed'
 
 
 def _default_acceleration(leg: Leg, unit: str, options: PlanningOptions) -> float:
@@ -254,11 +298,9 @@ def _turning_line(leg: Leg, angle: float, velocity: float, acceleration: float, 
         remark = (f'point {leg.index}: slowed from {velocity:.3g} to {options.max_tool_speed:.3g} '
                   'm/s by max_tool_speed')
         velocity = options.max_tool_speed
-    stands = _stands(leg)
-    length = leg.path.length
-    time = max(_least_time(length, velocity, acceleration, stands),
-               _least_time(angle, options.angular_velocity, options.angular_acceleration, stands))
-    profile = timed(angle * _share(leg), time * _share(leg), *stands)
+    time = max(least_time(leg.path.length, velocity, acceleration),
+               least_time(angle, options.angular_velocity, options.angular_acceleration))
+    profile = timed(angle * _share(leg), time * _share(leg), *_stands(leg))
     return Timing(velocity=velocity, acceleration=acceleration, wire_time=time, unit='rad',
                   profile=profile, duration=time, reason=f'{reason} and it turns on the way',
                   remark=remark)
@@ -271,15 +313,15 @@ def _by_time(leg: Leg, length: float, unit: str, options: PlanningOptions,
              model: RobotModel) -> Timing:
     """Return the timing of a leg for which the wire carries the time."""
     assert leg.time is not None
-    limits, stands = _limits(leg, length, options, model), _stands(leg)
-    least = _least_time(length, limits.speed, limits.acceleration, stands)
+    limits = _limits(leg, length, options, model)
+    least = least_time(length, limits.speed, limits.acceleration)
     time, remark = leg.time, ''
     if time < least * (1.0 - 1e-9):
         time, remark = _slowed(leg, length, unit, least, limits, options)
-    profile = timed(length * _share(leg), time * _share(leg), *stands)
+    profile = timed(length * _share(leg), time * _share(leg), *_stands(leg))
     # The robot ignores speed and acceleration when it has a time; they say what it will need.
     return Timing(velocity=profile.cruise, acceleration=profile.acceleration, wire_time=time,
-                  unit=unit, profile=profile, duration=time, reason=_time_reason(leg),
+                  unit=unit, profile=profile, duration=time, reason=_TIME_SAYS_SO,
                   remark=remark)
 
 
@@ -293,23 +335,25 @@ def _for_time(leg: Leg, measured: tuple[float, str], in_corners: float, options:
     """
     assert leg.time is not None
     length, unit = measured
-    limits, stands = _limits(leg, length, options, model), _stands(leg)
-    way, ramps = length * _share(leg), sum(stands)
+    limits = _limits(leg, length, options, model)
+    way, tail = length * _share(leg), _tail(leg, length)
+    bound = _bound(leg, limits)
     time, remark = leg.time, ''
-    least = in_corners + _least_time(way, limits.speed, _bound(leg, limits), stands)
+    least = in_corners + _least_by_speed(leg, way, limits.speed, bound)
     if strict and time < least * (1.0 - 1e-9):
         time, remark = _slowed(leg, length, unit, least, limits, options)
     between = max(time - in_corners, 0.05 * time)
-    acceleration = leg.segment.acceleration or _default_acceleration(leg, unit, options)
-    if not leg.segment.acceleration:
-        # At least what makes a third each of speeding up, cruising and braking.
-        acceleration = max(acceleration, 3.0 * peak_factor(*stands) * way / between ** 2)
-    velocity = cruise_for(way, between, acceleration, ramps)
+    acceleration = leg.segment.acceleration or max(
+        _default_acceleration(leg, unit, options),
+        # A third each of speeding up, cruising and braking; and no braking before a blend.
+        min(bound, 4.5 * way / between ** 2),
+        min(bound, (way / between) ** 2 / tail if 0.0 < tail < inf else 0.0))
+    velocity = cruise_for(way, between, acceleration, sum(_stands(leg)))
     if velocity is None:  # only before the corners are known, or within rounding
-        velocity = way / between * peak_factor(*stands)
-    profile = trapezoid(way, velocity, acceleration, *stands)
+        velocity = 2.0 * way / between
+    profile = trapezoid(way, velocity, acceleration, inf if leg.before else 0.0, tail)
     return Timing(velocity=velocity, acceleration=acceleration, wire_time=0.0, unit=unit,
-                  profile=profile, duration=time, reason=_time_reason(leg), remark=remark)
+                  profile=profile, duration=time, reason=_TIME_SAYS_SO, remark=remark)
 
 
 def _slowed(leg: Leg, length: float, unit: str, least: float, limits: _Limits,
@@ -319,23 +363,21 @@ def _slowed(leg: Leg, length: float, unit: str, least: float, limits: _Limits,
     if options.on_too_fast == 'slow':
         return least, (f'point {leg.index}: takes {least:.3f} s instead of {leg.time:.3f} s, '
                        f'because of {limits.name}')
-    speed = length / leg.time * peak_factor(*_stands(leg))
+    speed, acceleration = peak_of(length, leg.time)
     raise TooFast(
         point_field(leg.index, 'time_from_start'),
-        f'gives the segment {leg.time:.3f} s for {length:.3f} {unit}, which needs a speed of '
-        f'{speed:.3f} {_speed_unit(unit)} and {3.0 * speed / leg.time:.3f} {_speed_unit(unit)}^2; '
+        f'gives the segment {leg.time:.3f} s for {length:.3f} {unit}, which needs up to '
+        f'{speed:.3f} {_speed_unit(unit)} and {acceleration:.3f} {_speed_unit(unit)}^2; '
         f'allowed are {limits.speed:.3f} {_speed_unit(unit)} ({limits.name}) and '
         f'{_bound(leg, limits):.3f} {_speed_unit(unit)}^2',
         f'give it at least {least:.3f} s, or set on_too_fast to slow')
 
 
-def _least_time(length: float, speed: float, acceleration: float,
-                stands: tuple[bool, bool]) -> float:
-    """Return the shortest time in which a timed motion stays within speed and acceleration."""
-    factor = peak_factor(*stands)
-    by_speed = length * factor / speed
-    by_acceleration = sqrt(3.0 * factor * length / acceleration) if any(stands) else 0.0
-    return max(by_speed, by_acceleration)
+def _least_by_speed(leg: Leg, way: float, speed: float, acceleration: float) -> float:
+    """Return the shortest time between the corners of a leg that is sent as a speed."""
+    ramps = sum(_stands(leg))
+    peak = min(speed, sqrt(2.0 * acceleration * way / ramps)) if ramps else speed
+    return way / peak + 0.5 * ramps * peak / acceleration
 
 
 def _bound(leg: Leg, limits: _Limits) -> float:
@@ -345,32 +387,26 @@ def _bound(leg: Leg, limits: _Limits) -> float:
     return limits.acceleration
 
 
-def _time_reason(leg: Leg) -> str:
-    return f'{point_field(leg.index, "time_from_start")} says so'
-
-
 # -- corners --------------------------------------------------------------------------------------
 
 
-def _corner_time(legs: Sequence[Leg], timings: Sequence[Timing],
-                 measures: Sequence[tuple[float, str]], k: int) -> float:
+def _corner_time(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> float:
     """Return the time that a leg spends in its halves of the corners at its ends [s]."""
     time = 0.0
-    for corner, other in ((legs[k].before, k - 1), (legs[k].after, k + 1)):
-        if corner is not None:
-            mine = _tool_speed(legs[k], timings[k], measures[k][0])
-            its = _tool_speed(legs[other], timings[other], measures[other][0])
-            time += corner_duration(corner, mine, its) / 2.0
+    if legs[k].before is not None:
+        time += corner_duration(legs[k - 1], timings[k - 1], legs[k], timings[k]) / 2.0
+    if legs[k].after is not None:
+        time += corner_duration(legs[k], timings[k], legs[k + 1], timings[k + 1]) / 2.0
     return time
 
 
-def corner_duration(corner: Corner, speed: float, other: float) -> float:
-    """Return the time in a corner [s] in which the tool changes evenly between two speeds."""
-    return 2.0 * corner.length / max(speed + other, 1e-9)
-
-
-def _tool_speed(leg: Leg, timing: Timing, length: float) -> float:
-    return timing.profile.cruise * leg.path.length / length
+def corner_duration(first: Leg, timing: Timing, second: Leg, next_timing: Timing) -> float:
+    """Return the time in the corner between two legs [s]; the tool's speed changes evenly."""
+    assert first.after is not None
+    speeds = (timing.profile.leave * first.path.length / timing.profile.length * _share(first)
+              + next_timing.profile.enter * second.path.length / next_timing.profile.length
+              * _share(second))
+    return 2.0 * first.after.length / max(speeds, 1e-9)
 
 
 # -- limits ---------------------------------------------------------------------------------------
@@ -380,7 +416,7 @@ def _limits(leg: Leg, length: float, options: PlanningOptions, model: RobotModel
     """Return what bounds the leading quantity of a leg."""
     tool = inf
     if options.max_tool_speed > 0.0 and _moves(leg):
-        tool = options.max_tool_speed / _tool_per_unit(leg, length, model)
+        tool = options.max_tool_speed / _tool_per_unit(leg, length)
     speed, name = tool, f'max_tool_speed = {options.max_tool_speed:g} m/s'
     if leg.kind == SegmentType.JOINT and isinstance(leg.path, JointLine):
         for k, way in enumerate(leg.path.travel):
@@ -395,25 +431,19 @@ def _limits(leg: Leg, length: float, options: PlanningOptions, model: RobotModel
     return _Limits(speed=speed, name=name, acceleration=bound)
 
 
-def _tool_per_unit(leg: Leg, length: float, model: RobotModel) -> float:
+def _tool_per_unit(leg: Leg, length: float) -> float:
     """Return the most metres that the tool goes per unit of the leading quantity."""
     path = leg.path
-    if isinstance(path, JointLine):
-        return path.length * path.unevenness / length
-    if is_optimized(leg.kind):
-        places = [0.0, *(u for u, _ in leg.trace)]
-        ways = [(b - a) * path.length for a, b in pairwise(places)]
-        times = _joint_times(leg, model)
-        return max(way / time for way, time in zip(ways, times, strict=True) if time > 0.0)
-    return path.length / length
+    uneven = path.unevenness if isinstance(path, JointLine) else 1.0
+    return path.length * uneven / length
 
 
-def _joint_times(leg: Leg, model: RobotModel) -> list[float]:
-    """Return for each step of the trace the time that the slowest joint needs at its limit."""
-    configurations = [leg.q_start, *(q for _, q in leg.trace)]
-    return [max(abs(b - a) / limit
-                for a, b, limit in zip(p, q, model.max_joint_speed, strict=True))
-            for p, q in pairwise(configurations)]
+def _slowest_joint(leg: Leg, model: RobotModel) -> float:
+    """Return the time of a leg at the pace that its most burdened joint allows [s]."""
+    places = [(0.0, leg.q_start), *leg.trace]
+    return max(abs(b - a) / limit / (after - before)
+               for (before, p), (after, q) in pairwise(places)
+               for a, b, limit in zip(p, q, model.max_joint_speed, strict=True))
 
 
 def _moves(leg: Leg) -> bool:

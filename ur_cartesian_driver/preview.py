@@ -1,0 +1,133 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A plan before it is run: where tool and joints are at which time, and a table for people.
+
+For pictures, markers and a look before the first run; the robot keeps its own speed profile, so
+times are those expected at full speed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, degrees
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.inverse import nearest
+from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.primitive import Joints, MoveJ, OptimoveJ
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Preview:
+    """A plan, sampled; one row for each time."""
+
+    #: (n,) from the start of the motion [s], the last one is its end.
+    time: NDArray[np.float64]
+    #: (n, 7) of the TCP in the robot's base: x y z [m], unit quaternion x y z w.
+    poses: NDArray[np.float64]
+    #: (n, 6) [rad]; NaN where the calibrated arm has no solution.
+    joints: NDArray[np.float64]
+
+
+def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
+    """
+    Return the expected motion of tool and joints.
+
+    :param T_flange_tcp: the TCP with which the plan was made.
+    :param period: time between two samples [s].
+    :raises ValueError: the period is not positive.
+    """
+    if not period > 0.0:
+        raise ValueError(f'period is {period}; it must be positive')
+    reference = plan.reference
+    end = float(reference.time[-1])
+    time = np.minimum(np.arange(ceil(end / period - 1e-9) + 1) * period, end)
+    # Where times repeat the later row counts, as the robot passes through both at once.
+    row = np.clip(np.searchsorted(reference.time, time, side='right') - 1,
+                  0, max(len(reference.time) - 2, 0))
+    span = reference.time[np.minimum(row + 1, len(reference.time) - 1)] - reference.time[row]
+    share = np.clip((time - reference.time[row]) / np.where(span > 0.0, span, 1.0), 0.0, 1.0)
+    share[time >= end] = 1.0
+    poses = [_between(reference, int(k), float(f)) for k, f in zip(row, share, strict=True)]
+    joints = _joints(plan, arm, T_flange_tcp.inverse(), poses, row + share)
+    return Preview(time=time, poses=np.array([pose.row() for pose in poses]), joints=joints)
+
+
+def table(plan: Plan) -> str:
+    """Return the plan as lines of text: one for each segment, the remarks, the sum."""
+    length = sum(segment.length for segment in plan.segments)
+    lines = [f'{"point":>5}  {"command":<10} {"length":>9} {"turn":>8} {"time":>9} {"blend":>7}']
+    lines += [_line(segment) for segment in plan.segments]
+    lines.append(f'{"sum":>5}  {"":<10} {length:7.3f} m {"":>8} {plan.duration:7.3f} s')
+    lines += [f'  {remark}' for remark in plan.remarks]
+    return '\n'.join(lines)
+
+
+def _line(segment: PlannedSegment) -> str:
+    primitive = segment.primitive
+    blend = 1e3 * getattr(primitive, 'blend_radius', 0.0)
+    return (f'{segment.waypoint:>5}  {type(primitive).__name__:<10} {segment.length:7.3f} m '
+            f'{degrees(segment.angle):6.1f}\N{DEGREE SIGN} {segment.duration:8.3f} s '
+            f'{blend:4.0f} mm')
+
+
+def _between(reference: ReferencePath, row: int, share: float) -> Pose:
+    after = min(row + 1, len(reference.poses) - 1)
+    return pose_from_row(reference.poses[row]).interpolate(
+        pose_from_row(reference.poses[after]), share)
+
+
+def _joints(plan: Plan, arm: Arm, T_tcp_flange: Pose, poses: list[Pose],
+            place: NDArray[np.float64]) -> NDArray[np.float64]:
+    """
+    Return joint positions for poses at places of the reference path (rows and fractions).
+
+    The solution nearest to the one before; in joint moves, which may pass through singularities
+    where branches meet, the one nearest to the straight line in joint space.
+    """
+    lines = _joint_lines(plan)
+    point = plan.reference.point
+    rows = np.full((len(poses), 6), np.nan)
+    q = plan.start
+    for k, pose in enumerate(poses):
+        line = lines.get(int(point[min(ceil(place[k]), len(point) - 1)]))
+        q_near = q if line is None else line.at(float(place[k]))
+        found = nearest(arm, pose @ T_tcp_flange, q_near)
+        if found is not None:
+            rows[k] = q = found
+    return rows
+
+
+@dataclass(frozen=True, slots=True)
+class _JointLine:
+    """A joint move between two rows of the reference path, which has evenly spaced samples."""
+
+    q_start: Joints
+    q_end: Joints
+    first: int
+    last: int
+
+    def at(self, place: float) -> Joints:
+        u = min(1.0, max(0.0, (place - self.first) / max(1, self.last - self.first)))
+        a, b, c, d, e, f = (x + u * (y - x)
+                            for x, y in zip(self.q_start, self.q_end, strict=True))
+        return (a, b, c, d, e, f)
+
+
+def _joint_lines(plan: Plan) -> dict[int, _JointLine]:
+    """Return the joint moves by point."""
+    point = plan.reference.point
+    lines = {}
+    q = plan.start
+    for segment in plan.segments:
+        if isinstance(segment.primitive, MoveJ | OptimoveJ):
+            first, last = np.searchsorted(point, [segment.waypoint, segment.waypoint + 1])
+            lines[segment.waypoint] = _JointLine(
+                q, segment.joints, max(0, int(first) - 1), int(last) - 1)
+        q = segment.joints
+    return lines
