@@ -1,0 +1,353 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The action: every goal from its acceptance to its result.
+
+A goal is accepted at once and gets a thread of its own, in which it is converted, planned, waited
+for and watched. The executor of the node sees it twice only: when it comes, and when its outcome
+is there. So cancel requests, parameters and the heartbeat are served meanwhile, also by an
+executor with a single thread.
+
+The obvious form, a coroutine that awaits a future, is not used: executors of Jazzy poll a waiting
+coroutine whenever they wake, and the one with several threads keeps an entry for every poll until
+the coroutine ends. A motion of ten minutes beside a busy topic would slow the whole process down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import contextlib
+from dataclasses import replace
+import gc
+import threading
+from typing import Any, TypeAlias
+
+from rclpy.action.server import ActionServer, CancelResponse, RCLError
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.exceptions import InvalidHandle
+from rclpy.node import Node
+
+from ur_cartesian_driver.action import FollowCartesianTrajectory
+from ur_cartesian_driver.driver import Driver, Motion
+from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import (
+    Cancelled,
+    code_of,
+    DriverError,
+    ErrorCode,
+    RobotNotReady,
+)
+from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.planning.validate import check
+from ur_cartesian_driver.ros.convert import goal_from_message, nanoseconds
+from ur_cartesian_driver.ros.parameters import Settings
+from ur_cartesian_driver.ros.reports import feedback_message, FeedbackFrame, result_message
+
+GoalHandle: TypeAlias = Any
+
+#: How long the result of a goal is kept for clients that ask late [s]; the goal is kept with it.
+RESULT_TIMEOUT = 60
+#: How often a waiting goal looks at the node's clock, which may be a simulated one [s].
+CLOCK_PERIOD = 0.05
+#: How long rclpy may need from calling us about a cancel request to noting it [s].
+CANCEL_NOTED = 1.0
+#: How long the end of a goal is waited for when the node is destroyed [s].
+PATIENCE = 10.0
+
+SHUTDOWN = 'The driver node is shutting down'
+
+
+class CartesianActionServer:
+    """Serves ``~/follow_cartesian_trajectory``; others open and close the driver."""
+
+    def __init__(self, node: Node, driver: Driver, settings: Settings) -> None:
+        """Start to serve."""
+        self._node = node
+        self._clock = node.get_clock()
+        self._driver = driver
+        self._settings = settings
+        self._joint_names = tuple(settings.planning.tf_prefix + name for name in JOINT_NAMES)
+        # Guards what follows: the goals that have not ended, and which of them may move the arm.
+        self._lock = threading.Lock()
+        self._runs: dict[bytes, GoalRun] = {}
+        self._moving: GoalRun | None = None
+        self._closing = False
+        self._server: Any = _DeferringActionServer(  # type: ignore[no-untyped-call]
+            node, FollowCartesianTrajectory, '~/follow_cartesian_trajectory', self._begin,
+            # Of its own: goals and cancel requests are served while other callbacks run.
+            callback_group=MutuallyExclusiveCallbackGroup(),
+            cancel_callback=self._cancel,
+            result_timeout=RESULT_TIMEOUT,
+        )
+
+    @property
+    def idle(self) -> bool:
+        """Tell whether every accepted goal has its result."""
+        with self._lock:
+            return not self._runs
+
+    def stop(self) -> None:
+        """Stop the arm, end all goals and take no new ones; returns at once."""
+        with self._lock:
+            self._closing = True
+            runs = list(self._runs.values())
+        for run in runs:
+            run.shut_down()
+
+    def close(self) -> None:
+        """End all goals and their threads, and stop serving."""
+        self.stop()
+        with self._lock:
+            runs = list(self._runs.values())
+        for run in runs:
+            run.thread.join(PATIENCE)
+        self._server.destroy()
+
+    # ---- called by the executor ---------------------------------------------------------------
+
+    def _begin(self, handle: GoalHandle) -> None:
+        """Give an accepted goal its thread."""
+        run = GoalRun(self, handle, received=self._clock.now().nanoseconds)
+        with self._lock:
+            self._runs[run.key] = run
+            if self._closing:
+                run.shut_down()
+        run.thread.start()
+
+    def _cancel(self, handle: GoalHandle) -> CancelResponse:
+        """Let every goal be cancelled that has not ended."""
+        with self._lock:
+            run = self._runs.get(_key(handle))
+        if run is not None:
+            run.cancel()
+        return CancelResponse.ACCEPT
+
+    def _finish(self, run: GoalRun, outcome: Outcome) -> FollowCartesianTrajectory.Result:
+        """Bring a goal into its last state and return its result."""
+        try:
+            if outcome.succeeded:
+                run.handle.succeed()
+            elif outcome.code is ErrorCode.CANCELLED and run.handle.is_cancel_requested:
+                run.handle.canceled()
+            else:
+                run.handle.abort()
+        finally:
+            with self._lock:
+                self._runs.pop(run.key, None)
+        return result_message(outcome)
+
+    # ---- called by the threads of the goals ---------------------------------------------------
+
+    def converted(self, run: GoalRun) -> Goal:
+        """Return the goal of a run, in our own terms."""
+        state = self._driver.state
+        return goal_from_message(
+            run.handle.request, self._settings.frames, now=run.received,
+            T_flange_tcp=None if state is None else state.T_flange_tcp,
+            time_tolerance=self._settings.node.goal_time_tolerance)
+
+    def plan(self, goal: Goal) -> Plan:
+        """Plan from where the robot stands now."""
+        return self._driver.plan(goal)
+
+    def wait(self, until: int, given_up: threading.Event) -> None:
+        """Wait for a time of the node's clock [ns]."""
+        while (left := until - self._clock.now().nanoseconds) > 0:
+            if given_up.wait(min(left / 1_000_000_000, CLOCK_PERIOD)):
+                return
+
+    def occupy(self, run: GoalRun, goal: Goal) -> None:
+        """
+        Give the arm to a goal.
+
+        :raises GoalRefused: another goal has it; if this one is malformed, that is said instead.
+        """
+        with self._lock:
+            if self._moving is None:
+                self._moving = run
+                return
+        check(goal, self._settings.planning)
+        raise RobotNotReady('Another goal is running and on_new_goal is reject; wait for its end '
+                            'or cancel it, then send this goal again.')
+
+    def start(self, plan: Plan, on_progress: Callable[[Progress], None]) -> Motion:
+        """Set the arm in motion."""
+        return self._driver.start(plan, on_progress)
+
+    def ended(self, run: GoalRun, outcome: Outcome) -> None:
+        """Give the arm free, and the outcome to the executor."""
+        with self._lock:
+            if self._moving is run:
+                self._moving = None
+        self._server.finish(run.handle, lambda handle: self._finish(run, outcome))
+
+    def feedback_frame(self, run: GoalRun, plan: Plan) -> FeedbackFrame:
+        """Return what all feedback of a goal has in common."""
+        trajectory, frames = run.handle.request.trajectory, self._settings.frames
+        return FeedbackFrame(
+            frame_id=trajectory.header.frame_id or frames.base,
+            controlled_frame=trajectory.controlled_frame or frames.tcp,
+            T_frame_base=plan.goal.T_base_frame.inverse(),
+            joint_names=self._joint_names,
+            duration=plan.duration,
+        )
+
+    def publish_feedback(self, run: GoalRun, progress: Progress, frame: FeedbackFrame) -> None:
+        """Send one report; publishing is safe from any thread."""
+        message = feedback_message(progress, frame, self._clock.now().to_msg())
+        # When the node or all of ROS is shutting down, the motion hears of it in another way.
+        with contextlib.suppress(InvalidHandle, RCLError):
+            run.handle.publish_feedback(message)
+
+
+class GoalRun:
+    """One goal, from its acceptance to its outcome, in a thread of its own."""
+
+    def __init__(self, server: CartesianActionServer, handle: GoalHandle, received: int) -> None:
+        """
+        Make a run; its thread is still to be started.
+
+        :param received: time of the node's clock [ns].
+        """
+        self.handle = handle
+        self.key = _key(handle)
+        self.received = received
+        self.thread = threading.Thread(
+            target=self._run, name=f'goal {self.key.hex()[:8]}', daemon=True)
+        self._server = server
+        self._lock = threading.Lock()
+        self._motion: Motion | None = None
+        self._given_up = threading.Event()
+        self._cancel_requested = False
+
+    def cancel(self) -> None:
+        """Stop, because the client wants it."""
+        self._cancel_requested = True
+        self._give_up()
+
+    def shut_down(self) -> None:
+        """Stop, because the node ends."""
+        self._give_up()
+
+    def _give_up(self) -> None:
+        with self._lock:
+            self._given_up.set()
+            motion = self._motion
+        if motion is not None:
+            motion.cancel()
+
+    def _run(self) -> None:
+        try:
+            outcome = self._outcome()
+        except DriverError as error:
+            outcome = Outcome(code=code_of(error), text=str(error))
+        except Exception as error:
+            # A goal always ends with a result; the traceback goes the way of all threads.
+            self._server.ended(self, Outcome(
+                code=ErrorCode.EXECUTION_FAILED,
+                text=f'The driver has a defect, {type(error).__name__}: {error}; its log says '
+                     'more.'))
+            raise
+        if outcome.code is ErrorCode.CANCELLED and self._cancel_requested:
+            self._wait_until_cancel_is_noted()
+        self._server.ended(self, outcome)
+
+    def _outcome(self) -> Outcome:
+        server, request = self._server, self.handle.request
+        goal = server.converted(self)
+        if request.validate_only:
+            return Outcome(code=ErrorCode.SUCCESSFUL, text='The goal passed all checks.',
+                           report=self._checked(server.plan(goal)).report)
+        start_time = nanoseconds(request.trajectory.header.stamp)
+        if start_time > self.received:
+            self._checked(server.plan(goal))
+            server.wait(start_time, self._given_up)
+            goal = replace(goal, age=0.0)
+        server.occupy(self, goal)
+        return self._moved(self._checked(server.plan(goal)))
+
+    def _checked(self, plan: Plan) -> Plan:
+        """
+        Return a plan that is still wanted.
+
+        :raises Cancelled: the goal was given up meanwhile.
+        """
+        if self._given_up.is_set():
+            raise self._cancelled('before anything moved')
+        return plan
+
+    def _moved(self, plan: Plan) -> Outcome:
+        server = self._server
+        frame = server.feedback_frame(self, plan)
+        motion = server.start(
+            plan, lambda progress: server.publish_feedback(self, progress, frame))
+        with self._lock:
+            self._motion = motion
+            given_up = self._given_up.is_set()
+        if given_up:
+            motion.cancel()
+        outcome = motion.result()
+        if outcome.code is ErrorCode.CANCELLED and not self._cancel_requested \
+                and self._given_up.is_set():
+            return replace(outcome, text=str(self._cancelled('and the arm was stopped')))
+        return outcome
+
+    def _cancelled(self, when: str) -> Cancelled:
+        if self._cancel_requested:
+            return Cancelled(f'The goal was cancelled {when}.')
+        return Cancelled(f'{SHUTDOWN}: the goal ended {when}.')
+
+    def _wait_until_cancel_is_noted(self) -> None:
+        """
+        Wait until rclpy knows that the goal is being cancelled.
+
+        It asks us first and changes the goal's state then, maybe in another thread; before that
+        the goal cannot become CANCELED.
+        """
+        tick = threading.Event()
+        for _ in range(int(CANCEL_NOTED / 0.001)):
+            if self.handle.is_cancel_requested:
+                return
+            tick.wait(0.001)
+
+
+class _DeferringActionServer(ActionServer):
+    """
+    An action server whose goals come to the executor when their outcome is there.
+
+    rclpy hands every accepted goal to :meth:`notify_execute`, which gives the executor a task that
+    waits for the callback. Here the callback begins the goal at once, and the task comes with
+    :meth:`finish`, from whatever thread.
+    """
+
+    def take_data(self) -> Any:
+        """
+        Take a request without a garbage collection in between.
+
+        A large goal makes hundreds of thousands of objects, none of which is garbage, and the
+        collector would walk through them again and again: 40 % of the time, in which no other
+        thread runs.
+        """
+        enabled = gc.isenabled()
+        gc.disable()
+        try:
+            return super().take_data()  # type: ignore[no-untyped-call]
+        finally:
+            if enabled:
+                gc.enable()
+
+    def notify_execute(self, goal_handle: GoalHandle, execute_callback: Any) -> None:
+        """Begin a goal; it is in the state EXECUTING."""
+        (execute_callback or self._execute_callback)(goal_handle)
+
+    def finish(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:
+        """Let the executor call back for the result and send it; from any thread."""
+        if self._node.executor is not None:  # None: nobody is left to send it
+            super().notify_execute(  # type: ignore[no-untyped-call]
+                goal_handle, callback)
+
+
+def _key(handle: GoalHandle) -> bytes:
+    return bytes(handle.goal_id.uuid)

@@ -1,0 +1,183 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The node: it makes the parts and connects them, and does nothing itself.
+
+:func:`main` is the command ``ur-cartesian-driver``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+import logging
+import signal
+import sys
+from time import monotonic
+from types import FrameType
+from typing import Any
+
+import rclpy
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.rcutils_logger import RcutilsLogger
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
+
+from ur_cartesian_driver.driver import Driver
+from ur_cartesian_driver.ros.action_server import CartesianActionServer
+from ur_cartesian_driver.ros.parameters import declare, overrides, ParameterError, Value
+from ur_cartesian_driver.ros.state_publisher import StatePublisher
+
+#: How often the driver hears that the executor of the node is alive [s].
+HEARTBEAT_PERIOD = 0.5
+#: How long :func:`main` waits for the arm to stop and the results to be sent [s].
+SHUTDOWN_PATIENCE = 5.0
+
+
+class CartesianDriverNode(Node):
+    """
+    The driver of one arm as a ROS node.
+
+    It connects to the robot by itself from its construction on and until :meth:`destroy_node`,
+    and may be added to any executor, except that its executor must not hang for ``node_timeout``:
+    then the arm is stopped.
+    """
+
+    def __init__(self, node_name: str = 'ur_cartesian_driver', *, namespace: str | None = None,
+                 parameter_overrides: Mapping[str, Value] | Iterable[Parameter] | None = None,
+                 **node_kwargs: Any) -> None:
+        """
+        Declare the parameters and start to connect.
+
+        :param parameter_overrides: values by name, or as rclpy wants them.
+        :param node_kwargs: for ``rclpy.node.Node``.
+        :raises ParameterError: a parameter cannot have its value; the text says why.
+        """
+        super().__init__(
+            node_name, namespace=namespace, parameter_overrides=overrides(parameter_overrides),
+            automatically_declare_parameters_from_overrides=True, **node_kwargs)
+        self._parts: list[Any] = []  # with close(), the last one first
+        try:
+            self._start()
+        except BaseException:
+            self.destroy_node()
+            raise
+
+    def _start(self) -> None:
+        settings = declare(self)
+        logger = self.get_logger()  # type: ignore[no-untyped-call]
+        self._parts.append(_LogBridge(logger))
+        self.driver = Driver(settings.driver, settings.planning, auto_heartbeat=False)
+        self._parts.append(self.driver)
+        self.driver.open()
+        self._publisher = StatePublisher(self, self.driver, settings)
+        self._parts.append(self._publisher)
+        self.action_server = CartesianActionServer(self, self.driver, settings)
+        self._parts.append(self.action_server)
+        self._publisher.start()
+        self.create_timer(
+            HEARTBEAT_PERIOD, self.driver.heartbeat,
+            # Of its own, and on a clock that no simulation stops.
+            callback_group=MutuallyExclusiveCallbackGroup(),
+            clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def destroy_node(self) -> None:
+        """Stop the arm if it moves, end all goals, threads and connections, then the node."""
+        parts, self._parts = self._parts, []
+        for part in reversed(parts):
+            part.close()
+        super().destroy_node()  # type: ignore[no-untyped-call]
+
+
+class _LogBridge(logging.Handler):
+    """Passes what our own modules log on to the logger of the node."""
+
+    _SEVERITIES = (
+        (logging.ERROR, 'error'), (logging.WARNING, 'warning'), (logging.INFO, 'info'))
+
+    def __init__(self, logger: RcutilsLogger) -> None:
+        super().__init__()
+        self._ros_logger = logger
+        self._source = logging.getLogger('ur_cartesian_driver')
+        self._level_before = self._source.level
+        self._source.addHandler(self)
+        self._source.setLevel(logging.DEBUG)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        text = record.getMessage()
+        for level, severity in self._SEVERITIES:
+            if record.levelno >= level:
+                # One call site for each severity, as rclpy insists on.
+                getattr(self, f'_{severity}')(text)
+                return
+        self._ros_logger.debug(text)
+
+    def _error(self, text: str) -> None:
+        self._ros_logger.error(text)
+
+    def _warning(self, text: str) -> None:
+        self._ros_logger.warning(text)
+
+    def _info(self, text: str) -> None:
+        self._ros_logger.info(text)
+
+    def close(self) -> None:
+        self._source.removeHandler(self)
+        self._source.setLevel(self._level_before)
+        super().close()
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """
+    Run the node until SIGINT or SIGTERM.
+
+    The first signal stops the arm and lets running goals end with a result; a second one does not
+    wait for that.
+    """
+    # rclpy's own handlers would shut ROS down at once, and no goal could end with a result.
+    rclpy.init(args=list(sys.argv if arguments is None else arguments),
+               signal_handler_options=SignalHandlerOptions.NO)
+    signals = _Signals()
+    try:
+        node = CartesianDriverNode()
+    except ParameterError as error:
+        rclpy.shutdown()
+        sys.exit(f'ur_cartesian_driver: {error}')
+    try:
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
+        while not signals.count:
+            executor.spin_once(timeout_sec=0.2)
+        _end_goals(node, executor, signals)
+    finally:
+        node.destroy_node()
+        rclpy.shutdown()
+
+
+def _end_goals(node: CartesianDriverNode, executor: SingleThreadedExecutor,
+               signals: _Signals) -> None:
+    node.action_server.stop()
+    deadline = monotonic() + SHUTDOWN_PATIENCE
+    while not node.action_server.idle and monotonic() < deadline and signals.count < 2:
+        executor.spin_once(timeout_sec=0.05)
+    for _ in range(3):  # the results are on their way through the executor
+        executor.spin_once(timeout_sec=0.02)
+
+
+class _Signals:
+    """Counts SIGINT and SIGTERM."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._received)
+
+    def _received(self, number: int, frame: FrameType | None) -> None:
+        self.count += 1
+
+
+if __name__ == '__main__':
+    main()

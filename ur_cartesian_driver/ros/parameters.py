@@ -1,0 +1,314 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The parameters of the node: each declared once, with description and range.
+
+Defaults come from the dataclasses that use the values, :class:`DriverConfig` and
+:class:`PlanningOptions`, so a program without ROS starts from the same ones. All parameters are
+read-only: they say what robot this is and within which bounds it may move, and a change of that
+under a running goal helps nobody.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, fields
+from difflib import get_close_matches
+from math import inf, isfinite
+from typing import Any, TypeAlias
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.exceptions import InvalidParameterException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from ur_cartesian_driver.driver import DriverConfig
+from ur_cartesian_driver.kinematics.robots import MODELS
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.ros.frames import Frames, StaticFrame
+
+Value: TypeAlias = bool | int | float | str | list[str]
+
+_TYPE_NAMES: Mapping[type, str] = {
+    bool: 'true or false', int: 'a whole number', float: 'a number', str: 'a text',
+    list: 'a list of texts'}
+#: Fields that are not set but found out.
+_FOUND_OUT = ('calibration_known',)
+#: Parameters that rclpy itself makes out of what it is given.
+_OF_RCLPY = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
+
+
+class ParameterError(ValueError):
+    """A parameter has a value that it cannot have; the text is one sentence."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NodeSettings:
+    """What the node itself wants to know."""
+
+    on_new_goal: str = 'reject'
+    goal_time_tolerance: float = 1.0
+    state_publish_rate: float = 50.0
+    static_frames: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """All parameters, sorted by who uses them."""
+
+    driver: DriverConfig
+    planning: PlanningOptions
+    node: NodeSettings
+    frames: Frames
+
+
+@dataclass(frozen=True, slots=True)
+class Declaration:
+    """A parameter but for its default: what it is, and which values it takes."""
+
+    name: str
+    description: str
+    low: float = -inf
+    high: float = inf
+    choices: tuple[str, ...] = ()
+
+    def descriptor(self, default: Value) -> ParameterDescriptor:
+        """Return what ``ros2 param describe`` shows."""
+        descriptor = ParameterDescriptor(
+            name=self.name, description=self.description, read_only=True,
+            additional_constraints='one of: ' + ', '.join(self.choices) if self.choices else '')
+        if isfinite(self.low) and isfinite(self.high) and not isinstance(default, bool):
+            if isinstance(default, int):
+                descriptor.integer_range = [
+                    IntegerRange(from_value=int(self.low), to_value=int(self.high))]
+            elif isinstance(default, float):
+                descriptor.floating_point_range = [
+                    FloatingPointRange(from_value=self.low, to_value=self.high)]
+        return descriptor
+
+    def check(self, value: Value, default: Value) -> None:
+        """
+        Refuse a value of another type or out of range.
+
+        :raises ParameterError: with the bound.
+        """
+        wanted = type(default)
+        if type(value) is not wanted:
+            hint = f'; write {value}.0' if wanted is float and type(value) is int else ''
+            raise ParameterError(
+                f'Parameter {self.name} is {value!r}, but it is {_TYPE_NAMES[wanted]}{hint}.')
+        if isinstance(value, (int, float)) and not self.low <= value <= self.high:
+            raise ParameterError(
+                f'Parameter {self.name} is {value}; it must lie between {self.low:g} and '
+                f'{self.high:g}.')
+        if self.choices and value not in self.choices:
+            raise ParameterError(
+                f'Parameter {self.name} is {value!r}; it is one of {", ".join(self.choices)}.')
+
+
+_PORT = (0, 65535)
+
+#: Every parameter of the node, in the order of ``config/driver.yaml``.
+DECLARATIONS: tuple[Declaration, ...] = (
+    # -- which robot
+    Declaration('ur_type', 'Model of the robot; a robot that reports another one is refused.',
+                choices=tuple(MODELS)),
+    Declaration('robot_ip', 'Address of the robot.'),
+    Declaration('tf_prefix', 'Prefix of joint and frame names, for example left_.'),
+    Declaration('static_frames',
+                'Fixed frames in which goals may be given, each as "name parent x y z qx qy qz '
+                'qw" [m, unit quaternion]; the parent is base, base_link or another one of them. '
+                'Empty texts are skipped.'),
+    # -- the robot program
+    Declaration('headless_mode',
+                'Send the robot program directly (needs remote control), instead of serving it '
+                'to the External Control URCap.'),
+    # -- what a goal may do
+    Declaration('on_new_goal',
+                'What happens to a goal that comes while another one runs: reject it (it ends '
+                'ABORTED), or preempt the running one (not available yet).',
+                choices=('reject', 'preempt')),
+    Declaration('max_points', 'Longest list of points that a goal may have.', 1, 1_000_000),
+    Declaration('max_tool_speed',
+                'Largest speed of the TCP [m/s]; 0: without bound. Motions without times are '
+                'slowed to it.', 0.0, 10.0),
+    Declaration('on_too_fast',
+                'A goal whose times need more speed than the limits allow: refuse it, or slow '
+                'it down.', choices=('refuse', 'slow')),
+    Declaration('max_approach_distance',
+                'Longest way of the tool to the first point [m]; 0: without bound.', 0.0, 10.0),
+    Declaration('on_posture_change',
+                'A straight line or arc that cannot arrive in the posture asked for: refuse the '
+                'goal, or go there by a joint motion.', choices=('refuse', 'movej')),
+    Declaration('stamp_tolerance',
+                'How old the stamp of a goal may be when it arrives [s].', 0.0, 3600.0),
+    Declaration('goal_time_tolerance',
+                'How much later than planned the end may be reached, where the goal does not say '
+                '[s].', 0.001, 3600.0),
+    Declaration('start_tolerance_position',
+                'How far the robot may stand from a first point at time 0 [m].', 0.0, 1.0),
+    Declaration('start_tolerance_angle',
+                'How far the robot may stand from a first point at time 0 [rad].', 0.0, 3.2),
+    # -- speeds where the goal says nothing
+    Declaration('linear_velocity', 'Speed of the tool on lines and arcs [m/s].', 1e-4, 10.0),
+    Declaration('linear_acceleration', 'Acceleration of the tool on lines and arcs [m/s^2].',
+                1e-3, 100.0),
+    Declaration('angular_velocity', 'Speed of a segment that only turns the tool [rad/s].',
+                1e-3, 20.0),
+    Declaration('angular_acceleration',
+                'Acceleration of a segment that only turns the tool [rad/s^2].', 1e-2, 400.0),
+    Declaration('joint_velocity', 'Speed of the leading axis in joint motions [rad/s].',
+                1e-3, 10.0),
+    Declaration('joint_acceleration',
+                'Acceleration of the leading axis in joint motions [rad/s^2].', 1e-2, 400.0),
+    Declaration('optimized_velocity',
+                "Speed of OPTIMIZED_* segments, as a fraction of the robot's limits.", 1e-3, 1.0),
+    Declaration('optimized_acceleration',
+                "Acceleration of OPTIMIZED_* segments, as a fraction of the robot's limits.",
+                1e-3, 1.0),
+    # -- bounds of timed motions
+    Declaration('max_linear_acceleration',
+                'Largest acceleration of the tool that a time may lead to [m/s^2].', 0.1, 100.0),
+    Declaration('max_angular_acceleration',
+                'Largest angular acceleration of the tool that a time may lead to [rad/s^2].',
+                0.1, 1000.0),
+    Declaration('max_joint_acceleration',
+                'Largest acceleration of a joint that a time may lead to [rad/s^2].',
+                0.1, 1000.0),
+    Declaration('max_segment_time', 'Longest duration of one segment [s].', 0.1, 2147.483647),
+    # -- what is published
+    Declaration('state_publish_rate',
+                'How often joint states, TCP pose and speed scaling are published [Hz].',
+                1.0, 500.0),
+    Declaration('feedback_rate', 'How often a goal sends feedback [Hz].', 0.5, 500.0),
+    # -- network
+    Declaration('rtde_port', 'Port of RTDE on the robot.', *_PORT),
+    Declaration('primary_port', 'Port of the primary interface on the robot.', *_PORT),
+    Declaration('dashboard_port', 'Port of the dashboard server on the robot.', *_PORT),
+    Declaration('reverse_port', 'Port to which the robot program connects for control messages; '
+                '0: any free one.', *_PORT),
+    Declaration('script_sender_port', 'Port that serves the robot program to the External '
+                'Control URCap; 0: any free one.', *_PORT),
+    Declaration('trajectory_port', 'Port to which the robot program connects for trajectory '
+                'points; 0: any free one.', *_PORT),
+    Declaration('script_command_port', 'Port to which the robot program connects for single '
+                'commands; 0: any free one.', *_PORT),
+    Declaration('bind_address', 'Address at which the ports above listen; empty: the local '
+                'address of the connection to the robot.'),
+    Declaration('reverse_ip', 'Address at which the robot reaches this computer (NAT, '
+                'containers); empty: the one that is listened at.'),
+    Declaration('allowed_peers', 'Addresses that may connect to the ports above; empty: '
+                'robot_ip. Empty texts are skipped.'),
+    # -- timing
+    Declaration('rtde_frequency', 'How often the robot reports its state [Hz]; 0: as often as it '
+                'can.', 0.0, 500.0),
+    Declaration('robot_receive_timeout', 'How long the robot program waits for a sign of life '
+                'before it stops the arm [s].', 0.02, 10.0),
+    Declaration('keepalive_period', 'How often the robot program gets a sign of life [s].',
+                0.002, 1.0),
+    Declaration('node_timeout', 'How long this node may be silent before the arm is stopped [s]; '
+                'longer than the largest goal takes to arrive.', 0.5, 60.0),
+    Declaration('stop_deceleration', 'Deceleration of the leading axis when a goal is stopped '
+                '[rad/s^2].', 0.1, 100.0),
+    Declaration('robot_loop', 'Where the connection to the robot is served: in a process of its '
+                'own, or in a thread (tests).', choices=('process', 'thread')),
+)
+
+
+def defaults() -> dict[str, Value]:
+    """Return the default of every parameter, by name."""
+    values: dict[str, Value] = {}
+    for options in (DriverConfig(), PlanningOptions(), NodeSettings()):
+        for name in _names(type(options)):
+            value = getattr(options, name)
+            values[name] = _texts(value) if isinstance(value, tuple) else value
+    return values
+
+
+def declare(node: Node) -> Settings:
+    """
+    Declare all parameters of a node and return their values.
+
+    :param node: made with ``automatically_declare_parameters_from_overrides``, because that is
+        how names that nobody declares, mistyped ones for instance, come to light.
+    :raises ParameterError: a name is unknown or a value cannot be; nothing runs yet.
+    """
+    by_name = defaults()
+    _refuse_unknown(node.list_parameters([], 0).names, by_name)
+    values: dict[str, Value] = {}
+    for declaration in DECLARATIONS:
+        default = by_name[declaration.name]
+        if node.has_parameter(declaration.name):
+            declaration.check(_plain(node.get_parameter(declaration.name).value), default)
+            node.undeclare_parameter(declaration.name)
+        try:
+            parameter = node.declare_parameter(
+                declaration.name, default, declaration.descriptor(default))
+        except InvalidParameterException as error:  # what check() does not know
+            raise ParameterError(f'Parameter {declaration.name}: {error}.') from None
+        values[declaration.name] = _plain(parameter.value)
+    return settings(values)
+
+
+def settings(values: Mapping[str, Value]) -> Settings:
+    """
+    Return parameter values, sorted by who uses them.
+
+    :raises ParameterError: values do not go together.
+    """
+    if values['on_new_goal'] == 'preempt':
+        raise ParameterError(
+            "Parameter on_new_goal is 'preempt', which this version does not do yet; set it to "
+            "'reject', and cancel the running goal before the next one.")
+    try:
+        planning = PlanningOptions(**_fields_of(PlanningOptions, values))
+        node = NodeSettings(**_fields_of(NodeSettings, values))
+        return Settings(
+            driver=DriverConfig(**_fields_of(DriverConfig, values)),
+            planning=planning,
+            node=node,
+            frames=Frames(planning.tf_prefix, map(StaticFrame.parse, node.static_frames)),
+        )
+    except ValueError as error:
+        raise ParameterError(f'Parameter {str(error).rstrip(".")}.') from None
+
+
+def overrides(values: Mapping[str, Value] | Iterable[Parameter] | None) -> list[Parameter]:
+    """Return values by name as rclpy wants them."""
+    if isinstance(values, Mapping):
+        return [Parameter(name, Parameter.Type.STRING_ARRAY if value == [] else None, value)
+                for name, value in values.items()]  # an empty list would be one of bytes
+    return list(values or ())
+
+
+def _refuse_unknown(names: Iterable[str], known: Iterable[str]) -> None:
+    for name in names:
+        if name in known or name.startswith(_OF_RCLPY):
+            continue
+        near = get_close_matches(name, list(known), n=1)
+        hint = f'did you mean {near[0]}?' if near else 'config/driver.yaml lists all there are.'
+        raise ParameterError(f'There is no parameter {name}; {hint}')
+
+
+def _names(options: type[Any]) -> list[str]:
+    return [field.name for field in fields(options) if field.name not in _FOUND_OUT]
+
+
+def _fields_of(options: type[Any], values: Mapping[str, Value]) -> dict[str, Any]:
+    return {name: _without_blanks(values[name]) for name in _names(options)}
+
+
+def _without_blanks(value: Value) -> object:
+    """Return a list as a tuple without the empty texts that keep it from being empty."""
+    return tuple(text for text in value if text.strip()) if isinstance(value, list) else value
+
+
+def _texts(value: object) -> list[str]:
+    """Return a list of texts that is never empty: YAML and ROS have no type for an empty one."""
+    assert isinstance(value, (list, tuple))
+    return [str(text) for text in value] or ['']
+
+
+def _plain(value: Any) -> Value:
+    """Return a parameter's value as plain Python; arrays come as other sequences."""
+    return value if isinstance(value, (bool, int, float, str)) else _texts(value)

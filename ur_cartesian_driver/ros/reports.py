@@ -1,0 +1,151 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+From the driver's reports to messages: feedback, result, robot state.
+
+Feedback goes back in the frame of the goal. NaN stands for what nobody measures or plans
+(acceleration, jerk, joint positions of the plan).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import nan
+
+from builtin_interfaces.msg import Duration, Time
+from geometry_msgs.msg import Accel, Point, PoseStamped, Quaternion, Twist, Vector3
+from geometry_msgs.msg import Pose as PoseMessage
+from sensor_msgs.msg import JointState
+
+from ur_cartesian_driver.action import FollowCartesianTrajectory
+from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.pose import conjugate, multiply, Pose, rotate, Vector6
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.msg import CartesianTrajectoryPoint
+
+_MAX_SECONDS = 2**31 - 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FeedbackFrame:
+    """What all feedback of one goal has in common."""
+
+    frame_id: str
+    controlled_frame: str
+    T_frame_base: Pose
+    joint_names: tuple[str, ...]
+    #: Planned duration of the whole motion [s].
+    duration: float
+
+
+def feedback_message(progress: Progress, frame: FeedbackFrame,
+                     stamp: Time) -> FollowCartesianTrajectory.Feedback:
+    """Return the feedback for one report of a running motion."""
+    message = FollowCartesianTrajectory.Feedback()
+    message.header.stamp = stamp
+    message.header.frame_id = frame.frame_id
+    message.controlled_frame = frame.controlled_frame
+
+    desired = frame.T_frame_base @ progress.desired_pose
+    actual = frame.T_frame_base @ progress.actual_pose
+    desired_twist = _turned(frame.T_frame_base, progress.desired_twist)
+    actual_twist = _turned(frame.T_frame_base, progress.actual_twist)
+    message.desired = _point(progress.time, desired, desired_twist)
+    message.actual = _point(progress.time, actual, actual_twist)
+    message.actual.posture.posture_joint_names = list(frame.joint_names)
+    message.actual.posture.posture_joint_values = list(progress.actual_q)
+    message.error = _point(
+        0.0, pose_error(desired, actual), _difference(desired_twist, actual_twist))
+
+    message.point_index = progress.waypoint
+    message.progress = progress.fraction
+    message.speed_scaling = progress.speed_scaling
+    message.time_remaining = duration_message(frame.duration * (1.0 - progress.fraction))
+    message.points_received = progress.points_received
+    message.buffered = duration_message(progress.buffered)
+    message.lag = nan
+    return message
+
+
+def pose_error(desired: Pose, actual: Pose) -> Pose:
+    """
+    Return desired - actual.
+
+    The position is a difference along the axes of the common frame. The orientation is the
+    rotation from the actual to the desired orientation in the axes of the actual one,
+    q_actual^-1 q_desired, of the two quaternions that mean it the one with w >= 0.
+    """
+    (ax, ay, az), (dx, dy, dz) = actual.position, desired.position
+    x, y, z, w = multiply(conjugate(actual.quaternion), desired.quaternion)
+    if w < 0.0:
+        x, y, z, w = -x, -y, -z, -w
+    return Pose((dx - ax, dy - ay, dz - az), (x, y, z, w))
+
+
+def result_message(outcome: Outcome) -> FollowCartesianTrajectory.Result:
+    """Return the result for the end of a goal."""
+    message = FollowCartesianTrajectory.Result()
+    message.error_code = int(outcome.code)
+    message.error_string = outcome.text
+    message.report = list(outcome.report)
+    return message
+
+
+def joint_state_message(state: RobotState, names: tuple[str, ...], stamp: Time) -> JointState:
+    """Return positions [rad] and velocities [rad/s]; the robot reports no joint torques here."""
+    message = JointState()
+    message.header.stamp = stamp
+    message.name = list(names)
+    message.position = list(state.actual_q)
+    message.velocity = list(state.actual_qd)
+    return message
+
+
+def tcp_pose_message(state: RobotState, base: str, stamp: Time) -> PoseStamped:
+    """Return where the active TCP is measured to be in the robot's base."""
+    message = PoseStamped()
+    message.header.stamp = stamp
+    message.header.frame_id = base
+    message.pose = pose_message(state.actual_tcp_pose)
+    return message
+
+
+def pose_message(pose: Pose) -> PoseMessage:
+    """Return a pose as a message."""
+    (x, y, z), (qx, qy, qz, qw) = pose.position, pose.quaternion
+    return PoseMessage(position=Point(x=x, y=y, z=z),
+                       orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
+
+
+def duration_message(time: float) -> Duration:
+    """Return seconds as a message, to the nearest nanosecond; infinity as the largest it holds."""
+    sec, nanosec = divmod(round(min(time, _MAX_SECONDS) * 1_000_000_000), 1_000_000_000)
+    return Duration(sec=sec, nanosec=nanosec)
+
+
+def _point(time: float, pose: Pose, twist: Vector6) -> CartesianTrajectoryPoint:
+    vx, vy, vz, wx, wy, wz = twist
+    return CartesianTrajectoryPoint(
+        time_from_start=duration_message(time),
+        pose=pose_message(pose),
+        twist=Twist(linear=Vector3(x=vx, y=vy, z=vz), angular=Vector3(x=wx, y=wy, z=wz)),
+        acceleration=_unknown(),
+        jerk=_unknown(),
+    )
+
+
+def _unknown() -> Accel:
+    return Accel(linear=Vector3(x=nan, y=nan, z=nan), angular=Vector3(x=nan, y=nan, z=nan))
+
+
+def _turned(T_frame_base: Pose, twist: Vector6) -> Vector6:
+    """Return a twist along the axes of the goal's frame, which does not move."""
+    vx, vy, vz, wx, wy, wz = twist
+    q = T_frame_base.quaternion
+    return (*rotate(q, (vx, vy, vz)), *rotate(q, (wx, wy, wz)))
+
+
+def _difference(a: Vector6, b: Vector6) -> Vector6:
+    u0, u1, u2, u3, u4, u5 = a
+    v0, v1, v2, v3, v4, v5 = b
+    return (u0 - v0, u1 - v1, u2 - v2, u3 - v3, u4 - v4, u5 - v5)
