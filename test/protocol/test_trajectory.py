@@ -36,6 +36,7 @@ from ur_cartesian_driver.protocol.trajectory import (
     MotionType,
     POINT_FIELDS,
     POINT_SIZE,
+    PointField,
     ResultDecoder,
     SplineKind,
     to_fields,
@@ -207,6 +208,21 @@ def test_the_spline_kind_follows_from_the_accelerations():
     assert to_fields(quintic)[19] == SplineKind.QUINTIC
     assert decode_point(encode_point(cubic)) == cubic
     assert decode_point(encode_point(quintic)) == quintic
+
+
+def test_the_fields_have_the_places_that_the_robot_program_reads():
+    near = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+    line = struct.unpack('>21i', encode_point(MoveL(
+        target=Pose((7.0, 0.0, 0.0)), q_near=near, velocity=1.0, acceleration=2.0, duration=3.0,
+        blend_radius=4.0)))
+    places = {PointField.TARGET: 7.0, PointField.SECOND: 0.1, PointField.VELOCITY: 1.0,
+              PointField.ACCELERATION: 2.0, PointField.HAS_Q_NEAR: 1.0,
+              PointField.DURATION: 3.0, PointField.BLEND: 4.0}
+    assert {place: line[place] / 1e6 for place in places} == places
+    assert line[PointField.TYPE] == MotionType.MOVEL
+    arc = struct.unpack('>21i', encode_point(MoveC(
+        target=Pose(), via=Pose((8.0, 0.0, 0.0)), mode=ArcMode.FIXED)))
+    assert (arc[PointField.ARC_MODE], arc[PointField.SECOND]) == (1_000_000, 8_000_000)
 
 
 def words_with(**changes):

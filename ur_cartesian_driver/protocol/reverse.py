@@ -92,7 +92,8 @@ class FreedriveAction(IntEnum):
     START = 1
 
 
-MESSAGE_SIZE = 32
+MESSAGE_FIELDS = 8
+MESSAGE_SIZE = 4 * MESSAGE_FIELDS
 #: Longest time between two set-points that the robot is allowed to bridge [ms].
 MAX_REALTIME_TIMEOUT = 200
 #: Word 0 of a STOPPED message [ms].

@@ -114,6 +114,20 @@ class SplineKind(IntEnum):
     QUINTIC = 2
 
 
+class PointField(IntEnum):
+    """Where a field stands in the 21 words; of a group, its first word."""
+
+    TARGET = 0
+    SECOND = 6
+    VELOCITY = 12
+    ACCELERATION = 13
+    HAS_Q_NEAR = 14
+    ARC_MODE = 14
+    DURATION = 18
+    BLEND = 19
+    TYPE = 20
+
+
 POINT_FIELDS = 21
 POINT_SIZE = 4 * POINT_FIELDS
 #: The longest duration that fits [s].

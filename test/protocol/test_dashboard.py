@@ -1,0 +1,155 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The dashboard, both ends."""
+
+from contextlib import suppress
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.protocol.dashboard import (
+    BANNER,
+    DashboardClient,
+    DashboardServer,
+    encode_line,
+    Greeting,
+    not_understood,
+    parse_reply,
+    parse_request,
+    Request,
+    SHAPES,
+    success,
+)
+
+#: Command, text, answer of a robot, its telling part (None: refused).
+ANSWERS = [
+    ('load', 'a.urp', 'Loading program: /programs/a.urp', '/programs/a.urp'),
+    ('load', 'a.urp', 'File not found: /programs/a.urp', None),
+    ('play', '', 'Starting program', ''),
+    ('play', '', 'Failed to execute: play', None),
+    ('stop', '', 'Stopped', ''),
+    ('power on', '', 'Powering on', ''),
+    ('brake release', '', 'Brake releasing', ''),
+    ('unlock protective stop', '', 'Protective stop releasing', ''),
+    ('unlock protective stop', '', 'Cannot unlock until 5 s after the stop', None),
+    ('running', '', 'Program running: true', 'true'),
+    ('running', '', 'Program running: perhaps', None),
+    ('robotmode', '', 'Robotmode: POWER_OFF', 'POWER_OFF'),
+    ('safetystatus', '', 'Safetystatus: PROTECTIVE_STOP', 'PROTECTIVE_STOP'),
+    ('programState', '', 'STOPPED <unnamed>', 'STOPPED <unnamed>'),
+    ('programState', '', 'PLAYING', 'PLAYING'),
+    ('programState', '', 'could not understand', None),
+    ('PolyscopeVersion', '', 'URSoftware 5.23.0.0 (Jan 01 2026)', '5.23.0.0 (Jan 01 2026)'),
+    ('is in remote control', '', 'true', 'true'),
+    ('get operational mode', '', 'AUTOMATIC', 'AUTOMATIC'),
+    ('get robot model', '', 'UR5', 'UR5'),
+    ('get serial number', '', '20195500001', '20195500001'),
+    ('version', '', '5.6.0.0', '5.6.0.0'),
+    ('set operational mode', 'manual', "Operational mode 'manual' is set", "'manual' is set"),
+    ('popup', 'Hello', 'showing popup', ''),
+]
+
+
+@pytest.mark.parametrize(('name', 'argument', 'answer', 'value'), ANSWERS)
+def test_success_is_recognised_by_the_shape_of_the_answer(name, argument, answer, value):
+    client = DashboardClient()
+    assert client.feed(encode_line(BANNER)) == [Greeting(text=BANNER)]
+    line = client.send(name, argument)
+    assert line == (f'{name} {argument}' if argument else name).encode() + b'\n'
+    (reply,) = client.feed(encode_line(answer))
+    assert (reply.ok, reply.value, reply.text) == (value is not None, value, answer)
+    assert reply.request == Request(name=name, argument=argument)
+
+
+TEXTS = {'load': 'x.urp', 'popup': 'Hi', 'addToLog': 'Hi', 'setUserRole': 'operator',
+         'load installation': 'default.installation', 'set operational mode': 'automatic',
+         'generate flight report': 'system', 'generate support file': '/tmp'}
+VALUES = {'robotmode': 'IDLE', 'safetymode': 'NORMAL', 'safetystatus': 'NORMAL',
+          'get loaded program': '/programs/a.urp', 'PolyscopeVersion': '5.21.0.0 (Jan 01 2026)',
+          'clear operational mode': 'Selectable again', 'running': 'true',
+          'isProgramSaved': 'true a.urp', 'programState': 'PAUSED a.urp',
+          'version': '5.6.0.0', 'getUserRole': 'NONE', 'get operational mode': 'MANUAL',
+          'is in remote control': 'false', 'get serial number': '20195500001',
+          'get robot model': 'UR5'}
+
+
+@pytest.mark.parametrize('name', SHAPES)
+def test_the_two_ends_understand_each_other(name):
+    client, server = DashboardClient(), DashboardServer()
+    client.feed(encode_line(BANNER))
+    (request,) = server.feed(client.send(name, TEXTS.get(name, '')))
+    assert request == Request(name=name, argument=TEXTS.get(name, ''))
+    (reply,) = client.feed(success(request, VALUES.get(name)))
+    assert reply.ok
+
+
+def test_the_longer_of_two_commands_is_understood():
+    assert parse_request('load installation a') == Request(name='load installation', argument='a')
+    assert parse_request('load installations') == Request(name='load', argument='installations')
+
+
+@pytest.mark.parametrize('line', ['brake_release', 'play it', 'load', '', 'Play'])
+def test_a_line_that_is_no_command_is_returned_and_answered(line):
+    assert DashboardServer().feed(line.encode() + b'\r\n') == [line]
+    answer = not_understood(line).decode().rstrip('\n')
+    assert not parse_reply(Request(name='play'), answer).ok
+
+
+@pytest.mark.parametrize(('name', 'argument'), [
+    ('fly', ''), ('load', ''), ('play', 'now'), ('popup', 'two\nplay'), ('addToLog', 'a\rb')])
+def test_what_is_no_command_cannot_be_sent(name, argument):
+    with pytest.raises(LocalProtocolError):
+        DashboardClient().send(name, argument)
+
+
+@pytest.mark.parametrize(('name', 'version', 'available'), [
+    ('safetystatus', (3, 15), False), ('safetystatus', (5, 3), False),
+    ('safetystatus', (5, 4), True), ('setUserRole', (3, 15), True), ('setUserRole', (5, 9), False),
+    ('restart safety', (5, 0), False), ('restart safety', (3, 7), True), ('play', (5, 0), True)])
+def test_commands_have_a_first_version(name, version, available):
+    assert SHAPES[name].available(version) is available
+
+
+def test_answers_belong_to_commands_in_order_also_in_pieces():
+    client = DashboardClient()
+    client.send('robotmode')
+    client.send('play')
+    stream = encode_line(BANNER) + b'Robotmode: IDLE\r\n' + b'Starting program\n'
+    events = [e for i in range(len(stream)) for e in client.feed(stream[i:i + 1])]
+    assert [event.text for event in events] == [BANNER, 'Robotmode: IDLE', 'Starting program']
+    assert [event.ok for event in events[1:]] == [True, True]
+    assert client.feed(b'') == []
+
+
+def test_an_answer_to_nothing_is_an_error():
+    client = DashboardClient()
+    client.feed(encode_line(BANNER))
+    with pytest.raises(RemoteProtocolError, match='without being asked'):
+        client.feed(b'Stopped\n')
+
+
+def test_an_end_instead_of_an_answer_is_an_error():
+    client = DashboardClient()
+    client.send('play')
+    with pytest.raises(RemoteProtocolError, match='play'):
+        client.feed(b'')
+
+
+def test_the_number_of_waiting_commands_is_bounded():
+    client = DashboardClient()
+    for _ in range(64):
+        client.send('play')
+    with pytest.raises(LocalProtocolError, match='wait for an answer'):
+        client.send('play')
+
+
+@given(st.lists(st.binary(min_size=1, max_size=30)))
+def test_random_bytes_raise_nothing_but_a_remote_error(chunks):
+    client, server = DashboardClient(), DashboardServer()
+    client.send('programState')
+    for end in (client, server):
+        with suppress(RemoteProtocolError):
+            for chunk in chunks:
+                end.feed(chunk)
