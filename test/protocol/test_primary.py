@@ -368,7 +368,7 @@ def test_a_program_that_is_cut_off_is_passed_on_at_the_end():
 
 def test_a_program_without_end_is_refused():
     decoder = ScriptDecoder()
-    lines = b'  x = 1\n' * (1 << 17)
+    lines = (b'#' * 1023 + b'\n') * 1024
     decoder.feed(b'def f():\n' + 3 * lines)
     with pytest.raises(RemoteProtocolError, match='longer than'):
         decoder.feed(lines)

@@ -473,7 +473,11 @@ def test_text_messages_of_both_versions(version):
 @pytest.mark.parametrize('make', [
     lambda: TextMessage(text='x' * 256).encode(), lambda: SetupInputs(names=('a,b',)).encode(),
     lambda: SetupInputs(names=('',)).encode(),
-    lambda: SetupInputs(names=('x' * 100,) * 700).encode()])
+    lambda: SetupInputs(names=('x' * 100,) * 700).encode(),
+    lambda: RequestProtocolVersion(version=65536).encode(),
+    lambda: TextMessage(text='', level=256).encode(),
+    lambda: ControllerVersion(major=-1, minor=0, bugfix=0).encode(),
+    lambda: InputsReply(types=('BOOL',), recipe_id=256).encode()])
 def test_what_does_not_fit_a_package_is_refused(make):
     with pytest.raises(LocalProtocolError):
         make()

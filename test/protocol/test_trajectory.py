@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 import struct
 
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
@@ -277,7 +277,8 @@ def test_reading_what_was_written_is_the_same_within_half_a_unit(primitive):
     assert np.allclose(numbers, again, rtol=0.0, atol=0.5e-6 + 1e-9)
 
 
-@given(st.lists(PRIMITIVES, max_size=5))
+@settings(max_examples=50)
+@given(st.lists(PRIMITIVES, max_size=4))
 def test_the_fast_way_gives_the_same_bytes(primitives):
     assert encode_points(primitives) == b''.join(map(encode_point, primitives))
 

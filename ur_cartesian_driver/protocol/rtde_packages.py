@@ -223,7 +223,7 @@ class RequestProtocolVersion:
 
     def encode(self) -> bytes:
         """Return the frame."""
-        return frame(PackageType.REQUEST_PROTOCOL_VERSION, struct.pack('>H', self.version))
+        return frame(PackageType.REQUEST_PROTOCOL_VERSION, _packed('>H', self.version))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -244,7 +244,7 @@ class SetupOutputs:
 
     def encode(self) -> bytes:
         """Return the frame."""
-        head = b'' if self.frequency is None else struct.pack('>d', self.frequency)
+        head = b'' if self.frequency is None else _packed('>d', self.frequency)
         return frame(PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS, head + join(self.names))
 
 
@@ -309,14 +309,14 @@ class TextMessage:
         """Return the frame."""
         text, source = self.text.encode(), self.source.encode()
         if version == 1:
-            return frame(PackageType.TEXT_MESSAGE, bytes([self.level]) + text)
+            return frame(PackageType.TEXT_MESSAGE, _packed('>B', self.level) + text)
         if max(len(text), len(source)) > 255:
             raise LocalProtocolError(
                 f'text has {len(text)} and source {len(source)} bytes, but an RTDE text message '
                 'holds at most 255 of each.')
         return frame(PackageType.TEXT_MESSAGE,
                      bytes([len(text)]) + text + bytes([len(source)]) + source
-                     + bytes([self.level]))
+                     + _packed('>B', self.level))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -343,7 +343,7 @@ class ControllerVersion:
     def encode(self) -> bytes:
         """Return the frame."""
         return frame(PackageType.GET_URCONTROL_VERSION,
-                     _VERSION.pack(self.major, self.minor, self.bugfix, self.build))
+                     _packed('>4I', self.major, self.minor, self.bugfix, self.build))
 
     def __str__(self) -> str:
         """Return the version with dots."""
@@ -359,7 +359,7 @@ class OutputsReply:
 
     def encode(self) -> bytes:
         """Return the frame."""
-        head = b'' if self.recipe_id is None else bytes([self.recipe_id])
+        head = b'' if self.recipe_id is None else _packed('>B', self.recipe_id)
         return frame(PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS, head + join(self.types))
 
 
@@ -373,7 +373,7 @@ class InputsReply:
     def encode(self) -> bytes:
         """Return the frame."""
         return frame(PackageType.CONTROL_PACKAGE_SETUP_INPUTS,
-                     bytes([self.recipe_id]) + join(self.types))
+                     _packed('>B', self.recipe_id) + join(self.types))
 
 
 Request: TypeAlias = (RequestProtocolVersion | GetControllerVersion | SetupOutputs | SetupInputs
@@ -394,6 +394,13 @@ def frame(package_type: PackageType, payload: bytes = b'') -> bytes:
             f'An RTDE package of {size} bytes cannot be sent, 65535 are possible; ask for fewer '
             'fields.')
     return _HEADER.pack(size, package_type) + payload
+
+
+def _packed(layout: str, *values: float) -> bytes:
+    try:
+        return struct.pack(layout, *values)
+    except (struct.error, OverflowError) as error:
+        raise LocalProtocolError(f'{values} cannot be sent in an RTDE package: {error}.') from None
 
 
 def join(names: Sequence[str]) -> bytes:
