@@ -1,3 +1,95 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Fixtures for the tests of our users; pytest loads this wherever the package is installed."""
+"""
+Fixtures for tests of programs that use the driver; installed as a pytest plugin.
+
+``ur_sim``
+    a simulated robot on free ports; ``@pytest.mark.ur_sim(model='ur10e')`` sets fields of its
+    :class:`~ur_cartesian_driver.sim.SimulatorConfig`.
+``cartesian_driver``
+    the driver's node, connected to ``ur_sim`` and ready for goals; it is not spinning, add it to
+    an executor of your own. ``@pytest.mark.cartesian_driver(max_tool_speed=1.0)`` sets parameters.
+
+Importing this module costs next to nothing: pytest does it in every project of the environment,
+so what is heavy is imported where a fixture is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+import os
+from typing import Any, TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.ros import CartesianDriverNode
+    from ur_cartesian_driver.sim import SimulatedRobot
+
+#: How long driver and simulator may need to find each other [s].
+READY_TIMEOUT = 10.0
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the markers."""
+    config.addinivalue_line(
+        'markers', 'ur_sim(**config): fields of the SimulatorConfig of the ur_sim fixture')
+    config.addinivalue_line(
+        'markers', 'cartesian_driver(**parameters): parameters of the cartesian_driver fixture')
+
+
+@pytest.fixture
+def ur_sim(request: pytest.FixtureRequest) -> Iterator[SimulatedRobot]:
+    """Yield a simulated robot that listens on free ports, in a thread of this process."""
+    from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
+
+    settings = {'rtde_port': 0, 'primary_port': 0, 'dashboard_port': 0}
+    with SimulatedRobot(SimulatorConfig(**settings | _marked(request, 'ur_sim'))) as robot:
+        yield robot
+
+
+@pytest.fixture
+def cartesian_driver(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch,
+                     ur_sim: SimulatedRobot) -> Iterator[CartesianDriverNode]:
+    """Yield the driver's node, ready for goals of ``ur_sim``; destroyed afterwards."""
+    _keep_to_ourselves(monkeypatch)
+    import rclpy
+    from rclpy.parameter import Parameter
+
+    from ur_cartesian_driver.ros import CartesianDriverNode
+
+    parameters = {
+        'robot_ip': ur_sim.config.host, 'ur_type': ur_sim.config.model, 'headless_mode': True,
+        'robot_loop': 'thread', 'rtde_port': ur_sim.ports.rtde,
+        'primary_port': ur_sim.ports.primary, 'dashboard_port': ur_sim.ports.dashboard,
+        'reverse_port': 0, 'script_sender_port': 0, 'trajectory_port': 0,
+        'script_command_port': 0} | _marked(request, 'cartesian_driver')
+    started_here = not rclpy.ok()
+    if started_here:
+        rclpy.init()
+    try:
+        node = CartesianDriverNode(parameter_overrides=[
+            Parameter(name, value=value) for name, value in parameters.items()])
+        try:
+            node.driver.wait_ready(READY_TIMEOUT)
+            yield node
+        finally:
+            node.destroy_node()
+    finally:
+        if started_here:
+            rclpy.shutdown()
+
+
+def _marked(request: pytest.FixtureRequest, name: str) -> dict[str, Any]:
+    marker = request.node.get_closest_marker(name)
+    return {} if marker is None else dict(marker.kwargs)
+
+
+def _keep_to_ourselves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep the nodes of a test run on this machine, and those of parallel runs apart."""
+    worker = os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw')
+    domain = 1 + (10 * os.getpid() + int(worker or 0)) % 100
+    for name, value in {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+                        'ROS_DOMAIN_ID': str(domain)}.items():
+        if name not in os.environ:
+            monkeypatch.setenv(name, value)

@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the tool is on the path, and what counts as off the path."""
 
+import itertools
 from math import cos, pi, sin
 
-from hypothesis import given, strategies as st
+from hypothesis import given
+from hypothesis import strategies as st
 import numpy as np
 import pytest
 
@@ -39,7 +41,7 @@ def walk(tracker, positions, begun=lambda i: 0, step=0.002):
 
 
 def along(corners, n=100):
-    for a, b in zip(corners, corners[1:], strict=False):
+    for a, b in itertools.pairwise(corners):
         for i in range(n):
             f = (i + 1) / n
             yield tuple(x + f * (y - x) for x, y in zip(a, b, strict=True))
@@ -137,7 +139,8 @@ def test_each_axis_trips_alone_and_is_named(quantity, axis, sign):
     error = Deviation(**{'position': zero, 'orientation': zero, quantity: tuple(errors)})
     clause = violation(error, Tolerance(**{quantity: tuple(limits)}))
     assert f'{quantity} {"xyz"[axis]}' in clause
-    assert '0.002100' in clause and '0.002000' in clause
+    assert '0.002100' in clause
+    assert '0.002000' in clause
     limits[axis] = 0.0022
     assert violation(error, Tolerance(**{quantity: tuple(limits)})) is None
 

@@ -162,7 +162,8 @@ def test_an_arm_that_does_not_settle_violates_the_goal_tolerance():
     assert machine.step(robot(0.95, timestamp=2.4, qd=REST), 2.4)[-1:] != []
     end = outcome(machine.step(robot(0.95, timestamp=2.5, qd=REST), 2.5))
     assert end.code is ErrorCode.GOAL_TOLERANCE_VIOLATED
-    assert 'Position x' in end.text and 'last point' in end.text
+    assert 'Position x' in end.text
+    assert 'last point' in end.text
 
 
 def test_a_late_arrival_violates_the_goal_and_names_the_times():
@@ -170,7 +171,8 @@ def test_a_late_arrival_violates_the_goal_and_names_the_times():
     machine.step(robot(1.0, timestamp=2.6), 2.6)
     end = outcome(machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.6))
     assert end.code is ErrorCode.GOAL_TOLERANCE_VIOLATED
-    assert '0.600 s' in end.text and '0.500 s' in end.text
+    assert '0.600 s' in end.text
+    assert '0.500 s' in end.text
 
 
 def test_a_slowed_robot_is_not_late():
@@ -212,7 +214,7 @@ STOPPED_STATES = [
 ]
 
 
-@pytest.mark.parametrize('changes, signal', STOPPED_STATES)
+@pytest.mark.parametrize(('changes', 'signal'), STOPPED_STATES)
 @pytest.mark.parametrize('state', [s for s in State if s is not State.ENDED])
 def test_a_robot_that_stops_by_itself_ends_the_goal_in_every_state(state, changes, signal):
     machine = brought_to(state)
@@ -221,7 +223,7 @@ def test_a_robot_that_stops_by_itself_ends_the_goal_in_every_state(state, change
     assert machine.state is State.ENDED
 
 
-@pytest.mark.parametrize('link, code', [('program', ErrorCode.PROGRAM_STOPPED),
+@pytest.mark.parametrize(('link', 'code'), [('program', ErrorCode.PROGRAM_STOPPED),
                                         ('RTDE', ErrorCode.CONNECTION_LOST)])
 @pytest.mark.parametrize('state', [s for s in State if s is not State.ENDED])
 def test_a_lost_link_ends_the_goal_in_every_state_and_says_who_hung_up(state, link, code):

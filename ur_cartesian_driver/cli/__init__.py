@@ -90,7 +90,8 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
 
 def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
     send = _add(sub, 'send', commands.send, 'send a goal to a running driver and wait for its end')
-    send.add_argument('file', help='goal in the YAML of `ros2 action send_goal`, - = standard input')
+    send.add_argument(
+        'file', help='goal in the YAML of `ros2 action send_goal`; - = standard input')
     send.add_argument('--action', default=ACTION, help='name of the action')
     send.add_argument('--validate-only', action='store_true', help='plan, but do not move')
     send.add_argument('--record', metavar='FILE', help='write the feedback as JSON lines')

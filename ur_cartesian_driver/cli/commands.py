@@ -43,18 +43,24 @@ def sim(arguments: argparse.Namespace) -> int:
 
 async def _simulate(robot: SimulatedRobot) -> None:
     """Say where the simulator listens, then show its state as long as somebody looks."""
-    running = asyncio.ensure_future(robot.run())
-    while robot.ports is None and not running.done():
-        await asyncio.sleep(0.01)
-    if robot.ports is not None:
-        ports = robot.ports
-        print(f'simulated {robot.config.model} on {robot.config.host}: RTDE {ports.rtde}, '
-              f'primary {ports.primary}, dashboard {ports.dashboard}', flush=True)
-    while not running.done():
-        if sys.stdout.isatty():
-            print(f'\r{robot.status_line()}\033[K', end='', flush=True)
-        await asyncio.wait({running}, timeout=0.5)
-    await running
+    async with asyncio.TaskGroup() as tasks:
+        showing = tasks.create_task(_show_status(robot))
+        try:
+            await robot.run(on_listening=lambda: _show_ports(robot))
+        finally:
+            showing.cancel()
+
+
+def _show_ports(robot: SimulatedRobot) -> None:
+    ports = robot.ports
+    print(f'simulated {robot.config.model} on {robot.config.host}: RTDE {ports.rtde}, '
+          f'primary {ports.primary}, dashboard {ports.dashboard}', flush=True)
+
+
+async def _show_status(robot: SimulatedRobot) -> None:
+    while sys.stdout.isatty():
+        await asyncio.sleep(0.5)
+        print(f'\r{robot.status_line()}\033[K', end='', flush=True)
 
 
 def send(arguments: argparse.Namespace) -> int:
@@ -83,7 +89,7 @@ class Recorder:
     def __enter__(self) -> Recorder:
         """Open the file."""
         if self._path:
-            self._file = open(self._path, 'w', encoding='utf-8')  # noqa: SIM115 - closed below
+            self._file = open(self._path, 'w', encoding='utf-8')
         return self
 
     def __exit__(self, *_: object) -> None:

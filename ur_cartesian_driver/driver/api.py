@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Future
+import contextlib
 from dataclasses import replace
 import itertools
 import logging
@@ -274,12 +275,10 @@ class Driver:
 
     def _send(self, request: Request) -> None:
         data = channel.pack(request)
-        with self._lock:
+        # When the loop is gone the reader thread sees that and says so.
+        with self._lock, contextlib.suppress(OSError):
             if self._host is not None:
-                try:
-                    self._host.pipe.sendall(data)
-                except OSError:
-                    pass  # the loop is gone; the reader thread sees that and says so
+                self._host.pipe.sendall(data)
 
     def _beat(self) -> None:
         while not self._closed.wait(self.config.node_timeout / 4.0):

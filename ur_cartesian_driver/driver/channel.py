@@ -113,7 +113,7 @@ def pack(message: Request | Notice) -> bytes:
 
 def unpack(body: bytes) -> Request | Notice:
     """Return the message of the bytes behind a length."""
-    message: Request | Notice = pickle.loads(body)  # noqa: S301 - see the module's description
+    message: Request | Notice = pickle.loads(body)
     return message
 
 

@@ -56,7 +56,6 @@ from ur_cartesian_driver.motion.events import (
     StateReceived,
     Tick,
 )
-from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.protocol.trajectory import POINT_SIZE
 from ur_cartesian_driver.robot.link import LinkSettings, LinkStatus, RobotLink
 
@@ -154,7 +153,8 @@ class RobotLoop:
                 case SendControl(action=action, count=count):
                     self._link.send_control(action, count)
                 case SendPoints(first=first, end=end):
-                    self._link.send_points(bytes(self._points[first * POINT_SIZE:end * POINT_SIZE]))
+                    points = self._points[first * POINT_SIZE:end * POINT_SIZE]
+                    self._link.send_points(bytes(points))
                 case StopProgram(reason=reason):
                     self._link.stop_program(reason)
                 case Report(progress=progress):

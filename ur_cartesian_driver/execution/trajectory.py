@@ -31,6 +31,8 @@ from enum import auto, Enum
 from math import inf
 from types import MappingProxyType
 
+import numpy as np
+
 from ur_cartesian_driver.execution.commands import (
     Command,
     Finish,
@@ -363,7 +365,7 @@ class TrajectoryMachine:
         scaling = state.speed_scaling
         remaining = max(0.0, order.duration - time)
         buffered_from = min(self._window.sent, order.points)
-        rows = order.reference.point.searchsorted(buffered_from - 1, side='right') - 1
+        last = int(np.searchsorted(order.reference.point, buffered_from - 1, side='right')) - 1
         return Report(progress=Progress(
             waypoint=self._tracker.waypoint(),
             fraction=1.0 if order.duration <= 0.0 else min(1.0, time / order.duration),
@@ -376,7 +378,7 @@ class TrajectoryMachine:
             time_remaining=remaining / scaling if scaling > 0.0 else (inf if remaining else 0.0),
             speed_scaling=scaling,
             points_received=order.points,
-            buffered=max(0.0, float(order.reference.time[max(rows, 0)]) - time),
+            buffered=max(0.0, float(order.reference.time[max(last, 0)]) - time),
             timestamp=state.timestamp))
 
     def _time_tolerance(self) -> float:

@@ -21,8 +21,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 import logging
 from types import MappingProxyType
+from typing import TypeVar
 
-from ur_cartesian_driver.kinematics.robots import Geometry, robot_model
+from ur_cartesian_driver.kinematics.robots import Geometry, MODELS
 from ur_cartesian_driver.motion.errors import DriverError, ProtocolError
 from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, TrajectoryEnded
 from ur_cartesian_driver.motion.state import (
@@ -46,6 +47,8 @@ from ur_cartesian_driver.protocol.trajectory import ResultDecoder
 from ur_cartesian_driver.robot.lifecycle import after, Change, ConnectionState
 from ur_cartesian_driver.robot.state_recipe import OPTIONAL, REQUIRED, robot_state
 from ur_cartesian_driver.robot.transport import BACK_OFF, Connection, dial, Listener
+
+T = TypeVar('T')
 
 #: A robot that streams nothing for that long is lost [s].
 RTDE_SILENCE = 1.0
@@ -152,7 +155,7 @@ class RobotLink:
         """End the robot program, so that nothing of it can resume."""
         self._on_log(logging.WARNING, f'the robot program is stopped: {reason}')
         if self._primary is not None:
-            self._primary.send(primary.command('stop program'))
+            self._primary.send(primary.command(primary.Command.STOP_PROGRAM))
         connection = self._listeners['reverse_port'].connection
         if connection is not None:
             connection.send(reverse.stop().encode())
@@ -257,7 +260,7 @@ class RobotLink:
         """Return when the robot was silent for too long."""
         loop = asyncio.get_running_loop()
         self._last_packet = loop.time()
-        while loop.time() - self._last_packet < RTDE_SILENCE:
+        while loop.time() - self._last_packet < RTDE_SILENCE:  # noqa: ASYNC110 - a pulse
             await asyncio.sleep(RTDE_SILENCE / 10.0)
         return f'the robot sent nothing for {RTDE_SILENCE:g} s'
 
@@ -291,15 +294,16 @@ class RobotLink:
                 await self._report.wait()
         except TimeoutError:
             raise OSError('the robot does not report its configuration') from None
-        assert self._configuration is not None and self._version is not None
-        models = primary.model_names(self._configuration, self._version.major)
+        assert self._configuration is not None
+        assert self._version is not None
+        models = model_names(self._configuration.robot_type, self._version.major)
         expected = self._settings.ur_type
-        self._update(robot_model=expected if expected in models else models[0],
+        self._update(robot_model=expected if expected in models else ' or '.join(models),
                      polyscope_version=str(self._version))
         if expected not in models:
             self._update(message=(
-                f"The robot is a {' or '.join(models)}, but ur_type is {expected}; set ur_type "
-                'to the model that is there.'))
+                f"The robot is a {' or '.join(models)}, but ur_type is {expected}; set ur_type to "
+                'the model that is there.'))
             self._change(Change.ROBOT_REFUSED)
             return
         self._change(Change.ROBOT_ACCEPTED)
@@ -381,10 +385,15 @@ class RobotLink:
             if self._primary is not None:
                 self._primary.abort(str(error))
             return
-        for package in packages:
-            self._on_package(package)
+        for frame in packages:
+            if isinstance(frame, primary.RobotState):
+                for package in frame.packages:
+                    self._on_package(package)
+            else:
+                self._on_message(frame)
 
-    def _on_package(self, package: object) -> None:
+    def _on_package(self, package: primary.StatePackage) -> None:
+        """Take what a state frame tells: who the robot is."""
         match package:
             case primary.ConfigurationData():
                 self._configuration = package
@@ -393,11 +402,18 @@ class RobotLink:
                 self._update(calibration_known=True)
                 self._on_geometry(Geometry(
                     a=package.a, d=package.d, alpha=package.alpha, theta=package.theta))
-            case primary.ErrorCode() if package.is_error:
-                self._error(f'{package.label}: {package.text}'.rstrip(': '))
+
+    def _on_message(self, message: primary.Frame) -> None:
+        """Take what the robot has to say about errors."""
+        match message:
+            case primary.ErrorCodeMessage(level=level) if (
+                    primary.ReportLevel.WARNING <= level <= primary.ReportLevel.CRITICAL_FAULT):
+                self._error(f'the robot reports {message.label} {message.text}'.rstrip())
             case primary.RuntimeExceptionMessage():
-                self._error(f'the robot program failed in line {package.line}, column '
-                            f'{package.column}: {package.text}')
+                self._error(f'the robot program failed in line {message.line}, column '
+                            f'{message.column}: {message.text}')
+            case primary.TextMessage():
+                self._on_log(logging.INFO, f'robot: {message.text}')
 
     def _on_trajectory_data(self, data: bytes) -> None:
         try:
@@ -458,7 +474,7 @@ class RobotLink:
     # ---- status -------------------------------------------------------------------------------
 
     def _lost(self, reason: str) -> None:
-        """The robot is gone, or never was there."""
+        """Take note that the robot is gone, or never was there."""
         if self._status.has_state:
             self._on_event(LinkLost(link='RTDE', reason=reason))
         self._latest = None
@@ -506,6 +522,13 @@ class RobotLink:
         self._on_log(logging.WARNING, text)
 
 
+def model_names(robot_type: int, software_major: int) -> list[str]:
+    """Return the models that report this type: a UR7e says that it is a UR5."""
+    names = [name for name, model in MODELS.items() if model.wire_type == robot_type
+             and (model.series == 'CB3') == (software_major < 5)]
+    return names or [f'robot of the unknown type {robot_type}']
+
+
 def _mode_of(state: RobotState) -> tuple[RobotMode, SafetyMode, RuntimeState]:
     return state.robot_mode, state.safety_mode, state.runtime_state
 
@@ -523,7 +546,7 @@ def _stopped_sentence(state: RobotState) -> str:
             'program again.')
 
 
-def _succeed(future: asyncio.Future[object], value: object) -> None:
+def _succeed(future: asyncio.Future[T], value: T) -> None:
     if not future.done():
         future.set_result(value)
 

@@ -1,0 +1,91 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The robot program's text: complete, loadable, and with each number from one place only."""
+
+import re
+
+import pytest
+
+from ur_cartesian_driver.motion.errors import LocalProtocolError
+from ur_cartesian_driver.motion.events import TrajectoryResult
+from ur_cartesian_driver.program import as_program, ProgramSettings, render
+from ur_cartesian_driver.program.render import FEATURES, has_feature
+from ur_cartesian_driver.protocol.registers import POINTS_BEGUN
+from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
+from ur_cartesian_driver.protocol.script_command import ScriptCommand
+from ur_cartesian_driver.protocol.trajectory import MotionType
+from ur_cartesian_driver.urscript import parse
+
+SETTINGS = {'host': '192.168.56.1', 'reverse_port': 50001, 'trajectory_port': 50003,
+            'script_command_port': 50004}
+
+
+def text(**changes):
+    return render(ProgramSettings(**SETTINGS | changes))
+
+
+@pytest.mark.parametrize('version', [(3, 15, 8), (5, 4, 0), (5, 21, 0), (10, 7, 0), (10, 12, 1)])
+def test_the_program_can_be_parsed_for_every_software(version):
+    assert parse(as_program(text(version=version))).name == 'ur_cartesian_driver'
+
+
+def test_addresses_are_those_of_the_settings():
+    lines = text(host='10.0.0.7', reverse_port=1, trajectory_port=2, script_command_port=3)
+    for line in ('DRIVER_HOST = "10.0.0.7"', 'REVERSE_PORT = 1', 'TRAJECTORY_PORT = 2',
+                 'COMMAND_PORT = 3'):
+        assert line in lines.splitlines()
+
+
+@pytest.mark.parametrize(('prefix', 'members'), [
+    ('MODE', ControlMode), ('TRAJECTORY', TrajectoryAction), ('MOTION', MotionType),
+    ('RESULT', TrajectoryResult), ('COMMAND', ScriptCommand)])
+def test_every_wire_constant_comes_from_its_enum(prefix, members):
+    lines = text().splitlines()
+    for member in members:
+        assert f'{prefix}_{member.name} = {member.value}' in lines
+
+
+def test_the_register_of_the_progress_is_the_one_that_the_driver_reads():
+    assert f'REGISTER_POINTS_BEGUN = {int(POINTS_BEGUN)}' in text().splitlines()
+
+
+def test_there_are_no_numbers_of_the_protocol_in_the_statements():
+    """Small ones index, count or are units; everything else has a name."""
+    statements = [line for line in text().splitlines()
+                  if not re.match(r'\s*#|[A-Z_]+ = ', line)]
+    numbers = {number for line in statements
+               for number in re.findall(r'(?<![\w.])\d+(?:\.\d+)?(?![\w.])',
+                                        re.sub(r'"[^"]*"', '', line))}
+    assert numbers <= {*map(str, range(13)), '0.2', '1000'}
+
+
+@pytest.mark.parametrize(('feature', 'version', 'known'), [
+    ('optimove', (5, 20, 9), False), ('optimove', (5, 21, 0), True),
+    ('optimove', (10, 7, 9), False), ('optimove', (10, 8, 0), True),
+    ('target_payload', (3, 15, 8), False), ('target_payload', (5, 10, 0), True)])
+def test_functions_are_named_only_where_the_controller_knows_them(feature, version, known):
+    assert has_feature(feature, version) == known
+    name = {'optimove': 'optimovej(', 'target_payload': 'set_target_payload('}[feature]
+    assert (name in text(version=version)) == known
+    assert feature in FEATURES
+
+
+@pytest.mark.parametrize('host', ['', '1.2.3.4"', 'a b', 'x\n'])
+def test_a_host_cannot_smuggle_text_into_the_program(host):
+    with pytest.raises(LocalProtocolError, match='reverse_ip'):
+        ProgramSettings(**SETTINGS | {'host': host})
+
+
+def test_the_urcap_finds_its_markers():
+    lines = [line.strip() for line in text().splitlines()]
+    markers = ['# HEADER_BEGIN', '# HEADER_END', '# NODE_CONTROL_LOOP_BEGINS',
+               '# NODE_CONTROL_LOOP_ENDS']
+    places = [lines.index(marker) for marker in markers]
+    assert places == sorted(places)
+
+
+def test_an_uploaded_program_is_one_indented_definition():
+    lines = as_program(text()).splitlines()
+    assert lines[0] == 'def ur_cartesian_driver():'
+    assert lines[-1] == 'end'
+    assert all(not line or line.startswith('\t') for line in lines[1:-1])
