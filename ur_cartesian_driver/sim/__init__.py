@@ -1,0 +1,16 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A simulated UR controller: it interprets the URScript it is sent and knows nothing of any program.
+
+:class:`SimulatedRobot` is the product, a robot on the ports of a real one. :class:`Controller` is
+the same without network and clock, for tests that count cycles.
+"""
+
+from ur_cartesian_driver.sim.config import HOME, SimulatorConfig
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.robot import Ports, RobotSnapshot, SimulatedRobot
+from ur_cartesian_driver.sim.script_sockets import MemorySockets
+
+__all__ = ['HOME', 'Controller', 'MemorySockets', 'Ports', 'RobotSnapshot', 'SimulatedRobot',
+           'SimulatorConfig']

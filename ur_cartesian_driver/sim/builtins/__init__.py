@@ -1,0 +1,60 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The functions that programs call, one class for each of their subjects.
+
+Each public method of a class is one function: parameter names and defaults are those of the
+robot's manual, because programs pass arguments by these names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+import functools
+import inspect
+from typing import Any, TYPE_CHECKING
+
+from ur_cartesian_driver.sim.builtins.arguments import builtins_in
+from ur_cartesian_driver.sim.builtins.io import AnalogBuiltins, DigitalBuiltins, RegisterBuiltins
+from ur_cartesian_driver.sim.builtins.kinematics import KinematicsBuiltins
+from ur_cartesian_driver.sim.builtins.motion import ModeBuiltins, MotionBuiltins
+from ur_cartesian_driver.sim.builtins.poses import PoseBuiltins
+from ur_cartesian_driver.sim.builtins.sockets import SocketBuiltins
+from ur_cartesian_driver.sim.builtins.state import PeopleBuiltins, RobotBuiltins, TimeBuiltins
+from ur_cartesian_driver.urscript import core_builtins
+from ur_cartesian_driver.urscript.errors import RuntimeException
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.sim.controller import Controller
+
+Builtins = Mapping[str, Any]
+
+
+def builtins_of(controller: Controller) -> Builtins:
+    """Return all functions of a primary program."""
+    groups = (
+        DigitalBuiltins(controller.signals), AnalogBuiltins(controller.signals),
+        RegisterBuiltins(controller.signals), KinematicsBuiltins(controller),
+        ModeBuiltins(controller), MotionBuiltins(controller), PoseBuiltins(),
+        SocketBuiltins(controller.sockets, lambda: controller.time),
+        PeopleBuiltins(controller), RobotBuiltins(controller), TimeBuiltins(controller))
+    found = dict(core_builtins())
+    for group in groups:
+        found |= builtins_in(group)
+    return found
+
+
+def timeless(builtins: Builtins) -> Builtins:
+    """Return the functions of a secondary program: what takes time raises."""
+    return {name: _refusing(name, function) if inspect.isgeneratorfunction(function) else function
+            for name, function in builtins.items()}
+
+
+def _refusing(name: str, function: Any) -> Any:
+    @functools.wraps(function)
+    def refuse(*arguments: Any, **named: Any) -> None:
+        raise RuntimeException(f'{name} takes time, which a secondary program does not have.')
+    # The signature stays that of the function; what counts as a generator must not.
+    refuse.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]
+    del refuse.__wrapped__  # type: ignore[attr-defined]
+    return refuse

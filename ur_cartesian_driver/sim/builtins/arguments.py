@@ -1,0 +1,99 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The border between the values of a program and the values of this package."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import Any
+
+from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.urscript.errors import RuntimeException
+from ur_cartesian_driver.urscript.values import is_number, type_name, Value
+from ur_cartesian_driver.urscript.values import Pose as ScriptPose
+
+
+def number(value: Value, name: str) -> float:
+    """Return a finite number; a program that passes anything else ends."""
+    if not is_number(value):
+        raise RuntimeException(f'Type error: {name} must be a number, not a {type_name(value)}')
+    if not isfinite(value):
+        raise RuntimeException(f'{name} is {value}; it must be a finite number')
+    return float(value)
+
+
+def positive(value: Value, name: str) -> float:
+    """Return a number above zero."""
+    result = number(value, name)
+    if result <= 0.0:
+        raise RuntimeException(f'{name} is {result:g}; it must be greater than 0')
+    return result
+
+
+def not_negative(value: Value, name: str) -> float:
+    """Return a number not below zero."""
+    result = number(value, name)
+    if result < 0.0:
+        raise RuntimeException(f'{name} is {result:g}; it must not be negative')
+    return result
+
+
+def whole(value: Value, name: str) -> int:
+    """Return a whole number; a float without fraction will do, as programs divide to get them."""
+    result = number(value, name)
+    if not result.is_integer():
+        raise RuntimeException(f'{name} is {result:g}; it must be a whole number')
+    return int(result)
+
+
+def index(value: Value, name: str, count: int) -> int:
+    """Return a whole number within 0 .. count - 1."""
+    result = whole(value, name)
+    if not 0 <= result < count:
+        raise RuntimeException(f'{name} is {result}; it must be within 0..{count - 1}')
+    return result
+
+
+def six(value: Value, name: str) -> Vector6:
+    """Return the six numbers of a list, or of a pose."""
+    if not isinstance(value, list | ScriptPose) or len(value) != 6:
+        raise RuntimeException(f'Type error: {name} must be a list of 6 numbers')
+    a, b, c, d, e, f = (number(item, f'{name}[{i}]') for i, item in enumerate(value))
+    return a, b, c, d, e, f
+
+
+def three(value: Value, name: str) -> tuple[float, float, float]:
+    """Return the three numbers of a list."""
+    if not isinstance(value, list) or len(value) != 3:
+        raise RuntimeException(f'Type error: {name} must be a list of 3 numbers')
+    a, b, c = (number(item, f'{name}[{i}]') for i, item in enumerate(value))
+    return a, b, c
+
+
+def pose(value: Value, name: str) -> Pose:
+    """Return the pose of a `p[...]`."""
+    if not isinstance(value, ScriptPose):
+        raise RuntimeException(f'Type error: {name} must be a pose, not a {type_name(value)}')
+    return Pose.from_rotation_vector(six(value, name))
+
+
+def is_pose(value: Value) -> bool:
+    """Tell a pose from a list of joint positions."""
+    return isinstance(value, ScriptPose)
+
+
+def script_pose(value: Pose) -> ScriptPose:
+    """Return the `p[...]` of a pose."""
+    return ScriptPose(*value.rotation_vector())
+
+
+def text(value: Value, name: str) -> str:
+    """Return a string."""
+    if not isinstance(value, str):
+        raise RuntimeException(f'Type error: {name} must be a string, not a {type_name(value)}')
+    return value
+
+
+def builtins_in(group: object) -> dict[str, Any]:
+    """Return the public methods of an object by name: these are the functions of a program."""
+    return {name: getattr(group, name) for name in dir(group) if not name.startswith('_')}

@@ -1,0 +1,287 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The simulated controller: one step is one cycle, and nothing in it waits.
+
+It joins the parts: programs, motion, power, safety, signals. It owns no socket and no clock, so it
+runs as well under a virtual clock; whoever drives it calls its methods between two steps.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Hashable
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.pose import Vector3, Vector6
+from ur_cartesian_driver.motion.state import (
+    RobotMode,
+    RobotStatus,
+    RuntimeState,
+    SafetyMode,
+    SafetyStatus,
+)
+from ur_cartesian_driver.sim.announcements import Announcements
+from ur_cartesian_driver.sim.builtins import builtins_of
+from ur_cartesian_driver.sim.builtins.motion import HandGuided, Ownership
+from ur_cartesian_driver.sim.config import SimulatorConfig
+from ur_cartesian_driver.sim.controller_state import Payload, Popup
+from ur_cartesian_driver.sim.modes import (
+    OPERATIONAL,
+    Power,
+    POWERLESS,
+    Safety,
+    SafetyEvent,
+    STATUS_BITS,
+)
+from ur_cartesian_driver.sim.motion import MotionGenerator
+from ur_cartesian_driver.sim.programs import Programs
+from ur_cartesian_driver.sim.script_sockets import MemorySockets, ScriptSockets
+from ur_cartesian_driver.sim.signals import Signals
+from ur_cartesian_driver.sim.watchdog import Watchdogs
+from ur_cartesian_driver.urscript.errors import RuntimeException
+
+#: The controller's clock at the start [s]: clients of RTDE take a controller that has been up for
+#: less than 40 s for one that is still booting.
+START_TIME = 60.0
+#: Time in which the speed goes from full to zero [s]: by the slider and by a pause, and by a
+#: protective stop. A real robot's are not published.
+SLIDER_TIME, PROTECTIVE_STOP_TIME = 0.25, 0.1
+_HISTORY = 100
+
+
+class Controller:
+    """A robot without its network; see the module."""
+
+    def __init__(self, config: SimulatorConfig, sockets: ScriptSockets | None = None) -> None:
+        """
+        Begin as configured, with the arm at rest.
+
+        :param sockets: what programs connect with; None = in memory, to be listened to by tests.
+        """
+        self.config = config
+        self.cycle = config.cycle
+        self.cycles = 0
+        self.arm = Arm(config.robot_model, config.geometry)
+        self.motion = MotionGenerator(self.arm, self.cycle, config.q)
+        self.sockets = MemorySockets() if sockets is None else sockets
+        self.signals = Signals()
+        self.safety = Safety(config.unlock_delay)
+        self.power = Power(
+            RobotMode.RUNNING if config.power == 'running' else RobotMode.POWER_OFF,
+            config.power_on_time, config.brake_release_time)
+        self.announcements = Announcements(lambda: self.time)
+        self.ownership = Ownership(self.motion)
+        self.watchdogs = Watchdogs()
+        self.popups: list[Popup] = []
+        self.payload = Payload()
+        self.gravity: Vector3 = (0.0, 0.0, 9.82)
+        self.hand_guided = HandGuided.NOBODY
+        self.force_mode = False
+        self.external_ft = False
+        #: What `tool_contact` returns: steps back to the contact, 0 = none.
+        self.contact_steps = 0
+        self.remote_control = config.remote_control
+        #: The speed slider, 0..1, and what motion really runs at.
+        self.slider = 1.0
+        self.scale = 1.0
+        self._past: deque[Vector6] = deque([config.q] * _HISTORY, maxlen=_HISTORY)
+        self.programs = Programs(builtins_of(self), self.announcements, self)
+        self.programs.on_end = self.sockets.close_all
+
+    # What it reports
+
+    @property
+    def time(self) -> float:
+        """The controller's clock [s]: whole cycles, none skipped."""
+        return START_TIME + self.cycles * self.cycle
+
+    @property
+    def qd(self) -> Vector6:
+        """Joint speeds [rad/s]."""
+        return self.motion.qd
+
+    @property
+    def tcp_twist(self) -> Vector6:
+        """Twist of the TCP in base axes [m/s, rad/s]."""
+        return self.motion.tcp_twist
+
+    @property
+    def standing(self) -> bool:
+        """Whether nothing moves, at the end of a motion or paused on its path."""
+        return self.scale == 0.0 or not self.motion.moving
+
+    @property
+    def robot_status(self) -> RobotStatus:
+        """Bits of power and program."""
+        powered = self.power.mode >= RobotMode.POWER_ON
+        bits = RobotStatus.POWER_ON if powered else RobotStatus(0)
+        return bits | RobotStatus.PROGRAM_RUNNING if self.programs.running else bits
+
+    @property
+    def safety_status(self) -> SafetyStatus:
+        """Bits of the safety system."""
+        return STATUS_BITS[self.safety.mode]
+
+    def past_joints(self, steps: int) -> Vector6:
+        """
+        Return the joint positions some cycles ago.
+
+        :raises RuntimeException: farther back than is remembered.
+        """
+        if not 0 <= steps < _HISTORY:
+            raise RuntimeException(f'steps is {steps}; the history holds 0..{_HISTORY - 1}')
+        return self._past[-1 - steps]
+
+    # The cycle
+
+    def step(self) -> None:
+        """Compute one cycle."""
+        self.cycles += 1
+        self.power.step(self.time)
+        self.sockets.poll()
+        self._watch_inputs()
+        rested = not self.motion.moving
+        self.programs.step()
+        self._change_scale(rested)
+        self.motion.step(self.scale)
+        self._past.append(self.motion.q)
+        self._look_at_motion()
+        if self.safety.mode in POWERLESS and self.standing:
+            self.power.off()
+
+    def _change_scale(self, rested: bool) -> None:
+        """
+        Move the scale towards what it should be, slowly enough for an arm.
+
+        :param rested: the arm stood before this cycle, so it can begin with any scale.
+        """
+        paused = self.programs.state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
+        target = 0.0 if paused else self.slider
+        if rested:
+            self.scale = target
+            return
+        stopped = self.safety.mode not in OPERATIONAL
+        change = self.cycle / (PROTECTIVE_STOP_TIME if stopped else SLIDER_TIME)
+        self.scale = max(target, self.scale - change) if self.scale > target else (
+            min(target, self.scale + change))
+
+    def _look_at_motion(self) -> None:
+        for warning in self.motion.warnings:
+            self.announcements.error(warning.code, warning.argument, warning.text)
+        self.motion.warnings.clear()
+        fault = self.motion.fault
+        if fault is not None and self.safety.mode in OPERATIONAL:
+            self.announcements.error(fault.code, fault.argument, fault.text)
+            self.safety_event(SafetyEvent.PROTECTIVE_STOP, reported=True)
+
+    def _watch_inputs(self) -> None:
+        """Act on inputs that an RTDE client has stopped to write."""
+        for variable, action in self.watchdogs.expired(self.time):
+            self.announcements.text(f'RTDE watchdog: {variable} was not written in time.')
+            if action == 'stop':
+                self.programs.stop()
+            elif action == 'pause':
+                self.programs.pause()
+
+    # What the life of programs asks for
+
+    def brake(self) -> None:
+        """Stop hard; an arm that is paused on its path stands already and only forgets it."""
+        if self.scale == 0.0:
+            self.motion.halt_hard()
+        self.ownership.brake()
+
+    def end_modes(self) -> None:
+        """End what lives only as long as a program."""
+        self.hand_guided = HandGuided.NOBODY
+        self.force_mode = False
+        self.watchdogs.clear()
+
+    def end_of_frame(self) -> None:
+        """Brake if nobody goes on with what moves."""
+        self.ownership.end_of_frame()
+
+    def release(self, thread: Hashable) -> None:
+        """Forget a thread that has ended."""
+        self.ownership.release(thread)
+
+    def why_not_ready(self) -> str:
+        """Return why no program can run now."""
+        if self.safety.mode not in OPERATIONAL:
+            return f'the safety mode is {self.safety.mode.name}'
+        if self.power.mode is not RobotMode.RUNNING:
+            return f'the robot mode is {self.power.mode.name}, not RUNNING'
+        return ''
+
+    # Commands from outside and from programs
+
+    def set_slider(self, fraction: float) -> None:
+        """Set the speed slider, cut to 0..1."""
+        self.slider = min(1.0, max(0.0, fraction))
+
+    def power_on(self) -> str:
+        """Power up to IDLE; return why not, or an empty string."""
+        if self.safety.mode in POWERLESS:
+            return f'the safety mode is {self.safety.mode.name}'
+        self.power.on(self.time)
+        return ''
+
+    def release_brakes(self) -> str:
+        """Power up to RUNNING; return why not, or an empty string."""
+        if self.safety.mode in POWERLESS:
+            return f'the safety mode is {self.safety.mode.name}'
+        self.power.release_brakes(self.time)
+        return ''
+
+    def power_off(self) -> None:
+        """Cut the power; the arm stays where it is, the program ends."""
+        self.motion.halt_hard()
+        self.programs.stop()
+        self.power.off()
+
+    def safety_event(self, event: SafetyEvent, reported: bool = False) -> str:
+        """
+        Let something happen to the safety system; return why it is refused, or an empty string.
+
+        :param reported: the error code of a protective stop has been announced already.
+        """
+        before = self.safety.mode
+        refusal = self.safety.step(event, self.time)
+        if refusal or self.safety.mode is before:
+            return refusal
+        if event is SafetyEvent.PROTECTIVE_STOP and not reported:
+            self.announcements.error(209, 0, 'A protective stop was triggered')
+        self.announcements.safety_mode(self.safety.mode)
+        if self.safety.mode in OPERATIONAL:
+            self.motion.clear_fault()
+        if self.safety.mode in (SafetyMode.VIOLATION, SafetyMode.FAULT):
+            self.power_off()
+        elif self.safety.mode not in OPERATIONAL:
+            self.programs.pause()
+        return ''
+
+    def teleport(self, q: Vector6) -> None:
+        """Put the arm somewhere at rest."""
+        self.motion.teleport(q)
+
+    def watch_input(self, variable: str, frequency: float, action: str) -> None:
+        """
+        Expect that an RTDE input is written at a rate [1/s].
+
+        :raises RuntimeException: the action does not exist.
+        """
+        if action not in ('pause', 'stop', 'ignore'):
+            raise RuntimeException(f"action is {action!r}; it must be 'pause', 'stop' or 'ignore'")
+        self.watchdogs.watch(variable, frequency, action, self.time)
+
+    def show_popup(self, popup: Popup) -> None:
+        """Show a window."""
+        self.popups.append(popup)
+        self.announcements.popup(popup)
+
+    def close_popups(self) -> None:
+        """Close all windows; programs that wait for them go on."""
+        for popup in self.popups:
+            popup.open = False
+        self.popups.clear()

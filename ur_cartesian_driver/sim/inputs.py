@@ -1,0 +1,82 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What RTDE clients may write, and what writing it does.
+
+Outputs come with a mask that says which channels the value means; the slider as well. A package
+is applied as a whole: masks first, whatever their place in the recipe.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, TYPE_CHECKING
+
+from ur_cartesian_driver.sim.signals import Registers
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.sim.controller import Controller
+
+_DIGITAL = (('standard', 'standard_digital_output'),
+            ('configurable', 'configurable_digital_output'),
+            ('tool', 'tool_digital_output'))
+
+
+def apply_inputs(controller: Controller, values: Mapping[str, Any]) -> None:
+    """Apply one input package: name -> value."""
+    if values.get('speed_slider_mask', 0) & 1 and 'speed_slider_fraction' in values:
+        controller.set_slider(values['speed_slider_fraction'])
+    for side, name in _DIGITAL:
+        mask = values.get(f'{name}_mask', 0)
+        if mask and name in values:
+            _set_masked(getattr(controller.signals.digital_out, side), mask, values[name])
+    if values.get('standard_analog_output_mask', 0):
+        _set_analog(controller, values)
+    if 'external_force_torque' in values:
+        controller.signals.external_force = values['external_force_torque']
+    for name, value in values.items():
+        if write := _WRITE.get(name):
+            write(controller.signals.inputs, value)
+    controller.watchdogs.written(tuple(values), controller.time)
+
+
+def _set_masked(bits: list[bool], mask: int, value: int) -> None:
+    for i in range(len(bits)):
+        if mask >> i & 1:
+            bits[i] = bool(value >> i & 1)
+
+
+def _set_analog(controller: Controller, values: Mapping[str, Any]) -> None:
+    mask, signals = values['standard_analog_output_mask'], controller.signals
+    types = values.get('standard_analog_output_type')
+    for i in (0, 1):
+        if mask >> i & 1:
+            if types is not None:
+                signals.analog_out_voltage[i] = bool(types >> i & 1)
+            if f'standard_analog_output_{i}' in values:
+                signals.set_analog_out(i, values[f'standard_analog_output_{i}'])
+
+
+Write = Callable[[Registers, Any], None]
+
+
+def _write_packed(first: int) -> Write:
+    def write(registers: Registers, value: int) -> None:
+        registers.bits[first:first + 32] = [bool(value >> i & 1) for i in range(32)]
+    return write
+
+
+def _writers() -> dict[str, Write]:
+    writers: dict[str, Write] = {
+        'input_bit_registers0_to_31': _write_packed(0),
+        'input_bit_registers32_to_63': _write_packed(32),
+    }
+    for i in range(64, 128):
+        writers[f'input_bit_register_{i}'] = lambda r, v, i=i: r.bits.__setitem__(i, bool(v))
+    for i in range(48):
+        writers[f'input_int_register_{i}'] = lambda r, v, i=i: r.integers.__setitem__(i, v)
+        writers[f'input_double_register_{i}'] = lambda r, v, i=i: r.floats.__setitem__(i, v)
+    return writers
+
+
+_WRITE: Mapping[str, Write] = _writers()

@@ -1,0 +1,145 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Power and safety of the simulated arm, as two tables.
+
+Power goes up in a chain, POWER_OFF -> POWER_ON -> IDLE -> RUNNING, and each link takes its time;
+a command only says how far. It falls at once.
+
+The safety system is a second machine. What it does to the arm is decided by the controller: a
+protective stop brakes the arm on its path and pauses the program, an emergency stop does the same
+and then cuts the power (a category 1 stop), a violation or fault cuts it where the arm stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+from types import MappingProxyType
+
+from ur_cartesian_driver.motion.state import RobotMode, SafetyMode, SafetyStatus
+
+
+class SafetyEvent(Enum):
+    """What can happen to the safety system."""
+
+    PROTECTIVE_STOP = 'protective stop'
+    UNLOCK = 'unlock protective stop'
+    EMERGENCY_STOP = 'emergency stop'
+    RELEASE = 'release the emergency stop'
+    SAFEGUARD_STOP = 'safeguard stop'
+    SAFEGUARD_RESET = 'reset the safeguard stop'
+    VIOLATION = 'violation'
+    FAULT = 'fault'
+    RESTART = 'restart safety'
+
+
+_STOPS = {
+    SafetyEvent.PROTECTIVE_STOP: SafetyMode.PROTECTIVE_STOP,
+    SafetyEvent.SAFEGUARD_STOP: SafetyMode.SAFEGUARD_STOP,
+    SafetyEvent.EMERGENCY_STOP: SafetyMode.ROBOT_EMERGENCY_STOP,
+    SafetyEvent.VIOLATION: SafetyMode.VIOLATION,
+    SafetyEvent.FAULT: SafetyMode.FAULT,
+}
+_CUTS = {event: _STOPS[event] for event in (
+    SafetyEvent.EMERGENCY_STOP, SafetyEvent.VIOLATION, SafetyEvent.FAULT)}
+
+#: What is not in the table is refused.
+SAFETY: Mapping[SafetyMode, Mapping[SafetyEvent, SafetyMode]] = MappingProxyType({
+    SafetyMode.NORMAL: _STOPS,
+    SafetyMode.REDUCED: _STOPS,
+    SafetyMode.PROTECTIVE_STOP: {**_CUTS, SafetyEvent.UNLOCK: SafetyMode.NORMAL},
+    SafetyMode.SAFEGUARD_STOP: {**_CUTS, SafetyEvent.SAFEGUARD_RESET: SafetyMode.NORMAL},
+    SafetyMode.ROBOT_EMERGENCY_STOP: {SafetyEvent.RELEASE: SafetyMode.NORMAL},
+    SafetyMode.VIOLATION: {SafetyEvent.RESTART: SafetyMode.NORMAL},
+    SafetyMode.FAULT: {SafetyEvent.RESTART: SafetyMode.NORMAL},
+})
+
+#: The bits that RTDE reports beside the mode.
+STATUS_BITS: Mapping[SafetyMode, SafetyStatus] = MappingProxyType({
+    SafetyMode.NORMAL: SafetyStatus.NORMAL_MODE,
+    SafetyMode.REDUCED: SafetyStatus.REDUCED_MODE,
+    SafetyMode.PROTECTIVE_STOP:
+        SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+    SafetyMode.RECOVERY: SafetyStatus.RECOVERY_MODE,
+    SafetyMode.SAFEGUARD_STOP:
+        SafetyStatus.SAFEGUARD_STOPPED | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+    SafetyMode.ROBOT_EMERGENCY_STOP:
+        SafetyStatus.ROBOT_EMERGENCY_STOPPED | SafetyStatus.EMERGENCY_STOPPED
+        | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+    SafetyMode.VIOLATION: SafetyStatus.VIOLATION | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+    SafetyMode.FAULT: SafetyStatus.FAULT | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+})
+
+#: Modes in which the arm may be powered and may move.
+OPERATIONAL = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
+#: Modes in which the brakes hold and the motors are off.
+POWERLESS = frozenset({
+    SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP,
+    SafetyMode.VIOLATION, SafetyMode.FAULT})
+
+_CHAIN = (RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.RUNNING)
+
+
+class Safety:
+    """The safety system's mode and when it was entered."""
+
+    def __init__(self, unlock_delay: float) -> None:
+        """
+        Begin in NORMAL.
+
+        :param unlock_delay: [s] during which an unlock is refused.
+        """
+        self.mode = SafetyMode.NORMAL
+        self._unlock_delay = unlock_delay
+        self._since = 0.0
+
+    def step(self, event: SafetyEvent, now: float) -> str:
+        """
+        Take an event; return why it is refused, or an empty string.
+
+        :param now: the controller's clock [s].
+        """
+        target = SAFETY.get(self.mode, {}).get(event)
+        if target is None:
+            return f'{event.value} is not possible in safety mode {self.mode.name}'
+        wait = self._unlock_delay - (now - self._since)
+        if event is SafetyEvent.UNLOCK and wait > 1e-9:
+            return (f'a protective stop cannot be unlocked for {self._unlock_delay:g} s after it '
+                    f'happened; wait another {wait:.1f} s')
+        self.mode, self._since = target, now
+        return ''
+
+
+class Power:
+    """The arm's power: where it is, and where it was told to go."""
+
+    def __init__(self, mode: RobotMode, power_on_time: float, brake_release_time: float) -> None:
+        """Begin in a mode of the chain; times in [s]."""
+        self.mode = mode
+        self._goal = mode
+        self._times = {RobotMode.POWER_OFF: 0.0, RobotMode.POWER_ON: power_on_time,
+                       RobotMode.IDLE: brake_release_time}
+        self._since = 0.0
+
+    def on(self, now: float) -> None:
+        """Go to IDLE; an arm that is farther stays where it is."""
+        self._raise_goal(RobotMode.IDLE, now)
+
+    def release_brakes(self, now: float) -> None:
+        """Go to RUNNING, through all modes before it."""
+        self._raise_goal(RobotMode.RUNNING, now)
+
+    def off(self) -> None:
+        """Cut the power at once."""
+        self.mode = self._goal = RobotMode.POWER_OFF
+
+    def _raise_goal(self, goal: RobotMode, now: float) -> None:
+        if self.mode == self._goal:
+            self._since = now
+        self._goal = max(self._goal, goal)
+
+    def step(self, now: float) -> None:
+        """Climb one link of the chain when its time is over."""
+        if self.mode < self._goal and now - self._since >= self._times[self.mode]:
+            self.mode, self._since = _CHAIN[_CHAIN.index(self.mode) + 1], now

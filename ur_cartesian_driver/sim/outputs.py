@@ -1,0 +1,142 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What each RTDE output means in the simulated controller.
+
+Target and actual are one: the arm follows without error, and nothing but its motion is simulated.
+So the outputs that would need dynamics or electricity have fixed, plausible values, and these
+stand in :data:`FIXED`, apart from those that are computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import hypot
+from types import MappingProxyType
+from typing import Any, TYPE_CHECKING
+
+from ur_cartesian_driver.motion.pose import IDENTITY, Vector3, Vector6
+from ur_cartesian_driver.sim.signals import BITS, FLOATS, INTEGERS, pack_bits, Registers
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.sim.controller import Controller
+
+Getter = Callable[['Controller'], Any]
+
+_ZERO6: Vector6 = (0.0,) * 6
+_NO_FORCE: Vector6 = (0.0,) * 6
+#: ``joint_mode``: RUNNING and POWER_OFF, numbers of the controller.
+_JOINT_RUNNING, _JOINT_POWER_OFF = 253, 239
+
+
+def _elbow(controller: Controller) -> Vector3:
+    """Return where the elbow is: the third joint [m]."""
+    return controller.arm.frames(controller.motion.q).origins[2]
+
+
+def _tcp(controller: Controller) -> Vector6:
+    return controller.motion.T_base_tcp.rotation_vector()
+
+
+def _scaled_momentum(controller: Controller) -> float:
+    return controller.payload.mass * hypot(*controller.tcp_twist[:3])
+
+
+#: Outputs that are computed.
+COMPUTED: Mapping[str, Getter] = MappingProxyType({
+    'timestamp': lambda c: c.time,
+    'control_step': lambda c: c.cycles,
+    'target_q': lambda c: c.motion.q,
+    'actual_q': lambda c: c.motion.q,
+    'target_qd': lambda c: c.qd,
+    'actual_qd': lambda c: c.qd,
+    'target_qdd': lambda c: c.motion.qdd,
+    'target_TCP_pose': _tcp,
+    'actual_TCP_pose': _tcp,
+    'target_TCP_speed': lambda c: c.tcp_twist,
+    'actual_TCP_speed': lambda c: c.tcp_twist,
+    'tcp_offset': lambda c: (
+        _ZERO6 if c.motion.T_flange_tcp is IDENTITY else c.motion.T_flange_tcp.rotation_vector()),
+    'speed_scaling': lambda c: c.scale,
+    'target_speed_fraction': lambda c: c.slider,
+    'robot_mode': lambda c: c.power.mode,
+    'safety_mode': lambda c: c.safety.mode,
+    'safety_status': lambda c: c.safety.mode,
+    'runtime_state': lambda c: c.programs.state,
+    'robot_status_bits': lambda c: c.robot_status,
+    'safety_status_bits': lambda c: c.safety_status,
+    'joint_mode': lambda c: (
+        (_JOINT_RUNNING if c.robot_status & 1 else _JOINT_POWER_OFF,) * 6),
+    'actual_momentum': _scaled_momentum,
+    'payload': lambda c: c.payload.mass,
+    'payload_cog': lambda c: c.payload.cog,
+    'payload_inertia': lambda c: c.payload.inertia,
+    'target_gravity': lambda c: c.gravity,
+    'actual_TCP_force': lambda c: c.signals.external_force if c.external_ft else _NO_FORCE,
+    'ft_raw_wrench': lambda c: c.signals.external_force if c.external_ft else _NO_FORCE,
+    'tcp_force_scalar': lambda c: (
+        hypot(*c.signals.external_force[:3]) if c.external_ft else 0.0),
+    'actual_digital_input_bits': lambda c: c.signals.digital_in.packed(),
+    'actual_digital_output_bits': lambda c: c.signals.digital_out.packed(),
+    'actual_configurable_digital_input_bits':
+        lambda c: pack_bits(c.signals.digital_in.configurable),
+    'actual_configurable_digital_output_bits':
+        lambda c: pack_bits(c.signals.digital_out.configurable),
+    'analog_io_types': lambda c: c.signals.analog_types(),
+    'standard_analog_input0': lambda c: c.signals.analog_in[0],
+    'standard_analog_input1': lambda c: c.signals.analog_in[1],
+    'standard_analog_output0': lambda c: c.signals.analog_out[0],
+    'standard_analog_output1': lambda c: c.signals.analog_out[1],
+    'tool_analog_input0': lambda c: c.signals.tool_analog_in[0],
+    'tool_analog_input1': lambda c: c.signals.tool_analog_in[1],
+    'tool_output_voltage': lambda c: c.signals.tool_voltage,
+    'elbow_position': _elbow,
+})
+
+#: Outputs that never change, because nothing behind them is simulated.
+FIXED: Mapping[str, Any] = MappingProxyType({
+    'joint_temperatures': (25.0,) * 6,
+    'actual_joint_voltage': (48.0,) * 6,
+    'actual_main_voltage': 48.0,
+    'actual_robot_voltage': 48.0,
+    'actual_robot_current': 0.5,
+    'io_current': 0.0,
+    'tool_temperature': 25.0,
+    'tool_mode': _JOINT_RUNNING,
+    'actual_tool_accelerometer': (0.0, 0.0, 9.82),
+    'actual_execution_time': 0.0,
+    'target_execution_time': 0.0,
+})
+
+
+def _register_getters(prefix: str, of: Callable[[Controller], Registers]) -> dict[str, Getter]:
+    getters: dict[str, Getter] = {
+        f'{prefix}_bit_registers0_to_31': lambda c: pack_bits(of(c).bits[:32]),
+        f'{prefix}_bit_registers32_to_63': lambda c: pack_bits(of(c).bits[32:64]),
+    }
+    for i in range(64, BITS):
+        getters[f'{prefix}_bit_register_{i}'] = lambda c, i=i: of(c).bits[i]
+    for i in range(INTEGERS):
+        getters[f'{prefix}_int_register_{i}'] = lambda c, i=i: of(c).integers[i]
+    for i in range(FLOATS):
+        getters[f'{prefix}_double_register_{i}'] = lambda c, i=i: of(c).floats[i]
+    return getters
+
+
+REGISTERS: Mapping[str, Getter] = MappingProxyType({
+    **_register_getters('input', lambda c: c.signals.inputs),
+    **_register_getters('output', lambda c: c.signals.outputs),
+})
+
+
+def getter(name: str, zero: Any) -> Getter:
+    """
+    Return what computes an output.
+
+    :param zero: its value if nothing of it is simulated.
+    """
+    found = COMPUTED.get(name) or REGISTERS.get(name)
+    if found is not None:
+        return found
+    value = FIXED.get(name, zero)
+    return lambda _controller: value

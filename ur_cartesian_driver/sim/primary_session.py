@@ -1,0 +1,36 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One client of the primary interface: programs and commands in, announcements and states out."""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.primary_states import version_frame
+from ur_cartesian_driver.sim.script_commands import execute
+from ur_cartesian_driver.sim.server import Hangup
+from ur_cartesian_driver.sim.uploads import TooLong, Uploads
+
+
+class PrimarySession:
+    """A :class:`~.server.Session`."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Wait for programs."""
+        self._controller = controller
+        self._uploads = Uploads()
+
+    def open(self) -> bytes:
+        """Introduce the controller: clients wait for this before anything else."""
+        return version_frame(self._controller)
+
+    def close(self) -> None:
+        """Forget what came of an unfinished program."""
+
+    def feed(self, data: bytes) -> bytes:
+        """Do what is complete; what there is to say goes to all clients."""
+        try:
+            for item in self._uploads.feed(data):
+                execute(self._controller, item)
+        except TooLong:
+            raise Hangup from None
+        return b''

@@ -1,0 +1,318 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A simulated robot that listens on the ports of a real one.
+
+One thread runs one event loop with everything in it: the controller's cycle, the servers, nothing
+to lock. Calls from other threads are carried out between two cycles.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import Future
+import contextlib
+from dataclasses import dataclass
+import threading
+from types import TracebackType
+from typing import TypeVar
+
+from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.sim.clock import Clock, Lateness, RealClock, VirtualClock
+from ur_cartesian_driver.sim.config import SimulatorConfig
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.dashboard_session import DashboardSession
+from ur_cartesian_driver.sim.modes import SafetyEvent
+from ur_cartesian_driver.sim.primary_session import PrimarySession
+from ur_cartesian_driver.sim.primary_states import PrimaryStream
+from ur_cartesian_driver.sim.rtde_session import RtdeSession
+from ur_cartesian_driver.sim.server import TcpServer
+from ur_cartesian_driver.sim.tcp_script_sockets import TcpScriptSockets
+
+T = TypeVar('T')
+
+_CALL_TIMEOUT = 10.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Ports:
+    """Where the servers listen."""
+
+    rtde: int
+    primary: int
+    dashboard: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotSnapshot:
+    """The simulated robot at one cycle: joints [rad, rad/s], poses of the TCP in the base."""
+
+    timestamp: float
+    q: Vector6
+    qd: Vector6
+    T_base_tcp: Pose
+    T_flange_tcp: Pose
+    robot_mode: RobotMode
+    safety_mode: SafetyMode
+    runtime_state: RuntimeState
+    program: str
+    speed_slider: float
+    speed_scaling: float
+    digital_outputs: int
+    #: What programs wrote with `textmsg`, and the errors, newest last.
+    messages: tuple[str, ...]
+    popups: tuple[str, ...]
+
+
+class SimulatedRobot:
+    """
+    A context manager: on entering, all ports listen; on leaving, nothing is left.
+
+    ::
+
+        with SimulatedRobot(SimulatorConfig(rtde_port=0, primary_port=0, dashboard_port=0)) as ur:
+            connect_to(ur.ports.rtde)
+    """
+
+    def __init__(self, config: SimulatorConfig | None = None) -> None:
+        """Make a robot; it lives from `start` to `close`."""
+        self.config = config or SimulatorConfig()
+        #: Called with the port and the bytes that a program's socket received, in our thread.
+        self.on_socket_data: Callable[[int, bytes], None] | None = None
+        self.controller = Controller(self.config, TcpScriptSockets(self._on_socket_data))
+        taken_inputs: set[str] = set()
+        self._rtde = TcpServer('RTDE', lambda: RtdeSession(self.controller, taken_inputs))
+        self._primary = TcpServer('primary', lambda: PrimarySession(self.controller))
+        self._dashboard = TcpServer('dashboard', lambda: DashboardSession(self.controller))
+        self._clock: Clock = (RealClock(self.config.cycle, self.config.rate)
+                              if self.config.rate > 0.0 else VirtualClock())
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._thread: threading.Thread | None = None
+        self._running: asyncio.Task[None] | None = None
+        self._ports: Ports | None = None
+
+    # Life
+
+    def start(self) -> SimulatedRobot:
+        """
+        Start the thread; return when all ports listen.
+
+        :raises OSError: a port is taken.
+        """
+        listening: Future[None] = Future()
+        self._thread = threading.Thread(
+            target=self._run_thread, args=(listening,), name='ur-sim', daemon=True)
+        self._thread.start()
+        try:
+            listening.result()
+        except BaseException:
+            self.close()
+            raise
+        return self
+
+    def close(self) -> None:
+        """Disconnect everybody and end the thread; may be called twice."""
+        thread, self._thread = self._thread, None
+        if thread is None:
+            return
+        if self._loop is not None and self._running is not None:
+            with contextlib.suppress(RuntimeError):  # the loop has just ended by itself
+                self._loop.call_soon_threadsafe(self._running.cancel)
+        thread.join()
+
+    def __enter__(self) -> SimulatedRobot:
+        """Start."""
+        return self.start()
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 traceback: TracebackType | None) -> None:
+        """Close."""
+        self.close()
+
+    def _run_thread(self, listening: Future[None]) -> None:
+        with contextlib.suppress(asyncio.CancelledError):
+            asyncio.run(self._serve(listening))
+
+    async def run(self, on_listening: Callable[[], None] | None = None) -> None:
+        """
+        Serve on the running event loop until cancelled.
+
+        :param on_listening: called when all ports listen.
+        """
+        listening: Future[None] = Future()
+        if on_listening is not None:
+            listening.add_done_callback(
+                lambda future: None if future.exception() else on_listening())
+        await self._serve(listening)
+
+    async def _serve(self, listening: Future[None]) -> None:
+        self._loop, self._running = asyncio.get_running_loop(), asyncio.current_task()
+        try:
+            try:
+                await self._listen()
+            except OSError as error:
+                listening.set_exception(error)
+                return
+            listening.set_result(None)
+            await self._cycles()
+        finally:
+            self._loop = None
+            self.controller.sockets.close_all()
+            for server in (self._rtde, self._primary, self._dashboard):
+                await server.close()
+
+    async def _listen(self) -> None:
+        host, config = self.config.host, self.config
+        await self._rtde.listen(host, config.rtde_port)
+        await self._primary.listen(host, config.primary_port)
+        await self._dashboard.listen(host, config.dashboard_port)
+        self._ports = Ports(rtde=self._rtde.port, primary=self._primary.port,
+                            dashboard=self._dashboard.port)
+
+    async def _cycles(self) -> None:
+        stream = PrimaryStream(self.controller)
+        while True:
+            await self._clock.next_cycle()
+            self.controller.step()
+            for session, connection in self._rtde.sessions:
+                for package in session.packages():
+                    connection.write(package)
+            for frame in stream.frames():
+                self._primary.broadcast(frame)
+
+    def _on_socket_data(self, port: int, data: bytes) -> None:
+        if self.on_socket_data is not None:
+            self.on_socket_data(port, data)
+
+    # Calls from any thread
+
+    def call(self, function: Callable[[Controller], T]) -> T:
+        """
+        Let a function work on the controller between two cycles, and return its result.
+
+        :raises TimeoutError: the robot's thread did not get to it within 10 s.
+        """
+        loop = self._loop
+        if loop is None or _is_running_in(loop):
+            return function(self.controller)
+        future: Future[T] = Future()
+
+        def carry_out() -> None:
+            try:
+                future.set_result(function(self.controller))
+            except Exception as error:
+                future.set_exception(error)
+
+        loop.call_soon_threadsafe(carry_out)
+        return future.result(_CALL_TIMEOUT)
+
+    @property
+    def ports(self) -> Ports:
+        """
+        The ports that are listened on.
+
+        :raises RuntimeError: the robot has not been started.
+        """
+        if self._ports is None:
+            raise RuntimeError('The simulated robot listens nowhere yet; start it first.')
+        return self._ports
+
+    def state(self) -> RobotSnapshot:
+        """Return the robot as it is now."""
+        return self.call(_snapshot)
+
+    def set_speed_slider(self, fraction: float) -> None:
+        """Move the speed slider, 0..1."""
+        self.call(lambda controller: controller.set_slider(fraction))
+
+    def protective_stop(self) -> None:
+        """Stop the arm as if it had hit something."""
+        self._safety(SafetyEvent.PROTECTIVE_STOP)
+
+    def unlock_protective_stop(self) -> None:
+        """
+        Unlock as a person at the pendant does.
+
+        :raises RuntimeError: not stopped, or stopped less than the unlock delay ago.
+        """
+        self._safety(SafetyEvent.UNLOCK)
+
+    def emergency_stop(self) -> None:
+        """Press the button."""
+        self._safety(SafetyEvent.EMERGENCY_STOP)
+
+    def release_emergency_stop(self) -> None:
+        """
+        Turn the button back; the arm stays without power.
+
+        :raises RuntimeError: it is not pressed.
+        """
+        self._safety(SafetyEvent.RELEASE)
+
+    def stop_program(self) -> None:
+        """Stop the program as a person at the pendant does."""
+        self.call(lambda controller: controller.programs.stop())
+
+    def pause_program(self) -> None:
+        """Pause the program on its path."""
+        self._checked(lambda controller: controller.programs.pause())
+
+    def play_program(self) -> None:
+        """
+        Resume the paused program, or start the loaded one.
+
+        :raises RuntimeError: there is none, or the robot cannot run.
+        """
+        self._checked(lambda controller: controller.programs.play())
+
+    def run_script(self, text: str) -> None:
+        """Start a program as if a client had sent it."""
+        self.call(lambda controller: controller.programs.submit(text))
+
+    def close_popups(self) -> None:
+        """Confirm all popups."""
+        self.call(lambda controller: controller.close_popups())
+
+    def lateness(self) -> Lateness | None:
+        """Return how late cycles begin; None without real time."""
+        clock = self._clock
+        return self.call(
+            lambda _: clock.lateness() if isinstance(clock, RealClock) else None)
+
+    def _safety(self, event: SafetyEvent) -> None:
+        self._checked(lambda controller: controller.safety_event(event))
+
+    def _checked(self, function: Callable[[Controller], str]) -> None:
+        refusal = self.call(function)
+        if refusal:
+            raise RuntimeError(f'The simulated robot refuses: {refusal}.')
+
+    def status_line(self) -> str:
+        """Return one line for a terminal: model, modes, program, clients, slider."""
+        state = self.state()
+        clients = ' '.join(f'{server.name} {len(server.connections)}' for server in (
+            self._rtde, self._primary, self._dashboard))
+        return (f'{self.config.model} | {state.robot_mode.name} {state.safety_mode.name} | '
+                f'{state.runtime_state.name} {state.program or "no program"} | '
+                f'clients: {clients} | speed {state.speed_slider:.0%}')
+
+
+def _is_running_in(loop: asyncio.AbstractEventLoop) -> bool:
+    try:
+        return asyncio.get_running_loop() is loop
+    except RuntimeError:
+        return False
+
+
+def _snapshot(controller: Controller) -> RobotSnapshot:
+    motion, programs = controller.motion, controller.programs
+    return RobotSnapshot(
+        timestamp=controller.time, q=motion.q, qd=controller.qd, T_base_tcp=motion.T_base_tcp,
+        T_flange_tcp=motion.T_flange_tcp, robot_mode=controller.power.mode,
+        safety_mode=controller.safety.mode, runtime_state=programs.state, program=programs.name,
+        speed_slider=controller.slider, speed_scaling=controller.scale,
+        digital_outputs=controller.signals.digital_out.packed(),
+        messages=tuple(controller.announcements.log),
+        popups=tuple(popup.text for popup in controller.popups))

@@ -1,0 +1,121 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The sockets that programs open, as the builtins see them.
+
+Nothing here waits: a builtin asks once per cycle and yields in between. Real TCP is in
+`tcp_script_sockets`; the one in memory is for programs under the virtual clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+from typing import Protocol
+
+
+class SocketState(Enum):
+    """What a script's socket is doing."""
+
+    CLOSED = 'closed'
+    CONNECTING = 'connecting'
+    OPEN = 'open'
+
+
+class ScriptSockets(Protocol):
+    """Named connections to the outside, none of whose methods blocks."""
+
+    def open(self, name: str, address: str, port: int) -> None:
+        """Begin to connect; an older socket of that name is closed."""
+
+    def state(self, name: str) -> SocketState:
+        """Return the state; an unknown name is CLOSED, one that its peer has closed as well."""
+
+    def received(self, name: str) -> bytearray:
+        """Return what has arrived and was not read yet; the reader deletes what it takes."""
+
+    def send(self, name: str, data: bytes) -> bool:
+        """Send without waiting; tell whether the socket took it."""
+
+    def close(self, name: str) -> None:
+        """Close; an unknown name is no error."""
+
+    def close_all(self) -> None:
+        """Close every socket, as the end of a program does."""
+
+    def poll(self) -> None:
+        """Go on with connecting and sending; called once per cycle."""
+
+
+class MemorySocket:
+    """One end of a connection in memory; the test, or whoever holds it, is the peer."""
+
+    def __init__(self) -> None:
+        """Begin open, with nothing in either direction."""
+        self.incoming = bytearray()
+        self.outgoing = bytearray()
+        self.state = SocketState.OPEN
+
+    def feed(self, data: bytes) -> None:
+        """Send to the program."""
+        self.incoming += data
+
+    def take(self) -> bytes:
+        """Return and forget what the program has sent."""
+        data = bytes(self.outgoing)
+        self.outgoing.clear()
+        return data
+
+    def hang_up(self) -> None:
+        """Close the peer's side; what is under way can still be read."""
+        self.state = SocketState.CLOSED
+
+
+class MemorySockets:
+    """Connections to peers in this process: port -> what is called with each new connection."""
+
+    def __init__(self) -> None:
+        """Begin with nobody listening."""
+        self.listeners: dict[int, Callable[[MemorySocket], None]] = {}
+        self._sockets: dict[str, MemorySocket] = {}
+
+    def listen(self, port: int) -> list[MemorySocket]:
+        """Accept connections to a port; they are appended to the list that is returned."""
+        accepted: list[MemorySocket] = []
+        self.listeners[port] = accepted.append
+        return accepted
+
+    def open(self, name: str, address: str, port: int) -> None:
+        """Connect at once, or not at all."""
+        self.close(name)
+        if port in self.listeners:
+            self._sockets[name] = MemorySocket()
+            self.listeners[port](self._sockets[name])
+
+    def state(self, name: str) -> SocketState:
+        """Return the state of a name."""
+        return self._sockets[name].state if name in self._sockets else SocketState.CLOSED
+
+    def received(self, name: str) -> bytearray:
+        """Return what the peer has sent."""
+        return self._sockets[name].incoming if name in self._sockets else bytearray()
+
+    def send(self, name: str, data: bytes) -> bool:
+        """Hand the data to the peer."""
+        if self.state(name) is not SocketState.OPEN:
+            return False
+        self._sockets[name].outgoing += data
+        return True
+
+    def close(self, name: str) -> None:
+        """Close one."""
+        if socket := self._sockets.pop(name, None):
+            socket.hang_up()
+
+    def close_all(self) -> None:
+        """Close all."""
+        for name in list(self._sockets):
+            self.close(name)
+
+    def poll(self) -> None:
+        """Do nothing: everything has happened already."""

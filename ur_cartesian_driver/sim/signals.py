@@ -1,0 +1,75 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Inputs, outputs and registers of the simulated controller.
+
+Values that RTDE clients write, that programs write, and that both read. Registers are plain lists,
+indexed as in the robot's manual: bit 0-127, integer and float 0-47.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from ur_cartesian_driver.motion.pose import Vector6
+
+BITS, INTEGERS, FLOATS = 128, 48, 48
+STANDARD, CONFIGURABLE, TOOL = 8, 8, 2
+
+
+def pack_bits(bits: list[bool]) -> int:
+    """Return the number whose bit i is ``bits[i]``."""
+    return sum(1 << i for i, bit in enumerate(bits) if bit)
+
+
+@dataclass(slots=True)
+class Registers:
+    """One direction of the general purpose registers."""
+
+    bits: list[bool] = field(default_factory=lambda: [False] * BITS)
+    integers: list[int] = field(default_factory=lambda: [0] * INTEGERS)
+    floats: list[float] = field(default_factory=lambda: [0.0] * FLOATS)
+
+
+@dataclass(slots=True)
+class DigitalPort:
+    """The digital channels of one side: standard, configurable and tool."""
+
+    standard: list[bool] = field(default_factory=lambda: [False] * STANDARD)
+    configurable: list[bool] = field(default_factory=lambda: [False] * CONFIGURABLE)
+    tool: list[bool] = field(default_factory=lambda: [False] * TOOL)
+
+    def packed(self) -> int:
+        """Return standard in bits 0-7, configurable in 8-15, tool in 16-17."""
+        return pack_bits(self.standard + self.configurable + self.tool)
+
+
+@dataclass(slots=True)
+class Signals:
+    """All of them."""
+
+    digital_in: DigitalPort = field(default_factory=DigitalPort)
+    digital_out: DigitalPort = field(default_factory=DigitalPort)
+    #: [V] or [A] as the domain says; True = voltage.
+    analog_in: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    analog_in_voltage: list[bool] = field(default_factory=lambda: [True, True])
+    analog_out: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    analog_out_voltage: list[bool] = field(default_factory=lambda: [True, True])
+    tool_analog_in: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    tool_voltage: int = 0
+    #: Force [N] and torque [Nm] that an RTDE client measures for us.
+    external_force: Vector6 = (0.0,) * 6
+    inputs: Registers = field(default_factory=Registers)
+    outputs: Registers = field(default_factory=Registers)
+    #: ``set_flag`` / ``get_flag``; they survive programs.
+    flags: list[bool] = field(default_factory=lambda: [False] * 32)
+
+    def set_analog_out(self, index: int, fraction: float) -> None:
+        """Set an analog output to a fraction 0 to 1 of its range: 0-10 V, or 4-20 mA."""
+        fraction = min(1.0, max(0.0, fraction))
+        self.analog_out[index] = (
+            10.0 * fraction if self.analog_out_voltage[index] else 0.004 + 0.016 * fraction)
+
+    def analog_types(self) -> int:
+        """Return the domains as RTDE packs them: inputs in bits 0-1, outputs in bits 2-3."""
+        return pack_bits(self.analog_in_voltage + self.analog_out_voltage)

@@ -1,0 +1,49 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Which RTDE inputs a program wants to be written regularly, and which were not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(slots=True)
+class _Watch:
+    period: float
+    action: str
+    last: float
+    expired: bool = False
+
+
+class Watchdogs:
+    """The watches that `rtde_set_watchdog` has set; they end with the program."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._watches: dict[str, _Watch] = {}
+
+    def watch(self, variable: str, frequency: float, action: str, now: float) -> None:
+        """Watch an input from now on; a frequency of 0 ends it."""
+        if frequency > 0.0:
+            self._watches[variable] = _Watch(1.0 / frequency, action, now)
+        else:
+            self._watches.pop(variable, None)
+
+    def written(self, variables: tuple[str, ...], now: float) -> None:
+        """Note that inputs were written."""
+        for variable in variables:
+            if watch := self._watches.get(variable):
+                watch.last, watch.expired = now, False
+
+    def expired(self, now: float) -> list[tuple[str, str]]:
+        """Return the inputs that have just become late, with what to do."""
+        late = []
+        for variable, watch in self._watches.items():
+            if not watch.expired and now - watch.last > watch.period:
+                watch.expired = True
+                late.append((variable, watch.action))
+        return late
+
+    def clear(self) -> None:
+        """Watch nothing."""
+        self._watches.clear()
