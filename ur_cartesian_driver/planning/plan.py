@@ -216,7 +216,7 @@ class _Planner:
                    q_start=q, trace=trace, time=None)
 
     def _say_fixed(self, i: int, arc: Arc) -> None:
-        """Say where an arc that keeps the orientation to its tangent ends in another than asked."""
+        """Say where an arc that keeps to its tangent ends in another orientation than asked."""
         off = arc.end.angle_to(self.targets[i])
         if off > self.options.start_tolerance_angle:
             self.remarks.append(

@@ -1,0 +1,286 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Every reason to refuse a goal without a robot: its class, and the place that its text names."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf, nan
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import pytest
+
+from ur_cartesian_driver.motion.errors import (
+    InvalidGoal,
+    InvalidJoints,
+    NotAvailable,
+    OldHeaderTimestamp,
+)
+from ur_cartesian_driver.motion.goal import (
+    ArcMode,
+    ExecutionMode,
+    Goal,
+    IOCommand,
+    OutputKind,
+    Posture,
+    Segment,
+    SegmentType,
+    Tolerance,
+    Waypoint,
+)
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.planning import check, PlanningOptions
+from ur_cartesian_driver.planning.validate import RULES
+
+OPTIONS = PlanningOptions(max_points=10)
+TYPE = SegmentType
+
+
+def at(x, y=0.0, z=0.0, time=0.0, **fields):
+    return Waypoint(pose=Pose((x, y, z)), time=time, **fields)
+
+
+PLAIN = Goal(waypoints=(at(0.1), at(0.2), at(0.3)))
+TIMED = Goal(waypoints=(at(0.1, time=1.0), at(0.2, time=2.0), at(0.3, time=3.0)))
+
+
+def with_point(goal, index, **fields):
+    points = list(goal.waypoints)
+    points[index] = replace(points[index], **fields)
+    return replace(goal, waypoints=tuple(points))
+
+
+def with_segment(goal, index, **fields):
+    segments = [Segment()] * len(goal.waypoints)
+    segments[index] = Segment(**fields)
+    return replace(goal, segments=tuple(segments))
+
+
+def turned(*quaternion):
+    return Pose((0.1, 0.0, 0.0), quaternion)
+
+
+SIX_NAN = (0.0, 0.0, nan, 0.0, 0.0, 0.0)
+ONE = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
+VIA = Pose((0.15, 0.05, 0.0))
+ARC = {'type': TYPE.CIRCULAR, 'via': VIA}
+
+REFUSALS = [
+    # number of things
+    (Goal(waypoints=()), InvalidGoal, 'trajectory.points is empty'),
+    (Goal(waypoints=tuple(at(0.01 * i) for i in range(11))), InvalidGoal,
+     'trajectory.points has 11 points, more than max_points = 10'),
+    (replace(PLAIN, segments=(Segment(), Segment())), InvalidGoal,
+     'segments has 2 entries for 3 points'),
+    # unknown numbers
+    (replace(PLAIN, execution=7), InvalidGoal, 'execution is 7, which is none of AUTO = 0'),
+    (with_segment(PLAIN, 1, type=9), InvalidGoal, 'segments[1].type is 9'),
+    (with_segment(PLAIN, 1, **ARC, arc_mode=2), InvalidGoal, 'segments[1].arc_mode is 2'),
+    # not finite
+    (with_point(PLAIN, 2, time=nan), InvalidGoal, 'trajectory.points[2].time_from_start contains'),
+    (with_point(PLAIN, 1, pose=Pose((0.0, nan, 0.0))), InvalidGoal,
+     'trajectory.points[1].pose.position contains nan'),
+    (with_point(PLAIN, 2, pose=turned(0.0, inf, 0.0, 1.0)), InvalidGoal,
+     'trajectory.points[2].pose.orientation contains inf'),
+    (with_point(PLAIN, 0, twist=SIX_NAN), InvalidGoal, 'trajectory.points[0].twist contains nan'),
+    (with_point(PLAIN, 0, acceleration=SIX_NAN), InvalidGoal,
+     'trajectory.points[0].acceleration contains nan'),
+    (with_point(PLAIN, 0, jerk=SIX_NAN), InvalidGoal, 'trajectory.points[0].jerk contains nan'),
+    (with_segment(PLAIN, 1, velocity=inf), InvalidGoal, 'segments[1].velocity contains inf'),
+    (with_segment(PLAIN, 1, acceleration=nan), InvalidGoal, 'segments[1].acceleration contains'),
+    (with_segment(PLAIN, 1, blend_radius=nan), InvalidGoal, 'segments[1].blend_radius contains'),
+    (with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((nan, 0.0, 0.0))), InvalidGoal,
+     'segments[1].via.position contains nan'),
+    (replace(PLAIN, path_tolerance=Tolerance(position=(0.0, nan, 0.0))), InvalidGoal,
+     'path_tolerance.position_error contains nan'),
+    (replace(PLAIN, goal_tolerance=Tolerance(orientation=(inf, 0.0, 0.0))), InvalidGoal,
+     'goal_tolerance.orientation_error contains inf'),
+    (replace(PLAIN, goal_tolerance=Tolerance(twist=SIX_NAN)), InvalidGoal,
+     'goal_tolerance.twist_error contains nan'),
+    (replace(PLAIN, path_tolerance=Tolerance(acceleration=SIX_NAN)), InvalidGoal,
+     'path_tolerance.acceleration_error contains nan'),
+    (replace(PLAIN, goal_time_tolerance=nan), InvalidGoal, 'goal_time_tolerance contains nan'),
+    (replace(PLAIN, age=nan), InvalidGoal, 'trajectory.header.stamp contains nan'),
+    # quaternions
+    (with_point(PLAIN, 2, pose=turned(0.0, 0.0, 0.0, 0.0)), InvalidGoal,
+     'trajectory.points[2].pose.orientation is zero'),
+    (with_point(PLAIN, 2, pose=turned(0.0, 0.0, 0.0, 1.002)), InvalidGoal,
+     'trajectory.points[2].pose.orientation has length 1.002'),
+    (with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.1, 0.1, 0.0), (0.0, 0.0, 0.0, 0.0))),
+     InvalidGoal, 'segments[1].via.orientation is zero'),
+    # negative
+    (with_segment(PLAIN, 1, velocity=-0.1), InvalidGoal, 'segments[1].velocity is -0.1'),
+    (with_segment(PLAIN, 1, acceleration=-1.0), InvalidGoal, 'segments[1].acceleration is -1'),
+    (with_segment(PLAIN, 1, blend_radius=-0.01), InvalidGoal,
+     'segments[1].blend_radius is -0.01'),
+    # stamps
+    (replace(PLAIN, age=1.5), OldHeaderTimestamp, 'trajectory.header.stamp lies 1.500 s in the pa'),
+    (replace(PLAIN, age=-61.0), InvalidGoal, 'trajectory.header.stamp lies 61.0 s in the future'),
+    # not there yet
+    (replace(TIMED, execution=ExecutionMode.SPLINE), NotAvailable, 'execution is SPLINE'),
+    (replace(TIMED, execution=ExecutionMode.SERVO), NotAvailable, 'execution is SERVO'),
+    (replace(PLAIN, keep_open=True), NotAvailable, 'keep_open is set'),
+    (replace(PLAIN, io_commands=(IOCommand(
+        waypoint=0, offset=0.0, output=OutputKind.TOOL_DIGITAL, pin=0, value=1.0),)),
+     NotAvailable, 'io_commands is not empty'),
+    (replace(PLAIN, controlled_frame='nozzle'), NotAvailable,
+     "trajectory.controlled_frame is 'nozzle'"),
+    (replace(PLAIN, path_tolerance=Tolerance(twist=ONE)), NotAvailable,
+     'path_tolerance.twist_error is positive'),
+    (replace(PLAIN, goal_tolerance=Tolerance(acceleration=ONE)), NotAvailable,
+     'goal_tolerance.acceleration_error is positive'),
+    (with_point(TIMED, 1, twist=ONE), NotAvailable, 'trajectory.points[1].twist is not zero'),
+    (with_point(TIMED, 0, acceleration=ONE), NotAvailable,
+     'trajectory.points[0].acceleration is not zero'),
+    # times
+    (with_point(TIMED, 2, time=2.0), InvalidGoal, 'trajectory.points[2].time_from_start is 2 s'),
+    (with_point(TIMED, 1, time=0.5), InvalidGoal, 'trajectory.points[1].time_from_start is 0.5 s'),
+    (with_point(TIMED, 2, time=0.0), InvalidGoal, 'trajectory.points[2].time_from_start is 0 s'),
+    (with_point(PLAIN, 2, time=1.0), InvalidGoal, 'trajectory.points[1].time_from_start is 0 s'),
+    (with_point(TIMED, 0, time=-1.0), InvalidGoal, 'trajectory.points[0].time_from_start is -1 s'),
+    (with_point(TIMED, 2, time=2150.0), InvalidGoal,
+     'trajectory.points[2].time_from_start gives the segment 2148 s'),
+    # speeds
+    (with_segment(TIMED, 1, velocity=0.1), InvalidGoal,
+     'segments[1].velocity is 0.1 in a goal with times'),
+    (with_segment(TIMED, 1, type=TYPE.OPTIMIZED_LINEAR), InvalidGoal,
+     'segments[1].type is OPTIMIZED_LINEAR, which cannot keep the time'),
+    (with_segment(TIMED, 1, type=TYPE.OPTIMIZED_JOINT), InvalidGoal,
+     'segments[1].type is OPTIMIZED_JOINT, which cannot keep the time'),
+    (with_segment(PLAIN, 1, type=TYPE.OPTIMIZED_JOINT, velocity=1.1), InvalidGoal,
+     'segments[1].velocity is 1.1'),
+    (with_segment(PLAIN, 1, type=TYPE.OPTIMIZED_LINEAR, acceleration=2.0), InvalidGoal,
+     'segments[1].acceleration is 2'),
+    # arcs
+    (with_segment(PLAIN, 1, type=TYPE.CIRCULAR), InvalidGoal, 'segments[1].via is missing'),
+    (with_segment(PLAIN, 1, via=VIA), InvalidGoal, 'segments[1].via is set, but the type is AUTO'),
+    (with_segment(PLAIN, 1, via_posture=Posture(names=('elbow_joint',), values=(0.0,))),
+     InvalidGoal, 'segments[1].via_posture is set, but'),
+    (with_segment(PLAIN, 1, type=TYPE.JOINT, arc_mode=ArcMode.FIXED), InvalidGoal,
+     'segments[1].arc_mode is set, but'),
+    (with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.15, 0.0, 0.0))), InvalidGoal,
+     'segments[1].via gives no arc to point 1: the start, the via and the end of the arc lie on'),
+    (with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.1, 0.0, 0.0))), InvalidGoal,
+     'the start and the via of the arc coincide'),
+    (with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.2, 0.0, 0.0))), InvalidGoal,
+     'the via and the end of the arc coincide'),
+    (with_segment(with_point(PLAIN, 1, pose=Pose((0.1, 0.0, 0.0))), 1, **ARC), InvalidGoal,
+     'the start and the end of the arc coincide'),
+    # postures
+    (with_point(PLAIN, 1, posture=Posture(names=('elbow',), values=(0.0,))), InvalidJoints,
+     "trajectory.points[1].posture.posture_joint_names[0] is 'elbow', which is no joint"),
+    (with_point(PLAIN, 1, posture=Posture(names=('elbow_joint',) * 2, values=(0.0, 0.0))),
+     InvalidJoints, "posture_joint_names[1] names 'elbow_joint' for the second time"),
+    (with_point(PLAIN, 1, posture=Posture(names=('elbow_joint',), values=())), InvalidJoints,
+     'trajectory.points[1].posture has 1 joint names and 0 values'),
+    (with_point(PLAIN, 1, posture=Posture(values=(0.0,))), InvalidJoints,
+     'trajectory.points[1].posture has 0 joint names and 1 values'),
+    (with_point(PLAIN, 1, posture=Posture(names=('elbow_joint',), values=(inf,))), InvalidJoints,
+     "posture_joint_values[0] ('elbow_joint') is inf"),
+    (with_segment(PLAIN, 1, **ARC, via_posture=Posture(names=('knee',), values=(0.0,))),
+     InvalidJoints, "segments[1].via_posture.posture_joint_names[0] is 'knee'"),
+    # ways
+    (with_segment(PLAIN, 1, blend_radius=0.11), InvalidGoal,
+     'segments[1].blend_radius is too large: the blends around points 0 and 1 reach 0 mm and 110'),
+    (replace(PLAIN, segments=(Segment(blend_radius=0.06), Segment(blend_radius=0.05), Segment())),
+     InvalidGoal, 'reach 60 mm and 50 mm into a segment of 100.000 mm'),
+    (with_point(TIMED, 1, pose=Pose((0.1, 0.0, 0.0))), InvalidGoal,
+     'trajectory.points[1] is the same as points[0] for 1 s'),
+    (with_point(PLAIN, 1, pose=Pose((0.1, 0.0, 0.0))), InvalidGoal,
+     'trajectory.points[1] is the same as points[0]: there is no way to go'),
+]
+
+
+@pytest.mark.parametrize(('goal', 'error', 'text'), REFUSALS, ids=[r[2][:60] for r in REFUSALS])
+def test_a_wrong_goal_is_refused_by_its_class_with_the_place_in_the_text(goal, error, text):
+    with pytest.raises(error) as caught:
+        check(goal, OPTIONS)
+    assert type(caught.value) is error
+    assert text in str(caught.value)
+    assert str(caught.value).endswith('.')
+
+
+ACCEPTED = {
+    'plain': PLAIN,
+    'timed': TIMED,
+    'first point at time 0': with_point(TIMED, 0, time=0.0),
+    'single point at time 0': Goal(waypoints=(at(0.1),)),
+    'quaternion off by less than the bound': with_point(
+        PLAIN, 1, pose=Pose((0.2, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0009))),
+    'negative quaternion': with_point(PLAIN, 1, pose=Pose((0.2, 0, 0), (0.0, 0.0, 0.0, -1.0))),
+    'young stamp': replace(PLAIN, age=0.9),
+    'stamp ahead': replace(PLAIN, age=-59.0),
+    'primitives ignore a twist': replace(
+        with_point(TIMED, 1, twist=ONE), execution=ExecutionMode.PRIMITIVES),
+    'twist at the last point': with_point(TIMED, 2, twist=ONE),
+    'twist as a speed': with_point(PLAIN, 1, twist=ONE),
+    'arc': with_segment(PLAIN, 1, **ARC),
+    'unset via': with_segment(PLAIN, 1, via=Pose()),
+    'blends that touch': replace(PLAIN, segments=(
+        Segment(blend_radius=0.05), Segment(blend_radius=0.05), Segment())),
+    'blend on the last point is dropped': with_segment(PLAIN, 2, blend_radius=5.0),
+    'tolerances': replace(PLAIN, path_tolerance=Tolerance(
+        position=(0.01, -1.0, 0.0), orientation=(0.1, 0.0, 0.0), twist=(-1.0,) * 6)),
+    'joint move in place': with_segment(
+        with_point(PLAIN, 1, pose=Pose((0.1, 0.0, 0.0))), 1, type=TYPE.JOINT),
+}
+
+
+@pytest.mark.parametrize('goal', ACCEPTED.values(), ids=ACCEPTED)
+def test_a_right_goal_passes(goal):
+    check(goal, OPTIONS)
+
+
+def test_joint_names_carry_the_prefix():
+    options = PlanningOptions(tf_prefix='left_')
+    right = Posture(names=('left_elbow_joint',), values=(1.0,))
+    check(with_point(PLAIN, 1, posture=right), options)
+    with pytest.raises(InvalidJoints, match='left_shoulder_pan_joint'):
+        check(with_point(PLAIN, 1, posture=replace(right, names=('elbow_joint',))), options)
+
+
+def test_every_rule_refuses_some_goal_of_the_table():
+    def refusing(goal):
+        for rule in RULES:
+            try:
+                rule(goal, OPTIONS)
+            except Exception:
+                return rule
+        return None
+
+    assert {refusing(goal) for goal, _, _ in REFUSALS} == set(RULES)
+
+
+numbers = st.floats(allow_nan=True, allow_infinity=True, width=64)
+waypoints = st.builds(
+    Waypoint,
+    time=numbers,
+    pose=st.builds(Pose, st.tuples(numbers, numbers, numbers),
+                   st.tuples(numbers, numbers, numbers, numbers) | st.just((0.0, 0.0, 0.0, 1.0))),
+    twist=st.tuples(*[numbers] * 6),
+    posture=st.builds(Posture, names=st.lists(
+        st.sampled_from(['elbow_joint', 'wrist_1_joint', 'x']), max_size=3).map(tuple),
+        values=st.lists(numbers, max_size=3).map(tuple)))
+segments = st.builds(
+    Segment, type=st.sampled_from(SegmentType), blend_radius=numbers, velocity=numbers,
+    via=st.none() | st.builds(Pose, st.tuples(numbers, numbers, numbers)))
+
+
+@settings(max_examples=150, deadline=None)
+@given(points=st.lists(waypoints, max_size=3), ways=st.lists(segments, max_size=3))
+def test_nonsense_of_any_kind_ends_in_a_refusal_or_passes_but_never_in_another_error(points, ways):
+    try:
+        check(Goal(waypoints=tuple(points), segments=tuple(ways)), OPTIONS)
+    except (InvalidGoal, InvalidJoints):
+        return
+    assert len(points) >= 1
+
+
+@pytest.mark.parametrize(('field', 'value'), [
+    ('linear_velocity', 0.0), ('optimized_velocity', 1.5), ('max_tool_speed', -1.0),
+    ('on_too_fast', 'ignore'), ('on_posture_change', 'maybe'), ('max_points', 0),
+    ('stamp_tolerance', nan)])
+def test_options_out_of_their_range_are_named(field, value):
+    with pytest.raises(ValueError, match=field):
+        PlanningOptions(**{field: value})
