@@ -16,21 +16,26 @@ and stops there with a fault.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf, sqrt
+from math import inf
 from typing import NamedTuple, TypeAlias
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.motion.pose import (
-    conjugate,
     IDENTITY,
-    multiply,
     Pose,
-    rotation_vector_from_quaternion,
     Vector6,
 )
 from ur_cartesian_driver.sim.motion.moves import MotionError, MotionFault, MotionWarning, Move
 from ur_cartesian_driver.sim.motion.paths import Arc, JointLine, Leg, Line, Place
+from ur_cartesian_driver.sim.motion.reach import (
+    is_singular,
+    lead,
+    MAX_JOINT_ACCELERATION,
+    NO_CHANGE,
+    rate_of,
+    Reach,
+    twist_between,
+)
 from ur_cartesian_driver.sim.motion.servo import JointSpeed, JointStop, Servo, ToolSpeed, ToolStop
 from ur_cartesian_driver.sim.motion.track import from_rest, joined, Law, Track
 
@@ -38,30 +43,17 @@ _Motion: TypeAlias = Track | JointSpeed | JointStop | Servo | ToolSpeed | ToolSt
 _Speeding = JointSpeed | Servo | ToolSpeed
 _Stop = JointStop | ToolStop
 
-# Assumptions, the robot's numbers are not published:
-#: What optimove's fractions are of [rad/s^2] and [rad/s^3]; also bounds servoj.
-MAX_JOINT_ACCELERATION = 40.0
-MAX_JOINT_JERK = 400.0
-#: How hard a joint can brake before the end of its range [rad/s^2].
-LIMIT_BRAKING = 10.0
-#: How hard the arm brakes when servoj set-points stay away [rad/s^2].
-SERVO_BRAKING = 15.0
-#: Joint travel per tool travel [rad/m, rad/rad] beyond which the arm counts as singular.
-SINGULAR_RATE = 1000.0
+#: How hard the arm brakes when servoj set-points stay away, or before a path [rad/s^2].
+RUN_OUT_BRAKING = 15.0
 #: Still this long [s]: steady.
 STEADY_AFTER = 0.5
 
 # Cycles are shortened this often before a place counts as out of reach.
 _ATTEMPTS = 12
 _WITHIN = 1.0 + 1e-6
-# Joint changes below this are rounding [rad].
-_NO_CHANGE = 1e-9
-# As near to its limit a joint is the reason why there is no solution [rad].
-_AT_LIMIT = 0.02
 # Blends that touch do not overlap [m].
 _TOUCHING = 1e-9
 _STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-_OPTIMOVE_SAMPLES = 8
 
 # Error codes of waypoints that were skipped, by the kind of move: C171 and its argument.
 _SKIPPED = {'movej': 4, 'optimovej': 4, 'movel': 11, 'optimovel': 11, 'movec': 0, 'movep': 9}
@@ -106,9 +98,9 @@ class MotionGenerator:
         self.fault: MotionFault | None = None
         self.warnings: list[MotionWarning] = []
         self._T_flange_tcp = self._used_tcp = self._T_tcp_flange = IDENTITY
-        self._speeds = arm.model.max_joint_speed
-        self._limits = arm.model.position_limits
-        self._scale = 1.0
+        self._reach = Reach(arm, cycle)
+        #: The scaling that came in, and the one of the last cycle, joint limits included.
+        self._scale = self._rate = 1.0
         self._motion: _Motion | None = None
         self._move: Move | None = None
         #: What waits until the arm stands.
@@ -174,15 +166,15 @@ class MotionGenerator:
 
     def optimovej(self, q: Vector6, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
         """Like movej with limited jerk; a, v fractions in (0, 1] of what the joints can do."""
-        _check_fractions('optimovej', a, v, r)
+        _check_fractions('optimovej', a, v)
         return self._follow('optimovej', self._joint_leg(q),
-                            lambda leg, start: self._optimal(leg, start, a, v), r)
+                            self._optimal(a, v), r)
 
     def optimovel(self, T_base_tcp: Pose, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
         """Like movel with limited jerk; a, v fractions in (0, 1] of what the joints can do."""
-        _check_fractions('optimovel', a, v, r)
+        _check_fractions('optimovel', a, v)
         return self._follow('optimovel', lambda start: Line(start.pose, T_base_tcp),
-                            lambda leg, start: self._optimal(leg, start, a, v), r)
+                            self._optimal(a, v), r)
 
     def servoj(self, q: Vector6, t: float, lookahead_time: float = 0.1,
                gain: float = 300.0) -> Move:
@@ -199,7 +191,7 @@ class MotionGenerator:
                a_rot: float | None = None) -> Move:
         """Change to a tool speed (base axes [m/s, rad/s]) and hold it."""
         motion = self._motion
-        now = motion.twist if isinstance(motion, ToolSpeed) else self._unscaled(self.tcp_twist)
+        now = motion.twist if isinstance(motion, ToolSpeed) else self._unscaled(self._real_twist())
         return self._take_over(ToolSpeed(
             self.T_base_tcp, now, twist, a, a if a_rot is None else a_rot, t))
 
@@ -209,9 +201,8 @@ class MotionGenerator:
 
     def stopl(self, a: float, a_rot: float | None = None) -> Move:
         """Brake along the tool's tangent; in real time."""
-        twist = self.tcp_twist if self._motion is not None else _STILL
         return self._take_over(ToolStop(
-            self.T_base_tcp, twist, a, a if a_rot is None else a_rot))
+            self.T_base_tcp, self._real_twist(), a, a if a_rot is None else a_rot))
 
     def halt_hard(self) -> None:
         """Stay where the target is (the power is cut); a running call returns as aborted."""
@@ -262,80 +253,43 @@ class MotionGenerator:
             if q is None:
                 h *= 0.5
                 continue
-            ratio = self._overspeed(q)
+            ratio = self._reach.overspeed(q, self.q)
             if ratio <= _WITHIN or (ratio < inf and isinstance(motion, JointStop)):
                 motion.accept(state)
+                self._rate = h / self.cycle
                 return q, place
-            if ratio == inf or self._is_singular(q, place):
+            if ratio == inf:
                 break
-            h /= ratio
+            # A jump to another branch does not shrink with the step: creep up to its place.
+            jump = isinstance(place, Pose) and is_singular(self.q, q, self.T_base_tcp, place)
+            h /= 2.0 if jump else ratio
         if isinstance(motion, ToolStop):
             # No straight line left: brake in joint space.
-            stop = self._motion = JointStop(self.q, self.qd, motion.acceleration)
+            stop = self._motion = JointStop(self.q, self._real_joint_speed(), motion.acceleration)
             return self._attempt(stop, self.cycle)
-        self.fault = self._why_not(place)
+        if isinstance(motion, JointStop):
+            self._motion = None
+            self._come_to_rest()
+        self.fault = self._reach.why_not(self.q, self._joints(place))
         return None
 
     def _joints(self, place: Place) -> Vector6 | None:
         if not isinstance(place, Pose):
             return place
-        return nearest(self.arm, place @ self._T_tcp_flange, self.q)
-
-    def _overspeed(self, q: Vector6) -> float:
-        """
-        Return by which factor the way to ``q`` is too long for one cycle; inf: no way.
-
-        A joint may be as fast as its limit says, and no faster than it can still brake before
-        the end of its range: v^2 = 2 a x.
-        """
-        worst = 0.0
-        for new, old, fastest, (low, high) in zip(
-                q, self.q, self._speeds, self._limits, strict=True):
-            way = abs(new - old)
-            if way < _NO_CHANGE:
-                continue
-            room = high - old if new > old else old - low
-            allowed = fastest * self.cycle
-            if 2.0 * LIMIT_BRAKING * room < fastest * fastest:
-                if room <= _NO_CHANGE:
-                    return inf
-                allowed = min(allowed, room, sqrt(2.0 * LIMIT_BRAKING * room) * self.cycle)
-            worst = max(worst, way / allowed)
-        return worst
-
-    def _is_singular(self, q: Vector6, place: Place) -> bool:
-        if not isinstance(place, Pose):
-            return False
-        way = place.distance_to(self.T_base_tcp) + place.angle_to(self.T_base_tcp)
-        return _lead(q, self.q) > SINGULAR_RATE * way
-
-    def _why_not(self, place: Place) -> MotionFault:
-        for i, (q, (low, high)) in enumerate(zip(self.q, self._limits, strict=True)):
-            if q - low < _AT_LIMIT or high - q < _AT_LIMIT:
-                return MotionFault(code=191, argument=1, text=(
-                    f'Joint position limit: joint {i} stands at {q:.4f} rad and would leave '
-                    f'[{low:.4f}, {high:.4f}].'))
-        q_next = self._joints(place)
-        if q_next is None:
-            return MotionFault(code=154, argument=0, text=(
-                'Position in singularity: the path goes on where there is no inverse kinematics '
-                'solution.'))
-        return MotionFault(code=204, argument=7, text=(
-            'Robot approaching singularity: acceleration threshold failed, joint '
-            f'{_leading(q_next, self.q)} would have to turn at once.'))
+        return self._reach.joints(place @ self._T_tcp_flange, self.q)
 
     def _go(self, q: Vector6, place: Place) -> None:
         """Make it the target."""
         pose = place if isinstance(place, Pose) and self._tcp_kept else self._forward(q)
         rate = 1.0 / self.cycle
-        self.tcp_twist = _twist(self.T_base_tcp, pose, rate)
-        qd = _rate(q, self.q, rate)
-        self.qdd = _rate(qd, self.qd, rate)
+        self.tcp_twist = twist_between(self.T_base_tcp, pose, rate)
+        qd = rate_of(q, self.q, rate)
+        self.qdd = rate_of(qd, self.qd, rate)
         self.q, self.qd, self.T_base_tcp = q, qd, pose
-        self._still_for = 0.0 if _lead(qd, _STILL) > _NO_CHANGE else self._still_for + self.cycle
+        self._still_for = 0.0 if lead(qd, _STILL) > NO_CHANGE else self._still_for + self.cycle
 
     def _stand(self) -> None:
-        self.qdd = _rate(_STILL, self.qd, 1.0 / self.cycle)
+        self.qdd = rate_of(_STILL, self.qd, 1.0 / self.cycle)
         self.qd = self.tcp_twist = _STILL
         self._still_for += self.cycle
 
@@ -343,10 +297,11 @@ class MotionGenerator:
         """Let the call return when it may, and what waited for rest begin."""
         move = self._move
         if isinstance(motion, Track):
-            if move is not None and motion.may_return(self.cycle):
-                move.returned = True
+            if motion.may_return(self.cycle):
+                motion.tip.call.returned = True
             if motion.finished:
                 self._motion = None
+                self._come_to_rest()
         elif isinstance(self._motion, _Stop):
             if self._motion.over:
                 self._motion = None
@@ -355,21 +310,23 @@ class MotionGenerator:
             move.returned = True
 
     def _come_to_rest(self) -> None:
-        if self._move is not None:
-            self._move.returned = True
-        if self._then is not None:
-            call, self._then = self._then, None
-            try:
-                self._begin(call)
-            except MotionError as error:
-                self.fault = MotionFault(code=171, argument=0, text=str(error))
+        """End what has come to rest, and begin what waited for that."""
+        if self._then is None:
+            if self._move is not None:
+                self._move.returned = True
+            return
+        call, self._then = self._then, None
+        try:
+            self._begin(call)
+        except MotionError as error:
+            self.fault = MotionFault(code=171, argument=0, text=str(error))
 
     def _run_out(self, motion: JointSpeed | Servo | ToolSpeed) -> _Motion:
         """Brake, because nobody has called again in time."""
         if isinstance(motion, ToolSpeed):
-            return ToolStop(self.T_base_tcp, self.tcp_twist, motion.acceleration,
+            return ToolStop(self.T_base_tcp, self._real_twist(), motion.acceleration,
                             motion.acceleration_rot)
-        a = SERVO_BRAKING if isinstance(motion, Servo) else motion.acceleration
+        a = RUN_OUT_BRAKING if isinstance(motion, Servo) else motion.acceleration
         return JointStop(self.q, self._real_joint_speed(), a)
 
     # -- beginning a motion ------------------------------------------------------------------
@@ -380,6 +337,10 @@ class MotionGenerator:
     def _follow(self, name: str, leg: Callable[[_Start], Leg],
                 law: Law | Callable[[Leg, _Start], Law], radius: float) -> Move:
         chosen = (lambda _leg, _start: law) if isinstance(law, Law) else law
+        if isinstance(law, Law):
+            _check_law(name, law)
+        if not 0.0 <= radius < inf:
+            raise MotionError(f'{name}: the blend radius is {radius:g} m, it must be 0 or more.')
         call = _Call(name, leg, chosen, radius, Move())
         self._begin(call)
         return call.move
@@ -387,13 +348,17 @@ class MotionGenerator:
     def _begin(self, call: _Call) -> None:
         self._skip_overlapping()
         motion = self._motion
-        if isinstance(motion, Track) and motion.tip.radius > 0.0 and motion.tip.call.returned:
-            self._join(motion, call)
+        if isinstance(motion, Track) and motion.tip.call.returned:
+            if self._tcp_kept:
+                self._join(motion, call)
+            else:
+                # A corner is one of two legs of the same point: first to the waypoint.
+                self._move, self._then = call.move, call
         elif motion is None:
             self._set_out(call)
         else:
             # A path begins at rest or in a blend, nowhere else: brake first.
-            self._take_over(JointStop(self.q, self._real_joint_speed(), SERVO_BRAKING))
+            self._take_over(JointStop(self.q, self._real_joint_speed(), RUN_OUT_BRAKING))
             self._move = call.move
             self._then = call
             if self._motion is None:
@@ -413,17 +378,17 @@ class MotionGenerator:
         before = track.tip
         pose = before.leg.pose(before.leg.length)
         q = (before.leg.end if isinstance(before.leg, JointLine) else self._joints(pose)) or self.q
-        if not self._tcp_kept:
-            pose = self._forward(q)
         start = _Start(q, pose)
         leg = call.leg(start)
         law = call.law(leg, start)
         circular = call.name == 'movep' and self._circular
         blended, whole = joined(track, leg, law, call.radius, call.move, circular)
-        if not whole:
+        way = _length(pose, leg)
+        if not whole and call.radius <= 0.0 and way <= before.radius:
             self.warnings.append(MotionWarning(code=197, argument=0, text=(
-                f'{call.name}: no blend around the waypoint before, the arm stops there.')))
-        room = _length(pose, leg) - call.radius - (before.radius if call.radius > 0.0 else 0.0)
+                f'Blend overlap: the waypoint of this {call.name} lies within the blend before '
+                'it, so the arm stops at the waypoint before.')))
+        room = way - call.radius - (before.radius if call.radius > 0.0 else 0.0)
         self._run(track, blended, call, room)
 
     def _run(self, before: Track | None, track: Track, call: _Call, room: float) -> None:
@@ -479,8 +444,27 @@ class MotionGenerator:
     def _tcp_kept(self) -> bool:
         return self._used_tcp is self._T_flange_tcp
 
+    def _optimal(self, a: float, v: float) -> Callable[[Leg, _Start], Law]:
+        def law(leg: Leg, start: _Start) -> Law:
+            return self._reach.fastest(leg, start.q, self._T_tcp_flange, a, v)
+        return law
+
     def _real_joint_speed(self) -> Vector6:
-        return _STILL if self._motion is None else self.qd
+        """Return the joint speed at the end of the last cycle (``qd`` is the mean of it)."""
+        motion = self._motion
+        if motion is None or isinstance(motion, JointStop):
+            return _STILL if motion is None else motion.qd
+        if isinstance(motion, JointSpeed | Servo):
+            return rate_of(motion.qd, _STILL, self._rate)
+        return self.qd
+
+    def _real_twist(self) -> Vector6:
+        motion = self._motion
+        if motion is None or isinstance(motion, ToolStop):
+            return _STILL if motion is None else motion.twist
+        if isinstance(motion, ToolSpeed):
+            return rate_of(motion.twist, _STILL, self._rate)
+        return self.tcp_twist
 
     def _nominal_joint_speed(self) -> Vector6:
         """Return the joint speed as it would be without speed scaling."""
@@ -491,28 +475,7 @@ class MotionGenerator:
     def _unscaled(self, speed: Vector6) -> Vector6:
         if self._motion is None or self._scale <= 0.0:
             return _STILL
-        return _rate(speed, _STILL, 1.0 / self._scale)
-
-    def _optimal(self, leg: Leg, start: _Start, a: float, v: float) -> Law:
-        """Return the fastest law of a leg that no joint minds, times the fractions."""
-        places = [leg.at(leg.length * i / _OPTIMOVE_SAMPLES) for i in range(_OPTIMOVE_SAMPLES + 1)]
-        step = leg.length / _OPTIMOVE_SAMPLES or 1.0
-        q, speed, acceleration = start.q, inf, inf
-        for place in places[1:]:
-            after = place if not isinstance(place, Pose) else nearest(
-                self.arm, place @ self._T_tcp_flange, q)
-            if after is None:
-                break
-            rates = [abs(x - y) / step for x, y in zip(after, q, strict=True)]
-            speed = min([speed, *(limit / rate for limit, rate in zip(
-                self._speeds, rates, strict=True) if rate > 0.0)])
-            acceleration = min([acceleration, *(
-                MAX_JOINT_ACCELERATION / rate for rate in rates if rate > 0.0)])
-            q = after
-        if speed == inf:
-            speed, acceleration = 1.0, 1.0
-        jerk = acceleration * MAX_JOINT_JERK / MAX_JOINT_ACCELERATION
-        return Law(acceleration=a * acceleration, speed=v * speed, jerk=jerk)
+        return rate_of(speed, _STILL, 1.0 / self._scale)
 
 
 def _constant(a: float, v: float, r: float) -> Law:
@@ -521,37 +484,22 @@ def _constant(a: float, v: float, r: float) -> Law:
     return Law(acceleration=a, speed=v, braking=braking)
 
 
-def _check_fractions(name: str, a: float, v: float, r: float) -> None:
+def _check_law(name: str, law: Law) -> None:
+    if not 0.0 <= law.time < inf:
+        raise MotionError(f'{name}: the time is {law.time:g} s, it must be 0 or more.')
+    if law.time > 0.0:
+        return
+    for word, value in (('acceleration', law.acceleration), ('speed', law.speed)):
+        if not 0.0 < value < inf:
+            raise MotionError(f'{name}: the {word} is {value:g}, it must be above 0.')
+
+
+def _check_fractions(name: str, a: float, v: float) -> None:
     for word, value in (('acceleration', a), ('velocity', v)):
         if not 0.0 < value <= 1.0:
             raise MotionError(f'{name}: {word} is {value:g}, it must be a fraction in (0, 1].')
-    if r < 0.0:
-        raise MotionError(f'{name}: the blend radius is {r:g} m, it must not be negative.')
 
 
 def _length(start: Pose, leg: Leg) -> float:
     """Return how far the waypoint is from the start [m]."""
     return start.distance_to(leg.pose(leg.length))
-
-
-def _lead(a: Vector6, b: Vector6) -> float:
-    return max(abs(a[0] - b[0]), abs(a[1] - b[1]), abs(a[2] - b[2]),
-               abs(a[3] - b[3]), abs(a[4] - b[4]), abs(a[5] - b[5]))
-
-
-def _leading(a: Vector6, b: Vector6) -> int:
-    return max(range(6), key=lambda i: abs(a[i] - b[i]))
-
-
-def _rate(a: Vector6, b: Vector6, f: float) -> Vector6:
-    return ((a[0] - b[0]) * f, (a[1] - b[1]) * f, (a[2] - b[2]) * f,
-            (a[3] - b[3]) * f, (a[4] - b[4]) * f, (a[5] - b[5]) * f)
-
-
-def _twist(before: Pose, after: Pose, rate: float) -> Vector6:
-    """Return the mean twist between two poses, base axes."""
-    (ax, ay, az), (bx, by, bz) = before.position, after.position
-    wx, wy, wz = rotation_vector_from_quaternion(
-        multiply(after.quaternion, conjugate(before.quaternion)))
-    return ((bx - ax) * rate, (by - ay) * rate, (bz - az) * rate,
-            wx * rate, wy * rate, wz * rate)

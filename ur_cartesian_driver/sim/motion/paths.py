@@ -28,6 +28,8 @@ from ur_cartesian_driver.sim.motion.moves import MotionError
 
 Place: TypeAlias = Vector6 | Pose
 
+# Legs shorter than this are none, their ends differ by rounding [m, rad].
+_NO_WAY = 1e-9
 # Three points of an arc nearer than this [m], or in line within this sine, make no circle.
 _COINCIDENT = 1e-6
 _COLLINEAR = 1e-6
@@ -76,7 +78,8 @@ class JointLine:
         """Take the leading axis: the one with the longest way."""
         self.start, self.end, self._forward = start, end, forward
         self._way = tuple(b - a for a, b in zip(start, end, strict=True))
-        self.length = max(abs(way) for way in self._way)
+        length = max(abs(way) for way in self._way)
+        self.length = length if length > _NO_WAY else 0.0
 
     def at(self, s: float) -> Vector6:
         """Return the joint positions [rad]."""
@@ -104,7 +107,8 @@ class Line:
         """Measure the way."""
         self.start, self.end = start, end
         self.distance = start.distance_to(end)
-        self.length = max(self.distance, start.angle_to(end))
+        length = max(self.distance, start.angle_to(end))
+        self.length = length if length > _NO_WAY else 0.0
 
     def at(self, s: float) -> Pose:
         """Return T_base_tcp."""
