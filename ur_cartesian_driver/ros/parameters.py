@@ -276,8 +276,8 @@ def settings(values: Mapping[str, Value]) -> Settings:
 def overrides(values: Mapping[str, Value] | Iterable[Parameter] | None) -> list[Parameter]:
     """Return values by name as rclpy wants them."""
     if isinstance(values, Mapping):
-        return [Parameter(name, Parameter.Type.STRING_ARRAY if value == [] else None, value)
-                for name, value in values.items()]  # an empty list would be one of bytes
+        return [Parameter(name, value=[''] if value == [] else value)  # [] would be bytes
+                for name, value in values.items()]
     return list(values or ())
 
 

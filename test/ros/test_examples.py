@@ -1,0 +1,78 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+from math import pi
+
+import pytest
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.planning import check, plan, PlanningOptions
+from ur_cartesian_driver.resources import share_path
+from ur_cartesian_driver.ros.client import load_goal
+from ur_cartesian_driver.ros.convert import goal_from_message
+from ur_cartesian_driver.ros.frames import Frames
+
+FOLDER = share_path() / 'config' / 'examples'
+NAMES = sorted(path.stem for path in FOLDER.glob('*.yaml'))
+HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
+ELBOW = 2
+
+
+def goal_of(name):
+    return goal_from_message(load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0)
+
+
+def planned(name):
+    arm = Arm(robot_model('ur5e'))
+    T_base_tcp = arm.forward(HOME)
+    state = RobotState(timestamp=0.0, actual_q=HOME, target_q=HOME,
+                       actual_tcp_pose=T_base_tcp, target_tcp_pose=T_base_tcp)
+    return plan(goal_of(name), state, arm, PlanningOptions())
+
+
+def kinds(name):
+    return [type(segment.primitive) for segment in planned(name).segments]
+
+
+def test_there_are_examples():
+    assert set(NAMES) >= {'square', 'seam', 'postures'}
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_an_example_passes_all_checks_with_the_default_parameters(name):
+    check(goal_of(name), PlanningOptions())
+    result = planned(name)
+    assert len(result.report) >= len(result.segments)
+    assert not any('slowed' in line for line in result.report)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_an_example_ends_where_it_began(name):
+    result = planned(name)
+    assert result.segments[-1].joints == pytest.approx(HOME, abs=1e-4)
+
+
+def test_the_square_is_20_cm_in_10_s_and_plain():
+    result = planned('square')
+    assert kinds('square') == [MoveL] * 4
+    assert [segment.length for segment in result.segments] == pytest.approx([0.2] * 4)
+    assert result.duration == pytest.approx(10.0)
+    assert not result.goal.segments
+
+
+def test_the_seam_shows_every_kind_of_motion():
+    assert kinds('seam') == [MoveJ, MoveL, MoveL, MoveP, MoveC, MoveP, MoveL, MoveL, MoveJ]
+    assert 14.0 < planned('seam').duration < 20.0
+
+
+def test_the_posture_of_the_seam_is_the_one_of_its_pose():
+    result = planned('seam')
+    assert result.goal.waypoints[0].posture.values == pytest.approx(
+        result.segments[0].joints, abs=1e-3)
+
+
+def test_the_postures_bend_the_elbow_as_asked():
+    elbows = [segment.joints[ELBOW] for segment in planned('postures').segments]
+    assert [elbow > 0.0 for elbow in elbows] == [True, False, False, True]
