@@ -1,0 +1,159 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A driver on a simulated robot, and witnesses of their own: RTDE packets and socket bytes."""
+
+from contextlib import contextmanager
+import socket
+import threading
+
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.driver import Driver, DriverConfig
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.protocol.rtde import DataReceived, RtdeClient
+from ur_cartesian_driver.protocol.trajectory import POINT_SIZE
+
+READY = 10.0
+
+
+class Recording:
+    """What RTDE said: time stamps [s], TCP positions [m], joints [rad] and speeds [rad/s]."""
+
+    def __init__(self):
+        self.rows = []
+
+    @property
+    def time(self):
+        return np.array([row[0] for row in self.rows])
+
+    @property
+    def poses(self):
+        """The actual TCP poses as rotation vectors, (n, 6)."""
+        return np.array([row[1] for row in self.rows])
+
+    @property
+    def positions(self):
+        return self.poses[:, :3]
+
+    @property
+    def joints(self):
+        return np.array([row[2] for row in self.rows])
+
+    @property
+    def moving(self):
+        """A mask: some joint turns."""
+        return np.abs(np.array([row[3] for row in self.rows])).max(axis=1) > 1e-6
+
+    @property
+    def duration(self):
+        """Time from the first to the last packet in motion [s]."""
+        times = self.time[self.moving]
+        return float(times[-1] - times[0])
+
+
+@pytest.fixture
+def record(ur_sim):
+    """Return a context manager that records RTDE through a connection of its own."""
+    @contextmanager
+    def recorder():
+        recording = Recording()
+        end = threading.Event()
+        with socket.create_connection(('127.0.0.1', ur_sim.ports.rtde)) as connection:
+            connection.settimeout(5.0)
+            client = RtdeClient(['timestamp', 'actual_TCP_pose', 'actual_q', 'actual_qd'])
+            connection.sendall(client.start())
+            running = threading.Event()
+
+            def listen():
+                while not end.is_set():
+                    for event in client.feed(connection.recv(65536)):
+                        if isinstance(event, DataReceived):
+                            recording.rows.append(event.values)
+                            running.set()
+                    connection.sendall(client.data_to_send())
+
+            thread = threading.Thread(target=listen)
+            thread.start()
+            try:
+                assert running.wait(5.0)
+                yield recording
+            finally:
+                end.set()
+                thread.join()
+
+    return recorder
+
+
+@pytest.fixture
+def trajectory_bytes(ur_sim, make_driver):
+    """Collect what the robot program received on the trajectory socket."""
+    received = bytearray()
+
+    def take(port, data):
+        if port == make_driver.ports().get('trajectory_port'):
+            received.extend(data)
+
+    ur_sim.on_socket_data = take
+
+    def points():
+        assert len(received) % POINT_SIZE == 0
+        return [bytes(received[i:i + POINT_SIZE]) for i in range(0, len(received), POINT_SIZE)]
+
+    return points
+
+
+class DriverFactory:
+    """Makes drivers for one simulated robot, and closes them."""
+
+    def __init__(self, robot):
+        self._robot = robot
+        self._drivers = []
+
+    def __call__(self, options=None, **settings):
+        config = {
+            'robot_ip': '127.0.0.1', 'ur_type': self._robot.config.model, 'headless_mode': True,
+            'rtde_port': self._robot.ports.rtde, 'primary_port': self._robot.ports.primary,
+            'dashboard_port': self._robot.ports.dashboard, 'reverse_port': 0,
+            'script_sender_port': 0, 'trajectory_port': 0, 'script_command_port': 0,
+            'robot_loop': 'thread'}
+        driver = Driver(DriverConfig(**config | settings),
+                        PlanningOptions(**{'max_tool_speed': 1.0} | (options or {})))
+        self._drivers.append(driver)
+        driver.open()
+        return driver
+
+    def ports(self):
+        return self._drivers[-1].status.ports if self._drivers else {}
+
+    def close(self):
+        for driver in self._drivers:
+            driver.close()
+
+
+@pytest.fixture
+def make_driver(ur_sim):
+    factory = DriverFactory(ur_sim)
+    yield factory
+    factory.close()
+
+
+@pytest.fixture
+def driver(make_driver):
+    made = make_driver()
+    made.wait_ready(READY)
+    return made
+
+
+@pytest.fixture
+def home(driver):
+    """Where the tool stands at first."""
+    pose = driver.state.actual_tcp_pose
+
+    def offset(x=0.0, y=0.0, z=0.0, turned=None):
+        px, py, pz = pose.position
+        q = pose.quaternion if turned is None else turned
+        return Pose((px + x, py + y, pz + z), q)
+
+    return offset
