@@ -25,6 +25,7 @@ def distances(r, waypoint):
     return np.linalg.norm(r.positions - np.array(waypoint.position), axis=1)
 
 
+@pytest.mark.slow
 @few
 @given(directions, directions, st.floats(0.01, 0.05), st.floats(0.05, 0.4),
        st.floats(0.05, 0.4))
@@ -60,6 +61,7 @@ def test_blend_of_straight_lines_returns_at_the_radius_and_stays_in_the_corner(
         assert (np.abs(shares.T @ np.stack([-into, onwards]) - inside) < 1e-9).all()
 
 
+@pytest.mark.slow
 @few
 @given(directions, directions, st.floats(0.01, 0.05), st.floats(0.05, 0.5), st.floats(0.3, 2.0))
 def test_tool_never_jumps_and_its_acceleration_is_bounded_through_a_blend(

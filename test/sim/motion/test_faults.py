@@ -46,6 +46,7 @@ def test_fault_holds_until_it_is_cleared_and_comes_back_on_the_same_path(recorde
     assert r.generator.fault is None
 
 
+@pytest.mark.slow
 def test_line_through_the_wrist_singularity_faults_instead_of_jumping(recorder, shifted):
     # Wrist 2 at zero on the way: the tool turns over its axis of wrist 1.
     r = recorder((0.0, -1.2, 1.6, -0.9, 0.4, 0.0))

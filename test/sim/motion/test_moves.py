@@ -50,6 +50,7 @@ def test_movej_takes_the_time_of_the_closed_formula_and_keeps_a_and_v(recorder, 
     assert not r.generator.moving
 
 
+@pytest.mark.slow
 @few
 @given(ways, turns, st.floats(0.3, 3.0), st.floats(0.05, 0.5))
 def test_movel_is_straight_in_time_and_ends_exactly(recorder, shifted, way, turn, a, v):
@@ -75,6 +76,7 @@ def test_movel_is_straight_in_time_and_ends_exactly(recorder, shifted, way, turn
     assert np.linalg.norm(r.tool_speeds(), axis=1).max() <= v * (1.0 + 1e-6)
 
 
+@pytest.mark.slow
 @few
 @given(st.floats(0.05, 0.1), st.floats(0.5, 5.5), st.integers(0, 1))
 def test_movec_stays_on_its_circle_at_tool_speed(recorder, radius, angle, mode):
@@ -141,6 +143,7 @@ def test_eight_millisecond_cycles_reach_the_same_place(recorder):
     assert r.generator.q == target
 
 
+@pytest.mark.slow
 @few
 @given(ways, st.lists(st.floats(0.0, 1.0), min_size=5, max_size=30))
 def test_speed_scaling_leaves_the_path_unchanged(recorder, shifted, way, scales):

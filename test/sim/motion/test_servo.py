@@ -82,6 +82,7 @@ def test_stopl_brakes_along_the_tangent(recorder, shifted):
     assert r.positions[-1][0] - here[0] == pytest.approx(0.2**2 / 2.0, abs=1e-6)
 
 
+@pytest.mark.slow
 @few
 @given(speeds, st.floats(0.5, 20.0))
 def test_speedj_without_a_time_returns_at_speed(recorder, qd, a):
@@ -157,6 +158,7 @@ def test_servoj_lasts_its_time_divided_by_the_scaling(recorder, scale, t, cycles
     assert r.run(r.generator.servoj(HOME, t), lambda i: scale) == cycles
 
 
+@pytest.mark.slow
 @few
 @given(st.floats(0.03, 0.2), st.floats(100.0, 2000.0))
 def test_servoj_settles_on_its_target_for_all_legal_gains(recorder, lookahead, gain):

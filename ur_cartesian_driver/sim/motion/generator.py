@@ -17,13 +17,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import inf
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.pose import (
     IDENTITY,
     Pose,
     Vector6,
+)
+from ur_cartesian_driver.sim.motion.calls import (
+    Call,
+    check_fractions,
+    check_law,
+    constant_speed,
+    SKIPPED,
+    Start,
 )
 from ur_cartesian_driver.sim.motion.moves import MotionError, MotionFault, MotionWarning, Move
 from ur_cartesian_driver.sim.motion.paths import Arc, JointLine, Leg, Line, Place
@@ -55,26 +63,6 @@ _WITHIN = 1.0 + 1e-6
 _TOUCHING = 1e-9
 _STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
-# Error codes of waypoints that were skipped, by the kind of move: C171 and its argument.
-_SKIPPED = {'movej': 4, 'optimovej': 4, 'movel': 11, 'optimovel': 11, 'movec': 0, 'movep': 9}
-
-
-class _Start(NamedTuple):
-    """Where a leg begins: joint positions [rad], and T_base_tcp."""
-
-    q: Vector6
-    pose: Pose
-
-
-class _Call(NamedTuple):
-    """A call of a path motion, to be resolved where the leg begins."""
-
-    name: str
-    leg: Callable[[_Start], Leg]
-    law: Callable[[Leg, _Start], Law]
-    radius: float
-    move: Move
-
 
 class MotionGenerator:
     """
@@ -104,7 +92,7 @@ class MotionGenerator:
         self._motion: _Motion | None = None
         self._move: Move | None = None
         #: What waits until the arm stands.
-        self._then: _Call | None = None
+        self._then: Call | None = None
         #: Whether the last leg is a movep's.
         self._circular = False
         #: What was before a waypoint that may be skipped.
@@ -152,7 +140,7 @@ class MotionGenerator:
         harder than ``a`` where it has to.
         """
         return self._follow('movep', lambda start: Line(start.pose, T_base_tcp),
-                            _constant(a, v, r), r)
+                            constant_speed(a, v, r), r)
 
     def movec(self, via: Pose, to: Pose, a: float = 1.2, v: float = 0.25, r: float = 0.0,
               mode: int = 0) -> Move:
@@ -166,13 +154,13 @@ class MotionGenerator:
 
     def optimovej(self, q: Vector6, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
         """Like movej with limited jerk; a, v fractions in (0, 1] of what the joints can do."""
-        _check_fractions('optimovej', a, v)
+        check_fractions('optimovej', a, v)
         return self._follow('optimovej', self._joint_leg(q),
                             self._optimal(a, v), r)
 
     def optimovel(self, T_base_tcp: Pose, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
         """Like movel with limited jerk; a, v fractions in (0, 1] of what the joints can do."""
-        _check_fractions('optimovel', a, v)
+        check_fractions('optimovel', a, v)
         return self._follow('optimovel', lambda start: Line(start.pose, T_base_tcp),
                             self._optimal(a, v), r)
 
@@ -331,21 +319,21 @@ class MotionGenerator:
 
     # -- beginning a motion ------------------------------------------------------------------
 
-    def _joint_leg(self, q: Vector6) -> Callable[[_Start], Leg]:
+    def _joint_leg(self, q: Vector6) -> Callable[[Start], Leg]:
         return lambda start: JointLine(start.q, q, self._forward)
 
-    def _follow(self, name: str, leg: Callable[[_Start], Leg],
-                law: Law | Callable[[Leg, _Start], Law], radius: float) -> Move:
+    def _follow(self, name: str, leg: Callable[[Start], Leg],
+                law: Law | Callable[[Leg, Start], Law], radius: float) -> Move:
         chosen = (lambda _leg, _start: law) if isinstance(law, Law) else law
         if isinstance(law, Law):
-            _check_law(name, law)
+            check_law(name, law)
         if not 0.0 <= radius < inf:
             raise MotionError(f'{name}: the blend radius is {radius:g} m, it must be 0 or more.')
-        call = _Call(name, leg, chosen, radius, Move())
+        call = Call(name, leg, chosen, radius, Move())
         self._begin(call)
         return call.move
 
-    def _begin(self, call: _Call) -> None:
+    def _begin(self, call: Call) -> None:
         self._skip_overlapping()
         motion = self._motion
         if isinstance(motion, Track) and motion.tip.call.returned:
@@ -364,21 +352,21 @@ class MotionGenerator:
             if self._motion is None:
                 self._come_to_rest()
 
-    def _set_out(self, call: _Call) -> None:
+    def _set_out(self, call: Call) -> None:
         """Begin from rest."""
         self._use_tcp()
-        start = _Start(self.q, self.T_base_tcp)
+        start = Start(self.q, self.T_base_tcp)
         leg = call.leg(start)
         track = from_rest(leg, call.law(leg, start), call.radius, call.move)
         room = _length(start.pose, leg) - call.radius
         self._run(None, track, call, room)
 
-    def _join(self, track: Track, call: _Call) -> None:
+    def _join(self, track: Track, call: Call) -> None:
         """Go on from a leg whose blend is about to begin or has begun."""
         before = track.tip
         pose = before.leg.pose(before.leg.length)
         q = (before.leg.end if isinstance(before.leg, JointLine) else self._joints(pose)) or self.q
-        start = _Start(q, pose)
+        start = Start(q, pose)
         leg = call.leg(start)
         law = call.law(leg, start)
         circular = call.name == 'movep' and self._circular
@@ -391,7 +379,7 @@ class MotionGenerator:
         room = way - call.radius - (before.radius if call.radius > 0.0 else 0.0)
         self._run(track, blended, call, room)
 
-    def _run(self, before: Track | None, track: Track, call: _Call, room: float) -> None:
+    def _run(self, before: Track | None, track: Track, call: Call, room: float) -> None:
         """
         Follow a track.
 
@@ -412,7 +400,7 @@ class MotionGenerator:
             return
         self._motion, self._circular, name = self._overlapping
         self._overlapping = None
-        self.warnings.append(MotionWarning(code=171, argument=_SKIPPED[name], text=(
+        self.warnings.append(MotionWarning(code=171, argument=SKIPPED[name], text=(
             f'Overlapping blends in a {name}, a waypoint was skipped.')))
 
     def _take_over(self, motion: _Motion) -> Move:
@@ -444,8 +432,8 @@ class MotionGenerator:
     def _tcp_kept(self) -> bool:
         return self._used_tcp is self._T_flange_tcp
 
-    def _optimal(self, a: float, v: float) -> Callable[[Leg, _Start], Law]:
-        def law(leg: Leg, start: _Start) -> Law:
+    def _optimal(self, a: float, v: float) -> Callable[[Leg, Start], Law]:
+        def law(leg: Leg, start: Start) -> Law:
             return self._reach.fastest(leg, start.q, self._T_tcp_flange, a, v)
         return law
 
@@ -476,28 +464,6 @@ class MotionGenerator:
         if self._motion is None or self._scale <= 0.0:
             return _STILL
         return rate_of(speed, _STILL, 1.0 / self._scale)
-
-
-def _constant(a: float, v: float, r: float) -> Law:
-    # To stand in the waypoint without having slowed down before the fillet: v^2 = 2 b r.
-    braking = max(a, v * v / (2.0 * r)) if r > 0.0 else None
-    return Law(acceleration=a, speed=v, braking=braking)
-
-
-def _check_law(name: str, law: Law) -> None:
-    if not 0.0 <= law.time < inf:
-        raise MotionError(f'{name}: the time is {law.time:g} s, it must be 0 or more.')
-    if law.time > 0.0:
-        return
-    for word, value in (('acceleration', law.acceleration), ('speed', law.speed)):
-        if not 0.0 < value < inf:
-            raise MotionError(f'{name}: the {word} is {value:g}, it must be above 0.')
-
-
-def _check_fractions(name: str, a: float, v: float) -> None:
-    for word, value in (('acceleration', a), ('velocity', v)):
-        if not 0.0 < value <= 1.0:
-            raise MotionError(f'{name}: {word} is {value:g}, it must be a fraction in (0, 1].')
 
 
 def _length(start: Pose, leg: Leg) -> float:
