@@ -22,7 +22,7 @@ from ur_cartesian_driver.sim.controller_state import Popup
 
 #: Messages that wait to be sent, and lines that are remembered.
 _KEPT = 10_000
-#: Longest text in a message: a frame must stay below 4092 bytes.
+#: Longest text in a message [bytes]: a frame must stay below 4092.
 _LONGEST = 4000
 
 _POPUP = 2
@@ -55,25 +55,25 @@ class Announcements:
     def text(self, text: str) -> None:
         """Announce a text of a program, or of the controller."""
         self.log.append(text)
-        self.pending.append(TextMessage(timestamp=self._stamp(), text=text[:_LONGEST]))
+        self.pending.append(TextMessage(timestamp=self._stamp(), text=_cut(text)))
 
     def key(self, title: str, text: str) -> None:
         """Announce an event of a program's life."""
         self.pending.append(
-            KeyMessage(timestamp=self._stamp(), title=title, text=text[:_LONGEST]))
+            KeyMessage(timestamp=self._stamp(), title=title, text=_cut(text)))
 
     def exception(self, line: int, column: int, text: str) -> None:
         """Announce why a program does not start, or ended; line and column from 1."""
         self.log.append(f'{line}:{column}: {text}')
         self.pending.append(RuntimeExceptionMessage(
             timestamp=self._stamp(), line=max(0, line), column=max(0, column),
-            text=text[:_LONGEST]))
+            text=_cut(text)))
 
     def error(self, code: int, argument: int, text: str) -> None:
         """Announce an error code; a protective stop, too, is a warning to the controller."""
         message = ErrorCodeMessage(
             timestamp=self._stamp(), code=code, argument=argument, level=ReportLevel.WARNING,
-            text=text[:_LONGEST])
+            text=_cut(text))
         self.log.append(f'{message.label}: {text}')
         self.pending.append(message)
 
@@ -97,3 +97,8 @@ class Announcements:
 
     def _stamp(self) -> int:
         return round(self._now() * 1e6)
+
+
+def _cut(text: str) -> str:
+    """Return as much of a text as a message can hold."""
+    return text if len(text) < _LONGEST // 4 else text.encode()[:_LONGEST].decode(errors='ignore')

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, TYPE_CHECKING
 
-from ur_cartesian_driver.sim.signals import Registers
+from ur_cartesian_driver.sim.signals import BITS, FLOATS, INTEGERS, Registers
 
 if TYPE_CHECKING:
     from ur_cartesian_driver.sim.controller import Controller
@@ -66,17 +66,23 @@ def _write_packed(first: int) -> Write:
     return write
 
 
+def _write_item(values: Callable[[Registers], list[Any]], i: int) -> Write:
+    def write(registers: Registers, value: Any) -> None:
+        values(registers)[i] = value
+    return write
+
+
 def _writers() -> dict[str, Write]:
-    writers: dict[str, Write] = {
+    """Return what writes each input register; values have the types of their recipe already."""
+    return {
         'input_bit_registers0_to_31': _write_packed(0),
         'input_bit_registers32_to_63': _write_packed(32),
+        **{f'input_bit_register_{i}': _write_item(lambda r: r.bits, i) for i in range(64, BITS)},
+        **{f'input_int_register_{i}': _write_item(lambda r: r.integers, i)
+           for i in range(INTEGERS)},
+        **{f'input_double_register_{i}': _write_item(lambda r: r.floats, i)
+           for i in range(FLOATS)},
     }
-    for i in range(64, 128):
-        writers[f'input_bit_register_{i}'] = lambda r, v, i=i: r.bits.__setitem__(i, bool(v))
-    for i in range(48):
-        writers[f'input_int_register_{i}'] = lambda r, v, i=i: r.integers.__setitem__(i, v)
-        writers[f'input_double_register_{i}'] = lambda r, v, i=i: r.floats.__setitem__(i, v)
-    return writers
 
 
 _WRITE: Mapping[str, Write] = _writers()

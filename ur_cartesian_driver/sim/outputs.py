@@ -110,17 +110,19 @@ FIXED: Mapping[str, Any] = MappingProxyType({
 
 
 def _register_getters(prefix: str, of: Callable[[Controller], Registers]) -> dict[str, Getter]:
-    getters: dict[str, Getter] = {
+    """Return what reads each register of one direction."""
+    def item(values: Callable[[Controller], list[Any]], i: int) -> Getter:
+        return lambda controller: values(controller)[i]
+
+    return {
         f'{prefix}_bit_registers0_to_31': lambda c: pack_bits(of(c).bits[:32]),
         f'{prefix}_bit_registers32_to_63': lambda c: pack_bits(of(c).bits[32:64]),
+        **{f'{prefix}_bit_register_{i}': item(lambda c: of(c).bits, i) for i in range(64, BITS)},
+        **{f'{prefix}_int_register_{i}': item(lambda c: of(c).integers, i)
+           for i in range(INTEGERS)},
+        **{f'{prefix}_double_register_{i}': item(lambda c: of(c).floats, i)
+           for i in range(FLOATS)},
     }
-    for i in range(64, BITS):
-        getters[f'{prefix}_bit_register_{i}'] = lambda c, i=i: of(c).bits[i]
-    for i in range(INTEGERS):
-        getters[f'{prefix}_int_register_{i}'] = lambda c, i=i: of(c).integers[i]
-    for i in range(FLOATS):
-        getters[f'{prefix}_double_register_{i}'] = lambda c, i=i: of(c).floats[i]
-    return getters
 
 
 REGISTERS: Mapping[str, Getter] = MappingProxyType({

@@ -134,4 +134,4 @@ def _configuration(controller: Controller) -> ConfigurationData:
     return ConfigurationData(
         position_limits=(a, b, c, d, e, f), motion_limits=(s1, s2, s3, s4, s5, s6),
         a=geometry.a, d=geometry.d, alpha=geometry.alpha, theta=geometry.theta,
-        robot_type=model.wire_type, reserved=(0, 0))
+        robot_type=model.wire_type)

@@ -132,29 +132,31 @@ class SimulatedRobot:
         self.close()
 
     def _run_thread(self, listening: Future[None]) -> None:
-        with contextlib.suppress(asyncio.CancelledError):
+        try:
             asyncio.run(self._serve(listening))
+        except asyncio.CancelledError:
+            pass
+        except OSError as error:
+            if listening.done():
+                raise
+            listening.set_exception(error)
 
     async def run(self, on_listening: Callable[[], None] | None = None) -> None:
         """
         Serve on the running event loop until cancelled.
 
         :param on_listening: called when all ports listen.
+        :raises OSError: a port is taken.
         """
         listening: Future[None] = Future()
         if on_listening is not None:
-            listening.add_done_callback(
-                lambda future: None if future.exception() else on_listening())
+            listening.add_done_callback(lambda _: on_listening())
         await self._serve(listening)
 
     async def _serve(self, listening: Future[None]) -> None:
         self._loop, self._running = asyncio.get_running_loop(), asyncio.current_task()
         try:
-            try:
-                await self._listen()
-            except OSError as error:
-                listening.set_exception(error)
-                return
+            await self._listen()
             listening.set_result(None)
             await self._cycles()
         finally:

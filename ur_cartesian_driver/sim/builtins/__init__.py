@@ -56,5 +56,5 @@ def _refusing(name: str, function: Any) -> Any:
         raise RuntimeException(f'{name} takes time, which a secondary program does not have.')
     # The signature stays that of the function; what counts as a generator must not.
     refuse.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]
-    del refuse.__wrapped__  # type: ignore[attr-defined]
+    del refuse.__wrapped__
     return refuse
