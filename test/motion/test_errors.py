@@ -1,0 +1,93 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Every error a goal can end with has its one code, and keeps its sentence on its way."""
+
+import copy
+import pickle
+
+import pytest
+
+from ur_cartesian_driver.motion.errors import (
+    code_of,
+    CODES,
+    DriverError,
+    ErrorCode,
+    ExecutionEnded,
+    GoalRefused,
+    InvalidGoal,
+    LocalProtocolError,
+    ProtocolError,
+    RemoteProtocolError,
+    TooFast,
+)
+
+SENTENCE = 'points[2]: the wrist centre lies 1.2 m from the shoulder, and the reach is 0.85 m.'
+
+
+def descendants(cls):
+    for child in cls.__subclasses__():
+        yield child
+        yield from descendants(child)
+
+
+ENDS = [*descendants(GoalRefused), *descendants(ExecutionEnded)]
+ALL = [DriverError, *descendants(DriverError)]
+
+
+def make(cls):
+    return cls('points[2]', 'is wrong') if issubclass(cls, InvalidGoal) else cls(SENTENCE)
+
+
+@pytest.mark.parametrize('cls', ENDS, ids=lambda cls: cls.__name__)
+def test_every_way_in_which_a_goal_ends_has_a_code(cls):
+    assert isinstance(CODES[cls], ErrorCode)
+    assert code_of(make(cls)) is CODES[cls]
+
+
+def test_the_table_holds_nothing_else():
+    assert set(CODES) == set(ENDS)
+
+
+def test_every_code_but_success_belongs_to_an_error():
+    assert set(CODES.values()) == set(ErrorCode) - {ErrorCode.SUCCESSFUL}
+
+
+def test_codes_are_distinct_but_for_the_kinds_of_invalid_goal():
+    distinct = [code for cls, code in CODES.items() if InvalidGoal not in cls.__bases__]
+    assert len(distinct) == len(set(distinct))
+    assert {CODES[cls] for cls in descendants(InvalidGoal)} == {ErrorCode.INVALID_GOAL}
+
+
+def test_the_numbers_of_the_original_action_are_kept():
+    assert [ErrorCode(n).name for n in range(0, -7, -1)] == [
+        'SUCCESSFUL', 'INVALID_GOAL', 'INVALID_JOINTS', 'OLD_HEADER_TIMESTAMP',
+        'PATH_TOLERANCE_VIOLATED', 'GOAL_TOLERANCE_VIOLATED', 'INVALID_POSTURE']
+
+
+@pytest.mark.parametrize('cls', [ProtocolError, LocalProtocolError, RemoteProtocolError])
+def test_a_broken_protocol_counts_as_a_lost_connection(cls):
+    assert code_of(cls('three bytes too many: 00 01 02')) is ErrorCode.CONNECTION_LOST
+
+
+@pytest.mark.parametrize('cls', ALL, ids=lambda cls: cls.__name__)
+@pytest.mark.parametrize('travel', [lambda e: pickle.loads(pickle.dumps(e)), copy.copy])
+def test_an_error_keeps_class_and_sentence_on_its_way(cls, travel):
+    error = make(cls)
+    arrived = travel(error)
+    assert type(arrived) is cls
+    assert str(arrived) == str(error) != ''
+
+
+def test_an_invalid_goal_says_where_what_and_what_to_do():
+    error = InvalidGoal('points[2].pose', 'is 3.1 m away, and the bound is 0.5 m', 'go nearer')
+    assert str(error) == 'points[2].pose is 3.1 m away, and the bound is 0.5 m; go nearer.'
+    assert error.field == 'points[2].pose'
+
+
+def test_without_a_remedy_the_sentence_ends_with_the_problem():
+    assert str(TooFast('segments[1]', 'needs 2 m/s')) == 'segments[1] needs 2 m/s.'
+
+
+def test_every_error_is_caught_as_a_driver_error():
+    assert all(issubclass(cls, DriverError) for cls in ENDS)
+    assert not issubclass(GoalRefused, ExecutionEnded)
