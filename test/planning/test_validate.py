@@ -115,7 +115,7 @@ REFUSALS = [
     (with_segment(PLAIN, 1, blend_radius=-0.01), InvalidGoal,
      'segments[1].blend_radius is -0.01'),
     # stamps
-    (replace(PLAIN, age=1.5), OldHeaderTimestamp, 'trajectory.header.stamp lies 1.500 s in the pa'),
+    (replace(PLAIN, age=1.5), OldHeaderTimestamp, 'header.stamp lies 1.500 s in the past'),
     (replace(PLAIN, age=-61.0), InvalidGoal, 'trajectory.header.stamp lies 61.0 s in the future'),
     # not there yet
     (replace(TIMED, execution=ExecutionMode.SPLINE), NotAvailable, 'execution is SPLINE'),

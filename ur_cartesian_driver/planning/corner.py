@@ -72,7 +72,8 @@ class Corner:
     def samples(self) -> int:
         """Into how many pieces to cut it so that chords follow it."""
         start, end = self.first.pose(self.leave), self.second.pose(self.join)
-        turns = ceil((start.angle_to(self.first.end) + self.second.start.angle_to(end))
+        # At its ends the blend turns at twice its mean rate.
+        turns = ceil(2.0 * (start.angle_to(self.first.end) + self.second.start.angle_to(end))
                      / TURN_PER_SAMPLE)
         if self.fillet:
             step = sqrt(8.0 * ARC_CHORD_ERROR / max(self._fillet_radius(), 1e-3))

@@ -290,8 +290,8 @@ class _Planner:
         for k in range(len(legs) - 1):
             first, second = legs[k], legs[k + 1]
             radius = first.segment.blend_radius
-            if radius == 0.0 or not self._can_blend(first, second):
-                continue
+            if radius <= SAME_POSITION or not self._can_blend(first, second):
+                continue  # the wire rounds so small a radius to none
             process = first.kind == second.kind == SegmentType.PROCESS
             corner = Corner.between(first.path, second.path, radius, fillet=process)
             legs[k], legs[k + 1] = replace(first, after=corner), replace(second, before=corner)

@@ -11,7 +11,7 @@ then sent along as ``q_near``.
 
 from __future__ import annotations
 
-from math import ceil, degrees, dist, pi
+from math import ceil, degrees, dist, pi, sin
 from typing import TypeAlias
 
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -41,8 +41,8 @@ _FIRST_ANGLE = 0.2
 #: A step along a path is halved until no joint turns more than this in it [rad] ...
 _STEP = 0.2
 #: ... or it is this short [m], [rad]: a joint that still turns more than _JUMP jumps.
-_LEAST_LENGTH = 0.0005
-_LEAST_ANGLE = 0.25 * pi / 180.0
+_LEAST_LENGTH = 0.0001
+_LEAST_ANGLE = 0.05 * pi / 180.0
 _JUMP = 0.5
 
 #: Places on the way: the path's ``u`` and the joint positions there.
@@ -115,7 +115,7 @@ class Reach:
             pose = path.end if end == 1.0 else path.pose(end)
             q_next = self.nearest(pose, q, where)
             turn = max(abs(b - a) for a, b in zip(q, q_next, strict=True))
-            if turn > _STEP and end - u > least:
+            if (turn > _STEP or _changes_branch(q, q_next)) and end - u > least:
                 ends.append(0.5 * (u + end))
                 continue
             if turn > _JUMP:
@@ -184,6 +184,16 @@ def missed(q: Joints, chosen: Joints, named: dict[int, float]) -> str:
             return (f'{JOINT_NAMES[k]} arrives at {q[k]:.3f} rad, and the solution for the '
                     f'posture has it at {chosen[k]:.3f} rad')
     return ''
+
+
+def _changes_branch(q: Joints, q_next: Joints) -> bool:
+    """
+    Tell whether elbow or wrist 2 change sides.
+
+    Beside a singularity the other branch is the nearer one after a long step, while the arm that
+    goes there in small steps swings round and stays on its own.
+    """
+    return sin(q[2]) * sin(q_next[2]) < 0.0 or sin(q[4]) * sin(q_next[4]) < 0.0
 
 
 def _pieces(path: Path) -> int:

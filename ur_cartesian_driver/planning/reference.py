@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import ceil
 from typing import TypeAlias
 
 import numpy as np
@@ -55,9 +56,9 @@ def _places(leg: Leg, timing: Timing) -> list[float]:
     begin, end = leg.u_before, leg.u_after
     span = max(end - begin, 0.0)
     if isinstance(leg.path, JointLine):  # evenly: preview finds the joint positions by counting
-        n = max(_LEAST_OF_JOINTS, round(leg.path.samples * span))
+        n = max(_LEAST_OF_JOINTS, ceil(leg.path.samples * span))
         return [*(begin + span * k / n for k in range(1, n)), end]
-    n = max(1, round(leg.path.samples * span))
+    n = max(1, ceil(leg.path.samples * span))
     places = {begin + span * k / n for k in range(1, n)}
     places.update(begin + span * f for f in timing.profile.knots())
     return [*sorted(places), end]

@@ -1,0 +1,73 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A plan sampled without a robot."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.preview import sample, table
+
+ARM = Arm(robot_model('ur5e'))
+TOOL = Pose((0.0, 0.0, 0.1))
+Q = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
+HOME = ARM.forward(Q) @ TOOL
+STATE = RobotState(timestamp=0.0, actual_q=Q, actual_tcp_pose=HOME, T_flange_tcp=TOOL)
+
+
+def moved(x, y, z):
+    a, b, c = HOME.position
+    return Pose((a + x, b + y, c + z), HOME.quaternion)
+
+
+def made(*segments):
+    flipped = Posture(names=('elbow_joint',), values=(-1.5,))
+    points = (Waypoint(pose=moved(0.1, 0.0, 0.0)), Waypoint(pose=moved(0.1, 0.2, 0.0)),
+              Waypoint(pose=moved(0.0, 0.2, 0.05), posture=flipped))
+    return plan(Goal(waypoints=points, segments=segments), STATE, ARM, PlanningOptions())
+
+
+PLAN = made(Segment(), Segment(blend_radius=0.02), Segment(type=SegmentType.JOINT))
+
+
+def test_samples_run_from_the_start_to_the_end_at_the_period():
+    preview = sample(PLAN, ARM, TOOL, 0.05)
+    assert np.allclose(np.diff(preview.time)[:-1], 0.05)
+    assert preview.time[-1] == pytest.approx(PLAN.duration)
+    assert np.allclose(preview.poses[0], HOME.row())
+    assert np.allclose(preview.poses[-1][:3], moved(0.0, 0.2, 0.05).position, atol=1e-6)
+    assert preview.poses.shape == (len(preview.time), 7)
+
+
+def test_joints_lead_to_the_poses_without_jumps_also_through_an_elbow_flip():
+    preview = sample(PLAN, ARM, TOOL, 0.01)
+    assert preview.joints.shape == (len(preview.time), 6)
+    for q, pose in zip(preview.joints, preview.poses, strict=True):
+        assert np.allclose((ARM.forward(q) @ TOOL).position, pose[:3], atol=1e-7)
+    assert np.allclose(preview.joints[0], Q)
+    assert np.allclose(preview.joints[-1], PLAN.segments[-1].joints, atol=1e-4)
+    assert preview.joints[-1][2] < 0.0
+    assert np.abs(np.diff(preview.joints, axis=0)).max() < 0.2
+
+
+def test_a_period_that_is_not_positive_is_refused():
+    with pytest.raises(ValueError, match='period'):
+        sample(PLAN, ARM, TOOL, 0.0)
+
+
+def test_the_table_has_a_line_for_each_segment_and_the_sum():
+    lines = table(PLAN).splitlines()
+    assert lines[1].split()[:2] == ['0', 'MoveL']
+    assert '20 mm' in lines[2]
+    assert lines[3].split()[:2] == ['2', 'MoveJ']
+    assert lines[4].split()[0] == 'sum'
+    assert f'{PLAN.duration:.3f} s' in lines[4]
