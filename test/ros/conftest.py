@@ -1,21 +1,187 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Keep the ROS graphs of tests apart: from the network, and from each other."""
+"""A cell to test in: a simulated robot, the node, a client, one executor for both."""
 
-import os
+import contextlib
+import fcntl
+from pathlib import Path
+import tempfile
+import threading
+from time import monotonic
 
 import pytest
+import rclpy
+from rclpy.action import ActionClient
+from rclpy.context import Context
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+
+from ur_cartesian_driver.action import FollowCartesianTrajectory
+from ur_cartesian_driver.driver import ConnectionState
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.msg import CartesianTrajectoryPoint
+from ur_cartesian_driver.ros import CartesianDriverNode
+from ur_cartesian_driver.ros.reports import duration_message, pose_message
+from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 #: Domains that no user is likely to be on; 0 to 101 are allowed everywhere.
-_FIRST_DOMAIN = 60
+DOMAINS = range(60, 100)
+EXECUTORS = {'single': SingleThreadedExecutor, 'multi': MultiThreadedExecutor}
 
 
 @pytest.fixture(scope='session', autouse=True)
 def private_graph(tmp_path_factory):
-    """Give each worker of pytest-xdist a domain of its own, on this computer only."""
-    worker = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw'))
-    with pytest.MonkeyPatch.context() as patch:
+    """Take a ROS domain, on this computer only, that no other running test has."""
+    with contextlib.ExitStack() as stack, pytest.MonkeyPatch.context() as patch:
+        for domain in DOMAINS:
+            path = Path(tempfile.gettempdir(), f'ur_cartesian_driver_test_domain_{domain}')
+            lock = stack.enter_context(path.open('w'))
+            with contextlib.suppress(BlockingIOError):
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
         patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-        patch.setenv('ROS_DOMAIN_ID', str(_FIRST_DOMAIN + worker % 40))
+        patch.setenv('ROS_DOMAIN_ID', str(domain))
         patch.setenv('ROS_LOG_DIR', str(tmp_path_factory.mktemp('ros_log')))
         yield
+
+
+@pytest.fixture
+def no_thread_left():
+    """See to it that a test ends all threads that it starts."""
+    before = set(threading.enumerate())
+    yield
+    deadline = monotonic() + 5.0
+    for thread in ours(before):
+        thread.join(max(0.0, deadline - monotonic()))
+    assert not ours(before)
+
+
+def ours(before):
+    """Return the threads that came since, without the pool that a MultiThreadedExecutor keeps."""
+    return {thread for thread in set(threading.enumerate()) - before
+            if not thread.name.startswith('ThreadPoolExecutor')}
+
+
+def sim_parameters(sim, **more):
+    """Return parameters for a driver of a simulated robot."""
+    own = ('reverse_port', 'script_sender_port', 'trajectory_port', 'script_command_port')
+    return {'rtde_port': sim.ports.rtde, 'primary_port': sim.ports.primary,
+            'dashboard_port': sim.ports.dashboard, **dict.fromkeys(own, 0),
+            'headless_mode': True, 'robot_loop': 'thread', **more}
+
+
+class Cell:
+    """Robot, driver and client, driven by the thread of the test."""
+
+    def __init__(self, sim, executor='single', **parameters):
+        self.sim = sim
+        self.context = Context()
+        rclpy.init(args=[], context=self.context)
+        self.node = CartesianDriverNode(
+            parameter_overrides=sim_parameters(sim, **parameters), context=self.context)
+        self.client_node = rclpy.create_node('client', context=self.context)
+        self.client = ActionClient(self.client_node, FollowCartesianTrajectory,
+                                   '/ur_cartesian_driver/follow_cartesian_trajectory')
+        self.executor = EXECUTORS[executor](context=self.context)
+        self.executor.add_node(self.node)
+        self.executor.add_node(self.client_node)
+        self.feedback = []
+
+    def close(self):
+        if not self.context.ok():
+            return
+        self.client.destroy()
+        self.client_node.destroy_node()
+        self.node.destroy_node()
+        self.executor.shutdown()
+        rclpy.shutdown(context=self.context)
+
+    def spin_until(self, condition, timeout=10.0):
+        deadline = monotonic() + timeout
+        while not (value := condition()):
+            assert monotonic() < deadline, 'it did not happen in time'
+            self.executor.spin_once(timeout_sec=0.02)
+        return value
+
+    def wait_ready(self):
+        self.spin_until(lambda: self.node.driver.status.state is ConnectionState.READY)
+        self.spin_until(self.client.server_is_ready)
+
+    def await_(self, future, timeout=20.0):
+        self.spin_until(future.done, timeout)
+        return future.result()
+
+    def send(self, goal):
+        """Send a goal, return the handle when it is accepted."""
+        handle = self.await_(self.client.send_goal_async(
+            goal, feedback_callback=lambda message: self.feedback.append(message.feedback)))
+        assert handle.accepted
+        return handle
+
+    def result(self, handle):
+        response = self.await_(handle.get_result_async())
+        return response.status, response.result
+
+    def run(self, goal):
+        return self.result(self.send(goal))
+
+    @property
+    def T_base_tcp(self):
+        return self.sim.state().T_base_tcp
+
+    def goal(self, *steps, **fields):
+        """Return a goal of steps (seconds, x, y, z) from where the tool is."""
+        start = self.T_base_tcp
+        message = FollowCartesianTrajectory.Goal(**fields)
+        for time, *offset in steps:
+            position = tuple(a + b for a, b in zip(start.position, offset, strict=True))
+            message.trajectory.points.append(CartesianTrajectoryPoint(
+                time_from_start=duration_message(time),
+                pose=pose_message(Pose(position, start.quaternion))))
+        return message
+
+
+@pytest.fixture
+def parameters_for():
+    """Return a function that returns parameters for a driver of a simulated robot."""
+    return sim_parameters
+
+
+@pytest.fixture
+def sim():
+    with SimulatedRobot(SimulatorConfig(rtde_port=0, primary_port=0, dashboard_port=0)) as robot:
+        yield robot
+
+
+@pytest.fixture(params=list(EXECUTORS))
+def executor(request):
+    return request.param
+
+
+@pytest.fixture
+def make_cell():
+    """Return a function that makes cells, which are closed after the test."""
+    made = []
+
+    def make(*arguments, **parameters):
+        made.append(Cell(*arguments, **parameters))
+        return made[-1]
+
+    yield make
+    for cell in made:
+        cell.close()
+
+
+@pytest.fixture
+def cell(no_thread_left, sim, executor, make_cell):
+    """Return a cell that is ready, with each kind of executor."""
+    made = make_cell(sim, executor)
+    made.wait_ready()
+    return made
+
+
+@pytest.fixture
+def single_cell(no_thread_left, sim, make_cell):
+    """Return a cell that is ready."""
+    made = make_cell(sim)
+    made.wait_ready()
+    return made

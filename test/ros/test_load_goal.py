@@ -9,9 +9,9 @@ from ur_cartesian_driver.ros.client import GoalFileError, load_goal
 
 
 def test_a_goal_reads_as_in_ros2_action_send_goal():
-    goal = load_goal("{trajectory: {header: {frame_id: base}, points: [{time_from_start: "
-                     "{sec: 2}, pose: {position: {x: -0.4, y: 1, z: 1e-3}}, posture: "
-                     "{posture_joint_names: [elbow_joint], posture_joint_values: [1.5]}}]}, "
+    goal = load_goal('{trajectory: {header: {frame_id: base}, points: [{time_from_start: '
+                     '{sec: 2}, pose: {position: {x: -0.4, y: 1, z: 1e-3}}, posture: '
+                     '{posture_joint_names: [elbow_joint], posture_joint_values: [1.5]}}]}, '
                      'segments: [{type: 2}], validate_only: true}')
     point, = goal.trajectory.points
     assert goal.trajectory.header.frame_id == 'base'

@@ -14,8 +14,8 @@ from ur_cartesian_driver.driver import DriverConfig
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.parameters import (
-    declare,
     DECLARATIONS,
+    declare,
     defaults,
     NodeSettings,
     overrides,

@@ -322,6 +322,8 @@ class _DeferringActionServer(ActionServer):
     :meth:`finish`, from whatever thread.
     """
 
+    _destroyed = False
+
     def take_data(self) -> Any:
         """
         Take a request without a garbage collection in between.
@@ -344,9 +346,19 @@ class _DeferringActionServer(ActionServer):
 
     def finish(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:
         """Let the executor call back for the result and send it; from any thread."""
-        if self._node.executor is not None:  # None: nobody is left to send it
-            super().notify_execute(  # type: ignore[no-untyped-call]
-                goal_handle, callback)
+        executor = self._node.executor
+        if executor is not None:  # None: nobody is left to send it
+            # A plain function first: a coroutine that no executor runs any more would complain.
+            executor.create_task(self._hand_over, goal_handle, callback)
+
+    def _hand_over(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:
+        if not self._destroyed:
+            super().notify_execute(goal_handle, callback)  # type: ignore[no-untyped-call]
+
+    def destroy(self) -> None:
+        """Send no more results."""
+        self._destroyed = True
+        super().destroy()  # type: ignore[no-untyped-call]
 
 
 def _key(handle: GoalHandle) -> bytes:

@@ -1,0 +1,182 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+import signal
+import subprocess
+import sys
+import threading
+from time import monotonic
+
+from geometry_msgs.msg import PoseStamped
+import pytest
+import rclpy
+from rclpy.context import Context
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Float64, Int8
+
+from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.msg import DriverStatus
+from ur_cartesian_driver.resources import share_path
+from ur_cartesian_driver.ros import CartesianDriverNode
+from ur_cartesian_driver.ros.client import GoalClient, load_goal
+from ur_cartesian_driver.ros.parameters import ParameterError
+from ur_cartesian_driver.ros.state_publisher import LATCHED, STATE
+
+pytestmark = pytest.mark.slow
+
+TOPICS = {
+    'joint_states': (JointState, STATE),
+    'ur_cartesian_driver/tcp_pose': (PoseStamped, STATE),
+    'ur_cartesian_driver/speed_scaling': (Float64, STATE),
+    'ur_cartesian_driver/robot_mode': (Int8, LATCHED),
+    'ur_cartesian_driver/safety_mode': (Int8, LATCHED),
+    'ur_cartesian_driver/robot_program_running': (Bool, LATCHED),
+    'ur_cartesian_driver/status': (DriverStatus, LATCHED),
+}
+
+
+def subscribe(cell, names):
+    """Return a mapping that fills with the newest message of each topic."""
+    newest = {}
+    for name in names:
+        kind, qos = TOPICS[name]
+        cell.client_node.create_subscription(
+            kind, f'/{name}', lambda message, name=name: newest.update({name: message}), qos)
+    return newest
+
+
+def test_the_state_of_the_robot_is_published(single_cell):
+    cell = single_cell
+    newest = subscribe(cell, TOPICS)
+    cell.spin_until(lambda: len(newest) == len(TOPICS))
+    assert newest['joint_states'].name == list(JOINT_NAMES)
+    assert list(newest['joint_states'].position) == pytest.approx(cell.sim.state().q)
+    pose = newest['ur_cartesian_driver/tcp_pose']
+    assert pose.header.frame_id == 'base'
+    assert pose.pose.position.x == pytest.approx(cell.T_base_tcp.position[0])
+    assert newest['ur_cartesian_driver/speed_scaling'].data == 1.0
+    assert newest['ur_cartesian_driver/robot_mode'].data == 7
+    assert newest['ur_cartesian_driver/safety_mode'].data == 1
+    assert newest['ur_cartesian_driver/robot_program_running'].data
+    status = newest['ur_cartesian_driver/status']
+    assert status.state == DriverStatus.READY
+    assert status.robot_model == 'ur5e'
+
+
+def test_a_protective_stop_is_published(single_cell):
+    cell = single_cell
+    newest = subscribe(cell, ['ur_cartesian_driver/safety_mode', 'ur_cartesian_driver/status'])
+    cell.spin_until(lambda: len(newest) == 2)
+    cell.sim.protective_stop()
+    cell.spin_until(lambda: newest['ur_cartesian_driver/safety_mode'].data == 3)
+    cell.spin_until(lambda: newest['ur_cartesian_driver/status'].state == DriverStatus.STOPPED)
+    assert newest['ur_cartesian_driver/status'].message
+
+
+def test_destroying_the_node_stops_a_running_goal(no_thread_left, sim, executor, make_cell):
+    cell = make_cell(sim, executor)
+    cell.wait_ready()
+    cell.send(cell.goal((5.0, 0.2, 0.2, 0.0)))
+    cell.spin_until(lambda: any(abs(qd) > 0.02 for qd in sim.state().qd))
+    cell.node.destroy_node()
+    assert max(map(abs, sim.state().qd)) < 1e-3
+    assert not any(thread.name.startswith(('goal', 'driver', 'state publisher', 'robot loop'))
+                   for thread in threading.enumerate())
+
+
+def test_a_node_can_be_made_and_destroyed_again(no_thread_left, sim, make_cell):
+    for _ in range(2):
+        cell = make_cell(sim)
+        cell.wait_ready()
+        assert cell.run(cell.goal((0.4, 0.0, 0.01, 0.0)))[1].error_code == 0
+        cell.close()
+
+
+def test_a_node_with_bad_parameters_is_not_made_and_leaves_nothing(no_thread_left):
+    context = Context()
+    rclpy.init(args=[], context=context)
+    with pytest.raises(ParameterError, match="ur_type is 'ur4'"):
+        CartesianDriverNode(parameter_overrides={'ur_type': 'ur4'}, context=context)
+    rclpy.shutdown(context=context)
+
+
+def test_prefix_and_namespace_are_in_all_names(no_thread_left, sim, make_cell):
+    cell = make_cell(sim, tf_prefix='left_')
+    names = []
+    cell.client_node.create_subscription(
+        JointState, '/joint_states', lambda message: names.append(list(message.name)), STATE)
+    cell.spin_until(lambda: names)
+    assert names[0] == [f'left_{name}' for name in JOINT_NAMES]
+
+
+def test_ctrl_c_at_the_client_cancels_the_goal(single_cell):
+    cell = single_cell
+    ended = threading.Event()
+
+    def serve():
+        while not ended.is_set():
+            cell.executor.spin_once(timeout_sec=0.05)
+
+    thread = threading.Thread(target=serve)
+    thread.start()
+    try:
+        with GoalClient() as client:
+            sent = []
+
+            def interrupt(feedback):
+                if not sent and feedback.progress > 0.02:
+                    sent.append(feedback)
+                    signal.raise_signal(signal.SIGINT)
+
+            _, result = client.send(cell.goal((5.0, 0.2, 0.2, 0.0)), interrupt)
+    finally:
+        ended.set()
+        thread.join()
+    assert result.error_code == ErrorCode.CANCELLED
+
+
+def test_a_client_without_a_driver_says_so(no_thread_left):
+    with GoalClient('nobody') as client, \
+            pytest.raises(TimeoutError, match='Nobody serves /nobody/follow_cartesian_trajectory'):
+        client.send(None, timeout=0.1)
+
+
+def command(*arguments):
+    return [sys.executable, '-m', 'ur_cartesian_driver.ros.node', '--ros-args', *arguments]
+
+
+def test_a_signal_ends_the_goal_with_a_result_and_the_command_with_0(
+        sim, parameters_for, tmp_path):
+    arguments = [word for name, value in parameters_for(sim, robot_loop='process').items()
+                 for word in ('-p', f'{name}:={str(value).lower()}')]
+    errors = tmp_path / 'stderr'
+    with errors.open('w') as stderr, subprocess.Popen(command(*arguments), stderr=stderr) as node:
+        try:
+            with GoalClient() as client:
+                goal = load_goal(share_path() / 'config' / 'examples' / 'square.yaml')
+                result = run_when_ready(
+                    client, goal, lambda feedback: node.send_signal(signal.SIGINT))
+            assert node.wait(10.0) == 0
+        finally:
+            node.kill()
+    assert result.error_code == ErrorCode.CANCELLED
+    assert result.error_string.startswith('The driver node is shutting down')
+    assert max(map(abs, sim.state().qd)) < 1e-3
+    assert 'Traceback' not in errors.read_text()
+
+
+def run_when_ready(client, goal, on_feedback):
+    """Send a goal again and again until the driver has connected to its robot."""
+    deadline = monotonic() + 15.0
+    while True:
+        _, result = client.send(goal, on_feedback)
+        if result.error_code != ErrorCode.ROBOT_NOT_READY or monotonic() > deadline:
+            return result
+
+
+def test_the_command_explains_a_bad_parameter_in_one_line():
+    done = subprocess.run(command('-p', 'ur_type:=ur4'), capture_output=True, text=True,
+                          timeout=30.0, check=False)
+    assert done.returncode == 1
+    assert done.stderr.startswith("ur_cartesian_driver: Parameter ur_type is 'ur4'; it is one of")
+    assert done.stderr.count('\n') == 1
