@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import gc
+import itertools
 import json
 from pathlib import Path
 import socket
@@ -161,7 +162,7 @@ def test_every_cycle_is_sent_once_and_the_clock_has_been_running_for_a_while(rob
         times = [struct.unpack('>d', data[4:])[0]
                  for kind, data in (wire.rtde() for _ in range(203)) if kind == ord('U')]
     assert times[0] >= 40.0
-    assert [b - a for a, b in zip(times, times[1:], strict=False)] == pytest.approx([0.002] * 199)
+    assert [b - a for a, b in itertools.pairwise(times)] == pytest.approx([0.002] * 199)
 
 
 def test_a_frequency_is_kept_by_spreading_packages_over_the_cycles(robot):
@@ -169,7 +170,7 @@ def test_a_frequency_is_kept_by_spreading_packages_over_the_cycles(robot):
         wire.send(VERSION_2 + setup_outputs('timestamp', frequency=125.0) + START)
         times = [struct.unpack('>d', data[4:])[0]
                  for kind, data in (wire.rtde() for _ in range(50)) if kind == ord('U')]
-    assert [b - a for a, b in zip(times, times[1:], strict=False)] == pytest.approx(
+    assert [b - a for a, b in itertools.pairwise(times)] == pytest.approx(
         [0.008] * (len(times) - 1))
 
 
@@ -411,7 +412,7 @@ def test_a_script_reads_and_sends_integers_and_notices_a_closed_peer(robot):
     robot.on_socket_data = lambda port, data: received.append((port, data))
     with socket.create_server((HOST, 0)) as server, Primary(robot.ports.primary) as wire:
         port = server.getsockname()[1]
-        wire.send(f'''def echo():
+        wire.send(f"""def echo():
   textmsg(socket_open("{HOST}", {port}, "s"))
   got = socket_read_binary_integer(3, "s", 0)
   textmsg(got)
@@ -419,7 +420,7 @@ def test_a_script_reads_and_sends_integers_and_notices_a_closed_peer(robot):
   textmsg(socket_read_binary_integer(2, "s", 0))
   textmsg(socket_send_int(1, "s"))
 end
-'''.encode())
+""".encode())
         peer, _ = server.accept()
         with peer:
             peer.settimeout(5.0)

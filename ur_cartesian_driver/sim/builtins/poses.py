@@ -31,6 +31,10 @@ class PoseBuiltins:
         """Return the inverse."""
         return script_pose(pose(p_from, 'p_from').inverse())
 
+    def inv(self, m: Value) -> Value:
+        """Return the inverse of a pose or of a matrix."""
+        return self.pose_inv(m) if is_pose(m) else _invert_matrix(m)
+
     def pose_add(self, p_1: Value, p_2: Value) -> ScriptPose:
         """Return the sum of the positions with the rotation R1 R2."""
         a, b = pose(p_1, 'p_1'), pose(p_2, 'p_2')

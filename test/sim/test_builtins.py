@@ -1,0 +1,110 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The functions of a program, by example: each file in `programs` says itself what it does.
+
+`# expect: text` for each text that it writes, in order; `# expect error: text` for the runtime
+exception that ends it, raised on that line.
+"""
+
+import inspect
+import json
+from pathlib import Path
+import re
+
+import pytest
+
+from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.sim.builtins import builtins_of, timeless
+from ur_cartesian_driver.urscript.values import Pose as ScriptPose
+
+HERE = Path(__file__).parent
+PROGRAMS = sorted((HERE / 'programs').glob('*.script'))
+EXPECT = re.compile(r'# expect(?P<error> error)?: (?P<text>.*)')
+GOLDEN = json.loads((HERE / 'golden' / 'pose_math.json').read_text())
+
+#: What the manufacturer's external_control.urscript and the guide to buffered servoj call.
+USED_BY_OTHERS = """
+    get_steptime textmsg str_cat to_str norm pow get_list_length popup sleep sync
+    get_joint_positions get_target_joint_positions get_target_joint_speeds get_actual_tcp_speed
+    get_actual_joint_positions_history get_inverse_kin movej movel movep movec optimovej optimovel
+    servoj speedj speedl stopj stopl direct_torque force_mode force_mode_set_damping
+    force_mode_set_gain_scaling end_force_mode freedrive_mode end_freedrive_mode tool_contact
+    zero_ftsensor set_payload set_target_payload set_gravity set_tool_voltage set_tcp
+    ft_rtde_input_enable enable_external_ft_sensor socket_open socket_close
+    socket_read_binary_integer socket_send_int set_tool_communication
+    end_teach_mode get_actual_joint_positions interpreter_mode is_steady
+    read_input_float_register read_input_integer_register size teach_mode transpose
+    write_output_float_register write_output_integer_register""".split()
+
+
+def echo(sockets, port):
+    """Answer everything with itself."""
+    accepted = sockets.listen(port)
+
+    def poll():
+        for peer in accepted:
+            peer.feed(peer.take())
+    sockets.poll = poll
+
+
+@pytest.mark.parametrize('path', PROGRAMS, ids=[path.stem for path in PROGRAMS])
+def test_the_program_does_what_it_says(bench, path):
+    echo(bench.controller.sockets, 1)
+    text = path.read_text()
+    expected = []
+    for number, line in enumerate(text.splitlines(), 1):
+        if match := EXPECT.search(line):
+            expected.append((number, match['text']) if match['error'] else match['text'])
+    bench.programs.submit(text)
+    bench.until(lambda: bench.programs.state is RuntimeState.STOPPED)
+    assert [as_expected(line) for line in bench.log] == expected
+
+
+def as_expected(line):
+    error = re.fullmatch(r'(\d+):\d+: Runtime error \(\1:\d+\): (.*)', line)
+    return (int(error[1]), error[2]) if error else line
+
+
+def test_every_function_that_well_known_programs_call_exists(bench):
+    assert set(USED_BY_OTHERS) - set(builtins_of(bench.controller)) == set()
+
+
+def test_in_a_secondary_program_no_function_takes_time_and_all_keep_their_parameters(bench):
+    primary = builtins_of(bench.controller)
+    secondary = timeless(primary)
+    assert set(primary) == set(secondary)
+    for name, function in secondary.items():
+        assert not inspect.isgeneratorfunction(function)
+        assert str(inspect.signature(function)) == str(inspect.signature(primary[name]))
+
+
+def value(function, position, item):
+    """Return a golden argument as a program would pass it."""
+    is_vector = isinstance(item, list) and len(item) == 6
+    return ScriptPose(*item) if is_vector else item
+
+
+def rotation(function, numbers):
+    """Return what a result turns by, however it is written."""
+    if function == 'rotvec2rpy':
+        from ur_cartesian_driver.sim.builtins.poses import PoseBuiltins
+        numbers = PoseBuiltins().rpy2rotvec(list(numbers))
+    return Pose((0.0, 0.0, 0.0), quaternion_from_rotation_vector(tuple(numbers[-3:])))
+
+
+@pytest.mark.parametrize('case', GOLDEN['random_cases'] + GOLDEN['manual_cases'],
+                         ids=lambda case: case['function'])
+def test_pose_arithmetic_agrees_with_independent_values(bench, case):
+    function, expected = case['function'], case['expected']
+    arguments = [value(function, i, item) for i, item in enumerate(case['args'])]
+    result = builtins_of(bench.controller)[function](*arguments)
+    tolerance = case.get('tolerance', 1e-6 if case.get('near_pi') else 1e-8)
+    if case.get('near_pi') or case.get('near_gimbal_lock'):
+        assert list(result)[:-3] == pytest.approx(expected[:-3], abs=tolerance)
+        assert rotation(function, result).angle_to(rotation(function, expected)) < 1e-6
+    elif isinstance(expected, list):
+        assert list(result) == pytest.approx(expected, abs=tolerance)
+    else:
+        assert result == pytest.approx(expected, abs=tolerance)
