@@ -59,6 +59,9 @@ STEADY_AFTER = 0.5
 # Cycles are shortened this often before a place counts as out of reach.
 _ATTEMPTS = 12
 _WITHIN = 1.0 + 1e-6
+# The rest of a leg is walked in so many steps, none of which turns a joint by more [rad].
+_WALK = 8
+_JUMP = 0.7
 # Blends that touch do not overlap [m].
 _TOUCHING = 1e-9
 _STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -365,7 +368,12 @@ class MotionGenerator:
         """Go on from a leg whose blend is about to begin or has begun."""
         before = track.tip
         pose = before.leg.pose(before.leg.length)
-        q = (before.leg.end if isinstance(before.leg, JointLine) else self._joints(pose)) or self.q
+        q = self._waypoint_joints(before.leg)
+        if q is None and call.name.endswith('j'):
+            # No joint line begins where the arm cannot come: let it fail on its way there.
+            self._move, self._then = call.move, call
+            return
+        q = q or self.q
         start = Start(q, pose)
         leg = call.leg(start)
         law = call.law(leg, start)
@@ -378,6 +386,20 @@ class MotionGenerator:
                 'it, so the arm stops at the waypoint before.')))
         room = way - call.radius - (before.radius if call.radius > 0.0 else 0.0)
         self._run(track, blended, call, room)
+
+    def _waypoint_joints(self, leg: Leg) -> Vector6 | None:
+        """Return the solution that the arm will have at the end of a leg, or None: a jump."""
+        if isinstance(leg, JointLine):
+            return leg.end
+        here, there = self.T_base_tcp, leg.pose(leg.length)
+        q = self.q
+        for i in range(1, _WALK + 1):
+            pose = here.interpolate(there, i / _WALK)
+            after = self._reach.joints(pose @ self._T_tcp_flange, q)
+            if after is None or lead(after, q) > _JUMP:
+                return None
+            q = after
+        return q
 
     def _run(self, before: Track | None, track: Track, call: Call, room: float) -> None:
         """
