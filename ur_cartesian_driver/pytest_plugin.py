@@ -54,7 +54,7 @@ def cartesian_driver(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyP
     """Yield the driver's node, ready for goals of ``ur_sim``; destroyed afterwards."""
     _keep_to_ourselves(monkeypatch)
     import rclpy
-    from rclpy.parameter import Parameter
+    from rclpy.utilities import get_default_context
 
     from ur_cartesian_driver.ros import CartesianDriverNode
 
@@ -64,12 +64,11 @@ def cartesian_driver(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyP
         'primary_port': ur_sim.ports.primary, 'dashboard_port': ur_sim.ports.dashboard,
         'reverse_port': 0, 'script_sender_port': 0, 'trajectory_port': 0,
         'script_command_port': 0} | _marked(request, 'cartesian_driver')
-    started_here = not rclpy.ok()
+    started_here = not get_default_context().ok()
     if started_here:
         rclpy.init()
     try:
-        node = CartesianDriverNode(parameter_overrides=[
-            Parameter(name, value=value) for name, value in parameters.items()])
+        node = CartesianDriverNode(parameter_overrides=parameters)
         try:
             node.driver.wait_ready(READY_TIMEOUT)
             yield node

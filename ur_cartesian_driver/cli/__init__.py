@@ -19,8 +19,6 @@ from ur_cartesian_driver.cli import commands
 from ur_cartesian_driver.kinematics.robots import MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 
-ACTION = '/ur_cartesian_driver/follow_cartesian_trajectory'
-
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status: 0 only if what was asked for happened."""
@@ -92,7 +90,10 @@ def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
     send = _add(sub, 'send', commands.send, 'send a goal to a running driver and wait for its end')
     send.add_argument(
         'file', help='goal in the YAML of `ros2 action send_goal`; - = standard input')
-    send.add_argument('--action', default=ACTION, help='name of the action')
+    send.add_argument('--driver', default='ur_cartesian_driver',
+                      help='name of the driver node, with its namespace if it has one')
+    send.add_argument('--wait', type=float, default=10.0, metavar='SECONDS',
+                      help='how long the driver may need until it is ready; 0 = do not look')
     send.add_argument('--validate-only', action='store_true', help='plan, but do not move')
     send.add_argument('--record', metavar='FILE', help='write the feedback as JSON lines')
 

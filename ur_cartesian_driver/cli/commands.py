@@ -7,8 +7,10 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
+from math import hypot
 from pathlib import Path
 import sys
+from time import monotonic
 from typing import Any
 
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -70,12 +72,22 @@ def send(arguments: argparse.Namespace) -> int:
     goal = client.load_goal(sys.stdin.read() if arguments.file == '-' else
                             goal_file(arguments.file))
     goal.validate_only = goal.validate_only or arguments.validate_only
-    with Recorder(arguments.record) as recorder:
-        status, result = client.send(goal, recorder.take, action=arguments.action)
-    for line in result.report:
-        print(line)
-    print(f'\r\033[K{status}: {result.error_string}')
+    with Recorder(arguments.record) as recorder, client.GoalClient(arguments.driver) as sender:
+        if arguments.wait > 0.0:
+            sender.wait_ready(arguments.wait)
+        code, result = sender.send(goal, recorder.take)
+    status = client.STATUS_NAMES[code]
+    clear_line()
+    if goal.validate_only:
+        print(*result.report, sep='\n')
+    print(f'{status}: {result.error_string}')
     return 0 if status == 'SUCCEEDED' else 1
+
+
+def clear_line() -> None:
+    """Take back the line of progress on a terminal."""
+    if sys.stdout.isatty():
+        print('\r\033[K', end='')
 
 
 class Recorder:
@@ -85,6 +97,7 @@ class Recorder:
         """Take the file's name, None = no file."""
         self._path = path
         self._file: Any = None
+        self._next_line = 0.0
 
     def __enter__(self) -> Recorder:
         """Open the file."""
@@ -103,27 +116,36 @@ class Recorder:
         line = (f'{100.0 * feedback.progress:5.1f} %  to point {feedback.point_index}  '
                 f'x {position.x:7.3f}  y {position.y:7.3f}  z {position.z:7.3f} m  '
                 f'speed {100.0 * feedback.speed_scaling:3.0f} %')
-        print(f'\r{line}\033[K' if sys.stdout.isatty() else line, end='' if sys.stdout.isatty()
-              else '\n', flush=True)
+        self._show(line)
         if self._file is not None:
             self._file.write(json.dumps({
                 'stamp': feedback.header.stamp.sec + 1e-9 * feedback.header.stamp.nanosec,
                 'point': feedback.point_index, 'progress': feedback.progress,
                 'desired': _position(feedback.desired), 'actual': _position(feedback.actual),
+                'speed': _speed(feedback.actual),
             }) + '\n')
+
+
+    def _show(self, line: str) -> None:
+        """Rewrite one line on a terminal; elsewhere a line a second is enough to follow."""
+        if sys.stdout.isatty():
+            print(f'\r{line}\033[K', end='', flush=True)
+        elif monotonic() >= self._next_line:
+            self._next_line = monotonic() + 1.0
+            print(line, flush=True)
 
 
 def validate(arguments: argparse.Namespace) -> int:
     """Plan a goal from where the arm is said to stand, and print the plan."""
     from ur_cartesian_driver.planning import plan, PlanningOptions
     from ur_cartesian_driver.preview import table
-    from ur_cartesian_driver.ros import client, convert
+    from ur_cartesian_driver.ros import client, convert, frames
 
     arm = Arm(robot_model(arguments.ur_type))
     state = standing_at(arm, arguments.joints or SimulatorConfig().q)
     message = client.load_goal(goal_file(arguments.file))
     try:
-        goal = convert.goal_from_message(message)
+        goal = convert.goal_from_message(message, frames.Frames(), now=0)
         print(table(plan(goal, state, arm,
                          PlanningOptions(max_tool_speed=arguments.max_tool_speed))))
     except GoalRefused as refusal:
@@ -179,6 +201,11 @@ def goal_file(name: str) -> Path:
 def _position(point: Any) -> list[float]:
     position = point.pose.position
     return [position.x, position.y, position.z]
+
+
+def _speed(point: Any) -> float:
+    linear = point.twist.linear
+    return hypot(linear.x, linear.y, linear.z)
 
 
 def _pose_text(pose: Pose) -> str:

@@ -6,16 +6,19 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
+
+Floats: TypeAlias = NDArray[np.float64]
 
 
 def draw(record: Path, drawing: Path, title: str) -> None:
     """
     Draw recorded feedback.
 
-    :param record: JSON lines with ``stamp``, ``progress``, ``desired`` and ``actual`` [m].
+    :param record: JSON lines with ``stamp`` [s], ``desired`` and ``actual`` [m], ``speed`` [m/s].
     :param drawing: the picture; its suffix decides the format.
     :raises OSError: matplotlib is not installed, or the file cannot be written.
     """
@@ -33,24 +36,23 @@ def draw(record: Path, drawing: Path, title: str) -> None:
     figure = pyplot.figure(figsize=(11.0, 5.0), layout='constrained')
     figure.suptitle(title)
     _path(figure.add_subplot(1, 2, 1, projection='3d'), planned, actual)
-    _over_time(figure, time, planned, actual)
+    off = 1000.0 * np.linalg.norm(planned - actual, axis=1)
+    _over_time(figure, time, np.array([row['speed'] for row in rows]), off)
     figure.savefig(drawing, dpi=110)
     pyplot.close(figure)
 
 
-def _path(axes: Any, planned: np.ndarray, actual: np.ndarray) -> None:
+def _path(axes: Any, planned: Floats, actual: Floats) -> None:
     axes.plot(*planned.T, color='tab:gray', linewidth=4.0, alpha=0.5, label='planned')
     axes.plot(*actual.T, color='tab:red', linewidth=1.2, label='executed')
     axes.scatter(*actual[0], color='tab:green', label='start')
     axes.set(xlabel='x [m]', ylabel='y [m]', zlabel='z [m]')
+    axes.yaxis.labelpad = 14.0
     axes.set_aspect('equal')
     axes.legend(loc='upper left')
 
 
-def _over_time(figure: Any, time: np.ndarray, planned: np.ndarray, actual: np.ndarray) -> None:
-    speed = np.linalg.norm(np.gradient(actual, axis=0), axis=1) / np.maximum(
-        np.gradient(time), 1e-6)
-    off = 1000.0 * np.linalg.norm(planned - actual, axis=1)
+def _over_time(figure: Any, time: Floats, speed: Floats, off: Floats) -> None:
     upper, lower = figure.add_subplot(2, 2, 2), figure.add_subplot(2, 2, 4)
     upper.plot(time, speed, color='tab:blue')
     upper.set(ylabel='tool speed [m/s]')

@@ -51,7 +51,7 @@ class ProcessHost:
         descriptor = snapshot.create()
         try:
             self._process = subprocess.Popen(
-                [sys.executable, '-m', __name__, str(theirs.fileno()), str(descriptor)],
+                [sys.executable, '-m', __package__, str(theirs.fileno()), str(descriptor)],
                 pass_fds=(theirs.fileno(), descriptor), env=_environment(),
                 stdin=subprocess.DEVNULL,
                 # Ctrl-C is for the owner, which then ends us in order.
@@ -114,7 +114,3 @@ def main() -> None:
     pipe, descriptor = (int(argument) for argument in sys.argv[1:])
     with socket.socket(fileno=pipe) as connection:
         asyncio.run(serve(connection, descriptor))
-
-
-if __name__ == '__main__':
-    main()

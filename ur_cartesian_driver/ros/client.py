@@ -25,6 +25,7 @@ import rclpy
 from rclpy.action.client import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosidl_parser.definition import (  # type: ignore[import-untyped]
     AbstractSequence,
     AbstractString,
@@ -35,6 +36,7 @@ from rosidl_parser.definition import (  # type: ignore[import-untyped]
 import yaml
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
+from ur_cartesian_driver.msg import DriverStatus
 
 Message: TypeAlias = Any
 
@@ -148,7 +150,8 @@ class GoalClient:
 
         :param driver: name of the driver's node, with its namespace if it has one.
         """
-        self.action = f'/{driver.strip("/")}/follow_cartesian_trajectory'
+        self._driver = f'/{driver.strip("/")}'
+        self.action = f'{self._driver}/follow_cartesian_trajectory'
         # A context of its own leaves signals alone: after Ctrl-C a goal can still be cancelled.
         self._context = Context()
         rclpy.init(args=[], context=self._context)
@@ -205,6 +208,27 @@ class GoalClient:
 
             response = self._spin_until(handle.get_result_async(), cancel_once)
         return response.status, response.result
+
+    def wait_ready(self, timeout: float) -> None:
+        """
+        Wait until the driver says on its status topic that a goal can run.
+
+        :raises TimeoutError: it takes longer than ``timeout`` [s]; the text says what is needed.
+        """
+        latest: list[DriverStatus] = []
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        subscription = self._node.create_subscription(
+            DriverStatus, f'{self._driver}/status', latest.append, latched)
+        try:
+            deadline = monotonic() + timeout
+            while not latest or latest[-1].state < DriverStatus.READY:
+                if monotonic() > deadline:
+                    needed = latest[-1].message if latest else 'Its status does not come.'
+                    raise TimeoutError(
+                        f'The driver {self._driver} is not ready after {timeout:g} s: {needed}')
+                self._executor.spin_once(timeout_sec=0.1)
+        finally:
+            self._node.destroy_subscription(subscription)
 
     def _find_server(self, timeout: float) -> None:
         if not self._client.wait_for_server(timeout_sec=timeout):

@@ -1,0 +1,7 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""``python -m ur_cartesian_driver.driver``: the robot loop of a driver in another process."""
+
+from ur_cartesian_driver.driver.host import main
+
+main()
