@@ -62,6 +62,8 @@ _WITHIN = 1.0 + 1e-6
 # The rest of a leg is walked in so many steps, none of which turns a joint by more [rad].
 _WALK = 8
 _JUMP = 0.7
+# A joint line does not begin where the tool's path before it ends if it is so much too fast.
+_JUMP_RATIO = 50.0
 # Blends that touch do not overlap [m].
 _TOUCHING = 1e-9
 _STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -94,6 +96,8 @@ class MotionGenerator:
         self._scale = self._rate = 1.0
         self._motion: _Motion | None = None
         self._move: Move | None = None
+        #: Whether the last place was a pose, solved by inverse kinematics.
+        self._on_tool_path = False
         #: What waits until the arm stands.
         self._then: Call | None = None
         #: Whether the last leg is a movep's.
@@ -248,11 +252,13 @@ class MotionGenerator:
             if ratio <= _WITHIN or (ratio < inf and isinstance(motion, JointStop)):
                 motion.accept(state)
                 self._rate = h / self.cycle
+                self._on_tool_path = isinstance(place, Pose)
                 return q, place
             if ratio == inf:
                 break
             # A jump to another branch does not shrink with the step: creep up to its place.
-            jump = isinstance(place, Pose) and is_singular(self.q, q, self.T_base_tcp, place)
+            jump = is_singular(self.q, q, self.T_base_tcp, place) if isinstance(
+                place, Pose) else self._on_tool_path and ratio > _JUMP_RATIO
             h /= 2.0 if jump else ratio
         if isinstance(motion, ToolStop):
             # No straight line left: brake in joint space.
