@@ -6,12 +6,14 @@ import sys
 import threading
 from time import monotonic
 
+from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import PoseStamped
 import pytest
 import rclpy
 from rclpy.context import Context
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Int8
+from std_srvs.srv import Trigger
 
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -24,6 +26,7 @@ from ur_cartesian_driver.ros.state_publisher import LATCHED, STATE
 
 pytestmark = pytest.mark.slow
 
+ABORTED = GoalStatus.STATUS_ABORTED
 TOPICS = {
     'joint_states': (JointState, STATE),
     'ur_cartesian_driver/tcp_pose': (PoseStamped, STATE),
@@ -71,6 +74,18 @@ def test_a_protective_stop_is_published(single_cell):
     cell.spin_until(lambda: newest['ur_cartesian_driver/safety_mode'].data == 3)
     cell.spin_until(lambda: newest['ur_cartesian_driver/status'].state == DriverStatus.STOPPED)
     assert newest['ur_cartesian_driver/status'].message
+
+
+def test_a_stopped_robot_program_comes_back_when_it_is_asked_for(single_cell):
+    cell = single_cell
+    resend = cell.client_node.create_client(Trigger, '/ur_cartesian_driver/resend_robot_program')
+    cell.sim.stop_program()
+    cell.spin_until(lambda: not cell.node.driver.status.program_running)
+    status, result = cell.run(cell.goal((0.4, 0.0, 0.01, 0.0)))
+    assert (status, result.error_code) == (ABORTED, ErrorCode.ROBOT_NOT_READY)
+    assert cell.await_(resend.call_async(Trigger.Request())).success
+    cell.wait_ready()
+    assert cell.run(cell.goal((0.4, 0.0, 0.01, 0.0)))[1].error_code == 0
 
 
 def test_destroying_the_node_stops_a_running_goal(no_thread_left, sim, executor, make_cell):
