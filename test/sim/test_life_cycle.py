@@ -329,3 +329,15 @@ def test_the_same_inputs_give_the_same_states(make_bench):
             states.append(bench.controller.motion.q)
         return states
     assert trace() == trace()
+
+
+def test_a_cb3_arm_moves_in_steps_of_8_ms(make_bench):
+    bench = make_bench(model='ur5')
+    taken = _time_of(bench, LONG_LINE.replace('a=0.5, v=0.1', 't=1') + '\ntextmsg(get_steptime())')
+    assert bench.log == ['0.008']
+    assert taken == pytest.approx(1.0, abs=0.033)
+
+
+def test_windows_that_nobody_waits_for_do_not_pile_up(bench):
+    bench.run('i = 0\nwhile i < 150:\n  popup("again")\n  i = i + 1\nend')
+    assert len(bench.controller.popups) == 100

@@ -48,6 +48,7 @@ START_TIME = 60.0
 #: protective stop. A real robot's are not published.
 SLIDER_TIME, PROTECTIVE_STOP_TIME = 0.25, 0.1
 _HISTORY = 100
+_MOST_POPUPS = 100
 
 
 class Controller:
@@ -276,8 +277,9 @@ class Controller:
         self.watchdogs.watch(variable, frequency, action, self.time)
 
     def show_popup(self, popup: Popup) -> None:
-        """Show a window."""
-        self.popups.append(popup)
+        """Show a window; one that nobody waits for is not kept when there are many already."""
+        if popup.blocking or len(self.popups) < _MOST_POPUPS:
+            self.popups.append(popup)
         self.announcements.popup(popup)
 
     def close_popups(self) -> None:

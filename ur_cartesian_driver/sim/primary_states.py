@@ -54,7 +54,7 @@ class PrimaryStream:
         self._constant = (_kinematics(controller), _configuration(controller))
         self._every = max(1, round(1.0 / (STATE_RATE * controller.cycle)))
 
-    def frames(self, listeners: bool = True) -> Iterator[bytes]:
+    def frames(self, listeners: bool) -> Iterator[bytes]:
         """
         Yield the frames of this cycle.
 

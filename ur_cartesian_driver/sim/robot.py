@@ -181,7 +181,7 @@ class SimulatedRobot:
             for session, connection in self._rtde.sessions:
                 for package in session.packages():
                     connection.write(package)
-            for frame in stream.frames():
+            for frame in stream.frames(listeners=bool(self._primary.connections)):
                 self._primary.broadcast(frame)
 
     def _on_socket_data(self, port: int, data: bytes) -> None:

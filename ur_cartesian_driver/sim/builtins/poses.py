@@ -15,9 +15,19 @@ from ur_cartesian_driver.motion.pose import (
     rotation_from_quaternion,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.sim.builtins.arguments import number, pose, script_pose, six, three
+from ur_cartesian_driver.sim.builtins.arguments import (
+    is_pose,
+    number,
+    pose,
+    script_pose,
+    six,
+    three,
+)
+from ur_cartesian_driver.urscript import core_builtins
 from ur_cartesian_driver.urscript.values import Pose as ScriptPose
 from ur_cartesian_driver.urscript.values import Value
+
+_invert_matrix = core_builtins()['inv']
 
 
 class PoseBuiltins:
