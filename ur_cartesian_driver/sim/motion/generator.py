@@ -62,6 +62,9 @@ _WITHIN = 1.0 + 1e-6
 # The rest of a leg is walked in so many steps, none of which turns a joint by more [rad].
 _WALK = 8
 _JUMP = 0.7
+# A tool motion at less than this part of its speed for so long [s] has met a wall.
+_STALLED = 0.01
+_STALLED_AFTER = 1.0
 # A joint line does not begin where the tool's path before it ends if it is so much too fast.
 _JUMP_RATIO = 50.0
 # Blends that touch do not overlap [m].
@@ -98,6 +101,7 @@ class MotionGenerator:
         self._move: Move | None = None
         #: Whether the last place was a pose, solved by inverse kinematics.
         self._on_tool_path = False
+        self._stalled_for = 0.0
         #: What waits until the arm stands.
         self._then: Call | None = None
         #: Whether the last leg is a movep's.
@@ -207,7 +211,7 @@ class MotionGenerator:
 
     def clear_fault(self) -> None:
         """Allow motion again; the call that failed goes on from where the arm stands."""
-        self.fault = None
+        self.fault, self._stalled_for = None, 0.0
 
     def teleport(self, q: Vector6) -> None:
         """Stand at ``q`` [rad] without having moved there."""
@@ -242,6 +246,7 @@ class MotionGenerator:
     def _attempt(self, motion: _Motion, h: float) -> tuple[Vector6, Place] | None:
         """Advance by ``h`` seconds or as far as the joints can follow; None: not at all."""
         place: Place = self.q
+        requested = h
         for _ in range(_ATTEMPTS):
             place, state = motion.preview(h)
             q = self._joints(place)
@@ -250,6 +255,8 @@ class MotionGenerator:
                 continue
             ratio = self._reach.overspeed(q, self.q)
             if ratio <= _WITHIN or (ratio < inf and isinstance(motion, JointStop)):
+                if self._stalls(place, h, requested):
+                    break
                 motion.accept(state)
                 self._rate = h / self.cycle
                 self._on_tool_path = isinstance(place, Pose)
@@ -269,6 +276,12 @@ class MotionGenerator:
             self._come_to_rest()
         self.fault = self._reach.why_not(self.q, self._joints(place))
         return None
+
+    def _stalls(self, place: Place, h: float, requested: float) -> bool:
+        """Return whether a tool motion has hardly come on for a while: it never will."""
+        slow = isinstance(place, Pose) and h < _STALLED * requested
+        self._stalled_for = self._stalled_for + self.cycle if slow else 0.0
+        return self._stalled_for > _STALLED_AFTER
 
     def _joints(self, place: Place) -> Vector6 | None:
         if not isinstance(place, Pose):
