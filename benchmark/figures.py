@@ -1,0 +1,122 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a benchmark reports, how it is printed, and how a function's time is taken."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
+import gc
+import json
+from math import floor, isnan, log10
+import os
+import platform
+from time import perf_counter, strftime
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Figure:
+    """One measured value, beside a baseline of the same run where there is one."""
+
+    benchmark: str
+    name: str
+    value: float
+    unit: str
+    baseline: float | None = None
+    #: What the baseline is.
+    than: str = ''
+    #: How it was measured, in a few words.
+    note: str = ''
+
+    @property
+    def ratio(self) -> float | None:
+        """Value over baseline."""
+        return self.value / self.baseline if self.baseline else None
+
+
+def table(figures: Iterable[Figure]) -> str:
+    """Return lines of text: a heading for each benchmark, a line for each figure."""
+    lines: list[str] = []
+    heading = ''
+    for figure in figures:
+        if figure.benchmark != heading:
+            heading = figure.benchmark
+            lines += ['', heading]
+        lines.append(_line(figure))
+    return '\n'.join(lines)
+
+
+def _line(figure: Figure) -> str:
+    text = f'  {figure.name:<46} {_short(figure.value):>9} {figure.unit:<5}'
+    if figure.baseline is not None:
+        times = '' if figure.ratio is None else f'x {_short(figure.ratio)} of '
+        text += f' {times}{_short(figure.baseline)} ({figure.than})'
+    return f'{text}  {figure.note}'.rstrip()
+
+
+def _short(value: float) -> str:
+    """Return three significant digits, never an exponent."""
+    if isnan(value):
+        return '-'
+    if value == 0.0:
+        return '0'
+    digits = max(0, 2 - floor(log10(abs(value))))
+    return f'{value:,.{digits}f}'
+
+
+def as_json(figures: Sequence[Figure]) -> str:
+    """Return figures and machine as JSON."""
+    return json.dumps({'machine': machine(),
+                       'figures': [asdict(f) | {'ratio': f.ratio} for f in figures]}, indent=2)
+
+
+def machine() -> dict[str, object]:
+    """Return what the figures depend on."""
+    return {'date': strftime('%Y-%m-%d'), 'python': platform.python_version(),
+            'system': platform.platform(), 'cores': len(os.sched_getaffinity(0)),
+            'load': os.getloadavg()[0]}
+
+
+def percentile(values: Sequence[float], percent: float) -> float:
+    """Return the value that ``percent`` of all do not exceed (nearest rank); NaN of none."""
+    ordered = sorted(values)
+    if not ordered:
+        return float('nan')
+    return ordered[min(len(ordered) - 1, int(percent / 100.0 * len(ordered)))]
+
+
+def median(values: Sequence[float]) -> float:
+    """Return the middle value; NaN of none."""
+    return percentile(values, 50.0)
+
+
+def seconds(function: Callable[[], object], repeat: int = 5) -> float:
+    """Return the shortest time of some calls [s]: other processes can only make it longer."""
+    times = []
+    for _ in range(repeat):
+        start = perf_counter()
+        function()
+        times.append(perf_counter() - start)
+    return min(times)
+
+
+def seconds_each(function: Callable[[], object], budget: float = 0.2) -> float:
+    """
+    Return the time of a short call [s], as part of a loop of about ``budget`` [s].
+
+    The collector is off, so that the objects of one benchmark are not counted in another.
+    """
+    once = max(seconds(function, 3), 1e-9)
+    number = max(1, int(budget / 5 / once))
+
+    def loop() -> None:
+        for _ in range(number):
+            function()
+
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        return seconds(loop) / number
+    finally:
+        if enabled:
+            gc.enable()

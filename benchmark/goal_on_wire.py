@@ -1,0 +1,125 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How fast the driver reacts: goal to first byte on the wire, cancel request to CANCEL on the wire.
+
+Simulator, relay and driver node are processes of their own, the client is here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from figures import Figure, median, percentile, seconds
+import paths
+from processes import Child, node, simulator
+from ros_client import goal_message, TimedClient
+from wire_tap import Mark, wire_tap
+
+from ur_cartesian_driver.driver import channel
+from ur_cartesian_driver.driver.api import order_of
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.protocol.reverse import TrajectoryAction
+from ur_cartesian_driver.protocol.trajectory import encode_points
+from ur_cartesian_driver.ros.convert import goal_from_message
+from ur_cartesian_driver.ros.frames import Frames
+
+POINTS = 1_000
+#: How long each goal moves before it is cancelled [s].
+MOVING = 0.4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Times:
+    """When things happened to one goal [ns]."""
+
+    sent: int
+    accepted: int
+    first_point: int
+    cancel_requested: int
+    cancel_on_wire: int
+
+
+def run(quick: bool) -> Iterator[Figure]:
+    """Send the same goal a few times and cancel it each time."""
+    with simulator() as robot, wire_tap() as (tap, parameters), node(robot, **parameters), \
+            TimedClient() as client:
+        message = goal_message(POINTS)
+        goals = [_one_goal(client, tap, message) for _ in range(4 if quick else 12)]
+    # The first goal finds everything cold (imports, caches): said apart.
+    yield from _goal_figures(goals)
+    yield from _breakdown([_ms(g.accepted, g.first_point) for g in goals[1:]])
+    yield from _cancel_figures(goals)
+
+
+def _one_goal(client: TimedClient, tap: Child, message: object) -> Times:
+    import time
+
+    tap.call('marks')
+    sent = time.monotonic_ns()
+    handle, accepted = client.wait(client.send(message))
+    client.spin(MOVING)
+    cancel_requested = client.cancelled(handle)
+    marks: list[Mark] = tap.call('marks')
+    client.spin(0.2)
+    return Times(
+        sent=sent, accepted=accepted, cancel_requested=cancel_requested,
+        first_point=next(m.time for m in marks if m.port == 'trajectory_port'),
+        cancel_on_wire=next(m.time for m in marks if m.is_trajectory_action
+                            and m.action == TrajectoryAction.CANCEL))
+
+
+def _goal_figures(goals: Sequence[Times]) -> Iterator[Figure]:
+    name = f'goal of {POINTS:,} points'
+    warm = goals[1:]
+    times = [_ms(g.accepted, g.first_point) for g in warm]
+    yield Figure(benchmark=name, name='accepted -> first point on the wire, p50',
+                 value=median(times), unit='ms',
+                 baseline=median([_ms(g.sent, g.accepted) for g in warm]),
+                 than='ROS: sent -> accepted', note=f'{len(warm)} goals')
+    yield Figure(benchmark=name, name='the same, slowest', value=max(times), unit='ms')
+    yield Figure(benchmark=name, name='the same, first goal of the node',
+                 value=_ms(goals[0].accepted, goals[0].first_point), unit='ms')
+
+
+def _breakdown(totals: Sequence[float]) -> Iterator[Figure]:
+    """Time the steps of the same goal here; what is left is threads, pipe and network."""
+    name, total = 'its parts, timed one by one', median(totals)
+    message, frames = goal_message(POINTS), Frames()
+    arm = Arm(robot_model(paths.MODEL))
+    state, options = paths.at_home(arm), PlanningOptions()
+    goal = goal_from_message(message, frames, now=0)
+    planned = plan(goal, state, arm, options)
+    points = encode_points(s.primitive for s in planned.segments)
+
+    def handed_over() -> object:
+        request = channel.StartMotion(motion=1, order=order_of(planned), points=points)
+        return channel.unpack(channel.pack(request)[channel.LENGTH.size:])
+
+    left = total
+    for part, step in (
+            ('conversion', lambda: goal_from_message(message, frames, now=0)),
+            ('planning', lambda: plan(goal, state, arm, options)),
+            ('encoding', lambda: encode_points(s.primitive for s in planned.segments)),
+            ('packing and unpacking for the other process', handed_over)):
+        taken = 1e3 * seconds(step, repeat=5)
+        left -= taken
+        yield Figure(benchmark=name, name=part, value=taken, unit='ms', baseline=total,
+                     than='the whole')
+    yield Figure(benchmark=name, name='rest: threads, pipe, sockets, busy cores', value=left,
+                 unit='ms', baseline=total, than='the whole')
+
+
+def _cancel_figures(goals: Sequence[Times]) -> Iterator[Figure]:
+    times = [_ms(g.cancel_requested, g.cancel_on_wire) for g in goals]
+    for text, value in (('p50', median(times)), ('p90', percentile(times, 90)),
+                        ('slowest', max(times))):
+        yield Figure(benchmark='cancel', name=f'client call -> CANCEL on the wire, {text}',
+                     value=value, unit='ms', note=f'{len(times)} goals')
+
+
+def _ms(start: int, end: int) -> float:
+    return 1e-6 * (end - start)

@@ -1,0 +1,48 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Goals of any number of points, all well within the reach of a UR5e that stands at home."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.sim.config import HOME
+
+MODEL = 'ur5e'
+#: Distance of two points [m]; a block of so many along x and along y.
+STEP = 0.005
+ALONG = 41
+
+
+def meander(points: int) -> Iterator[Pose]:
+    """
+    Yield poses that are 5 mm apart: to and fro in x, row by row in y, layer by layer in z.
+
+    100,000 of them fill a block of 0.2 m x 0.2 m x 0.3 m around the home position.
+    """
+    home = Arm(robot_model(MODEL)).forward(HOME)
+    x, y, z = home.position
+    for i in range(points):
+        rest, column = divmod(i, ALONG)
+        layer, row = divmod(rest, ALONG)
+        column = column if rest % 2 == 0 else ALONG - 1 - column
+        row = row if layer % 2 == 0 else ALONG - 1 - row
+        yield Pose((x + STEP * (column - ALONG // 2), y + STEP * (row - ALONG // 2),
+                    z - 0.15 + STEP * layer), home.quaternion)
+
+
+def goal(points: int) -> Goal:
+    """Return a goal through the meander; the speeds are the driver's own."""
+    return Goal(waypoints=tuple(Waypoint(pose=pose) for pose in meander(points)))
+
+
+def at_home(arm: Arm) -> RobotState:
+    """Return the state of an arm that stands at home."""
+    pose = arm.forward(HOME)
+    return RobotState(timestamp=0.0, actual_q=HOME, target_q=HOME, actual_tcp_pose=pose,
+                      target_tcp_pose=pose)

@@ -1,0 +1,225 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The processes of a measurement: simulated robot, wire tap, empty loop, driver node.
+
+They are children of ours, speak over loopback only, and are gone when their block is left. All of
+them read the same clock (``time.monotonic_ns`` is one clock for the whole machine), so times from
+different processes can be subtracted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import time
+from typing import Any
+
+from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
+
+HOST = '127.0.0.1'
+PERIOD = 0.002
+START_TIMEOUT = 30.0
+END_TIMEOUT = 8.0
+
+_SPAWN = get_context('spawn')
+
+
+class Child:
+    """A process that answers calls: ``child.call('name', ...)`` returns what it returns there."""
+
+    def __init__(self, connection: Connection, pid: int) -> None:
+        """Take the connection and the process's id."""
+        self._connection = connection
+        self.pid = pid
+
+    def call(self, name: str, *arguments: Any) -> Any:
+        """
+        Call a function of the child and wait for what it returns.
+
+        :raises TimeoutError: no answer.
+        """
+        self._connection.send((name, arguments))
+        return self.answer()
+
+    def answer(self) -> Any:
+        """Wait for a message of the child."""
+        if not self._connection.poll(START_TIMEOUT):
+            raise TimeoutError(f'child {self.pid} does not answer')
+        return self._connection.recv()
+
+
+def answer_calls(connection: Connection, functions: Mapping[str, Callable[..., Any]]) -> None:
+    """Be the other side of :meth:`Child.call`, until it hangs up."""
+    while True:
+        try:
+            name, arguments = connection.recv()
+        except EOFError:
+            return
+        connection.send(functions[name](*arguments))
+
+
+@contextmanager
+def child(target: Callable[..., None], *arguments: Any) -> Iterator[Child]:
+    """Run ``target(connection, *arguments)`` in a fresh process; it ends when we hang up."""
+    ours, theirs = _SPAWN.Pipe()
+    process = _SPAWN.Process(target=target, args=(theirs, *arguments), daemon=True)
+    process.start()
+    theirs.close()
+    try:
+        assert process.pid is not None
+        yield Child(ours, process.pid)
+    finally:
+        ours.close()
+        process.join(END_TIMEOUT)
+        if process.is_alive():
+            process.kill()
+            process.join()
+
+
+# ---- simulated robot --------------------------------------------------------------------------
+
+
+@contextmanager
+def simulator() -> Iterator[Child]:
+    """Run a simulated robot; calls: ``ports``, ``state``, ``begin``, ``cycles``."""
+    with child(_simulate) as robot:
+        yield robot
+
+
+def _simulate(connection: Connection) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
+    config = SimulatorConfig(rtde_port=0, primary_port=0, dashboard_port=0)
+    with SimulatedRobot(config) as robot:
+        beginnings = note_cycles(robot)
+        answer_calls(connection, {
+            'ports': lambda: robot.ports,
+            'state': robot.state,
+            'begin': beginnings.clear,
+            'cycles': lambda: list(beginnings),
+        })
+
+
+def note_cycles(robot: SimulatedRobot) -> list[float]:
+    """Return a list to which each controller cycle adds the time of its beginning [s]."""
+    beginnings: list[float] = []
+    step = robot.controller.step
+
+    def noted() -> None:
+        beginnings.append(time.monotonic())
+        step()
+
+    robot.controller.step = noted  # type: ignore[method-assign]
+    return beginnings
+
+
+@contextmanager
+def empty_loop() -> Iterator[Child]:
+    """Run a loop that does nothing 500 times a second; calls: ``begin``, ``cycles``."""
+    with child(_loop) as loop:
+        yield loop
+
+
+def _loop(connection: Connection) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    beginnings: list[float] = []
+    due = time.monotonic()
+    while True:
+        while connection.poll():
+            try:
+                name, _ = connection.recv()
+            except EOFError:
+                return
+            connection.send(list(beginnings))
+            if name == 'begin':
+                beginnings.clear()
+                due = time.monotonic()
+        due += PERIOD
+        time.sleep(max(0.0, due - time.monotonic()))
+        beginnings.append(time.monotonic())
+
+
+def lateness(beginnings: list[float]) -> list[float]:
+    """
+    Return how late each cycle began [s], measured from a grid of 2 ms.
+
+    The grid is the earliest one that fits: no cycle begins before its time.
+    """
+    offsets = [time - i * PERIOD for i, time in enumerate(beginnings)]
+    earliest = min(offsets, default=0.0)
+    return [offset - earliest for offset in offsets]
+
+
+# ---- driver node ------------------------------------------------------------------------------
+
+
+@contextmanager
+def node(robot: Child, **parameters: object) -> Iterator[int]:
+    """Run the driver node for a simulated robot until its program runs; yield the node's id."""
+    ports = robot.call('ports')
+    parameters = {
+        'robot_ip': HOST, 'ur_type': 'ur5e', 'headless_mode': 'true', 'rtde_port': ports.rtde,
+        'primary_port': ports.primary, 'dashboard_port': ports.dashboard, 'reverse_port': 0,
+        'script_sender_port': 0, 'trajectory_port': 0, 'script_command_port': 0} | parameters
+    settings = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'ur_cartesian_driver.ros.node', '--ros-args', '--log-level',
+         'error', *settings], stdout=subprocess.DEVNULL, start_new_session=True)
+    try:
+        _wait_for_program(robot, process)
+        yield process.pid
+    finally:
+        _end(process)
+
+
+def _wait_for_program(robot: Child, process: subprocess.Popen[bytes]) -> None:
+    deadline = time.monotonic() + START_TIMEOUT
+    while robot.call('state').runtime_state is not RuntimeState.PLAYING:
+        if process.poll() is not None or time.monotonic() > deadline:
+            raise RuntimeError('The driver node did not start the robot program.')
+        time.sleep(0.1)
+    time.sleep(0.5)  # the program connects
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.send_signal(signal.SIGINT)
+    try:
+        process.wait(END_TIMEOUT)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+# ---- processor time ---------------------------------------------------------------------------
+
+
+def cpu_seconds(pid: int) -> float:
+    """Return the processor time that a process has used, user and system [s] (proc(5))."""
+    fields = _stat(pid)
+    return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
+
+
+def children_of(pid: int) -> list[int]:
+    """Return the ids of the children of a process."""
+    found = []
+    for entry in Path('/proc').iterdir():
+        if entry.name.isdigit():
+            try:
+                if int(_stat(int(entry.name))[1]) == pid:
+                    found.append(int(entry.name))
+            except OSError:
+                pass  # it has just ended
+    return found
+
+
+def _stat(pid: int) -> list[str]:
+    """Return the fields of a process's stat behind its name, which may hold anything."""
+    return Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()

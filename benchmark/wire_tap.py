@@ -1,0 +1,133 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A relay between robot program and driver that notes when bytes come from the driver.
+
+The driver listens on 127.0.0.1 and tells the robot program to call 127.0.0.2 (``reverse_ip``, as
+one does behind an address translation); there the relay listens on the same ports and passes
+everything on. It is a process of its own, so that nothing else keeps it from looking at its clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+import selectors
+import signal
+import socket
+import threading
+import time
+
+from processes import answer_calls, Child, child, HOST
+
+from ur_cartesian_driver.protocol.reverse import ControlMode, ReverseDecoder
+
+TAP_HOST = '127.0.0.2'
+PORTS = ('reverse_port', 'trajectory_port', 'script_command_port')
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """Something came from the driver."""
+
+    #: Of ``time.monotonic_ns``.
+    time: int
+    port: str
+    size: int
+    #: Mode and first word of a message on the reverse socket.
+    mode: int = 0
+    action: int = 0
+
+    @property
+    def is_trajectory_action(self) -> bool:
+        """Tell whether it is a message of a running trajectory."""
+        return self.port == 'reverse_port' and self.mode == ControlMode.FORWARD
+
+
+@contextmanager
+def wire_tap() -> Iterator[tuple[Child, dict[str, object]]]:
+    """Run a relay; yield it (calls: ``ports``, ``marks``, ``hang_ups``) and the parameters."""
+    with child(_tap) as tap:
+        yield tap, {'reverse_ip': TAP_HOST, **tap.call('ports')}
+
+
+def _tap(connection: Connection) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    relay = Relay()
+    threading.Thread(target=relay.run, daemon=True).start()
+    answer_calls(connection, {
+        'ports': lambda: relay.ports, 'marks': relay.take, 'hang_ups': lambda: relay.hang_ups})
+
+
+class Relay:
+    """Passes bytes on, both ways, in one thread."""
+
+    def __init__(self) -> None:
+        """Listen on free ports."""
+        self.ports: dict[str, int] = {}
+        self.hang_ups = 0
+        self._marks: list[Mark] = []
+        self._selector = selectors.DefaultSelector()
+        for name in PORTS:
+            listener = socket.create_server((TAP_HOST, 0))
+            self.ports[name] = listener.getsockname()[1]
+            self._selector.register(listener, selectors.EVENT_READ, name)
+
+    def take(self) -> list[Mark]:
+        """Return the marks since the last call."""
+        marks, self._marks = self._marks, []
+        return marks
+
+    def run(self) -> None:
+        """Serve for ever."""
+        while True:
+            for key, _ in self._selector.select():
+                sock = key.fileobj
+                assert isinstance(sock, socket.socket)
+                if isinstance(key.data, _Way):
+                    self._pass_on(sock, key.data)
+                else:
+                    self._accept(sock, key.data)
+
+    def _accept(self, listener: socket.socket, name: str) -> None:
+        robot, _ = listener.accept()
+        driver = socket.create_connection((HOST, self.ports[name]))
+        for source, target, noted in ((robot, driver, ''), (driver, robot, name)):
+            source.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._selector.register(source, selectors.EVENT_READ, _Way(target, noted))
+
+    def _pass_on(self, source: socket.socket, way: _Way) -> None:
+        try:
+            data = source.recv(65536)
+            now = time.monotonic_ns()
+            way.target.sendall(data)
+        except OSError:
+            data = b''
+        if data:
+            way.note(self._marks, now, data)
+            return
+        self.hang_ups += 1
+        self._selector.unregister(source)
+        try:
+            way.target.shutdown(socket.SHUT_WR)
+        except OSError:
+            pass  # the other one hung up too
+
+
+class _Way:
+    """One direction of one connection."""
+
+    def __init__(self, target: socket.socket, noted: str) -> None:
+        self.target = target
+        self._noted = noted
+        self._messages = ReverseDecoder()
+
+    def note(self, marks: list[Mark], now: int, data: bytes) -> None:
+        """Add what came from the driver to the marks."""
+        if self._noted == 'reverse_port':
+            marks += [Mark(now, self._noted, len(data), message.mode, message.payload[0])
+                      for message in self._messages.feed(data)]
+        elif self._noted:
+            marks.append(Mark(now, self._noted, len(data)))
