@@ -301,10 +301,10 @@ class RobotLink:
         self._update(robot_model=expected if expected in models else ' or '.join(models),
                      polyscope_version=str(self._version))
         if expected not in models:
+            self._change(Change.ROBOT_REFUSED)
             self._update(message=(
                 f"The robot is a {' or '.join(models)}, but ur_type is {expected}; set ur_type to "
                 'the model that is there.'))
-            self._change(Change.ROBOT_REFUSED)
             return
         self._change(Change.ROBOT_ACCEPTED)
         self._start_program_once()

@@ -1,0 +1,130 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The robot program as text: what is sent is what runs, word for word.
+
+The test plays the External Control URCap: it fetches the program from the driver's script sender,
+edits it, and uploads it to the controller, which knows nothing of it but that text.
+"""
+
+import re
+import socket
+
+import pytest
+
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.program import as_program
+from ur_cartesian_driver.protocol.primary import PrimaryDecoder, RuntimeExceptionMessage
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+
+END = '# NODE_CONTROL_LOOP_ENDS'
+
+
+@pytest.fixture
+def served(make_driver):
+    """A driver that waits for a program, and the text that it serves."""
+    driver = make_driver(headless_mode=False)
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    with socket.create_connection(('127.0.0.1', driver.status.ports['script_sender_port'])) as s:
+        s.settimeout(5.0)
+        s.sendall(b'request_program\n')
+        text = ''
+        while END not in text:
+            text += s.recv(65536).decode()
+    return driver, text
+
+
+def wait_for(condition, timeout=5.0):
+    from time import monotonic, sleep
+    end = monotonic() + timeout
+    while not condition():
+        assert monotonic() < end
+        sleep(0.005)
+
+
+def upload(ur_sim, text):
+    with socket.create_connection(('127.0.0.1', ur_sim.ports.primary)) as primary:
+        primary.sendall((text + '\n').encode())
+
+
+def short_goal(driver, y=0.02):
+    pose = driver.state.actual_tcp_pose
+    x0, y0, z0 = pose.position
+    return Goal(waypoints=(Waypoint(time=0.4, pose=type(pose)((x0, y0 + y, z0),
+                                                              pose.quaternion)),))
+
+
+def test_the_served_program_runs_as_it_is(served, ur_sim):
+    driver, text = served
+    upload(ur_sim, as_program(text))
+    driver.wait_ready(5.0)
+    assert driver.execute(short_goal(driver), timeout=10.0).succeeded
+
+
+def test_a_program_with_other_names_does_the_same(served, ur_sim):
+    driver, text = served
+    for name in ('run_point', 'points_left', 'abandon_trajectory', 'run_trajectory', 'kind',
+                 'read_timeout', 'dial_all'):
+        text, count = re.subn(rf'\b{name}\b', f'renamed_{name}', text)
+        assert count >= 2
+    upload(ur_sim, as_program(text))
+    driver.wait_ready(5.0)
+    assert driver.execute(short_goal(driver), timeout=10.0).succeeded
+
+
+def test_a_line_that_is_added_is_carried_out(served, ur_sim):
+    driver, text = served
+    text = text.replace('  local kind = point[POINT_TYPE]',
+                        '  local kind = point[POINT_TYPE]\n  textmsg("this point is a ", kind)')
+    upload(ur_sim, as_program(text))
+    driver.wait_ready(5.0)
+    assert driver.execute(short_goal(driver), timeout=10.0).succeeded
+    assert 'this point is a 1' in ur_sim.state().messages
+
+
+def test_a_changed_constant_changes_the_motion(served, ur_sim, record):
+    """Half the length of a metre: the arm goes half the way, in the program's own scale."""
+    driver, text = served
+    text = text.replace('MULT_TIME = 1000000', 'MULT_TIME = 500000')
+    upload(ur_sim, as_program(text))
+    driver.wait_ready(5.0)
+    with record() as recording:
+        assert driver.execute(short_goal(driver), timeout=10.0).succeeded
+    assert recording.duration == pytest.approx(0.8, abs=0.01)
+
+
+def test_a_changed_result_changes_the_outcome(served, ur_sim):
+    driver, text = served
+    upload(ur_sim, as_program(text.replace('RESULT_SUCCESS = 0', 'RESULT_SUCCESS = 2')))
+    driver.wait_ready(5.0)
+    outcome = driver.execute(short_goal(driver), timeout=10.0)
+    assert outcome.code is ErrorCode.EXECUTION_FAILED
+
+
+@pytest.mark.parametrize(('line', 'replacement', 'expected'), [
+    ('begin_point()', 'no_such_function()', 'compile_error_name_not_found:no_such_function:'),
+    ('local kind = point[POINT_TYPE]', 'local kind = = 3', 'syntax_error_on_line:'),
+])
+def test_a_broken_program_is_refused_with_line_and_column(
+        served, ur_sim, line, replacement, expected):
+    driver, text = served
+    program = as_program(text)
+    assert line in program
+    lines = program.splitlines()
+    at = next(i for i, row in enumerate(lines) if row.strip() == line)
+    lines[at] = lines[at].replace(line, replacement)
+    with socket.create_connection(('127.0.0.1', ur_sim.ports.primary)) as primary:
+        primary.settimeout(5.0)
+        primary.sendall(('\n'.join(lines) + '\n\n').encode())
+        decoder, errors = PrimaryDecoder(), []
+        while not errors:
+            errors = [frame for frame in decoder.feed(primary.recv(65536))
+                      if isinstance(frame, RuntimeExceptionMessage)]
+    assert errors[0].text.startswith(expected)
+    assert errors[0].line == at + 1
+    assert errors[0].column >= 1
+    assert driver.status.state is ConnectionState.CONNECTED
+    wait_for(lambda: expected in driver.status.last_error)
