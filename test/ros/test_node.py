@@ -189,9 +189,27 @@ def run_when_ready(client, goal, on_feedback):
             return result
 
 
-def test_the_command_explains_a_bad_parameter_in_one_line():
-    done = subprocess.run(command('-p', 'ur_type:=ur4'), capture_output=True, text=True,
-                          timeout=30.0, check=False)
+@pytest.mark.parametrize(('arguments', 'sentence'), [
+    (['-p', 'ur_type:=ur4'], "Parameter ur_type is 'ur4'; it is one of ur3,"),
+    (['-p', 'max_tool_speed:=fast'], "Parameter max_tool_speed is 'fast', but it is a number."),
+    (['-p', 'max_tool_sped:=0.5'], 'There is no parameter max_tool_sped; did you mean'),
+    (['-p', 'ur_type'], "failed to initialize rcl: Couldn't parse parameter override rule"),
+    (['--params-file', '/nowhere'], "failed to initialize rcl: Couldn't parse params file"),
+])
+def test_the_command_ends_with_a_sentence_for_bad_arguments(arguments, sentence):
+    done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=30.0,
+                          check=False)
     assert done.returncode == 1
-    assert done.stderr.startswith("ur_cartesian_driver: Parameter ur_type is 'ur4'; it is one of")
-    assert done.stderr.count('\n') == 1
+    assert done.stderr.splitlines()[-1].startswith(f'ur_cartesian_driver: {sentence}')
+    assert 'Traceback' not in done.stderr
+
+
+def test_an_empty_list_in_a_file_is_explained(no_thread_left, tmp_path):
+    path = tmp_path / 'parameters.yaml'
+    path.write_text('/**: {ros__parameters: {static_frames: []}}')
+    context = Context()
+    rclpy.init(args=[], context=context)
+    with pytest.raises(ParameterError, match='for an empty list'):
+        CartesianDriverNode(context=context,
+                            cli_args=['--ros-args', '--params-file', str(path)])
+    rclpy.shutdown(context=context)

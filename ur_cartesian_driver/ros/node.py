@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 import logging
+import re
 import signal
 import sys
 from time import monotonic
@@ -57,9 +58,15 @@ class CartesianDriverNode(Node):
         :param node_kwargs: for ``rclpy.node.Node``.
         :raises ParameterError: a parameter cannot have its value; the text says why.
         """
-        super().__init__(
-            node_name, namespace=namespace, parameter_overrides=overrides(parameter_overrides),
-            automatically_declare_parameters_from_overrides=True, **node_kwargs)
+        try:
+            super().__init__(
+                node_name, namespace=namespace, parameter_overrides=overrides(parameter_overrides),
+                automatically_declare_parameters_from_overrides=True, **node_kwargs)
+        except ValueError as error:
+            if 'PARAMETER_NOT_SET' not in str(error):
+                raise
+            raise ParameterError("A parameter is given without a value; write '' for an empty "
+                                 "text and [''] for an empty list.") from None
         self._parts: list[Any] = []  # with close(), the last one first
         try:
             self._start()
@@ -151,8 +158,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     wait for that.
     """
     # rclpy's own handlers would shut ROS down at once, and no goal could end with a result.
-    rclpy.init(args=list(sys.argv if arguments is None else arguments),
-               signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(args=list(sys.argv if arguments is None else arguments),
+                   signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        # Behind the sentence stands where in the source of rcl it was written.
+        sys.exit(f'ur_cartesian_driver: {re.split(r", at /", str(error))[0]}')
     signals = _Signals()
     try:
         node = CartesianDriverNode()
