@@ -1,0 +1,262 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the documents promise: their goals plan, their snippets run, their links lead somewhere."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from pathlib import Path
+import re
+import shlex
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from ur_cartesian_driver.cli import parser
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.resources import share_path
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+pytestmark = pytest.mark.skipif(
+    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has the documents')
+
+README = CHECKOUT / 'README.md'
+DOCUMENTS = [README, CHECKOUT / 'CONTRIBUTING.md', *sorted(CHECKOUT.glob('doc/**/*.md'))]
+#: Programs that the documents start and that are no part of this package.
+FOREIGN = {'git', 'cd', '.', 'export', 'make', 'rosdep', 'colcon', 'pip', 'ros2'}
+
+
+def name_of(document):
+    return str(document.relative_to(CHECKOUT))
+
+
+def blocks(document, *languages):
+    """Return the fenced blocks of a document in one of the languages."""
+    text = document.read_text(encoding='utf-8')
+    return [body for language, body in re.findall(
+        r'^ *```(\w*)\n(.*?)^ *```$', text, re.DOTALL | re.MULTILINE) if language in languages]
+
+
+def commands(document):
+    """Return the commands of the shell blocks, each as a list of words."""
+    found = []
+    for body in blocks(document, 'bash'):
+        found += lines_of(body)
+    for body in blocks(document, 'console'):
+        found += lines_of('\n'.join(
+            line[2:] for line in body.splitlines() if line.startswith('$ ')))
+    return found
+
+
+def lines_of(text):
+    """Return the words of each line, quotes over several lines respected, comments left out."""
+    words = shlex.shlex(text, posix=True, punctuation_chars='&\n')
+    words.whitespace, words.whitespace_split, words.commenters = ' ', True, ''
+    line, lines, comment = [], [], False
+    for word in words:
+        if set(word) <= {'&', '\n'}:
+            lines.append(line)
+            line, comment = [], False
+        else:
+            comment = comment or word.startswith('#')
+            if not comment:
+                line.append(word)
+    return [line for line in [*lines, line] if line]
+
+
+def snippets():
+    return [pytest.param(body, id=f'{name_of(document)}-{number}')
+            for document in DOCUMENTS if document.is_file()
+            for number, body in enumerate(blocks(document, 'python'))]
+
+
+def snippet(part):
+    """Return the one Python snippet of the README that contains a text."""
+    (found,) = [body for body in blocks(README, 'python') if part in body]
+    return found
+
+
+# ---- the goal -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope='module')
+def send_goal():
+    """Return the words of the README's ros2 action send_goal line."""
+    (found,) = [words for words in commands(README) if words[1:3] == ['action', 'send_goal']]
+    return found
+
+
+def test_send_goal_names_the_action_that_is_served(send_goal):
+    assert send_goal[3:5] == [
+        '/ur_cartesian_driver/follow_cartesian_trajectory',
+        'ur_cartesian_driver/action/FollowCartesianTrajectory']
+    assert len(send_goal) == 6
+
+
+def test_send_goal_is_the_goal_of_the_square_example(send_goal):
+    from ur_cartesian_driver.ros.client import load_goal
+
+    assert load_goal(send_goal[5]) == load_goal(
+        share_path() / 'config' / 'examples' / 'square.yaml')
+
+
+def test_send_goal_passes_planning_from_home_and_takes_ten_seconds(send_goal):
+    from ur_cartesian_driver.cli.commands import standing_at
+    from ur_cartesian_driver.kinematics.chain import Arm
+    from ur_cartesian_driver.kinematics.robots import robot_model
+    from ur_cartesian_driver.planning import plan, PlanningOptions
+    from ur_cartesian_driver.ros.client import load_goal
+    from ur_cartesian_driver.ros.convert import goal_from_message
+    from ur_cartesian_driver.ros.frames import Frames
+    from ur_cartesian_driver.sim import HOME
+
+    arm = Arm(robot_model('ur5e'))
+    goal = goal_from_message(load_goal(send_goal[5]), Frames(), now=0)
+    found = plan(goal, standing_at(arm, HOME), arm, PlanningOptions())
+    assert found.duration == pytest.approx(10.0)
+    assert [segment.length for segment in found.segments] == pytest.approx([0.2] * 4)
+
+
+# ---- snippets -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('body', snippets())
+def test_python_snippet_compiles(body):
+    compile(body, 'snippet', 'exec')
+
+
+@pytest.mark.slow
+def test_snippet_without_ros_moves_the_arm(ur_sim, capsys):
+    ports = ur_sim.ports
+    there = (f"robot_ip='127.0.0.1', rtde_port={ports.rtde}, primary_port={ports.primary}, "
+             'reverse_port=0, script_sender_port=0, trajectory_port=0, script_command_port=0')
+    body = snippet('DriverConfig(')
+    assert "robot_ip='127.0.0.1'" in body
+    exec(body.replace("robot_ip='127.0.0.1'", there), {})
+    assert 'SUCCESSFUL All 2 points' in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_snippet_of_an_action_client_moves_the_arm(ur_sim, cartesian_driver):
+    from rclpy.executors import SingleThreadedExecutor
+
+    executor = SingleThreadedExecutor()
+    executor.add_node(cartesian_driver)
+    spinning = threading.Thread(target=executor.spin)
+    spinning.start()
+    try:
+        ended = subprocess.run(
+            [sys.executable, '-c', snippet('ActionClient(')], capture_output=True, text=True,
+            timeout=60, check=False, env=os.environ)
+    finally:
+        executor.shutdown()
+        spinning.join()
+    assert ended.stdout.splitlines()[-1].startswith('0 All 2 points were executed'), ended.stderr
+
+
+@pytest.mark.slow
+def test_snippet_of_a_test_passes(ur_sim, cartesian_driver):
+    names = {}
+    exec(snippet('def test_my_cell'), names)
+    names['test_my_cell'](ur_sim, cartesian_driver)
+
+
+# ---- commands and links -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize('document', DOCUMENTS, ids=name_of)
+def test_commands_exist(document):
+    for words in commands(document):
+        if words[0] == 'ur-cartesian':
+            parser().parse_args(
+                [word.replace('FILE', 'square') for word in words[1:]])
+        elif words[0] == 'ur-cartesian-driver':
+            check_parameters(words)
+        elif words[0].startswith('scripts/'):
+            assert (CHECKOUT / words[0]).is_file()
+        elif words[0] == 'make':
+            targets = re.findall(r'^(\w+):', (CHECKOUT / 'Makefile').read_text(), re.MULTILINE)
+            assert words[1] in targets
+        elif words[:2] == ['ros2', 'launch']:
+            check_launch(words)
+        else:
+            assert words[0] in FOREIGN, words
+
+
+def check_parameters(words):
+    from ur_cartesian_driver.ros.parameters import DECLARATIONS
+
+    known = {declaration.name for declaration in DECLARATIONS}
+    given = {word.split(':=')[0] for word in words if ':=' in word}
+    assert words[1] == '--ros-args'
+    assert given <= known
+
+
+def check_launch(words):
+    text = (share_path() / 'launch' / words[3]).read_text(encoding='utf-8')
+    assert words[2] == 'ur_cartesian_driver'
+    for word in words[4:]:
+        assert f"'{word.split(':=')[0]}'" in text
+
+
+@pytest.mark.parametrize('document', DOCUMENTS, ids=name_of)
+def test_links_lead_to_files(document):
+    text = document.read_text(encoding='utf-8')
+    targets = re.findall(r'\]\(([^)#]+)(?:#[^)]*)?\)', text)
+    missing = [target for target in targets if not target.startswith('https://')
+               and not (document.parent / target).exists()]
+    assert missing == []
+
+
+def test_readme_leads_to_every_document():
+    linked = set()
+    for document in DOCUMENTS:
+        text = document.read_text(encoding='utf-8')
+        linked |= {(document.parent / target).resolve()
+                   for target in re.findall(r'\]\(([^)#]+)\)', text)}
+        if document == CHECKOUT / 'doc' / 'architecture.md':
+            linked |= set((CHECKOUT / 'doc' / 'diagrams').glob('*.md'))
+    assert [name_of(d) for d in DOCUMENTS[1:] if d not in linked] == []
+
+
+# ---- what is said about the code ----------------------------------------------------------------
+
+
+def test_every_error_code_is_described_with_its_number():
+    text = (CHECKOUT / 'doc' / 'errors.md').read_text(encoding='utf-8')
+    described = re.findall(r'^### (\w+), (-?\d+)$', text, re.MULTILINE)
+    assert {(name, int(number)) for name, number in described} == {
+        (code.name, code.value) for code in ErrorCode}
+    assert len(described) == len(ErrorCode)
+
+
+def test_every_parameter_that_is_named_as_one_exists():
+    from ur_cartesian_driver.ros.parameters import defaults
+
+    (table,) = re.findall(r'^\| parameter \|.*?\n\n', README.read_text(encoding='utf-8'),
+                          re.DOTALL | re.MULTILINE)
+    named = [name for line in table.strip().splitlines()[2:]
+             for name in re.findall(r'`(\w+)`', line.split('|')[1])]
+    assert named
+    assert set(named) <= set(defaults())
+
+
+def test_every_robot_model_is_listed():
+    from ur_cartesian_driver.kinematics.robots import MODELS
+
+    (section,) = re.findall(r'^## Robots\n(.*?)^## ', README.read_text(encoding='utf-8'),
+                            re.DOTALL | re.MULTILINE)
+    assert set(re.findall(r'\bur\d+(?:e|long)?\b', section)) == set(MODELS)
+
+
+def test_diagrams_are_those_of_the_tables():
+    spec = importlib.util.spec_from_file_location(
+        'make_diagrams', CHECKOUT / 'scripts' / 'make_diagrams.py')
+    make_diagrams = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(make_diagrams)
+    directory = CHECKOUT / 'doc' / 'diagrams'
+    assert {path.name: path.read_text(encoding='utf-8') for path in directory.glob('*.md')} == \
+        make_diagrams.pages(), 'run python scripts/make_diagrams.py'
