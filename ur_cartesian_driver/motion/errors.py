@@ -64,6 +64,10 @@ class ErrorCode(IntEnum):
 class DriverError(Exception):
     """The root of all errors of this package; its text is one sentence for a person."""
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle and copy by the finished sentence, because constructors take facts."""
+        return _restore, (type(self), str(self)), self.__dict__
+
 
 class GoalRefused(DriverError):
     """A goal was refused before anything moved."""
@@ -82,10 +86,6 @@ class InvalidGoal(GoalRefused):
         """
         super().__init__(f'{field} {problem}' + (f'; {remedy}.' if remedy else '.'))
         self.field = field
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle by the finished sentence, not by the facts."""
-        return _restore, (type(self), str(self))
 
 
 class NotAvailable(InvalidGoal):
