@@ -106,11 +106,28 @@ def test_a_motion_that_arrives_succeeds():
 def test_points_beyond_the_window_wait_for_the_robot():
     machine = TrajectoryMachine(order(points=2000))
     assert machine.start(0.0)[1] == SendPoints(first=0, end=500)
+    machine.step(robot(0.0), 0.05)
     commands = machine.step(robot(0.0, points_begun=10), 0.1)
     assert SendPoints(first=500, end=510) in commands
     machine.step(CancelRequested(), 0.2)
     assert not [c for c in machine.step(robot(0.0, points_begun=50), 0.3)
                 if isinstance(c, SendPoints)]
+
+
+def test_the_count_of_the_last_trajectory_is_not_taken_for_this_one_s():
+    machine = TrajectoryMachine(order(points=4))
+    machine.start(0.0)
+
+    def place(count, part):
+        (report,) = (c for c in machine.step(robot(part, points_begun=count), next(times))
+                     if isinstance(c, Report))
+        return report.progress.waypoint
+
+    times = iter(range(1, 9))
+    assert place(4, 0.0) == 0
+    assert place(4, 0.0) == 0
+    assert place(0, 0.0) == 0
+    assert place(4, 0.8) >= 2
 
 
 def test_cancel_brakes_waits_for_the_answer_and_for_rest():

@@ -197,6 +197,8 @@ class TrajectoryMachine:
         self._feedback_period = feedback_period
         self._next_report = -inf
         self._latest: RobotState | None = None
+        #: What the robot reports of the goal before; None once it reports about this one.
+        self._stale_begun: int | None = -1
         #: Time since the start in which the controller's own clock ran [s].
         self._scaled_time = 0.0
         self._deadline = inf
@@ -345,12 +347,27 @@ class TrajectoryMachine:
             self._scaled_time += passed * state.speed_scaling
         if self.state is State.MOVING:
             reach = 2.0 * passed * speed(state.actual_tcp_twist)
-            self._tracker.update(state.actual_tcp_pose, reach, state.points_begun)
-        commands = self._release(max(state.points_begun, self._tracker.waypoint()))
+            self._tracker.update(state.actual_tcp_pose, reach, self._begun(state))
+        commands = self._release(max(self._begun(state), self._tracker.waypoint()))
         if now >= self._next_report:
             self._next_report = now + self._feedback_period
             commands.append(self._progress_report())
         return commands
+
+    def _begun(self, state: RobotState) -> int:
+        """
+        Return how many points of this goal the robot has begun; 0 = unknown.
+
+        The register keeps the count of the goal before until the robot program has read START, so
+        the first value that comes is believed only when it changes.
+        """
+        if self._stale_begun is not None:
+            if self._stale_begun < 0:
+                self._stale_begun = state.points_begun
+            if state.points_begun == self._stale_begun:
+                return 0
+            self._stale_begun = None
+        return state.points_begun
 
     def _release(self, begun: int) -> list[Command]:
         if self.state is not State.MOVING:
