@@ -9,6 +9,8 @@ Fixtures for tests of programs that use the driver; installed as a pytest plugin
 ``cartesian_driver``
     the driver's node, connected to ``ur_sim`` and ready for goals; it is not spinning, add it to
     an executor of your own. ``@pytest.mark.cartesian_driver(max_tool_speed=1.0)`` sets parameters.
+``private_ros_graph``
+    keeps all nodes of a test run to themselves; ``cartesian_driver`` uses it.
 
 Importing this module costs next to nothing: pytest does it in every project of the environment,
 so what is heavy is imported where a fixture is used.
@@ -17,7 +19,11 @@ so what is heavy is imported where a fixture is used.
 from __future__ import annotations
 
 from collections.abc import Iterator
+import contextlib
+import fcntl
 import os
+from pathlib import Path
+import tempfile
 from typing import Any, TYPE_CHECKING
 
 import pytest
@@ -26,6 +32,8 @@ if TYPE_CHECKING:
     from ur_cartesian_driver.ros import CartesianDriverNode
     from ur_cartesian_driver.sim import SimulatedRobot
 
+#: ROS domains that users seldom are on; 0 to 101 are allowed everywhere.
+DOMAINS = range(60, 101)
 #: How long driver and simulator may need to find each other [s].
 READY_TIMEOUT = 10.0
 
@@ -48,17 +56,45 @@ def ur_sim(request: pytest.FixtureRequest) -> Iterator[SimulatedRobot]:
         yield robot
 
 
+@pytest.fixture(scope='session')
+def private_ros_graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
+    """
+    Keep the nodes of this test run to themselves, and yield their ROS domain.
+
+    The graph stays on this computer, in a domain that no other run with this plugin has, and logs
+    go to a temporary folder. Variables that are set already are left alone.
+    """
+    with contextlib.ExitStack() as stack, pytest.MonkeyPatch.context() as environment:
+        domain = next(d for d in DOMAINS if _taken(d, stack))
+        for name, value in {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+                            'ROS_LOG_DIR': str(tmp_path_factory.mktemp('ros_log'))}.items():
+            if name not in os.environ:
+                environment.setenv(name, value)
+        environment.setenv('ROS_DOMAIN_ID', str(domain))
+        yield domain
+
+
+def _taken(domain: int, stack: contextlib.ExitStack) -> bool:
+    """Take a domain for as long as the stack lives, unless another run has it."""
+    path = Path(tempfile.gettempdir(), f'ur_cartesian_driver_test_domain_{domain}')
+    lock = stack.enter_context(path.open('w'))
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
 @pytest.fixture
-def cartesian_driver(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch,
+def cartesian_driver(request: pytest.FixtureRequest, private_ros_graph: int,
                      ur_sim: SimulatedRobot) -> Iterator[CartesianDriverNode]:
     """Yield the driver's node, ready for goals of ``ur_sim``; destroyed afterwards."""
-    _keep_to_ourselves(monkeypatch)
     import rclpy
     from rclpy.utilities import get_default_context
 
     from ur_cartesian_driver.ros import CartesianDriverNode
 
-    parameters = {
+    parameters: dict[str, Any] = {
         'robot_ip': ur_sim.config.host, 'ur_type': ur_sim.config.model, 'headless_mode': True,
         'robot_loop': 'thread', 'rtde_port': ur_sim.ports.rtde,
         'primary_port': ur_sim.ports.primary, 'dashboard_port': ur_sim.ports.dashboard,
@@ -82,13 +118,3 @@ def cartesian_driver(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyP
 def _marked(request: pytest.FixtureRequest, name: str) -> dict[str, Any]:
     marker = request.node.get_closest_marker(name)
     return {} if marker is None else dict(marker.kwargs)
-
-
-def _keep_to_ourselves(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep the nodes of a test run on this machine, and those of parallel runs apart."""
-    worker = os.environ.get('PYTEST_XDIST_WORKER', 'gw0').removeprefix('gw')
-    domain = 1 + (10 * os.getpid() + int(worker or 0)) % 100
-    for name, value in {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-                        'ROS_DOMAIN_ID': str(domain)}.items():
-        if name not in os.environ:
-            monkeypatch.setenv(name, value)

@@ -2,10 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A cell to test in: a simulated robot, the node, a client, one executor for both."""
 
-import contextlib
-import fcntl
-from pathlib import Path
-import tempfile
 import threading
 from time import monotonic
 
@@ -23,25 +19,12 @@ from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros.reports import duration_message, pose_message
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
-#: Domains that no user is likely to be on; 0 to 101 are allowed everywhere.
-DOMAINS = range(60, 100)
 EXECUTORS = {'single': SingleThreadedExecutor, 'multi': MultiThreadedExecutor}
 
 
-@pytest.fixture(scope='session', autouse=True)
-def private_graph(tmp_path_factory):
-    """Take a ROS domain, on this computer only, that no other running test has."""
-    with contextlib.ExitStack() as stack, pytest.MonkeyPatch.context() as patch:
-        for domain in DOMAINS:
-            path = Path(tempfile.gettempdir(), f'ur_cartesian_driver_test_domain_{domain}')
-            lock = stack.enter_context(path.open('w'))
-            with contextlib.suppress(BlockingIOError):
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-        patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
-        patch.setenv('ROS_DOMAIN_ID', str(domain))
-        patch.setenv('ROS_LOG_DIR', str(tmp_path_factory.mktemp('ros_log')))
-        yield
+@pytest.fixture(autouse=True)
+def private_graph(private_ros_graph):
+    """Let no other run hear the nodes of these tests."""
 
 
 @pytest.fixture

@@ -373,7 +373,7 @@ class RobotLink:
         """Turn the robot's modes into a change of the connection, and into what is needed."""
         self._change(Change.ROBOT_STOPPED if _is_stopped(state) else Change.ROBOT_FREE)
         if self._status.state is ConnectionState.CONNECTED:
-            if self._listeners['reverse_port'].connection is not None:
+            if self._status.program_connected:
                 self._change(Change.PROGRAM_CONNECTED)
             else:
                 self._start_program_once()
