@@ -66,8 +66,14 @@ def _short(value: float) -> str:
 
 def as_json(figures: Sequence[Figure]) -> str:
     """Return figures and machine as JSON."""
-    return json.dumps({'machine': machine(),
-                       'figures': [asdict(f) | {'ratio': f.ratio} for f in figures]}, indent=2)
+    rows = [asdict(f) | {'ratio': f.ratio} for f in figures]
+    known = [{key: _or_none(value) for key, value in row.items()} for row in rows]
+    return json.dumps({'machine': machine(), 'figures': known}, indent=2, allow_nan=False)
+
+
+def _or_none(value: object) -> object:
+    """Return None for NaN, which JSON does not have."""
+    return None if isinstance(value, float) and isnan(value) else value
 
 
 def machine() -> dict[str, object]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+import time
 
 from figures import Figure, median, percentile, seconds
 import paths
@@ -56,8 +57,6 @@ def run(quick: bool) -> Iterator[Figure]:
 
 
 def _one_goal(client: TimedClient, tap: Child, message: object) -> Times:
-    import time
-
     tap.call('marks')
     sent = time.monotonic_ns()
     handle, accepted = client.wait(client.send(message))

@@ -4,13 +4,17 @@
 Whether the robot hears from the driver while the node is busy with a huge goal.
 
 The robot program halts when it has waited for longer than ``robot_receive_timeout`` (200 ms). The
-gaps between messages on the reverse socket are taken from the call that sends the goal until its
-first point is on the wire: receiving, conversion and planning hold the node's interpreter.
+gaps between messages on the reverse socket are taken from the call that sends the goal until it
+has moved for a while: receiving, conversion and planning hold the node's interpreter, and the
+plan is handed over to the very loop that sends the messages.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import inf
 import time
 
 from figures import Figure, percentile
@@ -21,6 +25,10 @@ from wire_tap import Mark, wire_tap
 from ur_cartesian_driver.motion.state import RuntimeState
 
 TIMEOUT = 120.0
+#: How long the goal moves before it is cancelled [s].
+AFTERWARDS = 1.0
+#: Of the robot program, the driver's default [ms].
+READ_TIMEOUT = 200.0
 PERCENTILES = (('p50', 50.0), ('p99', 99.0), ('p99.9', 99.9), ('longest', 100.0))
 
 
@@ -31,38 +39,62 @@ def run(quick: bool) -> Iterator[Figure]:
     with simulator() as robot, wire_tap() as (tap, parameters), \
             node(robot, max_points=points, node_timeout=60.0, **parameters), \
             TimedClient() as client:
-        idle = _idle(tap, idle_time)
-        busy, arrival, first_point = _busy(client, tap, message)
-        running = robot.call('state').runtime_state is RuntimeState.PLAYING
-        halts = tap.call('hang_ups') + (not running)
+        tap.call('marks')
+        time.sleep(idle_time)
+        idle = _gaps(tap.call('marks'))
+        busy = _busy(client, tap, message)
+        halted = (tap.call('hang_ups') > 0
+                  or robot.call('state').runtime_state is not RuntimeState.PLAYING)
     name = f'keepalives while {points:,} points arrive'
+    gaps = _gaps(busy.marks)
     for text, percent in PERCENTILES:
         yield Figure(benchmark=name, name=f'gap on the reverse socket, {text}',
-                     value=percentile(busy, percent), unit='ms',
+                     value=percentile(gaps, percent), unit='ms',
                      baseline=percentile(idle, percent), than='idle',
-                     note=f'{len(busy)} gaps, idle {len(idle)}')
-    yield Figure(benchmark=name, name='times that the robot program halted', value=halts, unit='')
-    yield Figure(benchmark=name, name='goal sent -> accepted', value=arrival, unit='s')
-    yield Figure(benchmark=name, name='accepted -> first point on the wire', value=first_point,
-                 unit='s')
+                     note=f'{len(gaps)} gaps, idle {len(idle)}')
+    for text, begin, end in (('received', busy.sent, busy.accepted),
+                             ('converted, planned, encoded', busy.accepted, busy.start),
+                             ('handed over, started', busy.start, busy.marks[-1].time)):
+        yield Figure(benchmark=name, name=f'longest while it is {text}',
+                     value=max(_gaps(busy.marks, begin, end), default=float('nan')), unit='ms')
+    yield Figure(benchmark=name, name='times that the robot program halted', value=float(halted),
+                 unit='', note=f'it does after {READ_TIMEOUT:g} ms without a message')
+    yield Figure(benchmark=name, name='goal sent -> accepted',
+                 value=1e-9 * (busy.accepted - busy.sent), unit='s')
+    yield Figure(benchmark=name, name='accepted -> first point on the wire',
+                 value=1e-9 * (busy.first_point - busy.accepted), unit='s')
 
 
-def _idle(tap: Child, duration: float) -> list[float]:
-    tap.call('marks')
-    time.sleep(duration)
-    return _gaps(tap.call('marks'))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Busy:
+    """What happened around the huge goal; times in [ns]."""
+
+    sent: int
+    accepted: int
+    first_point: int
+    marks: Sequence[Mark]
+
+    @property
+    def start(self) -> int:
+        """The last message before the one that starts the motion."""
+        return max(m.time for m in self.marks
+                   if m.port == 'reverse_port' and not m.is_trajectory_action)
 
 
-def _busy(client: TimedClient, tap: Child, message: object) -> tuple[list[float], float, float]:
-    """Return the gaps [ms], and the times to acceptance and from there to the first point [s]."""
+def _busy(client: TimedClient, tap: Child, message: object) -> Busy:
+    """Send the goal, listen until it has moved for a while, cancel it."""
     tap.call('marks')
     sent = time.monotonic_ns()
     handle, accepted = client.wait(client.send(message), TIMEOUT)
     marks = _until_first_point(client, tap)
     first_point = next(m.time for m in marks if m.port == 'trajectory_port')
-    client.cancelled(handle)
-    return (_gaps([m for m in marks if sent <= m.time <= first_point]),
-            1e-9 * (accepted - sent), 1e-9 * (first_point - accepted))
+    client.spin(AFTERWARDS)
+    marks += tap.call('marks')
+    # Not `cancelled`: a robot program that halted is a figure here.
+    client.wait(handle.cancel_goal_async())
+    client.wait(handle.get_result_async())
+    return Busy(sent=sent, accepted=accepted, first_point=first_point,
+                marks=[m for m in marks if m.time >= sent])
 
 
 def _until_first_point(client: TimedClient, tap: Child) -> list[Mark]:
@@ -76,7 +108,8 @@ def _until_first_point(client: TimedClient, tap: Child) -> list[Mark]:
     return marks
 
 
-def _gaps(marks: Sequence[Mark]) -> list[float]:
-    """Return the times between messages on the reverse socket [ms]."""
+def _gaps(marks: Sequence[Mark], begin: float = -inf, end: float = inf) -> list[float]:
+    """Return the times between messages on the reverse socket [ms]; those that end in a window."""
     times = [m.time for m in marks if m.port == 'reverse_port']
-    return [1e-6 * (after - before) for before, after in zip(times, times[1:], strict=False)]
+    return [1e-6 * (after - before) for before, after in pairwise(times)
+            if begin < after <= end]

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 from figures import Figure, seconds
 import paths
@@ -20,7 +21,7 @@ def run(quick: bool) -> Iterator[Figure]:
     state, options = paths.at_home(arm), PlanningOptions()
     for points in (1_000,) if quick else (1_000, 10_000):
         goal = paths.goal(points)
-        taken = seconds(lambda goal=goal: plan(goal, state, arm, options),
+        taken = seconds(partial(plan, goal, state, arm, options),
                         repeat=3 if points == 1_000 else 1)
         yield Figure(benchmark='planning', name=f'plan {points:,} points 5 mm apart',
                      value=1e3 * taken, unit='ms',

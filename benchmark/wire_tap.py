@@ -11,7 +11,7 @@ everything on. It is a process of its own, so that nothing else keeps it from lo
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 import selectors
@@ -110,10 +110,8 @@ class Relay:
             return
         self.hang_ups += 1
         self._selector.unregister(source)
-        try:
+        with suppress(OSError):  # the other one hung up too
             way.target.shutdown(socket.SHUT_WR)
-        except OSError:
-            pass  # the other one hung up too
 
 
 class _Way:

@@ -1,0 +1,162 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How many points the driver encodes, and sends, in a second.
+
+Sending is measured through all of the driver (pipe, robot loop, window of points in flight, TCP)
+to a reader that stands for a robot program which runs every point at once: it calls the driver's
+ports, reads, and reports how many points it has begun through the register of the simulated robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from multiprocessing.connection import Connection
+import signal
+import socket
+import struct
+import threading
+import time
+
+from figures import Figure, seconds
+import paths
+from processes import answer_calls, Child, child, HOST
+
+from ur_cartesian_driver.driver import ConnectionState, Driver, DriverConfig
+from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.primitive import MoveL
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.protocol.registers import POINTS_BEGUN
+from ur_cartesian_driver.protocol.trajectory import encode_points, POINT_FIELDS, POINT_SIZE
+from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
+
+NAME = 'points a second'
+#: The driver sends at most 500 points that the robot has not begun, and learns of that with each
+#: of 500 RTDE packages a second.
+BOUND = 500 * 500
+#: Runs as long as the reader stands in for it.
+STAND_IN = 'def stand_in():\n  while True:\n    sync()\n  end\nend\n'
+
+
+def run(quick: bool) -> Iterator[Figure]:
+    """Encode, then send."""
+    yield _encoding(10_000 if quick else 100_000)
+    yield from _sending(4_000 if quick else 20_000)
+
+
+def _encoding(points: int) -> Figure:
+    primitives = [MoveL(target=pose, blend_radius=0.002) for pose in paths.meander(points)]
+    packer = struct.Struct(f'>{POINT_FIELDS}i')
+    words = tuple(range(POINT_FIELDS))
+    return Figure(
+        benchmark=NAME, name='encoded', unit='1/s',
+        value=points / seconds(lambda: encode_points(primitives), repeat=3),
+        baseline=points / seconds(lambda: [packer.pack(*words) for _ in range(points)], repeat=3),
+        than='struct.pack of the words alone', note=f'{points:,} points')
+
+
+def _sending(points: int) -> Iterator[Figure]:
+    with child(_read) as reader:
+        baseline = _plain_socket(reader, points)
+        ports = reader.call('ports')
+        config = DriverConfig(
+            robot_ip=HOST, ur_type=paths.MODEL, rtde_port=ports.rtde, primary_port=ports.primary,
+            dashboard_port=ports.dashboard, reverse_port=0, script_sender_port=0,
+            trajectory_port=0, script_command_port=0, robot_loop='process')
+        with Driver(config, PlanningOptions(max_points=points)) as driver:
+            _until(lambda: driver.status.state is ConnectionState.CONNECTED)
+            reader.call('join', dict(driver.status.ports))
+            driver.wait_ready(10.0)
+            taken = _through_driver(driver, driver.plan(paths.goal(points)), reader, points)
+    yield Figure(benchmark=NAME, name='sent through the driver', unit='1/s',
+                 value=points / taken, baseline=points / baseline,
+                 than='the same bytes, plain sockets',
+                 note=f'{points:,} points, the window bounds it to {BOUND:,} after the first 500')
+
+
+def _through_driver(driver: Driver, plan: Plan, reader: Child, points: int) -> float:
+    """Return the time from the first point to the last at the reader [s]."""
+    motion = driver.start(plan)
+    times = reader.call('times', points)
+    motion.cancel()
+    driver.close()  # the reader does not answer a cancel
+    first, last = times
+    return float(last - first)
+
+
+def _plain_socket(reader: Child, points: int) -> float:
+    with socket.create_server((HOST, 0)) as server:
+        reader.call('join', {'trajectory_port': server.getsockname()[1]})
+        connection, _ = server.accept()
+        with connection:
+            connection.sendall(bytes(points * POINT_SIZE))
+            first, last = reader.call('times', points)
+    return float(last - first)
+
+
+def _until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 10.0
+    while not condition():
+        if time.monotonic() > deadline:
+            raise TimeoutError('the driver did not connect within 10 s')
+        time.sleep(0.02)
+
+
+# ---- the reader's process ---------------------------------------------------------------------
+
+
+def _read(connection: Connection) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    config = SimulatorConfig(rtde_port=0, primary_port=0, dashboard_port=0)
+    with SimulatedRobot(config) as robot, ExitStack() as sockets:
+        robot.run_script(STAND_IN)
+        reader = Reader(robot, sockets)
+        answer_calls(connection, {
+            'ports': lambda: robot.ports, 'join': reader.join, 'times': reader.times})
+
+
+class Reader:
+    """Stands for the robot program."""
+
+    def __init__(self, robot: SimulatedRobot, sockets: ExitStack) -> None:
+        """Take the robot in whose name it reports."""
+        self._robot = robot
+        self._sockets = sockets
+        self._arrived = 0
+        self._first = self._last = 0.0
+
+    def join(self, ports: dict[str, int]) -> None:
+        """Call the ports in the order of the robot program, and read in the background."""
+        self._arrived = 0
+        for name in ('trajectory_port', 'script_command_port', 'reverse_port'):
+            if name in ports:
+                sock = socket.create_connection((HOST, ports[name]))
+                self._sockets.enter_context(sock)
+                threading.Thread(target=self._take, args=(sock, name == 'trajectory_port'),
+                                 daemon=True).start()
+
+    def times(self, points: int) -> tuple[float, float]:
+        """Return when the first and the last of so many points came."""
+        deadline = time.monotonic() + 20.0
+        while self._arrived < points * POINT_SIZE and time.monotonic() < deadline:
+            time.sleep(0.005)
+        if self._arrived < points * POINT_SIZE:
+            raise TimeoutError(f'only {self._arrived // POINT_SIZE} of {points} points came')
+        return self._first, self._last
+
+    def _take(self, sock: socket.socket, counts: bool) -> None:
+        try:
+            while data := sock.recv(1 << 16):
+                if counts:
+                    self._count(len(data))
+        except OSError:
+            pass  # the block was left
+
+    def _count(self, size: int) -> None:
+        self._last = time.monotonic()
+        if self._arrived == 0:
+            self._first = self._last
+        self._arrived += size
+        begun = self._arrived // POINT_SIZE
+        self._robot.controller.signals.outputs.integers[POINTS_BEGUN] = begun

@@ -1,0 +1,74 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Measure, and print a table; README.md says what each figure means.
+
+::
+
+    make bench
+    .venv/bin/python benchmark/run.py --only keepalive --json figures.json
+"""
+
+from __future__ import annotations
+
+import argparse
+from importlib import import_module
+import os
+from pathlib import Path
+import signal
+import sys
+import time
+
+from figures import as_json, Figure, machine, table
+
+#: In the order of the table: what is measured with many processes first.
+MODULES = ('goal_on_wire', 'keepalive', 'points', 'load', 'planning', 'kinematics', 'codecs_rtde',
+           'urscript_frames')
+
+
+def main() -> int:
+    """Run the benchmarks; 1 when one of them could not be carried out."""
+    arguments = _parser().parse_args()
+    _keep_to_ourselves()
+    # A run that is told to end has to end its processes, as after Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    begin = time.monotonic()
+    print(', '.join(f'{name} {value}' for name, value in machine().items()), flush=True)
+    figures: list[Figure] = []
+    failed = False
+    for name in arguments.only or MODULES:
+        try:
+            measured = list(import_module(name).run(arguments.quick))
+        except Exception as error:
+            # The others can still be measured.
+            print(f'\n{name}: not measured: {error!r}', file=sys.stderr, flush=True)
+            failed = True
+            continue
+        print(table(measured), flush=True)
+        figures += measured
+    print(f'\n{len(figures)} figures in {time.monotonic() - begin:.0f} s')
+    if arguments.json == '-':
+        print(as_json(figures))
+    elif arguments.json:
+        Path(arguments.json).write_text(as_json(figures) + '\n', encoding='utf-8')
+    return int(failed)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description='Measure the driver and the simulated robot.')
+    parser.add_argument('--only', action='append', choices=MODULES, metavar='NAME',
+                        help=f'only this one (may be repeated): {", ".join(MODULES)}')
+    parser.add_argument('--quick', action='store_true',
+                        help='smaller goals, shorter times: to see that it runs')
+    parser.add_argument('--json', metavar='FILE', help='write the figures as JSON, - = print them')
+    return parser
+
+
+def _keep_to_ourselves() -> None:
+    """Let no other ROS program on this network, or computer, take part."""
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
+
+
+if __name__ == '__main__':
+    sys.exit(main())

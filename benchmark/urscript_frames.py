@@ -1,0 +1,89 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a frame of a URScript program, and a cycle of the simulated controller around it, cost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from figures import Figure, seconds_each
+
+from ur_cartesian_driver.program import as_program, ProgramSettings, render
+from ur_cartesian_driver.sim.config import SimulatorConfig
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.tcp_script_sockets import TcpScriptSockets
+from ur_cartesian_driver.urscript import core_builtins, Machine, parse
+
+NAME = 'URScript'
+#: 100 rounds of arithmetic, a comparison, lists and a call, then the end of the frame.
+WORK = """
+def work():
+  values = [1, 2, 3, 4, 5, 6]
+  def twice(x):
+    return x * 2
+  end
+  while True:
+    i = 0
+    while i < 100:
+      values[2] = twice(values[1]) + i
+      i = i + 1
+    end
+    sync()
+  end
+end
+"""
+IDLE = 'def idle():\n  while True:\n    sync()\n  end\nend\n'
+MOVING = """
+def moving():
+  while True:
+    movel(p[-0.40, -0.13, 0.45, 0, 3.14159, 0], a=0.5, v=0.02)
+    movel(p[-0.50, -0.13, 0.45, 0, 3.14159, 0], a=0.5, v=0.02)
+  end
+end
+"""
+
+
+def run(quick: bool) -> Iterator[Figure]:
+    """Run frames without a controller, then whole cycles of one."""
+    budget = 0.1 if quick else 0.5
+    text = as_program(render(ProgramSettings(
+        host='127.0.0.1', reverse_port=1, trajectory_port=2, script_command_port=3)))
+    yield Figure(benchmark=NAME, name='parse the robot program', unit='ms',
+                 value=1e3 * seconds_each(lambda: parse(text), budget),
+                 note=f'{len(text.splitlines())} lines')
+    machine = Machine(parse(WORK), core_builtins() | {'sync': _sync})
+    yield Figure(benchmark=NAME, name='frame with 100 rounds of a loop', unit='us',
+                 value=1e6 * seconds_each(machine.step, budget),
+                 baseline=1e6 * seconds_each(_work, budget), than='the same in Python')
+    nothing = 1e6 * _cycle('', budget)
+    for name, program in (('nothing running', ''), ('an empty loop', IDLE),
+                          ('a straight line', MOVING)):
+        yield Figure(benchmark='cycle of the simulated controller', name=name, unit='us',
+                     value=1e6 * _cycle(program, budget), baseline=nothing,
+                     than='nothing running', note='2,000 us are there')
+
+
+def _cycle(program: str, budget: float) -> float:
+    controller = Controller(SimulatorConfig(), TcpScriptSockets())
+    if program:
+        controller.programs.submit(program)
+    for _ in range(5):
+        controller.step()
+    assert bool(program) == controller.programs.running, controller.announcements.log
+    return seconds_each(controller.step, budget)
+
+
+def _sync() -> Iterator[None]:
+    yield
+
+
+def _twice(x: int) -> int:
+    return x * 2
+
+
+def _work() -> None:
+    values = [1, 2, 3, 4, 5, 6]
+    i = 0
+    while i < 100:
+        values[2] = _twice(values[1]) + i
+        i = i + 1
