@@ -45,12 +45,11 @@ def sim(arguments: argparse.Namespace) -> int:
 
 async def _simulate(robot: SimulatedRobot) -> None:
     """Say where the simulator listens, then show its state as long as somebody looks."""
-    async with asyncio.TaskGroup() as tasks:
-        showing = tasks.create_task(_show_status(robot))
-        try:
-            await robot.run(on_listening=lambda: _show_ports(robot))
-        finally:
-            showing.cancel()
+    showing = asyncio.create_task(_show_status(robot))
+    try:
+        await robot.run(on_listening=lambda: _show_ports(robot))
+    finally:
+        showing.cancel()
 
 
 def _show_ports(robot: SimulatedRobot) -> None:
@@ -146,11 +145,12 @@ def validate(arguments: argparse.Namespace) -> int:
     message = client.load_goal(goal_file(arguments.file))
     try:
         goal = convert.goal_from_message(message, frames.Frames(), now=0)
-        print(table(plan(goal, state, arm,
-                         PlanningOptions(max_tool_speed=arguments.max_tool_speed))))
+        found = plan(goal, state, arm, PlanningOptions(max_tool_speed=arguments.max_tool_speed))
     except GoalRefused as refusal:
         print(f'refused: {refusal}', file=sys.stderr)
         return 1
+    print(table(found))
+    print(*found.report, sep='\n')
     return 0
 
 

@@ -1,0 +1,119 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The command line: what it prints, and its exit status."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+import yaml
+
+from ur_cartesian_driver.cli import main, picture
+from ur_cartesian_driver.cli.commands import goal_file, standing_at
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, robot_model
+from ur_cartesian_driver.ros.client import load_goal
+
+EXAMPLES = ['postures', 'seam', 'square']
+HOME = (0.0, -1.5707963267948966, 1.5707963267948966, -1.5707963267948966, -1.5707963267948966,
+        0.0)
+
+
+@pytest.mark.parametrize('example', EXAMPLES)
+def test_validate_prints_the_plan_of_an_example(example, capsys):
+    assert main(['validate', example]) == 0
+    lines = capsys.readouterr().out
+    points = len(load_goal(goal_file(example)).trajectory.points)
+    for i in range(points):
+        assert f'{i}' in lines
+    assert 'MOVE' in lines
+
+
+def test_validate_refuses_with_a_sentence_and_a_status(tmp_path, capsys):
+    goal = yaml.safe_load(goal_file('square').read_text())
+    goal['trajectory']['points'][2]['pose']['position']['x'] = 5.0
+    file = tmp_path / 'far.yaml'
+    file.write_text(yaml.safe_dump(goal))
+    assert main(['validate', str(file)]) == 1
+    assert 'trajectory.points[2]' in capsys.readouterr().err
+
+
+def test_a_goal_that_is_nowhere_is_named_with_the_examples(capsys):
+    assert main(['validate', 'no_such_goal']) == 1
+    error = capsys.readouterr().err
+    assert 'no_such_goal' in error
+    assert all(example in error for example in EXAMPLES)
+
+
+def test_where_prints_a_point_that_can_be_pasted_into_a_goal(ur_sim, capsys):
+    assert main(['where', '--rtde-port', str(ur_sim.ports.rtde)]) == 0
+    text = capsys.readouterr().out
+    (point,) = yaml.safe_load(text)
+    assert point['posture']['posture_joint_names'] == list(JOINT_NAMES)
+    assert point['posture']['posture_joint_values'] == pytest.approx(HOME, abs=1e-6)
+    goal = load_goal(yaml.safe_dump({'trajectory': {'points': [point]}}))
+    position = goal.trajectory.points[0].pose.position
+    expected = Arm(robot_model('ur5e')).forward(HOME).position
+    assert (position.x, position.y, position.z) == pytest.approx(expected, abs=1e-6)
+
+
+def test_where_nobody_is_says_so(capsys, unused_port):
+    assert main(['where', '--rtde-port', str(unused_port)]) == 1
+    assert f'port {unused_port}' in capsys.readouterr().err
+
+
+@pytest.fixture
+def unused_port():
+    import socket
+    with socket.socket() as s:
+        s.bind(('127.0.0.1', 0))
+        yield s.getsockname()[1]
+
+
+def test_an_arm_that_is_said_to_stand_somewhere_stands_there():
+    arm = Arm(robot_model('ur10e'))
+    state = standing_at(arm, HOME)
+    assert state.actual_q == HOME
+    assert state.actual_tcp_pose == arm.forward(HOME)
+
+
+@pytest.mark.slow
+def test_the_simulator_says_where_it_listens_and_ends_on_a_signal():
+    process = subprocess.Popen(
+        [sys.executable, '-m', 'ur_cartesian_driver.cli', 'sim', '--rtde-port', '0',
+         '--primary-port', '0', '--dashboard-port', '0', '--model', 'ur10e'],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        env=os.environ | {'PYTHONUNBUFFERED': '1'})
+    try:
+        line = process.stdout.readline()
+        assert line.startswith('simulated ur10e on 127.0.0.1: RTDE ')
+        process.send_signal(signal.SIGTERM)
+        _, errors = process.communicate(timeout=10.0)
+        assert process.returncode == 130
+        assert not errors
+    finally:
+        process.kill()
+        process.wait()
+
+
+def test_a_taken_port_is_one_sentence(ur_sim, capsys):
+    assert main(['sim', '--rtde-port', str(ur_sim.ports.rtde), '--primary-port', '0',
+                 '--dashboard-port', '0']) == 1
+    error = capsys.readouterr().err
+    assert str(ur_sim.ports.rtde) in error
+    assert error.count('\n') == 1
+
+
+@pytest.mark.slow
+def test_the_picture_shows_what_was_recorded(tmp_path):
+    pytest.importorskip('matplotlib')
+    record = tmp_path / 'feedback.jsonl'
+    record.write_text(''.join(json.dumps({
+        'stamp': 0.1 * i, 'desired': [0.01 * i, 0.0, 0.2], 'actual': [0.01 * i, 1e-5, 0.2],
+        'speed': 0.1}) + '\n' for i in range(20)))
+    drawing = tmp_path / 'picture.png'
+    picture.draw(record, drawing, 'a line')
+    assert drawing.read_bytes().startswith(b'\x89PNG')

@@ -1,0 +1,58 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Messages between the owner and the robot loop."""
+
+import socket
+import threading
+
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.driver import channel
+from ur_cartesian_driver.driver.config import DriverConfig, DriverStatus
+from ur_cartesian_driver.execution import Order
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.events import Outcome
+from ur_cartesian_driver.motion.plan import ReferencePath
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+
+MESSAGES = [
+    channel.Configure(config=DriverConfig(robot_ip='10.0.0.1', headless_mode=True)),
+    channel.CancelMotion(motion=3), channel.Heartbeat(), channel.Shutdown(),
+    channel.ResendProgram(),
+    channel.MotionEnded(motion=3, outcome=Outcome(code=ErrorCode.SUCCESSFUL, text='Done.')),
+    channel.StatusChanged(status=DriverStatus(
+        state=ConnectionState.READY, ports={'reverse_port': 50001})),
+    channel.LogLine(level=30, text='a line')]
+
+
+@pytest.mark.parametrize('message', MESSAGES, ids=lambda m: type(m).__name__)
+def test_a_message_arrives_as_it_was_sent(message):
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        ours.sendall(channel.pack(message))
+        assert channel.receive(theirs) == message
+
+
+def test_a_large_order_arrives_whole():
+    n = 20_000
+    reference = ReferencePath(poses=np.ones((n, 7)), point=np.zeros(n, np.int32),
+                              time=np.arange(n, dtype=float))
+    sent = channel.StartMotion(motion=1, order=Order(
+        points=n, reference=reference, duration=1.0), points=bytes(84 * n))
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        thread = threading.Thread(target=ours.sendall, args=(channel.pack(sent),))
+        thread.start()
+        arrived = channel.receive(theirs)
+        thread.join()
+    assert arrived.points == sent.points
+    assert np.array_equal(arrived.order.reference.time, reference.time)
+
+
+def test_the_end_of_the_pipe_is_none_also_inside_a_message():
+    ours, theirs = socket.socketpair()
+    with theirs:
+        ours.sendall(channel.pack(channel.Heartbeat())[:-1])
+        ours.close()
+        assert channel.receive(theirs) is None

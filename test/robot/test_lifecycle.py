@@ -1,0 +1,45 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The table of the connection's states."""
+
+import pytest
+
+from ur_cartesian_driver.robot.lifecycle import after, Change, ConnectionState, TRANSITIONS
+
+WAY = [(Change.ROBOT_ANSWERED, ConnectionState.CONNECTING),
+       (Change.ROBOT_ACCEPTED, ConnectionState.CONNECTED),
+       (Change.PROGRAM_CONNECTED, ConnectionState.READY),
+       (Change.GOAL_STARTED, ConnectionState.EXECUTING),
+       (Change.GOAL_ENDED, ConnectionState.READY)]
+
+
+def test_the_way_to_a_goal_and_back():
+    state = ConnectionState.DISCONNECTED
+    for change, expected in WAY:
+        state = after(state, change)
+        assert state is expected
+
+
+@pytest.mark.parametrize('state', list(ConnectionState))
+@pytest.mark.parametrize('change', list(Change))
+def test_every_change_has_an_outcome_in_every_state(state, change):
+    assert isinstance(after(state, change), ConnectionState)
+    assert set(TRANSITIONS) == set(ConnectionState)
+
+
+@pytest.mark.parametrize('state', list(ConnectionState))
+def test_a_lost_robot_is_always_disconnected(state):
+    assert after(state, Change.ROBOT_LOST) is ConnectionState.DISCONNECTED
+
+
+@pytest.mark.parametrize('state', list(ConnectionState))
+@pytest.mark.parametrize('change', list(Change))
+def test_only_the_robot_program_makes_the_driver_ready(state, change):
+    if after(state, change) is ConnectionState.READY and state is not ConnectionState.READY:
+        assert change in (Change.PROGRAM_CONNECTED, Change.GOAL_ENDED)
+
+
+@pytest.mark.parametrize('change', list(Change))
+def test_a_refused_robot_stays_refused_until_it_is_gone(change):
+    state = after(ConnectionState.REFUSED, change)
+    assert (state is ConnectionState.REFUSED) == (change is not Change.ROBOT_LOST)
