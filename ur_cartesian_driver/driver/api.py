@@ -12,6 +12,7 @@ import itertools
 import logging
 import threading
 from types import TracebackType
+from typing import TypeVar
 
 from ur_cartesian_driver.driver import channel, host
 from ur_cartesian_driver.driver.channel import (
@@ -29,7 +30,7 @@ from ur_cartesian_driver.driver.channel import (
     StartMotion,
     StatusChanged,
 )
-from ur_cartesian_driver.driver.config import DriverConfig, DriverStatus
+from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.execution import Order
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
@@ -47,8 +48,11 @@ from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.trajectory import encode_points
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from ur_cartesian_driver.robot.status import DriverStatus
 
 LOG = logging.getLogger('ur_cartesian_driver')
+
+T = TypeVar('T')
 
 OnProgress = Callable[[Progress], None]
 
@@ -88,7 +92,7 @@ class Motion:
     def _report(self, progress: Progress) -> None:
         self.progress = progress
         if self._on_progress is not None:
-            self._on_progress(progress)
+            _call(self._on_progress, progress)
 
     def _end(self, outcome: Outcome) -> None:
         if not self._future.done():
@@ -286,9 +290,8 @@ class Driver:
 
     def _read(self) -> None:
         """Serve notices; when the loop dies, tell everybody and start another one."""
-        while True:
-            assert self._host is not None
-            notice = channel.receive(self._host.pipe)
+        while (running := self._host) is not None:  # None: closed by a callback of ours
+            notice = channel.receive(running.pipe)
             if notice is not None:
                 self._handle(notice)
             elif self._closed.is_set():
@@ -332,7 +335,7 @@ class Driver:
         else:
             self._ready.clear()
         for listener in list(self._status_listeners):
-            listener(status)
+            _call(listener, status)
 
     def _abandon(self, reason: str) -> None:
         with self._lock:
@@ -340,6 +343,15 @@ class Driver:
         for motion in motions.values():
             motion._end(Outcome(code=ErrorCode.CONNECTION_LOST,
                                 text=f'{reason[:1].upper()}{reason[1:]}.'))
+
+
+def _call(callback: Callable[[T], None], argument: T) -> None:
+    """Call somebody else's code; what it raises must not end the thread that serves all."""
+    try:
+        callback(argument)
+    except Exception as error:
+        LOG.exception('a callback of the driver failed with %s: %s; the driver goes on',
+                      type(error).__name__, error)
 
 
 def order_of(plan: Plan) -> Order:

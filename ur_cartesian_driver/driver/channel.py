@@ -16,10 +16,11 @@ import socket
 import struct
 from typing import TypeAlias
 
-from ur_cartesian_driver.driver.config import DriverConfig, DriverStatus
+from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.execution import Order
 from ur_cartesian_driver.kinematics.robots import Geometry
 from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.robot.status import DriverStatus
 
 LENGTH = struct.Struct('>I')
 

@@ -36,7 +36,7 @@ from ur_cartesian_driver.driver.channel import (
     StatusChanged,
     unpack,
 )
-from ur_cartesian_driver.driver.config import DriverConfig, DriverStatus
+from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.driver.snapshot import StateMemory
 from ur_cartesian_driver.execution import (
     Command,
@@ -57,7 +57,9 @@ from ur_cartesian_driver.motion.events import (
     Tick,
 )
 from ur_cartesian_driver.protocol.trajectory import POINT_SIZE
-from ur_cartesian_driver.robot.link import LinkSettings, LinkStatus, RobotLink
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from ur_cartesian_driver.robot.link import RobotLink
+from ur_cartesian_driver.robot.status import DriverStatus
 
 #: How often time alone is looked at [s].
 TICK = 0.02
@@ -77,7 +79,7 @@ class RobotLoop:
         self._points = memoryview(b'')
         self._last_heartbeat = 0.0
         self._link = RobotLink(
-            link_settings(config), on_event=self.handle_event, on_status=self._status_changed,
+            config, on_event=self.handle_event, on_status=self._status_changed,
             on_geometry=self._geometry_known, on_log=self._log)
 
     async def run(self, requests: asyncio.StreamReader) -> None:
@@ -186,14 +188,10 @@ class RobotLoop:
 
     # ---- the owner ----------------------------------------------------------------------------
 
-    def _status_changed(self, link: LinkStatus) -> None:
-        if not link.has_state:
+    def _status_changed(self, status: DriverStatus) -> None:
+        if status.state is ConnectionState.DISCONNECTED:
             self._memory.clear()
-        self._notify(StatusChanged(status=DriverStatus(
-            state=link.state, message=link.message, last_error=link.last_error,
-            robot_model=link.robot_model, polyscope_version=link.polyscope_version,
-            program_running=link.program_connected, calibration_known=link.calibration_known,
-            ports=link.ports)))
+        self._notify(StatusChanged(status=status))
 
     def _geometry_known(self, geometry: Geometry) -> None:
         self._notify(GeometryKnown(geometry=geometry))
@@ -207,11 +205,6 @@ class RobotLoop:
 
     def _now(self) -> float:
         return asyncio.get_running_loop().time()
-
-
-def link_settings(config: DriverConfig) -> LinkSettings:
-    """Return what of the configuration the link needs."""
-    return LinkSettings(**{name: getattr(config, name) for name in LinkSettings.__slots__})
 
 
 async def serve(pipe: socket.socket, descriptor: int) -> None:

@@ -80,6 +80,8 @@ class StateMemory:
                 return _state(_DATA.unpack(data)) if before else None
 
     def _write(self, data: bytes) -> None:
+        if self._memory.closed:  # sockets that close behind the loop still report
+            return
         self._count += 1
         _COUNTER.pack_into(self._memory, 0, 2 * self._count - 1)
         self._memory[_COUNTER.size:_COUNTER.size + len(data)] = data

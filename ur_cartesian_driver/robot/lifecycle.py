@@ -6,9 +6,9 @@ The connection to the robot as a table: where it is, and what brings it further.
 * **DISCONNECTED**: the robot does not answer; dialled again by itself.
 * **CONNECTING**: RTDE answers; the primary interface and the robot's report of itself are missing.
 * **CONNECTED**: the robot reports its state and is the one that was configured; the robot program
-  is not connected to us.
+  is not connected to us, or paused: it would run a goal that it is sent now at some later time.
 * **READY**: the robot program is connected and takes goals.
-* **EXECUTING**: a goal runs.
+* **EXECUTING**: a goal runs; it may be paused and resumed.
 * **STOPPED**: a person, another client or the safety system stopped the robot. Nothing starts by
   itself from here; the way out is a program that connects again.
 * **REFUSED**: this driver must not move this robot, until somebody changes its parameters.
@@ -43,6 +43,7 @@ class Change(Enum):
     ROBOT_REFUSED = auto()
     ROBOT_LOST = auto()
     PROGRAM_CONNECTED = auto()
+    PROGRAM_PAUSED = auto()
     PROGRAM_LOST = auto()
     ROBOT_STOPPED = auto()
     ROBOT_FREE = auto()
@@ -67,6 +68,7 @@ TRANSITIONS: Mapping[ConnectionState, Mapping[Change, ConnectionState]] = Mappin
     },
     S.READY: {
         C.GOAL_STARTED: S.EXECUTING,
+        C.PROGRAM_PAUSED: S.CONNECTED,
         C.PROGRAM_LOST: S.CONNECTED,
         C.ROBOT_STOPPED: S.STOPPED,
         C.ROBOT_LOST: S.DISCONNECTED,

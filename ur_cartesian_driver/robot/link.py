@@ -1,103 +1,55 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The link to one robot: its sockets joined to the codecs, kept up by itself.
+The link to one robot: its interfaces joined into one connection that keeps itself up.
 
 Order of things: RTDE is dialled first (it tells the software's version and streams the state),
 then we listen on our own ports, then the primary interface is dialled (it tells model, geometry
-and errors, and takes the robot program), then the robot program calls us: trajectory, script
-command, reverse. What was dialled is dialled again when it breaks. Power, brakes and programs are
-never started again by ourselves: the program is uploaded once, on the first connection, and never
-over a program that runs.
+and errors, and takes the robot program), then the robot program calls us. What was dialled is
+dialled again when it breaks.
+
+Power, brakes and programs are never started again by ourselves: the program is uploaded on the
+first connection only, when the arm is ready and nothing else runs there. Whoever switches the
+robot on later, or stopped it, stands beside it, and says when the program may run.
 
 Events (:mod:`~ur_cartesian_driver.motion.events`) go to one callback, in the order in which they
-happened, on the event loop.
+happened, on the event loop; a status that follows from an event is told before it, so that nobody
+who hears that a goal has ended takes a lost robot for a ready one.
 """
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import replace
 import logging
-from types import MappingProxyType
-from typing import TypeVar
+from typing import NoReturn
 
 from ur_cartesian_driver.kinematics.robots import Geometry, MODELS
-from ur_cartesian_driver.motion.errors import DriverError, ProtocolError
+from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, TrajectoryEnded
-from ur_cartesian_driver.motion.state import (
-    RobotMode,
-    RobotState,
-    RobotStatus,
-    RuntimeState,
-    SafetyMode,
-)
+from ur_cartesian_driver.motion.state import RobotMode, RobotState, RobotStatus
 from ur_cartesian_driver.program import as_program, ProgramSettings, render
-from ur_cartesian_driver.protocol import primary, reverse, script_sender
+from ur_cartesian_driver.protocol import primary
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
-from ur_cartesian_driver.protocol.rtde import (
-    ControllerVersion,
-    DataReceived,
-    Ready,
-    RtdeClient,
-    RtdeEvent,
-)
-from ur_cartesian_driver.protocol.trajectory import ResultDecoder
+from ur_cartesian_driver.protocol.rtde import ControllerVersion
 from ur_cartesian_driver.robot.lifecycle import after, Change, ConnectionState
-from ur_cartesian_driver.robot.state_recipe import OPTIONAL, REQUIRED, robot_state
-from ur_cartesian_driver.robot.transport import BACK_OFF, Connection, dial, Listener
+from ur_cartesian_driver.robot.primary_client import PrimaryClient, PrimaryListener
+from ur_cartesian_driver.robot.program_sockets import ProgramListener, ProgramSockets
+from ur_cartesian_driver.robot.settings import LinkSettings
+from ur_cartesian_driver.robot.state_stream import StateStream
+from ur_cartesian_driver.robot.status import DriverStatus, is_paused, is_stopped, what_is_needed
+from ur_cartesian_driver.robot.transport import Retry
 
-T = TypeVar('T')
-
-#: A robot that streams nothing for that long is lost [s].
-RTDE_SILENCE = 1.0
-#: How long the robot may take to tell its model on the primary interface [s].
-REPORT_TIMEOUT = 5.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LinkSettings:
-    """How to reach the robot; see ``driver.DriverConfig`` for the meaning of each."""
-
-    robot_ip: str
-    ur_type: str
-    rtde_port: int
-    primary_port: int
-    reverse_port: int
-    script_sender_port: int
-    trajectory_port: int
-    script_command_port: int
-    bind_address: str
-    reverse_ip: str
-    allowed_peers: tuple[str, ...]
-    headless_mode: bool
-    robot_receive_timeout: float
-    keepalive_period: float
-    rtde_frequency: float
-    stop_deceleration: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LinkStatus:
-    """How far the link is."""
-
-    state: ConnectionState = ConnectionState.DISCONNECTED
-    message: str = ''
-    last_error: str = ''
-    robot_model: str = ''
-    polyscope_version: str = ''
-    program_connected: bool = False
-    calibration_known: bool = False
-    has_state: bool = False
-    ports: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
+#: In these states nobody knows the robot, or it is the wrong one: the reason is the message.
+_OUT_OF_REACH = frozenset({ConnectionState.DISCONNECTED, ConnectionState.REFUSED})
 
 
 class RobotLink:
     """The only owner of the driver's sockets; used from one event loop."""
 
     def __init__(self, settings: LinkSettings, *, on_event: Callable[[Event], None],
-                 on_status: Callable[[LinkStatus], None],
+                 on_status: Callable[[DriverStatus], None],
                  on_geometry: Callable[[Geometry], None],
                  on_log: Callable[[int, str], None]) -> None:
         """
@@ -110,63 +62,46 @@ class RobotLink:
         self._settings = settings
         self._on_event, self._on_status = on_event, on_status
         self._on_geometry, self._on_log = on_geometry, on_log
-        self._status = LinkStatus(message=f'Connecting to the robot at {settings.robot_ip}.')
+        self._status = DriverStatus(message=f'Connecting to the robot at {settings.robot_ip}.')
         self._version: ControllerVersion | None = None
-        self._latest: RobotState | None = None
-        self._last_packet = 0.0
-        self._uploaded = False
-        self._program = ''
-        self._rtde: Connection | None = None
-        self._primary: Connection | None = None
-        self._report = asyncio.Event()
-        self._configuration: primary.ConfigurationData | None = None
-        self._results = ResultDecoder()
-        self._requests = script_sender.RequestDecoder()
-        self._action = TrajectoryAction.NOOP
-        self._busy = False
-        self._listeners = {
-            'trajectory_port': self._listener(
-                'trajectory_port', self._on_trajectory_data),
-            'script_command_port': self._listener('script_command_port', _ignore),
-            'reverse_port': self._listener('reverse_port', _ignore),
-            'script_sender_port': Listener(
-                'script_sender_port', on_open=_ignore_connection, on_data=self._on_request,
-                on_closed=_ignore_text, on_refused=self._warn),
-        }
+        self._robot: RobotState | None = None
+        self._first_connection = True
+        self._primary = PrimaryClient(PrimaryListener(
+            configuration=self._on_configuration, geometry=self._on_kinematics,
+            error=self._error, text=lambda text: self._on_log(logging.INFO, f'robot: {text}')))
+        self._program = ProgramSockets(settings, ProgramListener(
+            connected=self._on_program_connected, lost=self._on_program_lost,
+            result=lambda result: self._on_event(TrajectoryEnded(result=result)),
+            warning=self._warn))
 
     # ---- commands -----------------------------------------------------------------------------
 
     def send_control(self, action: TrajectoryAction, count: int) -> None:
-        """Send a trajectory action on the reverse socket."""
-        self._send_reverse(reverse.trajectory(action, count, self._read_timeout()))
+        """Send a trajectory action to the robot program."""
+        self._program.send_control(action, count)
 
     def send_points(self, data: bytes) -> None:
-        """Send points on the trajectory socket."""
-        connection = self._listeners['trajectory_port'].connection
-        if connection is not None:
-            connection.send(data)
+        """Send points to the robot program."""
+        self._program.send_points(data)
 
     def set_busy(self, busy: bool) -> None:
         """Say whether a goal runs: its keepalives are another message."""
-        self._busy = busy
+        self._program.busy = busy
         self._change(Change.GOAL_STARTED if busy else Change.GOAL_ENDED)
 
     def stop_program(self, reason: str) -> None:
         """End the robot program, so that nothing of it can resume."""
-        self._on_log(logging.WARNING, f'the robot program is stopped: {reason}')
-        if self._primary is not None:
-            self._primary.send(primary.command(primary.Command.STOP_PROGRAM))
-        connection = self._listeners['reverse_port'].connection
-        if connection is not None:
-            connection.send(reverse.stop().encode())
+        self._warn(f'the robot program is stopped: {reason}')
+        self._primary.send(primary.command(primary.Command.STOP_PROGRAM))
+        self._program.send_stop()
 
     def upload_program(self) -> None:
         """Upload the robot program; it replaces whatever program runs."""
-        if self._primary is None or not self._program:
-            self._warn('the robot program cannot be sent, the robot is not connected')
-            return
-        self._uploaded = True
-        self._primary.send(primary.upload(as_program(self._program)))
+        if self._status.state in (*_OUT_OF_REACH, ConnectionState.CONNECTING):
+            self._warn(f'the robot program is not sent: {self._status.message}')
+        elif not self._primary.send(primary.upload(as_program(self._program.text))):
+            self._warn('the robot program is not sent: there is no connection to the primary '
+                       'interface of the robot')
 
     def not_ready(self) -> str:
         """Return why no goal can run now; empty when one can."""
@@ -176,346 +111,157 @@ class RobotLink:
 
     def close(self) -> None:
         """Close everything; the robot program stops the arm, at the latest when we hang up."""
-        self._send_reverse(reverse.stop())
-        for listener in self._listeners.values():
-            listener.close()
-        for connection in (self._primary, self._rtde):
-            if connection is not None:
-                connection.close()
+        self._program.close()
 
     # ---- life ---------------------------------------------------------------------------------
 
     async def run(self) -> None:
         """Connect, and connect again, until cancelled."""
-        attempt = 0
         async with asyncio.TaskGroup() as tasks:
-            tasks.create_task(self._keep_alive())
-            while True:
-                try:
-                    await self._session()
-                    attempt = 0
-                except (OSError, DriverError) as error:
-                    self._lost(str(error))
-                await asyncio.sleep(BACK_OFF[min(attempt, len(BACK_OFF) - 1)])
-                attempt += 1
+            tasks.create_task(self._program.keep_alive())
+            tasks.create_task(self._stay_connected())
 
-    async def _session(self) -> None:
-        """Serve one RTDE connection from its first to its last byte."""
-        closed = asyncio.get_running_loop().create_future()
-        client = RtdeClient(outputs=(*REQUIRED, *OPTIONAL), optional_outputs=OPTIONAL,
-                            frequency=self._settings.rtde_frequency)
-        ready: asyncio.Future[Ready] = asyncio.get_running_loop().create_future()
-        names: list[str] = []
-
-        def on_data(data: bytes) -> None:
-            try:
-                events = client.feed(data)
-            except ProtocolError as error:
-                _fail(ready, error)
-                connection.abort(str(error))
-                return
-            connection.send(client.data_to_send())
-            for event in events:
-                if isinstance(event, Ready):
-                    names[:] = event.outputs.names
-                    _succeed(ready, event)
-                self._on_rtde(event, names)
-
-        def on_closed(reason: str) -> None:
-            _fail(ready, OSError(f'RTDE: {reason}'))
-            _succeed(closed, reason)
-
-        connection = await dial(self._settings.robot_ip, self._settings.rtde_port, on_data,
-                                on_closed)
-        self._rtde = connection
-        try:
-            self._change(Change.ROBOT_ANSWERED)
-            connection.send(client.start())
-            async with asyncio.timeout(REPORT_TIMEOUT):
-                self._version = (await ready).controller_version
-                await self._listen(connection.local_address)
-            await self._with_primary(closed)
-        except TimeoutError:
-            raise OSError(
-                f'{self._settings.robot_ip} port {self._settings.rtde_port} does not answer as '
-                'an RTDE server: is it a robot?') from None
-        finally:
-            self._rtde = None
-            connection.close()
-
-    async def _with_primary(self, rtde_closed: asyncio.Future[str]) -> None:
-        """Hold the primary connection as long as RTDE is there, and watch RTDE's pulse."""
-        primary_task = asyncio.create_task(self._hold_primary())
-        watch = asyncio.create_task(self._watch_pulse())
-        try:
-            done, _ = await asyncio.wait(
-                {primary_task, watch, rtde_closed}, return_when=asyncio.FIRST_COMPLETED)
-            reason = done.pop().result()
-        finally:
-            for task in (primary_task, watch):
-                task.cancel()
-        self._lost(f'RTDE: {reason}')
-
-    async def _watch_pulse(self) -> str:
-        """Return when the robot was silent for too long."""
-        loop = asyncio.get_running_loop()
-        self._last_packet = loop.time()
-        while loop.time() - self._last_packet < RTDE_SILENCE:  # noqa: ASYNC110 - a pulse
-            await asyncio.sleep(RTDE_SILENCE / 10.0)
-        return f'the robot sent nothing for {RTDE_SILENCE:g} s'
-
-    async def _hold_primary(self) -> str:
-        """Keep the primary connection up; it returns only when the robot must not be moved."""
-        attempt = 0
+    async def _stay_connected(self) -> NoReturn:
+        retry = Retry()
         while True:
-            closed = asyncio.get_running_loop().create_future()
-            frames = primary.PrimaryDecoder()
             try:
-                self._primary = await dial(
-                    self._settings.robot_ip, self._settings.primary_port,
-                    lambda data, frames=frames: self._on_primary_data(frames, data),  # type: ignore[misc]
-                    lambda reason, closed=closed: _succeed(closed, reason))  # type: ignore[misc]
-                await self._check_robot()
-                attempt = 0
-                self._warn(f'primary interface: {await closed}')
-            except OSError as error:
-                self._warn(f'primary interface: {error}')
-            finally:
-                if self._primary is not None:
-                    self._primary.close()
-                self._primary = None
-            await asyncio.sleep(BACK_OFF[min(attempt, len(BACK_OFF) - 1)])
-            attempt += 1
+                reason = await self._session()
+                retry.reset()
+            except (OSError, DriverError) as error:
+                reason = str(error)
+            self._on_robot_lost(reason)
+            await retry.pause()
 
-    async def _check_robot(self) -> None:
-        """Wait for the robot's report of itself; take it, or refuse the robot."""
+    async def _session(self) -> str:
+        """
+        Serve one RTDE connection from its first to its last byte and return why it ended.
+
+        :raises OSError: the robot cannot be reached, or one of our ports is taken.
+        :raises DriverError: the robot program cannot be made from the settings.
+        """
+        s = self._settings
+        stream = StateStream(s.rtde_frequency, self._on_state)
         try:
-            async with asyncio.timeout(REPORT_TIMEOUT):
-                await self._report.wait()
-        except TimeoutError:
-            raise OSError('the robot does not report its configuration') from None
-        assert self._configuration is not None
-        assert self._version is not None
-        models = model_names(self._configuration.robot_type, self._version.major)
-        expected = self._settings.ur_type
-        self._update(robot_model=expected if expected in models else ' or '.join(models),
-                     polyscope_version=str(self._version))
-        if expected not in models:
-            self._change(Change.ROBOT_REFUSED)
-            self._update(message=(
-                f"The robot is a {' or '.join(models)}, but ur_type is {expected}; set ur_type to "
-                'the model that is there.'))
-            return
-        self._change(Change.ROBOT_ACCEPTED)
-        self._start_program_once()
+            self._version = await stream.open(s.robot_ip, s.rtde_port)
+            self._change(Change.ROBOT_ANSWERED)
+            await self._listen(stream, self._version)
+            async with asyncio.TaskGroup() as tasks:
+                primary_task = tasks.create_task(self._primary.hold(s.robot_ip, s.primary_port))
+                reason = await stream.ended()
+                primary_task.cancel()
+            return reason
+        finally:
+            stream.close()
 
-    def _start_program_once(self) -> None:
-        """Upload the program on the first connection, if nothing else runs on the robot."""
-        state = self._latest
-        if self._uploaded or not self._settings.headless_mode or state is None:
-            return
-        if state.robot_mode is not RobotMode.RUNNING:
-            return
-        if state.robot_status & RobotStatus.PROGRAM_RUNNING:
-            self._warn('another program runs on the robot; stop it, then resend the robot program')
-            self._uploaded = True
-            return
-        self.upload_program()
-
-    async def _listen(self, local_address: str) -> None:
+    async def _listen(self, stream: StateStream, version: ControllerVersion) -> None:
         """Open our ports (once), and render the program with them."""
         s = self._settings
-        host = s.bind_address or local_address
-        allowed = frozenset(s.allowed_peers or (s.robot_ip, self._peer_address()))
-        for name, listener in self._listeners.items():
-            if listener.port == 0:
-                await listener.open(host, getattr(s, name), allowed)
-        ports = {name: listener.port for name, listener in self._listeners.items()}
-        self._update(ports=MappingProxyType(ports))
-        assert self._version is not None
-        v = self._version
-        self._program = render(ProgramSettings(
+        host = s.bind_address or stream.local_address
+        await self._program.open(
+            host, frozenset(s.allowed_peers or (s.robot_ip, stream.peer_address)))
+        ports = self._program.ports
+        self._program.text = render(ProgramSettings(
             host=s.reverse_ip or host, reverse_port=ports['reverse_port'],
             trajectory_port=ports['trajectory_port'],
             script_command_port=ports['script_command_port'],
-            version=(v.major, v.minor, v.bugfix), stop_deceleration=s.stop_deceleration))
+            version=(version.major, version.minor, version.bugfix),
+            stop_deceleration=s.stop_deceleration))
+        self._tell(ports=ports)
 
-    def _peer_address(self) -> str:
-        """Return the robot's address as a number, where robot_ip is a name."""
-        return self._rtde.peer_address if self._rtde is not None else self._settings.robot_ip
-
-    async def _keep_alive(self) -> None:
-        """Send the message that keeps the robot program running, at a steady pace."""
-        loop = asyncio.get_running_loop()
-        due = loop.time()
-        while True:
-            if self._busy:
-                self.send_control(TrajectoryAction.NOOP, 0)
-            else:
-                self._send_reverse(reverse.keepalive(self._read_timeout()))
-            due = max(due + self._settings.keepalive_period, loop.time())
-            await asyncio.sleep(due - loop.time())
+    def _start_program_once(self, robot: RobotState) -> None:
+        """Upload the program on the first connection, if nothing speaks against it."""
+        if not self._first_connection or self._status.state not in (
+                ConnectionState.CONNECTED, ConnectionState.STOPPED):
+            return
+        self._first_connection = False
+        if not self._settings.headless_mode or self._program.connected:
+            return
+        if self._status.state is ConnectionState.STOPPED \
+                or robot.robot_mode is not RobotMode.RUNNING:
+            self._warn(f'the robot program is not started: {self._status.message}')
+        elif robot.robot_status & RobotStatus.PROGRAM_RUNNING:
+            self._warn('the robot program is not started: another program runs on the robot; '
+                       'stop it, then resend the robot program')
+        else:
+            self.upload_program()
 
     # ---- what comes in ------------------------------------------------------------------------
 
-    def _on_rtde(self, event: RtdeEvent, names: list[str]) -> None:
-        if not isinstance(event, DataReceived):
+    def _on_state(self, robot: RobotState) -> None:
+        before, self._robot = self._robot, robot
+        if before is None or _modes(before) != _modes(robot):
+            self._review()
+        self._on_event(StateReceived(state=robot))
+
+    def _on_configuration(self, configuration: primary.ConfigurationData) -> None:
+        """Take the robot's report of itself: accept the robot, or refuse it."""
+        if self._status.state is not ConnectionState.CONNECTING:
             return
-        state = robot_state(dict(zip(names, event.values, strict=True)))
-        before, self._latest = self._latest, state
-        self._last_packet = asyncio.get_running_loop().time()
-        if before is None or _mode_of(before) != _mode_of(state) or not self._status.has_state:
-            self._update(has_state=True)
-            self._follow_safety(state)
-        self._on_event(StateReceived(state=state))
+        assert self._version is not None
+        models = model_names(configuration.robot_type, self._version.major)
+        expected = self._settings.ur_type
+        found = ' or '.join(models)
+        if expected in models:
+            self._change(Change.ROBOT_ACCEPTED, robot_model=expected,
+                         polyscope_version=str(self._version))
+            self._review()
+        else:
+            self._change(
+                Change.ROBOT_REFUSED, robot_model=found, polyscope_version=str(self._version),
+                message=f'The robot is a {found}, but ur_type is {expected}; set ur_type to the '
+                        'model that is there.')
 
-    def _follow_safety(self, state: RobotState) -> None:
-        """Turn the robot's modes into a change of the connection, and into what is needed."""
-        self._change(Change.ROBOT_STOPPED if _is_stopped(state) else Change.ROBOT_FREE)
-        if self._status.state is ConnectionState.CONNECTED:
-            if self._status.program_connected:
-                self._change(Change.PROGRAM_CONNECTED)
-            else:
-                self._start_program_once()
+    def _on_kinematics(self, geometry: Geometry) -> None:
+        if not self._status.calibration_known:
+            self._on_geometry(geometry)
+            self._tell(calibration_known=True)
 
-    def _on_primary_data(self, frames: primary.PrimaryDecoder, data: bytes) -> None:
-        try:
-            packages = frames.feed(data)
-        except ProtocolError as error:
-            if self._primary is not None:
-                self._primary.abort(str(error))
-            return
-        for frame in packages:
-            if isinstance(frame, primary.RobotState):
-                for package in frame.packages:
-                    self._on_package(package)
-            else:
-                self._on_message(frame)
+    def _on_program_connected(self) -> None:
+        self._tell(program_running=True)
+        self._review()
 
-    def _on_package(self, package: primary.StatePackage) -> None:
-        """Take what a state frame tells: who the robot is."""
-        match package:
-            case primary.ConfigurationData():
-                self._configuration = package
-                self._report.set()
-            case primary.KinematicsInfo() if not self._status.calibration_known:
-                self._update(calibration_known=True)
-                self._on_geometry(Geometry(
-                    a=package.a, d=package.d, alpha=package.alpha, theta=package.theta))
+    def _on_program_lost(self, reason: str) -> None:
+        self._change(Change.PROGRAM_LOST, program_running=False)
+        self._on_event(LinkLost(link='program', reason=reason))
 
-    def _on_message(self, message: primary.Frame) -> None:
-        """Take what the robot has to say about errors."""
-        match message:
-            case primary.ErrorCodeMessage(level=level) if (
-                    primary.ReportLevel.WARNING <= level <= primary.ReportLevel.CRITICAL_FAULT):
-                self._error(f'the robot reports {message.label} {message.text}'.rstrip())
-            case primary.RuntimeExceptionMessage():
-                self._error(f'the robot program failed in line {message.line}, column '
-                            f'{message.column}: {message.text}')
-            case primary.TextMessage():
-                self._on_log(logging.INFO, f'robot: {message.text}')
-
-    def _on_trajectory_data(self, data: bytes) -> None:
-        try:
-            for result in self._results.feed(data):
-                self._on_event(TrajectoryEnded(result=result))
-        except ProtocolError as error:
-            connection = self._listeners['trajectory_port'].connection
-            if connection is not None:
-                connection.abort(str(error))
-
-    def _on_request(self, data: bytes) -> None:
-        """Answer the External Control URCap that asks for the program."""
-        connection = self._listeners['script_sender_port'].connection
-        try:
-            wanted = self._requests.feed(data)
-        except ProtocolError as error:
-            self._warn(f'script_sender_port: {error}')
-            self._requests = script_sender.RequestDecoder()
-            if connection is not None:
-                connection.abort(str(error))
-            return
-        for _ in range(wanted):
-            if connection is not None:
-                connection.send(script_sender.reply(self._program))
-
-    # ---- the program's sockets ----------------------------------------------------------------
-
-    def _listener(self, name: str, on_data: Callable[[bytes], None]) -> Listener:
-        return Listener(name, on_open=self._on_program_connection, on_data=on_data,
-                        on_closed=lambda reason: self._on_program_closed(name, reason),
-                        on_refused=self._warn)
-
-    def _on_program_connection(self, connection: Connection) -> None:
-        names = ('trajectory_port', 'script_command_port', 'reverse_port')
-        if all(self._listeners[name].connection is not None for name in names):
-            self._results = ResultDecoder()
-            self._update(program_connected=True)
-            self._change(Change.PROGRAM_CONNECTED)
-
-    def _on_program_closed(self, name: str, reason: str) -> None:
-        """Take the loss of one of the program's sockets as the loss of all of them."""
-        self._on_event(LinkLost(link='program', reason=f'{name}: {reason}'))
-        for listener in self._listeners.values():
-            if listener.connection is not None and listener.name != 'script_sender_port':
-                listener.connection.close('the robot program hung up on another socket')
-        if self._status.program_connected:
-            self._update(program_connected=False)
-            self._change(Change.PROGRAM_LOST)
-
-    def _send_reverse(self, message: reverse.ReverseMessage) -> None:
-        connection = self._listeners['reverse_port'].connection
-        if connection is not None and self._status.program_connected:
-            connection.send(message.encode())
-
-    def _read_timeout(self) -> int:
-        return round(1000.0 * self._settings.robot_receive_timeout)
+    def _on_robot_lost(self, reason: str) -> None:
+        """Take note that the robot is gone, or never was there."""
+        before, self._robot = self._robot, None
+        self._change(Change.ROBOT_LOST, calibration_known=False, last_error=reason,
+                     message=f"No connection to the robot: {reason.rstrip('.')}.")
+        if before is not None:
+            self._on_event(LinkLost(link='RTDE', reason=reason))
 
     # ---- status -------------------------------------------------------------------------------
 
-    def _lost(self, reason: str) -> None:
-        """Take note that the robot is gone, or never was there."""
-        if self._status.has_state:
-            self._on_event(LinkLost(link='RTDE', reason=reason))
-        self._latest = None
-        self._report.clear()
-        self._update(has_state=False, calibration_known=False,
-                     last_error=reason, message=f'No connection to the robot: {reason}.')
-        self._change(Change.ROBOT_LOST)
+    def _review(self) -> None:
+        """Bring the connection's state in line with what robot and program are now."""
+        robot = self._robot
+        if robot is None:
+            return
+        self._change(Change.ROBOT_STOPPED if is_stopped(robot) else Change.ROBOT_FREE)
+        self._start_program_once(robot)
+        if is_paused(robot):
+            self._change(Change.PROGRAM_PAUSED)
+        elif self._program.connected:
+            self._change(Change.PROGRAM_CONNECTED)
 
-    def _change(self, change: Change) -> None:
-        state = after(self._status.state, change)
-        if state is not self._status.state:
-            self._update(state=state)
+    def _change(self, change: Change, **news: object) -> None:
+        """Go where the table of the life cycle leads, and tell it with other news."""
+        self._tell(state=after(self._status.state, change), **news)
 
-    def _update(self, **changes: object) -> None:
-        status = replace(self._status, **changes)  # type: ignore[arg-type]
-        if status.state not in (ConnectionState.DISCONNECTED, ConnectionState.REFUSED):
-            status = replace(status, message=self._needed(status))
+    def _tell(self, **news: object) -> None:
+        status = replace(self._status, **news)  # type: ignore[arg-type]
+        if status.state not in _OUT_OF_REACH:
+            status = replace(status, message=what_is_needed(
+                status.state, self._robot, program_connected=self._program.connected,
+                headless_mode=self._settings.headless_mode))
         if status != self._status:
             self._status = status
             self._on_status(status)
 
-    def _needed(self, status: LinkStatus) -> str:
-        """Return the sentence that says what is needed before a goal can run."""
-        state = self._latest
-        if status.state is ConnectionState.CONNECTING:
-            return 'The robot answers; waiting for its report of itself.'
-        if state is not None and status.state is ConnectionState.STOPPED:
-            return _stopped_sentence(state)
-        if status.state is ConnectionState.CONNECTED:
-            if state is not None and state.robot_mode is not RobotMode.RUNNING:
-                return (f'The arm is in mode {state.robot_mode.name}; switch it on and release '
-                        'its brakes, then start the robot program.')
-            if self._settings.headless_mode:
-                return ('The robot program does not run; resend it (headless_mode) when the arm '
-                        'may move.')
-            return ('The robot program does not run; play a program with the External Control '
-                    'node on the pendant.')
-        return ''
-
     def _error(self, text: str) -> None:
-        self._update(last_error=text)
+        self._tell(last_error=text)
         self._on_log(logging.ERROR, text)
 
     def _warn(self, text: str) -> None:
@@ -529,40 +275,5 @@ def model_names(robot_type: int, software_major: int) -> list[str]:
     return names or [f'robot of the unknown type {robot_type}']
 
 
-def _mode_of(state: RobotState) -> tuple[RobotMode, SafetyMode, RuntimeState]:
-    return state.robot_mode, state.safety_mode, state.runtime_state
-
-
-def _is_stopped(state: RobotState) -> bool:
-    return state.safety_mode not in (SafetyMode.NORMAL, SafetyMode.REDUCED)
-
-
-def _stopped_sentence(state: RobotState) -> str:
-    mode = state.safety_mode.name.replace('_', ' ').lower()
-    if state.safety_mode is SafetyMode.PROTECTIVE_STOP:
-        return (f'The robot is in a {mode}; remove the cause, unlock it, then start the robot '
-                'program again.')
-    return (f'The safety system reports {mode}; clear it on the robot, then start the robot '
-            'program again.')
-
-
-def _succeed(future: asyncio.Future[T], value: T) -> None:
-    if not future.done():
-        future.set_result(value)
-
-
-def _fail(future: asyncio.Future[Ready], error: Exception) -> None:
-    if not future.done():
-        future.set_exception(error)
-
-
-def _ignore(_: bytes) -> None:
-    """Take no notice of bytes that mean nothing to us."""
-
-
-def _ignore_text(_: str) -> None:
-    """Take no notice."""
-
-
-def _ignore_connection(_: Connection) -> None:
-    """Take no notice."""
+def _modes(robot: RobotState) -> tuple[int, int, int]:
+    return robot.robot_mode, robot.safety_mode, robot.runtime_state

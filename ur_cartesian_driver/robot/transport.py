@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-TCP endpoints: one that dials and redials, one that listens for the robot program.
+TCP endpoints: one that dials, one that listens for the robot program.
 
 Both call back on the event loop and never block it. Why a connection ended is always told as a
 clause that fits into a sentence ("the robot closed the connection", ...): a user who reads that a
@@ -52,25 +52,29 @@ class Connection(asyncio.Protocol):
         self._on_data(data)
 
     def eof_received(self) -> bool:
-        """Let the transport close: nobody here speaks on half a connection."""
-        self._reason = self._reason or 'the other side closed the connection'
+        """
+        Let the transport close: nobody here speaks on half a connection.
+
+        The end is told now and not when the transport is gone, because a robot program that is
+        started again calls at the same moment, and must find its predecessor gone.
+        """
+        self._end('the other side closed the connection')
         return False
 
     def connection_lost(self, exc: Exception | None) -> None:
         """Tell why."""
-        reason = self._reason or (f'{exc}' if exc is not None else 'we closed the connection')
-        self._transport = None
-        self._on_closed(reason)
+        self._end(f'{exc}' if exc is not None else 'we closed the connection')
+
+    def _end(self, reason: str) -> None:
+        """Tell once that the connection is gone."""
+        if self._transport is not None:
+            self._transport = None
+            self._on_closed(self._reason or reason)
 
     @property
     def is_open(self) -> bool:
         """Tell whether bytes can be sent."""
         return self._transport is not None and not self._transport.is_closing()
-
-    @property
-    def unsent(self) -> int:
-        """Return how many bytes wait because the other side does not read [bytes]."""
-        return 0 if self._transport is None else self._transport.get_write_buffer_size()
 
     @property
     def local_address(self) -> str:
@@ -83,11 +87,6 @@ class Connection(asyncio.Protocol):
         """Return the other side's address on this connection."""
         assert self._transport is not None
         return str(self._transport.get_extra_info('peername')[0])
-
-    def turn_away(self, text: str) -> None:
-        """Hang up on a caller that nobody wants to hear of again."""
-        self._on_data, self._on_closed = _ignore, _ignore
-        self.abort(text)
 
     def send(self, data: bytes) -> bool:
         """Send bytes; False when the connection is gone."""
@@ -109,47 +108,73 @@ class Connection(asyncio.Protocol):
             self._transport.abort()
 
 
-async def dial(host: str, port: int, on_data: OnData, on_closed: OnClosed) -> Connection:
+async def dial(connection: Connection, host: str, port: int) -> None:
     """
     Connect once.
+
+    The connection is made by the caller, who so has it before the first bytes come in: some
+    servers speak first.
 
     :raises OSError: nobody answers, with a text that names host and port.
     """
     loop = asyncio.get_running_loop()
     try:
         async with asyncio.timeout(CONNECT_TIMEOUT):
-            _, connection = await loop.create_connection(
-                lambda: Connection(on_data, on_closed), host, port)
+            await loop.create_connection(lambda: connection, host, port)
     except TimeoutError:
         raise OSError(f'{host} port {port} does not answer within {CONNECT_TIMEOUT:g} s') from None
     except OSError as error:
         raise OSError(f'{host} port {port}: {error.strerror or error}') from error
-    return connection
+
+
+class Retry:
+    """The pauses between attempts to connect, which grow until one of them succeeds."""
+
+    def __init__(self) -> None:
+        """Start with the shortest pause."""
+        self._attempt = 0
+
+    def reset(self) -> None:
+        """Take note of a success."""
+        self._attempt = 0
+
+    async def pause(self) -> None:
+        """Wait before the next attempt."""
+        await asyncio.sleep(BACK_OFF[min(self._attempt, len(BACK_OFF) - 1)])
+        self._attempt += 1
 
 
 class Listener:
     """
     A TCP port on which the robot program calls; one caller at a time.
 
-    A second caller is turned away as long as the first is there, as the robot program has no use
-    for two, and a caller that is not allowed never gets through.
+    A caller that is not allowed never gets through. While the port is taken, by a program that is
+    fully connected, callers are turned away; else the newest one counts: whoever called before
+    may have died without hanging up, or be no robot program at all.
     """
 
     def __init__(self, name: str, *, on_open: Callable[[Connection], None], on_data: OnData,
-                 on_closed: OnClosed, on_refused: Callable[[str], None]) -> None:
+                 on_closed: OnClosed, on_refused: Callable[[str], None],
+                 is_taken: Callable[[], bool] = lambda: False) -> None:
         """
         Describe the port.
 
         :param name: what the parameter of the port is called, for texts.
         :param on_refused: a caller was turned away, and why.
+        :param is_taken: tells whether the caller who is there must not be replaced.
         """
         self.name = name
         self.port = 0
         self.connection: Connection | None = None
         self._on_open, self._on_data, self._on_closed = on_open, on_data, on_closed
-        self._on_refused = on_refused
+        self._on_refused, self._is_taken = on_refused, is_taken
         self._server: asyncio.Server | None = None
         self._allowed: frozenset[str] = frozenset()
+
+    @property
+    def is_open(self) -> bool:
+        """Tell whether we listen."""
+        return self._server is not None
 
     async def open(self, host: str, port: int, allowed: frozenset[str]) -> None:
         """
@@ -174,32 +199,37 @@ class Listener:
         if self._server is not None:
             self._server.close()
             self._server = None
-        if self.connection is not None:
-            self.connection.close('the driver closed the connection')
+        self.hang_up()
+
+    def hang_up(self) -> None:
+        """Close the connection, if there is one; nobody is told, and the next may call."""
+        connection, self.connection = self.connection, None
+        if connection is not None:
+            connection.close()
 
     def _accept(self) -> Connection:
-        return Connection(self._on_data, self._ended, self._opened)
+        connection = Connection(
+            self._on_data, lambda reason: self._ended(connection, reason), self._opened)
+        return connection
 
     def _opened(self, connection: Connection) -> None:
         peer = connection.peer_address
         if self._allowed and peer not in self._allowed:
             self._turn_away(connection, f'{self.name}: {peer} may not connect; add it to '
                                         'allowed_peers if it is the robot')
-        elif self.connection is not None:
+        elif self.connection is not None and self._is_taken():
             self._turn_away(connection, f'{self.name}: {peer} was turned away, the robot program '
                                         'is connected already')
         else:
+            self.hang_up()
             self.connection = connection
             self._on_open(connection)
 
     def _turn_away(self, connection: Connection, text: str) -> None:
-        connection.turn_away(text)
+        connection.abort(text)
         self._on_refused(text)
 
-    def _ended(self, reason: str) -> None:
-        self.connection = None
-        self._on_closed(reason)
-
-
-def _ignore(_: object) -> None:
-    """Take no notice."""
+    def _ended(self, connection: Connection, reason: str) -> None:
+        if connection is self.connection:  # not one that was turned away or hung up on
+            self.connection = None
+            self._on_closed(reason)

@@ -1,0 +1,121 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The primary interface: the robot tells who it is and what goes wrong, and takes programs.
+
+It may come and go while the robot moves; only what has to be sent on it waits for it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NoReturn
+
+from ur_cartesian_driver.kinematics.robots import Geometry
+from ur_cartesian_driver.motion.errors import ProtocolError
+from ur_cartesian_driver.protocol import primary
+from ur_cartesian_driver.robot.transport import Connection, dial, Retry
+
+#: How long the robot may take to report its configuration [s].
+REPORT_TIMEOUT = 5.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PrimaryListener:
+    """Who is told what; all of it on the event loop."""
+
+    #: The robot's configuration, at least once for each connection.
+    configuration: Callable[[primary.ConfigurationData], None]
+    #: Its calibrated geometry, as often as it is reported.
+    geometry: Callable[[Geometry], None]
+    #: Something is wrong: with the robot, its program or this connection.
+    error: Callable[[str], None]
+    #: A text that the robot program wrote.
+    text: Callable[[str], None]
+
+
+class PrimaryClient:
+    """One connection at a time, made again when it breaks."""
+
+    def __init__(self, listener: PrimaryListener) -> None:
+        """Prepare; :meth:`hold` connects."""
+        self._listener = listener
+        self._frames = primary.PrimaryDecoder()
+        self._connection: Connection | None = None
+        self._reported = False
+
+    def send(self, data: bytes) -> bool:
+        """Send a program or command; False while there is no connection."""
+        return self._connection is not None and self._connection.send(data)
+
+    async def hold(self, host: str, port: int) -> NoReturn:
+        """Keep connected until cancelled."""
+        retry = Retry()
+        complaint = ''
+        while True:
+            try:
+                reason = await self._one_connection(host, port)
+                retry.reset()
+                complaint = ''
+            except OSError as error:
+                reason = str(error)
+            if reason != complaint:  # once, not with each attempt
+                complaint = reason
+                self._listener.error(f'primary interface: {reason}')
+            await retry.pause()
+
+    async def _one_connection(self, host: str, port: int) -> str:
+        """
+        Serve one connection and return why it ended.
+
+        :raises OSError: nobody answers, or not as a robot.
+        """
+        closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+        self._frames = primary.PrimaryDecoder()
+        self._reported = False
+        self._connection = Connection(self._on_data, closed.set_result)
+        try:
+            await dial(self._connection, host, port)
+            await asyncio.wait({closed}, timeout=REPORT_TIMEOUT)
+            if not self._reported and not closed.done():
+                raise OSError(f'{host} port {port}: the robot does not report its configuration')
+            return await closed
+        finally:
+            self._connection.close()
+            self._connection = None
+
+    def _on_data(self, data: bytes) -> None:
+        try:
+            frames = self._frames.feed(data)
+        except ProtocolError as error:
+            if self._connection is not None:
+                self._connection.abort(str(error))
+            return
+        for frame in frames:
+            if isinstance(frame, primary.RobotState):
+                for package in frame.packages:
+                    self._on_package(package)
+            else:
+                self._on_message(frame)
+
+    def _on_package(self, package: primary.StatePackage) -> None:
+        match package:
+            case primary.ConfigurationData():
+                self._reported = True
+                self._listener.configuration(package)
+            case primary.KinematicsInfo():
+                self._listener.geometry(Geometry(
+                    a=package.a, d=package.d, alpha=package.alpha, theta=package.theta))
+
+    def _on_message(self, message: primary.Frame) -> None:
+        match message:
+            case primary.ErrorCodeMessage(level=level) if (
+                    primary.ReportLevel.WARNING <= level <= primary.ReportLevel.CRITICAL_FAULT):
+                self._listener.error(f'the robot reports {message.label} {message.text}'.rstrip())
+            case primary.RuntimeExceptionMessage():
+                self._listener.error(f'the robot program failed in line {message.line}, column '
+                                     f'{message.column}: {message.text}')
+            case primary.TextMessage():
+                self._listener.text(message.text)

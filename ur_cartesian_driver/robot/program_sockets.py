@@ -1,0 +1,176 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The ports on which the robot calls us: three sockets of the robot program, and the script sender.
+
+The robot program dials the trajectory port, the script command port and the reverse port in this
+order, and is connected when it holds all three. They live and die together: a
+program that lost one of them has ended or is about to, so the others are closed, and a program
+that calls again finds all ports free.
+
+The script sender is apart from that: there a program with the External Control node asks for the
+text of ours.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import NoReturn
+
+from ur_cartesian_driver.motion.errors import ProtocolError
+from ur_cartesian_driver.motion.events import TrajectoryResult
+from ur_cartesian_driver.protocol import reverse, script_sender
+from ur_cartesian_driver.protocol.reverse import TrajectoryAction
+from ur_cartesian_driver.protocol.trajectory import ResultDecoder
+from ur_cartesian_driver.robot.settings import LinkSettings
+from ur_cartesian_driver.robot.transport import Connection, Listener
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProgramListener:
+    """Who is told what; all of it on the event loop."""
+
+    #: A robot program holds all its sockets.
+    connected: Callable[[], None]
+    #: It does not any more, and why.
+    lost: Callable[[str], None]
+    #: It reported the end of a trajectory.
+    result: Callable[[TrajectoryResult], None]
+    #: Somebody was turned away, and why.
+    warning: Callable[[str], None]
+
+
+class ProgramSockets:
+    """The robot program as seen from here."""
+
+    def __init__(self, settings: LinkSettings, listener: ProgramListener) -> None:
+        """Prepare; :meth:`open` listens."""
+        self._settings = settings
+        self._listener = listener
+        #: What the script sender hands out.
+        self.text = ''
+        #: A goal runs: its keepalives are another message.
+        self.busy = False
+        self.connected = False
+        self._read_timeout = round(1000.0 * settings.robot_receive_timeout)
+        self._results = ResultDecoder()
+        self._requests = script_sender.RequestDecoder()
+        self._trajectory = self._program_port('trajectory_port', self._on_results)
+        self._commands = self._program_port('script_command_port', _ignore)
+        self._reverse = self._program_port('reverse_port', _ignore)
+        self._sender = Listener(
+            'script_sender_port', on_open=self._on_sender_open, on_data=self._on_request,
+            on_closed=_ignore, on_refused=listener.warning)
+        self._program_ports = (self._trajectory, self._commands, self._reverse)
+
+    def _program_port(self, name: str, on_data: Callable[[bytes], None]) -> Listener:
+        return Listener(name, on_open=self._on_open, on_data=on_data,
+                        on_closed=partial(self._on_closed, name),
+                        on_refused=self._listener.warning, is_taken=lambda: self.connected)
+
+    @property
+    def ports(self) -> Mapping[str, int]:
+        """The ports that are open, by the name of their parameter."""
+        return {port.name: port.port for port in (*self._program_ports, self._sender)}
+
+    async def open(self, host: str, allowed: frozenset[str]) -> None:
+        """
+        Listen on all ports that are not open yet.
+
+        :param host: our address.
+        :param allowed: addresses that may call.
+        :raises OSError: a port is taken; the text names the parameter to change.
+        """
+        for port in (*self._program_ports, self._sender):
+            if not port.is_open:
+                await port.open(host, getattr(self._settings, port.name), allowed)
+
+    def close(self) -> None:
+        """Tell the robot program to stop the arm and end, and close all ports."""
+        self.send_stop()
+        for port in (*self._program_ports, self._sender):
+            port.close()
+
+    # ---- what goes out ------------------------------------------------------------------------
+
+    def send_control(self, action: TrajectoryAction, count: int) -> None:
+        """Send a trajectory action."""
+        self._send(reverse.trajectory(action, count, self._read_timeout))
+
+    def send_points(self, data: bytes) -> None:
+        """Send trajectory points."""
+        if self._trajectory.connection is not None:
+            self._trajectory.connection.send(data)
+
+    def send_stop(self) -> None:
+        """Ask the robot program to stop the arm and to end."""
+        self._send(reverse.stop())
+
+    async def keep_alive(self) -> NoReturn:
+        """Send the message that keeps the robot program running at a steady pace."""
+        loop = asyncio.get_running_loop()
+        due = loop.time()
+        while True:
+            if self.busy:
+                self.send_control(TrajectoryAction.NOOP, 0)
+            else:
+                self._send(reverse.keepalive(self._read_timeout))
+            due = max(due + self._settings.keepalive_period, loop.time())
+            await asyncio.sleep(due - loop.time())
+
+    def _send(self, message: reverse.ReverseMessage) -> None:
+        if self.connected and self._reverse.connection is not None:
+            self._reverse.connection.send(message.encode())
+
+    # ---- what comes in ------------------------------------------------------------------------
+
+    def _on_open(self, connection: Connection) -> None:
+        before = True
+        for port in self._program_ports:
+            if not before:
+                port.hang_up()  # a stranger, or a program that died while it connected
+            before = before and port.connection is not connection
+        if connection is self._trajectory.connection:
+            self._results = ResultDecoder()
+        if all(port.connection is not None for port in self._program_ports):
+            self.connected = True
+            self._listener.connected()
+
+    def _on_closed(self, name: str, reason: str) -> None:
+        """Take the loss of one of the program's sockets as the loss of all of them."""
+        for port in self._program_ports:
+            port.hang_up()
+        if self.connected:
+            self.connected = False
+            self._listener.lost(f'{name}: {reason}')
+
+    def _on_results(self, data: bytes) -> None:
+        try:
+            for result in self._results.feed(data):
+                self._listener.result(result)
+        except ProtocolError as error:
+            assert self._trajectory.connection is not None
+            self._trajectory.connection.abort(str(error))
+
+    def _on_sender_open(self, _: Connection) -> None:
+        self._requests = script_sender.RequestDecoder()
+
+    def _on_request(self, data: bytes) -> None:
+        """Answer the External Control node that asks for the program."""
+        connection = self._sender.connection
+        assert connection is not None
+        try:
+            wanted = self._requests.feed(data)
+        except ProtocolError as error:
+            self._listener.warning(f'script_sender_port: {error}')
+            connection.abort(str(error))
+            return
+        for _ in range(wanted):
+            connection.send(script_sender.reply(self.text))
+
+
+def _ignore(_: object) -> None:
+    """Take no notice."""

@@ -1,0 +1,57 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How to reach a robot, and how it reaches us."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LinkSettings:
+    """How to reach the robot; the defaults are those of a real one."""
+
+    robot_ip: str = '127.0.0.1'
+    #: Model that is expected, for example ``ur5e``; a robot that reports another is refused.
+    ur_type: str = 'ur5e'
+    rtde_port: int = 30004
+    primary_port: int = 30001
+    #: Where we listen for the robot program; 0 = any free port.
+    reverse_port: int = 50001
+    script_sender_port: int = 50002
+    trajectory_port: int = 50003
+    script_command_port: int = 50004
+    #: Address to listen on; empty = the local address of the RTDE connection.
+    bind_address: str = ''
+    #: Address that the robot program dials; empty = the one we listen on.
+    reverse_ip: str = ''
+    #: Addresses that may call; empty = robot_ip only.
+    allowed_peers: tuple[str, ...] = ()
+    #: Upload the robot program ourselves; else a program on the robot asks for it.
+    headless_mode: bool = False
+    #: The program stops the arm and ends when we are silent for that long [s].
+    robot_receive_timeout: float = 0.2
+    #: Time between two messages on the reverse socket [s].
+    keepalive_period: float = 0.02
+    #: Packets per second from the robot; 0 = as many as it can.
+    rtde_frequency: float = 0.0
+    #: Deceleration of the leading axis for every stop [rad/s^2].
+    stop_deceleration: float = 4.0
+
+    def __post_init__(self) -> None:
+        """
+        Refuse values that cannot work together.
+
+        :raises ValueError: names the field, its value and the bound.
+        """
+        self._require_positive('robot_receive_timeout', 'keepalive_period', 'stop_deceleration')
+        if self.robot_receive_timeout < 2.0 * self.keepalive_period:
+            raise ValueError(
+                f'robot_receive_timeout is {self.robot_receive_timeout} s, it has to be at least '
+                f'twice the keepalive_period of {self.keepalive_period} s.')
+
+    def _require_positive(self, *names: str) -> None:
+        for name in names:
+            value = getattr(self, name)
+            if not value > 0.0:
+                raise ValueError(f'{name} is {value}, it has to be greater than 0.')

@@ -1,0 +1,74 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a driver tells about its connection, and the sentences that say what is needed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriverStatus:
+    """How far the connection is, and what is needed before a goal can run."""
+
+    state: ConnectionState = ConnectionState.DISCONNECTED
+    #: What is needed, in a sentence; empty when nothing is.
+    message: str = ''
+    #: The last thing that went wrong.
+    last_error: str = ''
+    #: What the robot says it is; empty until it has said so.
+    robot_model: str = ''
+    polyscope_version: str = ''
+    #: Our program runs on the robot and is connected to us.
+    program_running: bool = False
+    calibration_known: bool = False
+    #: The ports that we really listen on, by the name of the parameter.
+    ports: Mapping[str, int] = field(default_factory=dict)
+
+
+def is_stopped(robot: RobotState) -> bool:
+    """Tell whether the safety system keeps the arm from moving."""
+    return robot.safety_mode not in (SafetyMode.NORMAL, SafetyMode.REDUCED)
+
+
+def is_paused(robot: RobotState) -> bool:
+    """Tell whether the program reads nothing until somebody plays it on."""
+    return robot.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
+
+
+def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_connected: bool,
+                   headless_mode: bool) -> str:
+    """
+    Return the sentence that says what is needed before a goal can run; empty when nothing is.
+
+    :param robot: what the robot reported last; None = nothing yet.
+    """
+    if state is ConnectionState.CONNECTING or robot is None:
+        return 'The robot answers; waiting for its report of itself.'
+    if state is ConnectionState.STOPPED:
+        return _after_a_stop(robot)
+    if state is not ConnectionState.CONNECTED:
+        return ''
+    if robot.robot_mode is not RobotMode.RUNNING:
+        return (f'The arm is in mode {robot.robot_mode.name}; switch it on and release its '
+                'brakes, then start the robot program.')
+    if program_connected:
+        return 'The robot program is paused; play it on the pendant.'
+    if headless_mode:
+        return ('The robot program does not run; resend it (headless_mode) when the arm may '
+                'move.')
+    return ('The robot program does not run; play a program with the External Control node on '
+            'the pendant.')
+
+
+def _after_a_stop(robot: RobotState) -> str:
+    mode = robot.safety_mode.name.replace('_', ' ').lower()
+    if robot.safety_mode is SafetyMode.PROTECTIVE_STOP:
+        return (f'The robot is in a {mode}; remove the cause, unlock it, then start the robot '
+                'program again.')
+    return (f'The safety system reports {mode}; clear it on the robot, then start the robot '
+            'program again.')
