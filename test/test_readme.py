@@ -11,6 +11,7 @@ import re
 import shlex
 import subprocess
 import sys
+from textwrap import indent
 import threading
 
 import pytest
@@ -24,7 +25,8 @@ pytestmark = pytest.mark.skipif(
     not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has the documents')
 
 README = CHECKOUT / 'README.md'
-DOCUMENTS = [README, CHECKOUT / 'CONTRIBUTING.md', *sorted(CHECKOUT.glob('doc/**/*.md'))]
+DOCUMENTS = [README, CHECKOUT / 'CONTRIBUTING.md', CHECKOUT / 'benchmark' / 'README.md',
+             *sorted(CHECKOUT.glob('doc/**/*.md'))]
 #: Programs that the documents start and that are no part of this package.
 FOREIGN = {'git', 'cd', '.', 'export', 'make', 'rosdep', 'colcon', 'pip', 'ros2'}
 
@@ -118,6 +120,23 @@ def test_send_goal_passes_planning_from_home_and_takes_ten_seconds(send_goal):
     found = plan(goal, standing_at(arm, HOME), arm, PlanningOptions())
     assert found.duration == pytest.approx(10.0)
     assert [segment.length for segment in found.segments] == pytest.approx([0.2] * 4)
+
+
+def test_what_where_prints_is_a_point_of_a_goal():
+    from ur_cartesian_driver.cli.commands import point_as_yaml, standing_at
+    from ur_cartesian_driver.kinematics.chain import Arm
+    from ur_cartesian_driver.kinematics.robots import robot_model
+    from ur_cartesian_driver.ros.client import load_goal
+    from ur_cartesian_driver.sim import HOME
+
+    arm = Arm(robot_model('ur5e'))
+    printed = point_as_yaml(standing_at(arm, HOME)).replace('-0.000000', '0.000000')
+    goal = load_goal(f'trajectory:\n  points:\n{indent(printed, "    ")}')
+    position = goal.trajectory.points[0].pose.position
+    assert (position.x, position.y, position.z) == pytest.approx(arm.forward(HOME).position,
+                                                                 abs=1e-6)
+    (shown,) = [body for body in blocks(README, 'console') if 'ur-cartesian where' in body]
+    assert printed.splitlines()[3:] == shown.splitlines()[4:]
 
 
 # ---- snippets -----------------------------------------------------------------------------------
