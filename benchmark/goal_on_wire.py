@@ -16,7 +16,7 @@ from figures import Figure, median, percentile, seconds
 import paths
 from processes import Child, node, simulator
 from ros_client import goal_message, TimedClient
-from wire_tap import Mark, wire_tap
+from wire_tap import marks_until_first_point, wire_tap
 
 from ur_cartesian_driver.driver import channel
 from ur_cartesian_driver.driver.api import order_of
@@ -30,7 +30,8 @@ from ur_cartesian_driver.ros.frames import Frames
 
 POINTS = 1_000
 #: How long each goal moves before it is cancelled [s].
-MOVING = 0.4
+MOVING = 0.3
+TIMEOUT = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,9 +61,10 @@ def _one_goal(client: TimedClient, tap: Child, message: object) -> Times:
     tap.call('marks')
     sent = time.monotonic_ns()
     handle, accepted = client.wait(client.send(message))
+    marks = marks_until_first_point(tap, client.spin, TIMEOUT)
     client.spin(MOVING)
     cancel_requested = client.cancelled(handle)
-    marks: list[Mark] = tap.call('marks')
+    marks += tap.call('marks')
     client.spin(0.2)
     return Times(
         sent=sent, accepted=accepted, cancel_requested=cancel_requested,

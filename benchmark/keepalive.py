@@ -20,7 +20,7 @@ import time
 from figures import Figure, percentile
 from processes import Child, node, simulator
 from ros_client import goal_message, TimedClient
-from wire_tap import Mark, wire_tap
+from wire_tap import Mark, marks_until_first_point, wire_tap
 
 from ur_cartesian_driver.motion.state import RuntimeState
 
@@ -86,7 +86,7 @@ def _busy(client: TimedClient, tap: Child, message: object) -> Busy:
     tap.call('marks')
     sent = time.monotonic_ns()
     handle, accepted = client.wait(client.send(message), TIMEOUT)
-    marks = _until_first_point(client, tap)
+    marks = marks_until_first_point(tap, client.spin, TIMEOUT)
     first_point = next(m.time for m in marks if m.port == 'trajectory_port')
     client.spin(AFTERWARDS)
     marks += tap.call('marks')
@@ -95,17 +95,6 @@ def _busy(client: TimedClient, tap: Child, message: object) -> Busy:
     client.wait(handle.get_result_async())
     return Busy(sent=sent, accepted=accepted, first_point=first_point,
                 marks=[m for m in marks if m.time >= sent])
-
-
-def _until_first_point(client: TimedClient, tap: Child) -> list[Mark]:
-    marks: list[Mark] = []
-    deadline = time.monotonic() + TIMEOUT
-    while not any(m.port == 'trajectory_port' for m in marks):
-        if time.monotonic() > deadline:
-            raise TimeoutError(f'no point on the wire within {TIMEOUT:g} s')
-        client.spin(0.1)
-        marks += tap.call('marks')
-    return marks
 
 
 def _gaps(marks: Sequence[Mark], begin: float = -inf, end: float = inf) -> list[float]:

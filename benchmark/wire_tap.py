@@ -10,7 +10,7 @@ everything on. It is a process of its own, so that nothing else keeps it from lo
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
@@ -51,6 +51,24 @@ def wire_tap() -> Iterator[tuple[Child, dict[str, object]]]:
     """Run a relay; yield it (calls: ``ports``, ``marks``, ``hang_ups``) and the parameters."""
     with child(_tap) as tap:
         yield tap, {'reverse_ip': TAP_HOST, **tap.call('ports')}
+
+
+def marks_until_first_point(tap: Child, spin: Callable[[float], None],
+                            timeout: float) -> list[Mark]:
+    """
+    Wait for a point on the wire and return all marks until then.
+
+    :param spin: waits [s].
+    :raises TimeoutError: none came within ``timeout`` [s].
+    """
+    marks: list[Mark] = []
+    deadline = time.monotonic() + timeout
+    while not any(mark.port == 'trajectory_port' for mark in marks):
+        if time.monotonic() > deadline:
+            raise TimeoutError(f'no point on the wire within {timeout:g} s')
+        spin(0.05)
+        marks += tap.call('marks')
+    return marks
 
 
 def _tap(connection: Connection) -> None:
