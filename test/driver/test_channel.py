@@ -8,8 +8,7 @@ import threading
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.driver import channel
-from ur_cartesian_driver.driver.config import DriverConfig, DriverStatus
+from ur_cartesian_driver.driver import channel, DriverConfig, DriverStatus
 from ur_cartesian_driver.execution import Order
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome

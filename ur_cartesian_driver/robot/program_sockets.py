@@ -3,10 +3,10 @@
 """
 The ports on which the robot calls us: three sockets of the robot program, and the script sender.
 
-The robot program dials the trajectory port, the script command port and the reverse port in this
-order, and is connected when it holds all three. They live and die together: a
-program that lost one of them has ended or is about to, so the others are closed, and a program
-that calls again finds all ports free.
+The robot program dials the trajectory port, the script command port and the reverse port, in this
+order, and is connected when it holds all three. They live and die together: a program that lost
+one of them has ended or is about to, so the others are closed, and a program that calls again
+finds all ports free.
 
 The script sender is apart from that: there a program with the External Control node asks for the
 text of ours.
@@ -128,11 +128,9 @@ class ProgramSockets:
     # ---- what comes in ------------------------------------------------------------------------
 
     def _on_open(self, connection: Connection) -> None:
-        before = True
-        for port in self._program_ports:
-            if not before:
-                port.hang_up()  # a stranger, or a program that died while it connected
-            before = before and port.connection is not connection
+        called = [port.connection for port in self._program_ports].index(connection)
+        for port in self._program_ports[called + 1:]:
+            port.hang_up()  # a stranger, or a program that died while it connected
         if connection is self._trajectory.connection:
             self._results = ResultDecoder()
         if all(port.connection is not None for port in self._program_ports):

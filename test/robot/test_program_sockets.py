@@ -1,0 +1,248 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The ports on which the robot calls, called from outside."""
+
+import asyncio
+import contextlib
+import itertools
+
+import pytest
+
+from ur_cartesian_driver.motion.events import TrajectoryResult
+from ur_cartesian_driver.protocol import reverse
+from ur_cartesian_driver.robot.program_sockets import ProgramListener, ProgramSockets
+from ur_cartesian_driver.robot.settings import LinkSettings
+
+HOST = '127.0.0.1'
+PROGRAM_PORTS = ('trajectory_port', 'script_command_port', 'reverse_port')
+
+
+class Cell:
+    """Open ports, and what was told about them, in order."""
+
+    def __init__(self):
+        self.news = asyncio.Queue()
+        tell = self.news.put_nowait
+        self.sockets = ProgramSockets(
+            LinkSettings(reverse_port=0, trajectory_port=0, script_command_port=0,
+                         script_sender_port=0),
+            ProgramListener(connected=lambda: tell('connected'),
+                            lost=lambda reason: tell(f'lost, {reason}'), result=tell,
+                            warning=lambda text: tell(f'warning, {text}')))
+        self._writers = []
+
+    async def dial(self, name):
+        reader, writer = await asyncio.open_connection(HOST, self.sockets.ports[name])
+        self._writers.append(writer)
+        return reader, writer
+
+    async def connect(self, order=PROGRAM_PORTS):
+        program = {name: await self.dial(name) for name in order}
+        assert await self.next() == 'connected'
+        return program
+
+    async def next(self):
+        return await asyncio.wait_for(self.news.get(), 5.0)
+
+    async def close(self):
+        self.sockets.close()
+        for writer in self._writers:
+            writer.close()
+        await asyncio.gather(*(w.wait_closed() for w in self._writers), return_exceptions=True)
+
+
+@contextlib.asynccontextmanager
+async def cell(allowed=frozenset()):
+    made = Cell()
+    await made.sockets.open(HOST, allowed)
+    try:
+        yield made
+    finally:
+        await made.close()
+
+
+def test_a_program_is_connected_when_it_has_all_sockets():
+    async def scene():
+        async with cell() as here:
+            for name in PROGRAM_PORTS[:2]:
+                await here.dial(name)
+            assert not here.sockets.connected
+            await here.dial(PROGRAM_PORTS[2])
+            assert await here.next() == 'connected'
+            assert here.sockets.connected
+
+    asyncio.run(scene())
+
+
+@pytest.mark.parametrize('stale', [
+    names for n in (1, 2) for names in itertools.permutations(PROGRAM_PORTS, n)
+    if names != PROGRAM_PORTS[:2]])
+def test_what_a_stranger_holds_makes_way_for_a_program(stale):
+    async def scene():
+        async with cell() as here:
+            readers = [(await here.dial(name))[0] for name in stale]
+            program = await here.connect()
+            for reader in readers:
+                assert await asyncio.wait_for(reader.read(), 5.0) == b''
+            here.sockets.send_points(b'points')
+            assert await program['trajectory_port'][0].readexactly(6) == b'points'
+
+    asyncio.run(scene())
+
+
+@pytest.mark.parametrize('name', PROGRAM_PORTS)
+def test_the_loss_of_one_socket_is_the_loss_of_all_and_told_once(name):
+    async def scene():
+        async with cell() as here:
+            program = await here.connect()
+            program[name][1].close()
+            assert await here.next() == f'lost, {name}: the other side closed the connection'
+            assert not here.sockets.connected
+            for other in set(PROGRAM_PORTS) - {name}:
+                assert await asyncio.wait_for(program[other][0].read(), 5.0) == b''
+            assert here.news.empty()
+
+    asyncio.run(scene())
+
+
+def test_the_next_program_finds_the_ports_free():
+    async def scene():
+        async with cell() as here:
+            for _ in range(3):
+                program = await here.connect()
+                program['reverse_port'][1].close()
+                assert (await here.next()).startswith('lost')
+
+    asyncio.run(scene())
+
+
+def test_a_second_program_is_turned_away_while_the_first_is_connected():
+    async def scene():
+        async with cell() as here:
+            program = await here.connect()
+            reader, _ = await here.dial('trajectory_port')
+            assert 'is connected already' in await here.next()
+            with contextlib.suppress(ConnectionError):
+                assert await reader.read() == b''
+            here.sockets.send_points(b'points')
+            assert await program['trajectory_port'][0].readexactly(6) == b'points'
+
+    asyncio.run(scene())
+
+
+def test_a_stranger_is_turned_away_with_the_parameter_that_would_let_him_in():
+    async def scene():
+        async with cell(frozenset({'192.0.2.1'})) as here:
+            await here.dial('reverse_port')
+            assert 'allowed_peers' in await here.next()
+
+    asyncio.run(scene())
+
+
+def test_a_result_may_come_in_pieces():
+    async def scene():
+        async with cell() as here:
+            _, writer = (await here.connect())['trajectory_port']
+            for byte in (b'\0', b'\0\0', b'\1', b'\0\0\0\0'):
+                writer.write(byte)
+                await writer.drain()
+            assert await here.next() is TrajectoryResult.CANCELED
+            assert await here.next() is TrajectoryResult.SUCCESS
+
+    asyncio.run(scene())
+
+
+def test_half_a_result_is_forgotten_with_its_program():
+    async def scene():
+        async with cell() as here:
+            _, writer = (await here.connect())['trajectory_port']
+            writer.write(b'\0\0\0')
+            writer.close()
+            assert (await here.next()).startswith('lost, trajectory_port')
+            _, writer = (await here.connect())['trajectory_port']
+            writer.write(b'\0\0\0\2')
+            assert await here.next() is TrajectoryResult.FAILURE
+
+    asyncio.run(scene())
+
+
+def test_a_number_that_is_no_result_ends_the_connection_with_the_number():
+    async def scene():
+        async with cell() as here:
+            _, writer = (await here.connect())['trajectory_port']
+            writer.write(b'\0\0\0\7')
+            assert '7 is not a trajectory result' in await here.next()
+
+    asyncio.run(scene())
+
+
+@pytest.mark.parametrize(('busy', 'mode'), [
+    (False, reverse.ControlMode.IDLE), (True, reverse.ControlMode.FORWARD)])
+def test_keepalives_are_those_of_what_the_program_does(busy, mode):
+    async def scene():
+        async with cell() as here:
+            reader, _ = (await here.connect())['reverse_port']
+            here.sockets.busy = busy
+            keeping = asyncio.create_task(here.sockets.keep_alive())
+            messages = [reverse.ReverseMessage.decode(
+                await reader.readexactly(reverse.MESSAGE_SIZE)) for _ in range(3)]
+            keeping.cancel()
+            assert {message.mode for message in messages} == {mode}
+            assert {message.read_timeout for message in messages} == {200}
+
+    asyncio.run(scene())
+
+
+def test_closing_tells_the_program_to_stop_first():
+    async def scene():
+        async with cell() as here:
+            reader, _ = (await here.connect())['reverse_port']
+            here.sockets.close()
+            data = await asyncio.wait_for(reader.read(), 5.0)
+            assert reverse.ReverseMessage.decode(data).mode is reverse.ControlMode.STOPPED
+
+    asyncio.run(scene())
+
+
+def test_the_program_is_served_to_a_request_in_pieces_and_to_the_next_caller():
+    async def scene():
+        async with cell() as here:
+            here.sockets.text = 'the program'
+            reader, writer = await here.dial('script_sender_port')
+            writer.write(b'request_')
+            await writer.drain()
+            writer.write(b'program\nrequest_program\n')
+            assert await reader.readexactly(24) == b'the program\nthe program\n'
+            writer.write(b'request_pro')  # and gives up
+            writer.close()
+            await writer.wait_closed()
+            reader, writer = await here.dial('script_sender_port')
+            writer.write(b'request_program\n')
+            assert await asyncio.wait_for(reader.readexactly(12), 5.0) == b'the program\n'
+
+    asyncio.run(scene())
+
+
+def test_nonsense_at_the_script_sender_is_reported_and_answered_by_hanging_up():
+    async def scene():
+        async with cell() as here:
+            _, writer = await here.dial('script_sender_port')
+            writer.write(b'GET / HTTP/1.1\r\n')
+            assert b'GET / HTTP'.hex() in await here.next()
+
+    asyncio.run(scene())
+
+
+def test_a_port_that_is_taken_is_named_with_its_parameter():
+    async def scene():
+        async with cell() as here:
+            port = here.sockets.ports['reverse_port']
+            other = ProgramSockets(
+                LinkSettings(reverse_port=port, trajectory_port=0, script_command_port=0,
+                             script_sender_port=0),
+                ProgramListener(connected=list, lost=list, result=list, warning=list))
+            with pytest.raises(OSError, match='set reverse_port to a free port or to 0'):
+                await other.open(HOST, frozenset())
+            other.close()
+
+    asyncio.run(scene())
