@@ -2,12 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots that are missing, wrong, stopped or lost: what the driver says, and what it does."""
 
+import contextlib
 import os
 import signal
 import socket
-from time import monotonic, sleep
+import threading
+from time import sleep
 
 import pytest
+from waiting import wait_for
 
 from ur_cartesian_driver.driver import ConnectionState, Driver, DriverConfig
 from ur_cartesian_driver.motion.errors import ErrorCode, RobotNotReady
@@ -15,13 +18,6 @@ from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
-
-
-def wait_for(condition, timeout=5.0):
-    end = monotonic() + timeout
-    while not condition():
-        assert monotonic() < end
-        sleep(0.005)
 
 
 @pytest.fixture
@@ -213,3 +209,109 @@ def test_closing_a_driver_stops_the_arm_and_ends_the_program(driver, long_goal, 
     assert motion.result(0.0).code in (ErrorCode.CANCELLED, ErrorCode.CONNECTION_LOST)
     wait_for(lambda: at_rest(ur_sim))
     wait_for(lambda: ur_sim.state().runtime_state.name == 'STOPPED')
+
+
+class Relay:
+    """A way to a port of the robot that can be cut, as if RTDE alone broke."""
+
+    def __init__(self, port):
+        self._target = port
+        self._pairs = []
+        self._server = socket.create_server(('127.0.0.1', 0))
+        self.port = self._server.getsockname()[1]
+        threading.Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self):
+        with contextlib.suppress(OSError):  # closed
+            while True:
+                client, _ = self._server.accept()
+                robot = socket.create_connection(('127.0.0.1', self._target))
+                self._pairs.append((client, robot))
+                for source, sink in ((client, robot), (robot, client)):
+                    threading.Thread(target=self._forward, args=(source, sink),
+                                     daemon=True).start()
+
+    @staticmethod
+    def _forward(source, sink):
+        with contextlib.suppress(OSError):
+            while data := source.recv(65536):
+                sink.sendall(data)
+
+    def cut(self):
+        for end in (end for pair in self._pairs for end in pair):
+            with contextlib.suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+            end.close()
+        self._pairs.clear()
+
+    def close(self):
+        with contextlib.suppress(OSError):
+            self._server.shutdown(socket.SHUT_RDWR)
+        self._server.close()
+        self.cut()
+
+
+def test_a_program_that_outlives_rtde_is_taken_up_again(make_driver, ur_sim):
+    with contextlib.closing(Relay(ur_sim.ports.rtde)) as relay:
+        driver = make_driver(rtde_port=relay.port)
+        driver.wait_ready(5.0)
+        pose = driver.state.actual_tcp_pose
+        x, y, z = pose.position
+        target = Pose((x, y + 0.2, z), pose.quaternion)
+        motion = moving(driver, Goal(waypoints=(Waypoint(pose=target, time=3.0),)))
+        relay.cut()
+        assert motion.result(2.0).code is ErrorCode.CONNECTION_LOST
+        assert driver.status.state is not ConnectionState.READY
+        wait_for(lambda: at_rest(ur_sim))
+        driver.wait_ready(5.0)
+        assert driver.execute(Goal(waypoints=(Waypoint(pose=pose, time=1.0),)),
+                              timeout=10.0).succeeded
+
+
+@pytest.mark.ur_sim(power='off', power_on_time=0.1, brake_release_time=0.1)
+def test_an_arm_that_a_person_switches_on_waits_for_a_word(make_driver, ur_sim):
+    """Power comes from somebody who stands there; the program does not follow by itself."""
+    driver = make_driver()
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    ur_sim.call(lambda controller: controller.power_on())
+    wait_for(lambda: driver.state.robot_mode.name == 'IDLE')
+    ur_sim.call(lambda controller: controller.release_brakes())
+    wait_for(lambda: 'resend' in driver.status.message)
+    sleep(0.3)
+    assert not driver.status.program_running
+    driver.resend_robot_program()
+    driver.wait_ready(5.0)
+
+
+def test_a_foreign_program_is_not_replaced(make_driver, ur_sim):
+    ur_sim.run_script('def somebody_elses():\n  while True:\n    sync()\n  end\nend\n')
+    wait_for(lambda: ur_sim.state().runtime_state.name == 'PLAYING')
+    driver = make_driver()
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    sleep(0.3)
+    assert not driver.status.program_running
+    assert ur_sim.state().runtime_state.name == 'PLAYING'
+    ur_sim.stop_program()
+    sleep(0.3)
+    assert ur_sim.state().runtime_state.name == 'STOPPED'
+    driver.resend_robot_program()
+    driver.wait_ready(5.0)
+
+
+def test_a_paused_program_takes_no_goal_until_it_is_played(driver, ur_sim):
+    ur_sim.pause_program()
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    assert 'paused' in driver.status.message
+    pose = driver.state.actual_tcp_pose
+    outcome = driver.execute(Goal(waypoints=(Waypoint(pose=pose, time=1.0),)))
+    assert outcome.code is ErrorCode.ROBOT_NOT_READY
+    ur_sim.play_program()
+    driver.wait_ready(5.0)
+
+
+def test_a_refused_robot_is_sent_no_program(make_driver, ur_sim):
+    driver = make_driver(ur_type='ur10e')
+    wait_for(lambda: driver.status.state is ConnectionState.REFUSED)
+    driver.resend_robot_program()
+    sleep(0.3)
+    assert ur_sim.state().runtime_state.name == 'STOPPED'

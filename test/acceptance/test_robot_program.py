@@ -11,6 +11,7 @@ import re
 import socket
 
 import pytest
+from waiting import wait_for
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
@@ -35,14 +36,6 @@ def served(make_driver):
         while END not in text:
             text += s.recv(65536).decode()
     return driver, text
-
-
-def wait_for(condition, timeout=5.0):
-    from time import monotonic, sleep
-    end = monotonic() + timeout
-    while not condition():
-        assert monotonic() < end
-        sleep(0.005)
 
 
 def upload(ur_sim, text):
