@@ -10,7 +10,7 @@ most like it is the start of a Newton iteration on the real one.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import ceil, copysign, dist, hypot, inf, pi, remainder, sqrt, tau
+from math import ceil, copysign, dist, hypot, inf, pi, remainder, tau
 
 import numpy as np
 
@@ -105,7 +105,7 @@ def nearest_in(arm: Arm, T_base_flange: Pose, named: Mapping[int, float], q_befo
     candidates = [
         q for solution in solutions(arm, T_base_flange, wanted)
         if (q := _turned(solution, wanted, arm.model.position_limits, q_before)) is not None]
-    misses = [sqrt(sum((q[i] - named[i]) ** 2 for i in named)) for q in candidates]
+    misses = [hypot(*(q[i] - named[i] for i in named)) for q in candidates]
     bound = min(misses, default=0.0) + _EQUALLY_NEAR
     return _closest(
         [q for q, miss in zip(candidates, misses, strict=True) if miss <= bound], q_before)

@@ -108,8 +108,12 @@ class Reach:
         u, q = 0.0, q_start
         least = _least_step(path)
         pieces = _pieces(path)
-        ends = [k / pieces for k in range(pieces, 0, -1)]
-        while ends:
+        # Piece by piece: a path to the moon has no end that could be listed.
+        begun, ends = 0, list[float]()
+        while ends or begun < pieces:
+            if not ends:
+                begun += 1
+                ends.append(begun / pieces)
             end = ends[-1]
             where = place if end == 1.0 else f'{place}, {100.0 * end:.1f} % of the way to it,'
             pose = path.end if end == 1.0 else path.pose(end)

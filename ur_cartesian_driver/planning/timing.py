@@ -134,15 +134,24 @@ def schedule(legs: Sequence[Leg], options: PlanningOptions, model: RobotModel) -
         if changed < 1e-6:
             break
     for leg, timing in zip(legs, timings, strict=True):
-        if timing.wire_time == 0.0 and timing.velocity < LEAST_SPEED:
-            raise InvalidGoal(
-                point_field(leg.index), f'would be approached at {timing.velocity:.2g} '
-                f'{timing.unit}/s, less than the {LEAST_SPEED:g} that the robot can be told',
-                'give it less time')
+        _check_least(leg, timing)
     for k in range(1, len(legs)):
         if legs[k].before is not None and legs[k].time is None:
             timings[k] = _from_corner(legs, timings, k)
     return [_whole(legs, timings, k) for k in range(len(legs))]
+
+
+def _check_least(leg: Leg, timing: Timing) -> None:
+    """Refuse what would be zero on the wire, or next to it."""
+    if timing.wire_time > 0.0:
+        return
+    unit = _speed_unit(timing.unit)
+    for value, name in ((timing.velocity, unit), (timing.acceleration, f'{unit}^2')):
+        if value < LEAST_SPEED:
+            raise InvalidGoal(
+                point_field(leg.index), f'would be approached with {value:.2g} {name}, less than '
+                f'the {LEAST_SPEED:g} that the robot can be told',
+                'give it less time' if leg.time else 'raise velocity or acceleration')
 
 
 def _from_corner(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> Timing:
@@ -237,10 +246,12 @@ def _by_speed(leg: Leg, length: float, unit: str, options: PlanningOptions,
     """Return the timing of a leg without a time."""
     wanted, reason = _wanted_speed(leg, unit, options)
     acceleration = leg.segment.acceleration or _default_acceleration(leg, unit, options)
+    limits = _limits(leg, length, options, model)
+    if not is_optimized(leg.kind):
+        acceleration = min(acceleration, limits.acceleration)
     turns_on_the_way = leg.kind == SegmentType.LINEAR and unit == 'rad' and _moves(leg)
     if turns_on_the_way:
         return _turning_line(leg, length, wanted, acceleration, reason, options)
-    limits = _limits(leg, length, options, model)
     velocity = min(wanted, limits.speed)
     remark = ''
     if velocity < wanted:
@@ -424,6 +435,10 @@ def _limits(leg: Leg, length: float, options: PlanningOptions, model: RobotModel
                 speed = model.max_joint_speed[k] * length / way
                 name = f'the limit of {JOINT_NAMES[k]}, {model.max_joint_speed[k]:.3f} rad/s'
         return _Limits(speed=speed, name=name, acceleration=options.max_joint_acceleration)
+    if not is_optimized(leg.kind):
+        least = _slowest_joint(leg, model)
+        if least > 0.0 and length / least < speed:
+            speed, name = length / least, 'the speed limits of the joints'
     bound = (options.max_linear_acceleration * length / leg.path.length
              if _moves(leg) else inf)
     if leg.path.angle > 0.0:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from enum import IntEnum
-from math import hypot, isfinite, sqrt
+from math import hypot, isfinite, pi, sqrt
 from typing import TypeAlias, TypeVar
 
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
@@ -40,6 +40,8 @@ from ur_cartesian_driver.planning.path import Arc, same
 
 #: How far a quaternion's length may be off 1.
 QUATERNION_TOLERANCE = 1e-3
+#: No joint of these robots is told to turn further [rad]; values beyond are mistakes, as degrees.
+LARGEST_JOINT_VALUE = 8.0 * pi
 #: How far ahead a stamp may lie [s].
 LARGEST_DELAY = 60.0
 
@@ -296,6 +298,10 @@ def check_posture(field: str, posture: Posture, tf_prefix: str) -> None:
         if not isfinite(value):
             raise InvalidJoints(f"{field}.posture_joint_values[{k}] ('{name}') is {value}; "
                                 'it must be finite.')
+        if abs(value) > LARGEST_JOINT_VALUE:
+            raise InvalidJoints(
+                f"{field}.posture_joint_values[{k}] ('{name}') is {value:g} rad, more than any "
+                'joint can turn; joint values are radians, not degrees.')
 
 
 def check_blends_fit(goal: Goal, index: int, apart: float, before: float, after: float) -> None:

@@ -1,0 +1,65 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Numbers that are finite and absurd: each is refused at once, or made into what can be sent."""
+
+from __future__ import annotations
+
+import pytest
+
+from ur_cartesian_driver.motion.errors import InvalidGoal, InvalidJoints, Unreachable
+from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.protocol.trajectory import encode_points
+
+TYPE = SegmentType
+
+
+def sent(cell, goal, **options):
+    """Plan a goal and encode it; return the plan."""
+    made = plan(goal, cell.state, cell.arm, PlanningOptions(**options))
+    encode_points(segment.primitive for segment in made.segments)
+    return made
+
+
+@pytest.mark.parametrize('z', [500.0, 1e9, 1e150, 1e300])
+def test_a_point_in_millimetres_or_beyond_the_moon_is_refused_at_once(cell, z):
+    far = Waypoint(pose=Pose((-0.5, -0.1, z), cell.home.quaternion))
+    with pytest.raises(Unreachable, match=r'points\[1\]'):
+        sent(cell, Goal(waypoints=(cell.point(0.01), far)))
+
+
+@pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.JOINT, TYPE.PROCESS])
+@pytest.mark.parametrize('point', [{'y': 0.05}, {'turn': (0.0, 0.0, 0.5)},
+                                   {'y': 0.01, 'turn': (0.0, 0.0, 0.5)}])
+def test_a_huge_speed_or_acceleration_becomes_one_that_the_arm_has(cell, kind, point):
+    segment = Segment(type=kind, velocity=1e300, acceleration=1e300)
+    made = sent(cell, Goal(waypoints=(cell.point(**point),), segments=(segment,)))
+    q, q_end = cell.state.actual_q, made.segments[0].joints
+    fastest = max(abs(b - a) / speed for a, b, speed in zip(
+        q, q_end, cell.arm.model.max_joint_speed, strict=True))
+    assert made.duration > fastest
+
+
+@pytest.mark.parametrize(('field', 'value', 'kind'), [
+    ('acceleration', 1e-300, TYPE.LINEAR), ('acceleration', 1e-7, TYPE.JOINT),
+    ('velocity', 1e-300, TYPE.LINEAR), ('velocity', 1e-9, TYPE.OPTIMIZED_LINEAR)])
+def test_what_would_be_zero_on_the_wire_is_refused(cell, field, value, kind):
+    segment = Segment(**{'type': kind, field: value})
+    with pytest.raises(InvalidGoal, match=r'points\[0\].*raise'):
+        sent(cell, Goal(waypoints=(cell.point(0.01),), segments=(segment,)))
+
+
+@pytest.mark.parametrize('value', [-90.0, 1e300])
+def test_a_posture_in_degrees_is_refused(cell, value):
+    posture = Posture(names=('elbow_joint',), values=(value,))
+    with pytest.raises(InvalidJoints, match='radians'):
+        sent(cell, Goal(waypoints=(cell.point(0.01, posture=posture),)))
+
+
+def test_a_line_is_no_faster_than_the_joints(cell):
+    """Next to the axis of the base a slow tool needs a fast shoulder."""
+    turn = Goal(waypoints=(cell.point(turn=(0.0, 0.0, 3.0), time=0.5),))
+    with pytest.raises(InvalidGoal, match='limits of the joints'):
+        sent(cell, turn)
+    assert sent(cell, turn, on_too_fast='slow').duration > 0.9
