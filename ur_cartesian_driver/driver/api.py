@@ -32,6 +32,7 @@ from ur_cartesian_driver.driver.channel import (
 )
 from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.execution import Order
+from ur_cartesian_driver.execution.trajectory import STOP_BOUND
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import (
@@ -54,7 +55,13 @@ LOG = logging.getLogger('ur_cartesian_driver')
 
 T = TypeVar('T')
 
+#: Pause before a robot loop that died is replaced [s]: what ends it may end the next one too.
+RESTART_PAUSE = 0.5
+
 OnProgress = Callable[[Progress], None]
+
+#: How long a cancelled motion may need to its outcome [s], whatever the robot does.
+STOP_PATIENCE = 2.0 * STOP_BOUND + 1.0
 
 
 class Motion:
@@ -167,7 +174,9 @@ class Driver:
         with self._lock:
             self._host.join()
             self._host, self._threads = None, []
-        self._abandon('the driver was closed')
+        # First the status, so that no motion can begin that nobody would end.
+        self._set_status(DriverStatus(message='The driver is closed; open it.'))
+        self._abandon('The driver was closed.')
 
     def heartbeat(self) -> None:
         """Say that the owner is alive; see ``node_timeout``."""
@@ -208,8 +217,7 @@ class Driver:
         :raises RobotNotReady: it takes longer than ``timeout`` [s]; the text says what is needed.
         """
         if not self._ready.wait(timeout):
-            status = self._status
-            raise RobotNotReady(status.message or f'The connection is {status.state.name}.')
+            raise RobotNotReady(self._status.not_ready())
 
     # ---- motion -------------------------------------------------------------------------------
 
@@ -236,9 +244,8 @@ class Driver:
         with self._lock:
             if self._motions:
                 raise RobotNotReady('A motion is running; wait for its end or cancel it.')
-            if self._status.state is not ConnectionState.READY:
-                raise RobotNotReady(
-                    self._status.message or f'The connection is {self._status.state.name}.')
+            if reason := self._status.not_ready():
+                raise RobotNotReady(reason)
             motion = Motion(self, next(self._numbers), on_progress)
             self._motions[motion.number] = motion
         self._send(StartMotion(motion=motion.number, order=order_of(plan), points=points))
@@ -249,7 +256,8 @@ class Driver:
         """
         Check, plan, run and wait; a refusal is an outcome too.
 
-        :raises TimeoutError: no outcome within ``timeout`` [s]; the motion was cancelled.
+        :raises TimeoutError: no outcome within ``timeout`` [s]; the motion was cancelled, and the
+            arm stands.
         """
         try:
             motion = self.start(self.plan(goal), on_progress)
@@ -259,6 +267,8 @@ class Driver:
             return motion.result(timeout)
         except BaseException:  # also Ctrl-C: nobody waits for this motion any more
             motion.cancel()
+            with contextlib.suppress(TimeoutError):
+                motion.result(STOP_PATIENCE)  # so that the next goal finds the arm free
             raise
 
     def stop(self) -> None:
@@ -302,14 +312,17 @@ class Driver:
     def _restart(self) -> None:
         """Replace a robot loop that died; its sockets are closed, so the arm is stopping."""
         LOG.error('the robot loop ended unexpectedly and is started again')
+        text = 'The robot loop ended unexpectedly; the robot program stops the arm.'
+        self._set_status(DriverStatus(message=text, last_error=text))
+        self._abandon(text)
+        if self._closed.wait(RESTART_PAUSE):
+            return
         with self._lock:
             if self._host is None or self._closed.is_set():
                 return
             self._host.join()
             self._host = host.start(self.config.robot_loop)
             self._send(Configure(config=self.config))
-        self._set_status(DriverStatus(last_error='The robot loop ended unexpectedly.'))
-        self._abandon('the robot loop ended unexpectedly, the robot program stops the arm')
 
     def _handle(self, notice: Notice | Request) -> None:
         match notice:
@@ -337,12 +350,12 @@ class Driver:
         for listener in list(self._status_listeners):
             _call(listener, status)
 
-    def _abandon(self, reason: str) -> None:
+    def _abandon(self, text: str) -> None:
+        """End all motions of a robot loop that cannot tell their ends any more."""
         with self._lock:
             motions, self._motions = self._motions, {}
         for motion in motions.values():
-            motion._end(Outcome(code=ErrorCode.CONNECTION_LOST,
-                                text=f'{reason[:1].upper()}{reason[1:]}.'))
+            motion._end(Outcome(code=ErrorCode.CONNECTION_LOST, text=text))
 
 
 def _call(callback: Callable[[T], None], argument: T) -> None:

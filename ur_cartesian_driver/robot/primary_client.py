@@ -75,7 +75,9 @@ class PrimaryClient:
         closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         self._frames = primary.PrimaryDecoder()
         self._reported = False
-        self._connection = Connection(self._on_data, closed.set_result)
+        self._connection = Connection(
+            # Cancelled, where the link is closed while it waits here.
+            self._on_data, lambda reason: None if closed.done() else closed.set_result(reason))
         try:
             await dial(self._connection, host, port)
             await asyncio.wait({closed}, timeout=REPORT_TIMEOUT)

@@ -1,0 +1,63 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The driver as a library: what its users' code may do wrong without harm."""
+
+import os
+import threading
+
+import pytest
+
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
+
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+
+
+@pytest.fixture
+def short_goal(home):
+    return Goal(waypoints=(Waypoint(pose=home(y=0.01), time=0.3),))
+
+
+def test_a_callback_that_raises_does_not_cost_the_outcome(driver, short_goal, caplog):
+    def defective(_):
+        raise LookupError('a defect of the caller')
+
+    motion = driver.start(driver.plan(short_goal), defective)
+    motion.add_done_callback(defective)
+    assert motion.result(5.0).succeeded
+    assert 'a defect of the caller' in caplog.text
+    assert driver.execute(short_goal, timeout=5.0).succeeded
+
+
+def test_a_callback_may_close_the_driver(driver, short_goal):
+    motion = driver.start(driver.plan(short_goal), lambda _: driver.close())
+    assert motion.result(5.0).code in (ErrorCode.CANCELLED, ErrorCode.CONNECTION_LOST)
+    assert driver.state is None
+
+
+def test_after_a_timeout_the_arm_is_free_for_the_next_goal(driver, home, short_goal):
+    with pytest.raises(TimeoutError):
+        driver.execute(Goal(waypoints=(Waypoint(pose=home(y=0.2), time=4.0),)), timeout=0.5)
+    assert driver.execute(short_goal, timeout=5.0).succeeded
+
+
+def test_the_way_there_and_the_way_back_keep_a_tight_path_tolerance(driver, home):
+    """The count of points of the goal before is still in the register when the next one starts."""
+    tolerance = Tolerance(position=(0.002,) * 3)
+    there = [0.002 * (i + 1) for i in range(10)]
+    for ways in (there, there[-2::-1], there, there[-2::-1]):
+        goal = Goal(path_tolerance=tolerance, waypoints=tuple(
+            Waypoint(pose=home(y=y), time=0.05 * (i + 1)) for i, y in enumerate(ways)))
+        outcome = driver.execute(goal, timeout=10.0)
+        assert outcome.succeeded, outcome.text
+
+
+def test_opening_and_closing_leaves_nothing_behind(make_driver):
+    def held():
+        return len(os.listdir('/proc/self/fd')), threading.active_count()
+
+    make_driver().close()
+    before = held()
+    for _ in range(10):
+        make_driver().close()
+    assert held() == before
