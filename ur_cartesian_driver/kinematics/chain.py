@@ -170,7 +170,8 @@ def pinocchio_model(arm: Arm) -> Any:
         import pinocchio
     except ImportError as error:
         raise ImportError(
-            'Pinocchio is needed for this and is not installed; "pip install pin" brings it.',
+            'Pinocchio is needed for this and is not installed; rosdep brings it on a ROS '
+            'installation, the extra `collision` in a virtual environment.',
             name='pinocchio') from error
     model = pinocchio.Model()
     model.name = arm.model.name
