@@ -171,7 +171,7 @@ def test_something_else_than_a_robot_is_not_waited_for_without_end(make_driver):
         connection, _ = server.accept()
         with connection:
             connection.sendall(b'HTTP/1.1 400 Bad Request\r\n\r\n')
-            wait_for(lambda: driver.status.last_error)
+            wait_for(lambda: driver.status.last_error, 10.0)  # given up after 5 s
         assert driver.status.state in (ConnectionState.DISCONNECTED, ConnectionState.CONNECTING)
 
 

@@ -30,12 +30,12 @@ from ur_cartesian_driver.ros.state_publisher import status_message
 STAMP = Time(sec=5, nanosec=6)
 NAMES = tuple('abcdef')
 FRAME = FeedbackFrame(frame_id='base', controlled_frame='tool0_controller', T_frame_base=IDENTITY,
-                      joint_names=NAMES, duration=8.0)
+                      joint_names=NAMES)
 PROGRESS = Progress(
     waypoint=3, fraction=0.25, desired_pose=Pose((0.5, 0.2, 0.3)),
     desired_twist=(0.1, 0.0, 0.0, 0.0, 0.0, 0.2), actual_pose=Pose((0.4, 0.2, 0.3)),
     actual_twist=(0.05, 0.0, 0.0, 0.0, 0.0, 0.0), actual_q=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0),
-    time=1.5, time_remaining=inf, speed_scaling=0.5, points_received=7, buffered=0.125)
+    time=1.5, time_remaining=6.0, speed_scaling=0.5, points_received=7, buffered=0.125)
 angles = st.floats(-pi, pi)
 
 

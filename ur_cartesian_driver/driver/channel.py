@@ -30,6 +30,9 @@ class Configure:
     """The first message: how to reach the robot."""
 
     config: DriverConfig
+    #: Whether the robot program may be sent on the first connection; not where an earlier loop of
+    #: the same owner has seen somebody stop it.
+    may_upload: bool = True
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

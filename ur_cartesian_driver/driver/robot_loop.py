@@ -68,10 +68,10 @@ TICK = 0.02
 class RobotLoop:
     """Joins the link to the robot, the machine of the running goal and the pipe to the owner."""
 
-    def __init__(self, config: DriverConfig, memory: StateMemory,
+    def __init__(self, configure: Configure, memory: StateMemory,
                  notify: asyncio.StreamWriter) -> None:
         """Prepare; :meth:`run` does the work."""
-        self._config = config
+        self._config = config = configure.config
         self._memory = memory
         self._pipe = notify
         self._machine: TrajectoryMachine | None = None
@@ -79,8 +79,9 @@ class RobotLoop:
         self._points = memoryview(b'')
         self._last_heartbeat = 0.0
         self._link = RobotLink(
-            config, on_event=self.handle_event, on_status=self._status_changed,
-            on_geometry=self._geometry_known, on_log=self._log)
+            config, on_event=self._handle_event, on_status=self._status_changed,
+            on_geometry=self._geometry_known, on_log=self._log,
+            may_upload=configure.may_upload)
 
     async def run(self, requests: asyncio.StreamReader) -> None:
         """Serve until the owner shuts down, hangs up or falls silent."""
@@ -93,7 +94,7 @@ class RobotLoop:
                 link.cancel()
                 ticks.cancel()
         finally:
-            self._end_motion('the driver was shut down')
+            self._end_motion('The driver was shut down.')
             self._link.close()
             self._memory.clear()
 
@@ -116,7 +117,7 @@ class RobotLoop:
                 self._start(request)
             case CancelMotion(motion=motion):
                 if motion == self._motion:
-                    self.handle_event(CancelRequested())
+                    self._handle_event(CancelRequested())
             case ResendProgram():
                 self._link.upload_program()
             case Heartbeat():
@@ -129,7 +130,7 @@ class RobotLoop:
         """Start a motion, or refuse it with the reason."""
         reason = self._link.not_ready()
         if self._machine is not None:
-            reason = 'another motion is running'
+            reason = 'Another motion is running; wait for its end or cancel it.'
         if reason:
             self._notify(MotionEnded(motion=request.motion, outcome=Outcome(
                 code=ErrorCode.ROBOT_NOT_READY, text=reason)))
@@ -142,7 +143,7 @@ class RobotLoop:
 
     # ---- events of the robot ------------------------------------------------------------------
 
-    def handle_event(self, event: Event) -> None:
+    def _handle_event(self, event: Event) -> None:
         """Feed the machine, and do what it answers."""
         if isinstance(event, StateReceived):
             self._memory.write(event.state)
@@ -170,21 +171,22 @@ class RobotLoop:
         self._link.set_busy(False)
         self._notify(MotionEnded(motion=motion, outcome=outcome))
 
-    def _end_motion(self, reason: str) -> None:
+    def _end_motion(self, text: str) -> None:
         if self._machine is not None:
-            self._finish(Outcome(code=ErrorCode.CANCELLED, text=f'{reason}.'))
+            self._finish(Outcome(code=ErrorCode.CANCELLED, text=text))
 
     async def _tick(self) -> None:
         """Let time pass where nothing else happens, and watch the owner."""
         while True:
             await asyncio.sleep(TICK)
-            self.handle_event(Tick())
+            self._handle_event(Tick())
             if self._now() - self._last_heartbeat > self._config.node_timeout:
                 self._last_heartbeat = self._now()
                 if self._machine is not None:
-                    self._log(logging.ERROR, 'the owner of the driver was silent for '
-                              f'{self._config.node_timeout:g} s: the arm is stopped')
-                    self.handle_event(CancelRequested())
+                    reason = ('the owner of the driver was silent for longer than node_timeout = '
+                              f'{self._config.node_timeout:g} s')
+                    self._log(logging.ERROR, f'{reason}: the arm is stopped')
+                    self._handle_event(CancelRequested(reason=reason))
 
     # ---- the owner ----------------------------------------------------------------------------
 
@@ -220,7 +222,7 @@ async def serve(pipe: socket.socket, descriptor: int) -> None:
         (size,) = LENGTH.unpack(await reader.readexactly(LENGTH.size))
         first = unpack(await reader.readexactly(size))
         if isinstance(first, Configure):
-            await RobotLoop(first.config, memory, writer).run(reader)
+            await RobotLoop(first, memory, writer).run(reader)
         if not writer.is_closing():
             await writer.drain()
     except (asyncio.IncompleteReadError, ConnectionError):

@@ -29,7 +29,7 @@ from ur_cartesian_driver.motion.state import (
 _COUNTER = struct.Struct('<Q')
 #: valid, timestamp, q qd (actual, target), TCP pose and twist (actual, target), wrench, TCP
 #: offset, two scalings, modes, bits, points begun.
-_DATA = struct.Struct('<?d6d6d6d6d7d6d7d6d6d7ddd7i')
+_DATA = struct.Struct('<?d6d6d6d6d7d6d7d6d6d7ddd6i')
 _SIZE = mmap.PAGESIZE
 
 
@@ -58,7 +58,7 @@ class StateMemory:
 
     def clear(self) -> None:
         """Say that there is no state (any more)."""
-        self._write(_DATA.pack(False, *([0.0] * (_DATA_FLOATS)), *([0] * 7)))
+        self._write(bytes(_DATA.size))
 
     def write(self, state: RobotState) -> None:
         """Publish a state."""
@@ -68,7 +68,7 @@ class StateMemory:
             *state.target_tcp_pose.row(), *state.target_tcp_twist, *state.actual_tcp_wrench,
             *state.T_flange_tcp.row(), state.speed_scaling, state.target_speed_fraction,
             state.robot_mode, state.safety_mode, state.runtime_state, state.robot_status,
-            state.safety_status, state.points_begun, 0))
+            state.safety_status, state.points_begun))
 
     def read(self) -> RobotState | None:
         """Return the newest state, None when there is none."""
@@ -86,9 +86,6 @@ class StateMemory:
         _COUNTER.pack_into(self._memory, 0, 2 * self._count - 1)
         self._memory[_COUNTER.size:_COUNTER.size + len(data)] = data
         _COUNTER.pack_into(self._memory, 0, 2 * self._count)
-
-
-_DATA_FLOATS = 66
 
 
 def _state(values: tuple[float, ...]) -> RobotState | None:

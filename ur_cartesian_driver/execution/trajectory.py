@@ -233,8 +233,8 @@ class TrajectoryMachine:
         match event:
             case TrajectoryEnded(result=result):
                 return _RESULTS[result]
-            case CancelRequested():
-                return Signal.CANCEL, 'the client cancelled the goal'
+            case CancelRequested(reason=reason):
+                return Signal.CANCEL, reason
             case LinkLost(link='program', reason=reason):
                 return Signal.PROGRAM_STOPPED, f'the robot program hung up: {reason}'
             case LinkLost(link=link, reason=reason):
@@ -293,11 +293,9 @@ class TrajectoryMachine:
         self._deadline = inf if tolerance < 0.0 else now + tolerance
         late = 0.0 if self.order.due is None else self._scaled_time - self.order.due
         if 0.0 <= tolerance < late:
-            self._code = ErrorCode.GOAL_TOLERANCE_VIOLATED
-            self._text = (f'the last point was reached {late:.3f} s after its time '
-                          f'{self.order.due:.3f} s, goal_time_tolerance is {tolerance:.3f} s')
-            self.state = State.ENDED
-            return self._finish()
+            return self._apply(Signal.LATE, (
+                f'the last point was reached {late:.3f} s after its time '
+                f'{self.order.due:.3f} s, goal_time_tolerance is {tolerance:.3f} s'), now)
         return []
 
     def _enter_stopping(self, signal: Signal, now: float) -> list[Command]:
@@ -379,8 +377,6 @@ class TrajectoryMachine:
         state, order = self._latest, self.order
         assert state is not None
         time = self._tracker.time()
-        scaling = state.speed_scaling
-        remaining = max(0.0, order.duration - time)
         buffered_from = min(self._window.sent, order.points)
         last = int(np.searchsorted(order.reference.point, buffered_from - 1, side='right')) - 1
         return Report(progress=Progress(
@@ -392,8 +388,8 @@ class TrajectoryMachine:
             actual_twist=state.actual_tcp_twist,
             actual_q=state.actual_q,
             time=time,
-            time_remaining=remaining / scaling if scaling > 0.0 else (inf if remaining else 0.0),
-            speed_scaling=scaling,
+            time_remaining=max(0.0, order.duration - time),
+            speed_scaling=state.speed_scaling,
             points_received=order.points,
             buffered=max(0.0, float(order.reference.time[max(last, 0)]) - time),
             timestamp=state.timestamp))

@@ -38,7 +38,9 @@ class TrajectoryEnded:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CancelRequested:
-    """Somebody wants the motion to stop."""
+    """Somebody wants the motion to stop; the reason is a clause for the outcome's text."""
+
+    reason: str = 'the client cancelled the goal'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +74,7 @@ class Progress:
     actual_q: Vector6 = ZERO6
     #: Expected time of the desired pose from the start of the motion [s].
     time: float = 0.0
-    #: Expected time to the end at the present speed scaling [s]; infinity when it stands still.
+    #: Planned time that is left, at full speed scaling [s].
     time_remaining: float = 0.0
     speed_scaling: float = 1.0
     points_received: int = 0

@@ -60,8 +60,6 @@ class PackageType(IntEnum):
 NOT_FOUND = 'NOT_FOUND'
 IN_USE = 'IN_USE'
 NEWEST_VERSION = 2
-#: Largest frame that the manufacturer's library reads [bytes].
-LARGEST_FRAME_FOR_URCL = 4091
 
 _HEADER = struct.Struct('>HB')
 _VERSION = struct.Struct('>4I')

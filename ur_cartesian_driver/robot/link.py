@@ -51,13 +51,14 @@ class RobotLink:
     def __init__(self, settings: LinkSettings, *, on_event: Callable[[Event], None],
                  on_status: Callable[[DriverStatus], None],
                  on_geometry: Callable[[Geometry], None],
-                 on_log: Callable[[int, str], None]) -> None:
+                 on_log: Callable[[int, str], None], may_upload: bool = True) -> None:
         """
         Prepare; :meth:`run` connects.
 
         :param on_status: the status changed.
         :param on_geometry: the robot told its calibrated geometry.
         :param on_log: a line for the log, with its level.
+        :param may_upload: whether the first connection to the robot is the owner's first.
         """
         self._settings = settings
         self._on_event, self._on_status = on_event, on_status
@@ -65,7 +66,7 @@ class RobotLink:
         self._status = DriverStatus(message=f'Connecting to the robot at {settings.robot_ip}.')
         self._version: ControllerVersion | None = None
         self._robot: RobotState | None = None
-        self._first_connection = True
+        self._first_connection = may_upload
         self._primary = PrimaryClient(PrimaryListener(
             configuration=self._on_configuration, geometry=self._on_kinematics,
             error=self._error, text=lambda text: self._on_log(logging.INFO, f'robot: {text}')))
@@ -105,9 +106,7 @@ class RobotLink:
 
     def not_ready(self) -> str:
         """Return why no goal can run now; empty when one can."""
-        if self._status.state is ConnectionState.READY:
-            return ''
-        return self._status.message or f'The connection is {self._status.state.name}.'
+        return self._status.not_ready()
 
     def close(self) -> None:
         """Close everything; the robot program stops the arm, at the latest when we hang up."""

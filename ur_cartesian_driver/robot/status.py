@@ -29,6 +29,12 @@ class DriverStatus:
     #: The ports that we really listen on, by the name of the parameter.
     ports: Mapping[str, int] = field(default_factory=dict)
 
+    def not_ready(self) -> str:
+        """Return the sentence that says why no goal can run now; empty when one can."""
+        if self.state is ConnectionState.READY:
+            return ''
+        return self.message or f'The connection is {self.state.name}.'
+
 
 def is_stopped(robot: RobotState) -> bool:
     """Tell whether the safety system keeps the arm from moving."""

@@ -191,7 +191,6 @@ class CartesianActionServer:
             controlled_frame=trajectory.controlled_frame or frames.tcp,
             T_frame_base=plan.goal.T_base_frame.inverse(),
             joint_names=self._joint_names,
-            duration=plan.duration,
         )
 
     def publish_feedback(self, run: GoalRun, progress: Progress, frame: FeedbackFrame) -> None:

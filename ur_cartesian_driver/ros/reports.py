@@ -34,8 +34,6 @@ class FeedbackFrame:
     controlled_frame: str
     T_frame_base: Pose
     joint_names: tuple[str, ...]
-    #: Planned duration of the whole motion [s].
-    duration: float
 
 
 def feedback_message(progress: Progress, frame: FeedbackFrame,
@@ -60,7 +58,7 @@ def feedback_message(progress: Progress, frame: FeedbackFrame,
     message.point_index = progress.waypoint
     message.progress = progress.fraction
     message.speed_scaling = progress.speed_scaling
-    message.time_remaining = duration_message(frame.duration * (1.0 - progress.fraction))
+    message.time_remaining = duration_message(progress.time_remaining)
     message.points_received = progress.points_received
     message.buffered = duration_message(progress.buffered)
     message.lag = nan
