@@ -188,6 +188,23 @@ def test_the_robot_loop_s_process_can_die(make_driver, long_goal, ur_sim, driver
     wait_for(lambda: driver.state is not None, 10.0)
 
 
+def test_a_robot_loop_that_dies_does_not_bring_back_a_program_that_was_stopped(
+        make_driver, ur_sim, driver):
+    driver.close()
+    wait_for(lambda: ur_sim.state().runtime_state.name == 'STOPPED')
+    driver = make_driver(robot_loop='process')
+    driver.wait_ready(10.0)
+    ur_sim.stop_program()
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    os.kill(driver._host.pid, signal.SIGKILL)
+    wait_for(lambda: driver.status.state is ConnectionState.DISCONNECTED)
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED, 10.0)
+    sleep(0.5)
+    assert ur_sim.state().runtime_state.name == 'STOPPED'
+    driver.resend_robot_program()
+    driver.wait_ready(5.0)
+
+
 def test_the_arm_stops_when_the_owner_falls_silent(ur_sim, make_driver, home, long_goal, driver):
     del home
     driver.close()
@@ -199,7 +216,9 @@ def test_the_arm_stops_when_the_owner_falls_silent(ur_sim, make_driver, home, lo
     with silent:
         silent.wait_ready(5.0)
         motion = silent.start(silent.plan(long_goal))
-        assert motion.result(3.0).code is ErrorCode.CANCELLED
+        outcome = motion.result(3.0)
+        assert outcome.code is ErrorCode.CANCELLED
+        assert 'node_timeout' in outcome.text
         assert at_rest(ur_sim)
 
 

@@ -313,6 +313,8 @@ class Driver:
         """Replace a robot loop that died; its sockets are closed, so the arm is stopping."""
         LOG.error('the robot loop ended unexpectedly and is started again')
         text = 'The robot loop ended unexpectedly; the robot program stops the arm.'
+        # A program that somebody stopped stays stopped.
+        may_upload = self._status.program_running
         self._set_status(DriverStatus(message=text, last_error=text))
         self._abandon(text)
         if self._closed.wait(RESTART_PAUSE):
@@ -322,7 +324,7 @@ class Driver:
                 return
             self._host.join()
             self._host = host.start(self.config.robot_loop)
-            self._send(Configure(config=self.config))
+            self._send(Configure(config=self.config, may_upload=may_upload))
 
     def _handle(self, notice: Notice | Request) -> None:
         match notice:

@@ -36,7 +36,6 @@ from ur_cartesian_driver.driver.channel import (
     StatusChanged,
     unpack,
 )
-from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.driver.snapshot import StateMemory
 from ur_cartesian_driver.execution import (
     Command,

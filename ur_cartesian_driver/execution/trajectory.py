@@ -19,7 +19,9 @@ signal means in the present state: the next state and how the goal ends, if it d
 * **ENDED**: the outcome is out. Later events mean nothing.
 
 Everything has a bound: an answer that does not come in STOPPING or HALTING ends the goal after
-:data:`STOP_BOUND` by ending the robot program. Only MOVING has none, because a speed slider at
+:data:`STOP_BOUND` by ending the robot program. A program that somebody has paused reads nothing:
+the arm stands, and the goal ends as it was to end (UNANSWERED); an arm that still moves is a
+failure (LATE). Only MOVING has none, because a speed slider at
 zero is not an error; there, RTDE packets that stop coming are reported as a lost connection.
 """
 
@@ -96,6 +98,7 @@ class Signal(Enum):
     SETTLED = auto()
     AT_REST = auto()
     LATE = auto()
+    UNANSWERED = auto()
 
 
 #: What ends a goal in every state but ENDED, and the code it ends with.
@@ -115,7 +118,8 @@ class Step:
     code: ErrorCode | None = None
 
 
-_PAUSES = frozenset({Signal.PROTECTIVE_STOP, Signal.EMERGENCY_STOP})
+#: After these the robot program is paused, and not ended.
+_PAUSES = frozenset({Signal.PROTECTIVE_STOP, Signal.EMERGENCY_STOP, Signal.UNANSWERED})
 
 
 def _ends(code: ErrorCode) -> Step:
@@ -129,8 +133,8 @@ def _stays(state: State, *signals: Signal) -> dict[Signal, Step]:
     return {signal: Step(state) for signal in signals}
 
 
-#: What each signal means in each state. SETTLED, AT_REST and LATE are about the state they are
-#: given for, so they are not possible in the others.
+#: What each signal means in each state. SETTLED, AT_REST, LATE and UNANSWERED are about the state
+#: they are given for, so they are not possible in the others.
 TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
     State.MOVING: {
         **_STOPS,
@@ -151,6 +155,7 @@ TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
         **_STOPS,
         **_stays(State.STOPPING, Signal.SUCCESS, Signal.FAILURE, Signal.CANCEL),
         Signal.CANCELED: Step(State.HALTING),
+        Signal.UNANSWERED: Step(State.ENDED),
         Signal.LATE: _ends(ErrorCode.EXECUTION_FAILED),
     },
     State.HALTING: {
@@ -247,7 +252,7 @@ class TrajectoryMachine:
 
     def _judge(self, state: RobotState, now: float) -> tuple[Signal | None, str]:
         """Return what a packet of a robot that runs means in the present state."""
-        at_rest = max(map(abs, state.actual_qd)) < REST_SPEED
+        at_rest = _rests(state)
         if self.state is State.MOVING:
             return self._path_violation(state)
         if self.state is State.SETTLING and at_rest and self._goal_error(state) is None:
@@ -273,6 +278,8 @@ class TrajectoryMachine:
         if self.state is State.SETTLING:
             missing = self._goal_error(self._latest) if self._latest is not None else None
             return Signal.LATE, missing or 'the arm did not come to rest'
+        if self.state is State.STOPPING and self._latest is not None and _rests(self._latest):
+            return Signal.UNANSWERED, ''
         return Signal.LATE, (f'the robot did not confirm the stop within {STOP_BOUND:g} s, '
                              'its program was ended')
 
@@ -308,14 +315,12 @@ class TrajectoryMachine:
 
     def _enter_ended(self, signal: Signal, now: float) -> list[Command]:
         commands: list[Command] = []
-        if signal in _PAUSES or (signal is Signal.LATE and self._unconfirmed()):
-            # These stops only pause the program, and then it reads no socket: without this the
-            # old motion would go on when somebody unlocks the arm and plays the program.
+        unconfirmed = signal is Signal.LATE and self._code is ErrorCode.EXECUTION_FAILED
+        if signal in _PAUSES or unconfirmed:
+            # A paused program reads no socket: without this the old motion would go on when
+            # somebody unlocks the arm and plays the program.
             commands.append(StopProgram(reason=self._text))
         return commands + self._finish()
-
-    def _unconfirmed(self) -> bool:
-        return self._code is ErrorCode.EXECUTION_FAILED
 
     def _finish(self) -> list[Command]:
         code = self._code if self._code is not None else ErrorCode.EXECUTION_FAILED
@@ -398,6 +403,10 @@ class TrajectoryMachine:
         return self.order.goal_time_tolerance or DEFAULT_GOAL_TIME_TOLERANCE
 
 
+def _rests(state: RobotState) -> bool:
+    return max(map(abs, state.actual_qd)) < REST_SPEED
+
+
 def stop_in(state: RobotState) -> tuple[Signal, str] | None:
     """Return why the robot cannot go on by itself, or None when it can."""
     safety = state.safety_status
@@ -407,6 +416,8 @@ def stop_in(state: RobotState) -> tuple[Signal, str] | None:
         return Signal.EMERGENCY_STOP, 'an emergency stop cut the power of the arm'
     if safety & SafetyStatus.PROTECTIVE_STOPPED:
         return Signal.PROTECTIVE_STOP, 'the robot made a protective stop'
+    if safety & SafetyStatus.SAFEGUARD_STOPPED:
+        return Signal.PROTECTIVE_STOP, 'the robot made a safeguard stop'
     if safety & (SafetyStatus.VIOLATION | SafetyStatus.FAULT):
         return Signal.PROTECTIVE_STOP, (
             f'the safety system reports {state.safety_mode.name.lower()}')
