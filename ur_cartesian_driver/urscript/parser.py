@@ -3,6 +3,9 @@
 """
 Tokens to syntax tree: recursive descent, one method per rule.
 
+Programs and statements are read here, expressions in
+:mod:`~ur_cartesian_driver.urscript.expression_parser`.
+
 The language is free of lines: a statement ends where its expression cannot go on, so
 `a = 1 b = 2` are two statements and an operator at the end of a line continues it. Lines matter
 in two places only: the value of `return` stands on its line, and so do the texts of a label.
@@ -41,29 +44,12 @@ in two places only: the value of `return` stands on its line, and so do the text
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Literal, TypedDict, TypeVar
+from typing import Literal
 
 from ur_cartesian_driver.urscript import syntax as tree
-from ur_cartesian_driver.urscript.errors import CompileError
-from ur_cartesian_driver.urscript.scanner import Kind, scan, syntax_error, Token
-
-#: Blocks, brackets and signs inside one another.
-MAX_NESTING = 50
-#: Operators of one precedence in a row; each makes the tree one node deeper.
-MAX_CHAIN = 100
-
-CONSTANTS = {'True': True, 'true': True, 'False': False, 'false': False, 'None': None}
-
-T = TypeVar('T')
-
-
-class Place(TypedDict):
-    """The position arguments of a node."""
-
-    line: int
-    column: int
+from ur_cartesian_driver.urscript.expression_parser import CONSTANTS, ExpressionParser
+from ur_cartesian_driver.urscript.scanner import Kind, Token
+from ur_cartesian_driver.urscript.token_reader import place
 
 
 def parse(text: str) -> tree.Program:
@@ -79,86 +65,12 @@ def parse(text: str) -> tree.Program:
         raise parser.error('the program is nested too deeply') from None
 
 
-def place(token: Token) -> Place:
-    """Return the position of a token as arguments of a node."""
-    return Place(line=token.line, column=token.column)
-
-
-class Parser:
-    """Reads the tokens of one text from left to right."""
+class Parser(ExpressionParser):
+    """Reads programs and statements."""
 
     def __init__(self, text: str) -> None:
-        self._text = text
-        self._tokens = scan(text)
-        self._next = 0
-        self._nesting = 0
+        super().__init__(text)
         self._loops = 0
-
-    # Tokens
-
-    @property
-    def _token(self) -> Token:
-        return self._tokens[self._next]
-
-    @property
-    def _previous(self) -> Token:
-        return self._tokens[self._next - 1]
-
-    def _advance(self) -> Token:
-        token = self._token
-        if token.kind is not Kind.END:
-            self._next += 1
-        return token
-
-    def _at(self, *texts: str) -> bool:
-        """Tell whether the next token is one of these keywords or symbols."""
-        return self._token.kind in (Kind.KEYWORD, Kind.SYMBOL) and self._token.text in texts
-
-    def _match(self, *texts: str) -> Token | None:
-        return self._advance() if self._at(*texts) else None
-
-    def _expect(self, text: str) -> Token:
-        if not self._at(text):
-            raise self.error(f'{text!r} is missing before {self._found()}')
-        return self._advance()
-
-    def _expect_kind(self, kind: Kind) -> Token:
-        if self._token.kind is not kind:
-            raise self.error(f'a {kind.value} is missing before {self._found()}')
-        return self._advance()
-
-    def _found(self) -> str:
-        token = self._token
-        return token.kind.value if token.kind is Kind.END else repr(token.text)
-
-    def _same_line(self) -> bool:
-        """Tell whether the next token stands on the line of the one before it."""
-        return self._token.line == self._previous.line
-
-    def error(self, reason: str, token: Token | None = None) -> CompileError:
-        """Return a syntax error at a token, by default the next one."""
-        at = token or self._token
-        return syntax_error(self._text, at.line, at.column, reason)
-
-    @contextmanager
-    def _nested(self) -> Iterator[None]:
-        """Bound the depth of what is inside something else."""
-        self._nesting += 1
-        if self._nesting > MAX_NESTING:
-            raise self.error(f'more than {MAX_NESTING} levels inside one another')
-        yield
-        self._nesting -= 1
-
-    def _list(self, item: Callable[[], T], close: str) -> tuple[T, ...]:
-        """Read `item { "," item }` up to the closing bracket; nothing at all is fine too."""
-        items: list[T] = []
-        with self._nested():
-            if not self._at(close):
-                items.append(item())
-                while self._match(','):
-                    items.append(item())
-        self._expect(close)
-        return tuple(items)
 
     # Programs, functions and blocks
 
@@ -377,154 +289,3 @@ class Parser:
         value = self._expression()
         assert isinstance(target, tree.Name | tree.Index | tree.Field)
         return tree.Assign(target=target, value=value, qualifier=qualifier, **place(start))
-
-    # Expressions, loosest binding first
-
-    def _expression(self) -> tree.Expression:
-        """Read conjunction { ( "or" | "xor" ) conjunction }."""
-        left = self._conjunction()
-        for token in self._operators('or', 'xor'):
-            right = self._conjunction()
-            left = tree.Logical(operator=token.text, left=left, right=right, **place(token))
-        return left
-
-    def _conjunction(self) -> tree.Expression:
-        """Read inversion { "and" inversion }."""
-        left = self._inversion()
-        for token in self._operators('and'):
-            right = self._inversion()
-            left = tree.Logical(operator=token.text, left=left, right=right, **place(token))
-        return left
-
-    def _inversion(self) -> tree.Expression:
-        """Read "not" inversion | comparison."""
-        if token := self._match('not'):
-            with self._nested():
-                operand = self._inversion()
-            return tree.Unary(operator='not', operand=operand, **place(token))
-        return self._comparison()
-
-    def _comparison(self) -> tree.Expression:
-        """Read sum { ( "==" | "!=" | "<" | "<=" | ">" | ">=" ) sum }."""
-        left = self._sum()
-        for token in self._operators('==', '!=', '<', '<=', '>', '>='):
-            right = self._sum()
-            left = tree.Binary(operator=token.text, left=left, right=right, **place(token))
-        return left
-
-    def _sum(self) -> tree.Expression:
-        """Read product { ( "+" | "-" ) product }."""
-        left = self._product()
-        for token in self._operators('+', '-'):
-            right = self._product()
-            left = tree.Binary(operator=token.text, left=left, right=right, **place(token))
-        return left
-
-    def _product(self) -> tree.Expression:
-        """Read unary { ( "*" | "/" | "%" ) unary }."""
-        left = self._unary()
-        for token in self._operators('*', '/', '%'):
-            right = self._unary()
-            left = tree.Binary(operator=token.text, left=left, right=right, **place(token))
-        return left
-
-    def _operators(self, *texts: str) -> Iterator[Token]:
-        """Yield the operators of one chain, which is bounded as it makes a tree as deep."""
-        for _ in range(MAX_CHAIN):
-            token = self._match(*texts)
-            if token is None:
-                return
-            yield token
-        if self._at(*texts):
-            raise self.error(f'more than {MAX_CHAIN} operators in a row')
-
-    def _unary(self) -> tree.Expression:
-        """Read ("-" | "+") unary | "run" NAME "(" ")" | postfix."""
-        if token := self._match('-', '+'):
-            with self._nested():
-                operand = self._unary()
-            return tree.Unary(operator=token.text, operand=operand, **place(token))
-        if self._match('run'):
-            name = self._expect_kind(Kind.NAME)
-            self._expect('(')
-            self._expect(')')
-            return tree.Run(thread=name.text, **place(name))
-        return self._postfix()
-
-    def _postfix(self) -> tree.Expression:
-        """Read primary { "(" arguments ")" | "[" indices "]" | "." NAME }."""
-        value = self._primary()
-        for _ in range(MAX_CHAIN):
-            if self._at('.'):
-                value = self._field(value)
-            elif self._at('(') and isinstance(value, tree.Name | tree.Field):
-                value = self._call(value)
-            elif self._at('['):
-                value = self._index(value)
-            else:
-                return value
-        raise self.error(f'more than {MAX_CHAIN} calls, indices or fields in a row')
-
-    def _field(self, target: tree.Expression) -> tree.Field:
-        """Read "." NAME, where a keyword is a name too."""
-        self._advance()
-        name = self._token
-        if name.kind not in (Kind.NAME, Kind.KEYWORD):
-            raise self.error(f'a name is missing before {self._found()}')
-        self._advance()
-        return tree.Field(target=target, name=name.text, **place(name))
-
-    def _call(self, callee: tree.Name | tree.Field) -> tree.Call | tree.MethodCall:
-        """Read "(" [ argument { "," argument } ] ")", positional arguments first."""
-        position = Place(line=callee.line, column=callee.column)
-        self._advance()
-        arguments = self._list(self._argument, ')')
-        named = [argument for argument in arguments if argument.name is not None]
-        if any(argument.name is None for argument in arguments[len(arguments) - len(named) :]):
-            raise self.error('a positional argument stands after a named one', self._previous)
-        if isinstance(callee, tree.Name):
-            return tree.Call(function=callee.identifier, arguments=arguments, **position)
-        return tree.MethodCall(
-            target=callee.target, method=callee.name, arguments=arguments, **position
-        )
-
-    def _argument(self) -> tree.Argument:
-        """Read [ NAME "=" ] expression."""
-        start = self._token
-        following = self._tokens[min(self._next + 1, len(self._tokens) - 1)]
-        name = None
-        if start.kind is Kind.NAME and following.kind is Kind.SYMBOL and following.text == '=':
-            name = start.text
-            self._advance()
-            self._advance()
-        return tree.Argument(name=name, value=self._expression(), **place(start))
-
-    def _index(self, target: tree.Expression) -> tree.Expression:
-        """Read "[" expression [ "," expression ] "]"; six after the name p are a pose."""
-        start = self._advance()
-        items = self._list(self._expression, ']')
-        if isinstance(target, tree.Name) and target.identifier == 'p' and len(items) == 6:
-            return tree.PoseLiteral(items=items, line=target.line, column=target.column)
-        if len(items) not in (1, 2):
-            raise self.error('an index has one or two parts, a pose p[...] has six', start)
-        return tree.Index(target=target, indices=items, **place(start))
-
-    def _primary(self) -> tree.Expression:
-        """Read NUMBER | STRING | constant | NAME | "(" expression ")" | "[" items "]"."""
-        token = self._token
-        if token.kind is Kind.NUMBER:
-            return tree.Constant(value=self._advance().number, **place(token))
-        if token.kind is Kind.STRING:
-            return tree.Constant(value=self._advance().text, **place(token))
-        if token.kind is Kind.NAME:
-            return tree.Name(identifier=self._advance().text, **place(token))
-        if self._at(*CONSTANTS):
-            return tree.Constant(value=CONSTANTS[self._advance().text], **place(token))
-        if self._match('['):
-            return tree.ListLiteral(items=self._list(self._expression, ']'), **place(token))
-        if self._match('('):
-            items = self._list(self._expression, ')')
-            if len(items) != 1:
-                raise self.error('brackets hold one expression', token)
-            return items[0]
-        raise self.error(f'a value is missing before {self._found()}')
