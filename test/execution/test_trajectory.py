@@ -158,6 +158,15 @@ def test_a_cancel_without_an_answer_ends_the_program_within_the_bound():
     assert outcome(commands).code is ErrorCode.EXECUTION_FAILED
 
 
+def test_a_cancel_that_a_paused_program_cannot_read_ends_the_goal_and_the_program():
+    machine = started()
+    machine.step(CancelRequested(), 1.0)
+    machine.step(robot(0.5, qd=REST), 1.5)
+    commands = machine.step(Tick(), 1.0 + STOP_BOUND)
+    assert any(isinstance(c, StopProgram) for c in commands)
+    assert outcome(commands).code is ErrorCode.CANCELLED
+
+
 def test_leaving_the_path_stops_the_arm_and_names_point_axis_value_and_limit():
     machine = started(path_tolerance=Tolerance(position=(0.0, 0.001, 0.0)))
     off = robot(0.5)
@@ -214,9 +223,10 @@ def test_progress_is_reported_at_its_rate():
 @pytest.mark.parametrize('state', list(State))
 @pytest.mark.parametrize('signal', list(Signal))
 def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
-    own = {State.SETTLING: {Signal.SETTLED, Signal.LATE}, State.STOPPING: {Signal.LATE},
+    own = {State.SETTLING: {Signal.SETTLED, Signal.LATE},
+           State.STOPPING: {Signal.LATE, Signal.UNANSWERED},
            State.HALTING: {Signal.AT_REST, Signal.LATE}, State.MOVING: {Signal.VIOLATION}}
-    judged = {Signal.SETTLED, Signal.AT_REST, Signal.LATE, Signal.VIOLATION}
+    judged = {Signal.SETTLED, Signal.AT_REST, Signal.LATE, Signal.UNANSWERED, Signal.VIOLATION}
     possible = state is not State.ENDED and (
         signal not in judged or signal in own.get(state, set()))
     assert (signal in TRANSITIONS[state]) == possible
@@ -225,6 +235,8 @@ def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
 STOPPED_STATES = [
     pytest.param({'safety_status': SafetyStatus.PROTECTIVE_STOPPED}, Signal.PROTECTIVE_STOP,
                  id='protective stop'),
+    pytest.param({'safety_status': SafetyStatus.SAFEGUARD_STOPPED}, Signal.PROTECTIVE_STOP,
+                 id='safeguard stop'),
     pytest.param({'safety_status': SafetyStatus.EMERGENCY_STOPPED}, Signal.EMERGENCY_STOP,
                  id='emergency stop'),
     pytest.param({'robot_mode': RobotMode.POWER_OFF}, Signal.PROGRAM_STOPPED, id='power off'),

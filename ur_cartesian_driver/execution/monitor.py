@@ -18,8 +18,8 @@ from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import (
     conjugate,
-    multiply,
     Pose,
+    pose_error,
     pose_from_row,
     rotate,
     rotation_vector_from_quaternion,
@@ -175,10 +175,10 @@ class Deviation:
 
 def deviation(desired: Pose, actual: Pose, T_base_frame: Pose) -> Deviation:
     """Return the deviation of two poses in base for a goal that was given in another frame."""
-    d, a = desired.position, actual.position
-    position = rotate(conjugate(T_base_frame.quaternion), (d[0] - a[0], d[1] - a[1], d[2] - a[2]))
-    turn = multiply(conjugate(actual.quaternion), desired.quaternion)
-    return Deviation(position=position, orientation=rotation_vector_from_quaternion(turn))
+    error = pose_error(desired, actual)
+    return Deviation(
+        position=rotate(conjugate(T_base_frame.quaternion), error.position),
+        orientation=rotation_vector_from_quaternion(error.quaternion))
 
 
 def violation(error: Deviation, tolerance: Tolerance) -> str | None:
