@@ -75,7 +75,7 @@ def test_the_limits_go_into_the_pinocchio_model():
 
 def test_without_pinocchio_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, 'pinocchio', None)
-    with pytest.raises(ImportError, match='extra .collision.'):
+    with pytest.raises(ImportError, match=r'extra .collision.'):
         pinocchio_model(Arm(UR5E))
 
 

@@ -11,7 +11,7 @@ import pytest
 from ur_cartesian_driver.driver import ConnectionState, DriverStatus
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome, Progress
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_error
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, SafetyMode
 from ur_cartesian_driver.msg import DriverStatus as DriverStatusMessage
 from ur_cartesian_driver.ros.convert import seconds
@@ -21,7 +21,6 @@ from ur_cartesian_driver.ros.reports import (
     feedback_message,
     FeedbackFrame,
     joint_state_message,
-    pose_error,
     result_message,
     tcp_pose_message,
 )

@@ -15,7 +15,7 @@ from typing import Any
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, robot_model
-from ur_cartesian_driver.motion.errors import GoalRefused, RobotNotReady
+from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.resources import share_path
@@ -124,7 +124,6 @@ class Recorder:
                 'speed': _speed(feedback.actual),
             }) + '\n')
 
-
     def _show(self, line: str) -> None:
         """Rewrite one line on a terminal; elsewhere a line a second is enough to follow."""
         if sys.stdout.isatty():
@@ -157,8 +156,6 @@ def validate(arguments: argparse.Namespace) -> int:
 def where(arguments: argparse.Namespace) -> int:
     """Print pose, joints and TCP of a robot."""
     state = asyncio.run(read_state(arguments.robot_ip, arguments.rtde_port))
-    if state is None:
-        raise RobotNotReady('The robot does not report its state.')
     print(point_as_yaml(state))
     return 0
 

@@ -170,6 +170,21 @@ def slerp(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
                       wa * a[2] + wb * b[2], wa * a[3] + wb * b[3]))
 
 
+def pose_error(desired: Pose, actual: Pose) -> Pose:
+    """
+    Return desired - actual.
+
+    The position is a difference along the axes of the common frame. The orientation is the
+    rotation from the actual to the desired orientation in the axes of the actual one,
+    q_actual^-1 q_desired, of the two quaternions that mean it the one with w >= 0.
+    """
+    (ax, ay, az), (dx, dy, dz) = actual.position, desired.position
+    x, y, z, w = multiply(conjugate(actual.quaternion), desired.quaternion)
+    if w < 0.0:
+        x, y, z, w = -x, -y, -z, -w
+    return Pose((dx - ax, dy - ay, dz - az), (x, y, z, w))
+
+
 def quaternion_from_rotation_vector(v: Sequence[float]) -> Quaternion:
     """Return the unit quaternion of a rotation vector [rad]."""
     x, y, z = v

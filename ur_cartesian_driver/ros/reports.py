@@ -19,7 +19,7 @@ from sensor_msgs.msg import JointState
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.events import Outcome, Progress
-from ur_cartesian_driver.motion.pose import conjugate, multiply, Pose, rotate, Vector6
+from ur_cartesian_driver.motion.pose import Pose, pose_error, rotate, Vector6
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 
@@ -63,21 +63,6 @@ def feedback_message(progress: Progress, frame: FeedbackFrame,
     message.buffered = duration_message(progress.buffered)
     message.lag = nan
     return message
-
-
-def pose_error(desired: Pose, actual: Pose) -> Pose:
-    """
-    Return desired - actual.
-
-    The position is a difference along the axes of the common frame. The orientation is the
-    rotation from the actual to the desired orientation in the axes of the actual one,
-    q_actual^-1 q_desired, of the two quaternions that mean it the one with w >= 0.
-    """
-    (ax, ay, az), (dx, dy, dz) = actual.position, desired.position
-    x, y, z, w = multiply(conjugate(actual.quaternion), desired.quaternion)
-    if w < 0.0:
-        x, y, z, w = -x, -y, -z, -w
-    return Pose((dx - ax, dy - ay, dz - az), (x, y, z, w))
 
 
 def result_message(outcome: Outcome) -> FollowCartesianTrajectory.Result:
