@@ -180,7 +180,7 @@ class RobotLink:
             self._warn(f'the robot program is not started: {self._status.message}')
         elif robot.robot_status & RobotStatus.PROGRAM_RUNNING:
             self._warn('the robot program is not started: another program runs on the robot; '
-                       'stop it, then resend the robot program')
+                       'stop it, then call resend_robot_program')
         else:
             self.upload_program()
 

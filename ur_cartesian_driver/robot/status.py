@@ -65,7 +65,7 @@ def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_
     if program_connected:
         return 'The robot program is paused; play it on the pendant.'
     if headless_mode:
-        return ('The robot program does not run; resend it (headless_mode) when the arm may '
+        return ('The robot program does not run; call resend_robot_program when the arm may '
                 'move.')
     return ('The robot program does not run; play a program with the External Control node on '
             'the pendant.')
