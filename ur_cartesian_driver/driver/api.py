@@ -67,12 +67,14 @@ STOP_PATIENCE = 2.0 * STOP_BOUND + 1.0
 class Motion:
     """A running motion; its outcome comes whatever happens to the robot."""
 
-    def __init__(self, driver: Driver, number: int, on_progress: OnProgress | None) -> None:
+    def __init__(self, driver: Driver, number: int, report: tuple[str, ...],
+                 on_progress: OnProgress | None) -> None:
         """Be made by :meth:`Driver.start`."""
         self._driver = driver
         self._future: Future[Outcome] = Future()
         self._on_progress = on_progress
         self.number = number
+        self._plan_report = report
         #: The newest report, None before the first.
         self.progress: Progress | None = None
 
@@ -103,7 +105,7 @@ class Motion:
 
     def _end(self, outcome: Outcome) -> None:
         if not self._future.done():
-            self._future.set_result(outcome)
+            self._future.set_result(replace(outcome, report=self._plan_report))
 
 
 class Driver:
@@ -246,7 +248,7 @@ class Driver:
                 raise RobotNotReady('A motion is running; wait for its end or cancel it.')
             if reason := self._status.not_ready():
                 raise RobotNotReady(reason)
-            motion = Motion(self, next(self._numbers), on_progress)
+            motion = Motion(self, next(self._numbers), plan.report, on_progress)
             self._motions[motion.number] = motion
         self._send(StartMotion(motion=motion.number, order=order_of(plan), points=points))
         return motion
@@ -377,7 +379,7 @@ def order_of(plan: Plan) -> Order:
         points=len(plan.segments), reference=plan.reference, duration=plan.duration,
         due=times if times > 0.0 else None, T_base_frame=goal.T_base_frame,
         path_tolerance=goal.path_tolerance, goal_tolerance=goal.goal_tolerance,
-        goal_time_tolerance=goal.goal_time_tolerance, report=plan.report)
+        goal_time_tolerance=goal.goal_time_tolerance)
 
 
 __all__ = ['Driver', 'DriverError', 'Motion', 'order_of']

@@ -15,8 +15,11 @@ program brakes and ends when they do.
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
+from functools import partial
 import logging
 import socket
+from typing import TypeVar
 
 from ur_cartesian_driver.driver.channel import (
     CancelMotion,
@@ -62,6 +65,9 @@ from ur_cartesian_driver.robot.status import DriverStatus
 
 #: How often time alone is looked at [s].
 TICK = 0.02
+#: What takes longer than a few milliseconds to unpack or prepare [bytes].
+LARGE = 1 << 18
+T = TypeVar('T')
 
 
 class RobotLoop:
@@ -102,18 +108,19 @@ class RobotLoop:
         while True:
             try:
                 (size,) = LENGTH.unpack(await requests.readexactly(LENGTH.size))
-                request = unpack(await requests.readexactly(size))
+                body = await requests.readexactly(size)
             except (asyncio.IncompleteReadError, ConnectionError):
                 return
-            if isinstance(request, Shutdown) or not self._handle_request(request):
+            request = await _apart(size, unpack, body)
+            if isinstance(request, Shutdown) or not await self._handle_request(request):
                 return
 
-    def _handle_request(self, request: Request | Notice) -> bool:
+    async def _handle_request(self, request: Request | Notice) -> bool:
         """Carry out a request; False for one that makes no sense here."""
         self._last_heartbeat = self._now()
         match request:
             case StartMotion():
-                self._start(request)
+                await self._start(request)
             case CancelMotion(motion=motion):
                 if motion == self._motion:
                     self._handle_event(CancelRequested())
@@ -125,8 +132,10 @@ class RobotLoop:
                 return False
         return True
 
-    def _start(self, request: StartMotion) -> None:
+    async def _start(self, request: StartMotion) -> None:
         """Start a motion, or refuse it with the reason."""
+        machine = await _apart(len(request.points), partial(
+            TrajectoryMachine, request.order, feedback_period=1.0 / self._config.feedback_rate))
         reason = self._link.not_ready()
         if self._machine is not None:
             reason = 'Another motion is running; wait for its end or cancel it.'
@@ -135,10 +144,9 @@ class RobotLoop:
                 code=ErrorCode.ROBOT_NOT_READY, text=reason)))
             return
         self._motion, self._points = request.motion, memoryview(request.points)
-        self._machine = TrajectoryMachine(
-            request.order, feedback_period=1.0 / self._config.feedback_rate)
+        self._machine = machine
         self._link.set_busy(True)
-        self._carry_out(self._machine.start(self._now()))
+        self._carry_out(machine.start(self._now()))
 
     # ---- events of the robot ------------------------------------------------------------------
 
@@ -206,6 +214,17 @@ class RobotLoop:
 
     def _now(self) -> float:
         return asyncio.get_running_loop().time()
+
+
+async def _apart(size: int, function: Callable[..., T], *arguments: object) -> T:
+    """
+    Call a function; in a thread when it has much to do, because keepalives cannot wait.
+
+    :param size: how much it has to do [bytes].
+    """
+    if size < LARGE:
+        return function(*arguments)
+    return await asyncio.to_thread(function, *arguments)
 
 
 async def serve(pipe: socket.socket, descriptor: int) -> None:

@@ -183,7 +183,6 @@ class Order:
     goal_tolerance: Tolerance = field(default_factory=Tolerance)
     #: 0 = the default, negative = without end [s].
     goal_time_tolerance: float = 0.0
-    report: tuple[str, ...] = ()
 
 
 class TrajectoryMachine:
@@ -326,7 +325,7 @@ class TrajectoryMachine:
         code = self._code if self._code is not None else ErrorCode.EXECUTION_FAILED
         text = self._sentence(code)
         report = [self._progress_report()] if self._latest is not None else []
-        return [*report, Finish(outcome=Outcome(code=code, text=text, report=self.order.report))]
+        return [*report, Finish(outcome=Outcome(code=code, text=text))]
 
     def _sentence(self, code: ErrorCode) -> str:
         if code is ErrorCode.SUCCESSFUL:
