@@ -3,6 +3,7 @@
 """The driver as a library: what its users' code may do wrong without harm."""
 
 import os
+import socket
 import threading
 
 import pytest
@@ -64,3 +65,19 @@ def test_opening_and_closing_leaves_nothing_behind(make_driver, ur_sim):
     for _ in range(10):
         make_driver().close()
     wait_for(lambda: held() <= before)  # the simulator, in this process too, hangs up later
+
+
+def test_the_log_says_what_is_needed_and_when_the_robot_is_ready(make_driver, caplog):
+    caplog.set_level('INFO', logger='ur_cartesian_driver')
+    driver = make_driver(headless_mode=False)
+    wait_for(lambda: 'play a program with the External Control node' in caplog.text)
+    driver.resend_robot_program()
+    wait_for(lambda: 'ready for goals' in caplog.text)
+    assert 'paused' not in caplog.text
+
+
+def test_the_log_names_a_port_that_is_taken(make_driver, caplog):
+    caplog.set_level('INFO', logger='ur_cartesian_driver')
+    with socket.create_server(('127.0.0.1', 0)) as server:
+        make_driver(reverse_port=server.getsockname()[1])
+        wait_for(lambda: 'set reverse_port to a free port' in caplog.text)

@@ -256,8 +256,17 @@ class RobotLink:
                 status.state, self._robot, program_connected=self._program.connected,
                 headless_mode=self._settings.headless_mode))
         if status != self._status:
-            self._status = status
+            before, self._status = self._status, status
             self._on_status(status)
+            self._log_change(before, status)
+
+    def _log_change(self, before: DriverStatus, now: DriverStatus) -> None:
+        """Write what is needed into the log, for those who do not see the status."""
+        if now.message and now.message != before.message:
+            self._on_log(logging.INFO, now.message)
+        idle = (ConnectionState.READY, ConnectionState.EXECUTING)
+        if now.state is ConnectionState.READY and before.state not in idle:
+            self._on_log(logging.INFO, 'The robot program is connected: ready for goals.')
 
     def _error(self, text: str) -> None:
         self._tell(last_error=text)

@@ -63,7 +63,7 @@ def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_
         return (f'The arm is in mode {robot.robot_mode.name}; switch it on and release its '
                 'brakes, then start the robot program.')
     if program_connected:
-        return 'The robot program is paused; play it on the pendant.'
+        return 'The robot program is paused; play it on the pendant.' if is_paused(robot) else ''
     if headless_mode:
         return ('The robot program does not run; call resend_robot_program when the arm may '
                 'move.')

@@ -18,7 +18,7 @@ from math import inf, isfinite
 from typing import Any, TypeAlias
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rclpy.exceptions import InvalidParameterException
+from rclpy.exceptions import InvalidParameterException, InvalidParameterTypeException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -244,7 +244,8 @@ def declare(node: Node) -> Settings:
         try:
             parameter = node.declare_parameter(
                 declaration.name, default, declaration.descriptor(default))
-        except InvalidParameterException as error:  # what check() does not know
+        # What check() does not know.
+        except (InvalidParameterException, InvalidParameterTypeException) as error:
             raise ParameterError(f'Parameter {declaration.name}: {error}.') from None
         values[declaration.name] = _plain(parameter.value)
     return settings(values)
