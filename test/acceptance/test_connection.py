@@ -7,7 +7,7 @@ import os
 import signal
 import socket
 import threading
-from time import sleep
+from time import monotonic, sleep
 
 import pytest
 from waiting import wait_for
@@ -175,17 +175,30 @@ def test_something_else_than_a_robot_is_not_waited_for_without_end(make_driver):
         assert driver.status.state in (ConnectionState.DISCONNECTED, ConnectionState.CONNECTING)
 
 
-def test_the_robot_loop_s_process_can_die(make_driver, long_goal, ur_sim, driver):
+@pytest.mark.parametrize(('number', 'bound'), [(signal.SIGKILL, 3.0), (signal.SIGSTOP, 8.0)])
+def test_the_robot_loop_s_process_can_die_or_hang(
+        make_driver, long_goal, ur_sim, driver, number, bound):
     driver.close()
     wait_for(lambda: ur_sim.state().runtime_state.name == 'STOPPED')
     driver = make_driver(robot_loop='process')
     driver.wait_ready(10.0)
     motion = moving(driver, long_goal)
-    os.kill(driver._host.pid, signal.SIGKILL)
-    outcome = motion.result(3.0)
+    os.kill(driver._host.pid, number)
+    outcome = motion.result(bound)
     assert outcome.code is ErrorCode.CONNECTION_LOST
     wait_for(lambda: at_rest(ur_sim))
     wait_for(lambda: driver.state is not None, 10.0)
+
+
+def test_a_driver_with_a_robot_loop_that_hangs_can_be_closed(make_driver, driver, ur_sim):
+    driver.close()
+    wait_for(lambda: ur_sim.state().runtime_state.name == 'STOPPED')
+    driver = make_driver(robot_loop='process')
+    driver.wait_ready(10.0)
+    os.kill(driver._host.pid, signal.SIGSTOP)
+    begin = monotonic()
+    driver.close()
+    assert monotonic() - begin < 10.0
 
 
 def test_a_robot_loop_that_dies_does_not_bring_back_a_program_that_was_stopped(

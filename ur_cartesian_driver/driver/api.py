@@ -301,7 +301,7 @@ class Driver:
             self.heartbeat()
 
     def _read(self) -> None:
-        """Serve notices; when the loop dies, tell everybody and start another one."""
+        """Serve notices; when the loop dies or hangs, tell everybody and start another one."""
         while (running := self._host) is not None:  # None: closed by a callback of ours
             notice = channel.receive(running.pipe)
             if notice is not None:
@@ -312,9 +312,13 @@ class Driver:
                 self._restart()
 
     def _restart(self) -> None:
-        """Replace a robot loop that died; its sockets are closed, so the arm is stopping."""
-        LOG.error('the robot loop ended unexpectedly and is started again')
-        text = 'The robot loop ended unexpectedly; the robot program stops the arm.'
+        """
+        Replace a robot loop that died or hangs.
+
+        The robot program stops the arm: its sockets are closed, or silent for too long.
+        """
+        LOG.error('the robot loop ended unexpectedly, or hangs, and is started again')
+        text = 'The robot loop ended unexpectedly, or hangs; the robot program stops the arm.'
         # A program that somebody stopped stays stopped.
         may_upload = self._status.program_running
         self._set_status(DriverStatus(message=text, last_error=text))

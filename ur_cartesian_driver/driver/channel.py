@@ -97,6 +97,11 @@ class MotionEnded:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Alive:
+    """The robot loop is alive."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LogLine:
     """Something worth a line in the owner's log; the levels are those of ``logging``."""
 
@@ -106,7 +111,8 @@ class LogLine:
 
 Request: TypeAlias = (
     Configure | StartMotion | CancelMotion | ResendProgram | Heartbeat | Shutdown)
-Notice: TypeAlias = StatusChanged | GeometryKnown | MotionProgress | MotionEnded | LogLine
+Notice: TypeAlias = (
+    Alive | StatusChanged | GeometryKnown | MotionProgress | MotionEnded | LogLine)
 
 
 def pack(message: Request | Notice) -> bytes:
@@ -122,7 +128,12 @@ def unpack(body: bytes) -> Request | Notice:
 
 
 def receive(pipe: socket.socket) -> Request | Notice | None:
-    """Wait for the next message on a blocking socket; None at the end of the pipe."""
+    """
+    Wait for the next message.
+
+    :param pipe: a blocking socket; its timeout is the longest silence that is borne.
+    :returns: None at the end of the pipe, and after a silence.
+    """
     head = _read(pipe, LENGTH.size)
     if head is None:
         return None

@@ -21,20 +21,22 @@ from typing import Protocol
 from ur_cartesian_driver.driver import snapshot
 from ur_cartesian_driver.driver.robot_loop import serve
 
+#: A robot loop that says nothing for that long hangs [s]; it says something every 0.5 s.
+SILENCE = 5.0
 #: How long the robot loop may need to stop the arm and end, before it is ended [s].
-PATIENCE = 5.0
+PATIENCE = 2.0
 
 
 class Host(Protocol):
     """Something that runs a robot loop."""
 
-    #: The owner's end of the pipe, blocking.
+    #: The owner's end of the pipe, blocking; it times out after :data:`SILENCE`.
     pipe: socket.socket
     #: The owner's view of the newest robot state.
     memory: snapshot.StateMemory
 
     def join(self) -> None:
-        """Wait for the end of the loop (the pipe is closed) and release everything."""
+        """End the loop, if need be by force, and release everything."""
 
 
 def start(robot_loop: str) -> Host:
@@ -48,6 +50,7 @@ class ProcessHost:
     def __init__(self) -> None:
         """Start the process."""
         self.pipe, theirs = socket.socketpair()
+        self.pipe.settimeout(SILENCE)
         descriptor = snapshot.create()
         try:
             self._process = subprocess.Popen(
@@ -67,14 +70,14 @@ class ProcessHost:
         return self._process.pid
 
     def join(self) -> None:
-        """Wait for the end of the process."""
+        """End the process."""
+        self.pipe.close()
         try:
             self._process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
         self.memory.close()
-        self.pipe.close()
 
 
 class ThreadHost:
@@ -83,6 +86,7 @@ class ThreadHost:
     def __init__(self) -> None:
         """Start the thread."""
         self.pipe, theirs = socket.socketpair()
+        self.pipe.settimeout(SILENCE)
         descriptor = snapshot.create()
         self.memory = snapshot.StateMemory(descriptor)
         self._thread = threading.Thread(
@@ -97,10 +101,10 @@ class ThreadHost:
             os.close(descriptor)
 
     def join(self) -> None:
-        """Wait for the end of the thread."""
+        """End the thread; one that hangs ends when it comes to itself, as the pipe is closed."""
+        self.pipe.close()
         self._thread.join(PATIENCE)
         self.memory.close()
-        self.pipe.close()
 
 
 def _environment() -> dict[str, str]:

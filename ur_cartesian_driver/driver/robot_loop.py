@@ -22,6 +22,7 @@ import socket
 from typing import TypeVar
 
 from ur_cartesian_driver.driver.channel import (
+    Alive,
     CancelMotion,
     Configure,
     GeometryKnown,
@@ -65,6 +66,8 @@ from ur_cartesian_driver.robot.status import DriverStatus
 
 #: How often time alone is looked at [s].
 TICK = 0.02
+#: How often the owner hears that we live [s].
+SIGN_OF_LIFE = 0.5
 #: What takes longer than a few milliseconds to unpack or prepare [bytes].
 LARGE = 1 << 18
 T = TypeVar('T')
@@ -184,9 +187,13 @@ class RobotLoop:
 
     async def _tick(self) -> None:
         """Let time pass where nothing else happens, and watch the owner."""
+        last_sign = self._now()
         while True:
             await asyncio.sleep(TICK)
             self._handle_event(Tick())
+            if self._now() - last_sign >= SIGN_OF_LIFE:
+                last_sign = self._now()
+                self._notify(Alive())
             if self._now() - self._last_heartbeat > self._config.node_timeout:
                 self._last_heartbeat = self._now()
                 if self._machine is not None:
@@ -248,3 +255,5 @@ async def serve(pipe: socket.socket, descriptor: int) -> None:
     finally:
         writer.close()
         memory.close()
+        for _ in range(3):  # calls that came in at the last moment are taken, and hung up on
+            await asyncio.sleep(0.0)

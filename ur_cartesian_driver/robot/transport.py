@@ -84,9 +84,10 @@ class Connection(asyncio.Protocol):
 
     @property
     def peer_address(self) -> str:
-        """Return the other side's address on this connection."""
+        """Return the other side's address on this connection; empty when it hung up at once."""
         assert self._transport is not None
-        return str(self._transport.get_extra_info('peername')[0])
+        peer = self._transport.get_extra_info('peername')
+        return str(peer[0]) if peer else ''
 
     def send(self, data: bytes) -> bool:
         """Send bytes; False when the connection is gone."""
@@ -214,7 +215,9 @@ class Listener:
 
     def _opened(self, connection: Connection) -> None:
         peer = connection.peer_address
-        if self._allowed and peer not in self._allowed:
+        if not self.is_open or not peer:  # closed, or hung up, between the call and here
+            connection.abort('nobody is left on one side')
+        elif self._allowed and peer not in self._allowed:
             self._turn_away(connection, f'{self.name}: {peer} may not connect; add it to '
                                         'allowed_peers if it is the robot')
         elif self.connection is not None and self._is_taken():
