@@ -14,7 +14,7 @@ from waiting import wait_for
 
 from ur_cartesian_driver.driver import ConnectionState, Driver, DriverConfig
 from ur_cartesian_driver.motion.errors import ErrorCode, RobotNotReady
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
@@ -143,6 +143,16 @@ def test_a_robot_of_another_model_is_refused(make_driver):
     wait_for(lambda: driver.status.state is ConnectionState.REFUSED)
     assert 'ur5e' in driver.status.message
     assert 'ur_type is ur10e' in driver.status.message
+
+
+@pytest.mark.ur_sim(model='ur5', polyscope='3.15.8')
+def test_old_software_is_not_sent_what_it_does_not_know(driver, home):
+    goal = Goal(waypoints=(Waypoint(pose=home(y=0.01)),),
+                segments=(Segment(type=SegmentType.OPTIMIZED_LINEAR),))
+    outcome = driver.execute(goal)
+    assert outcome.code is ErrorCode.INVALID_GOAL
+    assert 'PolyScope 5.21' in outcome.text
+    assert driver.execute(Goal(waypoints=(Waypoint(pose=home(y=0.01)),)), timeout=9.0).succeeded
 
 
 @pytest.mark.ur_sim(power='off')

@@ -122,6 +122,14 @@ def test_a_refused_goal_says_why_and_moves_nothing(client, ur_sim):
     assert ur_sim.state().q == q
 
 
+def test_every_goal_of_a_burst_is_answered(client):
+    goal = goal_at(client.driver, (0.0, 0.01, 0.0))
+    goal.validate_only = True
+    requests = [client._actions.send_goal_async(goal) for _ in range(60)]
+    results = [client.wait(request).get_result_async() for request in requests]
+    assert {client.wait(result).status for result in results} == {GoalStatus.STATUS_SUCCEEDED}
+
+
 def test_a_node_that_is_destroyed_during_a_goal_stops_the_arm(client, ur_sim):
     client.send(goal_at(client.driver, (0.0, 0.2, 0.0), seconds=5.0))
     assert client.spin_until(lambda: len(client.feedback) > 5)

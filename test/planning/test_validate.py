@@ -232,6 +232,14 @@ def test_a_right_goal_passes(goal):
     check(goal, OPTIONS)
 
 
+@pytest.mark.parametrize('kind', [SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT])
+def test_optimized_moves_need_a_software_that_knows_them(kind):
+    goal = Goal(waypoints=(Waypoint(pose=Pose((0.4, 0.1, 0.4))),), segments=(Segment(type=kind),))
+    check(goal, PlanningOptions())
+    with pytest.raises(NotAvailable, match=r'segments\[0\]\.type is OPTIMIZED.*5\.21'):
+        check(goal, PlanningOptions(optimove_known=False))
+
+
 def test_joint_names_carry_the_prefix():
     options = PlanningOptions(tf_prefix='left_')
     right = Posture(names=('left_elbow_joint',), values=(1.0,))

@@ -47,6 +47,7 @@ from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.protocol.trajectory import encode_points
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.status import DriverStatus
@@ -232,7 +233,10 @@ class Driver:
         state = self.state
         if state is None:
             raise RobotNotReady(self._status.message or 'The robot does not report its state.')
-        options = replace(self.options, calibration_known=self._status.calibration_known)
+        status = self._status
+        options = replace(
+            self.options, calibration_known=status.calibration_known,
+            optimove_known=has_feature('optimove', software_version(status.polyscope_version)))
         return plan(goal, state, self.arm, options)
 
     def start(self, plan: Plan, on_progress: OnProgress | None = None) -> Motion:
@@ -373,6 +377,13 @@ def _call(callback: Callable[[T], None], argument: T) -> None:
     except Exception as error:
         LOG.exception('a callback of the driver failed with %s: %s; the driver goes on',
                       type(error).__name__, error)
+
+
+def software_version(text: str) -> tuple[int, int, int]:
+    """Return major, minor and bugfix of ``5.21.0.1``; zeros while it is unknown."""
+    numbers = [int(part) for part in text.split('.') if part.isdigit()][:3]
+    major, minor, bugfix = numbers + [0] * (3 - len(numbers))
+    return major, minor, bugfix
 
 
 def order_of(plan: Plan) -> Order:

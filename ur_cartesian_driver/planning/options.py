@@ -37,6 +37,8 @@ class PlanningOptions:
     on_posture_change: PostureChoice = 'refuse'
     #: Whether the kinematics is the robot's own; if not, arcs are never sent as joint positions.
     calibration_known: bool = True
+    #: Whether the robot's software knows OPTIMIZED moves (PolyScope 5.21, PolyScope X 10.8).
+    optimove_known: bool = True
     #: Prefix of the joint names in postures.
     tf_prefix: str = ''
 

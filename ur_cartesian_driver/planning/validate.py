@@ -208,6 +208,11 @@ def _segment_rules(goal: Goal, options: PlanningOptions) -> None:
     timed = is_timed(goal)
     for i, segment in enumerate(goal.segments):
         if segment is not PLAIN:
+            if is_optimized(SegmentType(segment.type)) and not options.optimove_known:
+                raise NotAvailable(
+                    segment_field(i, 'type'), f'is {SegmentType(segment.type).name}, which the '
+                    'software of this robot does not know; it came with PolyScope 5.21 and '
+                    'PolyScope X 10.8', 'use LINEAR or JOINT')
             _speeds(i, segment, timed)
             _via(i, segment)
 

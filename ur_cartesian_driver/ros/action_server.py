@@ -26,6 +26,7 @@ from rclpy.action.server import ActionServer, CancelResponse, RCLError
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
+from rclpy.qos import HistoryPolicy, QoSProfile
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.driver import Driver, Motion
@@ -49,6 +50,8 @@ GoalHandle: TypeAlias = Any
 
 #: How long the result of a goal is kept for clients that ask late [s]; the goal is kept with it.
 RESULT_TIMEOUT = 60
+#: How requests are queued.
+REQUESTS = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST)
 #: How often a waiting goal looks at the node's clock, which may be a simulated one [s].
 CLOCK_PERIOD = 0.05
 #: How long rclpy may need from calling us about a cancel request to noting it [s].
@@ -80,6 +83,10 @@ class CartesianActionServer:
             callback_group=MutuallyExclusiveCallbackGroup(),
             cancel_callback=self._cancel,
             result_timeout=RESULT_TIMEOUT,
+            # Requests that come in a burst wait here; beyond the depth they would be lost.
+            goal_service_qos_profile=REQUESTS,
+            result_service_qos_profile=REQUESTS,
+            cancel_service_qos_profile=REQUESTS,
         )
 
     @property
