@@ -187,8 +187,10 @@ class Listener:
         """
         self._allowed = allowed
         try:
+            # In two steps, so that there is something to close when we are cancelled between.
             self._server = await asyncio.get_running_loop().create_server(
-                self._accept, host, port, backlog=4, reuse_address=True)
+                self._accept, host, port, backlog=4, reuse_address=True, start_serving=False)
+            await self._server.start_serving()
         except OSError as error:
             raise OSError(
                 f'cannot listen on {host} port {port} ({error.strerror or error}): another '
