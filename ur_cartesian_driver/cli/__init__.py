@@ -24,8 +24,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit status: 0 only if what was asked for happened."""
     arguments = parser().parse_args(sys.argv[1:] if argv is None else argv)
     logging.basicConfig(level=logging.WARNING, format='%(levelname)s: %(message)s')
-    # A command that is told to end has to tidy up as after Ctrl-C.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    # A command that is told to end has to tidy up as after Ctrl-C; a shell that starts it in the
+    # background has SIGINT ignored.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     run: Callable[[argparse.Namespace], int] = arguments.run
     try:
         return run(arguments)
