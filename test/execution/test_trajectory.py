@@ -62,7 +62,7 @@ def robot(part=0.0, timestamp=0.0, qd=MOVING, **changes):
 
 def started(**changes):
     machine = TrajectoryMachine(order(**changes))
-    machine.start(0.0)
+    machine.start(robot().state)
     machine.step(robot(), 0.0)
     return machine
 
@@ -87,7 +87,7 @@ def outcome(commands):
 
 
 def test_a_motion_starts_with_start_and_its_points():
-    commands = TrajectoryMachine(order(points=3)).start(0.0)
+    commands = TrajectoryMachine(order(points=3)).start(robot().state)
     assert commands == [SendControl(action=TrajectoryAction.START, count=3),
                         SendPoints(first=0, end=3)]
 
@@ -104,7 +104,7 @@ def test_a_motion_that_arrives_succeeds():
 
 def test_points_beyond_the_window_wait_for_the_robot():
     machine = TrajectoryMachine(order(points=2000))
-    assert machine.start(0.0)[1] == SendPoints(first=0, end=500)
+    assert machine.start(robot().state)[1] == SendPoints(first=0, end=500)
     machine.step(robot(0.0), 0.05)
     commands = machine.step(robot(0.0, points_begun=10), 0.1)
     assert SendPoints(first=500, end=510) in commands
@@ -115,7 +115,7 @@ def test_points_beyond_the_window_wait_for_the_robot():
 
 def test_the_count_of_the_last_trajectory_is_not_taken_for_this_one_s():
     machine = TrajectoryMachine(order(points=4))
-    machine.start(0.0)
+    machine.start(robot(points_begun=4).state)
 
     def place(count, part):
         (report,) = (c for c in machine.step(robot(part, points_begun=count), next(times))
@@ -210,7 +210,7 @@ def test_a_slowed_robot_is_not_late():
 
 def test_progress_is_reported_at_its_rate():
     machine = TrajectoryMachine(order(), feedback_period=0.1)
-    machine.start(0.0)
+    machine.start(robot().state)
     reports = [c for i in range(100)
                for c in machine.step(robot(i / 200, timestamp=0.01 * i), 0.01 * i)
                if isinstance(c, Report)]

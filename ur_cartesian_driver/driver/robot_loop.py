@@ -59,6 +59,7 @@ from ur_cartesian_driver.motion.events import (
     StateReceived,
     Tick,
 )
+from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.protocol.trajectory import POINT_SIZE
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import RobotLink
@@ -84,6 +85,7 @@ class RobotLoop:
         self._pipe = notify
         self._machine: TrajectoryMachine | None = None
         self._motion = 0
+        self._latest: RobotState | None = None
         self._points = memoryview(b'')
         self._last_heartbeat = 0.0
         self._link = RobotLink(
@@ -149,13 +151,15 @@ class RobotLoop:
         self._motion, self._points = request.motion, memoryview(request.points)
         self._machine = machine
         self._link.set_busy(True)
-        self._carry_out(machine.start(self._now()))
+        assert self._latest is not None  # else the link is not ready
+        self._carry_out(machine.start(self._latest))
 
     # ---- events of the robot ------------------------------------------------------------------
 
     def _handle_event(self, event: Event) -> None:
         """Feed the machine, and do what it answers."""
         if isinstance(event, StateReceived):
+            self._latest = event.state
             self._memory.write(event.state)
         if self._machine is not None:
             self._carry_out(self._machine.step(event, self._now()))

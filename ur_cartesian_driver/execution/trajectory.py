@@ -201,16 +201,21 @@ class TrajectoryMachine:
         self._feedback_period = feedback_period
         self._next_report = -inf
         self._latest: RobotState | None = None
-        #: What the robot reports of the goal before; None once it reports about this one.
-        self._stale_begun: int | None = -1
+        #: The count of the goal before, as long as the robot reports it; None afterwards.
+        self._stale_begun: int | None = None
         #: Time since the start in which the controller's own clock ran [s].
         self._scaled_time = 0.0
         self._deadline = inf
         self._code: ErrorCode | None = None
         self._text = ''
 
-    def start(self, now: float) -> list[Command]:
-        """Return the commands that start the motion: START, then the first points."""
+    def start(self, state: RobotState) -> list[Command]:
+        """
+        Return the commands that start the motion: START, then the first points.
+
+        :param state: the robot's newest packet.
+        """
+        self._stale_begun = state.points_begun
         return [SendControl(action=TrajectoryAction.START, count=self.order.points),
                 *self._release(0)]
 
@@ -361,14 +366,11 @@ class TrajectoryMachine:
         Return how many points of this goal the robot has begun; 0 = unknown.
 
         The register keeps the count of the goal before until the robot program has read START, so
-        the first value that comes is believed only when it changes.
+        it is believed once it changes.
         """
-        if self._stale_begun is not None:
-            if self._stale_begun < 0:
-                self._stale_begun = state.points_begun
-            if state.points_begun == self._stale_begun:
-                return 0
-            self._stale_begun = None
+        if state.points_begun == self._stale_begun:
+            return 0
+        self._stale_begun = None
         return state.points_begun
 
     def _release(self, begun: int) -> list[Command]:
