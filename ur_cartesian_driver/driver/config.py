@@ -13,6 +13,7 @@ from ur_cartesian_driver.robot.settings import LinkSettings
 class DriverConfig(LinkSettings):
     """How to reach the robot, and how to run the loop that does; the defaults fit a real robot."""
 
+    #: Not used yet: for services that need the dashboard.
     dashboard_port: int = 29999
     #: Progress reports per second.
     feedback_rate: float = 25.0
