@@ -184,7 +184,7 @@ DECLARATIONS: tuple[Declaration, ...] = (
     # -- network
     Declaration('rtde_port', 'Port of RTDE on the robot.', *_PORT),
     Declaration('primary_port', 'Port of the primary interface on the robot.', *_PORT),
-    Declaration('dashboard_port', 'Port of the dashboard server on the robot; not used yet.', *_PORT),
+    Declaration('dashboard_port', 'Port of the dashboard of the robot; not used yet.', *_PORT),
     Declaration('reverse_port', 'Port to which the robot program connects for control messages; '
                 '0: any free one.', *_PORT),
     Declaration('script_sender_port', 'Port that serves the robot program to the External '
