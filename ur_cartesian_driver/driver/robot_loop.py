@@ -259,5 +259,5 @@ async def serve(pipe: socket.socket, descriptor: int) -> None:
     finally:
         writer.close()
         memory.close()
-        for _ in range(3):  # calls that came in at the last moment are taken, and hung up on
-            await asyncio.sleep(0.0)
+        # Calls that came in at the last moment are taken, and hung up on.
+        await asyncio.sleep(0.01)

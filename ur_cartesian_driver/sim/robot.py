@@ -164,6 +164,8 @@ class SimulatedRobot:
             self.controller.sockets.close_all()
             for server in (self._rtde, self._primary, self._dashboard):
                 await server.close()
+            # Clients that called at the last moment are taken, and hung up on.
+            await asyncio.sleep(0.01)
 
     async def _listen(self) -> None:
         host, config = self.config.host, self.config
