@@ -63,6 +63,9 @@ class _Connection(asyncio.Protocol, Generic[S]):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
         self._server.connections.add(self)
+        if self._server.closing:  # it called at the last moment
+            self._transport.abort()
+            return
         self.write(self.session.open())
 
     def data_received(self, data: bytes) -> None:
@@ -114,6 +117,7 @@ class TcpServer(Generic[S]):
         self.make_session = make_session
         self.connections: set[_Connection[S]] = set()
         self._server: asyncio.Server | None = None
+        self.closing = False
 
     @property
     def port(self) -> int:
@@ -133,6 +137,7 @@ class TcpServer(Generic[S]):
         :raises OSError: the port is taken; the text names interface and port.
         """
         loop = asyncio.get_running_loop()
+        self.closing = False
         try:
             self._server = await loop.create_server(lambda: _Connection(self), host, port)
         except OSError as error:
@@ -150,6 +155,7 @@ class TcpServer(Generic[S]):
         """Stop listening and disconnect everybody."""
         if self._server is None:
             return
+        self.closing = True
         self._server.close()
         for connection in tuple(self.connections):
             connection.abort()
