@@ -306,9 +306,6 @@ def test_a_program_that_outlives_rtde_is_taken_up_again(make_driver, ur_sim):
         assert driver.status.state is not ConnectionState.READY
         wait_for(lambda: at_rest(ur_sim))
         driver.wait_ready(5.0)
-        # The program's answer to the goal that was lost may still be under way, and nothing in it
-        # says to which goal it belongs.
-        sleep(0.3)
         assert driver.execute(Goal(waypoints=(Waypoint(pose=pose, time=1.0),)),
                               timeout=10.0).succeeded
 

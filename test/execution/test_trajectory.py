@@ -166,6 +166,20 @@ def test_a_cancel_that_a_paused_program_cannot_read_ends_the_goal_and_the_progra
     assert outcome(commands).code is ErrorCode.CANCELLED
 
 
+def test_an_answer_to_a_lost_goal_is_not_taken_for_this_one_s():
+    machine = started()
+    machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 0.1)
+    machine.step(robot(0.1, points_begun=1), 0.2)
+    assert machine.step(Tick(), 2.0) == []
+    assert machine.state is State.MOVING
+
+
+def test_a_program_that_cancels_and_begins_nothing_ends_the_goal():
+    machine = started()
+    machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 0.1)
+    assert outcome(machine.step(Tick(), 1.2)).code is ErrorCode.EXECUTION_FAILED
+
+
 def test_leaving_the_path_stops_the_arm_and_names_point_axis_value_and_limit():
     machine = started(path_tolerance=Tolerance(position=(0.0, 0.001, 0.0)))
     off = robot(0.5)

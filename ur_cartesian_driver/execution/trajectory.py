@@ -68,6 +68,8 @@ from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 STOP_BOUND = 3.0
 #: Joint speed below which the arm is at rest [rad/s].
 REST_SPEED = 1e-3
+#: How long a program that answered CANCELED may take to begin all the same [s].
+EARLY_ANSWER = 1.0
 #: How long the arm may need from the program's SUCCESS to rest inside its goal tolerance, when
 #: the goal does not say [s].
 DEFAULT_GOAL_TIME_TOLERANCE = 1.0
@@ -240,6 +242,9 @@ class TrajectoryMachine:
     def _signal(self, event: Event, now: float) -> tuple[Signal | None, str]:
         """Return what the event means, with a clause for the outcome's text."""
         match event:
+            case TrajectoryEnded(result=TrajectoryResult.CANCELED) if self._has_not_begun():
+                self._deadline = now + EARLY_ANSWER
+                return None, ''
             case TrajectoryEnded(result=result):
                 return _RESULTS[result]
             case CancelRequested(reason=reason):
@@ -276,9 +281,21 @@ class TrajectoryMachine:
         error = deviation(self._tracker.pose(), state.actual_tcp_pose, self.order.T_base_frame)
         return violation(error, self.order.goal_tolerance)
 
+    def _has_not_begun(self) -> bool:
+        """
+        Tell whether the program has not reported a point of this goal yet.
+
+        A CANCELED that comes then most likely answers a goal whose end nobody waited for, because
+        RTDE was lost; it names no goal. It counts only if nothing begins after it.
+        """
+        return self.state is State.MOVING and self._stale_begun is not None
+
     def _late(self, now: float) -> tuple[Signal | None, str]:
         if now < self._deadline:
             return None, ''
+        if self.state is State.MOVING:
+            self._deadline = inf
+            return _RESULTS[TrajectoryResult.CANCELED] if self._has_not_begun() else (None, '')
         if self.state is State.SETTLING:
             missing = self._goal_error(self._latest) if self._latest is not None else None
             return Signal.LATE, missing or 'the arm did not come to rest'
