@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import fields
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 import os
@@ -90,19 +91,22 @@ def child(target: Callable[..., None], *arguments: Any) -> Iterator[Child]:
 
 @contextmanager
 def simulator() -> Iterator[Child]:
-    """Run a simulated robot; calls: ``ports``, ``state``, ``begin``, ``cycles``."""
+    """Run a simulated robot; calls: ``ports``, ``state``, ``run_script``, ``begin``, ..."""
     with child(_simulate) as robot:
         yield robot
 
 
 def _simulate(connection: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
-    config = SimulatorConfig(rtde_port=0, primary_port=0, dashboard_port=0)
+    any_port: dict[str, Any] = {
+        field.name: 0 for field in fields(SimulatorConfig) if field.name.endswith('_port')}
+    config = SimulatorConfig(**any_port)
     with SimulatedRobot(config) as robot:
         beginnings = note_cycles(robot)
         answer_calls(connection, {
             'ports': lambda: robot.ports,
             'state': robot.state,
+            'run_script': robot.run_script,
             'begin': beginnings.clear,
             'cycles': lambda: list(beginnings),
         })
