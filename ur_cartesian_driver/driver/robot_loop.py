@@ -56,7 +56,6 @@ from ur_cartesian_driver.motion.events import (
     CancelRequested,
     Event,
     Outcome,
-    StateReceived,
     Tick,
 )
 from ur_cartesian_driver.motion.state import RobotState
@@ -89,9 +88,9 @@ class RobotLoop:
         self._points = memoryview(b'')
         self._last_heartbeat = 0.0
         self._link = RobotLink(
-            config, on_event=self._handle_event, on_status=self._status_changed,
-            on_geometry=self._geometry_known, on_log=self._log,
-            may_upload=configure.may_upload)
+            config, on_state=self._keep_state, on_event=self._handle_event,
+            on_status=self._status_changed, on_geometry=self._geometry_known,
+            on_log=self._log, may_upload=configure.may_upload)
 
     async def run(self, requests: asyncio.StreamReader) -> None:
         """Serve until the owner shuts down, hangs up or falls silent."""
@@ -156,11 +155,12 @@ class RobotLoop:
 
     # ---- events of the robot ------------------------------------------------------------------
 
+    def _keep_state(self, state: RobotState) -> None:
+        self._latest = state
+        self._memory.write(state)
+
     def _handle_event(self, event: Event) -> None:
         """Feed the machine, and do what it answers."""
-        if isinstance(event, StateReceived):
-            self._latest = event.state
-            self._memory.write(event.state)
         if self._machine is not None:
             self._carry_out(self._machine.step(event, self._now()))
 

@@ -44,24 +44,31 @@ from ur_cartesian_driver.robot.transport import Retry
 #: In these states nobody knows the robot, or it is the wrong one: the reason is the message.
 _OUT_OF_REACH = frozenset({ConnectionState.DISCONNECTED, ConnectionState.REFUSED})
 
+#: How long a robot has to wait for its program before the log says so [s]: a program that is on
+#: its way there needs nobody's help.
+NOTEWORTHY = 1.0
+
 
 class RobotLink:
     """The only owner of the driver's sockets; used from one event loop."""
 
-    def __init__(self, settings: LinkSettings, *, on_event: Callable[[Event], None],
+    def __init__(self, settings: LinkSettings, *, on_state: Callable[[RobotState], None],
+                 on_event: Callable[[Event], None],
                  on_status: Callable[[DriverStatus], None],
                  on_geometry: Callable[[Geometry], None],
                  on_log: Callable[[int, str], None], may_upload: bool = True) -> None:
         """
         Prepare; :meth:`run` connects.
 
+        :param on_state: the robot's newest state, before any status or event that follows from
+            it: who hears that the robot is ready can read where it stands.
         :param on_status: the status changed.
         :param on_geometry: the robot told its calibrated geometry.
         :param on_log: a line for the log, with its level.
         :param may_upload: whether the first connection to the robot is the owner's first.
         """
         self._settings = settings
-        self._on_event, self._on_status = on_event, on_status
+        self._tell_state, self._on_event, self._on_status = on_state, on_event, on_status
         self._on_geometry, self._on_log = on_geometry, on_log
         self._status = DriverStatus(message=f'Connecting to the robot at {settings.robot_ip}.')
         self._version: ControllerVersion | None = None
@@ -188,6 +195,7 @@ class RobotLink:
 
     def _on_state(self, robot: RobotState) -> None:
         before, self._robot = self._robot, robot
+        self._tell_state(robot)
         if before is None or _modes(before) != _modes(robot):
             self._review()
         self._on_event(StateReceived(state=robot))
@@ -263,10 +271,17 @@ class RobotLink:
     def _log_change(self, before: DriverStatus, now: DriverStatus) -> None:
         """Write what is needed into the log, for those who do not see the status."""
         if now.message and now.message != before.message:
-            self._on_log(logging.INFO, now.message)
+            if now.state is ConnectionState.CONNECTED:
+                asyncio.get_running_loop().call_later(NOTEWORTHY, self._log_if_still, now.message)
+            else:
+                self._on_log(logging.INFO, now.message)
         idle = (ConnectionState.READY, ConnectionState.EXECUTING)
         if now.state is ConnectionState.READY and before.state not in idle:
             self._on_log(logging.INFO, 'The robot program is connected: ready for goals.')
+
+    def _log_if_still(self, message: str) -> None:
+        if self._status.message == message:
+            self._on_log(logging.INFO, message)
 
     def _error(self, text: str) -> None:
         self._tell(last_error=text)

@@ -1,0 +1,102 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The link to a robot, with the simulated one: what it tells, and in which order."""
+
+import asyncio
+import contextlib
+from dataclasses import replace
+import logging
+
+import pytest
+
+from ur_cartesian_driver.motion.state import RobotState, RuntimeState
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from ur_cartesian_driver.robot.link import NOTEWORTHY, RobotLink
+from ur_cartesian_driver.robot.settings import LinkSettings
+from ur_cartesian_driver.robot.status import DriverStatus
+
+
+class Ear:
+    """Everything that a link tells, in order."""
+
+    def __init__(self, ports, *, headless):
+        self.heard = []
+        self.log = []
+        self._ready = asyncio.Event()
+        self.link = RobotLink(
+            LinkSettings(rtde_port=ports.rtde, primary_port=ports.primary, reverse_port=0,
+                         trajectory_port=0, script_command_port=0, script_sender_port=0,
+                         headless_mode=headless),
+            on_state=self.heard.append, on_event=lambda event: None, on_status=self._status,
+            on_geometry=lambda geometry: None,
+            on_log=lambda level, text: self.log.append((level, text)))
+
+    def _status(self, status):
+        self.heard.append(status)
+        if status.state is ConnectionState.READY:
+            self._ready.set()
+
+    async def ready(self):
+        await asyncio.wait_for(self._ready.wait(), 5.0)
+
+    def statuses(self, state):
+        return [index for index, told in enumerate(self.heard)
+                if isinstance(told, DriverStatus) and told.state is state]
+
+
+@contextlib.asynccontextmanager
+async def listening(ur_sim, *, headless=True):
+    ear = Ear(ur_sim.ports, headless=headless)
+    life = asyncio.create_task(ear.link.run())
+    try:
+        yield ear
+    finally:
+        life.cancel()
+        ear.link.close()
+        with contextlib.suppress(asyncio.CancelledError):
+            await life
+
+
+def test_who_hears_that_the_robot_is_ready_knows_where_it_stands(ur_sim):
+    async def run():
+        async with listening(ur_sim) as ear:
+            await ear.ready()
+        first_ready = ear.statuses(ConnectionState.READY)[0]
+        assert any(isinstance(told, RobotState) for told in ear.heard[:first_ready])
+
+    asyncio.run(run())
+
+
+def test_a_state_is_told_before_what_follows_from_it(ur_sim):
+    """A program that outlived the connection makes the driver ready with the first state."""
+    async def run():
+        async with listening(ur_sim) as ear:
+            await ear.ready()
+            state = next(told for told in reversed(ear.heard) if isinstance(told, RobotState))
+            ear.link._on_state(replace(state, runtime_state=RuntimeState.PAUSED))
+            ear.heard.clear()
+            ear.link._on_state(state)
+        assert ear.heard[0] is state
+        assert ear.statuses(ConnectionState.READY)
+
+    asyncio.run(run())
+
+
+def test_the_log_asks_for_nothing_while_the_program_is_on_its_way(ur_sim):
+    async def run():
+        async with listening(ur_sim) as ear:
+            await ear.ready()
+        assert not [text for _, text in ear.log if 'resend' in text]
+
+    asyncio.run(run())
+
+
+@pytest.mark.slow
+def test_the_log_asks_for_a_program_that_does_not_come(ur_sim):
+    async def run():
+        async with listening(ur_sim, headless=False) as ear:
+            await asyncio.sleep(NOTEWORTHY + 1.0)
+        assert (logging.INFO, 'The robot program does not run; play a program with the External '
+                              'Control node on the pendant.') in ear.log
+
+    asyncio.run(run())
