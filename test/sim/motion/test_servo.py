@@ -40,11 +40,14 @@ def test_stopj_brakes_the_leading_axis_and_all_joints_stop_together(recorder, qd
     assert r.generator.qd == STILL
 
 
-def test_stopj_at_rest_returns_at_once(recorder):
+def test_stop_at_rest_takes_a_cycle_and_leaves_the_arm_steady(recorder):
+    # So a program may write: while (not is_steady()): stopj(50) end
     r = recorder()
-    assert r.generator.stopj(2.0).returned
-    assert r.generator.stopl(2.0).returned
+    assert r.run(r.generator.stopj(2.0)) == 1
+    assert r.run(r.generator.stopl(2.0)) == 1
     assert not r.generator.moving
+    assert r.generator.steady
+    assert r.generator.q == HOME
 
 
 def test_stopj_ends_even_when_the_speed_is_scaled_to_nothing(recorder):

@@ -195,11 +195,17 @@ class MotionGenerator:
             self.T_base_tcp, now, twist, a, a if a_rot is None else a_rot, t))
 
     def stopj(self, a: float) -> Move:
-        """Brake in joint space at ``a`` [rad/s^2]; in real time, the path is not kept."""
+        """
+        Brake in joint space at ``a`` [rad/s^2]; in real time, the path is not kept.
+
+        It takes a cycle at least: programs stop again and again until the arm is steady.
+        """
         return self._take_over(JointStop(self.q, self._real_joint_speed(), a))
 
     def stopl(self, a: float, a_rot: float | None = None) -> Move:
-        """Brake along the tool's tangent; in real time."""
+        """Brake along the tool's tangent; in real time, and a cycle at least."""
+        if not self.moving:
+            return self.stopj(a)
         return self._take_over(ToolStop(
             self.T_base_tcp, self._real_twist(), a, a if a_rot is None else a_rot))
 
@@ -368,10 +374,12 @@ class MotionGenerator:
             self._set_out(call)
         else:
             # A path begins at rest or in a blend, nowhere else: brake first.
-            self._take_over(JointStop(self.q, self._real_joint_speed(), RUN_OUT_BRAKING))
+            stop = JointStop(self.q, self._real_joint_speed(), RUN_OUT_BRAKING)
+            self._take_over(stop)
             self._move = call.move
             self._then = call
-            if self._motion is None:
+            if stop.over:
+                self._motion = None
                 self._come_to_rest()
 
     def _set_out(self, call: Call) -> None:
@@ -449,9 +457,7 @@ class MotionGenerator:
         self._abort()
         self._use_tcp()
         self._motion, self._move = motion, Move()
-        if isinstance(motion, _Stop) and motion.over:
-            self._motion, self._move.returned = None, True
-        elif isinstance(motion, _Speeding) and motion.duration is not None:
+        if isinstance(motion, _Speeding) and motion.duration is not None:
             self._move.returned = motion.over
         return self._move
 
