@@ -81,6 +81,10 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
                      help='software version, such as 5.21; empty = the newest for the model')
     for name, port in (('rtde', 30004), ('primary', 30001), ('dashboard', 29999)):
         sim.add_argument(f'--{name}-port', type=int, default=port, help='0 = any free port')
+    for name, port in (('secondary', 30002), ('realtime', 30003)):
+        sim.add_argument(
+            f'--{name}-port', type=int, default=None,
+            help=f'0 = any free port; left out: {port} if the primary port is 30001, else any')
     sim.add_argument('--joints', type=_six_numbers, metavar='Q1,...,Q6',
                      help='joint positions at the start [rad]')
     sim.add_argument('--power-off', action='store_true', help='start with the arm switched off')

@@ -35,7 +35,8 @@ def sim(arguments: argparse.Namespace) -> int:
     config = SimulatorConfig(
         model=arguments.model, host=arguments.host, polyscope=arguments.polyscope,
         rtde_port=arguments.rtde_port, primary_port=arguments.primary_port,
-        dashboard_port=arguments.dashboard_port, power='off' if arguments.power_off else 'running',
+        dashboard_port=arguments.dashboard_port, secondary_port=arguments.secondary_port,
+        realtime_port=arguments.realtime_port, power='off' if arguments.power_off else 'running',
         remote_control=not arguments.local,
         **({'q': arguments.joints} if arguments.joints else {}))
     robot = SimulatedRobot(config)
@@ -55,7 +56,8 @@ async def _simulate(robot: SimulatedRobot) -> None:
 def _show_ports(robot: SimulatedRobot) -> None:
     ports = robot.ports
     print(f'simulated {robot.config.model} on {robot.config.host}: RTDE {ports.rtde}, '
-          f'primary {ports.primary}, dashboard {ports.dashboard}', flush=True)
+          f'primary {ports.primary}, dashboard {ports.dashboard}, '
+          f'secondary {ports.secondary}, real-time {ports.realtime}', flush=True)
 
 
 async def _show_status(robot: SimulatedRobot) -> None:

@@ -15,6 +15,7 @@ from ur_cartesian_driver.motion.pose import Vector6
 #: Upright enough to move anywhere, away from every singularity [rad].
 HOME: Vector6 = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 
+_PRIMARY_PORT = 30001
 _NEWEST = {'CB3': '3.15.8', 'e': '5.21.0'}
 
 
@@ -34,8 +35,12 @@ class SimulatorConfig:
     polyscope: str = ''
     #: Ports; 0 = any free one.
     rtde_port: int = 30004
-    primary_port: int = 30001
+    primary_port: int = _PRIMARY_PORT
     dashboard_port: int = 29999
+    #: None = 30002 and 30003 beside a primary interface on 30001, any free ones beside another:
+    #: who gives the robot a port of his own is not alone on this computer.
+    secondary_port: int | None = None
+    realtime_port: int | None = None
     #: Joint positions at start [rad].
     q: Vector6 = HOME
     power: Literal['running', 'off'] = 'running'
@@ -65,9 +70,10 @@ class SimulatorConfig:
             raise ValueError(f'frequency is {self.frequency} Hz; use 1 to 1000 Hz.')
         if self.rate < 0.0:
             raise ValueError(f'rate is {self.rate}; use 1 for real time, 0 for no waiting.')
-        for name in ('rtde_port', 'primary_port', 'dashboard_port'):
+        for name in ('rtde_port', 'primary_port', 'dashboard_port', 'secondary_port',
+                     'realtime_port'):
             port = getattr(self, name)
-            if not 0 <= port <= 65535:
+            if port is not None and not 0 <= port <= 65535:
                 raise ValueError(f'{name} is {port}; use 0 (any free one) to 65535.')
         if len(self.q) != 6:
             raise ValueError(f'q has {len(self.q)} values; give one for each of the 6 joints.')
@@ -94,6 +100,21 @@ class SimulatorConfig:
             raise ValueError(f'polyscope is {text!r}; write it like 5.21 or 5.21.0.')
         major, minor, bugfix, build = [int(part) for part in parts] + [0] * (4 - len(parts))
         return major, minor, bugfix, build
+
+    @property
+    def listening_secondary_port(self) -> int:
+        """Return the port for the secondary interface; 0 = any free one."""
+        return self._beside_primary(self.secondary_port, 1)
+
+    @property
+    def listening_realtime_port(self) -> int:
+        """Return the port for the real-time interface; 0 = any free one."""
+        return self._beside_primary(self.realtime_port, 2)
+
+    def _beside_primary(self, chosen: int | None, distance: int) -> int:
+        if chosen is not None:
+            return chosen
+        return _PRIMARY_PORT + distance if self.primary_port == _PRIMARY_PORT else 0
 
     @property
     def cycle(self) -> float:

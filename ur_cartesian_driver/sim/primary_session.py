@@ -1,6 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One client of the primary interface: programs and commands in, announcements and states out."""
+"""
+One client of an interface that takes scripts: primary, secondary, real-time.
+
+What it sends is the same on all three, programs and commands; what it gets differs, comes unasked,
+and is not its session's business, apart from a greeting.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +16,7 @@ from ur_cartesian_driver.sim.server import Hangup
 from ur_cartesian_driver.sim.uploads import TooLong, Uploads
 
 
-class PrimarySession:
+class ScriptSession:
     """A :class:`~.server.Session`."""
 
     def __init__(self, controller: Controller) -> None:
@@ -20,8 +25,8 @@ class PrimarySession:
         self._uploads = Uploads()
 
     def open(self) -> bytes:
-        """Introduce the controller: clients wait for this before anything else."""
-        return version_frame(self._controller)
+        """Say nothing: the first state comes in this cycle."""
+        return b''
 
     def close(self) -> None:
         """Forget what came of an unfinished program."""
@@ -34,3 +39,11 @@ class PrimarySession:
         except TooLong:
             raise Hangup from None
         return b''
+
+
+class PrimarySession(ScriptSession):
+    """A client of the primary or secondary interface, which begin with the version."""
+
+    def open(self) -> bytes:
+        """Introduce the controller: clients wait for this before anything else."""
+        return version_frame(self._controller)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The robot state as the primary interface shows it, ten times a second, and the greeting."""
+"""The robot state on the primary and secondary interface, ten times a second, and the greeting."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def version_frame(controller: Controller) -> bytes:
 
 
 class PrimaryStream:
-    """What all clients get in each cycle: messages at once, states at their rate."""
+    """What clients get unasked: messages at once, states at their rate."""
 
     def __init__(self, controller: Controller) -> None:
         """Compute once what never changes."""
@@ -54,16 +54,15 @@ class PrimaryStream:
         self._constant = (_kinematics(controller), _configuration(controller))
         self._every = max(1, round(1.0 / (STATE_RATE * controller.cycle)))
 
-    def frames(self, listeners: bool) -> Iterator[bytes]:
-        """
-        Yield the frames of this cycle.
-
-        :param listeners: whether anybody is there; states are not computed for nobody.
-        """
+    def messages(self) -> Iterator[bytes]:
+        """Yield what has been announced since the last cycle."""
         for message in self._controller.announcements.take():
             yield encode_message(message)
-        if listeners and self._controller.cycles % self._every == 0:
-            yield self.state()
+
+    @property
+    def is_due(self) -> bool:
+        """Whether this is one of the cycles in which the state is sent."""
+        return self._controller.cycles % self._every == 0
 
     def state(self) -> bytes:
         """Return a state frame, its sub-packages in the order of a recorded UR5e."""

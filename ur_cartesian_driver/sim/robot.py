@@ -16,7 +16,7 @@ import contextlib
 from dataclasses import dataclass
 import threading
 from types import TracebackType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
@@ -25,8 +25,9 @@ from ur_cartesian_driver.sim.config import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.dashboard_session import DashboardSession
 from ur_cartesian_driver.sim.modes import SafetyEvent
-from ur_cartesian_driver.sim.primary_session import PrimarySession
+from ur_cartesian_driver.sim.primary_session import PrimarySession, ScriptSession
 from ur_cartesian_driver.sim.primary_states import PrimaryStream
+from ur_cartesian_driver.sim.realtime_states import RealtimeStream
 from ur_cartesian_driver.sim.rtde_session import RtdeSession
 from ur_cartesian_driver.sim.server import TcpServer
 from ur_cartesian_driver.sim.tcp_script_sockets import TcpScriptSockets
@@ -43,6 +44,8 @@ class Ports:
     rtde: int
     primary: int
     dashboard: int
+    secondary: int
+    realtime: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +88,11 @@ class SimulatedRobot:
         taken_inputs: set[str] = set()
         self._rtde = TcpServer('RTDE', lambda: RtdeSession(self.controller, taken_inputs))
         self._primary = TcpServer('primary', lambda: PrimarySession(self.controller))
+        self._secondary = TcpServer('secondary', lambda: PrimarySession(self.controller))
+        self._realtime = TcpServer('real-time', lambda: ScriptSession(self.controller))
         self._dashboard = TcpServer('dashboard', lambda: DashboardSession(self.controller))
+        self._servers: tuple[TcpServer[Any], ...] = (
+            self._rtde, self._primary, self._secondary, self._realtime, self._dashboard)
         self._clock: Clock = (RealClock(self.config.cycle, self.config.rate)
                               if self.config.rate > 0.0 else VirtualClock())
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -162,7 +169,7 @@ class SimulatedRobot:
         finally:
             self._loop = None
             self.controller.sockets.close_all()
-            for server in (self._rtde, self._primary, self._dashboard):
+            for server in self._servers:
                 await server.close()
             # Clients that called at the last moment are taken, and hung up on.
             await asyncio.sleep(0.01)
@@ -172,19 +179,28 @@ class SimulatedRobot:
         await self._rtde.listen(host, config.rtde_port)
         await self._primary.listen(host, config.primary_port)
         await self._dashboard.listen(host, config.dashboard_port)
+        await self._secondary.listen(host, config.listening_secondary_port)
+        await self._realtime.listen(host, config.listening_realtime_port)
         self._ports = Ports(rtde=self._rtde.port, primary=self._primary.port,
-                            dashboard=self._dashboard.port)
+                            dashboard=self._dashboard.port, secondary=self._secondary.port,
+                            realtime=self._realtime.port)
 
     async def _cycles(self) -> None:
-        stream = PrimaryStream(self.controller)
+        stream, realtime = PrimaryStream(self.controller), RealtimeStream(self.controller)
         while True:
             await self._clock.next_cycle()
             self.controller.step()
             for session, connection in self._rtde.sessions:
                 for package in session.packages():
                     connection.write(package)
-            for frame in stream.frames(listeners=bool(self._primary.connections)):
-                self._primary.broadcast(frame)
+            for message in stream.messages():
+                self._primary.broadcast(message)
+            if stream.is_due and (self._primary.connections or self._secondary.connections):
+                state = stream.state()
+                self._primary.broadcast_state(state)
+                self._secondary.broadcast_state(state)
+            if self._realtime.connections:
+                self._realtime.broadcast_state(realtime.packet())
 
     def _on_socket_data(self, port: int, data: bytes) -> None:
         if self.on_socket_data is not None:
@@ -296,8 +312,8 @@ class SimulatedRobot:
     def status_line(self) -> str:
         """Return one line for a terminal: model, modes, program, clients, slider."""
         state = self.state()
-        clients = ' '.join(f'{server.name} {len(server.connections)}' for server in (
-            self._rtde, self._primary, self._dashboard))
+        clients = ' '.join(
+            f'{server.name} {len(server.connections)}' for server in self._servers)
         return (f'{self.config.model} | {state.robot_mode.name} {state.safety_mode.name} | '
                 f'{state.runtime_state.name} {state.program or "no program"} | '
                 f'clients: {clients} | speed {state.speed_slider:.0%}')

@@ -20,6 +20,8 @@ _log = logging.getLogger(__name__)
 
 #: Bytes that a client may leave unread beside what the kernel holds.
 MOST_UNREAD = 1_000_000
+#: From here on a client is spared states: many send their scripts and never read.
+MANY_UNREAD = 16_384
 
 
 class Hangup(Exception):
@@ -92,6 +94,12 @@ class _Connection(asyncio.Protocol, Generic[S]):
             return
         self._transport.write(data)
 
+    def write_state(self, data: bytes) -> None:
+        """Send a piece that the next of its kind replaces, if the client has read the others."""
+        if self._transport is not None and (
+                self._transport.get_write_buffer_size() < MANY_UNREAD):
+            self.write(data)
+
     def abort(self) -> None:
         """Disconnect at once."""
         if self._transport is not None:
@@ -150,6 +158,11 @@ class TcpServer(Generic[S]):
         """Send the same piece to all clients."""
         for connection in tuple(self.connections):
             connection.write(data)
+
+    def broadcast_state(self, data: bytes) -> None:
+        """Send the same piece to all clients that read what they are sent."""
+        for connection in tuple(self.connections):
+            connection.write_state(data)
 
     async def close(self) -> None:
         """Stop listening and disconnect everybody."""

@@ -1,0 +1,187 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The packet of the real-time interface (port 30003), which the controller sends in every cycle.
+
+``int32`` size (these four bytes included), then big-endian doubles only, also for what is a whole
+number: modes, and the bits of inputs and outputs as the number that they make. Software has grown
+the packet at its end and never changed what stands before, so one table describes all versions
+and the size says where a packet stops::
+
+    size [bytes]   from PolyScope    the last field
+    1060           3.2               program_state
+    1108           3.5, 5.0          elbow_velocity
+    1116           3.10, 5.4         safety_status
+    1140           3.14, 5.9         three values for the manufacturer only
+    1220           5.10              payload_inertia
+
+From the manufacturer's tables of the client interfaces, as far as those are public.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from itertools import accumulate
+import struct
+from typing import cast, Final
+
+from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.goal import ZERO6
+from ur_cartesian_driver.motion.pose import Vector3, Vector6
+from ur_cartesian_driver.protocol.framing import quote
+
+ZERO3: Final[Vector3] = (0.0, 0.0, 0.0)
+
+#: Size of the packet [bytes] from a version (major, minor) on, oldest first.
+_SIZES: Final = (
+    ((3, 2), 1060), ((3, 5), 1108), ((3, 10), 1116), ((3, 14), 1140),
+    ((5, 0), 1108), ((5, 4), 1116), ((5, 9), 1140), ((5, 10), 1220))
+SIZES: Final = frozenset(size for _, size in _SIZES)
+_SIZE = struct.Struct('>i')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RealtimeData:
+    """
+    One packet, its fields in the order of the wire; older packets leave the last ones at 0.
+
+    Joints in rad, rad/s, rad/s^2, A, Nm, V; poses of the TCP and twists in the base frame in m,
+    rad (rotation vector), m/s, rad/s. ``reserved_*`` are for the manufacturer only.
+    """
+
+    #: Since the controller has started [s].
+    time: float
+    q_target: Vector6 = ZERO6
+    qd_target: Vector6 = ZERO6
+    qdd_target: Vector6 = ZERO6
+    current_target: Vector6 = ZERO6
+    moment_target: Vector6 = ZERO6
+    q_actual: Vector6 = ZERO6
+    qd_actual: Vector6 = ZERO6
+    current_actual: Vector6 = ZERO6
+    current_control: Vector6 = ZERO6
+    tcp_pose_actual: Vector6 = ZERO6
+    tcp_speed_actual: Vector6 = ZERO6
+    #: [N, Nm]
+    tcp_force: Vector6 = ZERO6
+    tcp_pose_target: Vector6 = ZERO6
+    tcp_speed_target: Vector6 = ZERO6
+    digital_input_bits: float = 0.0
+    #: [degrees Celsius]
+    joint_temperatures: Vector6 = ZERO6
+    #: What the cycle took the controller [s].
+    controller_timer: float = 0.0
+    reserved_test: float = 0.0
+    robot_mode: float = 0.0
+    joint_modes: Vector6 = ZERO6
+    safety_mode: float = 0.0
+    reserved_1: Vector6 = ZERO6
+    #: [m/s^2]
+    tool_accelerometer: Vector3 = ZERO3
+    reserved_2: Vector6 = ZERO6
+    speed_scaling: float = 0.0
+    #: [kg m/s]
+    momentum: float = 0.0
+    reserved_3: float = 0.0
+    reserved_4: float = 0.0
+    main_voltage: float = 0.0
+    robot_voltage: float = 0.0
+    robot_current: float = 0.0
+    joint_voltages: Vector6 = ZERO6
+    digital_output_bits: float = 0.0
+    program_state: float = 0.0
+    elbow_position: Vector3 = ZERO3
+    elbow_velocity: Vector3 = ZERO3
+    safety_status: float = 0.0
+    reserved_5: Vector3 = ZERO3
+    #: [kg], [m], [kg m^2]: Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
+    payload_mass: float = 0.0
+    payload_cog: Vector3 = ZERO3
+    payload_inertia: Vector6 = ZERO6
+
+    def encode(self, size: int) -> bytes:
+        """
+        Return the packet.
+
+        :param size: see :func:`packet_size`; what does not fit into it is left out.
+        :raises LocalProtocolError: no packet has this size.
+        """
+        if size not in SIZES:
+            raise LocalProtocolError(
+                f'A real-time packet has {sorted(SIZES)} bytes, not {size}.')
+        numbers = [number for field in fields(self) for number in _flat(getattr(self, field.name))]
+        count = _count(size)
+        return struct.pack(f'>i{count}d', size, *numbers[:count])
+
+
+def packet_size(version: tuple[int, ...]) -> int:
+    """
+    Return how long the packets of a controller are [bytes].
+
+    :param version: of PolyScope: major, minor, and more that does not matter.
+    """
+    found = _SIZES[0][1]
+    for first, size in _SIZES:
+        if version[:2] >= first:
+            found = size
+    return found
+
+
+def decode_packet(data: bytes) -> RealtimeData:
+    """
+    Read one packet, its size included; what a newer one has behind our last field is left out.
+
+    :raises RemoteProtocolError: the size is wrong.
+    """
+    stated = _SIZE.unpack_from(data)[0] if len(data) >= _SIZE.size else 0
+    if stated != len(data) or stated < min(SIZES) or (stated - _SIZE.size) % 8:
+        raise RemoteProtocolError(
+            f'A real-time packet of {len(data)} bytes says that it has {stated}: {quote(data)}.')
+    count = min(_count(stated), _ENDS[-1])
+    numbers = struct.unpack_from(f'>{count}d', data, _SIZE.size)
+    values: dict[str, float | tuple[float, ...]] = {}
+    for field, length, end in zip(fields(RealtimeData), _LENGTHS, _ENDS, strict=True):
+        if end <= count:
+            values[field.name] = numbers[end - 1] if length == 1 else numbers[end - length:end]
+    return RealtimeData(**values)  # type: ignore[arg-type]
+
+
+class RealtimeDecoder:
+    """Cuts a stream into packets."""
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self._rest = b''
+
+    def feed(self, data: bytes) -> Iterator[RealtimeData]:
+        """
+        Yield the packets that are complete now.
+
+        :raises RemoteProtocolError: a size is none that a packet has.
+        """
+        self._rest += data
+        while len(self._rest) >= _SIZE.size:
+            size = _SIZE.unpack_from(self._rest)[0]
+            if not min(SIZES) <= size <= 4 * max(SIZES):
+                raise RemoteProtocolError(
+                    f'A real-time packet says that it has {size} bytes: {quote(self._rest)}.')
+            if len(self._rest) < size:
+                return
+            packet, self._rest = self._rest[:size], self._rest[size:]
+            yield decode_packet(packet)
+
+
+def _flat(value: float | tuple[float, ...]) -> tuple[float, ...]:
+    return value if isinstance(value, tuple) else (value,)
+
+
+def _count(size: int) -> int:
+    return (size - _SIZE.size) // 8
+
+
+#: Numbers in each field, and in all up to its end.
+_LENGTHS: Final = [
+    len(cast(tuple[float, ...], field.default)) if isinstance(field.default, tuple) else 1
+    for field in fields(RealtimeData)]
+_ENDS: Final = list(accumulate(_LENGTHS))
