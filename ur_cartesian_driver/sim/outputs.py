@@ -3,9 +3,9 @@
 """
 What each RTDE output means in the simulated controller.
 
-Target and actual are one: the arm follows without error, and nothing but its motion is simulated.
-So the outputs that would need dynamics or electricity have fixed, plausible values, and these
-stand in :data:`FIXED`, apart from those that are computed.
+Target and actual are one: the arm follows without error. Its links weigh nothing; only the payload
+does. Outputs that would need more (currents, temperatures, encoders) have fixed, plausible values;
+those that are not zero stand in :data:`FIXED`, apart from those that are computed.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from types import MappingProxyType
 from typing import Any, TYPE_CHECKING
 
 from ur_cartesian_driver.motion.pose import IDENTITY, Vector3, Vector6
+from ur_cartesian_driver.motion.state import RobotMode
+from ur_cartesian_driver.sim.accelerations import dot, flange_point, moments_for, point_motion
 from ur_cartesian_driver.sim.signals import BITS, FLOATS, INTEGERS, pack_bits, Registers
 
 if TYPE_CHECKING:
@@ -25,13 +27,71 @@ Getter = Callable[['Controller'], Any]
 
 _ZERO6: Vector6 = (0.0,) * 6
 _NO_FORCE: Vector6 = (0.0,) * 6
-#: ``joint_mode``: RUNNING and POWER_OFF, numbers of the controller.
-_JOINT_RUNNING, _JOINT_POWER_OFF = 253, 239
+#: ``joint_mode`` and ``tool_mode``; numbers of the controller.
+_RUNNING, _IDLE, _POWER_OFF = 253, 255, 239
+#: Of the supply of the arm [V], and what an arm at rest takes [A].
+_VOLTAGE, _CURRENT = 48.0, 0.5
 
 
 def _elbow(controller: Controller) -> Vector3:
     """Return where the elbow is: the third joint [m]."""
     return controller.arm.frames(controller.motion.q).origins[2]
+
+
+def _elbow_velocity(controller: Controller) -> Vector3:
+    """Return how fast the elbow is [m/s]; the first two joints move it."""
+    motion = controller.motion
+    frames = controller.arm.frames(motion.q)
+    return point_motion(frames, motion.qd, motion.qdd, frames.origins[2], 2).velocity
+
+
+def _tcp_acceleration(controller: Controller) -> Vector6:
+    """Return linear and angular acceleration of the TCP [m/s^2, rad/s^2]."""
+    motion = controller.motion
+    frames = controller.arm.frames(motion.q)
+    tcp = point_motion(frames, motion.qd, motion.qdd,
+                       flange_point(frames, motion.T_flange_tcp.position))
+    return (*tcp.acceleration, *tcp.angular_acceleration)
+
+
+def _accelerometer(controller: Controller) -> Vector3:
+    """Return what a sensor in the flange feels, weight included, in its axes [m/s^2]."""
+    motion = controller.motion
+    frames = controller.arm.frames(motion.q)
+    acceleration = point_motion(frames, motion.qd, motion.qdd, frames.position).acceleration
+    felt = _sum(acceleration, controller.gravity)
+    return dot(felt, frames.x), dot(felt, frames.y), dot(felt, frames.z)
+
+
+def _moments(controller: Controller) -> Vector6:
+    """Return the joint moments that carry and accelerate the payload, a point mass [Nm]."""
+    mass, motion = controller.payload.mass, controller.motion
+    if mass == 0.0 or controller.power.mode is not RobotMode.RUNNING:
+        return _ZERO6
+    frames = controller.arm.frames(motion.q)
+    centre = flange_point(frames, controller.payload.cog)
+    acceleration = point_motion(frames, motion.qd, motion.qdd, centre).acceleration
+    x, y, z = _sum(acceleration, controller.gravity)
+    return moments_for(frames, centre, (mass * x, mass * y, mass * z))
+
+
+def _sum(a: Vector3, b: Vector3) -> Vector3:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def _powered(controller: Controller) -> bool:
+    return controller.power.mode >= RobotMode.POWER_ON
+
+
+def _tool_mode(controller: Controller) -> int:
+    return _RUNNING if _powered(controller) else _POWER_OFF
+
+
+def _joint_mode(controller: Controller) -> int:
+    """Return the mode of each joint: the brakes hold until the arm is RUNNING."""
+    if controller.power.mode is RobotMode.RUNNING:
+        return _RUNNING
+    return _IDLE if _powered(controller) else _POWER_OFF
 
 
 def _tcp(controller: Controller) -> Vector6:
@@ -65,8 +125,17 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType({
     'runtime_state': lambda c: c.programs.state,
     'robot_status_bits': lambda c: c.robot_status,
     'safety_status_bits': lambda c: c.safety_status,
-    'joint_mode': lambda c: (
-        (_JOINT_RUNNING if c.robot_status & 1 else _JOINT_POWER_OFF,) * 6),
+    'joint_mode': lambda c: (_joint_mode(c),) * 6,
+    'tool_mode': _tool_mode,
+    'actual_joint_voltage': lambda c: (_VOLTAGE if _powered(c) else 0.0,) * 6,
+    'actual_robot_voltage': lambda c: _VOLTAGE if _powered(c) else 0.0,
+    'actual_robot_current': lambda c: _CURRENT if _powered(c) else 0.0,
+    'target_moment': _moments,
+    'actual_current_as_torque': _moments,
+    'target_TCP_acceleration': _tcp_acceleration,
+    'actual_TCP_acceleration': _tcp_acceleration,
+    'actual_tool_accelerometer': _accelerometer,
+    'elbow_velocity': _elbow_velocity,
     'actual_momentum': _scaled_momentum,
     'payload': lambda c: c.payload.mass,
     'payload_cog': lambda c: c.payload.cog,
@@ -96,16 +165,8 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType({
 #: Outputs that never change, because nothing behind them is simulated.
 FIXED: Mapping[str, Any] = MappingProxyType({
     'joint_temperatures': (25.0,) * 6,
-    'actual_joint_voltage': (48.0,) * 6,
-    'actual_main_voltage': 48.0,
-    'actual_robot_voltage': 48.0,
-    'actual_robot_current': 0.5,
-    'io_current': 0.0,
+    'actual_main_voltage': _VOLTAGE,
     'tool_temperature': 25.0,
-    'tool_mode': _JOINT_RUNNING,
-    'actual_tool_accelerometer': (0.0, 0.0, 9.82),
-    'actual_execution_time': 0.0,
-    'target_execution_time': 0.0,
 })
 
 

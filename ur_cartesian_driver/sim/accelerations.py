@@ -1,0 +1,103 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How points of the arm move, from the joints' speeds and accelerations.
+
+The controller reports such things (elbow, tool accelerometer, moments) beside the joints, and they
+have to fit the joints. All vectors are in base axes, [m], [rad] and [s].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ur_cartesian_driver.kinematics.chain import Frames
+from ur_cartesian_driver.motion.pose import Vector3, Vector6
+
+_ZERO: Vector3 = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointMotion:
+    """A point that is fixed to a link, and the turning of that link."""
+
+    velocity: Vector3
+    acceleration: Vector3
+    angular_velocity: Vector3
+    angular_acceleration: Vector3
+
+
+def point_motion(frames: Frames, qd: Vector6, qdd: Vector6, point: Vector3,
+                 joints: int = 6) -> PointMotion:
+    """
+    Return how a point moves that is fixed behind the first joints.
+
+    From link to link, as in the outward half of the Newton-Euler recursion (Craig, Introduction
+    to Robotics, section 6.5).
+
+    :param point: where it is [m].
+    :param joints: how many joints lie between the base and the point's link.
+    """
+    omega = alpha = velocity = acceleration = _ZERO
+    here = frames.origins[0]
+    for i in range(joints):
+        axis, origin = frames.axes[i], frames.origins[i]
+        velocity, acceleration = _carried(velocity, acceleration, omega, alpha,
+                                          _minus(origin, here))
+        turning = _times(qd[i], axis)
+        alpha = _plus(alpha, _times(qdd[i], axis), cross(omega, turning))
+        omega = _plus(omega, turning)
+        here = origin
+    velocity, acceleration = _carried(velocity, acceleration, omega, alpha, _minus(point, here))
+    return PointMotion(velocity=velocity, acceleration=acceleration, angular_velocity=omega,
+                       angular_acceleration=alpha)
+
+
+def moments_for(frames: Frames, point: Vector3, force: Vector3) -> Vector6:
+    """
+    Return the joint moments [Nm] that make a force [N] at a point of the last link.
+
+    The principle of virtual work: moment times speed of the joints is force times velocity.
+    """
+    return tuple(  # type: ignore[return-value]
+        dot(axis, cross(_minus(point, origin), force))
+        for origin, axis in zip(frames.origins, frames.axes, strict=True))
+
+
+def flange_point(frames: Frames, offset: Vector3) -> Vector3:
+    """Return where a point is that is given in flange coordinates [m]."""
+    x, y, z = offset
+    return _plus(frames.position, _times(x, frames.x), _times(y, frames.y), _times(z, frames.z))
+
+
+def _carried(velocity: Vector3, acceleration: Vector3, omega: Vector3, alpha: Vector3,
+             arm: Vector3) -> tuple[Vector3, Vector3]:
+    """Return velocity and acceleration of a point of the same link, an arm farther out."""
+    round_ = cross(omega, arm)
+    return (_plus(velocity, round_),
+            _plus(acceleration, cross(alpha, arm), cross(omega, round_)))
+
+
+def dot(a: Vector3, b: Vector3) -> float:
+    """Return the scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector3, b: Vector3) -> Vector3:
+    """Return the vector product."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def _plus(*vectors: Vector3) -> Vector3:
+    x = y = z = 0.0
+    for vector in vectors:
+        x, y, z = x + vector[0], y + vector[1], z + vector[2]
+    return x, y, z
+
+
+def _minus(a: Vector3, b: Vector3) -> Vector3:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+def _times(factor: float, vector: Vector3) -> Vector3:
+    return factor * vector[0], factor * vector[1], factor * vector[2]
