@@ -39,6 +39,8 @@ class Announcements:
         """
         self._now = now
         self.pending: deque[Message] = deque(maxlen=_KEPT)
+        #: Called with code and argument of each error.
+        self.on_error: Callable[[int, int], None] | None = None
         #: What programs wrote and what went wrong, as lines for people.
         self.log: deque[str] = deque(maxlen=_KEPT)
 
@@ -76,6 +78,8 @@ class Announcements:
             text=_cut(text))
         self.log.append(f'{message.label}: {text}')
         self.pending.append(message)
+        if self.on_error is not None:
+            self.on_error(code, argument)
 
     def safety_mode(self, mode: SafetyMode) -> None:
         """Announce that the safety mode has changed."""

@@ -13,7 +13,7 @@ from collections import deque
 from collections.abc import Hashable
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.pose import Vector3, Vector6
+from ur_cartesian_driver.motion.pose import Pose, Vector3, Vector6
 from ur_cartesian_driver.motion.state import (
     RobotMode,
     RobotStatus,
@@ -25,7 +25,7 @@ from ur_cartesian_driver.sim.announcements import Announcements
 from ur_cartesian_driver.sim.builtins import builtins_of
 from ur_cartesian_driver.sim.builtins.motion import HandGuided, Ownership
 from ur_cartesian_driver.sim.config import SimulatorConfig
-from ur_cartesian_driver.sim.controller_state import Payload, Popup
+from ur_cartesian_driver.sim.controller_state import Payload, Popup, Process
 from ur_cartesian_driver.sim.modes import (
     OPERATIONAL,
     Power,
@@ -78,6 +78,9 @@ class Controller:
         self.payload = Payload()
         self.gravity: Vector3 = (0.0, 0.0, 9.82)
         self.hand_guided = HandGuided.NOBODY
+        self.process = Process()
+        #: Where the last move leads to; None after a stream.
+        self.waypoint: Pose | None = None
         self.force_mode = False
         self.external_ft = False
         #: What `tool_contact` returns: steps back to the contact, 0 = none.
@@ -89,6 +92,7 @@ class Controller:
         self._past: deque[Vector6] = deque([config.q] * _HISTORY, maxlen=_HISTORY)
         self.programs = Programs(builtins_of(self), self.announcements, self)
         self.programs.on_end = self.sockets.close_all
+        self.announcements.on_error = self._pause_if_wanted
 
     # What it reports
 
@@ -176,6 +180,11 @@ class Controller:
             self.announcements.error(fault.code, fault.argument, fault.text)
             self.safety_event(SafetyEvent.PROTECTIVE_STOP, reported=True)
 
+    def _pause_if_wanted(self, code: int, argument: int) -> None:
+        """Pause a program that has asked for it by `pause_on_error_code`."""
+        if self.process.pauses_on(code, argument):
+            self.programs.pause()
+
     def _watch_inputs(self) -> None:
         """Act on inputs that an RTDE client has stopped to write."""
         for variable, action in self.watchdogs.expired(self.time):
@@ -197,6 +206,7 @@ class Controller:
         """End what lives only as long as a program."""
         self.hand_guided = HandGuided.NOBODY
         self.force_mode = False
+        self.process = Process()
         self.watchdogs.clear()
 
     def end_of_frame(self) -> None:

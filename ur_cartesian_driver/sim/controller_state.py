@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ur_cartesian_driver.motion.pose import Vector3, Vector6
 
@@ -29,3 +29,34 @@ class Popup:
     error: bool = False
     blocking: bool = False
     open: bool = True
+
+
+@dataclass(slots=True, kw_only=True)
+class PathOffset:
+    """A Cartesian offset on top of the moves, with the limits that a robot begins with."""
+
+    enabled: bool = False
+    #: Frame -> offset [m, rad].
+    offsets: dict[int, Vector6] = field(default_factory=dict)
+    alpha: float = 1.0
+    most_translation: float = 0.1
+    most_rotation: float = 0.52
+
+
+@dataclass(slots=True, kw_only=True)
+class Process:
+    """What a program has set about its process; all of it ends with the program."""
+
+    path_offset: PathOffset = field(default_factory=PathOffset)
+    #: Force [N] and speed limit [m/s] while a screw is driven.
+    screw_driving: tuple[float, float] | None = None
+    #: Name of the axis -> limit [N, Nm].
+    wrench_limits: dict[str, float] = field(default_factory=dict)
+    high_holding_torque: bool = True
+    deviation_threshold: float | None = None
+    #: Codes and arguments (None: any) of errors that pause the program.
+    pause_on: set[tuple[int, int | None]] = field(default_factory=set)
+
+    def pauses_on(self, code: int, argument: int) -> bool:
+        """Tell whether an error is to pause the program."""
+        return bool(self.pause_on & {(code, argument), (code, None)})

@@ -15,6 +15,8 @@ from ur_cartesian_driver.motion.pose import Vector6
 
 BITS, INTEGERS, FLOATS = 128, 48, 48
 STANDARD, CONFIGURABLE, TOOL = 8, 8, 2
+#: Addresses of ports, which Modbus clients of a real robot share with its programs.
+PORTS = 256
 
 
 def pack_bits(bits: list[bool]) -> int:
@@ -63,6 +65,8 @@ class Signals:
     outputs: Registers = field(default_factory=Registers)
     #: ``set_flag`` / ``get_flag``; they survive programs.
     flags: list[bool] = field(default_factory=lambda: [False] * 32)
+    port_bits: list[bool] = field(default_factory=lambda: [False] * PORTS)
+    port_registers: list[int] = field(default_factory=lambda: [0] * PORTS)
 
     def set_analog_out(self, index: int, fraction: float) -> None:
         """Set an analog output to a fraction 0 to 1 of its range: 0-10 V, or 4-20 mA."""

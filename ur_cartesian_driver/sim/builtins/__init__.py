@@ -15,10 +15,16 @@ import inspect
 from typing import Any, TYPE_CHECKING
 
 from ur_cartesian_driver.sim.builtins.arguments import builtins_in
-from ur_cartesian_driver.sim.builtins.io import AnalogBuiltins, DigitalBuiltins, RegisterBuiltins
+from ur_cartesian_driver.sim.builtins.io import (
+    AnalogBuiltins,
+    DigitalBuiltins,
+    PortBuiltins,
+    RegisterBuiltins,
+)
 from ur_cartesian_driver.sim.builtins.kinematics import KinematicsBuiltins
 from ur_cartesian_driver.sim.builtins.motion import ModeBuiltins, MotionBuiltins
 from ur_cartesian_driver.sim.builtins.poses import PoseBuiltins
+from ur_cartesian_driver.sim.builtins.process import PathOffsetBuiltins, ProcessBuiltins
 from ur_cartesian_driver.sim.builtins.sockets import SocketBuiltins
 from ur_cartesian_driver.sim.builtins.state import PeopleBuiltins, RobotBuiltins, TimeBuiltins
 from ur_cartesian_driver.urscript import core_builtins
@@ -35,7 +41,8 @@ def builtins_of(controller: Controller) -> Builtins:
     groups = (
         DigitalBuiltins(controller.signals), AnalogBuiltins(controller.signals),
         RegisterBuiltins(controller.signals), KinematicsBuiltins(controller),
-        ModeBuiltins(controller), MotionBuiltins(controller), PoseBuiltins(),
+        ModeBuiltins(controller), MotionBuiltins(controller), PathOffsetBuiltins(controller),
+        PortBuiltins(controller.signals), PoseBuiltins(), ProcessBuiltins(controller),
         SocketBuiltins(controller.sockets, lambda: controller.time),
         PeopleBuiltins(controller), RobotBuiltins(controller), TimeBuiltins(controller))
     found = dict(core_builtins())

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from ur_cartesian_driver.sim.builtins.arguments import index, number, whole
-from ur_cartesian_driver.sim.signals import BITS, FLOATS, INTEGERS, Signals
+from ur_cartesian_driver.sim.signals import BITS, FLOATS, INTEGERS, PORTS, Signals
 from ur_cartesian_driver.urscript.errors import RuntimeException
 from ur_cartesian_driver.urscript.values import INT_MAX, INT_MIN, truth, Value
 
@@ -134,6 +134,31 @@ class AnalogBuiltins:
             self, enabled: Value, baud_rate: Value, parity: Value, stop_bits: Value,
             rx_idle_chars: Value, tx_idle_chars: Value) -> None:
         """Accept settings of the tool's serial line, which ends nowhere."""
+
+
+class PortBuiltins:
+    """Ports: on a robot Modbus clients see them, here they are memory that survives programs."""
+
+    def __init__(self, signals: Signals) -> None:
+        """Work on these signals."""
+        self._signals = signals
+
+    def read_port_bit(self, address: Value) -> bool:
+        """Read one of 256."""
+        return self._signals.port_bits[index(address, 'address', PORTS)]
+
+    def read_port_register(self, address: Value) -> int:
+        """Read one of 256."""
+        return self._signals.port_registers[index(address, 'address', PORTS)]
+
+    def write_port_bit(self, address: Value, value: Value) -> None:
+        """Write one of 256."""
+        self._signals.port_bits[index(address, 'address', PORTS)] = truth(value)
+
+    def write_port_register(self, address: Value, value: Value) -> None:
+        """Write one of 256, with 16 bits each."""
+        self._signals.port_registers[index(address, 'address', PORTS)] = index(
+            value, 'value', 2**16)
 
 
 class RegisterBuiltins:

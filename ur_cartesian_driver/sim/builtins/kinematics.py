@@ -101,6 +101,12 @@ class KinematicsBuiltins:
         """Return where the TCP should be."""
         return script_pose(self._controller.motion.T_base_tcp)
 
+    def get_target_waypoint(self) -> ScriptPose:
+        """Return where the running move leads to; without one, where the TCP should be."""
+        motion, waypoint = self._controller.motion, self._controller.waypoint
+        return script_pose(
+            waypoint if waypoint is not None and motion.moving else motion.T_base_tcp)
+
     def get_actual_tool_flange_pose(self) -> ScriptPose:
         """Return where the flange is."""
         return script_pose(self._controller.arm.forward(self._controller.motion.q))

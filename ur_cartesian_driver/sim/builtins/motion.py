@@ -28,7 +28,7 @@ from ur_cartesian_driver.sim.builtins.arguments import (
 from ur_cartesian_driver.sim.builtins.kinematics import joints_of, pose_of
 from ur_cartesian_driver.sim.motion import MotionError, MotionGenerator, Move
 from ur_cartesian_driver.urscript.errors import RuntimeException
-from ur_cartesian_driver.urscript.values import truth, Value
+from ur_cartesian_driver.urscript.values import Value
 
 if TYPE_CHECKING:
     from ur_cartesian_driver.sim.controller import Controller
@@ -56,6 +56,8 @@ class Ownership:
         self._motion = motion
         self._owner: Hashable = None
         self._calls = 0
+        self._abortable = 0
+        self._aborting = False
         self._abandoned = False
 
     def take(self, thread: Hashable) -> None:
@@ -69,10 +71,15 @@ class Ownership:
             raise RuntimeException('Another thread is already controlling the robot.')
         self._owner, self._abandoned = thread, False
 
-    def run(self, call: Callable[[], Move]) -> Steps:
+    def abort(self) -> None:
+        """Let the move that runs, if it can be aborted, brake and return."""
+        self._aborting = self._abortable > 0
+
+    def run(self, call: Callable[[], Move], abortable: bool = False) -> Steps:
         """
         Make a call of the motion generator and wait until it may return.
 
+        :param abortable: `abort` makes the call brake at :data:`HARD_STOP` and return.
         :raises RuntimeException: the call makes no sense.
         """
         try:
@@ -80,13 +87,18 @@ class Ownership:
         except MotionError as error:
             raise RuntimeException(str(error)) from None
         self._calls += 1
+        self._abortable += abortable
         finished = False
         try:
             while not move.returned:
+                if self._aborting and abortable:
+                    self._aborting = False
+                    move = self._motion.stopj(HARD_STOP)
                 yield
             finished = True
         finally:
             self._calls -= 1
+            self._abortable -= abortable
             self._abandoned = self._abandoned or not finished
 
     def release(self, thread: Hashable) -> None:
@@ -115,11 +127,13 @@ class MotionBuiltins:
         self._motion = controller.motion
         self._ownership = controller.ownership
 
-    def _take(self) -> None:
+    def _take(self, waypoint: Pose | None = None) -> None:
+        """Own the motion, which leads to a waypoint unless it is a stream."""
         guided = self._controller.hand_guided
         if guided is not HandGuided.NOBODY:
             raise RuntimeException(f'The robot cannot move: it is in {guided.value}.')
         self._ownership.take(self._controller.programs.current_thread)
+        self._controller.waypoint = waypoint
 
     def _joints(self, q: Value, function: str) -> Vector6:
         return joints_of(self._controller, q, function)
@@ -133,9 +147,9 @@ class MotionBuiltins:
         limits = _limits(a, v, t)
         radius = not_negative(r, 'r')
         target = self._joints(q, 'movej')
-        self._take()
+        self._take(self._pose(list(target)))
         yield from self._ownership.run(
-            lambda: self._motion.movej(target, *limits, radius))
+            lambda: self._motion.movej(target, *limits, radius), abortable=True)
 
     def movel(self, pose: Value, a: Value = 1.2, v: Value = 0.25, t: Value = 0, r: Value = 0
               ) -> Steps:
@@ -143,16 +157,16 @@ class MotionBuiltins:
         limits = _limits(a, v, t)
         radius = not_negative(r, 'r')
         target = self._pose(pose)
-        self._take()
+        self._take(target)
         yield from self._ownership.run(
-            lambda: self._motion.movel(target, *limits, radius))
+            lambda: self._motion.movel(target, *limits, radius), abortable=True)
 
     def movep(self, pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Steps:
         """Move straight at constant speed, corners rounded by arcs."""
         a_, v_, _ = _limits(a, v, 0)
         radius = not_negative(r, 'r')
         target = self._pose(pose)
-        self._take()
+        self._take(target)
         yield from self._ownership.run(
             lambda: self._motion.movep(target, a_, v_, radius))
 
@@ -164,7 +178,7 @@ class MotionBuiltins:
         if mode_ not in (0, 1):
             raise RuntimeException(f'mode is {mode_}; it must be 0 or 1')
         via, to = self._pose(pose_via, 'pose_via'), self._pose(pose_to, 'pose_to')
-        self._take()
+        self._take(to)
         yield from self._ownership.run(
             lambda: self._motion.movec(via, to, a_, v_, radius, mode_))
 
@@ -172,7 +186,7 @@ class MotionBuiltins:
         """Move in joint space with limited jerk, at fractions of what the joints can do."""
         a_, v_, radius = _fraction(a, 'a'), _fraction(v, 'v'), not_negative(r, 'r')
         target = self._joints(goal, 'optimovej')
-        self._take()
+        self._take(self._pose(list(target)))
         yield from self._ownership.run(
             lambda: self._motion.optimovej(target, a_, v_, radius))
 
@@ -180,7 +194,7 @@ class MotionBuiltins:
         """Move straight in space with limited jerk, at fractions of what the joints can do."""
         a_, v_, radius = _fraction(a, 'a'), _fraction(v, 'v'), not_negative(r, 'r')
         target = self._pose(goal, 'goal')
-        self._take()
+        self._take(target)
         yield from self._ownership.run(
             lambda: self._motion.optimovel(target, a_, v_, radius))
 
@@ -289,11 +303,6 @@ class ModeBuiltins:
         if direction is not None:
             six(direction, 'direction')
         return self._controller.contact_steps
-
-    def position_deviation_warning(self, enabled: Value, threshold: Value = 0.8) -> None:
-        """Accept; target and actual position are one here."""
-        truth(enabled)
-        number(threshold, 'threshold')
 
 
 def _limits(a: Value, v: Value, t: Value) -> tuple[float, float, float]:

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
+from math import isinf, pi
 from typing import TYPE_CHECKING
 
 from ur_cartesian_driver.sim.builtins.arguments import (
@@ -200,6 +201,22 @@ class RobotBuiltins:
     def set_pos(self, q: Value) -> None:
         """Put the arm somewhere, which only a simulated one can do."""
         self._controller.teleport(six(q, 'q'))
+
+    def reset_revolution_counter(self, qNear: Value = None) -> None:
+        """
+        Count the turns of joints without limits anew.
+
+        :param qNear: the count becomes the one nearest to these joints; left out, nothing changes.
+        """
+        if qNear is None:
+            return
+        near, limits = six(qNear, 'qNear'), self._controller.arm.model.position_limits
+        turn = 2.0 * pi
+        counted = [
+            q + turn * round((close - q) / turn) if isinf(high - low) else q
+            for q, close, (low, high) in zip(self._motion.q, near, limits, strict=True)]
+        if counted != list(self._motion.q):
+            self._controller.teleport(six(counted, 'q'))
 
     def set_speed_slider_fraction(self, fraction: Value) -> None:
         """Set the speed slider."""
