@@ -285,6 +285,32 @@ def test_inputs_of_another_client_are_named_and_free_again_after_its_end():
     assert not first.server.streaming
 
 
+def test_a_client_may_write_an_input_through_several_recipes_but_two_clients_may_not():
+    taken = set()
+    one, two = RtdeServer(VERSION, taken), RtdeServer(VERSION, taken)
+    both = ('input_int_register_1', 'input_int_register_2')
+    for names in (both[:1], both):
+        one.feed(SetupInputs(names=names).encode())
+    two.feed(SetupInputs(names=both).encode())
+    replies = [decode_reply(f) for f in RtdeFrameBuffer().feed(
+        one.data_to_send() + two.data_to_send())]
+    assert [(reply.recipe_id, reply.types) for reply in replies] == [
+        (1, ('INT32',)), (2, ('INT32', 'INT32')), (0, ('IN_USE', 'IN_USE'))]
+    (event,) = one.feed(struct.pack('>HBBii', 12, ord('U'), 2, 5, 6))
+    assert event.recipe.named(event.values) == dict(zip(both, (5, 6), strict=True))
+    one.close()
+    assert not taken
+
+
+def test_a_list_of_names_may_end_with_a_comma_as_some_clients_write_it():
+    controller = server()
+    for kind, head, names in ((b'O', struct.pack('>d', 125.0), b'timestamp,actual_q,'),
+                              (b'I', b'', b'input_int_register_1,')):
+        controller.feed(struct.pack('>H', 3 + len(head + names)) + kind + head + names)
+    replies = [decode_reply(f) for f in RtdeFrameBuffer().feed(controller.data_to_send())]
+    assert [reply.types for reply in replies] == [('DOUBLE', 'VECTOR6D'), ('INT32',)]
+
+
 def test_an_old_controller_is_asked_for_125_hz():
     old = ControllerVersion(major=3, minor=15, bugfix=8)
     assert Link(RtdeClient(['timestamp']), version=old).events[0].frequency == 125.0

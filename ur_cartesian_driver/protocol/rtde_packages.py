@@ -479,7 +479,9 @@ def _open(data: bytes) -> tuple[PackageType, bytes]:
 
 
 def _split(payload: bytes) -> tuple[str, ...]:
-    return tuple(decode_text(payload).split(',')) if payload else ()
+    """Return the items of a list; clients in use (ur_rtde) end it with a comma."""
+    items = decode_text(payload).removesuffix(',')
+    return tuple(items.split(',')) if items else ()
 
 
 def _sized(data: bytes, payload: bytes, size: int) -> bytes:

@@ -13,8 +13,9 @@ data packages are sent is up to its owner, who knows the time::
 * A client may agree on several output recipes; each has its own id and frequency. In version 1 it
   has one, without an id.
 * An unknown field makes the whole recipe invalid: types with ``NOT_FOUND``, id 0, nothing agreed.
-* An input belongs to one recipe of one client: everybody else is told ``IN_USE``. The set of taken
-  names is shared by all connections; ``close()`` gives ours back.
+* An input belongs to one client: everybody else is told ``IN_USE``. The client itself may have it
+  in several recipes, one for each kind of command it sends. The set of taken names is shared by
+  all connections; ``close()`` gives ours back.
 """
 
 from __future__ import annotations
@@ -173,10 +174,11 @@ class RtdeServer:
 
     def _set_up_inputs(self, request: SetupInputs) -> InputsReply:
         texts = []
+        ours = {name for recipe in self._inputs for name in recipe.names}
         for name in request.names:
             data_type = self._input_types.get(name)
             texts.append(NOT_FOUND if data_type is None
-                         else IN_USE if name in self._taken else data_type.name)
+                         else IN_USE if name in self._taken - ours else data_type.name)
         recipe_id = 0
         if texts and NOT_FOUND not in texts and IN_USE not in texts:
             _check_number(self._inputs)
