@@ -131,6 +131,17 @@ def test_speed_scaling_slows_speedj_and_lengthens_its_time(recorder):
     assert r.generator.q == pytest.approx(full.generator.q, abs=1e-9)
 
 
+@pytest.mark.parametrize('function', ['speedj', 'speedl'])
+def test_the_same_speed_asked_for_again_and_again_is_kept(recorder, function):
+    r = recorder()
+    target = (0.05, 0.0, 0.0, 0.0, 0.0, 0.0)
+    r.run(getattr(r.generator, function)(target, 0.5))
+    for _ in range(5):
+        assert r.run(getattr(r.generator, function)(target, 0.5)) == 1
+        speed = r.generator.qd if function == 'speedj' else r.generator.tcp_twist
+        assert speed == pytest.approx(target, abs=1e-9)
+
+
 def test_speedl_moves_the_tool_straight_and_turns_it(recorder):
     r = recorder()
     start = r.generator.T_base_tcp

@@ -64,8 +64,8 @@ class JointSpeed:
     @property
     def over(self) -> bool:
         """Whether the call may return."""
-        if self.duration is None:
-            return self.qd == self.target
+        if self.duration is None:  # at the speed already: hold it for a cycle, as any call does
+            return self.elapsed > 0.0 and self.qd == self.target
         return self.elapsed >= self.duration - _ROUNDING
 
 
@@ -168,8 +168,8 @@ class ToolSpeed:
     @property
     def over(self) -> bool:
         """Whether the call may return."""
-        if self.duration is None:
-            return self.twist == self.target
+        if self.duration is None:  # at the speed already: hold it for a cycle, as any call does
+            return self.elapsed > 0.0 and self.twist == self.target
         return self.elapsed >= self.duration - _ROUNDING
 
 
