@@ -208,6 +208,10 @@ class MotionBuiltins:
         yield from self._ownership.run(
             lambda: self._motion.servoj(target, *settings))
 
+    def servoc(self, pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Steps:
+        """Move as by `movep`: what else the manual's "servo circular" does is not published."""
+        yield from self.movep(pose, a, v, r)
+
     def speedj(self, qd: Value, a: Value, t: Value = None) -> Steps:
         """Go to joint speeds; return after a time, or when they are reached."""
         target, acceleration, time = six(qd, 'qd'), positive(a, 'a'), _duration(t)
@@ -266,6 +270,10 @@ class ModeBuiltins:
     def end_freedrive_mode(self) -> None:
         """End it; harmless when there is none."""
         self._controller.hand_guided = HandGuided.NOBODY
+
+    def get_freedrive_status(self) -> int:
+        """Return 0, which is normal operation: no hand ever pushes the arm near a singularity."""
+        return 0
 
     def teach_mode(self) -> None:
         """Let the arm be moved by hand."""

@@ -194,6 +194,10 @@ class RobotBuiltins:
         """Return the centre of gravity [m]."""
         return list(self._controller.payload.cog)
 
+    def get_target_payload_inertia(self) -> list[float]:
+        """Return the inertia [kg m^2]: Ixx, Iyy, Izz, Ixy, Ixz, Iyz."""
+        return list(self._controller.payload.inertia)
+
     def set_gravity(self, d: Value) -> None:
         """Set the direction away from the earth [m/s^2]."""
         self._controller.gravity = three(d, 'd')
