@@ -99,7 +99,9 @@ def cartesian_driver(request: pytest.FixtureRequest, private_ros_graph: int,
         'robot_loop': 'thread', 'rtde_port': ur_sim.ports.rtde,
         'primary_port': ur_sim.ports.primary, 'dashboard_port': ur_sim.ports.dashboard,
         'reverse_port': 0, 'script_sender_port': 0, 'trajectory_port': 0,
-        'script_command_port': 0} | _marked(request, 'cartesian_driver')
+        'script_command_port': 0,
+        # Robot, driver and test share one interpreter, which can be busy for longer than 0.2 s.
+        'robot_receive_timeout': 1.0} | _marked(request, 'cartesian_driver')
     started_here = not get_default_context().ok()
     if started_here:
         rclpy.init()

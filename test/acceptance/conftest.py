@@ -117,7 +117,9 @@ class DriverFactory:
             'rtde_port': self._robot.ports.rtde, 'primary_port': self._robot.ports.primary,
             'dashboard_port': self._robot.ports.dashboard, 'reverse_port': 0,
             'script_sender_port': 0, 'trajectory_port': 0, 'script_command_port': 0,
-            'robot_loop': 'thread'}
+            'robot_loop': 'thread',
+            # Robot, driver and test share one interpreter, and two cores with other tests.
+            'robot_receive_timeout': 1.0}
         driver = Driver(DriverConfig(**config | settings),
                         PlanningOptions(**{'max_tool_speed': 1.0} | (options or {})))
         self._drivers.append(driver)

@@ -235,7 +235,8 @@ def test_the_arm_stops_when_the_owner_falls_silent(ur_sim, make_driver, home, lo
     silent = Driver(DriverConfig(
         robot_loop='thread', headless_mode=True, node_timeout=0.5, reverse_port=0,
         trajectory_port=0, script_command_port=0, script_sender_port=0,
-        rtde_port=ur_sim.ports.rtde, primary_port=ur_sim.ports.primary), auto_heartbeat=False)
+        rtde_port=ur_sim.ports.rtde, primary_port=ur_sim.ports.primary,
+        robot_receive_timeout=1.0), auto_heartbeat=False)
     with silent:
         silent.wait_ready(5.0)
         motion = silent.start(silent.plan(long_goal))

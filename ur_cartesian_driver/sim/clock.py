@@ -18,8 +18,10 @@ from typing import Protocol
 #: The event loop wakes up to this much late [s] (epoll counts in milliseconds), so it is asked to
 #: wake this much early, and the rest is slept.
 _LOOP_GRAIN = 0.001
-#: Behind by more than this [s] (a suspended process), the clock starts anew instead of racing.
-_GIVE_UP = 0.5
+#: Behind by more than this [s] (a suspended process, a starved machine), the clock starts anew
+#: instead of racing: programs count their timeouts in cycles, commonly 0.2 s, and in a race of
+#: cycles nobody could answer them in time.
+_GIVE_UP = 0.1
 _KEPT = 20_000
 
 
