@@ -81,7 +81,7 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
                      help='software version, such as 5.21; empty = the newest for the model')
     for name, port in (('rtde', 30004), ('primary', 30001), ('dashboard', 29999)):
         sim.add_argument(f'--{name}-port', type=int, default=port, help='0 = any free port')
-    for name, port in (('secondary', 30002), ('realtime', 30003)):
+    for name, port in (('secondary', 30002), ('realtime', 30003), ('interpreter', 30020)):
         sim.add_argument(
             f'--{name}-port', type=int, default=None,
             help=f'0 = any free port; left out: {port} if the primary port is 30001, else any')

@@ -36,7 +36,8 @@ def sim(arguments: argparse.Namespace) -> int:
         model=arguments.model, host=arguments.host, polyscope=arguments.polyscope,
         rtde_port=arguments.rtde_port, primary_port=arguments.primary_port,
         dashboard_port=arguments.dashboard_port, secondary_port=arguments.secondary_port,
-        realtime_port=arguments.realtime_port, power='off' if arguments.power_off else 'running',
+        realtime_port=arguments.realtime_port, interpreter_port=arguments.interpreter_port,
+        power='off' if arguments.power_off else 'running',
         remote_control=not arguments.local,
         **({'q': arguments.joints} if arguments.joints else {}))
     robot = SimulatedRobot(config)
@@ -57,7 +58,8 @@ def _show_ports(robot: SimulatedRobot) -> None:
     ports = robot.ports
     print(f'simulated {robot.config.model} on {robot.config.host}: RTDE {ports.rtde}, '
           f'primary {ports.primary}, dashboard {ports.dashboard}, '
-          f'secondary {ports.secondary}, real-time {ports.realtime}', flush=True)
+          f'secondary {ports.secondary}, real-time {ports.realtime}, '
+          f'interpreter {ports.interpreter}', flush=True)
 
 
 async def _show_status(robot: SimulatedRobot) -> None:

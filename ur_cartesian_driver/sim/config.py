@@ -41,6 +41,8 @@ class SimulatorConfig:
     #: who gives the robot a port of his own is not alone on this computer.
     secondary_port: int | None = None
     realtime_port: int | None = None
+    #: Statements for programs in interpreter mode; None = 30020 or any free one, as above.
+    interpreter_port: int | None = None
     #: Joint positions at start [rad].
     q: Vector6 = HOME
     power: Literal['running', 'off'] = 'running'
@@ -71,7 +73,7 @@ class SimulatorConfig:
         if self.rate < 0.0:
             raise ValueError(f'rate is {self.rate}; use 1 for real time, 0 for no waiting.')
         for name in ('rtde_port', 'primary_port', 'dashboard_port', 'secondary_port',
-                     'realtime_port'):
+                     'realtime_port', 'interpreter_port'):
             port = getattr(self, name)
             if port is not None and not 0 <= port <= 65535:
                 raise ValueError(f'{name} is {port}; use 0 (any free one) to 65535.')
@@ -110,6 +112,11 @@ class SimulatorConfig:
     def listening_realtime_port(self) -> int:
         """Return the port for the real-time interface; 0 = any free one."""
         return self._beside_primary(self.realtime_port, 2)
+
+    @property
+    def listening_interpreter_port(self) -> int:
+        """Return the port for statements in interpreter mode; 0 = any free one."""
+        return self._beside_primary(self.interpreter_port, 19)
 
     def _beside_primary(self, chosen: int | None, distance: int) -> int:
         if chosen is not None:

@@ -26,6 +26,7 @@ from ur_cartesian_driver.sim.builtins import builtins_of
 from ur_cartesian_driver.sim.builtins.motion import HandGuided, Ownership
 from ur_cartesian_driver.sim.config import SimulatorConfig
 from ur_cartesian_driver.sim.controller_state import Payload, Popup, Process
+from ur_cartesian_driver.sim.interpreter import Interpreter
 from ur_cartesian_driver.sim.modes import (
     OPERATIONAL,
     Power,
@@ -90,7 +91,8 @@ class Controller:
         self.slider = 1.0
         self.scale = 1.0
         self._past: deque[Vector6] = deque([config.q] * _HISTORY, maxlen=_HISTORY)
-        self.programs = Programs(builtins_of(self), self.announcements, self)
+        self.programs: Programs = Programs(builtins_of(self), self.announcements, self)
+        self.interpreter = Interpreter(self.programs, self.ownership)
         self.programs.on_end = self.sockets.close_all
         self.announcements.on_error = self._pause_if_wanted
 
@@ -207,6 +209,7 @@ class Controller:
         self.hand_guided = HandGuided.NOBODY
         self.force_mode = False
         self.process = Process()
+        self.interpreter.end_of_program()
         self.watchdogs.clear()
 
     def end_of_frame(self) -> None:

@@ -86,6 +86,11 @@ class Programs:
         return None if machine is None else (id(machine), machine.current_thread)
 
     @property
+    def machine(self) -> Machine | None:
+        """The machine of the primary program, if its functions are being executed."""
+        return self._machine if self._stepping is self._machine else None
+
+    @property
     def running(self) -> bool:
         """Whether there is a program that has not ended; it may be paused."""
         return self.state in RUNNING

@@ -24,6 +24,7 @@ from ur_cartesian_driver.sim.clock import Clock, Lateness, RealClock, VirtualClo
 from ur_cartesian_driver.sim.config import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.dashboard_session import DashboardSession
+from ur_cartesian_driver.sim.interpreter_session import InterpreterSession
 from ur_cartesian_driver.sim.modes import SafetyEvent
 from ur_cartesian_driver.sim.primary_session import PrimarySession, ScriptSession
 from ur_cartesian_driver.sim.primary_states import PrimaryStream
@@ -46,6 +47,7 @@ class Ports:
     dashboard: int
     secondary: int
     realtime: int
+    interpreter: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,8 +93,10 @@ class SimulatedRobot:
         self._secondary = TcpServer('secondary', lambda: PrimarySession(self.controller))
         self._realtime = TcpServer('real-time', lambda: ScriptSession(self.controller))
         self._dashboard = TcpServer('dashboard', lambda: DashboardSession(self.controller))
+        self._interpreter = TcpServer('interpreter', lambda: InterpreterSession(self.controller))
         self._servers: tuple[TcpServer[Any], ...] = (
-            self._rtde, self._primary, self._secondary, self._realtime, self._dashboard)
+            self._rtde, self._primary, self._secondary, self._realtime, self._dashboard,
+            self._interpreter)
         self._clock: Clock = (RealClock(self.config.cycle, self.config.rate)
                               if self.config.rate > 0.0 else VirtualClock())
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -181,9 +185,11 @@ class SimulatedRobot:
         await self._dashboard.listen(host, config.dashboard_port)
         await self._secondary.listen(host, config.listening_secondary_port)
         await self._realtime.listen(host, config.listening_realtime_port)
+        await self._interpreter.listen(host, config.listening_interpreter_port)
         self._ports = Ports(rtde=self._rtde.port, primary=self._primary.port,
                             dashboard=self._dashboard.port, secondary=self._secondary.port,
-                            realtime=self._realtime.port)
+                            realtime=self._realtime.port,
+                            interpreter=self._interpreter.port)
 
     async def _cycles(self) -> None:
         stream, realtime = PrimaryStream(self.controller), RealtimeStream(self.controller)
@@ -193,6 +199,8 @@ class SimulatedRobot:
             for session, connection in self._rtde.sessions:
                 for package in session.packages():
                     connection.write(package)
+            for client, line in self._interpreter.sessions:
+                line.write(client.answers())
             for message in stream.messages():
                 self._primary.broadcast(message)
             if stream.is_due and (self._primary.connections or self._secondary.connections):

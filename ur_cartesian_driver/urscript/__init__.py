@@ -12,6 +12,7 @@ a robot are builtins, given by whoever runs it; `builtins` holds those that need
 from ur_cartesian_driver.urscript.builtins import core_builtins
 from ur_cartesian_driver.urscript.errors import CompileError, RuntimeException
 from ur_cartesian_driver.urscript.interpreter import Machine
+from ur_cartesian_driver.urscript.lines import Line
 from ur_cartesian_driver.urscript.parser import parse
 from ur_cartesian_driver.urscript.scopes import Builtin
 from ur_cartesian_driver.urscript.syntax import Program
@@ -28,6 +29,7 @@ from ur_cartesian_driver.urscript.values import (
 __all__ = [
     'Builtin',
     'CompileError',
+    'Line',
     'Machine',
     'Matrix',
     'Pose',

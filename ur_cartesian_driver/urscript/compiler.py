@@ -32,13 +32,19 @@ from ur_cartesian_driver.urscript.scopes import Builtin, FIRST_LOCAL, Scope
 from ur_cartesian_driver.urscript.values import Value
 
 
-def compile_program(root: Scope, builtins: Mapping[str, Builtin], runtime: Runtime) -> Procedure:
-    """Compile a checked program; the result is the body of its main thread."""
-    procedures = {id(scope): _procedure(scope) for scope in root.walk()}
+def compile_program(root: Scope, builtins: Mapping[str, Builtin], runtime: Runtime,
+                    procedures: dict[int, Procedure]) -> Procedure:
+    """
+    Compile a checked program; the result is the body of its main thread.
+
+    :param procedures: the functions that exist already, by the identity of their scopes; those of
+        the program are added.
+    """
+    procedures |= {id(scope): _procedure(scope) for scope in root.walk()}
     for scope in root.walk():
         compiler = _Compiler(scope, builtins, runtime, procedures)
         compiler.fill(procedures[id(scope)])
-    return procedures[id(root)]
+    return procedures.pop(id(root))
 
 
 def _procedure(scope: Scope) -> Procedure:

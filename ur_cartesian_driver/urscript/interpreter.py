@@ -24,6 +24,7 @@ from ur_cartesian_driver.urscript import syntax as tree
 from ur_cartesian_driver.urscript.closures import Procedure, ProgramHalted, Steps, too_deep, UNSET
 from ur_cartesian_driver.urscript.compiler import compile_program
 from ur_cartesian_driver.urscript.errors import CompileError, RuntimeException
+from ur_cartesian_driver.urscript.lines import Lines
 from ur_cartesian_driver.urscript.scopes import Builtin, resolve
 from ur_cartesian_driver.urscript.values import ThreadHandle, Value
 
@@ -90,13 +91,17 @@ class Machine:
             scope = resolve(program, builtins)
             self._global_names = scope.globals
             self.globals: list[Any] = [UNSET] * len(scope.globals)
-            main = compile_program(scope, builtins, self)
+            procedures: dict[int, Procedure] = {}
+            main = compile_program(scope, builtins, self, procedures)
         except RecursionError:
             text = f'syntax_error_on_line:{program.line}:{program.name}:'
             reason = 'the program is nested too deeply'
             raise CompileError(program.line, program.column, text, reason) from None
         self._threads = [_Thread(0, main.steps(), None)]
-        self._numbers = 1
+        #: How many threads there have been; the next one gets this number.
+        self.threads_started = 1
+        #: Compiles lines that the program is given while it runs.
+        self.lines = Lines(scope, procedures, builtins, self)
 
     @property
     def running(self) -> bool:
@@ -202,8 +207,8 @@ class Machine:
         """Start a thread; it runs in this frame, after all that were started before."""
         if self._is_secondary:
             raise RuntimeException('A secondary program cannot start threads.')
-        thread = _Thread(self._numbers, procedure.steps(), self.thread)
-        self._numbers += 1
+        thread = _Thread(self.threads_started, procedure.steps(), self.thread)
+        self.threads_started += 1
         self._threads.append(thread)
         return ThreadHandle(thread.number)
 
@@ -222,6 +227,12 @@ class Machine:
                 self._end(thread)
         if self._current in doomed:
             raise _ThreadKilled
+
+    def kill_since(self, number: int) -> None:
+        """End the threads that the current one has started from a number on, with theirs."""
+        for thread in tuple(self._threads):
+            if thread.parent is self._current and thread.number >= number:
+                self.kill(ThreadHandle(thread.number))
 
     def _find(self, handle: Value) -> _Thread | None:
         if type(handle) is not ThreadHandle:

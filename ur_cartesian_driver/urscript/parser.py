@@ -65,6 +65,19 @@ def parse(text: str) -> tree.Program:
         raise parser.error('the program is nested too deeply') from None
 
 
+def parse_line(text: str) -> tree.Program:
+    """
+    Parse statements that belong to a program that runs already, as if they were one.
+
+    :raises CompileError: at the first token that fits no rule.
+    """
+    parser = Parser(text)
+    try:
+        return parser.line()
+    except RecursionError:
+        raise parser.error('the statement is nested too deeply') from None
+
+
 class Parser(ExpressionParser):
     """Reads programs and statements."""
 
@@ -93,6 +106,14 @@ class Parser(ExpressionParser):
         if self._token.kind is not Kind.END:
             raise self.error('there is text after the end of the program')
         return tree.Program(name=name, kind=kind, body=body, **place(start))
+
+    def line(self) -> tree.Program:
+        """Read { statement }, up to the end of the text."""
+        start = self._token
+        statements: list[tree.Statement] = []
+        while self._token.kind is not Kind.END:
+            statements.append(self._statement())
+        return tree.Program(name='line', kind='def', body=tuple(statements), **place(start))
 
     def _block(self, *closing: str) -> tree.Block:
         """Read { statement }, up to one of the keywords that close it."""

@@ -69,13 +69,15 @@ class Scope:
             yield from inner.walk()
 
 
-def resolve(program: tree.Program, builtins: Mapping[str, Builtin]) -> Scope:
+def resolve(program: tree.Program, builtins: Mapping[str, Builtin], around: Scope | None = None
+            ) -> Scope:
     """
     Check a program and return the scope of its body.
 
+    :param around: of a program that this one is a later part of; it stays as it is.
     :raises CompileError: an unknown name or a call that does not fit, the first in the text.
     """
-    root = Scope(parent=None, owner=program, globals={})
+    root = Scope(parent=around, owner=program, globals=dict(around.globals) if around else {})
     _declare(root)
     for scope in root.walk():
         _assign_locals(scope)

@@ -57,9 +57,17 @@ class TimeBuiltins:
 
     def interpreter_mode(self, clearQueueOnEnter: Value = True, clearOnEnd: Value = True
                          ) -> Steps:
-        """Wait until the program ends; the port that takes lines is not there."""
-        while True:
-            yield
+        """Execute what the clients of the interpreter port send, until it is ended."""
+        yield from self._controller.interpreter.run(
+            clear_queue=truth(clearQueueOnEnter), clear_on_end=truth(clearOnEnd))
+
+    def end_interpreter(self) -> None:
+        """End the interpreter mode after the statement that is being executed."""
+        self._controller.interpreter.end()
+
+    def clear_interpreter(self) -> None:
+        """Forget what statements have made after the one that is being executed."""
+        self._controller.interpreter.clear()
 
     def rtde_set_watchdog(self, variable_name: Value, min_frequency: Value,
                           action: Value = 'pause') -> None:

@@ -1,0 +1,40 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One client of the interpreter port: statements in, a line for each out, in time."""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.protocol.framing import LineBuffer
+from ur_cartesian_driver.sim.controller import Controller
+
+#: A whole function may stand on one line [bytes].
+_LONGEST = 1024 * 1024
+
+
+class InterpreterSession:
+    """A :class:`~.server.Session` whose answers can come later than what they answer."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Wait for statements."""
+        self._interpreter = controller.interpreter
+        self._lines = LineBuffer(_LONGEST)
+        self._answers: list[str] = []
+
+    def open(self) -> bytes:
+        """Say nothing."""
+        return b''
+
+    def close(self) -> None:
+        """Hold nothing: statements that were sent are executed all the same."""
+
+    def feed(self, data: bytes) -> bytes:
+        """Hand over each line, return what can be answered at once."""
+        for line in self._lines.feed(data):
+            self._interpreter.receive(line, self._answers.append)
+        return self.answers()
+
+    def answers(self) -> bytes:
+        """Return the answers that have come up since the last time."""
+        text = ''.join(f'{answer}\n' for answer in self._answers)
+        self._answers.clear()
+        return text.encode()
