@@ -209,8 +209,17 @@ class MotionBuiltins:
             lambda: self._motion.servoj(target, *settings))
 
     def servoc(self, pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Steps:
-        """Move as by `movep`: what else the manual's "servo circular" does is not published."""
-        yield from self.movep(pose, a, v, r)
+        """
+        Move as by `movep`: what else the manual's "servo circular" does is not published.
+
+        It takes a cycle also at its target: programs call it in a loop with nothing else.
+        """
+        passed = False
+        for _ in self.movep(pose, a, v, r):
+            passed = True
+            yield
+        if not passed:
+            yield
 
     def speedj(self, qd: Value, a: Value, t: Value = None) -> Steps:
         """Go to joint speeds; return after a time, or when they are reached."""
