@@ -13,8 +13,9 @@ from ur_cartesian_driver.sim.motion.moves import MotionError, Move
 from ur_cartesian_driver.sim.motion.paths import Leg
 from ur_cartesian_driver.sim.motion.track import Law
 
-#: Error codes of waypoints that were skipped, by the kind of move: C171 and its argument.
+#: Arguments of C171: of waypoints that were skipped, and of blends that are none, by the move.
 SKIPPED = {'movej': 4, 'optimovej': 4, 'movel': 11, 'optimovel': 11, 'movec': 0, 'movep': 9}
+TOO_SMALL = {'movec': 1, 'movep': 10}
 
 
 class Start(NamedTuple):

@@ -7,10 +7,10 @@ A call (``movel`` ...) says what to do and returns a :class:`Move` at once; ``st
 of it. The caller polls ``Move.returned`` and may make its next call in the same frame, then the
 motion goes on without an idle cycle.
 
-Time is dilated, never the path: by the speed scaling that comes in, and where a joint would be
-faster than it can or closer to its limit than it can brake for. Tool motions are solved by inverse
-kinematics each cycle, from the solution before; where there is none the arm creeps up to the place
-and stops there with a fault.
+Time is dilated, never the path: by the speed scaling that comes in, where a joint would be faster
+than it can or closer to its limit than it can brake for, and where the tool would be too fast.
+Tool motions are solved by inverse kinematics each cycle, from the solution before; where there is
+none the arm creeps up to the place and stops there with a fault.
 """
 
 from __future__ import annotations
@@ -32,13 +32,15 @@ from ur_cartesian_driver.sim.motion.calls import (
     constant_speed,
     SKIPPED,
     Start,
+    TOO_SMALL,
 )
 from ur_cartesian_driver.sim.motion.moves import MotionError, MotionFault, MotionWarning, Move
-from ur_cartesian_driver.sim.motion.paths import Arc, JointLine, Leg, Line, Place
+from ur_cartesian_driver.sim.motion.paths import Arc, Fillet, JointLine, Leg, Line, Place
 from ur_cartesian_driver.sim.motion.reach import (
     is_singular,
     lead,
     MAX_JOINT_ACCELERATION,
+    MAX_TOOL_SPEED,
     NO_CHANGE,
     rate_of,
     Reach,
@@ -81,7 +83,7 @@ class MotionGenerator:
     of positions, so that they always fit these.
 
     ``warnings`` collects what the controller has to report; it takes them out. After a ``fault``
-    the arm stands until ``clear_fault``.
+    the arm stands until ``clear_fault``. ``max_tool_speed`` [m/s] is kept by all motion but stops.
 
     :param cycle: [s].
     :param q: where the arm stands [rad].
@@ -93,6 +95,7 @@ class MotionGenerator:
         self.cycle = cycle
         self.fault: MotionFault | None = None
         self.warnings: list[MotionWarning] = []
+        self.max_tool_speed = MAX_TOOL_SPEED
         self._T_flange_tcp = self._used_tcp = self._T_tcp_flange = IDENTITY
         self._reach = Reach(arm, cycle)
         #: The scaling that came in, and the one of the last cycle, joint limits included.
@@ -106,6 +109,8 @@ class MotionGenerator:
         self._then: Call | None = None
         #: Whether the last leg is a movep's.
         self._circular = False
+        #: The movep that has been found to be too fast.
+        self._too_fast: Move | None = None
         #: What was before a waypoint that may be skipped.
         self._overlapping: tuple[Track | None, bool, str] | None = None
         self.teleport(q)
@@ -150,8 +155,9 @@ class MotionGenerator:
         The speed holds until the fillet: if no other motion follows, the arm brakes within it,
         harder than ``a`` where it has to.
         """
+        radius = self._drivable('movep', r, v)
         return self._follow('movep', lambda start: Line(start.pose, T_base_tcp),
-                            constant_speed(a, v, r), r)
+                            constant_speed(a, v, radius), radius)
 
     def movec(self, via: Pose, to: Pose, a: float = 1.2, v: float = 0.25, r: float = 0.0,
               mode: int = 0) -> Move:
@@ -161,7 +167,7 @@ class MotionGenerator:
         :raises MotionError: the three points do not lie on a circle.
         """
         return self._follow('movec', lambda start: Arc(start.pose, via.position, to, mode == 1),
-                            Law(acceleration=a, speed=v), r)
+                            Law(acceleration=a, speed=v), self._drivable('movec', r, v))
 
     def optimovej(self, q: Vector6, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
         """Like movej with limited jerk; a, v fractions in (0, 1] of what the joints can do."""
@@ -249,8 +255,8 @@ class MotionGenerator:
         self._go(*reached)
         self._report(motion)
 
-    def _attempt(self, motion: _Motion, h: float) -> tuple[Vector6, Place] | None:
-        """Advance by ``h`` seconds or as far as the joints can follow; None: not at all."""
+    def _attempt(self, motion: _Motion, h: float) -> tuple[Vector6, Pose] | None:
+        """Advance by ``h`` seconds or as far as the arm can follow; None: not at all."""
         place: Place = self.q
         requested = h
         for _ in range(_ATTEMPTS):
@@ -259,19 +265,21 @@ class MotionGenerator:
             if q is None:
                 h *= 0.5
                 continue
-            ratio = self._reach.overspeed(q, self.q)
+            pose = place if isinstance(place, Pose) and self._tcp_kept else self._forward(q)
+            joints = self._reach.overspeed(q, self.q)
+            ratio = max(joints, self._tool_overspeed(pose))
             if ratio <= _WITHIN or (ratio < inf and isinstance(motion, JointStop)):
                 if self._stalls(place, h, requested):
                     break
                 motion.accept(state)
                 self._rate = h / self.cycle
                 self._on_tool_path = isinstance(place, Pose)
-                return q, place
+                return q, pose
             if ratio == inf:
                 break
             # A jump to another branch does not shrink with the step: creep up to its place.
             jump = is_singular(self.q, q, self.T_base_tcp, place) if isinstance(
-                place, Pose) else self._on_tool_path and ratio > _JUMP_RATIO
+                place, Pose) else self._on_tool_path and joints > _JUMP_RATIO
             h /= 2.0 if jump else ratio
         if isinstance(motion, ToolStop):
             # No straight line left: brake in joint space.
@@ -294,9 +302,12 @@ class MotionGenerator:
             return place
         return self._reach.joints(place @ self._T_tcp_flange, self.q)
 
-    def _go(self, q: Vector6, place: Place) -> None:
+    def _tool_overspeed(self, pose: Pose) -> float:
+        """Return by which factor the way to the pose is too long for one cycle."""
+        return self.T_base_tcp.distance_to(pose) / (self.max_tool_speed * self.cycle)
+
+    def _go(self, q: Vector6, pose: Pose) -> None:
         """Make it the target."""
-        pose = place if isinstance(place, Pose) and self._tcp_kept else self._forward(q)
         rate = 1.0 / self.cycle
         self.tcp_twist = twist_between(self.T_base_tcp, pose, rate)
         qd = rate_of(q, self.q, rate)
@@ -313,6 +324,7 @@ class MotionGenerator:
         """Let the call return when it may, and what waited for rest begin."""
         move = self._move
         if isinstance(motion, Track):
+            self._look_at_speed(motion)
             if motion.may_return(self.cycle):
                 motion.tip.call.returned = True
             if motion.finished:
@@ -324,6 +336,20 @@ class MotionGenerator:
                 self._come_to_rest()
         elif move is not None and motion.over:
             move.returned = True
+
+    def _look_at_speed(self, track: Track) -> None:
+        """Say once of a movep that it is too fast: slowed down, or too hard on a joint."""
+        call = track.tip.call
+        if not self._circular or call is self._too_fast:
+            return
+        slowed = self._rate < self._scale / _WITHIN
+        hard = isinstance(track.pieces[track.index].path, Fillet) and (
+            lead(self.qdd, _STILL) > MAX_JOINT_ACCELERATION)
+        if slowed or hard:
+            self._too_fast = call
+            self._warn(196, 0, 'MoveP speed too high: ' + (
+                'the arm cannot keep it here.' if slowed else
+                'a joint would need too much acceleration in a blend; enlarge its radius.'))
 
     def _come_to_rest(self) -> None:
         """End what has come to rest, and begin what waited for that."""
@@ -408,9 +434,9 @@ class MotionGenerator:
         blended, whole = joined(track, leg, law, call.radius, call.move, circular)
         way = _length(pose, leg)
         if not whole and call.radius <= 0.0 and way <= before.radius:
-            self.warnings.append(MotionWarning(code=197, argument=0, text=(
+            self._warn(197, 0, (
                 f'Blend overlap: the waypoint of this {call.name} lies within the blend before '
-                'it, so the arm stops at the waypoint before.')))
+                'it, so the arm stops at the waypoint before.'))
         room = way - call.radius - (before.radius if call.radius > 0.0 else 0.0)
         self._run(track, blended, call, room)
 
@@ -449,8 +475,19 @@ class MotionGenerator:
             return
         self._motion, self._circular, name = self._overlapping
         self._overlapping = None
-        self.warnings.append(MotionWarning(code=171, argument=SKIPPED[name], text=(
-            f'Overlapping blends in a {name}, a waypoint was skipped.')))
+        self._warn(171, SKIPPED[name], f'Overlapping blends in a {name}, a waypoint was skipped.')
+
+    def _drivable(self, name: str, radius: float, speed: float) -> float:
+        """Return the radius, 0 where the tool passes it within one cycle: that is no blend."""
+        if not 0.0 < radius < speed * self.cycle:
+            return radius
+        self._warn(171, TOO_SMALL[name], (
+            f'Blend radius too small in a {name}: {radius:g} m is less than the way of one cycle, '
+            'so the arm stops at the waypoint.'))
+        return 0.0
+
+    def _warn(self, code: int, argument: int, text: str) -> None:
+        self.warnings.append(MotionWarning(code=code, argument=argument, text=text))
 
     def _take_over(self, motion: _Motion) -> Move:
         """Run a motion without a path from now on."""

@@ -23,6 +23,8 @@ from ur_cartesian_driver.sim.motion.track import Law
 #: What optimove's fractions are of [rad/s^2] and [rad/s^3]; also bounds servoj.
 MAX_JOINT_ACCELERATION = 40.0
 MAX_JOINT_JERK = 400.0
+#: The greatest limit of the tool's speed that the safety settings allow [m/s].
+MAX_TOOL_SPEED = 5.0
 #: How hard a joint can brake before the end of its range [rad/s^2].
 LIMIT_BRAKING = 10.0
 #: Joint travel per tool travel [rad/m, rad/rad] beyond which the arm counts as singular.
