@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import pi
 from typing import Literal
 
 from ur_cartesian_driver.kinematics.robots import Geometry, robot_model, RobotModel
 from ur_cartesian_driver.motion.pose import Vector6
+from ur_cartesian_driver.sim.faults import Fault
 
 #: Upright enough to move anywhere, away from every singularity [rad].
 HOME: Vector6 = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
@@ -60,6 +61,9 @@ class SimulatorConfig:
     brake_release_time: float = 0.5
     #: How fast time passes against the wall clock; 0 = as fast as it can.
     rate: float = 1.0
+    #: What goes wrong, as :mod:`~ur_cartesian_driver.sim.faults` or in words; times count from
+    #: the first cycle.
+    faults: Sequence[Fault | str] = ()
     #: Programs that the dashboard can load: file name -> URScript.
     programs: Mapping[str, str] = field(default_factory=dict)
 

@@ -21,11 +21,13 @@ from ur_cartesian_driver.motion.state import (
     SafetyMode,
     SafetyStatus,
 )
+from ur_cartesian_driver.sim.actual import Actual
 from ur_cartesian_driver.sim.announcements import Announcements
 from ur_cartesian_driver.sim.builtins import builtins_of
 from ur_cartesian_driver.sim.builtins.motion import HandGuided, Ownership
 from ur_cartesian_driver.sim.config import SimulatorConfig
 from ur_cartesian_driver.sim.controller_state import Payload, Popup, Process
+from ur_cartesian_driver.sim.faults import Faults
 from ur_cartesian_driver.sim.interpreter import Interpreter
 from ur_cartesian_driver.sim.modes import (
     OPERATIONAL,
@@ -66,6 +68,8 @@ class Controller:
         self.cycles = 0
         self.arm = Arm(config.robot_model, config.geometry)
         self.motion = MotionGenerator(self.arm, self.cycle, config.q)
+        #: What is measured of the motion: the targets, unless a fault interferes.
+        self.actual = Actual(self.motion)
         self.sockets = MemorySockets() if sockets is None else sockets
         self.signals = Signals()
         self.safety = Safety(config.unlock_delay)
@@ -95,6 +99,7 @@ class Controller:
         self.interpreter = Interpreter(self.programs, self.ownership)
         self.programs.on_end = self.sockets.close_all
         self.announcements.on_error = self._pause_if_wanted
+        self.faults = Faults(self)
 
     # What it reports
 
@@ -145,6 +150,8 @@ class Controller:
     def step(self) -> None:
         """Compute one cycle."""
         self.cycles += 1
+        if self.faults.active:
+            self.faults.step()
         self.power.step(self.time)
         self.sockets.poll()
         self._watch_inputs()
@@ -152,7 +159,7 @@ class Controller:
         self.programs.step()
         self._change_scale(rested)
         self.motion.step(self.scale)
-        self._past.append(self.motion.q)
+        self._past.append(self.actual.q)
         self._look_at_motion()
         if self.safety.mode in POWERLESS and self.standing:
             self.power.off()

@@ -3,9 +3,10 @@
 """
 What each RTDE output means in the simulated controller.
 
-Target and actual are one: the arm follows without error. Its links weigh nothing; only the payload
-does. Outputs that would need more (currents, temperatures, encoders) have fixed, plausible values;
-those that are not zero stand in :data:`FIXED`, apart from those that are computed.
+Target and actual are one, unless a fault makes them differ: the arm follows without error. Its
+links weigh nothing; only the payload does. Outputs that would need more (currents, temperatures,
+encoders) have fixed, plausible values; those that are not zero stand in :data:`FIXED`, apart from
+those that are computed.
 """
 
 from __future__ import annotations
@@ -59,7 +60,8 @@ def _accelerometer(controller: Controller) -> Vector3:
     motion = controller.motion
     frames = controller.arm.frames(motion.q)
     acceleration = point_motion(frames, motion.qd, motion.qdd, frames.position).acceleration
-    felt = _sum(acceleration, controller.gravity)
+    ex, ey, ez, _, _, _ = controller.actual.acceleration_error
+    felt = _sum(_sum(acceleration, (ex, ey, ez)), controller.gravity)
     return dot(felt, frames.x), dot(felt, frames.y), dot(felt, frames.z)
 
 
@@ -94,6 +96,12 @@ def _joint_mode(controller: Controller) -> int:
     return _IDLE if _powered(controller) else _POWER_OFF
 
 
+def _actual_acceleration(controller: Controller) -> Vector6:
+    x, y, z, rx, ry, rz = (target + error for target, error in zip(
+        _tcp_acceleration(controller), controller.actual.acceleration_error, strict=True))
+    return x, y, z, rx, ry, rz
+
+
 def _tcp(controller: Controller) -> Vector6:
     return controller.motion.T_base_tcp.rotation_vector()
 
@@ -107,14 +115,14 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType({
     'timestamp': lambda c: c.time,
     'control_step': lambda c: c.cycles,
     'target_q': lambda c: c.motion.q,
-    'actual_q': lambda c: c.motion.q,
+    'actual_q': lambda c: c.actual.q,
     'target_qd': lambda c: c.qd,
-    'actual_qd': lambda c: c.qd,
+    'actual_qd': lambda c: c.actual.qd,
     'target_qdd': lambda c: c.motion.qdd,
     'target_TCP_pose': _tcp,
-    'actual_TCP_pose': _tcp,
+    'actual_TCP_pose': lambda c: c.actual.T_base_tcp.rotation_vector(),
     'target_TCP_speed': lambda c: c.tcp_twist,
-    'actual_TCP_speed': lambda c: c.tcp_twist,
+    'actual_TCP_speed': lambda c: c.actual.tcp_twist,
     'tcp_offset': lambda c: (
         _ZERO6 if c.motion.T_flange_tcp is IDENTITY else c.motion.T_flange_tcp.rotation_vector()),
     'speed_scaling': lambda c: c.scale,
@@ -133,7 +141,7 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType({
     'target_moment': _moments,
     'actual_current_as_torque': _moments,
     'target_TCP_acceleration': _tcp_acceleration,
-    'actual_TCP_acceleration': _tcp_acceleration,
+    'actual_TCP_acceleration': _actual_acceleration,
     'actual_tool_accelerometer': _accelerometer,
     'elbow_velocity': _elbow_velocity,
     'actual_momentum': _scaled_momentum,

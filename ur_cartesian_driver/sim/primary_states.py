@@ -91,13 +91,14 @@ def _mode(controller: Controller) -> RobotModeData:
 def _joints(controller: Controller) -> JointData:
     motion = controller.motion
     mode = 253 if controller.power.mode is RobotMode.RUNNING else 239
-    return JointData(q_actual=motion.q, q_target=motion.q, qd_actual=controller.qd,
+    return JointData(q_actual=controller.actual.q, q_target=motion.q,
+                     qd_actual=controller.actual.qd,
                      voltage=(48.0,) * 6, temperature=(25.0,) * 6, mode=(mode,) * 6)
 
 
 def _cartesian(controller: Controller) -> CartesianInfo:
     motion = controller.motion
-    return CartesianInfo(tcp_pose=motion.T_base_tcp.rotation_vector(),
+    return CartesianInfo(tcp_pose=controller.actual.T_base_tcp.rotation_vector(),
                          tcp_offset=motion.T_flange_tcp.rotation_vector())
 
 

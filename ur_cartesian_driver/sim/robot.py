@@ -24,6 +24,9 @@ from ur_cartesian_driver.sim.clock import Clock, Lateness, RealClock, VirtualClo
 from ur_cartesian_driver.sim.config import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.dashboard_session import DashboardSession
+from ur_cartesian_driver.sim.fault_text import parse_fault
+from ur_cartesian_driver.sim.faults import Fault
+from ur_cartesian_driver.sim.faulty_sockets import FaultySockets
 from ur_cartesian_driver.sim.interpreter_session import InterpreterSession
 from ur_cartesian_driver.sim.modes import SafetyEvent
 from ur_cartesian_driver.sim.primary_session import PrimarySession, ScriptSession
@@ -84,9 +87,11 @@ class SimulatedRobot:
     def __init__(self, config: SimulatorConfig | None = None) -> None:
         """Make a robot; it lives from `start` to `close`."""
         self.config = config or SimulatorConfig()
+        self._loop: asyncio.AbstractEventLoop | None = None
         #: Called with the port and the bytes that a program's socket received, in our thread.
         self.on_socket_data: Callable[[int, bytes], None] | None = None
-        self.controller = Controller(self.config, TcpScriptSockets(self._on_socket_data))
+        sockets = FaultySockets(TcpScriptSockets(self._on_socket_data))
+        self.controller = Controller(self.config, sockets)
         taken_inputs: set[str] = set()
         self._rtde = TcpServer('RTDE', lambda: RtdeSession(self.controller, taken_inputs))
         self._primary = TcpServer('primary', lambda: PrimarySession(self.controller))
@@ -97,9 +102,11 @@ class SimulatedRobot:
         self._servers: tuple[TcpServer[Any], ...] = (
             self._rtde, self._primary, self._secondary, self._realtime, self._dashboard,
             self._interpreter)
+        self.controller.faults.interfaces = {'sockets': sockets} | {
+            server.name.lower().replace('-', ''): server for server in self._servers}
+        self.inject(*self.config.faults)
         self._clock: Clock = (RealClock(self.config.cycle, self.config.rate)
                               if self.config.rate > 0.0 else VirtualClock())
-        self._loop: asyncio.AbstractEventLoop | None = None
         self._thread: threading.Thread | None = None
         self._running: asyncio.Task[None] | None = None
         self._ports: Ports | None = None
@@ -250,6 +257,24 @@ class SimulatedRobot:
     def state(self) -> RobotSnapshot:
         """Return the robot as it is now."""
         return self.call(_snapshot)
+
+    def inject(self, *faults: Fault | str) -> None:
+        """
+        Let something go wrong, now or at its moment: a fault, or the text of one.
+
+        :raises ValueError: a text is not understood, or the robot has no such interface.
+        """
+        parsed = [parse_fault(f) if isinstance(f, str) else f for f in faults]
+
+        def add(controller: Controller) -> None:
+            for fault in parsed:
+                controller.faults.add(fault)
+
+        self.call(add)
+
+    def clear_faults(self) -> None:
+        """Forget the faults to come and end those that last; what has happened stays."""
+        self.call(lambda controller: controller.faults.clear())
 
     def set_speed_slider(self, fraction: float) -> None:
         """Move the speed slider, 0..1."""

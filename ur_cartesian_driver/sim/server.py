@@ -15,6 +15,7 @@ import logging
 from typing import cast, Generic, Protocol, TypeVar
 
 from ur_cartesian_driver.motion.errors import ProtocolError
+from ur_cartesian_driver.sim.impairment import Hampered, Impairment
 
 _log = logging.getLogger(__name__)
 
@@ -61,16 +62,27 @@ class _Connection(asyncio.Protocol, Generic[S]):
         self._server = server
         self.session = server.make_session()
         self._transport: asyncio.Transport | None = None
+        #: What is wrong with this connection; None, as always without faults: nothing.
+        self._hampered: Hampered | None = None
+        self._leaving = False
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
         self._server.connections.add(self)
-        if self._server.closing:  # it called at the last moment
+        if self._server.refusing:
             self._transport.abort()
             return
+        if self._server.impairment is not None:
+            self.hamper(self._server.impairment)
         self.write(self.session.open())
 
     def data_received(self, data: bytes) -> None:
+        if self._hampered is None:
+            self._hear(data)
+        else:
+            self._hampered.hear(data, self._server.now)
+
+    def _hear(self, data: bytes) -> None:
         try:
             self.write(self.session.feed(data))
         except Hangup as hangup:
@@ -81,24 +93,59 @@ class _Connection(asyncio.Protocol, Generic[S]):
             self._hang_up()
 
     def _hang_up(self) -> None:
-        if self._transport is not None:
+        if self._hampered is not None and self._hampered.unsent:
+            self._leaving = True
+        elif self._transport is not None:
             self._transport.close()
 
     def write(self, data: bytes) -> None:
         """Send one piece; drop a client that does not read."""
+        if self._hampered is None:
+            self._send(data)
+            return
+        self._hampered.say(data, self._server.now)
+        if self._hampered.unsent > MOST_UNREAD:
+            self._drop_unread()
+
+    def _send(self, data: bytes) -> None:
         if not data or self._transport is None or self._transport.is_closing():
             return
         if self._transport.get_write_buffer_size() > MOST_UNREAD:
-            _log.warning('%s client dropped: it does not read', self._server.name)
-            self._transport.abort()
+            self._drop_unread()
             return
         self._transport.write(data)
+
+    def _drop_unread(self) -> None:
+        _log.warning('%s client dropped: it does not read', self._server.name)
+        self.abort()
 
     def write_state(self, data: bytes) -> None:
         """Send a piece that the next of its kind replaces, if the client has read the others."""
         if self._transport is not None and (
                 self._transport.get_write_buffer_size() < MANY_UNREAD):
             self.write(data)
+
+    def hamper(self, impairment: Impairment | None) -> Hampered:
+        """Let something be wrong with this connection."""
+        if self._hampered is None:
+            self._hampered = Hampered(impairment, self._server.now)
+        self._hampered.impairment = impairment
+        return self._hampered
+
+    def pump(self, now: float) -> bool:
+        """Let go what is due; tell whether anything is still wrong."""
+        hampered = self._hampered
+        if hampered is None:
+            return False
+        if data := hampered.heard(now):
+            self._hear(data)
+        self._send(hampered.said(now))
+        if self._leaving and not hampered.unsent:
+            self._leaving = False
+            self._hang_up()
+        if hampered.over:
+            self._hampered = None
+        return not hampered.over
 
     def abort(self) -> None:
         """Disconnect at once."""
@@ -126,12 +173,20 @@ class TcpServer(Generic[S]):
         self.connections: set[_Connection[S]] = set()
         self._server: asyncio.Server | None = None
         self.closing = False
+        #: What a fault makes of all connections, and the controller's clock while one does [s].
+        self.impairment: Impairment | None = None
+        self.now = 0.0
 
     @property
     def port(self) -> int:
         """The port that is listened on."""
         assert self._server is not None
         return int(self._server.sockets[0].getsockname()[1])
+
+    @property
+    def refusing(self) -> bool:
+        """Whether who calls is hung up on: at the last moment, or by a fault."""
+        return self.closing or (self.impairment is not None and self.impairment.refusing)
 
     @property
     def sessions(self) -> Iterator[tuple[S, _Connection[S]]]:
@@ -163,6 +218,34 @@ class TcpServer(Generic[S]):
         """Send the same piece to all clients that read what they are sent."""
         for connection in tuple(self.connections):
             connection.write_state(data)
+
+    # As faults see it: an Impairable
+
+    def impair(self, impairment: Impairment | None, now: float) -> None:
+        """Let this be wrong with all connections."""
+        self.impairment, self.now = impairment, now
+        for connection in self.connections:
+            connection.hamper(impairment)
+
+    def pump(self, now: float) -> bool:
+        """Let go what is due; tell whether this has to be called again in the next cycle."""
+        self.now = now
+        held = [connection.pump(now) for connection in tuple(self.connections)]
+        return self.impairment is not None or any(held)
+
+    def drop(self) -> None:
+        """Cut all connections."""
+        for connection in tuple(self.connections):
+            connection.abort()
+
+    def freeze(self) -> None:
+        """Make all connections half-open ones: neither hear nor say anything, do not hang up."""
+        for connection in self.connections:
+            connection.hamper(self.impairment).frozen = True
+
+    def inject(self, data: bytes) -> None:
+        """Say something that no session has said."""
+        self.broadcast(data)
 
     async def close(self) -> None:
         """Stop listening and disconnect everybody."""

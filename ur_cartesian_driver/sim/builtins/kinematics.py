@@ -95,7 +95,7 @@ class KinematicsBuiltins:
 
     def get_actual_tcp_pose(self) -> ScriptPose:
         """Return where the TCP is."""
-        return script_pose(self._controller.motion.T_base_tcp)
+        return script_pose(self._controller.actual.T_base_tcp)
 
     def get_target_tcp_pose(self) -> ScriptPose:
         """Return where the TCP should be."""
@@ -109,7 +109,7 @@ class KinematicsBuiltins:
 
     def get_actual_tool_flange_pose(self) -> ScriptPose:
         """Return where the flange is."""
-        return script_pose(self._controller.arm.forward(self._controller.motion.q))
+        return script_pose(self._controller.arm.forward(self._controller.actual.q))
 
     def get_tcp_offset(self) -> ScriptPose:
         """Return the active TCP in the flange frame."""

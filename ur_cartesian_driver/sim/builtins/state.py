@@ -116,7 +116,7 @@ class RobotBuiltins:
 
     def get_actual_joint_positions(self) -> list[float]:
         """Return the actual positions [rad]."""
-        return list(self._motion.q)
+        return list(self._controller.actual.q)
 
     def get_actual_joint_positions_history(self, steps: Value = 0) -> list[float]:
         """Return the actual positions some cycles ago [rad]."""
@@ -128,7 +128,7 @@ class RobotBuiltins:
 
     def get_actual_joint_speeds(self) -> list[float]:
         """Return the actual speeds [rad/s]."""
-        return list(self._controller.qd)
+        return list(self._controller.actual.qd)
 
     def get_target_joint_accelerations(self) -> list[float]:
         """Return the target accelerations [rad/s^2]."""
@@ -136,7 +136,7 @@ class RobotBuiltins:
 
     def get_actual_tcp_speed(self) -> list[float]:
         """Return the twist of the TCP in base axes."""
-        return list(self._controller.tcp_twist)
+        return list(self._controller.actual.tcp_twist)
 
     def get_target_tcp_speed(self) -> list[float]:
         """Return the twist of the TCP in base axes."""

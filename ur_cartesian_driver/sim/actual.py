@@ -1,0 +1,113 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the robot measures of its motion.
+
+The simulated arm follows its targets exactly, so the actual values are the targets, unless a fault
+makes them deviate. A deviation of the pose shows in pose and joint positions, one of the twist in
+twist and joint speeds, each as a faulty measurement would and neither in the other. One of the
+acceleration shows in acceleration and accelerometer and, summed up over the cycles, in twist and
+joint speeds, for there many clients look for it.
+"""
+
+from __future__ import annotations
+
+from math import dist
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.inverse import nearest
+from ur_cartesian_driver.motion.pose import (
+    multiply,
+    Pose,
+    quaternion_from_rotation_vector,
+    Vector6,
+)
+from ur_cartesian_driver.sim.motion import MotionGenerator
+
+_ZERO: Vector6 = (0.0,) * 6
+# A solution farther than this from the target is another branch [rad].
+_OTHER_BRANCH = 0.5
+
+
+class Actual:
+    """The measured side of one arm's motion."""
+
+    def __init__(self, motion: MotionGenerator) -> None:
+        """Follow the targets of this motion exactly."""
+        self._motion = motion
+        self._pose: Vector6 | None = None
+        self._twist: Vector6 | None = None
+        #: By how much the measured acceleration of the tool is off [m/s^2, rad/s^2].
+        self.acceleration_error: Vector6 = _ZERO
+        #: The sum of the deviation of the acceleration.
+        self._drift: Vector6 = _ZERO
+        self._solved: tuple[object, object, Vector6] | None = None
+
+    def deviate(self, pose: Vector6 | None, twist: Vector6 | None, acceleration: Vector6 | None
+                ) -> None:
+        """Be off by this in this cycle, in base axes; None = not at all."""
+        self._pose = pose
+        self.acceleration_error = acceleration or _ZERO
+        if acceleration is None:
+            self._drift, self._twist = _ZERO, twist
+        else:
+            self._drift = _sum(self._drift, _times(acceleration, self._motion.cycle))
+            self._twist = self._drift if twist is None else _sum(self._drift, twist)
+
+    @property
+    def T_base_tcp(self) -> Pose:
+        """Where the tool centre point is."""
+        target = self._motion.T_base_tcp
+        if self._pose is None:
+            return target
+        x, y, z, rx, ry, rz = self._pose
+        px, py, pz = target.position
+        return Pose((px + x, py + y, pz + z), multiply(
+            quaternion_from_rotation_vector((rx, ry, rz)), target.quaternion))
+
+    @property
+    def q(self) -> Vector6:
+        """Joint positions [rad]: those that lead to the pose."""
+        if self._pose is None:
+            return self._motion.q
+        if self._solved is None or self._solved[:2] != (self._motion.q, self._pose):
+            self._solved = (self._motion.q, self._pose, self._solve(self._pose))
+        return self._solved[2]
+
+    @property
+    def tcp_twist(self) -> Vector6:
+        """Twist of the tool centre point in base axes [m/s, rad/s]."""
+        twist = self._motion.tcp_twist
+        return twist if self._twist is None else _sum(twist, self._twist)
+
+    @property
+    def qd(self) -> Vector6:
+        """Joint speeds [rad/s]: those that lead to the twist."""
+        if self._twist is None:
+            return self._motion.qd
+        return _sum(self._motion.qd, self._joints_of(self._twist))
+
+    def _solve(self, deviation: Vector6) -> Vector6:
+        motion = self._motion
+        T_base_flange = self.T_base_tcp @ motion.T_flange_tcp.inverse()
+        q = nearest(motion.arm, T_base_flange, motion.q)
+        if q is None or dist(q, motion.q) > _OTHER_BRANCH:
+            return _sum(motion.q, self._joints_of(deviation))
+        return q
+
+    def _joints_of(self, change: Vector6) -> Vector6:
+        """Return the joints' share in a small change of the tool; the least one if singular."""
+        jacobian = self._motion.arm.jacobian(self._motion.q, self._motion.T_flange_tcp)
+        a, b, c, d, e, f = (float(v) for v in np.linalg.pinv(jacobian, rcond=1e-6) @ change)
+        return a, b, c, d, e, f
+
+
+def _sum(left: Vector6, right: Vector6) -> Vector6:
+    a, b, c, d, e, f = (x + y for x, y in zip(left, right, strict=True))
+    return a, b, c, d, e, f
+
+
+def _times(vector: Vector6, factor: float) -> Vector6:
+    a, b, c, d, e, f = (factor * v for v in vector)
+    return a, b, c, d, e, f

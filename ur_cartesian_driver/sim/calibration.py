@@ -1,0 +1,191 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Arms that are not as their model says: from a calibration file, or made up.
+
+Both are axes in space, which a DH table is computed from by their common normals. Where two axes
+are nearly parallel (shoulder lift, elbow, wrist 1) the normal may lie far away: so real robots
+come to report lengths of many metres that cancel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import atan2, isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.robots import Geometry, RobotModel
+
+Array = NDArray[np.float64]
+
+#: How far the axes of a made-up arm are off, standard deviations [rad, m]. Flanges then are some
+#: 1 to 2 mm off, as real ones are found to be.
+AXIS_TURN, AXIS_SHIFT = 1e-3, 3e-4
+
+_LINKS = ('shoulder', 'upper_arm', 'forearm', 'wrist_1', 'wrist_2', 'wrist_3')
+_FIELDS = ('x', 'y', 'z', 'roll', 'pitch', 'yaw')
+# Axes this parallel are taken as parallel [rad]: files are rounded to ten digits.
+_PARALLEL = 1e-8
+# How far the first joint may be from the axis of the base [m, rad].
+_OFF_AXIS = 1e-9
+
+
+@dataclass(slots=True)
+class _Axes:
+    """An arm with all joints at 0, in base axes."""
+
+    #: (6, 3) a point on each axis [m], and its direction.
+    points: Array
+    directions: Array
+    #: (4, 4) the flange; z along the last axis, origin on it.
+    flange: Array
+
+
+def read_calibration(path: Path, model: RobotModel) -> Geometry:
+    """
+    Return the table of a calibration file, as ``ur_calibration`` of the UR ROS driver writes it.
+
+    In the file ``kinematics`` holds for each of shoulder, upper_arm, forearm, wrist_1, wrist_2 and
+    wrist_3 the pose of its joint in the link before: x y z [m], roll pitch yaw [rad].
+
+    :raises OSError: the file cannot be read.
+    :raises ValueError: something is missing or not a number; the text names file, link and field.
+    """
+    import yaml
+
+    try:
+        content = yaml.safe_load(path.read_text(encoding='utf-8'))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ValueError(f'The calibration {path} is not YAML: {" ".join(str(error).split())}'
+                         ) from None
+    links = content.get('kinematics') if isinstance(content, Mapping) else None
+    if not isinstance(links, Mapping):
+        raise ValueError(f'The calibration {path} has no mapping `kinematics`.')
+    return _table(_axes_of_links([_link(path, links, name) for name in _LINKS], path), model)
+
+
+def random_calibration(model: RobotModel, seed: int) -> Geometry:
+    """Return the table of an arm whose axes are off as those of real arms are; see above."""
+    random = np.random.default_rng(seed)
+    axes = _nominal_axes(model.geometry)
+    for i in range(1, 6):
+        axes.directions[i] = _turned(axes.directions[i], random.normal(0.0, AXIS_TURN, 3))
+        axes.points[i] += random.normal(0.0, AXIS_SHIFT, 3)
+    # The table ends on the last axis: there the flange is put again.
+    axes.flange = _flange_on(axes)
+    return _table(axes, model)
+
+
+def _link(path: Path, links: Mapping[Any, Any], name: str) -> Array:
+    """Return the pose of a joint in the link before (4, 4)."""
+    link = links.get(name)
+    values = []
+    for field in _FIELDS:
+        value = link.get(field) if isinstance(link, Mapping) else None
+        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+            raise ValueError(
+                f'The calibration {path} gives {value!r} as kinematics.{name}.{field}; '
+                'it must be a number.')
+        values.append(float(value))
+    x, y, z, roll, pitch, yaw = values
+    T = _turn('z', yaw) @ _turn('y', pitch) @ _turn('x', roll)
+    T[:3, 3] = x, y, z
+    return T
+
+
+def _axes_of_links(links: list[Array], path: Path) -> _Axes:
+    T = np.eye(4)
+    points, directions = [], []
+    for link in links:
+        T = T @ link
+        points.append(T[:3, 3])
+        directions.append(T[:3, 2])
+    if np.abs([*points[0][:2], *directions[0][:2]]).max() > _OFF_AXIS:
+        raise ValueError(f'The calibration {path} moves the shoulder off the axis of the base: '
+                         'its x, y, roll and pitch must be 0.')
+    return _Axes(np.array(points), np.array(directions), T)
+
+
+def _nominal_axes(geometry: Geometry) -> _Axes:
+    T = np.eye(4)
+    points, directions = [], []
+    for theta, d, a, alpha in zip(
+            geometry.theta, geometry.d, geometry.a, geometry.alpha, strict=True):
+        points.append(T[:3, 3])
+        directions.append(T[:3, 2])
+        T = T @ _turn('z', theta) @ _shift(a, 0.0, d) @ _turn('x', alpha)
+    return _Axes(np.array(points), np.array(directions), T)
+
+
+def _table(axes: _Axes, model: RobotModel) -> Geometry:
+    """Return the DH table: each x axis is the common normal of an axis and the next."""
+    rows = []
+    origin, x, z = np.zeros(3), np.array([1.0, 0.0, 0.0]), axes.directions[0]
+    for i in range(1, 6):
+        following = axes.directions[i]
+        normal, d, a = _common_normal(origin, z, axes.points[i], following)
+        if a * model.geometry.a[i - 1] < 0.0:  # as the model has it, where that says something
+            normal, a = -normal, -a
+        rows.append((_angle(z, x, normal), d, a, _angle(normal, z, following)))
+        origin, x, z = origin + d * z + a * normal, normal, following
+    flange_x, flange = axes.flange[:3, 0], axes.flange[:3, 3]
+    rows.append((_angle(z, x, flange_x), float(z @ (flange - origin)), 0.0, 0.0))
+    theta, d6, a6, alpha = ((c[0], c[1], c[2], c[3], c[4], c[5]) for c in zip(*rows, strict=True))
+    return Geometry(theta=theta, d=d6, a=a6, alpha=alpha)
+
+
+def _common_normal(origin: Array, z: Array, point: Array, following: Array
+                   ) -> tuple[Array, float, float]:
+    """Return the direction between two axes, how far along the first it begins, its length."""
+    normal = np.cross(z, following)
+    size = float(np.linalg.norm(normal))
+    if size > _PARALLEL:
+        normal /= size
+        d, a, _ = np.linalg.solve(np.column_stack([z, normal, -following]), point - origin)
+        return normal, float(d), float(a)
+    # Any normal will do; this one goes through where the row begins.
+    across = point - origin
+    across = across - z * (z @ across)
+    a = float(np.linalg.norm(across))
+    return across / a, 0.0, a
+
+
+def _flange_on(axes: _Axes) -> Array:
+    """Return the flange with its z along the last axis and its origin on it."""
+    z, point, flange = axes.directions[5], axes.points[5], axes.flange
+    x = flange[:3, 0] - z * (z @ flange[:3, 0])
+    x /= np.linalg.norm(x)
+    T = np.eye(4)
+    T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    T[:3, 3] = point + z * (z @ (flange[:3, 3] - point))
+    return T
+
+
+def _angle(axis: Array, start: Array, end: Array) -> float:
+    return atan2(float(axis @ np.cross(start, end)), float(start @ end))
+
+
+def _turned(direction: Array, by: Array) -> Array:
+    """Return a direction turned by a small rotation vector [rad]."""
+    turned = direction + np.cross(by, direction)
+    return turned / np.linalg.norm(turned)
+
+
+def _turn(axis: str, angle: float) -> Array:
+    T = np.eye(4)
+    i, j = {'x': (1, 2), 'y': (2, 0), 'z': (0, 1)}[axis]
+    T[i, i] = T[j, j] = np.cos(angle)
+    T[j, i] = np.sin(angle)
+    T[i, j] = -T[j, i]
+    return T
+
+
+def _shift(x: float, y: float, z: float) -> Array:
+    T = np.eye(4)
+    T[:3, 3] = x, y, z
+    return T

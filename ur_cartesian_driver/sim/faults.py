@@ -1,0 +1,427 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Faults on demand: what goes wrong with the simulated robot, and when.
+
+A fault is a value that says both. :class:`Faults` waits for its moment, counts in the controller's
+cycles, and so is as deterministic as these; while no fault is set it costs nothing. How faults are
+written in words is in `fault_text`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+import logging
+from math import hypot, inf
+from random import Random
+from types import MappingProxyType
+from typing import get_args, Literal, TYPE_CHECKING, TypeAlias
+
+from ur_cartesian_driver.motion.pose import Vector6
+from ur_cartesian_driver.sim.impairment import Impairable, Impairment
+from ur_cartesian_driver.sim.modes import SafetyEvent
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.sim.controller import Controller
+
+_log = logging.getLogger(__name__)
+
+Axis: TypeAlias = Literal['x', 'y', 'z', 'rx', 'ry', 'rz']
+Quantity: TypeAlias = Literal['pose', 'twist', 'acceleration']
+Shape: TypeAlias = Literal['offset', 'ramp', 'noise']
+
+AXES: tuple[Axis, ...] = get_args(Axis)
+QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
+SHAPES: tuple[Shape, ...] = get_args(Shape)
+
+# Cycles are summed in floats.
+_ROUNDING = 1e-9
+
+
+# --- When ------------------------------------------------------------------------------------
+
+@dataclass(frozen=True, slots=True)
+class After:
+    """So long after the fault was set [s] of the controller's time."""
+
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Travelled:
+    """When the tool centre point has moved so far since the fault was set [m]."""
+
+    metres: float
+
+
+@dataclass(frozen=True, slots=True)
+class Crossing:
+    """When the tool centre point crosses the plane where a coordinate in the base is this [m]."""
+
+    axis: Literal['x', 'y', 'z']
+    position: float
+
+
+When: TypeAlias = After | Travelled | Crossing
+NOW = After()
+
+
+# --- What ------------------------------------------------------------------------------------
+
+class Action(Enum):
+    """What somebody else does to the robot: another client, or a person at it."""
+
+    PROTECTIVE_STOP = 'protective_stop'
+    EMERGENCY_STOP = 'emergency_stop'
+    RELEASE_EMERGENCY_STOP = 'release_emergency_stop'
+    SAFEGUARD_STOP = 'safeguard_stop'
+    RESET_SAFEGUARD = 'reset_safeguard'
+    VIOLATION = 'violation'
+    FAULT = 'fault'
+    UNLOCK = 'unlock'
+    STOP = 'stop'
+    PAUSE = 'pause'
+    PLAY = 'play'
+    POWER_OFF = 'power_off'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """Something happens to safety, power or program, without being asked for by the client."""
+
+    action: Action
+    when: When = NOW
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Slider:
+    """Somebody moves the speed slider, 0..1."""
+
+    fraction: float
+    when: When = NOW
+
+    def __post_init__(self) -> None:
+        """Reject what no slider shows."""
+        if not 0.0 <= self.fraction <= 1.0:
+            raise ValueError(f'The slider cannot stand at {self.fraction:g}; use 0 to 1.')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForeignMotion:
+    """Another client's program takes the place of the running one and moves the arm away."""
+
+    axis: Axis
+    #: In base axes, from where the tool is [m or rad].
+    distance: float
+    when: When = NOW
+
+    def script(self) -> str:
+        """Return that program."""
+        step = ', '.join(f'{self.distance:.9f}' if axis == self.axis else '0' for axis in AXES)
+        return ('def foreign_motion():\n'
+                f'  movel(pose_add(get_target_tcp_pose(), p[{step}]))\n'
+                'end\n')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Deviation:
+    """An actual value is not what the target asks for, on one axis of the base."""
+
+    quantity: Quantity
+    axis: Axis
+    shape: Shape
+    #: [m, rad and their derivatives]: of the offset, of the ramp per second, the standard
+    #: deviation of the noise.
+    amount: float
+    when: When = NOW
+    #: [s]
+    duration: float = inf
+    seed: int = 0
+
+    def value(self, elapsed: float, random: Random) -> float:
+        """Return by how much the value is off, so long after it began [s]."""
+        if self.shape == 'noise':
+            return random.gauss(0.0, self.amount)
+        return self.amount * elapsed if self.shape == 'ramp' else self.amount
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drop:
+    """All connections of an interface are cut, and none is accepted for the duration."""
+
+    interface: str
+    when: When = NOW
+    #: [s]
+    duration: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HalfOpen:
+    """The connections that there are stay open and dead, new ones work: as if a cable was cut."""
+
+    interface: str
+    when: When = NOW
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Silence:
+    """The robot hears, but what it has to say on an interface is lost, message by message."""
+
+    interface: str
+    when: When = NOW
+    duration: float = inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Delay:
+    """Everything on an interface takes longer [s], in each direction."""
+
+    interface: str
+    seconds: float
+    when: When = NOW
+    duration: float = inf
+
+    def __post_init__(self) -> None:
+        """Reject what would answer before it is asked."""
+        if self.seconds <= 0.0:
+            raise ValueError(f'A delay of {self.seconds:g} s cannot be; use more than 0.')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Throttle:
+    """An interface carries no more than a rate [bytes/s], in each direction."""
+
+    interface: str
+    rate: float
+    when: When = NOW
+    duration: float = inf
+
+    def __post_init__(self) -> None:
+        """Reject what carries nothing: that is another fault."""
+        if self.rate <= 0.0:
+            raise ValueError(
+                f'A rate of {self.rate:g} bytes/s cannot be; use more than 0, or silence.')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Garbage:
+    """The robot says random bytes to all clients of an interface."""
+
+    interface: str
+    size: int = 64
+    when: When = NOW
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Reject what is nothing, or would not fit a connection."""
+        if not 1 <= self.size <= 1_000_000:
+            raise ValueError(f'Garbage of {self.size} bytes cannot be; use 1 to 1000000.')
+
+
+Fault: TypeAlias = (Event | Slider | ForeignMotion | Deviation
+                    | Drop | HalfOpen | Silence | Delay | Throttle | Garbage)
+_Lasting: TypeAlias = Deviation | Drop | Silence | Delay | Throttle
+_OnInterface = Drop | HalfOpen | Silence | Delay | Throttle | Garbage
+
+
+# --- Letting it happen -----------------------------------------------------------------------
+
+def _safety(event: SafetyEvent) -> Callable[[Controller], str]:
+    return lambda controller: controller.safety_event(event)
+
+
+def _stop(controller: Controller) -> str:
+    controller.programs.stop()
+    return ''
+
+
+def _power_off(controller: Controller) -> str:
+    controller.power_off()
+    return ''
+
+
+_ACTIONS: Mapping[Action, Callable[[Controller], str]] = MappingProxyType({
+    Action.PROTECTIVE_STOP: _safety(SafetyEvent.PROTECTIVE_STOP),
+    Action.EMERGENCY_STOP: _safety(SafetyEvent.EMERGENCY_STOP),
+    Action.RELEASE_EMERGENCY_STOP: _safety(SafetyEvent.RELEASE),
+    Action.SAFEGUARD_STOP: _safety(SafetyEvent.SAFEGUARD_STOP),
+    Action.RESET_SAFEGUARD: _safety(SafetyEvent.SAFEGUARD_RESET),
+    Action.VIOLATION: _safety(SafetyEvent.VIOLATION),
+    Action.FAULT: _safety(SafetyEvent.FAULT),
+    Action.UNLOCK: _safety(SafetyEvent.UNLOCK),
+    Action.STOP: _stop,
+    Action.PAUSE: lambda controller: controller.programs.pause(),
+    Action.PLAY: lambda controller: controller.programs.play(),
+    Action.POWER_OFF: _power_off,
+})
+
+
+@dataclass(slots=True)
+class _Waiting:
+    """A fault that has not happened, with what its moment is reckoned from."""
+
+    fault: Fault
+    set_at: float
+    travelled: float
+    #: On which side of the plane the tool was.
+    side: bool
+
+
+@dataclass(slots=True)
+class _Running:
+    """A fault that lasts."""
+
+    fault: _Lasting
+    since: float
+    random: Random = field(default_factory=Random)
+
+    def over(self, now: float) -> bool:
+        """Whether its time is up."""
+        return now >= self.since + self.fault.duration - _ROUNDING
+
+
+class Faults:
+    """The faults of one robot: those that wait for their moment and those that last."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Begin with none."""
+        self._controller = controller
+        #: What connections can be impaired, by the name that faults call it.
+        self.interfaces: dict[str, Impairable] = {}
+        #: Whether there is anything to do in a cycle.
+        self.active = False
+        self._waiting: list[_Waiting] = []
+        self._running: list[_Running] = []
+        self._pumping: dict[str, Impairable] = {}
+        self._impaired: dict[str, Impairment] = {}
+        self._travelled = 0.0
+
+    def add(self, fault: Fault) -> None:
+        """
+        Set a fault; it happens at its moment, at the earliest in the next cycle.
+
+        :raises ValueError: the robot has no such interface.
+        """
+        if isinstance(fault, _OnInterface) and fault.interface not in self.interfaces:
+            known = ', '.join(self.interfaces) or 'none'
+            raise ValueError(
+                f'The robot has no interface {fault.interface!r}; faults know {known}.')
+        when = fault.when
+        side = isinstance(when, Crossing) and self._beyond(when)
+        self._waiting.append(_Waiting(fault, self._controller.time, self._travelled, side))
+        self.active = True
+
+    def clear(self) -> None:
+        """
+        Forget faults that wait and end those that last.
+
+        What has happened stays: a stop, a dropped or half-open connection.
+        """
+        self._waiting.clear()
+        self._running.clear()
+        self._apply_running(self._controller.time)
+
+    def step(self) -> None:
+        """Let happen what is due in this cycle."""
+        now = self._controller.time
+        self._measure_path()
+        due = [waiting for waiting in self._waiting if self._is_due(waiting, now)]
+        if due:
+            self._waiting = [waiting for waiting in self._waiting if waiting not in due]
+        for waiting in due:
+            self._begin(waiting.fault, now)
+        self._apply_running(now)
+        for name, interface in tuple(self._pumping.items()):
+            if not interface.pump(now):
+                del self._pumping[name]
+        self.active = bool(self._waiting or self._running or self._pumping)
+
+    # When
+
+    def _measure_path(self) -> None:
+        """Add what the tool has moved; the tool's change of another TCP is none."""
+        vx, vy, vz, _, _, _ = self._controller.tcp_twist
+        self._travelled += hypot(vx, vy, vz) * self._controller.cycle
+
+    def _beyond(self, plane: Crossing) -> bool:
+        position = self._controller.motion.T_base_tcp.position
+        return position['xyz'.index(plane.axis)] >= plane.position
+
+    def _is_due(self, waiting: _Waiting, now: float) -> bool:
+        when = waiting.fault.when
+        if isinstance(when, After):
+            return now >= waiting.set_at + when.seconds - _ROUNDING
+        if isinstance(when, Travelled):
+            return self._travelled - waiting.travelled >= when.metres - _ROUNDING
+        return self._beyond(when) != waiting.side
+
+    # What
+
+    def _begin(self, fault: Fault, now: float) -> None:
+        controller = self._controller
+        if isinstance(fault, _OnInterface):
+            self._begin_on(self.interfaces[fault.interface], fault)
+        if isinstance(fault, _Lasting):
+            seed = fault.seed if isinstance(fault, Deviation) else 0
+            self._running.append(_Running(fault, now, Random(seed)))
+        elif isinstance(fault, Slider):
+            controller.set_slider(fault.fraction)
+        elif isinstance(fault, ForeignMotion):
+            controller.programs.submit(fault.script())
+        elif isinstance(fault, Event) and (refusal := _ACTIONS[fault.action](controller)):
+            _log.warning('The fault %s had no effect: %s', fault.action.value, refusal)
+
+    def _begin_on(self, interface: Impairable, fault: Fault) -> None:
+        if isinstance(fault, Drop):
+            interface.drop()
+        elif isinstance(fault, HalfOpen):
+            interface.freeze()
+            self._pumping[fault.interface] = interface
+        elif isinstance(fault, Garbage):
+            interface.inject(Random(fault.seed).randbytes(fault.size))
+
+    def _apply_running(self, now: float) -> None:
+        """Make of all faults that last what is wrong in this cycle."""
+        self._running = [running for running in self._running if not running.over(now)]
+        self._deviate(now)
+        impaired = self._impairments()
+        for name in self._impaired.keys() | impaired.keys():
+            if self._impaired.get(name) != impaired.get(name):
+                self.interfaces[name].impair(impaired.get(name), now)
+                self._pumping[name] = self.interfaces[name]
+        self._impaired = impaired
+
+    def _deviate(self, now: float) -> None:
+        sums: dict[Quantity, list[float]] = {}
+        for running in self._running:
+            fault = running.fault
+            if isinstance(fault, Deviation):
+                values = sums.setdefault(fault.quantity, [0.0] * 6)
+                values[AXES.index(fault.axis)] += fault.value(
+                    now - running.since, running.random)
+        self._controller.actual.deviate(
+            pose=_six(sums.get('pose')), twist=_six(sums.get('twist')),
+            acceleration=_six(sums.get('acceleration')))
+
+    def _impairments(self) -> dict[str, Impairment]:
+        """Return what is wrong with each interface: the sum of its faults."""
+        found: dict[str, Impairment] = {}
+        for running in self._running:
+            fault = running.fault
+            if not isinstance(fault, Deviation):
+                before = found.get(fault.interface, Impairment())
+                found[fault.interface] = Impairment(
+                    silent=before.silent or isinstance(fault, Silence),
+                    refusing=before.refusing or isinstance(fault, Drop),
+                    delay=before.delay + (fault.seconds if isinstance(fault, Delay) else 0.0),
+                    rate=min(before.rate, fault.rate if isinstance(fault, Throttle) else inf))
+        return found
+
+
+def _six(values: list[float] | None) -> Vector6 | None:
+    if values is None:
+        return None
+    x, y, z, rx, ry, rz = values
+    return x, y, z, rx, ry, rz

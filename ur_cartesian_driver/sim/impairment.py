@@ -1,0 +1,135 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Bad connections, without sockets or a clock: what is held back, and when it is let go.
+
+A connection that nothing is wrong with has none of this. One that is hampered hands its bytes over
+in both directions and asks once per cycle for those that are due; times are the controller's, so
+that the virtual clock stays deterministic.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from math import inf
+from typing import Protocol
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Impairment:
+    """What is wrong with all connections of an interface."""
+
+    #: What the robot says is lost.
+    silent: bool = False
+    #: Who calls is hung up on.
+    refusing: bool = False
+    #: In each direction [s].
+    delay: float = 0.0
+    #: In each direction [bytes/s].
+    rate: float = inf
+
+
+class Impairable(Protocol):
+    """An interface with its connections, as faults see it."""
+
+    def impair(self, impairment: Impairment | None, now: float) -> None:
+        """Let this be wrong from now on; None = nothing any more."""
+
+    def pump(self, now: float) -> bool:
+        """Let go what is due; tell whether this has to be called again in the next cycle."""
+
+    def drop(self) -> None:
+        """Cut all connections."""
+
+    def freeze(self) -> None:
+        """Neither hear nor say anything on the connections that there are, and keep them open."""
+
+    def inject(self, data: bytes) -> None:
+        """Say something on all connections."""
+
+
+class Line:
+    """Bytes on their way in one direction."""
+
+    def __init__(self, now: float) -> None:
+        """Begin empty."""
+        self._pieces: deque[tuple[float, bytes]] = deque()
+        self._budget = 0.0
+        self._last = now
+        #: Bytes on their way.
+        self.size = 0
+
+    def put(self, data: bytes, due: float) -> None:
+        """Send a piece on its way; it arrives after all before it."""
+        self._pieces.append((due, data))
+        self.size += len(data)
+
+    def take(self, now: float, rate: float = inf) -> bytes:
+        """
+        Return what has arrived since the last time.
+
+        :param rate: most bytes per second; a piece may arrive in parts.
+        """
+        self._budget = inf if rate == inf else self._budget + rate * (now - self._last)
+        self._last = now if now < inf else self._last
+        arrived = bytearray()
+        while self._pieces and self._pieces[0][0] <= now and self._budget >= 1.0:
+            due, data = self._pieces.popleft()
+            part = data if len(data) <= self._budget else data[:int(self._budget)]
+            if len(part) < len(data):
+                self._pieces.appendleft((due, data[len(part):]))
+            self._budget -= len(part)
+            arrived += part
+        if not self._pieces or self._budget == inf:
+            self._budget = 0.0  # what was not used is gone
+        self.size -= len(arrived)
+        return bytes(arrived)
+
+
+class Hampered:
+    """One connection that something is wrong with, or that still holds what came before."""
+
+    def __init__(self, impairment: Impairment | None, now: float) -> None:
+        """Begin with nothing on its way."""
+        self.impairment = impairment
+        self.frozen = False
+        self._incoming, self._outgoing = Line(now), Line(now)
+
+    @property
+    def unsent(self) -> int:
+        """Bytes that have been said and have not left."""
+        return self._outgoing.size
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing is wrong any more and nothing held back."""
+        return (self.impairment is None and not self.frozen
+                and not self._incoming.size and not self._outgoing.size)
+
+    def say(self, data: bytes, now: float) -> None:
+        """Take what the robot says."""
+        silent = self.impairment is not None and self.impairment.silent
+        if not self.frozen and not silent:
+            self._outgoing.put(data, now + self._delay)
+
+    def hear(self, data: bytes, now: float) -> None:
+        """Take what the client says."""
+        if not self.frozen:
+            self._incoming.put(data, now + self._delay)
+
+    def heard(self, now: float) -> bytes:
+        """Return what reaches the robot now."""
+        return self._incoming.take(*self._terms(now))
+
+    def said(self, now: float) -> bytes:
+        """Return what leaves the robot now."""
+        return self._outgoing.take(*self._terms(now))
+
+    @property
+    def _delay(self) -> float:
+        return 0.0 if self.impairment is None else self.impairment.delay
+
+    def _terms(self, now: float) -> tuple[float, float]:
+        """Return until when pieces are due, and how fast they may come; at once when cured."""
+        return (inf, inf) if self.impairment is None else (now, self.impairment.rate)
