@@ -14,13 +14,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, sin
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.robots import Geometry, JOINT_NAMES, RobotModel
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector3
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 
 #: A number: one pose's, or one for each pose of a batch.
 N = TypeVar('N', float, NDArray[np.float64])
@@ -44,17 +44,20 @@ class _Link:
 
 
 @dataclass(frozen=True, slots=True)
-class Frames:
-    """Where the joints and the flange are, in base axes."""
+class FramesOf(Generic[N]):
+    """Where the joints and the flange are, in base axes: of one row or of each of a batch."""
 
     #: Origin [m] and direction of each joint's axis.
-    origins: tuple[Vector3, ...]
-    axes: tuple[Vector3, ...]
+    origins: tuple[tuple[N, N, N], ...]
+    axes: tuple[tuple[N, N, N], ...]
     #: The flange: origin [m] and the directions of its axes x, y, z.
-    position: Vector3
-    x: Vector3
-    y: Vector3
-    z: Vector3
+    position: tuple[N, N, N]
+    x: tuple[N, N, N]
+    y: tuple[N, N, N]
+    z: tuple[N, N, N]
+
+
+Frames: TypeAlias = FramesOf[float]
 
 
 class Arm:
@@ -121,18 +124,33 @@ class Arm:
             return jacobian_at(frames, frames.position)
         return jacobian_at(frames, (self.forward(q) @ T_flange_tcp).position)
 
+    def jacobian_rows(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the Jacobians (n, 6, 6) of the flange at many joint positions (n, 6)."""
+        frames = self.frames_rows(q)
+        return jacobian_at(frames, frames.position)
+
     def frames(self, q: Sequence[float]) -> Frames:
         """Return the places and directions of all joints and of the flange [m]."""
-        px = py = pz = 0.0
-        xx, xy, xz = 1.0, 0.0, 0.0
-        yx, yy, yz = 0.0, 1.0, 0.0
-        zx, zy, zz = 0.0, 0.0, 1.0
-        origins: list[Vector3] = []
-        axes: list[Vector3] = []
-        for link, angle in zip(self._links, q, strict=True):
+        return self._frames([(cos(angle + link.theta), sin(angle + link.theta))
+                             for link, angle in zip(self._links, q, strict=True)], 0.0, 1.0)
+
+    def frames_rows(self, q: NDArray[np.float64]) -> FramesOf[NDArray[np.float64]]:
+        """Return the same for many joint positions (n, 6); each number is an array (n,)."""
+        angles = np.ascontiguousarray(q.T) + np.array(self.geometry.theta)[:, None]
+        return self._frames(list(zip(np.cos(angles), np.sin(angles), strict=True)),
+                            np.zeros(len(q)), np.ones(len(q)))
+
+    def _frames(self, turns: list[tuple[N, N]], zero: N, one: N) -> FramesOf[N]:
+        """Walk along the links, from the cosine and the sine of each joint."""
+        px = py = pz = zero
+        xx, xy, xz = one, zero, zero
+        yx, yy, yz = zero, one, zero
+        zx, zy, zz = zero, zero, one
+        origins: list[tuple[N, N, N]] = []
+        axes: list[tuple[N, N, N]] = []
+        for link, (c, s) in zip(self._links, turns, strict=True):
             origins.append((px, py, pz))
             axes.append((zx, zy, zz))
-            c, s = cos(angle + link.theta), sin(angle + link.theta)
             # Rz: the axes x and y turn about z,
             ux, uy, uz = c * yx - s * xx, c * yy - s * xy, c * yz - s * xz
             xx, xy, xz = c * xx + s * yx, c * xy + s * yy, c * xz + s * yz
@@ -140,15 +158,19 @@ class Arm:
             a, d = link.a, link.d
             px, py, pz = px + d * zx + a * xx, py + d * zy + a * xy, pz + d * zz + a * xz
             # Rx: y and z turn about the new x.
-            c, s = link.cos_alpha, link.sin_alpha
-            yx, yy, yz = c * ux + s * zx, c * uy + s * zy, c * uz + s * zz
-            zx, zy, zz = c * zx - s * ux, c * zy - s * uy, c * zz - s * uz
-        return Frames(tuple(origins), tuple(axes), (px, py, pz),
+            ca, sa = link.cos_alpha, link.sin_alpha
+            yx, yy, yz = ca * ux + sa * zx, ca * uy + sa * zy, ca * uz + sa * zz
+            zx, zy, zz = ca * zx - sa * ux, ca * zy - sa * uy, ca * zz - sa * uz
+        return FramesOf(tuple(origins), tuple(axes), (px, py, pz),
                       (xx, xy, xz), (yx, yy, yz), (zx, zy, zz))
 
 
-def jacobian_at(frames: Frames, point: Vector3) -> NDArray[np.float64]:
-    """Return the Jacobian (6, 6) of a point of the last link [m], all in base axes."""
+def jacobian_at(frames: FramesOf[N], point: tuple[N, N, N]) -> NDArray[np.float64]:
+    """
+    Return the Jacobian (6, 6) of a point of the last link [m], all in base axes.
+
+    :returns: (6, 6); of frames of n rows (n, 6, 6).
+    """
     x, y, z = point
     columns = []
     for (px, py, pz), (ax, ay, az) in zip(frames.origins, frames.axes, strict=True):

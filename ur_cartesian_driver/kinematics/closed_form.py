@@ -24,11 +24,11 @@ from ur_cartesian_driver.motion.primitive import Joints
 
 # A square this far below zero counts as zero [m^2]: the flange lies a nanometre out of reach, as
 # the poses do that a robot rounds when it reports its own stretched arm.
-_SLACK = 1e-9
+FLANGE_ROUNDING = 1e-9
 # Two roots this close are one [m^2]: their joint positions differ by about a microradian.
-_MERGED = 1e-13
+MERGED_ROOTS = 1e-13
 # Sine of wrist 2 below which the axes 4 and 6 are one line and only their sum counts.
-_WRIST_SINGULAR = 2e-10
+WRIST_SINGULAR = 2e-10
 # How many times the misfit wrist 3 must be off the axis of wrist 1 for its direction to count.
 _WRIST_DOUBT = 3.0
 
@@ -56,14 +56,19 @@ def closed_form(shape: Shape, T_base_flange: Pose, wrist_3: float = 0.0, doubt: 
         the ideal one does not; there both roots are returned, as guesses.
     """
     o1, o2, o3, o4, o5, o6 = shape.offsets
-    # (r + dr)^2 - r^2 is about 2 r dr.
-    slack = doubt * 2.0 * shape.misfit * abs(shape.a2 + shape.a3)
+    slack = root_slack(shape, doubt)
     return [
         (wrap(wrist.theta1 - o1), wrap(theta2 - o2), wrap(theta3 - o3),
          wrap(wrist.theta234 - theta2 - theta3 - o4),
          wrap(wrist.theta5 - o5), wrap(wrist.theta6 - o6))
         for wrist in wrists(shape, T_base_flange, wrist_3 + o6, slack)
         for theta2, theta3 in _elbows(shape, wrist.outward, wrist.up, slack)]
+
+
+def root_slack(shape: Shape, doubt: float) -> float:
+    """Return by how much a square in the roots is uncertain [m^2]."""
+    # (r + dr)^2 - r^2 is about 2 r dr.
+    return doubt * 2.0 * shape.misfit * abs(shape.a2 + shape.a3)
 
 
 def wrist_centre(shape: Shape, T_base_flange: Pose) -> Vector3:
@@ -102,7 +107,7 @@ def _flips(shape: Shape, along_x: float, along_y: float, c5: float, theta6_if_si
     """Solve the wrist, from the flange's axes along axis 2: theta5, theta6."""
     s5 = hypot(along_x, along_y)
     theta5, theta6 = atan2(s5, c5), atan2(-along_y, along_x)
-    if s5 < _WRIST_SINGULAR:
+    if s5 < WRIST_SINGULAR:
         yield theta5, theta6_if_singular
         return
     yield theta5, theta6
@@ -130,10 +135,10 @@ def _elbows(shape: Shape, outward: float, up: float, slack: float
 
 def _roots(square: float, slack: float) -> tuple[float, ...]:
     """Return the square roots, the positive one first; both also where slack decides."""
-    if square < -max(slack, _SLACK):
+    if square < -max(slack, FLANGE_ROUNDING):
         return ()
     square = max(square, 0.25 * slack)
-    if square < _MERGED:
+    if square < MERGED_ROOTS:
         return (0.0,)
     root = sqrt(square)
     return (root, -root)

@@ -26,7 +26,7 @@ _LIMIT_ROUNDING = 1e-9
 
 # How many times its misfit, a mean, the ideal arm is taken to be wrong; the second if the first
 # leads to nothing, which happens where two singularities meet.
-_DOUBTS = (3.0, 30.0)
+DOUBTS = (3.0, 30.0)
 
 # Newton: the sum of the squares of metres and radians that counts as exact; the number of steps,
 # of steps that may fail to halve the error, and the longest of a joint [rad].
@@ -63,7 +63,7 @@ def solutions(arm: Arm, T_base_flange: Pose, seed: Joints | None = None) -> list
     if not arm.calibrated:
         return closed_form(shape_of(arm), T_base_flange, wrist_3)
     more = [seed] if seed is not None and _is_near(arm.forward(seed), T_base_flange) else []
-    for doubt in _DOUBTS:
+    for doubt in DOUBTS:
         starts = closed_form(shape_of(arm), T_base_flange, wrist_3, doubt)
         found = _refined(arm, T_base_flange, starts + more)
         if found:
@@ -78,7 +78,7 @@ def nearest(arm: Arm, T_base_flange: Pose, q_near: Joints) -> Joints | None:
     Nearest of all branches and of all full turns of each joint, by the sum of squares.
     """
     best = None
-    for doubt in _DOUBTS if arm.calibrated else (0.0,):
+    for doubt in DOUBTS if arm.calibrated else (0.0,):
         starts = closed_form(shape_of(arm), T_base_flange, q_near[5], doubt)
         best = _nearest_of(arm, T_base_flange, starts, q_near)
         if best is not None:

@@ -1,0 +1,226 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The closed form for many poses at once, one branch at a time.
+
+The formulas are those of :mod:`~.closed_form`. There each root of one pose is found in turn; here
+the three choices (shoulder, elbow, wrist) are given as signs and all poses are solved for them.
+The same three quantities whose signs are the choices vanish where the arm is singular, so that a
+:class:`Posture` is both the name of a branch and its distance from its twin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import pi, tau
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.closed_form import (
+    FLANGE_ROUNDING,
+    MERGED_ROOTS,
+    WRIST_SINGULAR,
+)
+from ur_cartesian_driver.kinematics.shape import Shape
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+#: The signs of shoulder, elbow and wrist of the eight branches, in the order of their numbers.
+BRANCHES = tuple((shoulder, elbow, wrist)
+                 for shoulder in (1, -1) for elbow in (1, -1) for wrist in (1, -1))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Posture:
+    """
+    Of each row, three signed measures: the sign is the branch, 0 is the singularity.
+
+    Those of a calibrated arm are of the ideal arm that is most like it: exact to its misfit.
+    """
+
+    #: How far the wrist centre is in front of the plane of the axes 1 and 2 [m]. The centre is
+    #: that far outside of the cylinder about the axis 1 that it cannot enter, by Pythagoras:
+    #: its distance from the axis is hypot(d4, shoulder).
+    shoulder: Floats
+    #: sin theta3: 0 where the arm is stretched or folded.
+    elbow: Floats
+    #: sin theta5: 0 where the axes 4 and 6 are parallel.
+    wrist: Floats
+
+    @property
+    def branch(self) -> NDArray[np.int64]:
+        """The number of the branch, 0 to 7; see :data:`BRANCHES`."""
+        return (4 * (self.shoulder < 0) + 2 * (self.elbow < 0) + (self.wrist < 0)).astype(np.int64)
+
+
+@dataclass(frozen=True, slots=True)
+class Targets:
+    """Poses as columns: positions, and rotation matrices row by row, each an array (n,)."""
+
+    position: tuple[Floats, Floats, Floats]
+    rotation: tuple[Floats, ...]
+
+    @classmethod
+    def of(cls, poses: Floats) -> Targets:
+        """Take rows (n, 7): x y z [m], unit quaternion x y z w."""
+        px, py, pz, x, y, z, w = np.ascontiguousarray(poses.T, dtype=np.float64)
+        return cls((px, py, pz), (
+            1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w),
+            2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w),
+            2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)))
+
+    def rows(self, index: NDArray[np.int64]) -> Targets:
+        """Return some of the rows."""
+        px, py, pz = (p[index] for p in self.position)
+        return Targets((px, py, pz), tuple(r[index] for r in self.rotation))
+
+
+@dataclass(frozen=True, slots=True)
+class Branch:
+    """One branch of many poses."""
+
+    #: (6, n) angles [rad], not wrapped; meaningless where it does not exist.
+    q: Floats
+    #: (n,) whether the pose has this branch; of two that meet it has both.
+    exists: Flags
+    #: (n,) whether it is the same as the branch of the other sign, which comes first.
+    repeats: Flags
+    #: (n,) no other branch is nearer than this [rad], full turns not counted.
+    apart: Floats
+
+
+def posture(shape: Shape, q: Floats) -> Posture:
+    """Return the measures of joint positions (n, 6) [rad]."""
+    theta = q.T + np.array(shape.offsets)[:, None]
+    theta23 = theta[1] + theta[2]
+    return Posture(
+        shoulder=(shape.a2 * np.cos(theta[1]) + shape.a3 * np.cos(theta23)
+                  + shape.d5 * np.sin(theta23 + theta[3])),
+        elbow=np.sin(theta[2]), wrist=np.sin(theta[4]))
+
+
+def branch_rows(shape: Shape, targets: Targets, signs: tuple[int, int, int],
+                wrist_3: float = 0.0, slack: float = 0.0) -> Branch:
+    """
+    Solve all poses for one branch.
+
+    :param signs: of shoulder, elbow and wrist.
+    :param wrist_3: what wrist 3 is to show where the axes 4 and 6 are one line [rad].
+    :param slack: as of the roots in :mod:`~.closed_form` [m^2].
+    """
+    shoulder, elbow, wrist = signs
+    pan = _pan(shape, targets, shoulder, slack)
+    flip = _flip(shape, targets, pan, wrist, wrist_3)
+    lift = _lift(shape, flip, elbow, slack)
+    theta = np.stack([pan.theta1, lift.theta2, lift.theta3,
+                      flip.theta234 - lift.theta2 - lift.theta3, flip.theta5, flip.theta6])
+    elbow_apart = 2.0 * np.abs(lift.theta3)
+    return Branch(
+        theta - np.array(shape.offsets)[:, None],
+        pan.exists & lift.exists,
+        _second(shoulder, pan.outward) | _second(elbow, lift.smaller) | flip.repeats,
+        # The twin of the wrist has theta6 + pi, whatever its elbow and if its shoulder is this.
+        np.minimum(np.minimum(elbow_apart, tau - elbow_apart), pan.apart))
+
+
+def all_branch_rows(shape: Shape, targets: Targets, wrist_3: float = 0.0, slack: float = 0.0
+                    ) -> Iterator[Branch]:
+    """Solve for the eight branches in the order of :data:`BRANCHES`."""
+    for signs in BRANCHES:
+        yield branch_rows(shape, targets, signs, wrist_3, slack)
+
+
+@dataclass(frozen=True, slots=True)
+class _Pan:
+    theta1: Floats
+    sin: Floats
+    cos: Floats
+    outward: Floats
+    up: Floats
+    exists: Flags
+    apart: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class _Flip:
+    theta5: Floats
+    theta6: Floats
+    theta234: Floats
+    outward: Floats
+    up: Floats
+    repeats: Flags
+
+
+@dataclass(frozen=True, slots=True)
+class _Lift:
+    theta2: Floats
+    theta3: Floats
+    exists: Flags
+    #: The root that decides the elbow, or that which vanishes where it is folded [m].
+    smaller: Floats
+
+
+def _pan(shape: Shape, targets: Targets, sign: int, slack: float) -> _Pan:
+    r = targets.rotation
+    px, py, pz = (p - shape.d6 * z for p, z in zip(targets.position, r[2::3], strict=True))
+    d4 = shape.d4
+    root, exists = _root(px * px + py * py - d4 * d4, slack)
+    outward = sign * root
+    s1, c1 = d4 * px + outward * py, outward * px - d4 * py
+    length = np.maximum(np.sqrt(s1 * s1 + c1 * c1), 1e-300)  # 0 on the axis, out of reach
+    return _Pan(np.arctan2(s1, c1), s1 / length, c1 / length, outward, pz - shape.d1, exists,
+                2.0 * np.arctan2(root, abs(d4)))
+
+
+def _flip(shape: Shape, targets: Targets, pan: _Pan, sign: int, wrist_3: float) -> _Flip:
+    r11, r12, r13, r21, r22, r23, r31, r32, _ = targets.rotation
+    s1, c1 = pan.sin, pan.cos
+    along_x, along_y, c5 = s1 * r11 - c1 * r21, s1 * r12 - c1 * r22, s1 * r13 - c1 * r23
+    s5 = np.sqrt(along_x * along_x + along_y * along_y)
+    straight = s5 < WRIST_SINGULAR
+    theta6_straight = wrist_3 + shape.offsets[5]
+    safe = np.where(straight, 1.0, s5)
+    s6 = np.where(straight, np.sin(theta6_straight), -sign * along_y / safe)
+    c6 = np.where(straight, np.cos(theta6_straight), sign * along_x / safe)
+    s234 = -(c1 * (s6 * r11 + c6 * r12) + s1 * (s6 * r21 + c6 * r22))
+    c234 = s6 * r31 + c6 * r32
+    theta6 = np.where(straight, theta6_straight, np.arctan2(s6, c6))
+    return _Flip(np.arctan2(sign * s5, c5), theta6, np.arctan2(s234, c234),
+                 pan.outward - shape.d5 * s234, pan.up + shape.d5 * c234, straight & (sign < 0))
+
+
+def _lift(shape: Shape, flip: _Flip, sign: int, slack: float) -> _Lift:
+    a2, a3 = shape.a2, shape.a3
+    square = flip.outward * flip.outward + flip.up * flip.up
+    folded, not_too_near = _root(square - (a2 - a3) ** 2, slack)
+    stretched, not_too_far = _root((a2 + a3) ** 2 - square, slack)
+    f2, s2 = folded * folded, stretched * stretched
+    c3 = (f2 - s2) / (f2 + s2)
+    s3 = 2.0 * sign * folded * stretched / (f2 + s2)
+    along, across = a2 + a3 * c3, a3 * s3
+    return _Lift(
+        np.arctan2(flip.up * along - flip.outward * across,
+                   flip.outward * along + flip.up * across),
+        2.0 * np.arctan2(sign * stretched, folded),
+        not_too_near & not_too_far, np.minimum(folded, stretched))
+
+
+def _root(square: Floats, slack: float) -> tuple[Floats, Flags]:
+    """Return the root that is not negative, and whether there is one."""
+    exists = square >= -max(slack, FLANGE_ROUNDING)
+    square = np.maximum(square, 0.25 * slack)
+    return np.sqrt(np.where(square < MERGED_ROOTS, 0.0, square)), exists
+
+
+def _second(sign: int, root: Floats) -> Flags:
+    """Tell where both signs are the same root and this is the second."""
+    return root == 0.0 if sign < 0 else np.zeros(len(root), dtype=np.bool_)
+
+
+def wrapped(angles: Floats) -> Floats:
+    """Return the angles within (-pi, pi]."""
+    angles = angles - tau * np.rint(angles / tau)
+    return np.where(angles <= -pi, pi, angles)

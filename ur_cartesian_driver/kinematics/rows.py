@@ -1,0 +1,273 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The inverse kinematics of a sampled path, or of any batch of poses.
+
+A look ahead along a goal asks for tens of thousands of poses; one by one that takes seconds. Here
+numpy solves them together. Where rows are regular, which is nearly always, the result needs no
+search: the branch stays the one of the row before. That is proved for each row by comparing its
+step with its distance to the other branches; the few rows where the proof fails (next to
+singularities, at joint limits, after a jump) are given to :mod:`~.inverse`, so that both give the
+same answers.
+
+Poses are rows (n, 7), x y z [m] and the unit quaternion x y z w; joints rows (n, 6) [rad].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import tau
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.chain import Arm, FramesOf, jacobian_at
+from ur_cartesian_driver.kinematics.closed_form import root_slack
+from ur_cartesian_driver.kinematics.closed_form_rows import (
+    all_branch_rows,
+    Branch,
+    branch_rows,
+    BRANCHES,
+    Flags,
+    Floats,
+    Posture,
+    posture,
+    Targets,
+    wrapped,
+)
+from ur_cartesian_driver.kinematics.inverse import DOUBTS, nearest, solutions
+from ur_cartesian_driver.kinematics.shape import shape_of
+from ur_cartesian_driver.motion.pose import pose_from_row
+from ur_cartesian_driver.motion.primitive import Joints
+
+# Rows solved together: as many as have their numbers in the cache of a core.
+_BLOCK = 1024
+# Rows that are tried after one at which the branch had to be searched for.
+_FIRST_BLOCK = 16
+
+# Newton: the sum of the squares of metres and radians that counts as exact, and the least damping,
+# which keeps the normal equations of a singular arm solvable and slows no other down.
+_EXACT = 1e-21
+_LEAST_DAMPING = 1e-14
+_LONGEST_STEP = 0.5
+# Steps from a solution of the ideal arm: two suffice but next to singularities.
+_STEPS = 3
+# A solution of the real arm this far from that of the ideal one [rad] may belong to another.
+_MOVED = 0.05
+# Branches of the ideal arm this close may be exchanged in the real one [rad].
+_CONFUSED = 4.0 * _MOVED
+_LIMIT_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Branches:
+    """All solutions of many poses."""
+
+    #: (n, 8, 6) [rad], within (-pi, pi]; NaN where there is none. The second index is the branch
+    #: of :class:`Posture`; next to a singularity of a calibrated arm it is only a place.
+    q: Floats
+    #: (n, 8) which of them there are. Where branches meet only one of them.
+    exists: Flags
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JointPath:
+    """The joint positions of an arm that follows a path."""
+
+    #: (n, 6) [rad], NaN where no solution lies within the limits.
+    q: Floats
+    #: (n,) whether there is one.
+    found: Flags
+    #: (n,) the largest change of a joint from the last row that was found [rad], of the first row
+    #: from the start. Where branch or turn jump it is large however finely the path is sampled.
+    step: Floats
+
+
+def postures(arm: Arm, q: Floats) -> Posture:
+    """Return the branch, and the distance from each singularity, of joint rows (n, 6)."""
+    return posture(shape_of(arm), q)
+
+
+# --- All branches ----------------------------------------------------------------------------
+
+def branches(arm: Arm, poses: Floats, wrist_3: float = 0.0) -> Branches:
+    """
+    Return all solutions of each pose, whatever the limits are: those of ``solutions``.
+
+    :param poses: (n, 7).
+    :param wrist_3: what wrist 3 is to show where the axes 4 and 6 are one line [rad].
+    """
+    q = np.full((len(poses), len(BRANCHES), 6), np.nan)
+    exists = np.zeros((len(poses), len(BRANCHES)), dtype=np.bool_)
+    for begin in range(0, len(poses), _BLOCK):
+        rows = slice(begin, begin + _BLOCK)
+        q[rows], exists[rows] = _branches(arm, poses[rows], wrist_3)
+    q[~exists] = np.nan
+    return Branches(q=q, exists=exists)
+
+
+def _branches(arm: Arm, poses: Floats, wrist_3: float) -> tuple[Floats, Flags]:
+    targets = Targets.of(poses)
+    found = list(all_branch_rows(shape_of(arm), targets, wrist_3))
+    q = np.stack([branch.q.T for branch in found], axis=1)
+    exists = np.stack([branch.exists & ~branch.repeats for branch in found], axis=1)
+    if arm.calibrated:
+        sound = _sound(arm, targets, q, found)
+        for i in range(len(BRANCHES)):
+            rows = np.flatnonzero(sound & exists[:, i])
+            refined, exact = refine(arm, targets.rows(rows), q[rows, i])
+            sound[rows] &= exact & (_largest(refined - q[rows, i]) < _MOVED)
+            q[rows, i] = refined
+        for row in np.flatnonzero(~sound):
+            q[row], exists[row] = _searched(arm, poses[row], wrist_3)
+    return wrapped(q), exists
+
+
+def _sound(arm: Arm, targets: Targets, q: Floats, found: list[Branch]) -> Flags:
+    """Tell of which poses the ideal arm's branches are certain to be the real one's."""
+    shape = shape_of(arm)
+    sound: Flags = np.logical_or.reduce([branch.exists for branch in found])
+    possible = all_branch_rows(shape, targets, slack=root_slack(shape, DOUBTS[0]))
+    for i, (branch, doubtful) in enumerate(zip(found, possible, strict=True)):
+        straight = np.abs(posture(shape, q[:, i]).wrist) < _CONFUSED
+        certain = branch.exists & (branch.apart > _CONFUSED) & ~straight
+        sound = sound & (certain | ~doubtful.exists)
+    return sound
+
+
+def _searched(arm: Arm, pose: Floats, wrist_3: float) -> tuple[Floats, Flags]:
+    """Put the solutions of a single pose into the places of their branches, if these are free."""
+    q, exists = np.full((len(BRANCHES), 6), np.nan), np.zeros(len(BRANCHES), dtype=np.bool_)
+    found = np.array(solutions(arm, pose_from_row(pose), (0.0,) * 5 + (wrist_3,))).reshape(-1, 6)
+    for solution, branch in zip(found, postures(arm, found).branch, strict=True):
+        place = int(branch) if not exists[branch] else int(np.flatnonzero(~exists)[0])
+        q[place], exists[place] = solution, True
+    return q, exists
+
+
+# --- Along a path ----------------------------------------------------------------------------
+
+def follow(arm: Arm, poses: Floats, q_start: Joints) -> JointPath:
+    """
+    Return the joint positions along a path, each the nearest to those of the row before.
+
+    The same as :func:`~.inverse.nearest` from row to row: nearest of all branches and all full
+    turns within the limits. A row without solution is passed over.
+
+    :param poses: (n, 7).
+    :param q_start: from where the first row is reached [rad].
+    """
+    q = np.full((len(poses), 6), np.nan)
+    before, row, block, singly = q_start, 0, _FIRST_BLOCK, 1
+    while row < len(poses):
+        ahead = _ahead(arm, poses[row:row + block], before)
+        if len(ahead):
+            q[row:row + len(ahead)] = ahead
+            row, before, singly = row + len(ahead), _joints(ahead[-1]), 1
+        if len(ahead) == block:
+            block = min(2 * block, _BLOCK)
+            continue
+        for index in range(row, min(row + singly, len(poses))):
+            solution = nearest(arm, pose_from_row(poses[index]), before)
+            if solution is not None:
+                q[index] = before = solution
+        # Of a long stretch that is not certain few rows are tried in vain.
+        row, block, singly = row + singly, _FIRST_BLOCK, min(2 * singly, _FIRST_BLOCK)
+    found = ~np.isnan(q[:, 0])
+    return JointPath(q=q, found=found, step=_steps(q, found, q_start))
+
+
+def _ahead(arm: Arm, poses: Floats, before: Joints) -> Floats:
+    """Return the joints of the rows that are certain to stay on the branch they are on."""
+    shape, targets = shape_of(arm), Targets.of(poses)
+    start = np.array([before])
+    signs = BRANCHES[int(posture(shape, start).branch[0])]
+    branch = branch_rows(shape, targets, signs)
+    q, certain = branch.q.T, branch.exists
+    room = 0.5 * branch.apart
+    if arm.calibrated:
+        refined, exact = refine(arm, targets, q)
+        certain = certain & exact & (_largest(refined - q) < _MOVED)
+        q, room = refined, room - 0.5 * _CONFUSED
+    way = np.concatenate([start, q])
+    way = way - tau * np.cumsum(np.rint(np.diff(way, axis=0, prepend=start) / tau), axis=0)
+    # Triangle inequality: of two branches that are `apart` now, the one within half of that from
+    # where the arm was is the nearer one.
+    change = np.diff(way, axis=0)
+    certain = certain & (np.einsum('ij,ij->i', change, change) < np.maximum(room, 0.0) ** 2)
+    low, high = np.array(arm.model.position_limits).T
+    q = way[1:]
+    inside = (q >= low - _LIMIT_ROUNDING) & (q <= high + _LIMIT_ROUNDING)
+    certain = certain & inside.all(axis=1)
+    stop = len(q) if certain.all() else int(np.argmin(certain))
+    clipped: Floats = np.clip(q[:stop], low, high)
+    return clipped
+
+
+def _steps(q: Floats, found: Flags, q_start: Joints) -> Floats:
+    steps = np.full(len(q), np.nan)
+    steps[found] = _largest(np.diff(q[found], axis=0, prepend=np.array([q_start])))
+    return steps
+
+
+def _largest(changes: Floats) -> Floats:
+    largest: Floats = np.abs(changes).max(axis=1, initial=0.0)
+    return largest
+
+
+def _joints(row: Floats) -> Joints:
+    a, b, c, d, e, f = row.tolist()
+    return (a, b, c, d, e, f)
+
+
+# --- The calibrated arm ----------------------------------------------------------------------
+
+def refine(arm: Arm, targets: Targets, q: Floats, steps: int = _STEPS) -> tuple[Floats, Flags]:
+    """
+    Return the joint positions that Newton's method finds from ``q``, and which are exact.
+
+    Exact is an error below 3e-11 [m, rad].
+
+    :param q: (n, 6) [rad], within some hundredths of the solution.
+    """
+    q = q.copy()
+    exact = np.zeros(len(q), dtype=np.bool_)
+    active = np.arange(len(q))
+    for step in range(steps + 1):
+        frames = arm.frames_rows(q[active])
+        errors, facing = _errors(frames, targets)
+        squares = np.einsum('in,in->n', errors, errors)
+        done = facing & (squares < _EXACT)
+        exact[active[done]] = True
+        if step == steps or done.all():
+            break
+        change = _newton(frames, errors, squares)
+        change[done] = 0.0
+        q[active] += change
+        if done.any():
+            active, targets = active[~done], targets.rows(np.flatnonzero(~done))
+    return q, exact
+
+
+def _errors(frames: FramesOf[Floats], targets: Targets) -> tuple[Floats, Flags]:
+    """Return what lacks to the targets (6, n), as for a single pose, and whether they face it."""
+    r = targets.rotation
+    turn, cosines = np.zeros((3, len(r[0]))), np.zeros(len(r[0]))
+    for (ax, ay, az), (bx, by, bz) in zip(
+            (frames.x, frames.y, frames.z), (r[0::3], r[1::3], r[2::3]), strict=True):
+        turn += (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
+        cosines += ax * bx + ay * by + az * bz
+    shift = np.subtract(targets.position, frames.position)
+    # The sum of the cosines is 1 + 2 cos(angle). The sines also vanish for half a turn.
+    return np.concatenate([shift, 0.5 * turn]), cosines > 1.0
+
+
+def _newton(frames: FramesOf[Floats], errors: Floats, squares: Floats) -> Floats:
+    """Return (J'J + square I)^-1 J' error (n, 6), the largest change of each row limited."""
+    jacobian = jacobian_at(frames, frames.position)
+    transposed = jacobian.transpose(0, 2, 1)
+    normal = transposed @ jacobian
+    normal[:, range(6), range(6)] += np.maximum(squares, _LEAST_DAMPING)[:, None]
+    gradient = transposed @ errors.T[:, :, None]
+    change: Floats = np.linalg.solve(normal, gradient)[:, :, 0].astype(np.float64)
+    change *= np.minimum(1.0, _LONGEST_STEP / np.maximum(_largest(change), 1e-300))[:, None]
+    return change
