@@ -46,7 +46,8 @@ states = st.builds(
     safety_mode=st.sampled_from(SafetyMode), runtime_state=st.sampled_from(RuntimeState),
     robot_status=st.integers(0, 15).map(RobotStatus),
     safety_status=st.integers(0, 0xFFF).map(SafetyStatus),
-    points_begun=st.integers(0, 2**31 - 1))
+    points_begun=st.integers(0, 2**31 - 1), actual_tcp_acceleration=st.none() | vectors,
+    target_tcp_acceleration=st.none() | vectors)
 
 
 @given(states)
@@ -94,4 +95,4 @@ def test_a_reader_never_sees_half_of_a_state(memories):
 
 def test_the_layout_holds_every_field_of_the_state():
     """A field that is added to RobotState has to be added to the memory too."""
-    assert len(fields(RobotState)) == 19
+    assert len(fields(RobotState)) == 21

@@ -67,7 +67,8 @@ def test_every_parameter_is_declared_once():
 def test_every_option_is_a_parameter_but_for_what_is_found_out():
     options = {f.name for kind in (DriverConfig, PlanningOptions, NodeSettings)
                for f in fields(kind)}
-    assert options - set(defaults()) == {'calibration_known', 'optimove_known'}
+    assert options - set(defaults()) == {
+        'calibration_known', 'optimove_known', 'acceleration_known'}
 
 
 def test_every_default_is_in_its_range():

@@ -236,7 +236,9 @@ class Driver:
         status = self._status
         options = replace(
             self.options, calibration_known=status.calibration_known,
-            optimove_known=has_feature('optimove', software_version(status.polyscope_version)))
+            optimove_known=has_feature('optimove', software_version(status.polyscope_version)),
+            acceleration_known=state.actual_tcp_acceleration is not None
+            and state.target_tcp_acceleration is not None)
         return plan(goal, state, self.arm, options)
 
     def start(self, plan: Plan, on_progress: OnProgress | None = None) -> Motion:

@@ -15,6 +15,9 @@ class DriverConfig(LinkSettings):
 
     #: Not used yet: for services that need the dashboard.
     dashboard_port: int = 29999
+    #: How far the controller's own target may be from the plan, corners apart [m], [rad]; 0 = any.
+    max_plan_deviation: float = 0.002
+    max_plan_deviation_angle: float = 0.02
     #: Progress reports per second.
     feedback_rate: float = 25.0
     #: The arm is stopped when the owner of the driver is silent for that long [s].
@@ -33,3 +36,6 @@ class DriverConfig(LinkSettings):
             raise ValueError(
                 f"robot_loop is {self.robot_loop!r}, it has to be 'process' or 'thread'.")
         self._require_positive('feedback_rate', 'node_timeout')
+        for name in ('max_plan_deviation', 'max_plan_deviation_angle'):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f'{name} is {getattr(self, name)}, it must not be negative.')

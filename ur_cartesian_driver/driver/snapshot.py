@@ -11,12 +11,13 @@ behind, however the processes end.
 
 from __future__ import annotations
 
+from math import isnan, nan
 import mmap
 import os
 import struct
 import tempfile
 
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.motion.state import (
     RobotMode,
     RobotState,
@@ -28,9 +29,11 @@ from ur_cartesian_driver.motion.state import (
 
 _COUNTER = struct.Struct('<Q')
 #: valid, timestamp, q qd (actual, target), TCP pose and twist (actual, target), wrench, TCP
-#: offset, two scalings, modes, bits, points begun.
-_DATA = struct.Struct('<?d6d6d6d6d7d6d7d6d6d7ddd6i')
+#: offset, two scalings, accelerations (actual, target; NaN: not reported), modes, bits, points
+#: begun.
+_DATA = struct.Struct('<?d6d6d6d6d7d6d7d6d6d7ddd6d6d6i')
 _SIZE = mmap.PAGESIZE
+_UNKNOWN = (nan,) * 6
 
 
 def create() -> int:
@@ -67,8 +70,9 @@ class StateMemory:
             *state.target_qd, *state.actual_tcp_pose.row(), *state.actual_tcp_twist,
             *state.target_tcp_pose.row(), *state.target_tcp_twist, *state.actual_tcp_wrench,
             *state.T_flange_tcp.row(), state.speed_scaling, state.target_speed_fraction,
-            state.robot_mode, state.safety_mode, state.runtime_state, state.robot_status,
-            state.safety_status, state.points_begun))
+            *(state.actual_tcp_acceleration or _UNKNOWN),
+            *(state.target_tcp_acceleration or _UNKNOWN), state.robot_mode, state.safety_mode,
+            state.runtime_state, state.robot_status, state.safety_status, state.points_begun))
 
     def read(self) -> RobotState | None:
         """Return the newest state, None when there is none."""
@@ -102,6 +106,10 @@ def _state(values: tuple[float, ...]) -> RobotState | None:
         a, b, c, d, e, f = take(6)
         return (a, b, c, d, e, f)
 
+    def known() -> Vector6 | None:
+        values = vector()
+        return None if isnan(values[0]) else values
+
     def pose() -> Pose:
         x, y, z, qx, qy, qz, qw = take(7)
         return Pose((x, y, z), (qx, qy, qz, qw))
@@ -114,6 +122,7 @@ def _state(values: tuple[float, ...]) -> RobotState | None:
         target_qd=vector(), actual_tcp_pose=pose(), actual_tcp_twist=vector(),
         target_tcp_pose=pose(), target_tcp_twist=vector(), actual_tcp_wrench=vector(),
         T_flange_tcp=pose(), speed_scaling=take(1)[0], target_speed_fraction=take(1)[0],
+        actual_tcp_acceleration=known(), target_tcp_acceleration=known(),
         robot_mode=RobotMode(number()), safety_mode=SafetyMode(number()),
         runtime_state=RuntimeState(number()), robot_status=RobotStatus(number()),
         safety_status=SafetyStatus(number()), points_begun=number())

@@ -107,6 +107,9 @@ class RobotState:
     actual_tcp_twist: Vector6 = ZERO6
     target_tcp_pose: Pose = IDENTITY
     target_tcp_twist: Vector6 = ZERO6
+    #: Linear [m/s^2] and angular [rad/s^2], as the twists; None = the robot does not report it.
+    actual_tcp_acceleration: Vector6 | None = None
+    target_tcp_acceleration: Vector6 | None = None
     #: Force [N] and torque [Nm] at the TCP in base axes.
     actual_tcp_wrench: Vector6 = ZERO6
     #: The active TCP in the flange frame.

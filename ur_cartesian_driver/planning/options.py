@@ -39,8 +39,26 @@ class PlanningOptions:
     calibration_known: bool = True
     #: Whether the robot's software knows OPTIMIZED moves (PolyScope 5.21, PolyScope X 10.8).
     optimove_known: bool = True
+    #: Whether the robot reports the accelerations of the TCP; else nobody can watch them.
+    acceleration_known: bool = True
     #: Prefix of the joint names in postures.
     tf_prefix: str = ''
+
+    #: Largest deviations on the way, on every axis of which the goal says nothing; 0 = without
+    #: limit: [m], [rad], [m/s], [rad/s], [m/s^2], [rad/s^2] ...
+    path_tolerance_position: float = 0.0
+    path_tolerance_orientation: float = 0.0
+    path_tolerance_linear_velocity: float = 0.0
+    path_tolerance_angular_velocity: float = 0.0
+    path_tolerance_linear_acceleration: float = 0.0
+    path_tolerance_angular_acceleration: float = 0.0
+    #: ... and at the end.
+    goal_tolerance_position: float = 0.0
+    goal_tolerance_orientation: float = 0.0
+    goal_tolerance_linear_velocity: float = 0.0
+    goal_tolerance_angular_velocity: float = 0.0
+    goal_tolerance_linear_acceleration: float = 0.0
+    goal_tolerance_angular_acceleration: float = 0.0
 
     #: Speeds and accelerations where the goal says nothing: tool [m/s], [m/s^2] ...
     linear_velocity: float = 0.1

@@ -51,6 +51,7 @@ from ur_cartesian_driver.planning.postures import (
 from ur_cartesian_driver.planning.reference import reference_path
 from ur_cartesian_driver.planning.report import ignored, note
 from ur_cartesian_driver.planning.timing import Leg, schedule, Timing
+from ur_cartesian_driver.planning.tolerances import with_default_tolerances
 from ur_cartesian_driver.planning.validate import (
     arc_of,
     check,
@@ -89,6 +90,7 @@ def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> P
     :raises GoalRefused: the subclass that fits; its text names place, quantity, value and bound.
     """
     check(goal, options)
+    goal = with_default_tolerances(goal, options)
     planner = _Planner(goal, state, arm, options)
     legs = planner.blended(planner.legs())
     timings = schedule(legs, options, arm.model)

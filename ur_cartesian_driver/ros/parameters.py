@@ -33,7 +33,7 @@ _TYPE_NAMES: Mapping[type, str] = {
     bool: 'true or false', int: 'a whole number', float: 'a number', str: 'a text',
     list: 'a list of texts'}
 #: Fields that are not set but found out.
-_FOUND_OUT = ('calibration_known', 'optimove_known')
+_FOUND_OUT = ('calibration_known', 'optimove_known', 'acceleration_known')
 #: Parameters that rclpy itself makes out of what it is given.
 _OF_RCLPY = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
 
@@ -149,6 +149,49 @@ DECLARATIONS: tuple[Declaration, ...] = (
                 'How far the robot may stand from a first point at time 0 [m].', 0.0, 1.0),
     Declaration('start_tolerance_angle',
                 'How far the robot may stand from a first point at time 0 [rad].', 0.0, 3.2),
+    # -- what is watched
+    Declaration('max_plan_deviation',
+                "How far the controller's own target may be from the plan, corners apart [m]; "
+                '0: any way.', 0.0, 1.0),
+    Declaration('max_plan_deviation_angle',
+                "How far the controller's own target may be from the plan, corners apart [rad]; "
+                '0: any angle.', 0.0, 3.2),
+    Declaration('path_tolerance_position',
+                'Largest deviation of the position on the way, where the goal does '
+                'not say [m]; 0: without limit.', 0.0, 10.0),
+    Declaration('path_tolerance_orientation',
+                'Largest deviation of the orientation on the way, where the goal does '
+                'not say [rad]; 0: without limit.', 0.0, 3.2),
+    Declaration('path_tolerance_linear_velocity',
+                'Largest deviation of the velocity on the way, where the goal does '
+                'not say [m/s]; 0: without limit.', 0.0, 10.0),
+    Declaration('path_tolerance_angular_velocity',
+                'Largest deviation of the angular velocity on the way, where the goal does '
+                'not say [rad/s]; 0: without limit.', 0.0, 50.0),
+    Declaration('path_tolerance_linear_acceleration',
+                'Largest deviation of the acceleration on the way, where the goal does '
+                'not say [m/s^2]; 0: without limit.', 0.0, 1000.0),
+    Declaration('path_tolerance_angular_acceleration',
+                'Largest deviation of the angular acceleration on the way, where the goal does '
+                'not say [rad/s^2]; 0: without limit.', 0.0, 1000.0),
+    Declaration('goal_tolerance_position',
+                'Largest deviation of the position at the end, where the goal does '
+                'not say [m]; 0: without limit.', 0.0, 10.0),
+    Declaration('goal_tolerance_orientation',
+                'Largest deviation of the orientation at the end, where the goal does '
+                'not say [rad]; 0: without limit.', 0.0, 3.2),
+    Declaration('goal_tolerance_linear_velocity',
+                'Largest deviation of the velocity at the end, where the goal does '
+                'not say [m/s]; 0: without limit.', 0.0, 10.0),
+    Declaration('goal_tolerance_angular_velocity',
+                'Largest deviation of the angular velocity at the end, where the goal does '
+                'not say [rad/s]; 0: without limit.', 0.0, 50.0),
+    Declaration('goal_tolerance_linear_acceleration',
+                'Largest deviation of the acceleration at the end, where the goal does '
+                'not say [m/s^2]; 0: without limit.', 0.0, 1000.0),
+    Declaration('goal_tolerance_angular_acceleration',
+                'Largest deviation of the angular acceleration at the end, where the goal does '
+                'not say [rad/s^2]; 0: without limit.', 0.0, 1000.0),
     # -- speeds where the goal says nothing
     Declaration('linear_velocity', 'Speed of the tool on lines and arcs [m/s].', 1e-4, 10.0),
     Declaration('linear_acceleration', 'Acceleration of the tool on lines and arcs [m/s^2].',

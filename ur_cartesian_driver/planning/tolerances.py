@@ -1,0 +1,50 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a tolerance of zero means: the parameter for that quantity."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ur_cartesian_driver.motion.goal import Goal, Tolerance
+from ur_cartesian_driver.motion.pose import Vector3, Vector6
+from ur_cartesian_driver.planning.options import PlanningOptions
+
+#: What tolerances limit, as in the names of the parameters ``path_tolerance_...``.
+_QUANTITIES = ('position', 'orientation', 'linear_velocity', 'angular_velocity',
+               'linear_acceleration', 'angular_acceleration')
+
+
+def tolerances_of(goal: Goal) -> tuple[tuple[str, Tolerance], tuple[str, Tolerance]]:
+    """Return both tolerances of a goal with their names."""
+    return ('path_tolerance', goal.path_tolerance), ('goal_tolerance', goal.goal_tolerance)
+
+
+def with_default_tolerances(goal: Goal, options: PlanningOptions) -> Goal:
+    """Return the goal with the parameters in place of zeros; what is still zero has no limit."""
+    path, end = (_filled(tolerance, name, options) for name, tolerance in tolerances_of(goal))
+    if path is goal.path_tolerance and end is goal.goal_tolerance:
+        return goal
+    return replace(goal, path_tolerance=path, goal_tolerance=end)
+
+
+def _filled(tolerance: Tolerance, name: str, options: PlanningOptions) -> Tolerance:
+    """Return a tolerance with the parameters ``<name>_position`` ... in place of its zeros."""
+    position, orientation, *rest = (
+        float(getattr(options, f'{name}_{quantity}')) for quantity in _QUANTITIES)
+    if not any((position, orientation, *rest)):
+        return tolerance
+
+    def three(values: Vector3, default: float) -> Vector3:
+        x, y, z = (value or default for value in values)
+        return (x, y, z)
+
+    def six(values: Vector6, linear: float, angular: float) -> Vector6:
+        x, y, z, rx, ry, rz = values
+        return (*three((x, y, z), linear), *three((rx, ry, rz), angular))
+
+    return Tolerance(
+        position=three(tolerance.position, position),
+        orientation=three(tolerance.orientation, orientation),
+        twist=six(tolerance.twist, rest[0], rest[1]),
+        acceleration=six(tolerance.acceleration, rest[2], rest[3]))
