@@ -31,7 +31,7 @@ def run(quick: bool) -> Iterator[Figure]:
     joints = [_drawn(draw, 2.5) for _ in range(100 if quick else 500)]
     seeds = [_moved(q, draw) for q in joints]
     poses = [arm.forward(q) for q in joints]
-    reference = _pinocchio(arm)
+    reference = pinocchio_or_none(arm)
 
     yield _figure('forward', joints, arm.forward, reference.forward if reference else None)
     yield _figure('inverse, all branches', poses, lambda pose: solutions(arm, pose))
@@ -103,7 +103,7 @@ class Pinocchio:
         return None
 
 
-def _pinocchio(arm: Arm) -> Pinocchio | None:
+def pinocchio_or_none(arm: Arm) -> Pinocchio | None:
     try:
         import pinocchio
     except ImportError:

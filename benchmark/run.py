@@ -26,7 +26,7 @@ from figures import as_json, Figure, machine, table
 RTDE_RATE = 'rtde_rate'
 #: In the order of the table: what is measured with many processes first.
 MODULES = ('goal_on_wire', 'keepalive', 'points', 'load', RTDE_RATE, 'planning', 'kinematics',
-           'codecs_rtde', 'urscript_frames')
+           'kinematics_rows', 'codecs_rtde', 'urscript_frames')
 
 
 def main() -> int:

@@ -1,0 +1,77 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Inverse kinematics along a path: all rows at once, beside pinocchio from row to row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from figures import Figure, seconds
+from kinematics import pinocchio_or_none
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.rows import branches, follow
+from ur_cartesian_driver.motion.pose import pose_from_row, Vector6
+
+NAME = 'kinematics, poses of a path per second'
+START: Vector6 = (0.3, -1.6, 1.9, -1.8, -1.5, 0.4)
+WAY = (0.8, 0.4, -0.6, 0.5, 0.3, 1.0)
+#: Of pinocchio fewer rows are timed.
+ROWS, ROWS_ONE_BY_ONE = 40_000, 2_000
+Rows = NDArray[np.float64]
+
+
+def run(quick: bool) -> Iterator[Figure]:
+    """Follow a path of a UR5e, nominal and calibrated, whose joint positions are known."""
+    rows = ROWS // 10 if quick else ROWS
+    joints = np.array(START) + np.linspace(0.0, 1.0, rows)[:, None] * np.array(WAY)
+    for name, arm in ('nominal', Arm(robot_model('ur5e'))), ('calibrated', _calibrated()):
+        poses = arm.forward_rows(joints)
+        follow(arm, poses[:1], START)  # the fit of the ideal arm is made once for each arm
+        yield from _followed(name, arm, poses, joints)
+        taken = seconds(lambda arm=arm, poses=poses: branches(arm, poses))
+        yield Figure(benchmark=NAME, name=f'{name}, all branches', value=rows / taken, unit='1/s')
+
+
+def _followed(name: str, arm: Arm, poses: Rows, joints: Rows) -> Iterator[Figure]:
+    reference = pinocchio_or_none(arm)
+    taken = seconds(lambda: follow(arm, poses, START))
+    other = None
+    if reference is not None:
+        sparse = poses[:ROWS_ONE_BY_ONE]
+        other = len(sparse) / seconds(lambda: _one_by_one(reference, sparse), repeat=2)
+    path = follow(arm, poses, START)
+    yield Figure(benchmark=NAME, name=f'{name}, followed', value=len(poses) / taken, unit='1/s',
+                 baseline=other, than='pinocchio, CLIK from the row before',
+                 note=f'{len(poses)} poses')
+    back = arm.forward_rows(path.q) - poses
+    yield Figure(benchmark=NAME, name=f'{name}, largest error of position',
+                 value=1e9 * float(np.linalg.norm(back[:, :3], axis=1).max()), unit='nm')
+    yield Figure(benchmark=NAME, name=f'{name}, largest error of a joint',
+                 value=1e9 * float(np.abs(path.q - joints).max()), unit='nrad')
+
+
+def _one_by_one(reference: Any, poses: Rows) -> None:
+    before: Any = START
+    for pose in poses:
+        before = reference.inverse(pose_from_row(pose), before)
+
+
+def _calibrated() -> Arm:
+    """Return an arm that is off its model by about a millimetre in every length, and a mrad."""
+    model = robot_model('ur5e')
+    draw = np.random.default_rng(1)
+
+    def off(column: Vector6, by: float) -> Vector6:
+        a, b, c, d, e, f = (value + float(draw.normal(0.0, by)) for value in column)
+        return (a, b, c, d, e, f)
+
+    nominal = model.geometry
+    return Arm(model, replace(
+        nominal, a=off(nominal.a, 1e-3), d=off(nominal.d, 1e-3), alpha=off(nominal.alpha, 1e-3),
+        theta=off(nominal.theta, 1e-3)))
