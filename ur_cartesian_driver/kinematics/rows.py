@@ -41,7 +41,7 @@ from ur_cartesian_driver.motion.primitive import Joints
 
 # Rows solved together: as many as have their numbers in the cache of a core.
 _BLOCK = 1024
-# Rows that are tried after one at which the branch had to be searched for.
+# Rows that are tried after one at which the branch had to be searched for; then ever more.
 _FIRST_BLOCK = 16
 
 # Newton: the sum of the squares of metres and radians that counts as exact, and the least damping,
@@ -157,7 +157,7 @@ def follow(arm: Arm, poses: Floats, q_start: Joints) -> JointPath:
     :param q_start: from where the first row is reached [rad].
     """
     q = np.full((len(poses), 6), np.nan)
-    before, row, block, singly = q_start, 0, _FIRST_BLOCK, 1
+    before, row, block, singly = q_start, 0, _BLOCK, 1
     while row < len(poses):
         ahead = _ahead(arm, poses[row:row + block], before)
         if len(ahead):
