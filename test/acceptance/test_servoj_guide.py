@@ -6,11 +6,12 @@ The manufacturer's sample program for buffered servoj runs, and an RTDE client d
 ``programs/servoj_guide.script`` is the sample of Universal Robots' guide "Trajectory improvements
 for servoj()", word for word. Its indentation was lost on the way and has not been restored, which
 a controller does not mind. The client is our RTDE codec; it and the controller take turns cycle by
-cycle, so that the tests need no real time and always see the same.
+cycle, so that the tests need no real time and always see the same; the last one meets it over TCP.
 """
 
 from math import pi, sin
 from pathlib import Path
+from socket import create_connection
 
 import pytest
 
@@ -289,3 +290,30 @@ def test_same_inputs_give_the_same_packets():
         return client.packets
 
     assert run() == run()
+
+
+def test_program_follows_a_client_over_tcp_in_real_time(ur_sim):
+    client = RtdeClient(OUTPUTS, [MODE, SEQUENCE, ERROR, SYNC, *JOINTS, *THRESHOLDS, STATE_TIME])
+    values = dict.fromkeys([MODE, SEQUENCE, ERROR, SYNC, *JOINTS, *THRESHOLDS, STATE_TIME], 0)
+    values |= dict.fromkeys(THRESHOLDS, THRESHOLD) | {MODE: SERVO, SYNC: EXTERNAL_TO_ROBOT}
+    inputs, path, time, q = None, None, 0.0, ()
+    with create_connection(('127.0.0.1', ur_sim.ports.rtde), 5.0) as rtde, create_connection(
+            ('127.0.0.1', ur_sim.ports.primary), 5.0) as primary:
+        rtde.sendall(client.start())
+        while time < 1.5:
+            for event in client.feed(rtde.recv(65536)):
+                if isinstance(event, Ready):
+                    inputs = event.inputs[0]
+                    primary.sendall(PROGRAM.read_bytes())
+                elif isinstance(event, DataReceived):
+                    _, q, _, _, state, mode, *_ = event.values
+                    path = path or swing(q)
+                    if mode == SERVO:
+                        assert state == RuntimeState.PLAYING
+                        time += CYCLE
+                    # There and half back, then stand.
+                    values |= zip(JOINTS, path(min(time, 1.2)), strict=True)
+                    values |= {SEQUENCE: values[SEQUENCE] + 1, STATE_TIME: time}
+                    rtde.sendall(inputs.pack(list(values.values())))
+            rtde.sendall(client.data_to_send())
+    assert q == pytest.approx(path(1.2), abs=2e-3)
