@@ -52,6 +52,8 @@ EXTRAS = {
         'pytest-timeout>=2.3,<3',
         'pytest-xdist>=3.6,<4',
         'scipy>=1.13,<2',
+        # A client by others, where it has wheels; its test is skipped elsewhere.
+        'ur-rtde>=1.6.5,<1.7; platform_machine == "x86_64" and sys_platform == "linux"',
     ],
 }
 
