@@ -5,7 +5,9 @@ Fixtures for tests of programs that use the driver; installed as a pytest plugin
 
 ``ur_sim``
     a simulated robot on free ports; ``@pytest.mark.ur_sim(model='ur10e')`` sets fields of its
-    :class:`~ur_cartesian_driver.sim.SimulatorConfig`.
+    :class:`~ur_cartesian_driver.sim.SimulatorConfig`, such as
+    ``faults=['protective_stop at 0.35 m']``; ``ur_sim.inject('drop rtde')`` lets something go
+    wrong in the course of a test.
 ``cartesian_driver``
     the driver's node, connected to ``ur_sim`` and ready for goals; it is not spinning, add it to
     an executor of your own. ``@pytest.mark.cartesian_driver(max_tool_speed=1.0)`` sets parameters.

@@ -18,6 +18,8 @@ import sys
 from ur_cartesian_driver.cli import commands
 from ur_cartesian_driver.kinematics.robots import MODELS
 from ur_cartesian_driver.motion.errors import DriverError
+from ur_cartesian_driver.sim.fault_text import parse_fault
+from ur_cartesian_driver.sim.faults import Fault
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -87,6 +89,18 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
             help=f'0 = any free port; left out: {port} if the primary port is 30001, else any')
     sim.add_argument('--joints', type=_six_numbers, metavar='Q1,...,Q6',
                      help='joint positions at the start [rad]')
+    calibration = sim.add_mutually_exclusive_group()
+    calibration.add_argument(
+        '--calibration', metavar='FILE',
+        help='kinematics of this arm, in the YAML of ur_calibration of the UR ROS driver')
+    calibration.add_argument('--calibration-seed', type=int, metavar='N',
+                             help='a made-up calibration, for each number another')
+    sim.add_argument('--rate', type=float, default=1.0,
+                     help='how fast time passes; 2 = twice as fast, 0 = as fast as it can')
+    sim.add_argument(
+        '--fault', type=_fault, action='append', default=[], metavar='TEXT', dest='faults',
+        help="what goes wrong, and when: 'protective_stop at 2 s', 'drop rtde at 0.35 m'; may be "
+             'given several times, see doc/simulation.md')
     sim.add_argument('--power-off', action='store_true', help='start with the arm switched off')
     sim.add_argument('--local', action='store_true',
                      help='local control: no scripts over the network')
@@ -119,6 +133,13 @@ def _add_where(sub: Commands[argparse.ArgumentParser]) -> None:
                  'print where the robot stands, as a point to paste into a goal')
     where.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
     where.add_argument('--rtde-port', type=int, default=30004, help='its RTDE port')
+
+
+def _fault(text: str) -> Fault:
+    try:
+        return parse_fault(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def _six_numbers(text: str) -> tuple[float, ...]:

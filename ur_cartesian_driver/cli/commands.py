@@ -14,13 +14,14 @@ from time import monotonic
 from typing import Any
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, robot_model
+from ur_cartesian_driver.kinematics.robots import Geometry, JOINT_NAMES, robot_model
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.robot.probe import read_state
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
+from ur_cartesian_driver.sim.calibration import random_calibration, read_calibration
 
 
 def demo(arguments: argparse.Namespace) -> int:
@@ -32,17 +33,36 @@ def demo(arguments: argparse.Namespace) -> int:
 
 def sim(arguments: argparse.Namespace) -> int:
     """Run a simulated controller until it is told to end."""
-    config = SimulatorConfig(
+    robot = SimulatedRobot(simulator_config(arguments))
+    asyncio.run(_simulate(robot))
+    return 0
+
+
+def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
+    """
+    Return the robot that is asked for.
+
+    :raises ValueError: there is no such robot, or its calibration is not understood.
+    """
+    return SimulatorConfig(
         model=arguments.model, host=arguments.host, polyscope=arguments.polyscope,
         rtde_port=arguments.rtde_port, primary_port=arguments.primary_port,
         dashboard_port=arguments.dashboard_port, secondary_port=arguments.secondary_port,
         realtime_port=arguments.realtime_port, interpreter_port=arguments.interpreter_port,
         power='off' if arguments.power_off else 'running',
-        remote_control=not arguments.local,
+        remote_control=not arguments.local, rate=arguments.rate, faults=arguments.faults,
+        geometry=_calibration(arguments),
         **({'q': arguments.joints} if arguments.joints else {}))
-    robot = SimulatedRobot(config)
-    asyncio.run(_simulate(robot))
-    return 0
+
+
+def _calibration(arguments: argparse.Namespace) -> Geometry | None:
+    """Return the table of the arm that is asked for; None = that of the model."""
+    model = robot_model(arguments.model)
+    if arguments.calibration is not None:
+        return read_calibration(Path(arguments.calibration), model)
+    if arguments.calibration_seed is not None:
+        return random_calibration(model, arguments.calibration_seed)
+    return None
 
 
 async def _simulate(robot: SimulatedRobot) -> None:

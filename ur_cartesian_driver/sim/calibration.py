@@ -70,7 +70,13 @@ def read_calibration(path: Path, model: RobotModel) -> Geometry:
 
 
 def random_calibration(model: RobotModel, seed: int) -> Geometry:
-    """Return the table of an arm whose axes are off as those of real arms are; see above."""
+    """
+    Return the table of an arm whose axes are off as those of real arms are; see above.
+
+    :raises ValueError: the seed is negative.
+    """
+    if seed < 0:
+        raise ValueError(f'The seed of the calibration is {seed}; use 0 or more.')
     random = np.random.default_rng(seed)
     axes = _nominal_axes(model.geometry)
     for i in range(1, 6):
@@ -129,14 +135,18 @@ def _table(axes: _Axes, model: RobotModel) -> Geometry:
     for i in range(1, 6):
         following = axes.directions[i]
         normal, d, a = _common_normal(origin, z, axes.points[i], following)
-        if a * model.geometry.a[i - 1] < 0.0:  # as the model has it, where that says something
-            normal, a = -normal, -a
-        rows.append((_angle(z, x, normal), d, a, _angle(normal, z, following)))
+        alpha = _angle(normal, z, following)
+        # Of the two directions of the normal the one that the model has.
+        nominal_a, nominal_alpha = model.geometry.a[i - 1], model.geometry.alpha[i - 1]
+        if (a * nominal_a if nominal_a else alpha * nominal_alpha) < 0.0:
+            normal, a, alpha = -normal, -a, -alpha
+        rows.append((_angle(z, x, normal), d, a, alpha))
         origin, x, z = origin + d * z + a * normal, normal, following
     flange_x, flange = axes.flange[:3, 0], axes.flange[:3, 3]
     rows.append((_angle(z, x, flange_x), float(z @ (flange - origin)), 0.0, 0.0))
-    theta, d6, a6, alpha = ((c[0], c[1], c[2], c[3], c[4], c[5]) for c in zip(*rows, strict=True))
-    return Geometry(theta=theta, d=d6, a=a6, alpha=alpha)
+    thetas, ds, lengths, alphas = (
+        (c[0], c[1], c[2], c[3], c[4], c[5]) for c in zip(*rows, strict=True))
+    return Geometry(theta=thetas, d=ds, a=lengths, alpha=alphas)
 
 
 def _common_normal(origin: Array, z: Array, point: Array, following: Array

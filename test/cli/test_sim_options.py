@@ -1,0 +1,44 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Options of the simulator: what is refused, and that what is accepted reaches the robot."""
+
+from __future__ import annotations
+
+import pytest
+
+from ur_cartesian_driver.cli import commands, main, parser
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.sim.calibration import random_calibration
+from ur_cartesian_driver.sim.faults import Action, After, Drop, Event
+
+
+def test_a_fault_that_is_not_understood_is_one_sentence_with_the_word(capsys):
+    with pytest.raises(SystemExit):
+        main(['sim', '--fault', 'drop rtde in 5 s'])
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last.endswith("The fault 'drop rtde in 5 s' is not understood at 'in'; "
+                         "expected 'at', 'for' or the end.")
+
+
+def test_an_interface_that_there_is_not_is_one_sentence(capsys):
+    assert main(['sim', '--fault', 'drop rdte']) == 1
+    error = capsys.readouterr().err
+    assert "no interface 'rdte'" in error
+    assert error.count('\n') == 1
+
+
+def test_a_calibration_that_there_is_not_is_one_sentence(capsys):
+    assert main(['sim', '--calibration', '/nowhere.yaml']) == 1
+    error = capsys.readouterr().err
+    assert '/nowhere.yaml' in error
+    assert error.count('\n') == 1
+
+
+def test_options_reach_the_robot():
+    options = ['--rate', '0', '--calibration-seed', '3', '--fault', 'stop at 2 s', '--fault',
+               'drop rtde']
+    arguments = parser().parse_args(['sim', '--model', 'ur10e', *options])
+    config = commands.simulator_config(arguments)
+    assert config.rate == 0.0
+    assert config.geometry == random_calibration(robot_model('ur10e'), 3)
+    assert config.faults == [Event(action=Action.STOP, when=After(2.0)), Drop(interface='rtde')]
