@@ -4,7 +4,7 @@
 The functions of a program, by example: each file in `programs` says itself what it does.
 
 `# expect: text` for each text that it writes, in order; `# expect error: text` for the runtime
-exception that ends it, raised on that line.
+exception that ends it, raised on that line. The world around it is always the same: see `World`.
 """
 
 import inspect
@@ -17,10 +17,12 @@ import pytest
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.sim.builtins import builtins_of, timeless
+from ur_cartesian_driver.sim.modes import SafetyEvent
 from ur_cartesian_driver.urscript.values import Pose as ScriptPose
 
 HERE = Path(__file__).parent
-PROGRAMS = sorted((HERE / 'programs').glob('*.script'))
+PROGRAMS = sorted((HERE / 'programs').rglob('*.script'))
+CASES = sorted((HERE.parent / 'urscript' / 'cases').rglob('*.script'))
 EXPECT = re.compile(r'# expect(?P<error> error)?: (?P<text>.*)')
 GOLDEN = json.loads((HERE / 'golden' / 'pose_math.json').read_text())
 
@@ -39,32 +41,71 @@ USED_BY_OTHERS = """
     write_output_float_register write_output_integer_register""".split()
 
 
-def echo(sockets, port):
-    """Answer everything with itself."""
-    accepted = sockets.listen(port)
+class World:
+    """
+    What surrounds the robot of a program.
 
-    def poll():
-        for peer in accepted:
+    Inputs and input registers have the values below; a peer on port 1 answers everything with
+    itself; ten times a second a person closes the windows, unlocks a protective stop if that is
+    possible, and plays the program if it is paused.
+    """
+
+    def __init__(self, bench):
+        self.bench = bench
+        self.peers = bench.controller.sockets.listen(1)
+        bench.controller.sockets.poll = self.echo
+        signals = bench.controller.signals
+        signals.digital_in.standard[3] = True
+        signals.digital_in.configurable[2] = True
+        signals.digital_in.tool[1] = True
+        signals.analog_in[:] = 2.5, 0.01
+        signals.tool_analog_in[1] = 7.5
+        signals.inputs.bits[64] = True
+        signals.inputs.integers[24] = -7
+        signals.inputs.floats[47] = 0.125
+
+    def echo(self):
+        for peer in self.peers:
             peer.feed(peer.take())
-    sockets.poll = poll
+
+    def ended(self):
+        """Let the person act, and tell whether the program has ended."""
+        controller, programs = self.bench.controller, self.bench.programs
+        if controller.cycles % 50 == 0:
+            controller.close_popups()
+            controller.safety_event(SafetyEvent.UNLOCK)
+            if programs.state is RuntimeState.PAUSED:
+                programs.play()
+        return programs.state is RuntimeState.STOPPED
 
 
-@pytest.mark.parametrize('path', PROGRAMS, ids=[path.stem for path in PROGRAMS])
+@pytest.mark.parametrize('path', PROGRAMS, ids=lambda path: f'{path.parent.name}/{path.stem}')
 def test_the_program_does_what_it_says(bench, path):
-    echo(bench.controller.sockets, 1)
+    world = World(bench)
     text = path.read_text()
     expected = []
     for number, line in enumerate(text.splitlines(), 1):
         if match := EXPECT.search(line):
             expected.append((number, match['text']) if match['error'] else match['text'])
     bench.programs.submit(text)
-    bench.until(lambda: bench.programs.state is RuntimeState.STOPPED)
+    bench.until(world.ended)
+    assert expected
     assert [as_expected(line) for line in bench.log] == expected
 
 
 def as_expected(line):
     error = re.fullmatch(r'(\d+):\d+: Runtime error \(\1:\d+\): (.*)', line)
     return (int(error[1]), error[2]) if error else line
+
+
+def test_every_function_is_called_by_a_program_that_says_what_it_does(bench):
+    text = ''.join(re.sub(r'#.*', '', path.read_text()) for path in PROGRAMS + CASES)
+    called = set(re.findall(r'\b([a-z]\w*)\s*\(', text))
+    assert set(builtins_of(bench.controller)) - called == set()
+
+
+def test_there_are_many_programs():
+    assert len(PROGRAMS) + len(CASES) >= 300
 
 
 def test_every_function_that_well_known_programs_call_exists(bench):

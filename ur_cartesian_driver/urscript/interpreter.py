@@ -30,7 +30,7 @@ from ur_cartesian_driver.urscript.values import ThreadHandle, Value
 
 TOO_MUCH_TIME = (
     'The program used too much time without instructing the robot what to do. '
-    'Add a sync(), a sleep() or a motion to the loop.'
+    'Consider using a Wait or sync() in the loop.'
 )
 
 
