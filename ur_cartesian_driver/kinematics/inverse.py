@@ -9,10 +9,12 @@ most like it is the start of a Newton iteration on the real one.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from math import ceil, copysign, dist, hypot, inf, pi, remainder, tau
+from math import ceil, copysign, dist, hypot, inf, pi, remainder, sin, tau
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm, Frames, jacobian_at
 from ur_cartesian_driver.kinematics.closed_form import closed_form, wrap, wrist_centre, wrists
@@ -34,6 +36,12 @@ _EXACT = 1e-24
 _MAX_STEPS = 40
 _MAX_FAILURES = 12
 _LONGEST_STEP = 0.5
+# A least singular value of the Jacobian below which solutions may meet close by, the sine of
+# theta5 the same, the farthest twin that is looked for [rad], and the step of a derivative [rad].
+_NEARLY_SINGULAR = 0.05
+_NEARLY_STRAIGHT = 0.1
+_FARTHEST_TWIN = 0.6
+_DIFFERENCE = 1e-4
 # Two refined solutions closer than this are one [rad].
 _SAME = 1e-5
 # How near to the pose a seed must be to be a start of its own [m, rad].
@@ -53,8 +61,9 @@ def solutions(arm: Arm, T_base_flange: Pose, seed: Joints | None = None) -> list
     """
     Return every joint solution [rad], each angle within (-pi, pi], whatever the limits are.
 
-    Of a calibrated arm a solution may be missed within about a degree of a singularity, where
-    the ideal arm says little about the real one; not the one next to the seed.
+    Of a calibrated arm a solution may be missed where two singularities meet, within some degrees
+    of both, since the ideal arm says little about the real one there; not the one next to the
+    seed. There it may also have more than eight.
 
     :param seed: where the axes of wrist 1 and wrist 3 are one line, wrist 3 is taken from here
         (else it is 0). For a calibrated arm a seed near the pose is one more start of the search.
@@ -84,9 +93,13 @@ def nearest(arm: Arm, T_base_flange: Pose, q_near: Joints) -> Joints | None:
         if best is not None:
             break
     is_close = best is not None and dist(best, q_near) < _CLOSE
-    if arm.calibrated and not is_close and _is_near(arm.forward(q_near), T_base_flange):
+    if arm.calibrated and not is_close:
         # Near a singularity the starts may have missed the one that is next to q_near.
-        best = _closest([best, _settle(arm, T_base_flange, q_near, q_near)], q_near)
+        more = [] if best is None else _twins(arm, best)
+        if _is_near(arm.forward(q_near), T_base_flange):
+            more.append(q_near)
+        best = _closest(
+            [best, *(_settle(arm, T_base_flange, start, q_near) for start in more)], q_near)
     return best
 
 
@@ -133,11 +146,41 @@ def why_unreachable(arm: Arm, T_base_flange: Pose) -> str:
 def _refined(arm: Arm, T_base_flange: Pose, starts: list[Joints]) -> list[Joints]:
     """Return the different solutions that the starts lead to."""
     found: list[Joints] = []
-    for start in starts:
-        q = _refine(arm, T_base_flange, start)
+    pending = deque(starts)
+    while pending:
+        q = _refine(arm, T_base_flange, pending.popleft())
         if q is not None and not any(_same(q, other) for other in found):
             found.append(q)
+            pending.extend(_twins(arm, q))
     return found
+
+
+def _twins(arm: Arm, q: Joints) -> list[Joints]:
+    """
+    Return where to look for the solutions that meet with this one in a singularity close by.
+
+    Along the direction v in which the arm hardly moves, the error grows with the length t of the
+    step as sigma t + curvature t^2 / 2 (seen along u, where sigma is the least singular value and
+    u, v are its vectors): it vanishes again at the twin. Straight wrists have theirs half a turn
+    away.
+    """
+    jacobian = arm.jacobian(q)
+    u, sigma, v = np.linalg.svd(jacobian)
+    if sigma[-1] > _NEARLY_SINGULAR:
+        return []
+    twins = []
+    change = arm.jacobian(_moved(q, v[-1], _DIFFERENCE)) - jacobian
+    curvature = float(u[:, -1] @ change @ v[-1]) / _DIFFERENCE
+    if 2.0 * sigma[-1] < _FARTHEST_TWIN * abs(curvature):
+        twins.append(_moved(q, v[-1], -2.0 * float(sigma[-1]) / curvature))
+    o5 = shape_of(arm).offsets[4]
+    if abs(sin(q[4] + o5)) < _NEARLY_STRAIGHT:
+        twins.append((q[0], q[1], q[2], q[3] + pi, -q[4] - 2.0 * o5, q[5] + pi))
+    return twins
+
+
+def _moved(q: Joints, direction: NDArray[np.float64], way: float) -> Joints:
+    return _six(a + way * float(b) for a, b in zip(q, direction, strict=True))
 
 
 def _nearest_of(arm: Arm, T_base_flange: Pose, starts: list[Joints], q_near: Joints

@@ -93,6 +93,8 @@ def branches(arm: Arm, poses: Floats, wrist_3: float = 0.0) -> Branches:
     """
     Return all solutions of each pose, whatever the limits are: those of ``solutions``.
 
+    Where two singularities of a calibrated arm meet it may have more than eight; then eight.
+
     :param poses: (n, 7).
     :param wrist_3: what wrist 3 is to show where the axes 4 and 6 are one line [rad].
     """
@@ -137,7 +139,8 @@ def _sound(arm: Arm, targets: Targets, q: Floats, found: list[Branch]) -> Flags:
 def _searched(arm: Arm, pose: Floats, wrist_3: float) -> tuple[Floats, Flags]:
     """Put the solutions of a single pose into the places of their branches, if these are free."""
     q, exists = np.full((len(BRANCHES), 6), np.nan), np.zeros(len(BRANCHES), dtype=np.bool_)
-    found = np.array(solutions(arm, pose_from_row(pose), (0.0,) * 5 + (wrist_3,))).reshape(-1, 6)
+    single = solutions(arm, pose_from_row(pose), (0.0,) * 5 + (wrist_3,))[:len(BRANCHES)]
+    found = np.array(single).reshape(-1, 6)
     for solution, branch in zip(found, postures(arm, found).branch, strict=True):
         place = int(branch) if not exists[branch] else int(np.flatnonzero(~exists)[0])
         q[place], exists[place] = solution, True
