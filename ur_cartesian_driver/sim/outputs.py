@@ -125,7 +125,7 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType({
     'actual_TCP_speed': lambda c: c.actual.tcp_twist,
     'tcp_offset': lambda c: (
         _ZERO6 if c.motion.T_flange_tcp is IDENTITY else c.motion.T_flange_tcp.rotation_vector()),
-    'speed_scaling': lambda c: c.scale,
+    'speed_scaling': lambda c: c.motion.scaling,
     'target_speed_fraction': lambda c: c.slider,
     'robot_mode': lambda c: c.power.mode,
     'safety_mode': lambda c: c.safety.mode,

@@ -85,7 +85,7 @@ def _mode(controller: Controller) -> RobotModeData:
         protective_stopped=safety is SafetyMode.PROTECTIVE_STOP,
         program_running=controller.programs.running and not paused, program_paused=paused,
         robot_mode=controller.power.mode, target_speed_fraction=controller.slider,
-        speed_scaling=controller.scale)
+        speed_scaling=controller.motion.scaling)
 
 
 def _joints(controller: Controller) -> JointData:

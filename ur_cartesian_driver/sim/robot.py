@@ -39,6 +39,8 @@ from ur_cartesian_driver.sim.tcp_script_sockets import TcpScriptSockets
 T = TypeVar('T')
 
 _CALL_TIMEOUT = 10.0
+#: The first version without a dashboard.
+POLYSCOPE_X = 10
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +49,7 @@ class Ports:
 
     rtde: int
     primary: int
+    #: 0 for PolyScope X, which has none.
     dashboard: int
     secondary: int
     realtime: int
@@ -189,12 +192,15 @@ class SimulatedRobot:
         host, config = self.config.host, self.config
         await self._rtde.listen(host, config.rtde_port)
         await self._primary.listen(host, config.primary_port)
-        await self._dashboard.listen(host, config.dashboard_port)
+        dashboard = 0
+        if config.version[0] < POLYSCOPE_X:
+            await self._dashboard.listen(host, config.dashboard_port)
+            dashboard = self._dashboard.port
         await self._secondary.listen(host, config.listening_secondary_port)
         await self._realtime.listen(host, config.listening_realtime_port)
         await self._interpreter.listen(host, config.listening_interpreter_port)
         self._ports = Ports(rtde=self._rtde.port, primary=self._primary.port,
-                            dashboard=self._dashboard.port, secondary=self._secondary.port,
+                            dashboard=dashboard, secondary=self._secondary.port,
                             realtime=self._realtime.port,
                             interpreter=self._interpreter.port)
 
@@ -365,7 +371,7 @@ def _snapshot(controller: Controller) -> RobotSnapshot:
         timestamp=controller.time, q=motion.q, qd=controller.qd, T_base_tcp=motion.T_base_tcp,
         T_flange_tcp=motion.T_flange_tcp, robot_mode=controller.power.mode,
         safety_mode=controller.safety.mode, runtime_state=programs.state, program=programs.name,
-        speed_slider=controller.slider, speed_scaling=controller.scale,
+        speed_slider=controller.slider, speed_scaling=motion.scaling,
         digital_outputs=controller.signals.digital_out.packed(),
         messages=tuple(controller.announcements.log),
         popups=tuple(popup.text for popup in controller.popups))

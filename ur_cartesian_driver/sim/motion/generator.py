@@ -131,6 +131,11 @@ class MotionGenerator:
         return self._motion is not None or self.qd != _STILL
 
     @property
+    def scaling(self) -> float:
+        """What part of the speed the last cycle had: the scale asked for, less at a limit."""
+        return min(self._rate, self._scale)
+
+    @property
     def steady(self) -> bool:
         """Whether the target has stood still for half a second."""
         return self._still_for >= STEADY_AFTER - 0.5 * self.cycle
@@ -318,6 +323,7 @@ class MotionGenerator:
     def _stand(self) -> None:
         self.qdd = rate_of(_STILL, self.qd, 1.0 / self.cycle)
         self.qd = self.tcp_twist = _STILL
+        self._rate = self._scale
         self._still_for += self.cycle
 
     def _report(self, motion: _Motion) -> None:
