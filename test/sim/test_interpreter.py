@@ -63,6 +63,34 @@ def test_what_does_not_compile_is_discarded_with_the_reason(bench, client, state
     assert bench.programs.running
 
 
+@pytest.mark.parametrize('statement', [
+    'x = ' + '(' * 3000, 'x = ' + '1 + ' * 3000 + '1', 'if 1: ' * 500,
+    'x = ' + 'not ' * 3000 + '1'])
+def test_a_statement_nested_too_deeply_is_discarded_and_the_next_one_is_not(client, statement):
+    (answer,) = client.say(statement)
+    assert answer.startswith('discard: syntax_error_on_line:1:')
+    assert client.say('n = 2') == ['ack: 1: n = 2']
+
+
+def test_a_statement_can_halt_the_program(bench, client):
+    client.say('halt', 'textmsg("never")')
+    bench.step(3)
+    assert bench.log == []
+    assert not bench.programs.running
+
+
+def test_return_ends_its_statement_only(bench, client):
+    client.say('textmsg("a") return 1 textmsg("b")', 'textmsg("c")')
+    assert bench.log == ['a', 'c']
+
+
+def test_interpreter_mode_has_no_interpreter_mode_inside(bench, client):
+    client.say('interpreter_mode()')
+    bench.step(2)
+    assert not bench.programs.running
+    assert 'interpreter_mode is only possible in the main thread, once.' in bench.log[0]
+
+
 def test_a_function_on_one_line_can_be_called_by_the_next(bench, client):
     client.say('def greet(x): local s = str_cat("hello ", x) textmsg(s) end', 'greet("you")')
     assert bench.log == ['hello you']

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from ur_cartesian_driver.urscript import syntax as tree
 from ur_cartesian_driver.urscript.closures import Procedure, Runtime, Steps, UNSET
 from ur_cartesian_driver.urscript.compiler import compile_program
+from ur_cartesian_driver.urscript.errors import CompileError
 from ur_cartesian_driver.urscript.parser import parse_line
 from ur_cartesian_driver.urscript.scopes import Builtin, resolve, Scope
 
@@ -61,8 +62,11 @@ class Lines:
         :raises CompileError: it is no line, or names something unknown.
         """
         program = parse_line(text)
-        scope = resolve(program, self._builtins, around=self._scope)
-        procedure = compile_program(scope, self._builtins, self._runtime, self._procedures)
+        try:
+            scope = resolve(program, self._builtins, around=self._scope)
+            procedure = compile_program(scope, self._builtins, self._runtime, self._procedures)
+        except RecursionError:
+            raise CompileError(1, 1, 'syntax_error_on_line:1:', 'nested too deeply') from None
         self._scope.globals = scope.globals
         self._scope.functions.update(scope.functions)
         variables = self._runtime.globals
