@@ -34,7 +34,7 @@ from ur_cartesian_driver.motion.events import (
 )
 from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyStatus
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 
@@ -55,13 +55,15 @@ def order(points=1, **changes):
 def robot(part=0.0, timestamp=0.0, qd=MOVING, **changes):
     position = tuple(a + part * (b - a) for a, b in zip(START, END, strict=True))
     return StateReceived(state=RobotState(
-        timestamp=timestamp, actual_q=REST, actual_qd=qd, actual_tcp_pose=Pose(position),
-        actual_tcp_twist=(0.1, 0.0, 0.0, 0.0, 0.0, 0.0), runtime_state=RuntimeState.PLAYING,
-        **changes))
+        timestamp=timestamp, actual_q=REST, actual_qd=qd, **{
+            'actual_tcp_pose': Pose(position), 'target_tcp_pose': Pose(position),
+            'actual_tcp_twist': MOVING, 'target_tcp_twist': MOVING,
+            'runtime_state': RuntimeState.PLAYING} | changes))
 
 
 def started(**changes):
-    machine = TrajectoryMachine(order(**changes))
+    # These robots leap from place to place: where that does not matter it is no deviation.
+    machine = TrajectoryMachine(order(**changes), max_plan_deviation=(0.0, 0.0))
     machine.start(robot().state)
     machine.step(robot(), 0.0)
     return machine
@@ -194,6 +196,45 @@ def test_leaving_the_path_stops_the_arm_and_names_point_axis_value_and_limit():
                         'the tolerance is 0.001000 m.')
 
 
+@pytest.mark.parametrize(('pose', 'text'), [
+    (Pose((0.41, 0.0021, 0.2)), '0.002100 m, max_plan_deviation is 0.002000 m'),
+    (Pose((0.41, 0.0, 0.2), quaternion_from_rotation_vector((0.0, 0.021, 0.0))),
+     '0.021000 rad, max_plan_deviation_angle is 0.020000 rad')])
+def test_a_controller_that_makes_another_motion_is_stopped_in_the_same_step(pose, text):
+    machine = TrajectoryMachine(order())
+    machine.start(robot().state)
+    machine.step(robot(), 0.0)
+    commands = machine.step(robot(0.05, timestamp=0.1, target_tcp_pose=pose), 0.1)
+    assert SendControl(action=TrajectoryAction.CANCEL, count=1) in commands
+    machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 0.2)
+    end = outcome(machine.step(robot(0.1, qd=REST), 0.3))
+    assert end.code is ErrorCode.EXECUTION_FAILED
+    assert f'The controller itself left the plan by {text}' in end.text
+    assert 'on the way to point 0' in end.text
+
+
+@pytest.mark.parametrize('limits', [(0.01, 0.02), (0.0, 0.0)])
+def test_a_controller_within_the_bounds_or_without_any_goes_on(limits):
+    machine = TrajectoryMachine(order(), max_plan_deviation=limits)
+    machine.start(robot().state)
+    machine.step(robot(), 0.0)
+    machine.step(robot(0.05, timestamp=0.1, target_tcp_pose=Pose((0.41, 0.005, 0.2))), 0.1)
+    assert machine.state is State.MOVING
+
+
+def test_nothing_is_watched_before_the_program_has_begun():
+    """The TCP may still be another one; it is changed before the first point."""
+    machine = TrajectoryMachine(order(path_tolerance=Tolerance(position=(0.001,) * 3)))
+    elsewhere = {'actual_tcp_pose': Pose((0.4, 0, 0)), 'target_tcp_pose': Pose((0.4, 0, 0)),
+                 'target_tcp_twist': REST}
+    machine.start(robot(**elsewhere, points_begun=7).state)
+    machine.step(robot(**elsewhere, points_begun=7), 0.0)
+    machine.step(robot(**elsewhere, points_begun=0), 0.1)
+    assert machine.state is State.MOVING
+    machine.step(robot(**elsewhere, points_begun=1), 0.2)
+    assert machine.state is State.STOPPING
+
+
 def test_an_arm_that_does_not_settle_violates_the_goal_tolerance():
     machine = started(goal_tolerance=Tolerance(position=(0.001, 0.0, 0.0)),
                       goal_time_tolerance=0.5)
@@ -222,6 +263,34 @@ def test_a_slowed_robot_is_not_late():
     assert outcome(machine.step(robot(1.0, timestamp=4.1, qd=REST), 4.1)).succeeded
 
 
+def test_a_paused_robot_is_not_late_whatever_it_says_of_its_speed():
+    machine = started(due=2.0, goal_time_tolerance=0.1)
+    for i in range(1, 41):
+        paused = 10 < i <= 30
+        machine.step(robot(0.5 if paused else i / 40, timestamp=0.1 * i, runtime_state=(
+            RuntimeState.PAUSED if paused else RuntimeState.PLAYING)), 0.1 * i)
+    machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 4.0)
+    assert outcome(machine.step(robot(1.0, timestamp=4.1, qd=REST), 4.1)).succeeded
+
+
+def test_an_arm_that_settles_in_time_succeeds():
+    machine = started(goal_tolerance=Tolerance(position=(0.001, 0.0, 0.0)),
+                      goal_time_tolerance=0.5)
+    machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
+    machine.step(robot(0.95, timestamp=2.3, qd=REST), 2.3)
+    machine.step(robot(0.999, timestamp=2.4), 2.4)
+    assert machine.state is State.SETTLING
+    assert outcome(machine.step(robot(0.999, timestamp=2.49, qd=REST), 2.49)).succeeded
+
+
+def test_an_arm_may_settle_without_end():
+    machine = started(goal_tolerance=Tolerance(position=(0.001, 0.0, 0.0)),
+                      goal_time_tolerance=-1.0)
+    machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
+    machine.step(robot(0.95, timestamp=900.0, qd=REST), 900.0)
+    assert machine.state is State.SETTLING
+
+
 def test_progress_is_reported_at_its_rate():
     machine = TrajectoryMachine(order(), feedback_period=0.1)
     machine.start(robot().state)
@@ -238,8 +307,10 @@ def test_progress_is_reported_at_its_rate():
 def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
     own = {State.SETTLING: {Signal.SETTLED, Signal.LATE},
            State.STOPPING: {Signal.LATE, Signal.UNANSWERED},
-           State.HALTING: {Signal.AT_REST, Signal.LATE}, State.MOVING: {Signal.VIOLATION}}
-    judged = {Signal.SETTLED, Signal.AT_REST, Signal.LATE, Signal.UNANSWERED, Signal.VIOLATION}
+           State.HALTING: {Signal.AT_REST, Signal.LATE},
+           State.MOVING: {Signal.VIOLATION, Signal.DEVIATION}}
+    judged = {Signal.SETTLED, Signal.AT_REST, Signal.LATE, Signal.UNANSWERED, Signal.VIOLATION,
+              Signal.DEVIATION}
     possible = state is not State.ENDED and (
         signal not in judged or signal in own.get(state, set()))
     assert (signal in TRANSITIONS[state]) == possible

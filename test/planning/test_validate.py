@@ -126,10 +126,6 @@ REFUSALS = [
      NotAvailable, 'io_commands is not empty'),
     (replace(PLAIN, controlled_frame='nozzle'), NotAvailable,
      "trajectory.controlled_frame is 'nozzle'"),
-    (replace(PLAIN, path_tolerance=Tolerance(twist=ONE)), NotAvailable,
-     'path_tolerance.twist_error is positive'),
-    (replace(PLAIN, goal_tolerance=Tolerance(acceleration=ONE)), NotAvailable,
-     'goal_tolerance.acceleration_error is positive'),
     (with_point(TIMED, 1, twist=ONE), NotAvailable, 'trajectory.points[1].twist is not zero'),
     (with_point(TIMED, 0, acceleration=ONE), NotAvailable,
      'trajectory.points[0].acceleration is not zero'),
@@ -222,6 +218,8 @@ ACCEPTED = {
     'blend on the last point is dropped': with_segment(PLAIN, 2, blend_radius=5.0),
     'tolerances': replace(PLAIN, path_tolerance=Tolerance(
         position=(0.01, -1.0, 0.0), orientation=(0.1, 0.0, 0.0), twist=(-1.0,) * 6)),
+    'tolerances of twist and acceleration': replace(
+        PLAIN, path_tolerance=Tolerance(twist=ONE, acceleration=ONE)),
     'joint move in place': with_segment(
         with_point(PLAIN, 1, pose=Pose((0.1, 0.0, 0.0))), 1, type=TYPE.JOINT),
 }
@@ -240,6 +238,23 @@ def test_optimized_moves_need_a_software_that_knows_them(kind):
         check(goal, PlanningOptions(optimove_known=False))
 
 
+@pytest.mark.parametrize(('goal', 'options'), [
+    (replace(PLAIN, path_tolerance=Tolerance(acceleration=ONE)), {}),
+    (replace(PLAIN, goal_tolerance=Tolerance(acceleration=ONE)), {}),
+    (PLAIN, {'path_tolerance_linear_acceleration': 1.0}),
+    (PLAIN, {'goal_tolerance_angular_acceleration': 1.0})])
+def test_a_robot_that_reports_no_acceleration_cannot_be_held_to_it(goal, options):
+    check(goal, PlanningOptions(**options))
+    with pytest.raises(InvalidGoal, match=r'acceleration_error is positive.*does not report'):
+        check(goal, PlanningOptions(**options, acceleration_known=False))
+
+
+def test_a_robot_that_reports_no_acceleration_runs_goals_that_do_not_ask_for_it():
+    options = PlanningOptions(path_tolerance_linear_acceleration=1.0, acceleration_known=False)
+    check(replace(PLAIN, path_tolerance=Tolerance(acceleration=(-1.0,) * 6)), options)
+    check(replace(PLAIN, path_tolerance=Tolerance(acceleration=(-1.0,) * 3 + (0.0,) * 3)), options)
+
+
 def test_joint_names_carry_the_prefix():
     options = PlanningOptions(tf_prefix='left_')
     right = Posture(names=('left_elbow_joint',), values=(1.0,))
@@ -249,15 +264,17 @@ def test_joint_names_carry_the_prefix():
 
 
 def test_every_rule_refuses_some_goal_of_the_table():
-    def refusing(goal):
+    def refusing(goal, options=OPTIONS):
         for rule in RULES:
             try:
-                rule(goal, OPTIONS)
+                rule(goal, options)
             except Exception:
                 return rule
         return None
 
-    assert {refusing(goal) for goal, _, _ in REFUSALS} == set(RULES)
+    without = refusing(replace(PLAIN, path_tolerance=Tolerance(acceleration=ONE)),
+                       PlanningOptions(acceleration_known=False))
+    assert {refusing(goal) for goal, _, _ in REFUSALS} | {without} == set(RULES)
 
 
 numbers = st.floats(allow_nan=True, allow_infinity=True, width=64)

@@ -139,7 +139,9 @@ class RobotLoop:
     async def _start(self, request: StartMotion) -> None:
         """Start a motion, or refuse it with the reason."""
         machine = await _apart(len(request.points), partial(
-            TrajectoryMachine, request.order, feedback_period=1.0 / self._config.feedback_rate))
+            TrajectoryMachine, request.order, feedback_period=1.0 / self._config.feedback_rate,
+            max_plan_deviation=(self._config.max_plan_deviation,
+                                self._config.max_plan_deviation_angle)))
         reason = self._link.not_ready()
         if self._machine is not None:
             reason = 'Another motion is running; wait for its end or cancel it.'

@@ -44,7 +44,8 @@ from ur_cartesian_driver.execution.commands import (
     StopProgram,
 )
 from ur_cartesian_driver.execution.flow import Window
-from ur_cartesian_driver.execution.monitor import deviation, PathTracker, speed, violation
+from ur_cartesian_driver.execution.monitor import PathTracker, speed
+from ur_cartesian_driver.execution.tolerances import Watch
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
@@ -75,6 +76,10 @@ EARLY_ANSWER = 1.0
 DEFAULT_GOAL_TIME_TOLERANCE = 1.0
 
 
+#: How far the controller's own target may be from the plan [m], [rad].
+MAX_PLAN_DEVIATION = (0.002, 0.02)
+
+
 class State(Enum):
     """Where a goal is."""
 
@@ -93,6 +98,7 @@ class Signal(Enum):
     FAILURE = auto()
     CANCEL = auto()
     VIOLATION = auto()
+    DEVIATION = auto()
     PROTECTIVE_STOP = auto()
     EMERGENCY_STOP = auto()
     PROGRAM_STOPPED = auto()
@@ -145,6 +151,7 @@ TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
         Signal.FAILURE: _ends(ErrorCode.EXECUTION_FAILED),
         Signal.CANCEL: Step(State.STOPPING, ErrorCode.CANCELLED),
         Signal.VIOLATION: Step(State.STOPPING, ErrorCode.PATH_TOLERANCE_VIOLATED),
+        Signal.DEVIATION: Step(State.STOPPING, ErrorCode.EXECUTION_FAILED),
     },
     State.SETTLING: {
         **_STOPS,
@@ -190,15 +197,23 @@ class Order:
 class TrajectoryMachine:
     """The table above for one goal; see the module's description."""
 
-    def __init__(self, order: Order, *, feedback_period: float = 0.04) -> None:
+    def __init__(self, order: Order, *, feedback_period: float = 0.04,
+                 max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION) -> None:
         """
         Take an order; nothing happens before :meth:`start`.
 
         :param feedback_period: time between two progress reports [s].
+        :param max_plan_deviation: how far the controller's own target may be from the plan [m],
+            [rad]; 0 = any way, any angle.
         """
         self.order = order
         self.state = State.MOVING
         self._tracker = PathTracker(order.reference)
+        self._path_watch = Watch(order.path_tolerance, order.T_base_frame)
+        self._goal_watch = Watch(order.goal_tolerance, order.T_base_frame)
+        self._max_plan_deviation = max_plan_deviation
+        #: Whether the robot program has read START: it has begun a point, or the target moves.
+        self._under_way = False
         self._window = Window(order.points)
         self._feedback_period = feedback_period
         self._next_report = -inf
@@ -263,23 +278,44 @@ class TrajectoryMachine:
         """Return what a packet of a robot that runs means in the present state."""
         at_rest = _rests(state)
         if self.state is State.MOVING:
-            return self._path_violation(state)
+            return self._plan_deviation(state) or self._path_violation(state)
         if self.state is State.SETTLING and at_rest and self._goal_error(state) is None:
             return Signal.SETTLED, ''
         if self.state is State.HALTING and at_rest:
             return Signal.AT_REST, ''
         return self._late(now)
 
+    def _plan_deviation(self, state: RobotState) -> tuple[Signal, str] | None:
+        """Return that the controller does something else than the plan, or None."""
+        if not self._under_way:
+            return None
+        for name, unit, value, limit in zip(
+                ('max_plan_deviation', 'max_plan_deviation_angle'), ('m', 'rad'),
+                self._tracker.deviation(state.target_tcp_pose), self._max_plan_deviation,
+                strict=True):
+            if 0.0 < limit < value:
+                return Signal.DEVIATION, (
+                    f'the controller itself left the plan by {value:.6f} {unit}, {name} is '
+                    f'{limit:.6f} {unit}: the arm is on another branch, or something else than '
+                    'this goal moves it')
+        return None
+
     def _path_violation(self, state: RobotState) -> tuple[Signal | None, str]:
-        error = deviation(self._tracker.pose(), state.actual_tcp_pose, self.order.T_base_frame)
-        clause = violation(error, self.order.path_tolerance)
+        if not (self._path_watch and self._under_way):
+            return None, ''
+        clause = self._path_watch.violation(self._desired(state), state)
         if clause is None:
             return None, ''
         return Signal.VIOLATION, f'on the way to point {self._tracker.waypoint()} {clause}'
 
     def _goal_error(self, state: RobotState) -> str | None:
-        error = deviation(self._tracker.pose(), state.actual_tcp_pose, self.order.T_base_frame)
-        return violation(error, self.order.goal_tolerance)
+        return self._goal_watch.violation(self._tracker.pose(), state)
+
+    def _desired(self, state: RobotState) -> Pose:
+        """Return where the tool should be: around its progress, or at the end."""
+        if self.state is State.SETTLING:
+            return self._tracker.pose()
+        return self._tracker.desired(state.actual_tcp_pose, state.target_tcp_twist)
 
     def _has_not_begun(self) -> bool:
         """
@@ -368,15 +404,23 @@ class TrajectoryMachine:
             passed = 0.0
         else:
             passed = max(0.0, state.timestamp - before.timestamp)
-            self._scaled_time += passed * state.speed_scaling
+            if state.runtime_state is not RuntimeState.PAUSED:
+                self._scaled_time += passed * state.speed_scaling
         if self.state is State.MOVING:
-            reach = 2.0 * passed * speed(state.actual_tcp_twist)
-            self._tracker.update(state.actual_tcp_pose, reach, self._begun(state))
+            self._follow(before, state, passed)
         commands = self._release(max(self._begun(state), self._tracker.waypoint()))
         if now >= self._next_report:
             self._next_report = now + self._feedback_period
             commands.append(self._progress_report())
         return commands
+
+    def _follow(self, before: RobotState | None, state: RobotState, passed: float) -> None:
+        """Find the place on the path."""
+        begun, fastest = self._begun(state), speed(state.target_tcp_twist)
+        self._under_way = self._under_way or begun > 0 or fastest > 0.0
+        if before is not None:  # it may have braked since
+            fastest = max(fastest, speed(before.target_tcp_twist))
+        self._tracker.update(state.target_tcp_pose, 2.0 * passed * fastest, begun)
 
     def _begun(self, state: RobotState) -> int:
         """
@@ -405,7 +449,7 @@ class TrajectoryMachine:
         return Report(progress=Progress(
             waypoint=self._tracker.waypoint(),
             fraction=1.0 if order.duration <= 0.0 else min(1.0, time / order.duration),
-            desired_pose=self._tracker.pose(),
+            desired_pose=self._desired(state),
             desired_twist=state.target_tcp_twist,
             actual_pose=state.actual_tcp_pose,
             actual_twist=state.actual_tcp_twist,

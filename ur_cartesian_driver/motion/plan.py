@@ -32,15 +32,20 @@ class ReferencePath:
     point: NDArray[np.int32]
     #: (m,) expected time from the start of the motion [s] at full speed, not decreasing.
     time: NDArray[np.float64]
+    #: (m, 2) [m], [rad] how far the robot's own way may lie beside the sample: 0 but for corners,
+    #: of which the robot's maker publishes the size and not the shape. Empty = 0 everywhere.
+    room: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
 
     def __post_init__(self) -> None:
         """Check the shapes and make the arrays read-only."""
         m = len(self.poses)
-        if self.poses.shape != (m, 7) or self.point.shape != (m,) or self.time.shape != (m,):
-            raise ValueError(
-                f'reference path shapes differ: {self.poses.shape}, {self.point.shape}, '
-                f'{self.time.shape}')
-        for array in (self.poses, self.point, self.time):
+        if not len(self.room):
+            object.__setattr__(self, 'room', np.zeros((m, 2)))
+        arrays = (self.poses, self.point, self.time, self.room)
+        if [array.shape for array in arrays] != [(m, 7), (m,), (m,), (m, 2)]:
+            raise ValueError('reference path shapes differ: '
+                             + ', '.join(str(array.shape) for array in arrays))
+        for array in arrays:
             array.setflags(write=False)
 
 

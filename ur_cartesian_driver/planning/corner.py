@@ -84,6 +84,20 @@ class Corner:
         return max(2, turns, ceil(sqrt(bend / (4.0 * CURVE_CHORD_ERROR))))
 
     @property
+    def room(self) -> tuple[float, float]:
+        """
+        How far the robot's own corner may lie beside this one, [m] and [rad].
+
+        It may come as near to the waypoint as it likes, or cut the corner straight: this one is
+        half-way between. The turn of the tool may run ahead of its way, or behind it.
+        """
+        start, end, corner = (self.first.pose(self.leave), self.second.pose(self.join),
+                              self.second.start)
+        height = corner.distance_to(start.interpolate(end, 0.5))
+        turn = max(start.angle_to(corner), corner.angle_to(end))
+        return 0.5 * height, 0.5 * turn
+
+    @property
     def length(self) -> float:
         """Length of the rounded corner [m]."""
         poses = [self.pose(k / 16) for k in range(17)]

@@ -33,6 +33,7 @@ def reference_path(start: Pose, legs: Sequence[Leg], timings: Sequence[Timing]) 
     rows: list[_Row] = [start.row()]
     points: list[int] = [legs[0].index]
     times: list[float] = [0.0]
+    room: list[tuple[float, float]] = [(0.0, 0.0)]
     now = 0.0
     for k, (leg, timing) in enumerate(zip(legs, timings, strict=True)):
         u = _places(leg, timing)
@@ -42,13 +43,15 @@ def reference_path(start: Pose, legs: Sequence[Leg], timings: Sequence[Timing]) 
         times.extend(now + timing.profile.time_at(way * (x - leg.u_before) / span)
                      if span > 0.0 else now for x in u)
         now += timing.profile.duration
+        room.extend([(0.0, 0.0)] * len(u))
         if leg.after is not None:
             now = _append_corner(leg.after, (leg.index, legs[k + 1].index), now, timing.corner,
                                  rows, points, times)
+            room.extend([leg.after.room] * leg.after.samples)
     poses = np.array(rows)
     _keep_hemisphere(poses)
     return ReferencePath(poses=poses, point=np.array(points, dtype=np.int32),
-                         time=np.maximum.accumulate(np.array(times)))
+                         time=np.maximum.accumulate(np.array(times)), room=np.array(room))
 
 
 def _places(leg: Leg, timing: Timing) -> list[float]:

@@ -31,12 +31,12 @@ from ur_cartesian_driver.motion.goal import (
     Posture,
     Segment,
     SegmentType,
-    Tolerance,
     Waypoint,
 )
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Quaternion
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.path import Arc, same
+from ur_cartesian_driver.planning.tolerances import tolerances_of, with_default_tolerances
 
 #: How far a quaternion's length may be off 1.
 QUATERNION_TOLERANCE = 1e-3
@@ -130,12 +130,23 @@ def _numbers_of_segments(goal: Goal, options: PlanningOptions) -> None:
 
 
 def _numbers_of_tolerances(goal: Goal, options: PlanningOptions) -> None:
-    for name, tolerance in _tolerances(goal):
+    for name, tolerance in tolerances_of(goal):
         _check_finite(f'{name}.position_error', tolerance.position)
         _check_finite(f'{name}.orientation_error', tolerance.orientation)
         _check_finite(f'{name}.twist_error', tolerance.twist)
         _check_finite(f'{name}.acceleration_error', tolerance.acceleration)
     _check_finite('goal_time_tolerance', (goal.goal_time_tolerance,))
+
+
+def _tolerances_are_measurable(goal: Goal, options: PlanningOptions) -> None:
+    if options.acceleration_known:
+        return
+    for name, tolerance in tolerances_of(with_default_tolerances(goal, options)):
+        if max(tolerance.acceleration) > 0.0:
+            raise InvalidGoal(
+                f'{name}.acceleration_error', 'is positive (or 0, and the parameters '
+                f'{name}_linear_acceleration, {name}_angular_acceleration are), but the software '
+                'of this robot does not report accelerations of the TCP', 'set it to -1')
 
 
 def _stamp(goal: Goal, options: PlanningOptions) -> None:
@@ -168,12 +179,6 @@ def _available(goal: Goal, options: PlanningOptions) -> None:
         raise NotAvailable(
             'trajectory.controlled_frame', f"is '{goal.controlled_frame}', but this version "
             'moves the active TCP only', 'leave it empty and set the TCP on the robot')
-    for name, tolerance in _tolerances(goal):
-        for field, values in (('twist_error', tolerance.twist),
-                              ('acceleration_error', tolerance.acceleration)):
-            if max(values) > 0.0:
-                raise NotAvailable(f'{name}.{field}', 'is positive, but only position and '
-                                   'orientation are watched in this version', 'set it to 0')
 
 
 def _times(goal: Goal, options: PlanningOptions) -> None:
@@ -256,6 +261,7 @@ RULES: tuple[Rule, ...] = (
     _numbers_of_points,
     _numbers_of_segments,
     _numbers_of_tolerances,
+    _tolerances_are_measurable,
     _stamp,
     _available,
     _times,
@@ -427,7 +433,3 @@ def _via(index: int, segment: Segment) -> None:
         if given:
             raise InvalidGoal(segment_field(index, field), f'is set, but the type is {kind.name}',
                               'set the type to CIRCULAR, or leave it empty')
-
-
-def _tolerances(goal: Goal) -> tuple[tuple[str, Tolerance], tuple[str, Tolerance]]:
-    return ('path_tolerance', goal.path_tolerance), ('goal_tolerance', goal.goal_tolerance)

@@ -1,0 +1,131 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whether the arm is near enough to where it should be, axis by axis.
+
+An error is desired - actual. Position and orientation are compared with the planned path; twist
+and acceleration with what the controller itself wants at that moment, as both report them in one
+packet. So nothing here knows a speed profile: what the slider, a pause, a blend or the robot's own
+limits make of the speed changes both sides alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import nan
+
+from ur_cartesian_driver.motion.goal import Tolerance
+from ur_cartesian_driver.motion.pose import (
+    conjugate,
+    multiply,
+    Pose,
+    Quaternion,
+    rotate,
+    rotation_vector_from_quaternion,
+    Vector3,
+    Vector6,
+)
+from ur_cartesian_driver.motion.state import RobotState
+
+_AXES = ('x', 'y', 'z')
+_UNKNOWN: Vector6 = (nan,) * 6
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Three axes that are measured alike."""
+
+    name: str
+    unit: str
+    limits: Callable[[Tolerance], Vector3]
+    #: From the planned pose, the robot's packet and the rotation from base to the goal's frame.
+    error: Callable[[Pose, RobotState, Quaternion], Vector3]
+
+
+class Watch:
+    """A tolerance that packets are held against; it costs nothing for what has no limit."""
+
+    def __init__(self, tolerance: Tolerance, T_base_frame: Pose) -> None:
+        """
+        Prepare a tolerance.
+
+        :param tolerance: zero and negative mean no limit: defaults were filled in before.
+        :param T_base_frame: the frame of the goal, along whose axes all but the orientation is
+            compared.
+        """
+        self._turn = conjugate(T_base_frame.quaternion)
+        self._watched = tuple((quantity, quantity.limits(tolerance)) for quantity in QUANTITIES
+                              if max(quantity.limits(tolerance)) > 0.0)
+
+    def __bool__(self) -> bool:
+        """Tell whether there is any limit."""
+        return bool(self._watched)
+
+    def violation(self, desired: Pose, state: RobotState) -> str | None:
+        """
+        Return a clause that names an axis outside its limit, value and limit; or None.
+
+        Of several axes it is the one that is outside by the largest factor. What is not a number
+        is outside.
+
+        :param desired: planned pose of the TCP in base.
+        """
+        worst, clause = 1.0, None
+        for quantity, limits in self._watched:
+            errors = quantity.error(desired, state, self._turn)
+            for axis, error, limit in zip(_AXES, errors, limits, strict=True):
+                if limit > 0.0 and not abs(error) <= worst * limit:
+                    worst = abs(error) / limit
+                    clause = (f'{quantity.name} {axis} is off by {abs(error):.6f} '
+                              f'{quantity.unit}, the tolerance is {limit:.6f} {quantity.unit}')
+        return clause
+
+
+def _position(desired: Pose, state: RobotState, turn: Quaternion) -> Vector3:
+    return rotate(turn, _minus(desired.position, state.actual_tcp_pose.position))
+
+
+def _orientation(desired: Pose, state: RobotState, turn: Quaternion) -> Vector3:
+    """Return the rotation vector of q_actual^-1 q_desired, in the axes of the tool."""
+    actual = conjugate(state.actual_tcp_pose.quaternion)
+    return rotation_vector_from_quaternion(multiply(actual, desired.quaternion))
+
+
+def _linear_velocity(desired: Pose, state: RobotState, turn: Quaternion) -> Vector3:
+    return rotate(turn, _minus(state.target_tcp_twist[:3], state.actual_tcp_twist[:3]))
+
+
+def _angular_velocity(desired: Pose, state: RobotState, turn: Quaternion) -> Vector3:
+    return rotate(turn, _minus(state.target_tcp_twist[3:], state.actual_tcp_twist[3:]))
+
+
+def _linear_acceleration(desired: Pose, state: RobotState, turn: Quaternion) -> Vector3:
+    target, actual = _accelerations(state)
+    return rotate(turn, _minus(target[:3], actual[:3]))
+
+
+def _angular_acceleration(desired: Pose, state: RobotState, turn: Quaternion) -> Vector3:
+    target, actual = _accelerations(state)
+    return rotate(turn, _minus(target[3:], actual[3:]))
+
+
+def _accelerations(state: RobotState) -> tuple[Vector6, Vector6]:
+    """Return target and actual; planning refuses limits where the robot reports none."""
+    return state.target_tcp_acceleration or _UNKNOWN, state.actual_tcp_acceleration or _UNKNOWN
+
+
+def _minus(a: Vector3, b: Vector3) -> Vector3:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+#: Everything that has a tolerance.
+QUANTITIES: tuple[Quantity, ...] = (
+    Quantity('position', 'm', lambda t: t.position, _position),
+    Quantity('orientation', 'rad', lambda t: t.orientation, _orientation),
+    Quantity('linear velocity', 'm/s', lambda t: t.twist[:3], _linear_velocity),
+    Quantity('angular velocity', 'rad/s', lambda t: t.twist[3:], _angular_velocity),
+    Quantity('linear acceleration', 'm/s^2', lambda t: t.acceleration[:3], _linear_acceleration),
+    Quantity('angular acceleration', 'rad/s^2', lambda t: t.acceleration[3:],
+             _angular_acceleration),
+)
