@@ -206,8 +206,8 @@ class Controller:
     # What the life of programs asks for
 
     def brake(self) -> None:
-        """Stop hard; an arm that is paused on its path stands already and only forgets it."""
-        if self.scale == 0.0:
+        """Stop hard; an arm that stands on its path, paused or at a fault, only forgets it."""
+        if self.scale == 0.0 or self.motion.fault is not None:
             self.motion.halt_hard()
         self.ownership.brake()
 

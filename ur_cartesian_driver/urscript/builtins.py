@@ -245,12 +245,18 @@ def get_list_length(v: Value) -> int:
     return length(v)
 
 
+#: The manual names no limit; without one a program could take all the memory.
+LONGEST_LIST = 100_000
+
+
 def make_list(length: Value, initial_value: Value, capacity: Value = None) -> Value:
     """Return a list of equal items; its capacity is checked and otherwise without effect."""
     count = _int(length)
     room = count if capacity is None else _int(capacity)
     if not 0 <= count <= room:
         raise RuntimeException(f'make_list: length {count} does not lie in 0..{room} (capacity)')
+    if room > LONGEST_LIST:
+        raise RuntimeException(f'make_list: more than {LONGEST_LIST} items are not possible')
     if type(initial_value) in (list, Matrix):
         raise RuntimeException('make_list: a list of lists is not possible')
     return make_list_value([copy(initial_value) for _ in range(count)])

@@ -32,6 +32,8 @@ TOO_MUCH_TIME = (
     'The program used too much time without instructing the robot what to do. '
     'Consider using a Wait or sync() in the loop.'
 )
+#: The manual names no limit; threads that start threads would soon take all time and memory.
+MOST_THREADS = 256
 
 
 class _ThreadKilled(BaseException):
@@ -207,6 +209,8 @@ class Machine:
         """Start a thread; it runs in this frame, after all that were started before."""
         if self._is_secondary:
             raise RuntimeException('A secondary program cannot start threads.')
+        if len(self._threads) >= MOST_THREADS:
+            raise RuntimeException(f'More than {MOST_THREADS} threads run at once.')
         thread = _Thread(self.threads_started, procedure.steps(), self.thread)
         self.threads_started += 1
         self._threads.append(thread)

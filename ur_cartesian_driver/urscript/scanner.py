@@ -57,9 +57,11 @@ class Token(NamedTuple):
     @property
     def number(self) -> int | float:
         """The value of a number."""
-        if self.text.isdigit() and int(self.text) < INT_LIMIT:
+        value = float(self.text)
+        # Python refuses to read integers of thousands of digits.
+        if self.text.isdigit() and value < INT_LIMIT:
             return int(self.text)
-        return float(self.text)
+        return value
 
 
 def syntax_error(text: str, line: int, column: int, reason: str) -> CompileError:

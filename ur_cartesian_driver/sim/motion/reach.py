@@ -36,6 +36,9 @@ NO_CHANGE = 1e-9
 _AT_LIMIT = 0.02
 _SAMPLES = 8
 
+#: No arm reaches so far [m].
+_FAR = 1e3
+
 
 class Reach:
     """
@@ -51,6 +54,8 @@ class Reach:
 
     def joints(self, T_base_flange: Pose, q_near: Vector6) -> Vector6 | None:
         """Return the nearest solution within the limits."""
+        if not max(map(abs, T_base_flange.position)) < _FAR:
+            return None  # absurd speeds lead there; squares of such numbers overflow
         return nearest(self._arm, T_base_flange, q_near)
 
     def overspeed(self, q: Vector6, q_before: Vector6) -> float:
