@@ -33,6 +33,10 @@ from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 GOLDEN = json.loads((Path(__file__).parent / 'golden' / 'rtde_handshake.json').read_text())
 FREE = {'rtde_port': 0, 'primary_port': 0, 'dashboard_port': 0}
+#: The names and types in the tables of the manufacturer's client library, and sizes in bytes.
+OUTPUTS = json.loads((Path(__file__).parent / 'golden' / 'rtde_outputs.json').read_text())
+SIZES = {'BOOL': 1, 'UINT8': 1, 'UINT32': 4, 'INT32': 4, 'UINT64': 8, 'DOUBLE': 8,
+         'VECTOR3D': 24, 'VECTOR6D': 48, 'VECTOR6INT32': 24}
 HOST = '127.0.0.1'
 
 
@@ -172,6 +176,58 @@ def test_a_frequency_is_kept_by_spreading_packages_over_the_cycles(robot):
                  for kind, data in (wire.rtde() for _ in range(50)) if kind == ord('U')]
     assert [b - a for a, b in itertools.pairwise(times)] == pytest.approx(
         [0.008] * (len(times) - 1))
+
+
+@pytest.mark.parametrize(('settings', 'cycle'), [
+    ({'rate': 0.0}, 0.002), ({'rate': 1.0}, 0.002), ({'rate': 4.0, 'model': 'ur5'}, 0.008)],
+    ids=['virtual clock', 'real clock', 'CB3'])
+def test_timestamps_advance_by_one_cycle_for_every_client(settings, cycle):
+    with SimulatedRobot(SimulatorConfig(**FREE, **settings)) as robot, \
+            Wire(robot.ports.rtde) as one, Wire(robot.ports.rtde) as two:
+        one.send(VERSION_2 + setup_outputs('timestamp', frequency=1.0 / cycle) + START)
+        two.send(VERSION_2 + setup_outputs('timestamp', 'control_step', frequency=0.0) + START)
+        for wire in (one, two):
+            stamps = [struct.unpack_from('>d', data, 4)[0]
+                      for kind, data in (wire.rtde() for _ in range(203)) if kind == ord('U')]
+            assert [b - a for a, b in itertools.pairwise(stamps)] == pytest.approx(
+                [cycle] * (len(stamps) - 1), abs=1e-9)
+
+
+@pytest.mark.parametrize('frequency', [250.0, 200.0, 150.0, 333.3, 499.0, 60.0])
+def test_a_frequency_that_does_not_divide_is_kept_on_average(robot, frequency):
+    with Wire(robot.ports.rtde) as wire:
+        wire.send(VERSION_2 + setup_outputs('timestamp', frequency=frequency) + START)
+        stamps = [struct.unpack('>d', data[4:])[0]
+                  for kind, data in (wire.rtde() for _ in range(100)) if kind == ord('U')]
+    gaps = [round((b - a) / 0.002) for a, b in itertools.pairwise(stamps)]
+    assert {int(500.0 / frequency), -int(-500.0 // frequency)} >= set(gaps)
+    assert stamps[-1] - stamps[0] == pytest.approx(len(gaps) / frequency, abs=0.002)
+
+
+def test_a_pause_ends_the_packages_until_the_next_start(robot):
+    with Wire(robot.ports.rtde) as wire:
+        wire.send(VERSION_2 + setup_outputs('timestamp') + START)
+        wire.send(PAUSE + START)
+        kinds = [wire.rtde()[0] for _ in range(50)]
+    paused = kinds.index(ord('P'))
+    assert kinds[paused + 1] == ord('S')
+    assert set(kinds[paused + 2:]) == {ord('U')}
+
+
+@pytest.fixture(scope='module')
+def any_robot():
+    with SimulatedRobot(SimulatorConfig(**FREE, rate=4.0)) as robot:
+        yield robot
+
+
+@pytest.mark.parametrize(('name', 'data_type'), OUTPUTS.items())
+def test_an_output_that_clients_know_has_its_type_and_size(any_robot, name, data_type):
+    with Wire(any_robot.ports.rtde) as wire:
+        wire.send(VERSION_2 + setup_outputs(name) + START)
+        assert wire.rtde()[1][3:] == b'\x01'
+        assert wire.rtde()[1][3:] == b'\x01' + data_type.encode()
+        assert wire.rtde()[1][3:] == b'\x01'
+        assert len(wire.rtde()[1]) == 4 + SIZES[data_type]
 
 
 def test_two_clients_have_their_own_recipes_and_share_the_inputs(robot):
@@ -391,6 +447,14 @@ def test_the_dashboard_answers_in_the_robots_words():
         until(lambda: wire.ask('programState') == 'STOPPED a.urp')
         assert wire.ask('quit') == 'Disconnected'
         assert wire.socket.recv(10) == b''
+
+
+def test_polyscope_x_has_no_dashboard():
+    with SimulatedRobot(SimulatorConfig(**FREE, polyscope='10.8')) as robot, \
+            Wire(robot.ports.rtde) as wire:
+        assert robot.ports.dashboard == 0
+        wire.send(struct.pack('>HB', 3, ord('v')))
+        assert struct.unpack('>4I', wire.rtde()[1][3:]) == (10, 8, 0, 0)
 
 
 @pytest.mark.parametrize(('settings', 'command', 'known'), [

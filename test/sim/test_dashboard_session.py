@@ -1,0 +1,177 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Every command of the dashboard: its answer, and the software that has it."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.sim.config import SimulatorConfig
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.dashboard_session import COMMANDS, DashboardSession
+from ur_cartesian_driver.sim.modes import SafetyEvent
+from ur_cartesian_driver.sim.server import Hangup
+
+#: Command, the answer that the manufacturer's client library wants, and the minor versions of
+#: PolyScope 3 and 5 from which on that library sends it; None: in none.
+TABLE = [
+    ('load a.urp', r'Loading program: .*a\.urp.*', 0, 0),
+    ('play', r'Starting program', 0, 0),
+    ('pause', r'Pausing program', 0, 0),
+    ('stop', r'Stopped', 0, 0),
+    ('quit', r'Disconnected', 0, 0),
+    ('shutdown', r'Shutting down', 0, 0),
+    ('power on', r'Powering on', 0, 0),
+    ('power off', r'Powering off', 0, 0),
+    ('brake release', r'Brake releasing', 0, 0),
+    ('unlock protective stop', r'Protective stop releasing', 1, 0),
+    ('close popup', r'closing popup', 0, 0),
+    ('close safety popup', r'closing safety popup', 1, 0),
+    ('restart safety', r'Restarting safety', 7, 1),
+    ('running', r'Program running: (true|false)', 0, 0),
+    ('robotmode', r'Robotmode: RUNNING', 0, 0),
+    ('safetymode', r'Safetymode: NORMAL', 0, 0),
+    ('safetystatus', r'Safetystatus: NORMAL', None, 4),
+    ('get loaded program', r'Loaded program: .*a\.urp', 0, 0),
+    ('programState', r'(STOPPED|PLAYING|PAUSED) a\.urp', 0, 0),
+    ('isProgramSaved', r'(true|false) a\.urp', 0, 0),
+    ('popup careful', r'showing popup', 0, 0),
+    ('addToLog a line', r'Added log message', 0, 0),
+    ('PolyscopeVersion', r'URSoftware \d+(\.\d+){1,3} \(.*', 0, 0),
+    ('version', r'\d+(\.\d+){3}', None, 0),
+    ('setUserRole operator', r'Setting user role: operator', 1, None),
+    ('getUserRole', r'PROGRAMMER|OPERATOR|NONE|LOCKED|RESTRICTED', 1, None),
+    ('set operational mode manual', r'Operational mode .*manual.*', None, 0),
+    ('get operational mode', r'NONE|MANUAL|AUTOMATIC', None, 6),
+    ('clear operational mode', r'No longer controlling the operational mode\. .*', None, 0),
+    ('load installation default.installation', r'Loading installation: .*default.*', 2, 0),
+    ('is in remote control', r'true|false', None, 6),
+    ('get serial number', r'20\d+', 12, 6),
+    ('get robot model', r'UR\d+', 12, 6),
+    ('generate flight report system', r'Flight Report generated with id:.*', 13, 8),
+    ('generate support file /programs', r'Completed successfully:.*', 13, 8),
+    ('saveLog', r'Log saved to disk', 13, 8),
+]
+PROGRAM = 'def a():\n  while True:\n    sync()\n  end\nend\n'
+
+
+class Desk:
+    """A session without sockets; a program is loaded."""
+
+    def __init__(self, major: int, minor: int, **settings: object) -> None:
+        self.controller = Controller(SimulatorConfig(
+            model='ur5' if major < 5 else 'ur5e', polyscope=f'{major}.{minor}',
+            programs={'a.urp': PROGRAM}, **settings))  # type: ignore[arg-type]
+        self.session = DashboardSession(self.controller)
+        self.ask('load a.urp')
+
+    def ask(self, line: str) -> str:
+        try:
+            answer = self.session.feed(line.encode() + b'\n').decode()
+        except Hangup as hangup:
+            answer = hangup.farewell.decode()
+        assert answer.count('\n') == 1
+        return answer.removesuffix('\n')
+
+    def wait(self, seconds: float) -> None:
+        for _ in range(round(seconds / self.controller.cycle)):
+            self.controller.step()
+
+
+def minors(column):
+    return [(row[0], row[1], row[column]) for row in TABLE if row[column] is not None]
+
+
+@pytest.mark.parametrize(('major', 'command', 'answer', 'minor'), [
+    *[(3, *row) for row in minors(2)], *[(5, *row) for row in minors(3)]])
+def test_a_command_is_answered_from_its_version_on(major, command, answer, minor):
+    desk = Desk(major, minor)
+    if command == 'pause':
+        desk.ask('play')
+        desk.wait(0.1)
+    assert re.fullmatch(answer, desk.ask(command))
+    if minor:
+        # An older one may take `load installation` for the name of a program.
+        before = Desk(major, minor - 1).ask(command)
+        assert before.startswith(('could not understand: ', 'File not found: installation '))
+
+
+@pytest.mark.parametrize(('major', 'command'), [
+    *[(3, row[0]) for row in TABLE if row[2] is None],
+    *[(5, row[0]) for row in TABLE if row[3] is None]])
+def test_a_series_that_never_had_a_command_does_not_understand_it(major, command):
+    assert 'could not understand' in Desk(major, 15).ask(command)
+
+
+def test_the_table_is_complete():
+    assert len({row[0] for row in TABLE}) == len(TABLE) == len(COMMANDS)
+    for command in COMMANDS:
+        assert any(command.argument_in(row[0]) is not None for row in TABLE), command.words
+
+
+@pytest.mark.parametrize(('command', 'answer'), [
+    ('load b.urp', 'File not found: b.urp'),
+    ('load installation other.installation', 'File not found: other.installation'),
+    ('pause', 'Failed to execute: pause'),
+    ('set operational mode dancing', 'could not understand: "set operational mode dancing"'),
+    ('Play', 'could not understand: "Play"'),
+    ('play now', 'could not understand: "play now"'),
+    ('', 'could not understand: ""'),
+])
+def test_what_cannot_be_done_is_said(command, answer):
+    assert Desk(5, 21).ask(command) == answer
+
+
+@pytest.mark.parametrize('command', ['power on', 'brake release', 'play'])
+def test_an_arm_in_emergency_stop_refuses(command):
+    desk = Desk(5, 21)
+    desk.controller.safety_event(SafetyEvent.EMERGENCY_STOP)
+    desk.wait(0.1)
+    assert desk.ask(command) == f'Failed to execute: {command}'
+    assert desk.ask('safetystatus') == 'Safetystatus: ROBOT_EMERGENCY_STOP'
+
+
+def test_what_clients_poll_for_comes_true():
+    desk = Desk(5, 21, power='off')
+    desk.ask('power on')
+    desk.wait(1.0)
+    assert desk.ask('robotmode') == 'Robotmode: IDLE'
+    assert desk.ask('power on') == 'Powering on'
+    desk.ask('brake release')
+    desk.wait(1.0)
+    assert desk.ask('robotmode') == 'Robotmode: RUNNING'
+    for command, state in [('play', 'PLAYING'), ('pause', 'PAUSED'), ('play', 'PLAYING'),
+                           ('stop', 'STOPPED')]:
+        desk.ask(command)
+        desk.wait(0.1)
+        assert desk.ask('programState') == f'{state} a.urp'
+        assert desk.ask('running') == f'Program running: {str(state != "STOPPED").lower()}'
+    desk.ask('power off')
+    assert desk.ask('robotmode') == 'Robotmode: POWER_OFF'
+
+
+def test_a_protective_stop_is_unlocked_after_five_seconds_and_leaves_the_program_paused():
+    desk = Desk(5, 21)
+    desk.ask('play')
+    desk.wait(0.1)
+    desk.controller.safety_event(SafetyEvent.PROTECTIVE_STOP)
+    desk.wait(4.0)
+    assert desk.ask('unlock protective stop').startswith('Cannot unlock protective stop until 5s')
+    assert desk.ask('safetymode') == 'Safetymode: PROTECTIVE_STOP'
+    desk.wait(1.5)
+    assert desk.ask('unlock protective stop') == 'Protective stop releasing'
+    assert desk.ask('safetymode') == 'Safetymode: NORMAL'
+    assert desk.ask('robotmode') == 'Robotmode: RUNNING'
+    assert desk.controller.programs.state is RuntimeState.PAUSED
+
+
+def test_a_violation_is_left_by_restarting_safety_without_power():
+    desk = Desk(5, 21)
+    desk.controller.safety_event(SafetyEvent.VIOLATION)
+    assert desk.ask('safetystatus') == 'Safetystatus: VIOLATION'
+    assert desk.ask('restart safety') == 'Restarting safety'
+    assert desk.ask('safetystatus') == 'Safetystatus: NORMAL'
+    assert desk.ask('robotmode') == 'Robotmode: POWER_OFF'
