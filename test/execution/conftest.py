@@ -48,19 +48,19 @@ class Cell:
         return plan(goal, state, self.arm, PlanningOptions(max_tool_speed=1.0))
 
     def run(self, made, *, scale=lambda t: 1.0, disturb=lambda t, state: state,
-            path=None, end=None, **settings):
+            instead=None, **settings):
         """
         Run a plan, and hand every packet to a machine, in the cycle in which it was made.
 
         :param scale: speed scaling by time [s]; 0 = a pause.
         :param disturb: makes of a packet what the machine gets, by time [s].
-        :param path: path tolerance, ``end``: goal tolerance.
+        :param instead: a plan that the robot runs while the machine believes in the other.
         :returns: the machine, and the commands of each packet.
         """
         order = Order(points=len(made.segments), reference=made.reference, duration=made.duration,
                       T_base_frame=made.goal.T_base_frame,
-                      path_tolerance=path or made.goal.path_tolerance,
-                      goal_tolerance=end or made.goal.goal_tolerance)
+                      path_tolerance=made.goal.path_tolerance,
+                      goal_tolerance=made.goal.goal_tolerance)
         machine = TrajectoryMachine(order, **settings)
         robot = MotionGenerator(self.arm, CYCLE, made.start)
         robot.T_flange_tcp = self.T_flange_tcp
@@ -87,7 +87,7 @@ class Cell:
             answers.append(machine.step(StateReceived(state=state()), time))
 
         machine.start(state())
-        for k, segment in enumerate(made.segments):
+        for k, segment in enumerate((instead or made).segments):
             begun = k + 1
             move = self._begin(robot, segment.primitive)
             while not move.returned:
