@@ -645,6 +645,21 @@ def test_a_client_of_a_throttled_port_that_gets_too_far_behind_is_dropped(robot,
     assert client.is_closed()
 
 
+def test_a_flood_into_a_throttled_port_is_left_to_the_client(robot, connect):
+    client = connect(robot.ports.dashboard)
+    client.line()
+    robot.inject('throttle dashboard 1')
+    passes(robot, 0.1)
+    client.socket.settimeout(0.1)
+
+    def flood():
+        for _ in range(500):
+            client.socket.send(bytes(100_000))
+
+    with pytest.raises(TimeoutError):  # of one piece, not of all
+        flood()
+
+
 @pytest.mark.ur_sim(rate=20.0, faults=['protective_stop at 0.5 s', Slider(fraction=0.25)])
 def test_the_fixture_takes_faults(ur_sim):
     while ur_sim.state().safety_mode is not SafetyMode.PROTECTIVE_STOP:

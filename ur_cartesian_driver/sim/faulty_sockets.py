@@ -7,6 +7,9 @@ from __future__ import annotations
 from ur_cartesian_driver.sim.impairment import Hampered, Impairment
 from ur_cartesian_driver.sim.script_sockets import ScriptSockets, SocketState
 
+#: Bytes that are held back before the rest is left to the kernel, and so to the peer.
+_MOST_UNHEARD = 65_536
+
 
 class FaultySockets:
     """
@@ -107,8 +110,8 @@ class FaultySockets:
         return hampered
 
     def _pump(self, name: str, hampered: Hampered) -> None:
-        incoming, arrived = self._sockets.received(name), self._arrived[name]
-        if incoming:
+        arrived = self._arrived[name]
+        if hampered.unheard < _MOST_UNHEARD and (incoming := self._sockets.received(name)):
             hampered.hear(bytes(incoming), self._now)
             incoming.clear()
         arrived += hampered.heard(self._now)

@@ -102,6 +102,11 @@ class Hampered:
         return self._outgoing.size
 
     @property
+    def unheard(self) -> int:
+        """Bytes that have come and have not reached the robot."""
+        return self._incoming.size
+
+    @property
     def over(self) -> bool:
         """Whether nothing is wrong any more and nothing held back."""
         return (self.impairment is None and not self.frozen

@@ -81,6 +81,16 @@ class _Connection(asyncio.Protocol, Generic[S]):
             self._hear(data)
         else:
             self._hampered.hear(data, self._server.now)
+            self._transport_reading(self._hampered.unheard < MOST_UNREAD)
+
+    def _transport_reading(self, wanted: bool) -> None:
+        """Leave to the kernel, and so to the client, what is too much to hold back."""
+        if self._transport is None or self._transport.is_closing():
+            return
+        if wanted:
+            self._transport.resume_reading()
+        else:
+            self._transport.pause_reading()
 
     def _hear(self, data: bytes) -> None:
         try:
@@ -139,6 +149,7 @@ class _Connection(asyncio.Protocol, Generic[S]):
             return False
         if data := hampered.heard(now):
             self._hear(data)
+        self._transport_reading(hampered.unheard < MOST_UNREAD)
         self._send(hampered.said(now))
         if self._leaving and not hampered.unsent:
             self._leaving = False
