@@ -20,6 +20,7 @@ from ur_cartesian_driver.kinematics.inverse import (
     why_unreachable,
 )
 from ur_cartesian_driver.kinematics.robots import MODELS
+from ur_cartesian_driver.kinematics.rows import postures
 from ur_cartesian_driver.motion.pose import Pose
 
 UR5E = Arm(MODELS['ur5e'])
@@ -264,6 +265,54 @@ def test_out_of_reach_there_is_no_nearest(calibrated_arm):
         assert solutions(arm, far) == []
 
 
+# --- Next to a singularity of a calibrated arm -------------------------------------------------
+
+def next_to(singularity, arm, n):
+    """Joint positions close to one singularity and away from the two others."""
+    rows = np.random.default_rng(17).uniform(-pi, pi, (40 * n, 6))
+    if singularity == 'elbow':
+        rows[:, 2] *= 0.03
+    if singularity == 'wrist':
+        rows[:, 4] *= 0.01
+    measures = postures(arm, rows)
+    size = {'shoulder': np.abs(measures.shoulder) / 0.1, 'elbow': np.abs(measures.elbow) / 0.3,
+            'wrist': np.abs(measures.wrist) / 0.3}
+    away = np.all([size[name] > 1.0 for name in size if name != singularity], axis=0)
+    return [tuple(row) for row in rows[away & (size[singularity] < 0.33)][:n].tolist()]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('singularity', ['shoulder', 'elbow', 'wrist'])
+@pytest.mark.parametrize('name', ['ur3', 'ur5e', 'ur20'])
+def test_twins_are_found_without_a_seed(name, singularity, calibrated_arm):
+    arm = calibrated_arm(name, 3)
+    rows = next_to(singularity, arm, 40)
+    assert len(rows) > 20
+    missed = 0
+    for q in rows:
+        T_base_flange = arm.forward(q)
+        found = solutions(arm, T_base_flange)
+        assert_all_solve(arm, found, T_base_flange)
+        missed += min(miss(q, other) for other in found) > 1e-4
+    # Where the wrist is straight to the arm's misfit the iteration does not always get there.
+    assert missed <= (singularity == 'wrist')
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('singularity', ['shoulder', 'elbow', 'wrist'])
+def test_of_twins_the_nearest_is_the_nearer(singularity, calibrated_arm):
+    arm = calibrated_arm('ur10', 3)
+    for q in next_to(singularity, arm, 20):
+        T_base_flange = arm.forward(q)
+        found = solutions(arm, T_base_flange, seed=q)
+        for solution in found:
+            q_near = tuple(angle + 0.02 for angle in solution)
+            least = min(dist(q_near, turned) for other in found for turned in [tuple(
+                near + remainder(angle - near, tau)
+                for angle, near in zip(other, q_near, strict=True))])
+            assert dist(nearest(arm, T_base_flange, q_near), q_near) < least + 1e-6
+
+
 # --- Partial postures --------------------------------------------------------------------------
 
 @pytest.mark.parametrize('is_calibrated', [False, True])
@@ -366,5 +415,5 @@ def test_many_poses_of_many_calibrated_arms_come_back(name, calibrated_arm):
             missed += min(miss(q, other) for other in found) > 1e-4
             near = nearest(arm, T_base_flange, q)
             assert dist(near, q) < 1e-4
-    # Without a seed a branch may be missed next to a singularity; see solutions().
-    assert missed <= 4
+    # Without a seed a branch may be missed next to two singularities; see solutions().
+    assert missed <= 1

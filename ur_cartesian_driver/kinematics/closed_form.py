@@ -30,7 +30,7 @@ MERGED_ROOTS = 1e-13
 # Sine of wrist 2 below which the axes 4 and 6 are one line and only their sum counts.
 WRIST_SINGULAR = 2e-10
 # How many times the misfit wrist 3 must be off the axis of wrist 1 for its direction to count.
-_WRIST_DOUBT = 3.0
+_WRIST_DOUBT = 10.0
 
 
 class Wrist(NamedTuple):

@@ -62,8 +62,8 @@ def solutions(arm: Arm, T_base_flange: Pose, seed: Joints | None = None) -> list
     Return every joint solution [rad], each angle within (-pi, pi], whatever the limits are.
 
     Of a calibrated arm a solution may be missed where two singularities meet, within some degrees
-    of both, since the ideal arm says little about the real one there; not the one next to the
-    seed. There it may also have more than eight.
+    of both, and rarely within half a degree of a straight wrist, since the ideal arm says little
+    about the real one there; not the one next to the seed. There may also be more than eight.
 
     :param seed: where the axes of wrist 1 and wrist 3 are one line, wrist 3 is taken from here
         (else it is 0). For a calibrated arm a seed near the pose is one more start of the search.
