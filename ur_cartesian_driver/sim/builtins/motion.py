@@ -90,6 +90,8 @@ class Ownership:
         self._abortable += abortable
         finished = False
         try:
+            if move.returned and not self._motion.moving:
+                yield  # programs repeat moves to where the arm stands: these take a cycle, too
             while not move.returned:
                 if self._aborting and abortable:
                     self._aborting = False
