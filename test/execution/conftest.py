@@ -110,7 +110,7 @@ class Cell:
                 return robot.movep(move.target, a, v, r)
             case MoveC():
                 return robot.movec(move.via, move.target, a, v, r, int(move.mode))
-        raise NotImplementedError(move)
+        raise AssertionError(f'no plan of these tests has a {type(move).__name__}')
 
 
 @pytest.fixture(scope='session')

@@ -17,6 +17,7 @@ class Bench:
     """A controller and the ways in which tests let its time pass."""
 
     def __init__(self, **settings: object) -> None:
+        # The fields have types of their own; SimulatorConfig checks the values that tests give.
         self.controller = Controller(SimulatorConfig(**settings))  # type: ignore[arg-type]
         self.programs = self.controller.programs
 

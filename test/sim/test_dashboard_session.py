@@ -62,6 +62,7 @@ class Desk:
     """A session without sockets; a program is loaded."""
 
     def __init__(self, major: int, minor: int, **settings: object) -> None:
+        # The fields have types of their own; SimulatorConfig checks the values that tests give.
         self.controller = Controller(SimulatorConfig(
             model='ur5' if major < 5 else 'ur5e', polyscope=f'{major}.{minor}',
             programs={'a.urp': PROGRAM}, **settings))  # type: ignore[arg-type]

@@ -70,6 +70,7 @@ def test_a_runtime_exception_stands_between_start_and_stop(bench, case):
     program, line, column, text = RUNTIME_EXCEPTIONS[case]
     start, message, stop = messages(bench, program)
     assert isinstance(start, KeyMessage)
+    # The titles are the controller's own: it really writes XXX.
     assert start.title == 'PROGRAM_XXX_STARTED'
     assert isinstance(message, RuntimeExceptionMessage)
     assert (message.line, message.column, message.text) == (line, column, text)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ur_cartesian_driver.execution.trajectory import MAX_PLAN_DEVIATION
 from ur_cartesian_driver.robot.settings import LinkSettings
 
 
@@ -16,8 +17,8 @@ class DriverConfig(LinkSettings):
     #: Not used yet: for services that need the dashboard.
     dashboard_port: int = 29999
     #: How far the controller's own target may be from the plan, corners apart [m], [rad]; 0 = any.
-    max_plan_deviation: float = 0.002
-    max_plan_deviation_angle: float = 0.02
+    max_plan_deviation: float = MAX_PLAN_DEVIATION[0]
+    max_plan_deviation_angle: float = MAX_PLAN_DEVIATION[1]
     #: Progress reports per second.
     feedback_rate: float = 25.0
     #: The arm is stopped when the owner of the driver is silent for that long [s].

@@ -74,8 +74,6 @@ EARLY_ANSWER = 1.0
 #: How long the arm may need from the program's SUCCESS to rest inside its goal tolerance, when
 #: the goal does not say [s].
 DEFAULT_GOAL_TIME_TOLERANCE = 1.0
-
-
 #: How far the controller's own target may be from the plan [m], [rad].
 MAX_PLAN_DEVIATION = (0.002, 0.02)
 

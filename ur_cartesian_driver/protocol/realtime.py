@@ -144,6 +144,7 @@ def decode_packet(data: bytes) -> RealtimeData:
     for field, length, end in zip(fields(RealtimeData), _LENGTHS, _ENDS, strict=True):
         if end <= count:
             values[field.name] = numbers[end - 1] if length == 1 else numbers[end - length:end]
+    # `_LENGTHS` says which fields are tuples; mypy cannot follow names that come from `fields`.
     return RealtimeData(**values)  # type: ignore[arg-type]
 
 

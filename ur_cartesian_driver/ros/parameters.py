@@ -108,6 +108,26 @@ class Declaration:
 
 _PORT = (0, 65535)
 
+#: Name, words, unit and largest sensible value of everything that has a tolerance.
+_TOLERATED = (
+    ('position', 'position', 'm', 10.0),
+    ('orientation', 'orientation', 'rad', 3.2),
+    ('linear_velocity', 'velocity', 'm/s', 10.0),
+    ('angular_velocity', 'angular velocity', 'rad/s', 50.0),
+    ('linear_acceleration', 'acceleration', 'm/s^2', 1000.0),
+    ('angular_acceleration', 'angular acceleration', 'rad/s^2', 1000.0),
+)
+
+
+def _tolerances(which: str, where: str) -> tuple[Declaration, ...]:
+    """Return the parameters that stand in for zeros of ``<which>_tolerance``."""
+    return tuple(
+        Declaration(f'{which}_tolerance_{name}',
+                    f'Largest deviation of the {words} {where}, where the goal does not say '
+                    f'[{unit}]; 0: without limit.', 0.0, largest)
+        for name, words, unit, largest in _TOLERATED)
+
+
 #: Every parameter of the node, in the order of ``config/driver.yaml``.
 DECLARATIONS: tuple[Declaration, ...] = (
     # -- which robot
@@ -156,42 +176,8 @@ DECLARATIONS: tuple[Declaration, ...] = (
     Declaration('max_plan_deviation_angle',
                 "How far the controller's own target may be from the plan, corners apart [rad]; "
                 '0: any angle.', 0.0, 3.2),
-    Declaration('path_tolerance_position',
-                'Largest deviation of the position on the way, where the goal does '
-                'not say [m]; 0: without limit.', 0.0, 10.0),
-    Declaration('path_tolerance_orientation',
-                'Largest deviation of the orientation on the way, where the goal does '
-                'not say [rad]; 0: without limit.', 0.0, 3.2),
-    Declaration('path_tolerance_linear_velocity',
-                'Largest deviation of the velocity on the way, where the goal does '
-                'not say [m/s]; 0: without limit.', 0.0, 10.0),
-    Declaration('path_tolerance_angular_velocity',
-                'Largest deviation of the angular velocity on the way, where the goal does '
-                'not say [rad/s]; 0: without limit.', 0.0, 50.0),
-    Declaration('path_tolerance_linear_acceleration',
-                'Largest deviation of the acceleration on the way, where the goal does '
-                'not say [m/s^2]; 0: without limit.', 0.0, 1000.0),
-    Declaration('path_tolerance_angular_acceleration',
-                'Largest deviation of the angular acceleration on the way, where the goal does '
-                'not say [rad/s^2]; 0: without limit.', 0.0, 1000.0),
-    Declaration('goal_tolerance_position',
-                'Largest deviation of the position at the end, where the goal does '
-                'not say [m]; 0: without limit.', 0.0, 10.0),
-    Declaration('goal_tolerance_orientation',
-                'Largest deviation of the orientation at the end, where the goal does '
-                'not say [rad]; 0: without limit.', 0.0, 3.2),
-    Declaration('goal_tolerance_linear_velocity',
-                'Largest deviation of the velocity at the end, where the goal does '
-                'not say [m/s]; 0: without limit.', 0.0, 10.0),
-    Declaration('goal_tolerance_angular_velocity',
-                'Largest deviation of the angular velocity at the end, where the goal does '
-                'not say [rad/s]; 0: without limit.', 0.0, 50.0),
-    Declaration('goal_tolerance_linear_acceleration',
-                'Largest deviation of the acceleration at the end, where the goal does '
-                'not say [m/s^2]; 0: without limit.', 0.0, 1000.0),
-    Declaration('goal_tolerance_angular_acceleration',
-                'Largest deviation of the angular acceleration at the end, where the goal does '
-                'not say [rad/s^2]; 0: without limit.', 0.0, 1000.0),
+    *_tolerances('path', 'on the way'),
+    *_tolerances('goal', 'at the end'),
     # -- speeds where the goal says nothing
     Declaration('linear_velocity', 'Speed of the tool on lines and arcs [m/s].', 1e-4, 10.0),
     Declaration('linear_acceleration', 'Acceleration of the tool on lines and arcs [m/s^2].',

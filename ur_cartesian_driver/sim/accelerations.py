@@ -59,6 +59,7 @@ def moments_for(frames: Frames, point: Vector3, force: Vector3) -> Vector6:
 
     The principle of virtual work: moment times speed of the joints is force times velocity.
     """
+    # Six joints have six axes; mypy does not count what a generator yields.
     return tuple(  # type: ignore[return-value]
         dot(axis, cross(_minus(point, origin), force))
         for origin, axis in zip(frames.origins, frames.axes, strict=True))

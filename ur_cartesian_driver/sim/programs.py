@@ -149,6 +149,7 @@ class Programs:
         machine = self._machine
         machine.on_thread_end = lambda number: self._arm.release((id(machine), number))
         self.state = RuntimeState.PLAYING
+        # XXX is what a controller writes; the name of the program follows as the text.
         self._announce.key('PROGRAM_XXX_STARTED', self.name)
 
     def play(self) -> str:
