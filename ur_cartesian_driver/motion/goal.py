@@ -139,7 +139,10 @@ class Goal:
     #: The frame of the goal in the robot's base.
     T_base_frame: Pose = IDENTITY
     frame_id: str = ''
+    #: The frame that is moved, as the goal calls it, and where it is behind the flange; None = it
+    #: is the robot's active TCP.
     controlled_frame: str = ''
+    T_flange_controlled: Pose | None = None
     #: How long ago the stamp of the goal was when it was received [s]; None = no stamp.
     age: float | None = None
     path_tolerance: Tolerance = Tolerance()

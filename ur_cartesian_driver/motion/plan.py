@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.primitive import Joints, Primitive
 
 
@@ -76,6 +77,11 @@ class Plan:
     reference: ReferencePath
     #: Joint positions of the start [rad].
     start: Joints
+    #: The TCP that the robot has to have during the motion, and loses at its end; None = the one
+    #: it has.
+    T_flange_tcp: Pose | None = None
+    #: Where the controlled frame is behind that TCP: elsewhere only if the TCP must not change.
+    T_tcp_controlled: Pose = IDENTITY
     #: What was ignored, slowed or changed, and what a reader should know about the whole.
     remarks: tuple[str, ...] = field(default=())
 

@@ -35,6 +35,8 @@ class PlanningOptions:
     on_too_fast: Choice = 'refuse'
     #: What happens to a straight move or an arc that cannot arrive in the posture asked for.
     on_posture_change: PostureChoice = 'refuse'
+    #: Whether the TCP of the robot may be set to the controlled frame for the time of a goal.
+    allow_tcp_change: bool = True
     #: Whether the kinematics is the robot's own; if not, arcs are never sent as joint positions.
     calibration_known: bool = True
     #: Whether the robot's software knows OPTIMIZED moves (PolyScope 5.21, PolyScope X 10.8).

@@ -160,6 +160,10 @@ DECLARATIONS: tuple[Declaration, ...] = (
     Declaration('on_posture_change',
                 'A straight line or arc that cannot arrive in the posture asked for: refuse the '
                 'goal, or go there by a joint motion.', choices=('refuse', 'movej')),
+    Declaration('allow_tcp_change',
+                'Set the TCP of the robot to the controlled frame of a goal for the time of the '
+                'goal. False: a goal whose controlled frame is not the TCP must not turn it on '
+                'straight or circular segments.'),
     Declaration('stamp_tolerance',
                 'How old the stamp of a goal may be when it arrives [s].', 0.0, 3600.0),
     Declaration('goal_time_tolerance',
