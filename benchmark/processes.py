@@ -91,7 +91,7 @@ def child(target: Callable[..., None], *arguments: Any) -> Iterator[Child]:
 
 @contextmanager
 def simulator() -> Iterator[Child]:
-    """Run a simulated robot; calls: ``ports``, ``state``, ``run_script``, ``begin``, ..."""
+    """Run a simulated robot; calls: ``ports``, ``state``, ``inject``, ``begin``, ..."""
     with child(_simulate) as robot:
         yield robot
 
@@ -107,6 +107,7 @@ def _simulate(connection: Connection) -> None:
             'ports': lambda: robot.ports,
             'state': robot.state,
             'run_script': robot.run_script,
+            'inject': robot.inject,
             'begin': beginnings.clear,
             'cycles': lambda: list(beginnings),
         })

@@ -25,8 +25,8 @@ from figures import as_json, Figure, machine, table
 #: The one that is told how long to measure.
 RTDE_RATE = 'rtde_rate'
 #: In the order of the table: what is measured with many processes first.
-MODULES = ('goal_on_wire', 'keepalive', 'points', 'load', RTDE_RATE, 'planning', 'kinematics',
-           'kinematics_rows', 'codecs_rtde', 'urscript_frames')
+MODULES = ('goal_on_wire', 'violation_to_cancel', 'keepalive', 'points', 'load', RTDE_RATE,
+           'planning', 'kinematics', 'kinematics_rows', 'codecs_rtde', 'urscript_frames')
 
 
 def main() -> int:

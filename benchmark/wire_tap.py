@@ -89,9 +89,17 @@ class Relay:
         self._marks: list[Mark] = []
         self._selector = selectors.DefaultSelector()
         for name in PORTS:
-            listener = socket.create_server((TAP_HOST, 0))
-            self.ports[name] = listener.getsockname()[1]
-            self._selector.register(listener, selectors.EVENT_READ, name)
+            self.listen(TAP_HOST, name)
+
+    def listen(self, host: str, name: str) -> None:
+        """Listen on a free port that is called so."""
+        listener = socket.create_server((host, 0))
+        self.ports[name] = listener.getsockname()[1]
+        self._selector.register(listener, selectors.EVENT_READ, name)
+
+    def ways(self, name: str) -> tuple[int, str, str]:
+        """Return the port that is called for a caller there, and what its and our bytes are."""
+        return self.ports[name], '', name
 
     def take(self) -> list[Mark]:
         """Return the marks since the last call."""
@@ -104,19 +112,25 @@ class Relay:
             for key, _ in self._selector.select():
                 sock = key.fileobj
                 assert isinstance(sock, socket.socket)
-                if isinstance(key.data, _Way):
-                    self._pass_on(sock, key.data)
+                if isinstance(key.data, Way):
+                    self.pass_on(sock, key.data)
                 else:
                     self._accept(sock, key.data)
 
     def _accept(self, listener: socket.socket, name: str) -> None:
-        robot, _ = listener.accept()
-        driver = socket.create_connection((HOST, self.ports[name]))
-        for source, target, noted in ((robot, driver, ''), (driver, robot, name)):
-            source.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._selector.register(source, selectors.EVENT_READ, _Way(target, noted))
+        caller, _ = listener.accept()
+        port, asked, answered = self.ways(name)
+        called = socket.create_connection((HOST, port))
+        self.add_way(caller, called, asked)
+        self.add_way(called, caller, answered)
 
-    def _pass_on(self, source: socket.socket, way: _Way) -> None:
+    def add_way(self, source: socket.socket, target: socket.socket, noted: str) -> None:
+        """Pass on what comes from one socket to the other."""
+        source.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._selector.register(source, selectors.EVENT_READ, Way(target, noted))
+
+    def pass_on(self, source: socket.socket, way: Way) -> None:
+        """Pass on what has come, or that it was the last."""
         try:
             data = source.recv(65536)
             now = time.monotonic_ns()
@@ -132,18 +146,19 @@ class Relay:
             way.target.shutdown(socket.SHUT_WR)
 
 
-class _Way:
+class Way:
     """One direction of one connection."""
 
     def __init__(self, target: socket.socket, noted: str) -> None:
+        """Begin with nothing; ``noted`` is the port's name where it comes from the driver."""
         self.target = target
-        self._noted = noted
+        self.noted = noted
         self._messages = ReverseDecoder()
 
     def note(self, marks: list[Mark], now: int, data: bytes) -> None:
         """Add what came from the driver to the marks."""
-        if self._noted == 'reverse_port':
-            marks += [Mark(now, self._noted, len(data), message.mode, message.payload[0])
+        if self.noted == 'reverse_port':
+            marks += [Mark(now, self.noted, len(data), message.mode, message.payload[0])
                       for message in self._messages.feed(data)]
-        elif self._noted:
-            marks.append(Mark(now, self._noted, len(data)))
+        elif self.noted:
+            marks.append(Mark(now, self.noted, len(data)))

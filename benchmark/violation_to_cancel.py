@@ -1,0 +1,226 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How long a violated tolerance takes to CANCEL on the wire, beside a peer that only answers.
+
+Simulator, relay, robot loop and echo are processes of their own. All packets of the robot's state
+pass through the relay, which notes when each of them leaves for the robot loop, and when CANCEL
+comes back. Every few packets it holds one back and sends it to the echo first: an asyncio loop as
+the robot loop is one, which answers each packet with as many bytes as CANCEL has. So both times
+are taken by one process, of the same packets, while the same other processes run.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
+import signal
+import socket
+import threading
+import time
+
+from figures import Figure, percentile
+import paths
+from processes import answer_calls, Child, child, HOST, simulator
+from wire_tap import Mark, Relay, TAP_HOST, Way
+
+from ur_cartesian_driver.driver import Driver, DriverConfig
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.protocol.reverse import MESSAGE_SIZE, TrajectoryAction
+from ur_cartesian_driver.protocol.rtde import OUTPUT_TYPES, Recipe
+from ur_cartesian_driver.robot.state_recipe import OPTIONAL, REQUIRED
+
+NAME = 'violated tolerance'
+#: So far the tool is pushed aside, and so far it may be [m].
+PUSH, BOUND = 0.004, 0.002
+#: One in so many packets goes to the echo first.
+ECHOED = 7
+TIMEOUT = 10.0
+#: The robot loop's own.
+NAMES = (*REQUIRED, *OPTIONAL)
+RECIPE = Recipe(NAMES, [OUTPUT_TYPES[name] for name in NAMES])
+FRAME_SIZE = len(RECIPE.pack(RECIPE.zeros()))
+ACTUAL, TARGET = NAMES.index('actual_TCP_pose'), NAMES.index('target_TCP_pose')
+
+
+def run(quick: bool) -> Iterator[Figure]:
+    """Push the arm off its path again and again."""
+    with simulator() as robot, child(_echo) as echo, \
+            _relay(robot, echo) as (relay, settings), Driver(
+                DriverConfig(robot_ip=HOST, ur_type=paths.MODEL, headless_mode=True, **settings),
+                PlanningOptions(max_tool_speed=1.0)) as driver:
+        driver.wait_ready(TIMEOUT)
+        home = driver.state.actual_tcp_pose
+        _violate(driver, robot, home, 0)  # nothing is measured cold
+        relay.call('marks')
+        relay.call('echoes')
+        times = []
+        for trial in range(1, 10 if quick else 151):
+            _violate(driver, robot, home, trial)
+            times.append(_reaction(relay.call('marks')))
+        echoes = [1e-6 * taken for taken in relay.call('echoes')]
+    for text, percent in (('p50', 50.0), ('p90', 90.0), ('p99', 99.0), ('longest', 100.0)):
+        yield Figure(benchmark=NAME, name=f'packet -> CANCEL on the wire, {text}',
+                     value=percentile(times, percent), unit='ms',
+                     baseline=percentile(echoes, percent), than='echo of the same packets',
+                     note=f'{len(times)} violations, {len(echoes)} echoes')
+
+
+def _violate(driver: Driver, robot: Child, home: Pose, trial: int) -> None:
+    """
+    Run a goal to and fro until a push ends it.
+
+    :raises RuntimeError: it ended in another way.
+    """
+    x, y, z = home.position
+    there = Pose((x, y + (0.1 if trial % 2 == 0 else -0.1), z), home.quaternion)
+    motion = driver.start(driver.plan(Goal(
+        waypoints=(Waypoint(pose=there),), path_tolerance=Tolerance(position=(BOUND,) * 3))))
+    robot.call('inject', f'offset pose x {PUSH} at 0.01 m for 0.05 s')
+    outcome = motion.result(TIMEOUT)
+    if outcome.code is not ErrorCode.PATH_TOLERANCE_VIOLATED:
+        raise RuntimeError(f'The goal did not end by the push: {outcome.text}')
+    time.sleep(0.05)
+
+
+def _reaction(marks: Sequence[Mark]) -> float:
+    """Return the time from the first packet with the push in it to CANCEL [ms]."""
+    pushed = next(m.time for m in marks if m.port == 'rtde_port')
+    cancel = next(m.time for m in marks if m.is_trajectory_action
+                  and m.action == TrajectoryAction.CANCEL)
+    return 1e-6 * (cancel - pushed)
+
+
+# ---- the echo's process -----------------------------------------------------------------------
+
+
+def _echo(connection: Connection) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    asyncio.run(_serve(connection))
+
+
+async def _serve(connection: Connection) -> None:
+    loop = asyncio.get_running_loop()
+    server = await loop.create_server(_Echo, HOST, 0)
+    port = server.sockets[0].getsockname()[1]
+    await asyncio.to_thread(answer_calls, connection, {'port': lambda: port})
+    server.close()
+
+
+class _Echo(asyncio.Protocol):
+    """Answers whatever comes with bytes of the size of CANCEL."""
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        assert isinstance(transport, asyncio.Transport)
+        transport.get_extra_info('socket').setsockopt(
+            socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._transport = transport
+
+    def data_received(self, data: bytes) -> None:
+        self._transport.write(bytes(MESSAGE_SIZE))
+
+
+# ---- the relay's process ----------------------------------------------------------------------
+
+
+@contextmanager
+def _relay(robot: Child, echo: Child) -> Iterator[tuple[Child, dict[str, object]]]:
+    """Run the relay; yield it (calls: ``marks``, ``echoes``) and what the driver is told."""
+    ports = robot.call('ports')
+    with child(_run_relay, ports.rtde, echo.call('port')) as relay:
+        yield relay, {
+            'reverse_ip': TAP_HOST, 'primary_port': ports.primary, 'script_sender_port': 0,
+            'dashboard_port': ports.dashboard, **relay.call('ports')}
+
+
+def _run_relay(connection: Connection, rtde_port: int, echo_port: int) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    relay = RelayWithEcho(rtde_port, echo_port)
+    threading.Thread(target=relay.run, daemon=True).start()
+    answer_calls(connection, {'ports': lambda: relay.ports, 'marks': relay.take,
+                              'echoes': relay.take_echoes})
+
+
+class RelayWithEcho(Relay):
+    """Passes on the robot's packets too, and tries some of them on the echo first."""
+
+    def __init__(self, rtde_port: int, echo_port: int) -> None:
+        """
+        Listen, and call the echo.
+
+        :param rtde_port: the robot's own.
+        """
+        super().__init__()
+        self._rtde_port = rtde_port
+        self.listen(HOST, 'rtde_port')
+        self._echo = socket.create_connection((HOST, echo_port))
+        self.add_way(self._echo, self._echo, 'echo')
+        self._echoes: list[int] = []
+        self._marks_of_pushes: list[Mark] = []
+        #: What waits for the echo: since when, and where it goes then.
+        self._held: tuple[int, bytes, socket.socket] | None = None
+        self._packets = 0
+
+    def take(self) -> list[Mark]:
+        """Return the marks since the last call, those of packets with a push in them first."""
+        pushes, self._marks_of_pushes = self._marks_of_pushes, []
+        return pushes + super().take()
+
+    def take_echoes(self) -> list[int]:
+        """Return how long the echo took each time since the last call [ns]."""
+        echoes, self._echoes = self._echoes, []
+        return echoes
+
+    def ways(self, name: str) -> tuple[int, str, str]:
+        """Let the robot be called for who calls its port."""
+        return (self._rtde_port, '', name) if name == 'rtde_port' else super().ways(name)
+
+    def pass_on(self, source: socket.socket, way: Way) -> None:
+        """Treat the robot's packets and the echo's answers apart."""
+        if way.noted == 'rtde_port':
+            self._release()  # the echo is late: the robot loop shall not wait for it
+            self._pass_state_on(source, way)
+        elif way.noted == 'echo':
+            self._echoed(source)
+        else:
+            super().pass_on(source, way)
+
+    def _pass_state_on(self, source: socket.socket, way: Way) -> None:
+        if len(source.recv(65536, socket.MSG_PEEK)) != FRAME_SIZE:
+            super().pass_on(source, way)  # the handshake, or the end
+            return
+        data = source.recv(FRAME_SIZE)
+        pushed = is_pushed(data)
+        self._packets += 1
+        now = time.monotonic_ns()
+        if pushed:
+            way.target.sendall(data)
+            self._marks_of_pushes.append(Mark(now, 'rtde_port', len(data)))
+        elif self._packets % ECHOED == 0:
+            self._held = now, data, way.target
+            self._echo.sendall(data)
+        else:
+            way.target.sendall(data)
+
+    def _echoed(self, echo: socket.socket) -> None:
+        echo.recv(65536)
+        now = time.monotonic_ns()
+        if self._held is not None:
+            self._echoes.append(now - self._held[0])
+            self._release()
+
+    def _release(self) -> None:
+        held, self._held = self._held, None
+        if held is not None:
+            held[2].sendall(held[1])
+
+
+def is_pushed(data: bytes) -> bool:
+    """Tell whether the tool is pushed aside in a packet."""
+    values = RECIPE.unpack(data[3:])
+    return abs(values[ACTUAL][0] - values[TARGET][0]) > BOUND
