@@ -20,13 +20,12 @@ from ur_cartesian_driver.motion.errors import (
     InvalidPosture,
     JointLimitExceeded,
     NearSingularity,
-    NotAvailable,
     RobotNotReady,
     TooFast,
     Unreachable,
 )
 from ur_cartesian_driver.motion.goal import ArcMode, Goal, Posture, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ, OptimoveL
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
@@ -315,15 +314,6 @@ def test_a_robot_that_is_not_where_its_kinematics_puts_it_gets_no_plan(cell):
     text = refusal(RobotNotReady, cell, square(cell), state=elsewhere)
     assert '50.0 mm' in text
     assert 'ur5e' in text
-
-
-def test_tool0_is_the_tcp_only_where_no_tool_is_set(cell, make_cell):
-    goal = replace(square(cell), controlled_frame='tool0')
-    assert 'tool0' in refusal(NotAvailable, cell, goal)
-    bare = replace(cell.state, T_flange_tcp=IDENTITY,
-                   actual_tcp_pose=cell.arm.forward(cell.state.actual_q))
-    flange = replace(goal, waypoints=(Waypoint(pose=bare.actual_tcp_pose @ Pose((0, 0, 0.05))),))
-    assert len(plan(flange, bare, cell.arm, OPTIONS).segments) == 1
 
 
 def test_the_first_blend_must_fit_into_the_way_from_where_the_robot_stands(cell):

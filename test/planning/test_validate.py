@@ -124,7 +124,7 @@ REFUSALS = [
     (replace(PLAIN, io_commands=(IOCommand(
         waypoint=0, offset=0.0, output=OutputKind.TOOL_DIGITAL, pin=0, value=1.0),)),
      NotAvailable, 'io_commands is not empty'),
-    (replace(PLAIN, controlled_frame='nozzle'), NotAvailable,
+    (replace(PLAIN, controlled_frame='nozzle'), InvalidGoal,
      "trajectory.controlled_frame is 'nozzle'"),
     (with_point(TIMED, 1, twist=ONE), NotAvailable, 'trajectory.points[1].twist is not zero'),
     (with_point(TIMED, 0, acceleration=ONE), NotAvailable,

@@ -77,6 +77,8 @@ class Plan:
     reference: ReferencePath
     #: Joint positions of the start [rad].
     start: Joints
+    #: The TCP that the robot had when it was planned.
+    T_flange_active: Pose = IDENTITY
     #: The TCP that the robot has to have during the motion, and loses at its end; None = the one
     #: it has.
     T_flange_tcp: Pose | None = None

@@ -20,12 +20,11 @@ from ur_cartesian_driver.motion.errors import (
     InvalidPosture,
     JointLimitExceeded,
     NearSingularity,
-    NotAvailable,
     RobotNotReady,
 )
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import (
     Joints,
     MoveC,
@@ -38,6 +37,7 @@ from ur_cartesian_driver.motion.primitive import (
     Target,
 )
 from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.planning.controlled import carried
 from ur_cartesian_driver.planning.corner import Corner
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.path import Arc, JointLine, Line, Path, same, SAME_POSITION
@@ -91,15 +91,20 @@ def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> P
     """
     check(goal, options)
     goal = with_default_tolerances(goal, options)
+    T_flange_active = state.T_flange_tcp
+    about = carried(goal, state, options)
+    goal, state = about.goal, about.state
     planner = _Planner(goal, state, arm, options)
     legs = planner.blended(planner.legs())
     timings = schedule(legs, options, arm.model)
     segments = tuple(planner.segment(leg, timing)
                      for leg, timing in zip(legs, timings, strict=True))
-    remarks = [*planner.remarks, *ignored(goal),
+    remarks = [*about.remarks, *planner.remarks, *ignored(goal),
                *(timing.remark for timing in timings if timing.remark)]
     return Plan(goal=goal, segments=segments, start=state.actual_q, remarks=tuple(remarks),
-                reference=reference_path(state.actual_tcp_pose, legs, timings))
+                reference=reference_path(state.actual_tcp_pose, legs, timings),
+                T_flange_active=T_flange_active, T_flange_tcp=about.T_flange_tcp,
+                T_tcp_controlled=about.T_tcp_controlled)
 
 
 class _Planner:
@@ -120,12 +125,6 @@ class _Planner:
     def _check_robot(self) -> None:
         """Refuse where the robot is not what the kinematics thinks, or is somewhere else."""
         state = self.state
-        frame = self.goal.controlled_frame
-        if frame == self.options.tf_prefix + 'tool0' and not same(state.T_flange_tcp, IDENTITY):
-            raise NotAvailable(
-                'trajectory.controlled_frame', f"is '{frame}', but the robot has a TCP "
-                f'{1e3 * state.T_flange_tcp.distance_to(IDENTITY):.1f} mm away from it, and this '
-                'version moves the active TCP only', 'leave it empty, or take the TCP off')
         predicted = self.reach.arm.forward(state.actual_q) @ state.T_flange_tcp
         apart = predicted.distance_to(state.actual_tcp_pose)
         angle = predicted.angle_to(state.actual_tcp_pose)

@@ -174,11 +174,11 @@ def _available(goal: Goal, options: PlanningOptions) -> None:
     if goal.io_commands:
         raise NotAvailable('io_commands', 'is not empty, but outputs cannot be switched on the '
                            'way in this version', 'leave it empty')
-    known = ('', options.tf_prefix + 'tool0_controller', options.tf_prefix + 'tool0')
-    if goal.controlled_frame not in known:
-        raise NotAvailable(
-            'trajectory.controlled_frame', f"is '{goal.controlled_frame}', but this version "
-            'moves the active TCP only', 'leave it empty and set the TCP on the robot')
+    known = ('', options.tf_prefix + 'tool0_controller')
+    if goal.T_flange_controlled is None and goal.controlled_frame not in known:
+        raise InvalidGoal(
+            'trajectory.controlled_frame', f"is '{goal.controlled_frame}', and the goal does not "
+            'say where that is behind the flange', 'set T_flange_controlled, or leave it empty')
 
 
 def _times(goal: Goal, options: PlanningOptions) -> None:

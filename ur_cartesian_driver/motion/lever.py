@@ -1,0 +1,74 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The motion of one rigid body as another point of it sees it.
+
+Flange, TCP and every frame that a goal may move are fixed to each other. Their angular motion is
+the same; the linear one differs by the lever arm between their origins. The robot reports the TCP,
+a goal may be about another frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, rotate, Vector3, Vector6
+from ur_cartesian_driver.motion.state import RobotState
+
+
+def twist_at(twist: Vector6, lever: Vector3) -> Vector6:
+    """
+    Return the twist of a body at another point of it: v + w x r.
+
+    :param twist: linear [m/s] and angular [rad/s] velocity at the first point.
+    :param lever: from the first point to the other one [m], in the axes of the twist.
+    """
+    v, w = twist[:3], twist[3:]
+    return (*_sum(v, _cross(w, lever)), *w)
+
+
+def acceleration_at(acceleration: Vector6, twist: Vector6, lever: Vector3) -> Vector6:
+    """
+    Return the acceleration of a body at another point of it: a + e x r + w x (w x r).
+
+    :param acceleration: linear [m/s^2] and angular [rad/s^2], at the first point.
+    :param twist: at any point.
+    :param lever: from the first point to the other one [m], in the axes of both.
+    """
+    a, e, w = acceleration[:3], acceleration[3:], twist[3:]
+    return (*_sum(_sum(a, _cross(e, lever)), _cross(w, _cross(w, lever))), *e)
+
+
+def seen_at(state: RobotState, T_tcp_frame: Pose) -> RobotState:
+    """
+    Return the state as if a frame behind the TCP were the active TCP.
+
+    The wrench stays that of the TCP.
+    """
+    if T_tcp_frame is IDENTITY:
+        return state
+    actual = rotate(state.actual_tcp_pose.quaternion, T_tcp_frame.position)
+    target = rotate(state.target_tcp_pose.quaternion, T_tcp_frame.position)
+    return replace(
+        state,
+        T_flange_tcp=state.T_flange_tcp @ T_tcp_frame,
+        actual_tcp_pose=state.actual_tcp_pose @ T_tcp_frame,
+        target_tcp_pose=state.target_tcp_pose @ T_tcp_frame,
+        actual_tcp_twist=twist_at(state.actual_tcp_twist, actual),
+        target_tcp_twist=twist_at(state.target_tcp_twist, target),
+        actual_tcp_acceleration=_known(
+            state.actual_tcp_acceleration, state.actual_tcp_twist, actual),
+        target_tcp_acceleration=_known(
+            state.target_tcp_acceleration, state.target_tcp_twist, target))
+
+
+def _known(acceleration: Vector6 | None, twist: Vector6, lever: Vector3) -> Vector6 | None:
+    return None if acceleration is None else acceleration_at(acceleration, twist, lever)
+
+
+def _cross(a: Vector3, b: Vector3) -> Vector3:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def _sum(a: Vector3, b: Vector3) -> Vector3:
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])

@@ -1,0 +1,126 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Goals about another frame than the robot's active TCP.
+
+A straight line of one point of the tool is no straight line of another one when the tool turns.
+So the robot's TCP is set to the controlled frame for the time of the goal, and all that follows is
+planned as if it were there already. Where that is not allowed, the goal is carried over to the
+active TCP, which is exact as long as the tool does not turn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import degrees
+
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.lever import acceleration_at, seen_at, twist_at
+from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose, rotate
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.path import same
+from ur_cartesian_driver.planning.validate import is_timed, point_field, segment_field, segment_of
+
+#: How far the tool may turn on a straight or circular segment that counts as one without a turn
+#: [rad]: a frame r away from the TCP leaves its line by r angle^2 / 8, 5 um at 0.4 m.
+KEPT_ANGLE = 0.01
+
+_JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Carried:
+    """A goal and the state of its robot, both about the TCP that the motion will have."""
+
+    goal: Goal
+    state: RobotState
+    #: As in :class:`~ur_cartesian_driver.motion.plan.Plan`.
+    T_flange_tcp: Pose | None = None
+    T_tcp_controlled: Pose = IDENTITY
+    remarks: tuple[str, ...] = ()
+
+
+def carried(goal: Goal, state: RobotState, options: PlanningOptions) -> Carried:
+    """
+    Return a checked goal about the TCP with which it is going to be executed.
+
+    :raises InvalidGoal: the TCP must not change, and the tool turns on the way.
+    """
+    T_flange_controlled = goal.T_flange_controlled
+    if T_flange_controlled is None or same(T_flange_controlled, state.T_flange_tcp):
+        return Carried(goal=goal, state=state)
+    T_tcp_controlled = state.T_flange_tcp.inverse() @ T_flange_controlled
+    if options.allow_tcp_change:
+        x, y, z, rx, ry, rz = T_flange_controlled.rotation_vector()
+        return Carried(
+            goal=goal, state=seen_at(state, T_tcp_controlled), T_flange_tcp=T_flange_controlled,
+            remarks=(f'the TCP of the robot is set to {_name(goal)}, p[{x:.6f}, {y:.6f}, {z:.6f}, '
+                     f'{rx:.6f}, {ry:.6f}, {rz:.6f}], for this goal, and put back at its end',))
+    _check_turns(goal, state.actual_tcp_pose @ T_tcp_controlled)
+    return Carried(
+        goal=_about_tcp(goal, T_tcp_controlled.inverse()), state=state,
+        T_tcp_controlled=T_tcp_controlled,
+        remarks=(f'the motion is carried over from {_name(goal)} to the TCP of the robot, which '
+                 'must not change (allow_tcp_change is false)',))
+
+
+def _name(goal: Goal) -> str:
+    return goal.controlled_frame or 'the controlled frame'
+
+
+def _check_turns(goal: Goal, T_base_start: Pose) -> None:
+    """
+    Refuse straight and circular segments that turn the tool.
+
+    :param T_base_start: where the controlled frame is.
+    """
+    before = goal.T_base_frame.inverse() @ T_base_start
+    stands = is_timed(goal) and goal.waypoints[0].time == 0.0
+    for i, point in enumerate(goal.waypoints):
+        segment = segment_of(goal, i)
+        angle = before.angle_to(point.pose)
+        before = point.pose
+        if segment.type in _JOINT_TYPES or (i == 0 and stands):
+            continue
+        remedy = ('keep the orientation, use JOINT for that segment, or set allow_tcp_change to '
+                  'true')
+        if angle > KEPT_ANGLE:
+            raise InvalidGoal(
+                point_field(i, 'pose.orientation'), f'turns {_name(goal)} by {degrees(angle):.2f} '
+                'degrees on the way; a frame that is not the TCP of the robot keeps to a line or '
+                'an arc only if it does not turn, and the TCP must not change', remedy)
+        if segment.type == SegmentType.CIRCULAR and segment.arc_mode == ArcMode.FIXED:
+            raise InvalidGoal(
+                segment_field(i, 'arc_mode'), f'is FIXED, which turns {_name(goal)} along with '
+                'the arc; that needs the TCP of the robot to be there, and it must not change',
+                'use UNCONSTRAINED, or set allow_tcp_change to true')
+
+
+def _about_tcp(goal: Goal, T_controlled_tcp: Pose) -> Goal:
+    return replace(
+        goal,
+        waypoints=tuple(_waypoint(point, T_controlled_tcp) for point in goal.waypoints),
+        segments=tuple(_segment(segment, point, T_controlled_tcp)
+                       for segment, point in zip(goal.segments, goal.waypoints, strict=True)
+                       ) if goal.segments else ())
+
+
+def _waypoint(point: Waypoint, T_controlled_tcp: Pose) -> Waypoint:
+    pose = Pose(point.pose.position, normalize(point.pose.quaternion))
+    lever = rotate(pose.quaternion, T_controlled_tcp.position)
+    return replace(
+        point, pose=pose @ T_controlled_tcp, twist=twist_at(point.twist, lever),
+        acceleration=acceleration_at(point.acceleration, point.twist, lever))
+
+
+def _segment(segment: Segment, point: Waypoint, T_controlled_tcp: Pose) -> Segment:
+    """Return the segment to a point; the orientation of a via does not shape its arc."""
+    if segment.via is None:
+        return segment
+    lever = rotate(normalize(point.pose.quaternion), T_controlled_tcp.position)
+    x, y, z = segment.via.position
+    via = Pose((x + lever[0], y + lever[1], z + lever[2]),
+               (segment.via @ T_controlled_tcp).quaternion)
+    return replace(segment, via=via)
