@@ -33,6 +33,7 @@ from ur_cartesian_driver.sim.primary_session import PrimarySession, ScriptSessio
 from ur_cartesian_driver.sim.primary_states import PrimaryStream
 from ur_cartesian_driver.sim.realtime_states import RealtimeStream
 from ur_cartesian_driver.sim.rtde_session import RtdeSession
+from ur_cartesian_driver.sim.script_sockets import ScriptSockets
 from ur_cartesian_driver.sim.server import TcpServer
 from ur_cartesian_driver.sim.tcp_script_sockets import TcpScriptSockets
 
@@ -87,14 +88,20 @@ class SimulatedRobot:
             connect_to(ur.ports.rtde)
     """
 
-    def __init__(self, config: SimulatorConfig | None = None) -> None:
-        """Make a robot; it lives from `start` to `close`."""
+    def __init__(self, config: SimulatorConfig | None = None, *,
+                 sockets: ScriptSockets | None = None, clock: Clock | None = None) -> None:
+        """
+        Make a robot; it lives from `start` to `close`, or as long as `run` runs.
+
+        :param sockets: what programs connect with; None = TCP.
+        :param clock: when cycles are due; None = as the configuration's rate says.
+        """
         self.config = config or SimulatorConfig()
         self._loop: asyncio.AbstractEventLoop | None = None
         #: Called with the port and the bytes that a program's socket received, in our thread.
         self.on_socket_data: Callable[[int, bytes], None] | None = None
-        sockets = FaultySockets(TcpScriptSockets(self._on_socket_data))
-        self.controller = Controller(self.config, sockets)
+        hampered = FaultySockets(sockets or TcpScriptSockets(self._on_socket_data))
+        self.controller = Controller(self.config, hampered)
         taken_inputs: set[str] = set()
         self._rtde = TcpServer('RTDE', lambda: RtdeSession(self.controller, taken_inputs))
         self._primary = TcpServer('primary', lambda: PrimarySession(self.controller))
@@ -105,11 +112,12 @@ class SimulatedRobot:
         self._servers: tuple[TcpServer[Any], ...] = (
             self._rtde, self._primary, self._secondary, self._realtime, self._dashboard,
             self._interpreter)
-        self.controller.faults.interfaces = {'sockets': sockets} | {
+        self.controller.faults.interfaces = {'sockets': hampered} | {
             server.name.lower().replace('-', ''): server for server in self._servers}
         self.inject(*self.config.faults)
-        self._clock: Clock = (RealClock(self.config.cycle, self.config.rate)
-                              if self.config.rate > 0.0 else VirtualClock())
+        self._clock: Clock = clock or (
+            RealClock(self.config.cycle, self.config.rate)
+            if self.config.rate > 0.0 else VirtualClock())
         self._thread: threading.Thread | None = None
         self._running: asyncio.Task[None] | None = None
         self._ports: Ports | None = None

@@ -1,0 +1,255 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A cell in virtual time: simulated controller, robot loop, and its owner, in one event loop.
+
+The robot loop is the one of the driver with all its sockets, the controller the one behind
+``ur-cartesian sim``; only time and network are those of :mod:`virtual_network`. Cycles take 8 ms,
+as those of a CB3 robot, because the tests pay for each.
+"""
+
+import asyncio
+import contextlib
+from dataclasses import replace
+import os
+
+from virtual_network import HOST, LoopClock, ProgramNetwork, VirtualLoop
+
+from ur_cartesian_driver.driver import snapshot
+from ur_cartesian_driver.driver.api import order_of
+from ur_cartesian_driver.driver.channel import (
+    CancelMotion,
+    Configure,
+    Heartbeat,
+    LENGTH,
+    LogLine,
+    MotionEnded,
+    MotionProgress,
+    pack,
+    ResendProgram,
+    StartMotion,
+    StatusChanged,
+    unpack,
+)
+from ur_cartesian_driver.driver.config import DriverConfig
+from ur_cartesian_driver.driver.robot_loop import RobotLoop
+from ur_cartesian_driver.protocol.reverse import MESSAGE_SIZE, ReverseMessage
+from ur_cartesian_driver.protocol.script_sender import REQUEST
+from ur_cartesian_driver.protocol.trajectory import encode_points
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from ur_cartesian_driver.robot.status import DriverStatus
+from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
+
+CYCLE = 0.008
+OWNER_PORT = 1
+REVERSE, SENDER, TRAJECTORY, COMMANDS = 50001, 50002, 50003, 50004
+RTDE, PRIMARY, DASHBOARD = 30004, 30001, 29999
+#: What the pendant shows where somebody has installed the External Control node.
+PENDANT_PROGRAM = 'external_control.urp'
+
+
+class Motion:
+    """A goal on its way, as its owner sees it."""
+
+    def __init__(self):
+        self.outcome = None
+        self.ended_at = None
+        self.progress = []
+
+
+class Owner:
+    """The other end of the robot loop's pipe, as the node is."""
+
+    def __init__(self):
+        self.status = DriverStatus()
+        self.statuses = []
+        self.motions = {}
+        self.log = []
+        self.silent = False
+        self._writer = None
+
+    async def serve(self, reader, writer):
+        self._writer = writer
+        beat = asyncio.ensure_future(self._beat())
+        try:
+            while True:
+                (size,) = LENGTH.unpack(await reader.readexactly(LENGTH.size))
+                self._take(unpack(await reader.readexactly(size)))
+        except asyncio.IncompleteReadError:
+            pass  # the loop has ended
+        finally:
+            beat.cancel()
+
+    async def _beat(self):
+        while True:
+            if not self.silent:
+                self.send(Heartbeat())
+            await asyncio.sleep(0.5)
+
+    def send(self, request):
+        self._writer.write(pack(request))
+
+    def start(self, plan):
+        number = len(self.motions) + 1
+        motion = self.motions[number] = Motion()
+        self.send(StartMotion(motion=number, order=order_of(plan), points=encode_points(
+            segment.primitive for segment in plan.segments)))
+        return motion
+
+    def cancel(self):
+        self.send(CancelMotion(motion=len(self.motions)))
+
+    def hang_up(self):
+        self._writer.close()
+
+    def _take(self, notice):
+        match notice:
+            case StatusChanged(status=status):
+                self.status = status
+                self.statuses.append(status)
+            case MotionProgress(motion=number, progress=progress):
+                self.motions[number].progress.append(progress)
+            case MotionEnded(motion=number, outcome=outcome):
+                motion = self.motions[number]
+                assert motion.outcome is None, 'a goal ends once'
+                motion.outcome, motion.ended_at = outcome, asyncio.get_running_loop().time()
+            case LogLine(text=text):
+                self.log.append(text)
+
+
+class RobotCell:
+    """Everything, between two looks at it; used inside :func:`run_cell`."""
+
+    def __init__(self, loop, *, headless, settings):
+        self.loop, self.headless = loop, headless
+        self._settings = settings
+        self.owner = Owner()
+        self.robot = self.robot_task = self.loop_task = self.memory = None
+        self.config = None
+
+    # ---- life ---------------------------------------------------------------------------------
+
+    async def start(self):
+        """Start the robot, then the robot loop; return when a goal can run."""
+        await self.start_robot(SimulatorConfig(
+            frequency=1.0 / CYCLE, remote_control=self.headless, unlock_delay=0.05,
+            power_on_time=0.05, brake_release_time=0.05, secondary_port=30002,
+            realtime_port=30003, interpreter_port=30020))
+        self.config = DriverConfig(headless_mode=self.headless, **self._settings)
+        await asyncio.start_server(self.owner.serve, HOST, OWNER_PORT)
+        reader, writer = await asyncio.open_connection(HOST, OWNER_PORT)
+        descriptor = snapshot.create()
+        self.memory = snapshot.StateMemory(descriptor)
+        os.close(descriptor)
+        self.loop_task = asyncio.create_task(RobotLoop(
+            Configure(config=self.config), self.memory, writer).run(reader))
+        if not self.headless:
+            await self.until(lambda: self.status.state is ConnectionState.CONNECTED)
+            await self.load_pendant_program()
+            self.robot.play_program()
+        await self.until(self.is_ready, 3.0)
+
+    async def start_robot(self, config):
+        """Start the controller, or another one in the place of one that has crashed."""
+        self.robot = SimulatedRobot(config, sockets=ProgramNetwork(self.loop),
+                                    clock=LoopClock(self.loop, CYCLE))
+        self.robot_task = asyncio.create_task(self.robot.run())
+        await asyncio.sleep(0)
+
+    async def crash_robot(self):
+        """Let the controller die with all its sockets; the arm stands where it is then."""
+        self.robot_task.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await self.robot_task
+
+    async def reboot_robot(self):
+        """Start the controller again: no power, no program, the arm where it was."""
+        await self.start_robot(replace(
+            self.robot.config, q=self.robot.controller.motion.q, power='off'))
+
+    async def load_pendant_program(self):
+        """Let the External Control node fetch the program of the driver."""
+        reader, writer = await asyncio.open_connection(HOST, SENDER)
+        writer.write(REQUEST)
+        text = await reader.readuntil(b'# NODE_CONTROL_LOOP_ENDS\n')
+        writer.close()
+        assert not self.robot.controller.programs.load(
+            PENDANT_PROGRAM, f'def external_control():\n{text.decode()}\nend\n')
+
+    async def close(self):
+        self.owner.hang_up()
+        await asyncio.wait({self.loop_task}, timeout=5.0)
+        self.loop_task.cancel()
+        await asyncio.gather(self.loop_task, return_exceptions=True)
+        await self.crash_robot()
+        self.memory.close()
+
+    # ---- what is to be seen -------------------------------------------------------------------
+
+    @property
+    def status(self):
+        return self.owner.status
+
+    @property
+    def q(self):
+        return self.robot.controller.motion.q
+
+    def is_ready(self):
+        return self.status.state is ConnectionState.READY
+
+    def at_rest(self):
+        """Tell whether no joint moves."""
+        return max(map(abs, self.robot.controller.qd)) < 1e-6
+
+    async def until(self, condition, bound=2.0):
+        """
+        Wait for a condition, which is looked at twice in each cycle; return the time it took [s].
+
+        :raises AssertionError: it does not hold within the bound [s].
+        """
+        begin = self.loop.time()
+        while not condition():
+            assert self.loop.time() - begin < bound, (
+                f'waited {bound} s in vain; {self.status}; {self.owner.log}; '
+                f'{list(self.robot.controller.announcements.log)}')
+            await asyncio.sleep(0.5 * CYCLE)
+        return self.loop.time() - begin
+
+    def control_messages(self):
+        """Return what the driver has said on the reverse socket since it was connected."""
+        (end,) = self.loop.open_ends(REVERSE)
+        data = end.received
+        return [ReverseMessage.decode(bytes(data[i:i + MESSAGE_SIZE]))
+                for i in range(0, len(data), MESSAGE_SIZE)]
+
+    # ---- what people and other clients do -----------------------------------------------------
+
+    async def dashboard(self, *commands):
+        """Be another client of the dashboard; return the answers."""
+        reader, writer = await asyncio.open_connection(HOST, DASHBOARD)
+        await reader.readline()
+        answers = []
+        for command in commands:
+            writer.write(command.encode() + b'\n')
+            answers.append((await reader.readline()).decode().strip())
+        writer.close()
+        return answers
+
+    def resend(self):
+        self.owner.send(ResendProgram())
+
+
+def run_cell(scenario, *, headless=True, **settings):
+    """Run ``scenario(cell)`` in a cell that is ready for goals; return its result."""
+    loop = VirtualLoop()
+    with asyncio.Runner(loop_factory=lambda: loop) as runner:
+        return runner.run(_run(loop, scenario, headless, settings))
+
+
+async def _run(loop, scenario, headless, settings):
+    cell = RobotCell(loop, headless=headless, settings=settings)
+    try:
+        await cell.start()
+        return await scenario(cell)
+    finally:
+        await cell.close()

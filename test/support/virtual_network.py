@@ -1,0 +1,274 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+An event loop on a clock of its own, with a network in memory.
+
+When nothing is ready its time jumps to the next timer, so a test of minutes takes what its
+computations take, and takes the same way each time. What the code under test asks its loop for,
+timers, connections and listening ports, it gets here; it does not know the difference.
+
+Faults of single connections are made here, between the two ends: :meth:`VirtualLoop.cut`,
+:meth:`~VirtualLoop.freeze` and :meth:`~VirtualLoop.say`.
+"""
+
+import asyncio
+from collections import deque
+import contextlib
+import errno
+import selectors
+
+from ur_cartesian_driver.sim.script_sockets import SocketState
+
+HOST = '127.0.0.1'
+_FIRST_FREE_PORT = 40_001
+_FIRST_CLIENT_PORT = 60_001
+
+
+class _Jumping(selectors.DefaultSelector):
+    """Waits for nobody: what it was to wait for passes at once."""
+
+    loop = None
+
+    def select(self, timeout=None):
+        ready = super().select(0.0)
+        if not ready:
+            if timeout is None:
+                raise RuntimeError('nothing will ever happen any more')
+            self.loop.now += max(timeout, 0.0)
+        return ready
+
+
+class VirtualLoop(asyncio.SelectorEventLoop):
+    """The loop; one test, one loop."""
+
+    def __init__(self):
+        selector = _Jumping()
+        self.now = 0.0
+        super().__init__(selector)
+        selector.loop = self
+        self.servers = {}
+        #: Connections that were made: the end that dialled of each.
+        self.ends = []
+
+    def time(self):
+        return self.now
+
+    # ---- what asyncio is asked for ---------------------------------------------------------
+
+    async def create_server(self, protocol_factory, host=None, port=None, **_):
+        port = port or next(free for free in range(_FIRST_FREE_PORT, 65_536)
+                            if free not in self.servers)
+        if port in self.servers:
+            raise OSError(errno.EADDRINUSE, 'Address already in use')
+        self.servers[port] = _Server(self, protocol_factory, port)
+        return self.servers[port]
+
+    async def create_connection(self, protocol_factory, host=None, port=None, **_):
+        protocol = protocol_factory()
+        transport = self.connect(protocol, port)
+        await asyncio.sleep(0)
+        return transport, protocol
+
+    def connect(self, protocol, port):
+        """
+        Connect at once.
+
+        :raises ConnectionRefusedError: nobody listens.
+        """
+        if port not in self.servers:
+            raise ConnectionRefusedError(errno.ECONNREFUSED, 'Connection refused')
+        local = _FIRST_CLIENT_PORT + len(self.ends)
+        near = _End(self, protocol, (HOST, local), (HOST, port))
+        far = _End(self, self.servers[port].factory(), (HOST, port), (HOST, local))
+        near.peer, far.peer = far, near
+        self.ends.append(near)
+        near.protocol.connection_made(near)
+        far.protocol.connection_made(far)
+        return near
+
+    # ---- what a test does to a connection ----------------------------------------------------
+
+    def open_ends(self, port):
+        """Return the open connections to a port, the end that dialled of each."""
+        return [end for end in self.ends if end.address[1] == port and not end.is_closing()]
+
+    def cut(self, port):
+        """Cut all connections to a port; both sides are told."""
+        for end in self.open_ends(port):
+            end.abort()
+
+    def freeze(self, port):
+        """Deliver nothing any more on the connections to a port, not even their end."""
+        for end in self.open_ends(port):
+            end.frozen = end.peer.frozen = True
+
+    def say(self, port, data):
+        """Let whoever dialled a port say something that he did not say."""
+        for end in self.open_ends(port):
+            end.write(data)
+
+
+class _Server:
+    """A listening port; what asyncio.Server is needed for."""
+
+    def __init__(self, loop, factory, port):
+        self._loop, self.factory, self._port = loop, factory, port
+        self.sockets = [_Socket((HOST, port))]
+
+    async def start_serving(self):
+        """Do nothing: it serves."""
+
+    def close(self):
+        if self._loop.servers.get(self._port) is self:
+            del self._loop.servers[self._port]
+
+    async def wait_closed(self):
+        """Do nothing: it is closed."""
+
+
+class _Socket:
+    """As much of a socket as is asked of one."""
+
+    def __init__(self, name):
+        self._name = name
+
+    def getsockname(self):
+        return self._name
+
+    def setsockopt(self, *_):
+        """Do nothing: there is no delay to be switched off."""
+
+
+class _End(asyncio.Transport):
+    """One end of a connection: what is written arrives at the peer in the loop's next turn."""
+
+    def __init__(self, loop, protocol, name, address):
+        super().__init__({'socket': _Socket(name), 'sockname': name, 'peername': address})
+        self.loop, self.protocol, self.address = loop, protocol, address
+        self.peer = None
+        self.frozen = False
+        #: All that has arrived here, for a test to look at.
+        self.received = bytearray()
+        self._closing = self._paused = self._is_due = False
+        self._inbox = deque()
+
+    def get_protocol(self):
+        return self.protocol
+
+    def set_protocol(self, protocol):
+        self.protocol = protocol
+
+    def is_closing(self):
+        return self._closing
+
+    def write(self, data):
+        if not self._closing and data:
+            self.peer._take(bytes(data))
+
+    def get_write_buffer_size(self):
+        return sum(map(len, self.peer._inbox)) if self.peer._paused else 0
+
+    def pause_reading(self):
+        self._paused = True
+
+    def resume_reading(self):
+        if self._paused:
+            self._paused = False
+            self._arrange()
+
+    def is_reading(self):
+        return not self._paused and not self._closing
+
+    def close(self):
+        if not self._closing:
+            self._closing = True
+            self.loop.call_soon(self.protocol.connection_lost, None)
+            self.peer._take(b'')
+
+    abort = close
+
+    def _take(self, data):
+        """Take what the peer has written; no bytes are its end."""
+        if self.frozen or self._closing:
+            return
+        self._inbox.append(data)
+        self._arrange()
+
+    def _arrange(self):
+        if self._inbox and not self._is_due and not self._paused:
+            self._is_due = True
+            self.loop.call_soon(self._deliver)
+
+    def _deliver(self):
+        self._is_due = False
+        while self._inbox and not self._paused and not self._closing:
+            data = self._inbox.popleft()
+            if data:
+                self.received += data
+                self.protocol.data_received(data)
+            elif not self.protocol.eof_received():
+                self.close()
+
+
+class _ProgramSocket(asyncio.Protocol):
+    """A socket of a robot program; what has arrived waits until the program reads it."""
+
+    def __init__(self):
+        self.incoming = bytearray()
+        self.is_open = True
+
+    def data_received(self, data):
+        self.incoming += data
+
+    def connection_lost(self, exc):
+        self.is_open = False
+
+
+class ProgramNetwork:
+    """The simulator's ScriptSockets: what robot programs open on the loop's network."""
+
+    def __init__(self, loop):
+        self._loop = loop
+        self._sockets = {}
+
+    def open(self, name, address, port):
+        self.close(name)
+        protocol = _ProgramSocket()
+        with contextlib.suppress(ConnectionRefusedError):
+            self._sockets[name] = self._loop.connect(protocol, port), protocol
+
+    def state(self, name):
+        there = name in self._sockets and self._sockets[name][1].is_open
+        return SocketState.OPEN if there else SocketState.CLOSED
+
+    def received(self, name):
+        return self._sockets[name][1].incoming if name in self._sockets else bytearray()
+
+    def send(self, name, data):
+        if self.state(name) is not SocketState.OPEN:
+            return False
+        self._sockets[name][0].write(data)
+        return True
+
+    def close(self, name):
+        if name in self._sockets:
+            self._sockets.pop(name)[0].close()
+
+    def close_all(self):
+        for name in list(self._sockets):
+            self.close(name)
+
+    def poll(self):
+        """Do nothing: everything has happened already."""
+
+
+class LoopClock:
+    """The simulator's cycles on the loop's clock."""
+
+    def __init__(self, loop, cycle):
+        self._loop, self._cycle = loop, cycle
+        self._due = loop.time()
+
+    async def next_cycle(self):
+        self._due += self._cycle
+        await asyncio.sleep(max(0.0, self._due - self._loop.time()))
