@@ -250,6 +250,7 @@ JOINTS = vector(6.3)
 POSES = st.builds(lambda v: Pose.from_rotation_vector((*v[:3], *(x * 0.28 for x in v[3:]))),
                   vector(6.3))
 POSITIVE = st.floats(0.0, 2000.0)
+DURATION = st.just(0.0) | st.floats(1e-6, 2000.0)
 FRACTION = st.floats(1e-6, 1.0)
 SPEEDS = {'velocity': POSITIVE, 'acceleration': POSITIVE, 'blend_radius': POSITIVE}
 FRACTIONS = {'velocity': FRACTION, 'acceleration': FRACTION, 'blend_radius': POSITIVE}
@@ -261,12 +262,12 @@ def kinds(cls, **values):
 
 
 PRIMITIVES = st.one_of(
-    kinds(MoveJ, **SPEEDS, duration=POSITIVE), kinds(MoveL, **SPEEDS, duration=POSITIVE),
+    kinds(MoveJ, **SPEEDS, duration=DURATION), kinds(MoveL, **SPEEDS, duration=DURATION),
     kinds(MoveP, **SPEEDS), kinds(OptimoveJ, **FRACTIONS), kinds(OptimoveL, **FRACTIONS),
     st.builds(MoveC, target=POSES | JOINTS, via=POSES | JOINTS, **SPEEDS,
               mode=st.sampled_from(ArcMode)),
     st.builds(Spline, target=JOINTS, velocities=JOINTS, accelerations=st.none() | JOINTS,
-              duration=POSITIVE))
+              duration=DURATION))
 
 
 @given(PRIMITIVES)

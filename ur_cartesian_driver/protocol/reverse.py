@@ -30,6 +30,9 @@ The sender must
 * give START the number of points, and CANCEL in a stream the number of all points written since
   STREAM_START;
 * end or cancel a stream before the next START, which would else swallow the new points.
+
+The streams came with URCL 2.14 (see :mod:`~ur_cartesian_driver.protocol.dialects`). All else here
+has had its place and scale since URCL 2.0.
 """
 
 from __future__ import annotations
@@ -42,6 +45,7 @@ from typing import cast, TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.pose import Vector6
+from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
 from ur_cartesian_driver.protocol.framing import (
     checked_int32,
     checked_size,
@@ -101,6 +105,7 @@ STOPPED_TIMEOUT = 100
 #: Controller cycle of an e-Series robot [ms].
 DEFAULT_STEP_TIME = 2
 
+_STREAMS = frozenset({TrajectoryAction.STREAM_START, TrajectoryAction.STREAM_END})
 REALTIME_MODES = frozenset({
     ControlMode.SERVOJ, ControlMode.SPEEDJ, ControlMode.SPEEDL, ControlMode.POSE,
     ControlMode.TORQUE})
@@ -203,12 +208,17 @@ def read_timeout_for(mode: ControlMode, requested: int, step_time: int = DEFAULT
 
 
 def trajectory(action: TrajectoryAction, count: int = 0, read_timeout: int = 200,
-               step_time: int = DEFAULT_STEP_TIME) -> ReverseMessage:
+               step_time: int = DEFAULT_STEP_TIME, dialect: Dialect = NEWEST) -> ReverseMessage:
     """
     Return the message that starts, ends, cancels or keeps alive a trajectory.
 
     :param count: number of points: START, STREAM_END, CANCEL of a stream.
+    :raises LocalProtocolError: the dialect has no such action; a program would ignore it.
     """
+    if action in _STREAMS and not dialect.streams:
+        raise LocalProtocolError(
+            f'{action.name} does not exist in wire dialect {dialect.name}: its trajectories have '
+            'a number of points that is known at their start.')
     mode = ControlMode.FORWARD
     return ReverseMessage(read_timeout=read_timeout_for(mode, read_timeout, step_time), mode=mode,
                           payload=(action, count, 0, 0, 0, 0))

@@ -3,8 +3,9 @@
 """
 The trajectory point interface: motion primitives to the robot program, one result back.
 
-A point is 21 big-endian int32, 84 bytes; S = 1,000,000. The numbers are those of URCL since 2.12
-(2.14 for streams); the order velocity, acceleration is the wire's, not URScript's.
+A point is 21 big-endian int32, 84 bytes; S = 1,000,000. The table is that of URCL since 2.12; the
+order velocity, acceleration is the wire's, not URScript's. What programs of other versions read
+is data, see :mod:`~ur_cartesian_driver.protocol.dialects`; T is the dialect's time scale.
 
 =======  =====================================================================  =====
 index    meaning                                                                scale
@@ -16,8 +17,10 @@ index    meaning                                                                
 13       acceleration [rad/s^2 or m/s^2; OPTIMOVE*: fraction]                   S
 14       pose targets: 1 = 6 - 11 hold q_near; MOVEC*: the mode of the arc      S
 12 - 17  SPLINE: joint accelerations [rad/s^2], zeros when cubic                S
-18       duration [s]; 0 = by velocity and acceleration                         S
-19       blend radius [m]; SPLINE: its kind, unscaled                           S
+6 - 11   before 2.12, all but MOVEC* and SPLINE: the velocity, six times        S
+12 - 17  before 2.12, all but MOVEC* and SPLINE: the acceleration, six times    S
+18       duration [s]; 0 = by velocity and acceleration                         T
+19       blend radius [m]; SPLINE: its kind, unscaled                           T
 20       motion type                                                            1
 =======  =====================================================================  =====
 
@@ -59,6 +62,7 @@ from ur_cartesian_driver.motion.primitive import (
     Spline,
     Target,
 )
+from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
 from ur_cartesian_driver.protocol.framing import (
     checked_size,
     FIXED_POINT,
@@ -130,8 +134,6 @@ class PointField(IntEnum):
 
 POINT_FIELDS = 21
 POINT_SIZE = 4 * POINT_FIELDS
-#: The longest duration that fits [s].
-MAX_DURATION = INT32_MAX / FIXED_POINT
 
 #: The 21 numbers of a point in the order of the table, before scaling.
 Fields: TypeAlias = tuple[float, ...]
@@ -141,12 +143,16 @@ _E = TypeVar('_E', bound=IntEnum)
 _POINT = struct.Struct('>21i')
 _RESULT = struct.Struct('>i')
 
+_TARGET_NAMES = tuple(f'target[{i}]' for i in range(6))
 _FIELD_NAMES = (
-    *(f'target[{i}]' for i in range(6)), *(f'words 6-11[{i}]' for i in range(6)),
+    *_TARGET_NAMES, *(f'words 6-11[{i}]' for i in range(6)),
     'velocity', 'acceleration', 'mode', *(f'words 15-17[{i}]' for i in range(3)),
     'duration', 'blend_radius', 'motion type')
+_REPEATED_FIELD_NAMES = (
+    *_TARGET_NAMES, *['velocity'] * 6, *['acceleration'] * 6,
+    'duration', 'blend_radius', 'motion type')
 _SPLINE_FIELD_NAMES = (
-    *(f'target[{i}]' for i in range(6)), *(f'velocities[{i}]' for i in range(6)),
+    *_TARGET_NAMES, *(f'velocities[{i}]' for i in range(6)),
     *(f'accelerations[{i}]' for i in range(6)), 'duration', 'kind', 'motion type')
 
 #: Class -> motion type with joint positions, with a pose as target.
@@ -166,6 +172,9 @@ _MOVES = {types[is_pose]: (cls, is_pose) for cls, types in _TYPES.items() for is
 _ARCS = {motion: kinds for kinds, motion in _ARC_TYPES.items()}
 _OPTIMOVES = frozenset(
     motion for motion, (cls, _) in _MOVES.items() if cls in (OptimoveJ, OptimoveL))
+#: Where velocity and acceleration stand.
+_SPEEDS_ONCE = (PointField.VELOCITY, PointField.ACCELERATION)
+_SPEEDS_REPEATED = (PointField.SECOND, PointField.VELOCITY)
 
 
 def motion_type(primitive: Primitive) -> MotionType:
@@ -184,20 +193,23 @@ def motion_type(primitive: Primitive) -> MotionType:
         raise LocalProtocolError(f'{primitive!r} is not a motion primitive.') from None
 
 
-def to_fields(primitive: Primitive) -> Fields:
+def to_fields(primitive: Primitive, dialect: Dialect = NEWEST) -> Fields:
     """
     Return the 21 numbers of a primitive in SI units, see the table above.
 
-    :raises LocalProtocolError: joint positions come with a q_near, which belongs to poses.
+    :raises LocalProtocolError: joint positions come with a q_near, which belongs to poses; or the
+        dialect has no such motion, or no q_near.
     """
     kind = motion_type(primitive)
+    if kind not in dialect.motion_types:
+        raise _unknown_in(dialect, f'{kind.name} (motion type {kind})')
     if isinstance(primitive, Spline):
         spline = SplineKind.CUBIC if primitive.accelerations is None else SplineKind.QUINTIC
         return (*primitive.target, *primitive.velocities, *(primitive.accelerations or ZERO6),
                 primitive.duration, spline, kind)
-    target = _numbers(primitive.target)
+    target, v, a = _numbers(primitive.target), primitive.velocity, primitive.acceleration
     if isinstance(primitive, MoveC):
-        return (*target, *_numbers(primitive.via), primitive.velocity, primitive.acceleration,
+        return (*target, *_numbers(primitive.via), v, a,
                 primitive.mode, 0, 0, 0, 0, primitive.blend_radius, kind)
     near = primitive.q_near
     if near is not None and not isinstance(primitive.target, Pose):
@@ -205,17 +217,28 @@ def to_fields(primitive: Primitive) -> Fields:
             f'{type(primitive).__name__} has joint positions as its target and a q_near; a q_near '
             'goes with a pose only.')
     duration = primitive.duration if isinstance(primitive, MoveJ | MoveL) else 0
-    return (*target, *(near or ZERO6), primitive.velocity, primitive.acceleration,
-            near is not None, 0, 0, 0, duration, primitive.blend_radius, kind)
+    if dialect.q_near:
+        return (*target, *(near or ZERO6), v, a,
+                near is not None, 0, 0, 0, duration, primitive.blend_radius, kind)
+    if near is not None:
+        raise _unknown_in(dialect, 'q_near')
+    return (*target, v, v, v, v, v, v, a, a, a, a, a, a, duration, primitive.blend_radius, kind)
 
 
-def from_fields(fields: Sequence[float]) -> Primitive:
+def _unknown_in(dialect: Dialect, what: str) -> LocalProtocolError:
+    return LocalProtocolError(f'{what} does not exist in wire dialect {dialect.name}.')
+
+
+def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST) -> Primitive:
     """
     Return the primitive of the 21 numbers.
 
     :raises RemoteProtocolError: motion type, spline kind or arc mode is unknown.
     """
     kind = _known(MotionType, fields[20], 'motion type (word 20)')
+    if kind not in dialect.motion_types:
+        raise RemoteProtocolError(
+            f'{kind:d} is an unknown motion type (word 20) in wire dialect {dialect.name}.')
     target, second = _vector(fields[:6]), _vector(fields[6:12])
     if kind is MotionType.SPLINE:
         spline = _known(SplineKind, fields[19], 'spline kind (word 19)')
@@ -229,6 +252,8 @@ def from_fields(fields: Sequence[float]) -> Primitive:
             velocity=velocity, acceleration=acceleration, blend_radius=fields[19],
             mode=_known(ArcMode, flag, 'arc mode (word 14)'))
     cls, is_pose = _MOVES[kind]
+    if not dialect.q_near:
+        velocity, acceleration, flag = fields[6], fields[12], 0.0
     near = second if is_pose and flag else None
     goal = _target(target, bool(is_pose))
     if cls is MoveJ or cls is MoveL:
@@ -239,70 +264,86 @@ def from_fields(fields: Sequence[float]) -> Primitive:
         blend_radius=fields[19])
 
 
-def check_fields(fields: Fields) -> None:
+def check_fields(fields: Fields, dialect: Dialect = NEWEST) -> None:
     """
     Refuse what URCL refuses to send: it would mean something else to the robot, or nothing.
 
-    :raises LocalProtocolError: names the field, its value and the bound.
+    :raises LocalProtocolError: names the field, its value, the bound and the dialect.
     """
-    duration, kind = fields[18], fields[20]
-    if duration > MAX_DURATION:
-        raise LocalProtocolError(
-            f'duration is {duration!r} s, but at most {MAX_DURATION} s can be sent in one point.')
+    duration, blend, kind = fields[18], fields[19], fields[20]
+    if duration and (duration > dialect.max_duration or 0.0 < duration < dialect.least_duration):
+        raise _bad_duration(duration, dialect)
     if kind == MotionType.SPLINE:
         return
-    for name, value in (('velocity', fields[12]), ('acceleration', fields[13]),
-                        ('blend_radius', fields[19])):
-        if value < 0.0:
-            raise LocalProtocolError(f'{name} is {value!r}, but it must not be negative.')
-    if kind in _OPTIMOVES and not (0.0 < fields[12] <= 1.0 and 0.0 < fields[13] <= 1.0):
+    v_at, a_at = _SPEEDS_ONCE if dialect.q_near or kind in _ARCS else _SPEEDS_REPEATED
+    velocity, acceleration = fields[v_at], fields[a_at]
+    if velocity < 0.0 or acceleration < 0.0 or blend < 0.0:
+        name, value = next((name, value) for name, value in (
+            ('velocity', velocity), ('acceleration', acceleration), ('blend_radius', blend))
+            if value < 0.0)
+        raise LocalProtocolError(f'{name} is {value!r}, but it must not be negative.')
+    if kind in _OPTIMOVES and not (0.0 < velocity <= 1.0 and 0.0 < acceleration <= 1.0):
         raise LocalProtocolError(
-            f'velocity is {fields[12]!r} and acceleration is {fields[13]!r}, but an optimove '
+            f'velocity is {velocity!r} and acceleration is {acceleration!r}, but an optimove '
             'takes fractions in (0, 1].')
 
 
-def encode_fields(fields: Fields) -> bytes:
+def _bad_duration(duration: float, dialect: Dialect) -> LocalProtocolError:
+    if duration < dialect.least_duration:
+        return LocalProtocolError(
+            f'duration is {duration!r} s, but wire dialect {dialect.name} counts in '
+            f'{1.0 / dialect.time_scale:g} s, and 0 would mean that the velocity counts.')
+    return LocalProtocolError(
+        f'duration is {duration!r} s, but at most {dialect.max_duration} s can be sent in one '
+        f'point in wire dialect {dialect.name}.')
+
+
+def encode_fields(fields: Fields, dialect: Dialect = NEWEST) -> bytes:
     """
     Return the 84 bytes of the 21 numbers.
 
     :raises LocalProtocolError: a number cannot be sent.
     """
-    check_fields(fields)
+    check_fields(fields, dialect)
     spline = fields[20] == MotionType.SPLINE
-    names = _SPLINE_FIELD_NAMES if spline else _FIELD_NAMES
-    words = [to_fixed(value, name) for value, name in zip(fields[:19], names[:19], strict=True)]
-    word19 = int(fields[19]) if spline else to_fixed(fields[19], names[19])
-    return _POINT.pack(*words, word19, int(fields[20]))
+    names = _names(fields[20], dialect)
+    words = [to_fixed(value, name) for value, name in zip(fields[:18], names[:18], strict=True)]
+    word18 = to_fixed(fields[18], names[18], dialect.time_scale)
+    word19 = (int(fields[19]) if spline
+              else to_fixed(fields[19], names[19], dialect.time_scale))
+    return _POINT.pack(*words, word18, word19, int(fields[20]))
 
 
-def decode_fields(data: bytes) -> Fields:
+def decode_fields(data: bytes, dialect: Dialect = NEWEST) -> Fields:
     """
     Return the 21 numbers of 84 bytes, in SI units.
 
     :raises RemoteProtocolError: there are more or fewer bytes.
     """
     words = _POINT.unpack(checked_size(data, POINT_SIZE, 'trajectory point'))
-    word19 = words[19] if words[20] == MotionType.SPLINE else from_fixed(words[19])
-    return (*(from_fixed(word) for word in words[:19]), word19, words[20])
+    scale = dialect.time_scale
+    word19 = words[19] if words[20] == MotionType.SPLINE else from_fixed(words[19], scale)
+    return (*(from_fixed(word) for word in words[:18]), from_fixed(words[18], scale), word19,
+            words[20])
 
 
-def encode_point(primitive: Primitive) -> bytes:
+def encode_point(primitive: Primitive, dialect: Dialect = NEWEST) -> bytes:
     """
     Return the 84 bytes of a primitive.
 
     :raises LocalProtocolError: a value cannot be sent; the text names the field and the bound.
     """
-    return encode_fields(to_fields(primitive))
+    return encode_fields(to_fields(primitive, dialect), dialect)
 
 
-def decode_point(data: bytes) -> Primitive:
+def decode_point(data: bytes, dialect: Dialect = NEWEST) -> Primitive:
     """
     Return the primitive of 84 bytes.
 
     :raises RemoteProtocolError: it has another size, or a type, kind or mode that is unknown.
     """
     try:
-        return from_fields(decode_fields(data))
+        return from_fields(decode_fields(data, dialect), dialect)
     except RemoteProtocolError as error:
         raise RemoteProtocolError(f'{error} Bytes: {quote(data)}') from None
 
@@ -311,7 +352,7 @@ def decode_point(data: bytes) -> Primitive:
 _CHUNK = 4096
 
 
-def encode_points(primitives: Iterable[Primitive]) -> bytes:
+def encode_points(primitives: Iterable[Primitive], dialect: Dialect = NEWEST) -> bytes:
     """
     Return the bytes of many primitives, the same as :func:`encode_point` one by one but faster.
 
@@ -321,42 +362,49 @@ def encode_points(primitives: Iterable[Primitive]) -> bytes:
     iterator = iter(primitives)
     first = 0
     while chunk := list(islice(iterator, _CHUNK)):
-        chunks.append(_encode_chunk(chunk, first))
+        chunks.append(_encode_chunk(chunk, first, dialect))
         first += len(chunk)
     return b''.join(chunks)
 
 
-def _encode_chunk(primitives: list[Primitive], first: int) -> bytes:
+def _encode_chunk(primitives: list[Primitive], first: int, dialect: Dialect) -> bytes:
     rows = []
     for index, primitive in enumerate(primitives, first):
         try:
-            fields = to_fields(primitive)
-            check_fields(fields)
+            fields = to_fields(primitive, dialect)
+            check_fields(fields, dialect)
         except LocalProtocolError as error:
             raise LocalProtocolError(f'Point {index}: {error}') from None
         rows.append(fields)
-    return _encode_rows(np.array(rows, dtype=np.float64), first)
+    return _encode_rows(np.array(rows, dtype=np.float64), first, dialect)
 
 
-def _encode_rows(fields: NDArray[np.float64], first: int) -> bytes:
+def _encode_rows(fields: NDArray[np.float64], first: int, dialect: Dialect) -> bytes:
     """Return the bytes of rows of fields (n, 21) which were checked but for their range."""
+    scales = np.array([FIXED_POINT] * 18 + [dialect.time_scale] * 2 + [1], dtype=np.float64)
     with np.errstate(over='ignore'):  # what becomes infinite is refused below
-        scaled = fields * FIXED_POINT
+        scaled = fields * scales
     spline = fields[:, 20] == MotionType.SPLINE
     scaled[spline, 19] = fields[spline, 19]
-    scaled[:, 20] = fields[:, 20]
     bad = ~((scaled > INT32_MIN - 0.5) & (scaled < INT32_MAX + 0.5))
     if bad.any():
         row, column = (int(i) for i in np.argwhere(bad)[0])
-        names = _SPLINE_FIELD_NAMES if spline[row] else _FIELD_NAMES
-        error = out_of_range(float(fields[row, column]), names[column])
+        error = out_of_range(float(fields[row, column]),
+                             _names(fields[row, 20], dialect)[column], int(scales[column]))
         raise LocalProtocolError(f'Point {first + row}: {error}')
-    # Ties away from zero, as in to_fixed.
+    # Ties away from zero, as to_fixed() does it.
     size = np.abs(scaled)
     whole = np.floor(size)
     whole += size - whole >= 0.5
     words = np.copysign(whole, scaled)
     return words.astype('>i4').tobytes()
+
+
+def _names(kind: float, dialect: Dialect) -> Sequence[str]:
+    """Return what the 21 numbers of a motion type are called in errors."""
+    if kind == MotionType.SPLINE:
+        return _SPLINE_FIELD_NAMES
+    return _FIELD_NAMES if dialect.q_near or kind in _ARCS else _REPEATED_FIELD_NAMES
 
 
 def encode_result(result: TrajectoryResult) -> bytes:
