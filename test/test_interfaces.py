@@ -12,6 +12,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import ArcMode, ExecutionMode, OutputKind, SegmentType
+from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.motion.state import RobotMode, SafetyMode
 from ur_cartesian_driver.msg import (
     CartesianPosture,
@@ -20,11 +21,24 @@ from ur_cartesian_driver.msg import (
     CartesianTrajectoryPoint,
     DriverStatus,
     IOCommand,
+    IOStates,
     MotionSegment,
     ServoState,
+    ToolData,
 )
+from ur_cartesian_driver.msg import RobotMode as RobotModeMessage
+from ur_cartesian_driver.msg import SafetyMode as SafetyModeMessage
 from ur_cartesian_driver.resources import share_path
-from ur_cartesian_driver.srv import AppendPoints
+from ur_cartesian_driver.srv import (
+    AppendPoints,
+    Load,
+    Popup,
+    RawRequest,
+    SetIO,
+    SetPayload,
+    SetSpeedSliderFraction,
+    SetTCP,
+)
 
 # Section 4.2 of the proposal (FZI, 2020-09-17), with the ROS 2 names of its types.
 FZI = {
@@ -74,8 +88,11 @@ FZI_CODES = {
     'PATH_TOLERANCE_VIOLATED': -4, 'GOAL_TOLERANCE_VIOLATED': -5, 'INVALID_POSTURE': -6,
 }
 ALL = [
-    *FZI, DriverStatus, IOCommand, MotionSegment, ServoState,
-    AppendPoints.Request, AppendPoints.Response,
+    *FZI, DriverStatus, IOCommand, IOStates, MotionSegment, RobotModeMessage, SafetyModeMessage,
+    ServoState, ToolData,
+    *(part for service in (AppendPoints, Load, Popup, RawRequest, SetIO, SetPayload,
+                           SetSpeedSliderFraction, SetTCP)
+      for part in (service.Request, service.Response)),
 ]
 
 
@@ -126,6 +143,13 @@ def test_constants_of_a_choice_count_up(message, pattern, values):
     (OutputKind, IOCommand, '(?=.*_(DIGITAL|ANALOG)$)', {}),
     (RobotMode, DriverStatus, 'ROBOT_MODE_', {'UNKNOWN': -2}),
     (SafetyMode, DriverStatus, 'SAFETY_MODE_', {'UNKNOWN': 0}),
+    (RobotMode, RobotModeMessage, '', {'UNKNOWN': -2}),
+    (SafetyMode, SafetyModeMessage, '', {'UNKNOWN': 0}),
+    (AnalogDomain, IOStates, '', {}),
+    (AnalogDomain, ToolData, '', {}),
+    (AnalogDomain, IOCommand, '(?=CURRENT|VOLTAGE)', {}),
+    (AnalogDomain, SetIO.Request, '(?=CURRENT|VOLTAGE)', {}),
+    (OutputKind, SetIO.Request, '(?=.*_(DIGITAL|ANALOG)$)', {}),
 ])
 def test_our_own_types_use_the_numbers_of_the_messages(enum, message, prefix, only_in_the_message):
     numbers = {re.sub(f'^{prefix}', '', name): value

@@ -1,0 +1,62 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Inputs, outputs and the tool connector of a robot, as its controller reports them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from math import nan
+
+from ur_cartesian_driver.motion.pose import Vector3
+
+
+class AnalogDomain(IntEnum):
+    """What an analog channel carries: current [A] or voltage [V]."""
+
+    CURRENT = 0
+    VOLTAGE = 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnalogChannel:
+    """An analog input or output: its value [A] or [V], as the domain says."""
+
+    domain: AnalogDomain
+    value: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DigitalChannels:
+    """The digital inputs, or the outputs, by their number; True = high."""
+
+    standard: tuple[bool, ...]
+    configurable: tuple[bool, ...]
+    tool: tuple[bool, ...]
+
+    @classmethod
+    def from_bits(cls, bits: int) -> DigitalChannels:
+        """Return the channels of RTDE's number: standard from bit 0, then the others."""
+        flags = tuple(bool(bits >> i & 1) for i in range(18))
+        return cls(standard=flags[:8], configurable=flags[8:16], tool=flags[16:])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Signals:
+    """All of them at one moment."""
+
+    inputs: DigitalChannels
+    outputs: DigitalChannels
+    analog_inputs: tuple[AnalogChannel, AnalogChannel]
+    analog_outputs: tuple[AnalogChannel, AnalogChannel]
+    tool_analog_inputs: tuple[AnalogChannel, AnalogChannel]
+    #: Supply of the tool: set [V] and measured [A].
+    tool_voltage: int = 0
+    tool_current: float = 0.0
+    #: [degrees Celsius].
+    tool_temperature: float = 0.0
+    #: As the controller counts it.
+    tool_mode: int = 0
+    #: Mass [kg] and centre of gravity in the flange [m]; NaN = not reported.
+    payload: float = nan
+    payload_cog: Vector3 = (nan, nan, nan)

@@ -1,0 +1,150 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a robot can be asked for beside motions: each call with its values, and the one answer.
+
+Values are checked when a call is made, so that one which exists can be sent.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from typing import TypeAlias
+
+from ur_cartesian_driver.motion.errors import LocalProtocolError
+from ur_cartesian_driver.motion.goal import OutputKind
+from ur_cartesian_driver.motion.pose import Pose, Vector3
+from ur_cartesian_driver.motion.signals import AnalogDomain
+from ur_cartesian_driver.protocol.dashboard import Request
+
+#: How many outputs there are of each kind.
+PINS = {OutputKind.STANDARD_DIGITAL: 8, OutputKind.CONFIGURABLE_DIGITAL: 8,
+        OutputKind.TOOL_DIGITAL: 2, OutputKind.STANDARD_ANALOG: 2}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Answer:
+    """
+    How a call ended.
+
+    :param ok: the robot has done it, and reports so where it reports such things.
+    :param text: a sentence, or the value that was asked for.
+    """
+
+    ok: bool
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Dashboard:
+    """Give a command to the dashboard, and wait until the robot has done it."""
+
+    command: str
+    argument: str = ''
+
+    def __post_init__(self) -> None:
+        """Check that there is such a command."""
+        Request(name=self.command, argument=self.argument)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DashboardLine:
+    """Send a line to the dashboard, whatever it does there, and fetch the line that comes back."""
+
+    line: str
+
+    def __post_init__(self) -> None:
+        """Check that it is one line."""
+        if not self.line.strip() or '\n' in self.line or '\r' in self.line:
+            raise LocalProtocolError(
+                f'A request to the dashboard is one line of text, not {self.line!r:.100}.')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetTcp:
+    """Set the active TCP, given in the flange frame."""
+
+    T_flange_tcp: Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetPayload:
+    """Set mass [kg] and centre of gravity [m] (in the flange frame) of what the flange carries."""
+
+    mass: float
+    cog: Vector3 = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        """Check that the mass can be one."""
+        if not 0.0 <= self.mass < 1000.0 or not all(map(isfinite, self.cog)):
+            raise LocalProtocolError(
+                f'The payload has a mass of {self.mass} kg at {self.cog}; the mass must not be '
+                'negative, and all numbers finite.')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ZeroFtSensor:
+    """Take the force and torque that are measured now as zero."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetOutput:
+    """
+    Set an output.
+
+    :param value: 0 or 1 for a digital one, a fraction of its range for an analog one.
+    :param domain: of an analog one; a digital one has none.
+    """
+
+    kind: OutputKind
+    pin: int
+    value: float
+    domain: AnalogDomain = AnalogDomain.CURRENT
+
+    def __post_init__(self) -> None:
+        """Check number and value."""
+        if not 0 <= self.pin < PINS[self.kind]:
+            raise LocalProtocolError(
+                f'pin is {self.pin}, but {self.kind.name} has the pins 0 to '
+                f'{PINS[self.kind] - 1}.')
+        if self.is_analog and not 0.0 <= self.value <= 1.0:
+            raise LocalProtocolError(
+                f'value is {self.value}, but an analog output takes a fraction of its range, 0 '
+                'to 1.')
+        if not self.is_analog and self.value not in (0.0, 1.0):
+            raise LocalProtocolError(
+                f'value is {self.value}, but a digital output takes 0 or 1.')
+
+    @property
+    def is_analog(self) -> bool:
+        """Tell whether it is an analog output."""
+        return self.kind is OutputKind.STANDARD_ANALOG
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetSpeedSlider:
+    """Move the speed slider to a fraction, 0 to 1."""
+
+    fraction: float
+
+    def __post_init__(self) -> None:
+        """Check the range."""
+        if not 0.0 <= self.fraction <= 1.0:
+            raise LocalProtocolError(
+                f'speed_slider_fraction is {self.fraction}, but the slider takes 0 (the arm '
+                'stands) to 1 (full speed).')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SendProgram:
+    """Upload the robot program (again), and wait until it has called."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recover:
+    """Bring a stopped robot back to where it takes goals, as far as software may."""
+
+
+Call: TypeAlias = (Dashboard | DashboardLine | SetTcp | SetPayload | ZeroFtSensor | SetOutput
+                   | SetSpeedSlider | SendProgram | Recover)
