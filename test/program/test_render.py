@@ -12,7 +12,7 @@ from ur_cartesian_driver.program import as_program, ProgramSettings, render
 from ur_cartesian_driver.program.render import FEATURES, has_feature
 from ur_cartesian_driver.protocol.registers import POINTS_BEGUN
 from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
-from ur_cartesian_driver.protocol.script_command import ScriptCommand
+from ur_cartesian_driver.protocol.script_command import ScriptCommand, TcpHold
 from ur_cartesian_driver.protocol.trajectory import MotionType
 from ur_cartesian_driver.urscript import parse
 
@@ -38,7 +38,8 @@ def test_addresses_are_those_of_the_settings():
 
 @pytest.mark.parametrize(('prefix', 'members'), [
     ('MODE', ControlMode), ('TRAJECTORY', TrajectoryAction), ('MOTION', MotionType),
-    ('RESULT', TrajectoryResult), ('COMMAND', ScriptCommand)])
+    ('RESULT', TrajectoryResult), ('COMMAND', ScriptCommand),
+    ('TCP', TcpHold)])
 def test_every_wire_constant_comes_from_its_enum(prefix, members):
     lines = text().splitlines()
     for member in members:

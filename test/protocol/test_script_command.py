@@ -32,6 +32,7 @@ from ur_cartesian_driver.protocol.script_command import (
     SetToolVoltage,
     StartForceMode,
     StartToolContact,
+    TcpHold,
     ToolContactResult,
     ZeroFtSensor,
 )
@@ -156,3 +157,13 @@ def test_results_of_a_tool_contact(result, text):
     assert ResultDecoder().feed(bytes.fromhex(text) * 2) == [result, result]
     with pytest.raises(RemoteProtocolError, match='00000002'):
         ResultDecoder().feed(b'\0\0\0\2')
+
+
+@pytest.mark.parametrize('hold', list(TcpHold))
+def test_a_tcp_says_for_how_long_in_a_word_that_others_do_not_read(hold):
+    plain = encode(SetTcpOffset(offset=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6)))
+    command = SetTcpOffset(offset=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6), hold=hold)
+    sent = encode(command)
+    assert decode(sent) == command
+    assert sent[:28] == plain[:28]
+    assert struct.unpack('>21i', sent[28:]) == (hold, *(0,) * 20)

@@ -20,12 +20,15 @@ from ur_cartesian_driver.motion.lever import acceleration_at, seen_at, twist_at
 from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose, rotate
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.path import same
 from ur_cartesian_driver.planning.validate import is_timed, point_field, segment_field, segment_of
 
 #: How far the tool may turn on a straight or circular segment that counts as one without a turn
 #: [rad]: a frame r away from the TCP leaves its line by r angle^2 / 8, 5 um at 0.4 m.
 KEPT_ANGLE = 0.01
+
+#: How near the controlled frame is to the TCP for being it [m], [rad]: some steps of the wire, so
+#: that a TCP that is set and the one before it can be told apart.
+SAME_TCP = 5e-6
 
 _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
@@ -49,7 +52,7 @@ def carried(goal: Goal, state: RobotState, options: PlanningOptions) -> Carried:
     :raises InvalidGoal: the TCP must not change, and the tool turns on the way.
     """
     T_flange_controlled = goal.T_flange_controlled
-    if T_flange_controlled is None or same(T_flange_controlled, state.T_flange_tcp):
+    if T_flange_controlled is None or _same(T_flange_controlled, state.T_flange_tcp):
         return Carried(goal=goal, state=state)
     T_tcp_controlled = state.T_flange_tcp.inverse() @ T_flange_controlled
     if options.allow_tcp_change:
@@ -64,6 +67,10 @@ def carried(goal: Goal, state: RobotState, options: PlanningOptions) -> Carried:
         T_tcp_controlled=T_tcp_controlled,
         remarks=(f'the motion is carried over from {_name(goal)} to the TCP of the robot, which '
                  'must not change (allow_tcp_change is false)',))
+
+
+def _same(a: Pose, b: Pose) -> bool:
+    return a.distance_to(b) <= SAME_TCP and a.angle_to(b) <= SAME_TCP
 
 
 def _name(goal: Goal) -> str:

@@ -114,12 +114,14 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'POINT_FIELDS = {trajectory.POINT_FIELDS}'
     yield f'COMMAND_FIELDS = {script_command.COMMAND_WORDS}'
     yield f'STREAM_LENGTH = {2**31 - 1}'
+    yield f'TCP_RESOLUTION = {2.0 / FIXED_POINT:.6f}'
     yield f'REGISTER_POINTS_BEGUN = {int(registers.POINTS_BEGUN)}'
     yield from _enum('MODE', reverse.ControlMode)
     yield from _enum('TRAJECTORY', reverse.TrajectoryAction)
     yield from _enum('MOTION', trajectory.MotionType)
     yield from _enum('RESULT', TrajectoryResult)
     yield from _enum('COMMAND', script_command.ScriptCommand)
+    yield from _enum('TCP', script_command.TcpHold)
     # Where a field of a point stands in the list that the robot reads, its length first.
     yield from _enum('POINT', trajectory.PointField, offset=1)
 

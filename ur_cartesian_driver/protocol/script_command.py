@@ -21,7 +21,8 @@ All scaled by 1,000,000 but the words marked raw.
 8   FT_RTDE_INPUT_ENABLE       1 on (0, 1; raw), 2 mass of the sensor [kg], 3-5 its offset [m],
                                6-8 its centre of gravity [m]
 9   SET_GRAVITY                1-3 acceleration [m/s^2], pointing away from the earth
-10  SET_TCP_OFFSET             1-6 pose of the TCP in the flange
+10  SET_TCP_OFFSET             1-6 pose of the TCP in the flange, 7 for how long (raw; ours: other
+                               robot programs do not look at it)
 11  SET_FRICTION_SCALES        1-6 viscous, 7-12 Coulomb, limited to [0, 1]
 12  SET_TARGET_PAYLOAD         1 mass [kg], 2-4 centre of gravity [m], 5-10 inertia
                                xx yy zz xy xz yz [kg m^2], 11 transition time [s]
@@ -69,6 +70,18 @@ class ScriptCommand(IntEnum):
     SET_TCP_OFFSET = 10
     SET_FRICTION_SCALES = 11
     SET_TARGET_PAYLOAD = 12
+
+
+class TcpHold(IntEnum):
+    """For how long a TCP is set; known to our own robot program only."""
+
+    #: Until somebody sets another one.
+    KEEP = 0
+    #: Until LENT is taken back: the program remembers the TCP that it finds, and puts it back by
+    #: itself before it ends.
+    LENT = 1
+    #: The end of LENT: the program puts back what it remembers, else what the message says.
+    BACK = 2
 
 
 class ToolContactResult(IntEnum):
@@ -200,6 +213,7 @@ class SetTcpOffset:
 
     command: ClassVar = ScriptCommand.SET_TCP_OFFSET
     offset: Vector6
+    hold: TcpHold = TcpHold.KEEP
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -330,7 +344,7 @@ def _words(command: Command) -> list[int]:
         case SetGravity():
             return _fixed_all(command.gravity, 'gravity')
         case SetTcpOffset():
-            return _fixed_all(command.offset, 'offset')
+            return [*_fixed_all(command.offset, 'offset'), int(command.hold)]
         case SetFrictionScales():
             # URCL limits these where it refuses other values; the bytes shall be the same.
             return [*_fixed_all([min(max(v, 0.0), 1.0) for v in command.viscous], 'viscous'),
@@ -360,7 +374,8 @@ _READERS: Mapping[ScriptCommand, Callable[[list[int], list[float]], Command]] = 
         enabled=raw[0] != 0, sensor_mass=v[1], sensor_offset=_three(v[2:5]),
         sensor_cog=_three(v[5:8])),
     ScriptCommand.SET_GRAVITY: lambda _, v: SetGravity(gravity=_three(v[0:3])),
-    ScriptCommand.SET_TCP_OFFSET: lambda _, v: SetTcpOffset(offset=_six(v[0:6])),
+    ScriptCommand.SET_TCP_OFFSET: lambda raw, v: SetTcpOffset(
+        offset=_six(v[0:6]), hold=TcpHold(raw[6])),
     ScriptCommand.SET_FRICTION_SCALES: lambda _, v: SetFrictionScales(
         viscous=_six(v[0:6]), coulomb=_six(v[6:12])),
     ScriptCommand.SET_TARGET_PAYLOAD: lambda _, v: SetTargetPayload(
