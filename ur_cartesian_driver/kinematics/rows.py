@@ -181,29 +181,62 @@ def follow(arm: Arm, poses: Floats, q_start: Joints) -> JointPath:
 
 def _ahead(arm: Arm, poses: Floats, before: Joints) -> Floats:
     """Return the joints of the rows that are certain to stay on the branch they are on."""
-    shape, targets = shape_of(arm), Targets.of(poses)
     start = np.array([before])
-    signs = BRANCHES[int(posture(shape, start).branch[0])]
-    branch = branch_rows(shape, targets, signs)
-    q, certain = branch.q.T, branch.exists
-    room = 0.5 * branch.apart
-    if arm.calibrated:
-        refined, exact = refine(arm, targets, q)
-        certain = certain & exact & (_largest(refined - q) < _MOVED)
-        q, room = refined, room - 0.5 * _CONFUSED
+    signs = BRANCHES[int(postures(arm, start).branch[0])]
+    q, room = _on_branch(arm, Targets.of(poses), signs)
     way = np.concatenate([start, q])
     way = way - tau * np.cumsum(np.rint(np.diff(way, axis=0, prepend=start) / tau), axis=0)
+    q, certain = _certain(arm, way[1:], way[:-1], room)
+    return q if certain.all() else q[:int(np.argmin(certain))]
+
+
+def nearest_rows(arm: Arm, poses: Floats, q_near: Floats) -> Floats:
+    """
+    Return for each pose the solution nearest to a configuration of its own.
+
+    The same as :func:`~.inverse.nearest`, one by one.
+
+    :param poses: (n, 7).
+    :param q_near: (n, 6) [rad].
+    :returns: (n, 6) [rad], NaN where no solution lies within the limits.
+    """
+    found = np.full((len(poses), 6), np.nan)
+    certain = np.zeros(len(poses), dtype=np.bool_)
+    numbers = postures(arm, q_near).branch
+    for number in np.unique(numbers):
+        rows = np.flatnonzero(numbers == number)
+        q, room = _on_branch(arm, Targets.of(poses[rows]), BRANCHES[int(number)])
+        q = q - tau * np.rint((q - q_near[rows]) / tau)
+        found[rows], certain[rows] = _certain(arm, q, q_near[rows], room)
+    for row in np.flatnonzero(~certain):
+        solution = nearest(arm, pose_from_row(poses[row]), _joints(q_near[row]))
+        found[row] = np.nan if solution is None else solution
+    return found
+
+
+def _on_branch(arm: Arm, targets: Targets, signs: tuple[int, int, int]
+               ) -> tuple[Floats, Floats]:
+    """Return one branch (n, 6) and half its distance to the next (n,), negative if unsure."""
+    branch = branch_rows(shape_of(arm), targets, signs)
+    q, room = branch.q.T, 0.5 * branch.apart
+    sound = branch.exists
+    if arm.calibrated:
+        refined, exact = refine(arm, targets, q)
+        sound = sound & exact & (_largest(refined - q) < _MOVED)
+        q, room = refined, room - 0.5 * _CONFUSED
+    return q, np.where(sound, room, -1.0)
+
+
+def _certain(arm: Arm, q: Floats, q_near: Floats, room: Floats) -> tuple[Floats, Flags]:
+    """Return the rows put within the limits, and which are certain to be the nearest ones."""
     # Triangle inequality: of two branches that are `apart` now, the one within half of that from
     # where the arm was is the nearer one.
-    change = np.diff(way, axis=0)
-    certain = certain & (np.einsum('ij,ij->i', change, change) < np.maximum(room, 0.0) ** 2)
+    change = q - q_near
+    certain = np.einsum('ij,ij->i', change, change) < np.copysign(room * room, room)
     low, high = np.array(arm.model.position_limits).T
-    q = way[1:]
     inside = (q >= low - _LIMIT_ROUNDING) & (q <= high + _LIMIT_ROUNDING)
-    certain = certain & inside.all(axis=1)
-    stop = len(q) if certain.all() else int(np.argmin(certain))
-    clipped: Floats = np.clip(q[:stop], low, high)
-    return clipped
+    clipped: Floats = np.clip(q, low, high)
+    return clipped, certain & inside.all(axis=1)
 
 
 def _steps(q: Floats, found: Flags, q_start: Joints) -> Floats:
