@@ -63,7 +63,9 @@ def _sending(points: int) -> Iterator[Figure]:
         config = DriverConfig(
             robot_ip=HOST, ur_type=paths.MODEL, rtde_port=ports.rtde, primary_port=ports.primary,
             dashboard_port=ports.dashboard, reverse_port=0, script_sender_port=0,
-            trajectory_port=0, script_command_port=0, robot_loop='process')
+            trajectory_port=0, script_command_port=0, robot_loop='process',
+            # The reader claims progress while the arm stands.
+            max_plan_deviation=0.0, max_plan_deviation_angle=0.0)
         with Driver(config, PlanningOptions(max_points=points)) as driver:
             _until(lambda: driver.status.state is ConnectionState.CONNECTED)
             reader.call('join', dict(driver.status.ports))
