@@ -68,7 +68,7 @@ def test_every_option_is_a_parameter_but_for_what_is_found_out():
     options = {f.name for kind in (DriverConfig, PlanningOptions, NodeSettings)
                for f in fields(kind)}
     assert options - set(defaults()) == {
-        'calibration_known', 'optimove_known', 'acceleration_known'}
+        'calibration_known', 'optimove_known', 'acceleration_known', 'dialect'}
 
 
 def test_every_default_is_in_its_range():

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Literal, TypeAlias
 
+from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
+
 Choice: TypeAlias = Literal['refuse', 'slow']
 PostureChoice: TypeAlias = Literal['refuse', 'movej']
 
@@ -43,6 +45,8 @@ class PlanningOptions:
     optimove_known: bool = True
     #: Whether the robot reports the accelerations of the TCP; else nobody can watch them.
     acceleration_known: bool = True
+    #: What the robot program understands.
+    dialect: Dialect = NEWEST
     #: Prefix of the joint names in postures.
     tf_prefix: str = ''
 

@@ -50,6 +50,7 @@ from ur_cartesian_driver.planning.postures import (
 )
 from ur_cartesian_driver.planning.reference import reference_path
 from ur_cartesian_driver.planning.report import ignored, note
+from ur_cartesian_driver.planning.spoken import poses_only, spoken, spoken_radius, spoken_times
 from ur_cartesian_driver.planning.timing import Leg, schedule, Timing
 from ur_cartesian_driver.planning.tolerances import with_default_tolerances
 from ur_cartesian_driver.planning.validate import (
@@ -118,6 +119,8 @@ class _Planner:
         self.why: dict[int, list[str]] = {}
         self.targets = [goal.T_base_frame @ point.pose for point in goal.waypoints]
         self.timed = is_timed(goal)
+        self.times = spoken_times([point.time for point in goal.waypoints], options.dialect,
+                                  self.remarks)
         self._check_robot()
 
     # -- before the first segment ----------------------------------------------------------------
@@ -189,11 +192,11 @@ class _Planner:
         for i in range(begin, len(self.goal.waypoints)):
             leg = self._leg(i, T_base_tcp, q)
             if self.timed and leg.time is None:
-                leg = replace(leg, time=self.goal.waypoints[i].time - before)
+                leg = replace(leg, time=self.times[i] - before)
             if leg.path.length <= SAME_POSITION and self._no_way(leg):
                 leg = self._already_there(leg)
             legs.append(leg)
-            T_base_tcp, q, before = leg.path.end, leg.joints, self.goal.waypoints[i].time
+            T_base_tcp, q, before = leg.path.end, leg.joints, self.times[i]
         return legs
 
     def _leg(self, i: int, T_base_tcp: Pose, q: Joints) -> Leg:
@@ -290,7 +293,8 @@ class _Planner:
                 legs[0].path.end), 0.0, legs[0].segment.blend_radius)
         for k in range(len(legs) - 1):
             first, second = legs[k], legs[k + 1]
-            radius = first.segment.blend_radius
+            radius = spoken_radius(first.segment.blend_radius, first.index,
+                                   self.options.dialect, self.remarks)
             if radius <= SAME_POSITION or not self._can_blend(first, second):
                 continue  # the wire rounds so small a radius to none
             process = first.kind == second.kind == SegmentType.PROCESS
@@ -316,7 +320,9 @@ class _Planner:
 
     def segment(self, leg: Leg, timing: Timing) -> PlannedSegment:
         """Return the primitive of a leg and what is expected of it."""
-        primitive = self._primitive(leg, timing)
+        primitive, why = spoken(self._primitive(leg, timing), leg.index, leg.joints, self.options)
+        if why:
+            self.why.setdefault(leg.index, []).append(why)
         return PlannedSegment(
             primitive=primitive, waypoint=leg.index, length=leg.path.length,
             angle=leg.path.angle, duration=timing.duration, joints=leg.joints,
@@ -367,10 +373,10 @@ class _Planner:
         target: Target = self.targets[leg.index]
         wanted = [name for name, posture in (
             ('the point', leg.waypoint.posture), ('the via', segment.via_posture)) if posture]
-        if wanted and not self.options.calibration_known:
+        if wanted and (reason := poses_only(self.options)):
             self.remarks.append(
                 f'point {leg.index}: sent as poses in spite of the posture of '
-                f'{" and ".join(wanted)}, because the calibration of the robot is not known')
+                f'{" and ".join(wanted)}, because {reason}')
         elif wanted:
             self.why.setdefault(leg.index, []).append(
                 f'{" and ".join(wanted)} {"has" if len(wanted) == 1 else "have"} a posture')

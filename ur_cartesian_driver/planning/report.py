@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from math import degrees
 
 from ur_cartesian_driver.motion.goal import Goal, SegmentType
-from ur_cartesian_driver.motion.primitive import MoveC, OptimoveJ, Primitive
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, OptimoveJ, Primitive
 from ur_cartesian_driver.planning.timing import Leg, Timing
 from ur_cartesian_driver.planning.validate import is_optimized, is_timed, segment_of
 
@@ -78,7 +79,7 @@ def _name(primitive: Primitive) -> str:
         kinds = ['JOINT' if isinstance(x, tuple) else 'POSE'
                  for x in (primitive.target, primitive.via)]
         return name if kinds == ['POSE', 'POSE'] else f'{name}_{"_".join(dict.fromkeys(kinds))}'
-    if name == 'MOVEJ' or isinstance(primitive, OptimoveJ):
+    if isinstance(primitive, MoveJ | OptimoveJ) and isinstance(primitive.target, Pose):
         return f'{name}_POSE'
     return name
 

@@ -33,7 +33,7 @@ _TYPE_NAMES: Mapping[type, str] = {
     bool: 'true or false', int: 'a whole number', float: 'a number', str: 'a text',
     list: 'a list of texts'}
 #: Fields that are not set but found out.
-_FOUND_OUT = ('calibration_known', 'optimove_known', 'acceleration_known')
+_FOUND_OUT = ('calibration_known', 'optimove_known', 'acceleration_known', 'dialect')
 #: Parameters that rclpy itself makes out of what it is given.
 _OF_RCLPY = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
 

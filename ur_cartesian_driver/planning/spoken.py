@@ -1,0 +1,100 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What a robot program of an older wire dialect can be told: the same motion in other words, or no.
+
+A program skips motion types that it does not know, in silence, and goes on with the next point
+from where it is. So nothing is sent that the dialect does not have.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.primitive import (
+    Joints,
+    MoveC,
+    MoveJ,
+    OptimoveJ,
+    OptimoveL,
+    Primitive,
+    Spline,
+)
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.validate import point_field, segment_field
+from ur_cartesian_driver.protocol.dialects import Dialect
+from ur_cartesian_driver.protocol.trajectory import motion_type, MotionType
+
+
+def spoken(primitive: Primitive, point: int, joints: Joints, options: PlanningOptions
+           ) -> tuple[Primitive, str]:
+    """
+    Return a primitive in the words of the dialect, and why they are others; '' where they are not.
+
+    :param joints: the solution that it arrives in [rad].
+    :raises NotAvailable: the dialect has no words for it.
+    """
+    dialect, why = options.dialect, ''
+    if dialect.q_near or isinstance(primitive, MoveC | Spline):
+        pass
+    elif isinstance(primitive, MoveJ | OptimoveJ) and isinstance(primitive.target, Pose):
+        _check_calibration(primitive, point, options)
+        primitive = replace(primitive, target=joints, q_near=None)
+        why = f'wire dialect {dialect.name} has no q_near, so the joint solution itself is sent'
+    else:
+        primitive = replace(primitive, q_near=None)  # the robot would not look at it
+    if motion_type(primitive) not in dialect.motion_types:
+        raise NotAvailable(
+            segment_field(point, 'type'), f'needs {motion_type(primitive).name}, which robot '
+            f'programs of wire dialect {dialect.name} do not know',
+            'use LINEAR or JOINT' if isinstance(primitive, OptimoveJ | OptimoveL)
+            else 'use a newer program and wire_dialect')
+    return primitive, why
+
+
+def _check_calibration(primitive: Primitive, point: int, options: PlanningOptions) -> None:
+    if not options.calibration_known:
+        raise NotAvailable(
+            segment_field(point, 'type'), f'is a joint motion ({type(primitive).__name__}), for '
+            f'which wire dialect {options.dialect.name} takes joint positions only, and the '
+            'calibration of the robot, from which they follow, is not known', 'use LINEAR')
+
+
+def poses_only(options: PlanningOptions) -> str:
+    """Return why arcs cannot be sent as joint positions, as the end of "because ..."; '' = can."""
+    if not options.calibration_known:
+        return 'the calibration of the robot is not known'
+    if MotionType.MOVEC_JOINT not in options.dialect.motion_types:
+        return f'wire dialect {options.dialect.name} has no arcs with joint positions'
+    return ''
+
+
+def spoken_times(times: list[float], dialect: Dialect, remarks: list[str]) -> list[float]:
+    """
+    Return the times of all points as the wire carries their differences, so no error adds up.
+
+    :raises InvalidGoal: two points are nearer to each other than the wire can tell.
+    """
+    rounded = [dialect.whole_time(time) for time in times]
+    for i in range(1, len(rounded)):
+        if times[i] > times[i - 1] and rounded[i] <= rounded[i - 1]:
+            raise InvalidGoal(
+                point_field(i, 'time_from_start'), f'is {times[i] - times[i - 1]:.6f} s after the '
+                f'point before, but wire dialect {dialect.name} counts in '
+                f'{1.0 / dialect.time_scale:g} s', 'give it more time')
+    if max(abs(a - b) for a, b in zip(times, rounded, strict=True)) > 1e-6:
+        remarks.append(f'all points: times are rounded to {1.0 / dialect.time_scale:g} s, in '
+                       f'which wire dialect {dialect.name} counts')
+    return rounded
+
+
+def spoken_radius(radius: float, point: int, dialect: Dialect, remarks: list[str]) -> float:
+    """Return a blend radius that the wire carries [m]."""
+    whole = dialect.whole_radius(radius)
+    if whole < radius - 1e-6:
+        remarks.append(f'point {point}: blend of {1e3 * whole:g} mm instead of '
+                       f'{1e3 * radius:g} mm, because wire dialect {dialect.name} counts in '
+                       f'{1e3 / dialect.time_scale:g} mm')
+    return whole
