@@ -236,6 +236,9 @@ class Driver:
         status = self._status
         options = replace(
             self.options, calibration_known=status.calibration_known,
+            dialect=self.config.dialect,
+            # Another program may skip the command, and move the TCP that is there.
+            allow_tcp_change=self.options.allow_tcp_change and self.config.dialect.sets_tcp,
             optimove_known=has_feature('optimove', software_version(status.polyscope_version)),
             acceleration_known=state.actual_tcp_acceleration is not None
             and state.target_tcp_acceleration is not None)
@@ -248,7 +251,8 @@ class Driver:
         :raises RobotNotReady: the robot program is not connected, or a motion is running.
         :raises LocalProtocolError: a value of the plan does not fit into a message.
         """
-        points = encode_points(segment.primitive for segment in plan.segments)
+        points = encode_points((segment.primitive for segment in plan.segments),
+                               self.config.dialect)
         with self._lock:
             if self._motions:
                 raise RobotNotReady('A motion is running; wait for its end or cancel it.')

@@ -31,6 +31,7 @@ from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, Tr
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RobotStatus
 from ur_cartesian_driver.program import as_program, ProgramSettings, render
 from ur_cartesian_driver.protocol import primary
+from ur_cartesian_driver.protocol.dialects import NEWEST
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.rtde import ControllerVersion
 from ur_cartesian_driver.robot.lifecycle import after, Change, ConnectionState
@@ -107,6 +108,9 @@ class RobotLink:
         """Upload the robot program; it replaces whatever program runs."""
         if self._status.state in (*_OUT_OF_REACH, ConnectionState.CONNECTING):
             self._warn(f'the robot program is not sent: {self._status.message}')
+        elif not self._program.text:
+            self._warn('the robot program is not sent: wire_dialect says that the robot has an '
+                       'older one of its own; play that on the pendant')
         elif not self._primary.send(primary.upload(as_program(self._program.text))):
             self._warn('the robot program is not sent: there is no connection to the primary '
                        'interface of the robot')
@@ -166,12 +170,13 @@ class RobotLink:
         await self._program.open(
             host, frozenset(s.allowed_peers or (s.robot_ip, stream.peer_address)))
         ports = self._program.ports
-        self._program.text = render(ProgramSettings(
-            host=s.reverse_ip or host, reverse_port=ports['reverse_port'],
-            trajectory_port=ports['trajectory_port'],
-            script_command_port=ports['script_command_port'],
-            version=(version.major, version.minor, version.bugfix),
-            stop_deceleration=s.stop_deceleration))
+        if s.dialect is NEWEST:  # else the program on the robot is another one
+            self._program.text = render(ProgramSettings(
+                host=s.reverse_ip or host, reverse_port=ports['reverse_port'],
+                trajectory_port=ports['trajectory_port'],
+                script_command_port=ports['script_command_port'],
+                version=(version.major, version.minor, version.bugfix),
+                stop_deceleration=s.stop_deceleration))
         self._tell(ports=ports)
 
     def _start_program_once(self, robot: RobotState) -> None:

@@ -50,7 +50,7 @@ class ProgramSockets:
         """Prepare; :meth:`open` listens."""
         self._settings = settings
         self._listener = listener
-        #: What the script sender hands out.
+        #: What the script sender hands out; empty = nothing, the robot has its own program.
         self.text = ''
         #: A goal runs: its keepalives are another message.
         self.busy = False
@@ -98,7 +98,8 @@ class ProgramSockets:
 
     def send_control(self, action: TrajectoryAction, count: int) -> None:
         """Send a trajectory action."""
-        self._send(reverse.trajectory(action, count, self._read_timeout))
+        self._send(reverse.trajectory(action, count, self._read_timeout,
+                                      dialect=self._settings.dialect))
 
     def send_points(self, data: bytes) -> None:
         """Send trajectory points."""
@@ -165,6 +166,11 @@ class ProgramSockets:
         except ProtocolError as error:
             self._listener.warning(f'script_sender_port: {error}')
             connection.abort(str(error))
+            return
+        if not self.text:
+            self._listener.warning(
+                'script_sender_port: the robot asks for a robot program, but wire_dialect says '
+                'that it has an older one of its own; leave wire_dialect out to have ours run')
             return
         for _ in range(wanted):
             connection.send(script_sender.reply(self.text))

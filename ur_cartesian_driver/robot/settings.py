@@ -6,6 +6,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ur_cartesian_driver.protocol.dialects import Dialect, DIALECTS, NEWEST
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkSettings:
@@ -29,6 +31,9 @@ class LinkSettings:
     allowed_peers: tuple[str, ...] = ()
     #: Upload the robot program ourselves; else a program on the robot asks for it.
     headless_mode: bool = False
+    #: Which messages the robot program understands, by the version of the library that it came
+    #: with; other than the newest for a program that was saved on the robot.
+    wire_dialect: str = NEWEST.name
     #: The program stops the arm and ends when we are silent for that long [s].
     robot_receive_timeout: float = 0.2
     #: Time between two messages on the reverse socket [s].
@@ -44,11 +49,29 @@ class LinkSettings:
 
         :raises ValueError: names the field, its value and the bound.
         """
+        self._check_dialect()
         self._require_positive('robot_receive_timeout', 'keepalive_period', 'stop_deceleration')
         if self.robot_receive_timeout < 2.0 * self.keepalive_period:
             raise ValueError(
                 f'robot_receive_timeout is {self.robot_receive_timeout} s, it has to be at least '
                 f'twice the keepalive_period of {self.keepalive_period} s.')
+
+    @property
+    def dialect(self) -> Dialect:
+        """What the robot program understands."""
+        return DIALECTS[self.wire_dialect]
+
+    def _check_dialect(self) -> None:
+        if self.wire_dialect not in DIALECTS:
+            raise ValueError(
+                f'wire_dialect is {self.wire_dialect!r}, it has to be one of '
+                f'{", ".join(DIALECTS)}.')
+        if self.headless_mode and self.dialect is not NEWEST:
+            raise ValueError(
+                f"wire_dialect is '{self.wire_dialect}' and headless_mode is true, but "
+                f"headless_mode sends our own robot program, which understands '{NEWEST.name}'; "
+                'leave wire_dialect out, or set headless_mode to false and start the program that '
+                'is saved on the robot.')
 
     def _require_positive(self, *names: str) -> None:
         for name in names:

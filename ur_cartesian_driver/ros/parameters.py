@@ -25,6 +25,7 @@ from rclpy.parameter import Parameter
 from ur_cartesian_driver.driver import DriverConfig
 from ur_cartesian_driver.kinematics.robots import MODELS
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.protocol.dialects import DIALECTS
 from ur_cartesian_driver.ros.frames import Frames, StaticFrame
 
 Value: TypeAlias = bool | int | float | str | list[str]
@@ -143,6 +144,10 @@ DECLARATIONS: tuple[Declaration, ...] = (
     Declaration('headless_mode',
                 'Send the robot program directly (needs remote control), instead of serving it '
                 'to the External Control URCap.'),
+    Declaration('wire_dialect',
+                'Version of the messages that the robot program understands; an older one only '
+                'for a robot that runs a saved, older External Control program of its own.',
+                choices=tuple(DIALECTS)),
     # -- what a goal may do
     Declaration('on_new_goal',
                 'What happens to a goal that comes while another one runs: reject it (it ends '
