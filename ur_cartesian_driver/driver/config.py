@@ -14,7 +14,7 @@ from ur_cartesian_driver.robot.settings import LinkSettings
 class DriverConfig(LinkSettings):
     """How to reach the robot, and how to run the loop that does; the defaults fit a real robot."""
 
-    #: Not used yet: for services that need the dashboard.
+    #: Port of the dashboard on the robot; PolyScope X has none.
     dashboard_port: int = 29999
     #: How far the controller's own target may be from the plan, corners apart [m], [rad]; 0 = any.
     max_plan_deviation: float = MAX_PLAN_DEVIATION[0]

@@ -13,7 +13,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from ur_cartesian_driver.motion.errors import LocalProtocolError, ProtocolError
+from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.dashboard import DashboardClient as Codec
 from ur_cartesian_driver.protocol.dashboard import (
@@ -156,14 +156,3 @@ def _reason(command: str, answer: str, robot: RobotState | None,
             RuntimeState.STOPPED):
         return 'A program is running: stop it first.'
     return f'Robot mode {robot.robot_mode.name}, program {robot.runtime_state.name}.'
-
-
-def check_line(line: str) -> None:
-    """
-    Refuse what is not one short line.
-
-    :raises LocalProtocolError: with the bound.
-    """
-    if len(line) > LONGEST_LINE:
-        raise LocalProtocolError(
-            f'A line for the dashboard has at most {LONGEST_LINE} characters, not {len(line)}.')

@@ -28,6 +28,7 @@ from typing import NoReturn
 from ur_cartesian_driver.kinematics.robots import Geometry, MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, TrajectoryEnded
+from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RobotStatus
 from ur_cartesian_driver.program import as_program, ProgramSettings, render
 from ur_cartesian_driver.protocol import primary
@@ -38,12 +39,18 @@ from ur_cartesian_driver.robot.lifecycle import after, Change, ConnectionState
 from ur_cartesian_driver.robot.primary_client import PrimaryClient, PrimaryListener
 from ur_cartesian_driver.robot.program_sockets import ProgramListener, ProgramSockets
 from ur_cartesian_driver.robot.settings import LinkSettings
+from ur_cartesian_driver.robot.signal_stream import SignalStream
 from ur_cartesian_driver.robot.state_stream import StateStream
 from ur_cartesian_driver.robot.status import DriverStatus, is_paused, is_stopped, what_is_needed
 from ur_cartesian_driver.robot.transport import Retry
 
 #: In these states nobody knows the robot, or it is the wrong one: the reason is the message.
 _OUT_OF_REACH = frozenset({ConnectionState.DISCONNECTED, ConnectionState.REFUSED})
+
+#: Modes of an arm that can be switched on.
+_WITHOUT_MOTION = frozenset({RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE})
+#: How long it may take [s].
+POWER_UP_TIMEOUT = 30.0
 
 #: How long a robot has to wait for its program before the log says so [s]: a program that is on
 #: its way there needs nobody's help.
@@ -57,7 +64,9 @@ class RobotLink:
                  on_event: Callable[[Event], None],
                  on_status: Callable[[DriverStatus], None],
                  on_geometry: Callable[[Geometry], None],
-                 on_log: Callable[[int, str], None], may_upload: bool = True) -> None:
+                 on_log: Callable[[int, str], None],
+                 on_signals: Callable[[Signals], None] = lambda _: None,
+                 may_upload: bool = True) -> None:
         """
         Prepare; :meth:`run` connects.
 
@@ -66,14 +75,18 @@ class RobotLink:
         :param on_status: the status changed.
         :param on_geometry: the robot told its calibrated geometry.
         :param on_log: a line for the log, with its level.
+        :param on_signals: inputs, outputs or tool changed.
         :param may_upload: whether the first connection to the robot is the owner's first.
         """
         self._settings = settings
         self._tell_state, self._on_event, self._on_status = on_state, on_event, on_status
         self._on_geometry, self._on_log = on_geometry, on_log
+        self._tell_signals = on_signals
         self._status = DriverStatus(message=f'Connecting to the robot at {settings.robot_ip}.')
         self._version: ControllerVersion | None = None
         self._robot: RobotState | None = None
+        self._signals: Signals | None = None
+        self._powering_up = False
         self._first_connection = may_upload
         self._primary = PrimaryClient(PrimaryListener(
             configuration=self._on_configuration, geometry=self._on_kinematics,
@@ -82,6 +95,42 @@ class RobotLink:
             connected=self._on_program_connected, lost=self._on_program_lost,
             result=lambda result: self._on_event(TrajectoryEnded(result=result)),
             warning=self._warn))
+
+    # ---- what is known ------------------------------------------------------------------------
+
+    @property
+    def robot(self) -> RobotState | None:
+        """What the robot reported last; None = it is not connected."""
+        return self._robot
+
+    @property
+    def signals(self) -> Signals | None:
+        """Its inputs, outputs and tool; None = not reported yet."""
+        return self._signals
+
+    @property
+    def status(self) -> DriverStatus:
+        """How far the connection is."""
+        return self._status
+
+    @property
+    def version(self) -> ControllerVersion | None:
+        """The software of the robot; None = it never answered."""
+        return self._version
+
+    @property
+    def program_connected(self) -> bool:
+        """Whether the robot program holds its sockets."""
+        return self._program.connected
+
+    def keepalive_gap(self) -> float:
+        """Return the longest pause between two keepalives since the last call [s]."""
+        gap, self._program.longest_gap = self._program.longest_gap, 0.0
+        return gap
+
+    def set_serial_number(self, serial_number: str) -> None:
+        """Take note of the serial number of the robot."""
+        self._tell(serial_number=serial_number)
 
     # ---- commands -----------------------------------------------------------------------------
 
@@ -92,6 +141,14 @@ class RobotLink:
     def send_points(self, data: bytes) -> None:
         """Send points to the robot program."""
         self._program.send_points(data)
+
+    def send_command(self, data: bytes) -> bool:
+        """Send a single command to the robot program; False = it is not there."""
+        return self._program.send_command(data)
+
+    def send_primary(self, command: primary.Command) -> bool:
+        """Send a command to the primary interface; False = there is no connection."""
+        return self._primary.send(primary.command(command))
 
     def set_busy(self, busy: bool) -> None:
         """Say whether a goal runs: its keepalives are another message."""
@@ -156,9 +213,15 @@ class RobotLink:
             self._change(Change.ROBOT_ANSWERED)
             await self._listen(stream, self._version)
             async with asyncio.TaskGroup() as tasks:
-                primary_task = tasks.create_task(self._primary.hold(s.robot_ip, s.primary_port))
+                others = [
+                    tasks.create_task(self._primary.hold(s.robot_ip, s.primary_port))]
+                if s.io_publish_rate > 0.0:
+                    others.append(tasks.create_task(
+                        SignalStream(self._on_signals, self._warn).hold(
+                            s.robot_ip, s.rtde_port, s.io_publish_rate)))
                 reason = await stream.ended()
-                primary_task.cancel()
+                for task in others:
+                    task.cancel()
             return reason
         finally:
             stream.close()
@@ -184,6 +247,8 @@ class RobotLink:
         if not self._first_connection or self._status.state not in (
                 ConnectionState.CONNECTED, ConnectionState.STOPPED):
             return
+        if self._power_up_first(robot):
+            return
         self._first_connection = False
         if not self._settings.headless_mode or self._program.connected:
             return
@@ -196,6 +261,25 @@ class RobotLink:
         else:
             self.upload_program()
 
+    def _power_up_first(self, robot: RobotState) -> bool:
+        """Switch the arm on, where that is wanted; tell whether the program has to wait for it."""
+        s = self._settings
+        if not (s.auto_power and s.headless_mode) or robot.robot_mode not in _WITHOUT_MOTION \
+                or self._status.state is ConnectionState.STOPPED:
+            return False
+        if not self._powering_up and self.send_primary(primary.Command.RUN):
+            self._powering_up = True
+            self._warn('auto_power: the arm is switched on and its brakes are released')
+            asyncio.get_running_loop().call_later(POWER_UP_TIMEOUT, self._give_up_power)
+        return True
+
+    def _give_up_power(self) -> None:
+        """Start nothing by itself any more, if the arm did not come up."""
+        if self._first_connection:
+            self._first_connection = False
+            self._warn(f'auto_power: the arm is not running after {POWER_UP_TIMEOUT:g} s; '
+                       'is the robot in remote control?')
+
     # ---- what comes in ------------------------------------------------------------------------
 
     def _on_state(self, robot: RobotState) -> None:
@@ -204,6 +288,10 @@ class RobotLink:
         if before is None or _modes(before) != _modes(robot):
             self._review()
         self._on_event(StateReceived(state=robot))
+
+    def _on_signals(self, signals: Signals) -> None:
+        self._signals = signals
+        self._tell_signals(signals)
 
     def _on_configuration(self, configuration: primary.ConfigurationData) -> None:
         """Take the robot's report of itself: accept the robot, or refuse it."""
@@ -238,7 +326,7 @@ class RobotLink:
 
     def _on_robot_lost(self, reason: str) -> None:
         """Take note that the robot is gone, or never was there."""
-        before, self._robot = self._robot, None
+        before, self._robot, self._signals = self._robot, None, None
         self._change(Change.ROBOT_LOST, calibration_known=False, last_error=reason,
                      message=f"No connection to the robot: {reason.rstrip('.')}.")
         if before is not None:

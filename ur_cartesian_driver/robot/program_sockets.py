@@ -55,6 +55,8 @@ class ProgramSockets:
         #: A goal runs: its keepalives are another message.
         self.busy = False
         self.connected = False
+        #: The longest pause between two keepalives since somebody reset it [s].
+        self.longest_gap = 0.0
         self._read_timeout = round(1000.0 * settings.robot_receive_timeout)
         self._results = ResultDecoder()
         self._requests = script_sender.RequestDecoder()
@@ -106,6 +108,11 @@ class ProgramSockets:
         if self._trajectory.connection is not None:
             self._trajectory.connection.send(data)
 
+    def send_command(self, data: bytes) -> bool:
+        """Send a single command; False where no robot program would read it."""
+        return self.connected and self._commands.connection is not None \
+            and self._commands.connection.send(data)
+
     def send_stop(self) -> None:
         """Ask the robot program to stop the arm and to end."""
         self._send(reverse.stop())
@@ -113,8 +120,10 @@ class ProgramSockets:
     async def keep_alive(self) -> NoReturn:
         """Send the message that keeps the robot program running at a steady pace."""
         loop = asyncio.get_running_loop()
-        due = loop.time()
+        due = last = loop.time()
         while True:
+            last, before = loop.time(), last
+            self.longest_gap = max(self.longest_gap, last - before)
             if self.busy:
                 self.send_control(TrajectoryAction.NOOP, 0)
             else:

@@ -36,10 +36,14 @@ class LinkSettings:
     wire_dialect: str = NEWEST.name
     #: The program stops the arm and ends when we are silent for that long [s].
     robot_receive_timeout: float = 0.2
+    #: Switch the arm on and release its brakes on the first connection (headless mode only).
+    auto_power: bool = False
     #: Time between two messages on the reverse socket [s].
     keepalive_period: float = 0.02
     #: Packets per second from the robot; 0 = as many as it can.
     rtde_frequency: float = 0.0
+    #: How often inputs, outputs and tool are reported [Hz]; 0 = never.
+    io_publish_rate: float = 25.0
     #: Deceleration of the leading axis for every stop [rad/s^2].
     stop_deceleration: float = 4.0
 

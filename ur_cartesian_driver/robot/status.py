@@ -23,6 +23,7 @@ class DriverStatus:
     #: What the robot says it is; empty until it has said so.
     robot_model: str = ''
     polyscope_version: str = ''
+    serial_number: str = ''
     #: Our program runs on the robot and is connected to us.
     program_running: bool = False
     calibration_known: bool = False

@@ -50,6 +50,7 @@ class NodeSettings:
     on_new_goal: str = 'reject'
     goal_time_tolerance: float = 1.0
     state_publish_rate: float = 50.0
+    diagnostics_rate: float = 1.0
     static_frames: tuple[str, ...] = ()
 
 
@@ -144,6 +145,9 @@ DECLARATIONS: tuple[Declaration, ...] = (
     Declaration('headless_mode',
                 'Send the robot program directly (needs remote control), instead of serving it '
                 'to the External Control URCap.'),
+    Declaration('auto_power',
+                'Switch the arm on and release its brakes on the first connection, and never '
+                'again; only with headless_mode.'),
     Declaration('wire_dialect',
                 'Version of the messages that the robot program understands; an older one only '
                 'for a robot that runs a saved, older External Control program of its own.',
@@ -216,13 +220,18 @@ DECLARATIONS: tuple[Declaration, ...] = (
     Declaration('max_segment_time', 'Longest duration of one segment [s].', 0.1, 2147.483647),
     # -- what is published
     Declaration('state_publish_rate',
-                'How often joint states, TCP pose and speed scaling are published [Hz].',
-                1.0, 500.0),
+                'How often joint states, TCP pose, wrench, speed scaling and tf are published '
+                '[Hz].', 1.0, 500.0),
+    Declaration('io_publish_rate',
+                'How often changes of inputs, outputs and tool data are looked for [Hz]; 0: '
+                'never.', 0.0, 125.0),
+    Declaration('diagnostics_rate', 'How often /diagnostics is published [Hz]; 0: never.',
+                0.0, 50.0),
     Declaration('feedback_rate', 'How often a goal sends feedback [Hz].', 0.5, 500.0),
     # -- network
     Declaration('rtde_port', 'Port of RTDE on the robot.', *_PORT),
     Declaration('primary_port', 'Port of the primary interface on the robot.', *_PORT),
-    Declaration('dashboard_port', 'Port of the dashboard of the robot; not used yet.', *_PORT),
+    Declaration('dashboard_port', 'Port of the dashboard of the robot.', *_PORT),
     Declaration('reverse_port', 'Port to which the robot program connects for control messages; '
                 '0: any free one.', *_PORT),
     Declaration('script_sender_port', 'Port that serves the robot program to the External '

@@ -1,0 +1,178 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The way of a stopped robot back to where it takes goals, as tables: what is, to what is next.
+
+First the safety system, then power and brakes, then the program. Each step is looked up anew from
+what the robot reports, so a step that a person does meanwhile is not done twice. Where a person
+has to act, because the cause is on the robot or only they may judge it, the way ends with a
+sentence that says what.
+
+Pure: no socket, no clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import auto, Enum
+from types import MappingProxyType
+
+from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+
+
+class Step(Enum):
+    """What is next."""
+
+    DONE = auto()
+    #: The robot is on its way to another state by itself.
+    WAIT = auto()
+    UNLOCK = auto()
+    RESTART_SAFETY = auto()
+    POWER_ON = auto()
+    RELEASE_BRAKES = auto()
+    STOP_PROGRAM = auto()
+    SEND_PROGRAM = auto()
+    PLAY = auto()
+    #: A person has to act.
+    PERSON = auto()
+
+
+#: What a step is called in a sentence: an imperative.
+WORDS: Mapping[Step, str] = MappingProxyType({
+    Step.UNLOCK: 'unlock the protective stop',
+    Step.RESTART_SAFETY: 'restart the safety system',
+    Step.POWER_ON: 'switch the arm on',
+    Step.RELEASE_BRAKES: 'release the brakes',
+    Step.STOP_PROGRAM: 'stop the paused program',
+    Step.SEND_PROGRAM: 'send the robot program',
+    Step.PLAY: 'play the loaded program',
+})
+
+_GUARD = 'The safeguard stop is active: close the safeguard and reset it.'
+_BUTTON = 'The emergency stop is pressed: see that nobody is in danger, then release the button.'
+_ENABLE = 'An enabling device is in use: let go of it, or choose the automatic mode.'
+
+#: What the safety system needs; a sentence = a person has to act, None = nothing.
+SAFETY: Mapping[SafetyMode, Step | str | None] = MappingProxyType({
+    SafetyMode.NORMAL: None,
+    SafetyMode.REDUCED: None,
+    SafetyMode.PROTECTIVE_STOP: Step.UNLOCK,
+    SafetyMode.RECOVERY: 'The arm is outside its safety limits: move it back on the pendant.',
+    SafetyMode.SAFEGUARD_STOP: _GUARD,
+    SafetyMode.SYSTEM_EMERGENCY_STOP: _BUTTON,
+    SafetyMode.ROBOT_EMERGENCY_STOP: _BUTTON,
+    SafetyMode.VIOLATION: Step.RESTART_SAFETY,
+    SafetyMode.FAULT: Step.RESTART_SAFETY,
+    SafetyMode.VALIDATE_JOINT_ID: 'A joint has to be identified: follow the pendant.',
+    SafetyMode.UNDEFINED_SAFETY_MODE: 'The safety mode is not known: look at the pendant.',
+    SafetyMode.AUTOMATIC_MODE_SAFEGUARD_STOP: _GUARD,
+    SafetyMode.SYSTEM_THREE_POSITION_ENABLING_STOP: _ENABLE,
+    SafetyMode.TP_THREE_POSITION_ENABLING_STOP: _ENABLE,
+    SafetyMode.IMMI_EMERGENCY_STOP: _BUTTON,
+    SafetyMode.IMMI_SAFEGUARD_STOP: _GUARD,
+    SafetyMode.PROFISAFE_WAITING_FOR_PARAMETERS:
+        'The safety system waits for the PROFIsafe controller: start that.',
+    SafetyMode.PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP: _GUARD,
+    SafetyMode.PROFISAFE_SAFEGUARD_STOP: _GUARD,
+    SafetyMode.PROFISAFE_EMERGENCY_STOP: _BUTTON,
+    SafetyMode.SAFETY_API_SAFEGUARD_STOP: _GUARD,
+})
+
+#: What power and brakes need, as above.
+POWER: Mapping[RobotMode, Step | str | None] = MappingProxyType({
+    RobotMode.NO_CONTROLLER: 'The controller does not run: look at the pendant.',
+    RobotMode.DISCONNECTED: 'The arm is not connected to its controller: look at the pendant.',
+    RobotMode.CONFIRM_SAFETY: 'The safety configuration has to be confirmed on the pendant.',
+    RobotMode.BOOTING: Step.WAIT,
+    RobotMode.POWER_OFF: Step.POWER_ON,
+    RobotMode.POWER_ON: Step.WAIT,
+    RobotMode.IDLE: Step.RELEASE_BRAKES,
+    RobotMode.BACKDRIVE: 'The arm is being moved by hand: end that on the pendant.',
+    RobotMode.RUNNING: None,
+    RobotMode.UPDATING_FIRMWARE: 'The firmware of the arm is being updated: wait for its end.',
+})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Situation:
+    """
+    What the next step depends on.
+
+    :param message: what the connection says is needed.
+    :param robot: what the robot reported last; None = nothing.
+    :param program_connected: our program holds its sockets.
+    :param headless: we send the program, else a program on the robot asks for it.
+    :param remote_control: whether clients may control the robot; None = it cannot be known.
+    """
+
+    connection: ConnectionState
+    message: str = ''
+    robot: RobotState | None = None
+    program_connected: bool = False
+    headless: bool = True
+    remote_control: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Next:
+    """A step, with a sentence where it ends the way."""
+
+    step: Step
+    text: str = ''
+
+
+def next_step(situation: Situation) -> Next:
+    """Return what has to be done next."""
+    if situation.connection is ConnectionState.READY:
+        return Next(Step.DONE, 'The robot is ready for goals.')
+    if situation.connection is ConnectionState.EXECUTING:
+        return _during_a_goal(situation)
+    if situation.connection is ConnectionState.REFUSED:
+        return Next(Step.PERSON, situation.message)
+    if situation.robot is None or situation.connection in (
+            ConnectionState.DISCONNECTED, ConnectionState.CONNECTING):
+        # Restarting the safety system may cost the connection; it comes back by itself.
+        return Next(Step.WAIT, situation.message)
+    return _unless_local(_of_robot(situation, situation.robot), situation)
+
+
+def _during_a_goal(situation: Situation) -> Next:
+    robot = situation.robot
+    if robot is not None and robot.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED):
+        return Next(Step.PERSON, 'A goal is running and paused: play it on, or cancel it.')
+    return Next(Step.DONE, 'A goal is running; nothing has to be recovered.')
+
+
+def _of_robot(situation: Situation, robot: RobotState) -> Next:
+    for needed in (SAFETY[robot.safety_mode], POWER[robot.robot_mode]):
+        if isinstance(needed, str):
+            return Next(Step.PERSON, needed)
+        if needed is not None:
+            return Next(needed)
+    return _of_program(situation, robot.runtime_state)
+
+
+def _of_program(situation: Situation, runtime: RuntimeState) -> Next:
+    match runtime:
+        case RuntimeState.STOPPING | RuntimeState.RESUMING:
+            return Next(Step.WAIT)
+        case RuntimeState.PAUSING | RuntimeState.PAUSED:
+            # Played on, it could go on with an old motion.
+            return Next(Step.STOP_PROGRAM)
+        case RuntimeState.PLAYING if situation.program_connected:
+            return Next(Step.WAIT)
+        case RuntimeState.PLAYING:
+            return Next(Step.PERSON, 'Another program runs on the robot: stop it, or let it come '
+                                     'to its External Control node.')
+        case RuntimeState.STOPPED:
+            return Next(Step.SEND_PROGRAM if situation.headless else Step.PLAY)
+
+
+def _unless_local(wanted: Next, situation: Situation) -> Next:
+    """Leave to a person what the robot does for nobody else in local control."""
+    if situation.remote_control is False and wanted.step in WORDS:
+        return Next(Step.PERSON, 'The robot is in local control: switch it to remote control, or '
+                                 f'{WORDS[wanted.step]} on the pendant.')
+    return wanted
