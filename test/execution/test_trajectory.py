@@ -9,18 +9,22 @@ import pytest
 
 from ur_cartesian_driver.execution import (
     Finish,
+    LendTcp,
     Order,
     Report,
+    ReturnTcp,
     SendControl,
     SendPoints,
     StopProgram,
     TrajectoryMachine,
 )
+from ur_cartesian_driver.execution.tcp_loan import CARRIED_OUT
 from ur_cartesian_driver.execution.trajectory import (
     Signal,
     State,
     STOP_BOUND,
     STOPS,
+    TCP_BOUND,
     TRANSITIONS,
 )
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -41,6 +45,8 @@ from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 START, END = (0.4, 0.0, 0.2), (0.6, 0.0, 0.2)
 MOVING = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
 REST = (0.0,) * 6
+#: The TCP of the robot, and that of a goal about another frame.
+OWN, NOZZLE = Pose((0.0, 0.0, 0.1)), Pose((0.02, 0.0, 0.15))
 
 
 def order(points=1, **changes):
@@ -69,7 +75,33 @@ def started(**changes):
     return machine
 
 
+def with_tcp(T_flange_tcp, part=0.0, qd=REST, **changes):
+    """Return a packet of a robot that has a TCP; its poses are those of the goal's TCP."""
+    return robot(part, qd=qd, T_flange_tcp=T_flange_tcp, **changes)
+
+
+def lent(**changes):
+    """Return a machine whose goal needs another TCP, in ARMING, and its first commands."""
+    machine = TrajectoryMachine(order(T_flange_active=OWN, T_flange_tcp=NOZZLE, **changes),
+                                max_plan_deviation=(0.0, 0.0))
+    return machine, machine.start(with_tcp(OWN).state)
+
+
+def armed(**changes):
+    machine, _ = lent(**changes)
+    machine.step(with_tcp(NOZZLE), 0.0)
+    assert machine.state is State.MOVING
+    return machine
+
+
 def brought_to(state):
+    if state is State.ARMING:
+        return lent()[0]
+    if state is State.RESTORING:
+        machine = armed()
+        machine.step(TrajectoryEnded(result=TrajectoryResult.FAILURE), 1.0)
+        assert machine.state is state
+        return machine
     machine = started()
     if state is State.SETTLING:
         machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 1.0)
@@ -308,13 +340,19 @@ def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
     own = {State.SETTLING: {Signal.SETTLED, Signal.LATE},
            State.STOPPING: {Signal.LATE, Signal.UNANSWERED},
            State.HALTING: {Signal.AT_REST, Signal.LATE},
+           State.ARMING: {Signal.ARMED, Signal.LATE},
+           State.RESTORING: {Signal.RESTORED, Signal.LATE},
            State.MOVING: {Signal.VIOLATION, Signal.DEVIATION}}
-    judged = {Signal.SETTLED, Signal.AT_REST, Signal.LATE, Signal.UNANSWERED, Signal.VIOLATION,
+    judged = {Signal.ARMED, Signal.RESTORED, Signal.SETTLED, Signal.AT_REST, Signal.LATE,
+              Signal.UNANSWERED, Signal.VIOLATION,
               Signal.DEVIATION}
     possible = state is not State.ENDED and (
         signal not in judged or signal in own.get(state, set()))
     assert (signal in TRANSITIONS[state]) == possible
 
+
+#: Where the outcome is not decided yet.
+RUNNING = [s for s in State if s not in (State.RESTORING, State.ENDED)]
 
 STOPPED_STATES = [
     pytest.param({'safety_status': SafetyStatus.PROTECTIVE_STOPPED}, Signal.PROTECTIVE_STOP,
@@ -328,7 +366,7 @@ STOPPED_STATES = [
 
 
 @pytest.mark.parametrize(('changes', 'signal'), STOPPED_STATES)
-@pytest.mark.parametrize('state', [s for s in State if s is not State.ENDED])
+@pytest.mark.parametrize('state', RUNNING)
 def test_a_robot_that_stops_by_itself_ends_the_goal_in_every_state(state, changes, signal):
     machine = brought_to(state)
     commands = machine.step(robot(0.5, **changes), 1.2)
@@ -338,7 +376,7 @@ def test_a_robot_that_stops_by_itself_ends_the_goal_in_every_state(state, change
 
 @pytest.mark.parametrize(('link', 'code'), [('program', ErrorCode.PROGRAM_STOPPED),
                                         ('RTDE', ErrorCode.CONNECTION_LOST)])
-@pytest.mark.parametrize('state', [s for s in State if s is not State.ENDED])
+@pytest.mark.parametrize('state', RUNNING)
 def test_a_lost_link_ends_the_goal_in_every_state_and_says_who_hung_up(state, link, code):
     end = outcome(brought_to(state).step(LinkLost(link=link, reason='it closed'), 1.2))
     assert end.code is code
@@ -355,3 +393,134 @@ def test_a_protective_stop_ends_the_program_so_that_the_motion_cannot_resume():
     *(TrajectoryEnded(result=result) for result in TrajectoryResult)])
 def test_nothing_happens_after_the_end(event):
     assert brought_to(State.ENDED).step(event, 9.0) == []
+
+
+@pytest.mark.parametrize(('changes', 'signal'), STOPPED_STATES)
+def test_what_was_decided_stays_when_the_robot_stops_before_its_tcp_is_back(changes, signal):
+    machine = brought_to(State.RESTORING)
+    commands = machine.step(with_tcp(NOZZLE, **changes), 1.2)
+    assert outcome(commands).code is ErrorCode.EXECUTION_FAILED
+    assert not any(isinstance(c, StopProgram) for c in commands)
+    assert not machine.loan.returned
+
+
+def test_the_tcp_is_set_first_and_nothing_is_sent_before_the_robot_has_it():
+    machine, commands = lent(points=3)
+    assert commands == [LendTcp(T_flange_tcp=NOZZLE)]
+    assert machine.step(with_tcp(OWN), 0.01) == []
+    assert machine.step(Tick(), 0.02) == []
+    # The same packet may still show the pose of the old TCP.
+    elsewhere = Pose((0.4, 0.05, 0.2))
+    assert SendPoints(first=0, end=3) not in machine.step(
+        with_tcp(NOZZLE, actual_tcp_pose=elsewhere), 0.03)
+    assert machine.step(with_tcp(NOZZLE), 0.04)[:2] == [
+        SendControl(action=TrajectoryAction.START, count=3), SendPoints(first=0, end=3)]
+
+
+def test_a_tcp_within_the_resolution_of_the_wire_has_arrived():
+    machine, _ = lent()
+    machine.step(with_tcp(Pose((0.02 + 5e-7, -5e-7, 0.15 + 5e-7))), 0.01)
+    assert machine.state is State.MOVING
+
+
+def test_the_outcome_waits_until_the_tcp_is_back():
+    machine = armed()
+    machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
+    commands = machine.step(with_tcp(NOZZLE, 1.0), 2.01)
+    assert ReturnTcp(T_flange_tcp=OWN) in commands
+    assert not any(isinstance(c, Finish) for c in commands)
+    assert machine.step(with_tcp(NOZZLE, 1.0), 2.02) == []
+    end = outcome(machine.step(with_tcp(OWN, 1.0), 2.03))
+    assert end.succeeded
+    assert end.report == ('the TCP of the robot was set for the goal, and is what it was before',)
+
+
+def test_the_goal_tolerance_is_judged_with_the_tcp_of_the_goal():
+    machine = armed(goal_tolerance=Tolerance(position=(0.001,) * 3))
+    machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
+    machine.step(with_tcp(NOZZLE, 1.0), 2.01)
+    assert machine.state is State.RESTORING
+    elsewhere = Pose((0.6, 0.05, 0.2))
+    assert outcome(machine.step(with_tcp(OWN, 1.0, actual_tcp_pose=elsewhere), 2.02)).succeeded
+
+
+def test_nothing_is_reported_about_another_tcp():
+    machine, _ = lent()
+    commands = [*machine.step(with_tcp(OWN), 0.1), *machine.step(with_tcp(NOZZLE), 0.2)]
+    machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
+    at_end = machine.step(with_tcp(NOZZLE, 1.0), 2.01)
+    after = machine.step(with_tcp(OWN, actual_tcp_pose=Pose((9.0, 9.0, 9.0))), 2.1)
+    assert sum(isinstance(c, Report) for c in commands) == 1
+    assert any(isinstance(c, Report) for c in at_end)
+    assert not any(isinstance(c, Report) for c in after)
+
+
+def test_a_robot_that_does_not_take_the_tcp_is_not_moved():
+    machine, _ = lent()
+    machine.step(with_tcp(OWN), 0.0)
+    assert machine.step(with_tcp(OWN), TCP_BOUND - 0.01) == []
+    commands = machine.step(Tick(), TCP_BOUND)
+    assert commands == [ReturnTcp(T_flange_tcp=OWN)]
+    end = outcome(machine.step(with_tcp(OWN), TCP_BOUND + 0.01))
+    assert end.code is ErrorCode.ROBOT_NOT_READY
+    assert 'did not take the TCP of the goal within 1 s' in end.text
+    assert 'nothing was moved' in end.text
+
+
+def test_an_arm_that_went_away_before_it_was_armed_is_not_moved():
+    machine, _ = lent()
+    elsewhere = Pose((0.4, 0.05, 0.2))
+    machine.step(with_tcp(NOZZLE, actual_tcp_pose=elsewhere), 0.0)
+    commands = machine.step(with_tcp(NOZZLE, actual_tcp_pose=elsewhere), TCP_BOUND)
+    assert ReturnTcp(T_flange_tcp=OWN) in commands
+    end = outcome(machine.step(with_tcp(OWN), TCP_BOUND + 0.01))
+    assert end.code is ErrorCode.ROBOT_NOT_READY
+    assert 'the arm is 0.0500 m' in end.text.lower()
+
+
+def test_a_cancel_before_the_motion_waits_until_no_tcp_is_on_its_way():
+    """The TCP of the goal may be read and put back between two packets, or never."""
+    machine, _ = lent()
+    machine.step(with_tcp(OWN), 0.0)
+    assert machine.step(CancelRequested(), 0.01) == [ReturnTcp(T_flange_tcp=OWN)]
+    assert machine.step(with_tcp(OWN), 0.02) == []
+    assert machine.step(with_tcp(OWN), CARRIED_OUT - 0.01) == []
+    end = outcome(machine.step(with_tcp(OWN), CARRIED_OUT))
+    assert end.code is ErrorCode.CANCELLED
+    assert 'before anything moved' in end.text
+
+
+@pytest.mark.parametrize('result', list(TrajectoryResult))
+def test_a_late_result_of_the_goal_before_does_not_arm(result):
+    machine, _ = lent()
+    assert machine.step(TrajectoryEnded(result=result), 0.1) == []
+    assert machine.state is State.ARMING
+
+
+def test_a_tcp_that_does_not_come_back_is_said_and_left_to_the_owner():
+    machine = armed()
+    machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
+    machine.step(with_tcp(NOZZLE, 1.0), 2.01)
+    commands = machine.step(Tick(), 2.01 + TCP_BOUND)
+    assert not any(isinstance(c, StopProgram) for c in commands)
+    end = outcome(commands)
+    assert end.succeeded
+    assert 'is not back yet' in end.report[0]
+    assert not machine.loan.returned
+
+
+def test_tolerances_and_reports_are_about_the_controlled_frame():
+    """The TCP is where it should be, but turned: the frame at the end of the lever is off."""
+    machine = started(T_tcp_controlled=Pose((0.0, 0.0, 0.1)),
+                      path_tolerance=Tolerance(position=(0.001, 0.0, 0.0)))
+    turned = Pose((0.5, 0.0, 0.2), quaternion_from_rotation_vector((0.0, 0.02, 0.0)))
+    commands = machine.step(robot(0.5, timestamp=1.0, actual_tcp_pose=turned, actual_tcp_twist=(
+        0.1, 0.0, 0.0, 0.0, 0.5, 0.0), actual_tcp_acceleration=(0.0,) * 6,
+        target_tcp_acceleration=(0.0, 0.0, 0.0, 0.0, 2.0, 0.0)), 1.0)
+    assert machine.state is State.STOPPING
+    (report,) = (c.progress for c in commands if isinstance(c, Report))
+    assert report.desired_pose.position == pytest.approx((0.5, 0.0, 0.3), abs=1e-3)
+    assert report.actual_pose.position == pytest.approx((0.502, 0.0, 0.3), abs=1e-4)
+    assert report.actual_twist[0] == pytest.approx(0.15, abs=1e-4)
+    assert report.desired_acceleration[0] == pytest.approx(0.2, abs=1e-6)
+    assert report.actual_acceleration == pytest.approx((-0.0005, 0, -0.025, 0, 0, 0), abs=1e-4)

@@ -5,12 +5,27 @@
 from ur_cartesian_driver.execution.commands import (
     Command,
     Finish,
+    LendTcp,
     Report,
+    ReturnTcp,
     SendControl,
     SendPoints,
     StopProgram,
 )
+from ur_cartesian_driver.execution.tcp_loan import same_tcp, TcpLoan
 from ur_cartesian_driver.execution.trajectory import Order, TrajectoryMachine
 
-__all__ = ['Command', 'Finish', 'Order', 'Report', 'SendControl', 'SendPoints', 'StopProgram',
-           'TrajectoryMachine']
+__all__ = [
+    'Command',
+    'Finish',
+    'LendTcp',
+    'Order',
+    'Report',
+    'ReturnTcp',
+    'SendControl',
+    'SendPoints',
+    'StopProgram',
+    'TcpLoan',
+    'TrajectoryMachine',
+    'same_tcp',
+]

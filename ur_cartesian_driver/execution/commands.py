@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 
 
@@ -25,6 +26,20 @@ class SendPoints:
 
     first: int
     end: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LendTcp:
+    """Set the robot's TCP for the time of a goal."""
+
+    T_flange_tcp: Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReturnTcp:
+    """Put back the TCP that the robot had before :class:`LendTcp`."""
+
+    T_flange_tcp: Pose
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,4 +63,5 @@ class Finish:
     outcome: Outcome
 
 
-Command: TypeAlias = SendControl | SendPoints | StopProgram | Report | Finish
+Command: TypeAlias = (
+    SendControl | SendPoints | LendTcp | ReturnTcp | StopProgram | Report | Finish)

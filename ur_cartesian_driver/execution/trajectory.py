@@ -7,6 +7,9 @@ The machine is fed with events and the time and answers with commands; it sends 
 event is first turned into a signal (:class:`Signal`), then :data:`TRANSITIONS` says what that
 signal means in the present state: the next state and how the goal ends, if it does.
 
+* **ARMING**: the goal moves another frame than the robot's TCP, and the message that sets the TCP
+  there is on the wire. Nothing moves before the robot reports it, and itself where the plan
+  begins. Goals about the TCP itself begin in MOVING.
 * **MOVING**: the robot program runs points. The result SUCCESS leads to SETTLING; whatever stops
   the arm by itself (safety, program, connection) ends the goal at once, because nothing that we
   could send would be read; a reason of ours to stop (cancel, tolerance) leads to STOPPING.
@@ -16,12 +19,17 @@ signal means in the present state: the next state and how the goal ends, if it d
   and answers CANCELED. A SUCCESS in this state means that the last point was reached before the
   program read the CANCEL; it is no answer, CANCELED still follows.
 * **HALTING**: the program has answered; the arm is coming to rest.
+* **RESTORING**: how the goal ends is decided, and nothing moves; the TCP of before is on the wire.
+  The outcome waits until the robot reports it, so the next goal finds it. Goals that changed no
+  TCP pass through at once.
 * **ENDED**: the outcome is out. Later events mean nothing.
 
 Everything has a bound: an answer that does not come in STOPPING or HALTING ends the goal after
 :data:`STOP_BOUND` by ending the robot program. A program that somebody has paused reads nothing:
 the arm stands, and the goal ends as it was to end (UNANSWERED); an arm that still moves is a
-failure (LATE). Only MOVING has none, because a speed slider at
+failure (LATE). A TCP that is not set in time ends the goal before it began; one that is not back
+in time, or not at the end because the robot stopped, is the business of whoever carries out the
+commands: see :attr:`TrajectoryMachine.loan`. Only MOVING has none, because a speed slider at
 zero is not an error; there, RTDE packets that stop coming are reported as a lost connection.
 """
 
@@ -38,13 +46,16 @@ import numpy as np
 from ur_cartesian_driver.execution.commands import (
     Command,
     Finish,
+    LendTcp,
     Report,
+    ReturnTcp,
     SendControl,
     SendPoints,
     StopProgram,
 )
 from ur_cartesian_driver.execution.flow import Window
 from ur_cartesian_driver.execution.monitor import PathTracker, speed
+from ur_cartesian_driver.execution.tcp_loan import REST_SPEED, TcpLoan
 from ur_cartesian_driver.execution.tolerances import Watch
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
@@ -59,16 +70,19 @@ from ur_cartesian_driver.motion.events import (
     TrajectoryResult,
 )
 from ur_cartesian_driver.motion.goal import Tolerance
+from ur_cartesian_driver.motion.lever import seen_at
 from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyStatus
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 
 #: Longest time from CANCEL to the answer and to standstill [s]: the arm brakes within a second
 #: from full speed, and discarding the points in flight takes 0.5 s at most.
 STOP_BOUND = 3.0
-#: Joint speed below which the arm is at rest [rad/s].
-REST_SPEED = 1e-3
+#: How long the robot may take to report a TCP that it was told [s].
+TCP_BOUND = 1.0
+#: How far the arm may have gone from where the plan begins until it is armed [m], [rad].
+START_POSITION, START_ANGLE = 0.001, 0.01
 #: How long a program that answered CANCELED may take to begin all the same [s].
 EARLY_ANSWER = 1.0
 #: How long the arm may need from the program's SUCCESS to rest inside its goal tolerance, when
@@ -81,10 +95,12 @@ MAX_PLAN_DEVIATION = (0.002, 0.02)
 class State(Enum):
     """Where a goal is."""
 
+    ARMING = auto()
     MOVING = auto()
     SETTLING = auto()
     STOPPING = auto()
     HALTING = auto()
+    RESTORING = auto()
     ENDED = auto()
 
 
@@ -101,13 +117,15 @@ class Signal(Enum):
     EMERGENCY_STOP = auto()
     PROGRAM_STOPPED = auto()
     CONNECTION_LOST = auto()
+    ARMED = auto()
     SETTLED = auto()
+    RESTORED = auto()
     AT_REST = auto()
     LATE = auto()
     UNANSWERED = auto()
 
 
-#: What ends a goal in every state but ENDED, and the code it ends with.
+#: What ends a goal in every state but ENDED, and the code it ends with where none is decided yet.
 STOPS: Mapping[Signal, ErrorCode] = MappingProxyType({
     Signal.PROTECTIVE_STOP: ErrorCode.PROTECTIVE_STOP,
     Signal.EMERGENCY_STOP: ErrorCode.EMERGENCY_STOP,
@@ -132,6 +150,10 @@ def _ends(code: ErrorCode) -> Step:
     return Step(State.ENDED, code)
 
 
+def _judged(code: ErrorCode) -> Step:
+    return Step(State.RESTORING, code)
+
+
 _STOPS = {signal: _ends(code) for signal, code in STOPS.items()}
 
 
@@ -139,14 +161,22 @@ def _stays(state: State, *signals: Signal) -> dict[Signal, Step]:
     return {signal: Step(state) for signal in signals}
 
 
-#: What each signal means in each state. SETTLED, AT_REST, LATE and UNANSWERED are about the state
-#: they are given for, so they are not possible in the others.
+#: What each signal means in each state. ARMED, SETTLED, RESTORED, AT_REST, LATE and UNANSWERED are
+#: about the state they are given for, so they are not possible in the others.
 TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
+    State.ARMING: {
+        **_STOPS,
+        # Of a goal before this one.
+        **_stays(State.ARMING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
+        Signal.ARMED: Step(State.MOVING),
+        Signal.CANCEL: _judged(ErrorCode.CANCELLED),
+        Signal.LATE: _judged(ErrorCode.ROBOT_NOT_READY),
+    },
     State.MOVING: {
         **_STOPS,
         Signal.SUCCESS: Step(State.SETTLING),
-        Signal.CANCELED: _ends(ErrorCode.EXECUTION_FAILED),
-        Signal.FAILURE: _ends(ErrorCode.EXECUTION_FAILED),
+        Signal.CANCELED: _judged(ErrorCode.EXECUTION_FAILED),
+        Signal.FAILURE: _judged(ErrorCode.EXECUTION_FAILED),
         Signal.CANCEL: Step(State.STOPPING, ErrorCode.CANCELLED),
         Signal.VIOLATION: Step(State.STOPPING, ErrorCode.PATH_TOLERANCE_VIOLATED),
         Signal.DEVIATION: Step(State.STOPPING, ErrorCode.EXECUTION_FAILED),
@@ -154,9 +184,9 @@ TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
     State.SETTLING: {
         **_STOPS,
         **_stays(State.SETTLING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
-        Signal.CANCEL: _ends(ErrorCode.CANCELLED),
-        Signal.SETTLED: _ends(ErrorCode.SUCCESSFUL),
-        Signal.LATE: _ends(ErrorCode.GOAL_TOLERANCE_VIOLATED),
+        Signal.CANCEL: _judged(ErrorCode.CANCELLED),
+        Signal.SETTLED: _judged(ErrorCode.SUCCESSFUL),
+        Signal.LATE: _judged(ErrorCode.GOAL_TOLERANCE_VIOLATED),
     },
     State.STOPPING: {
         **_STOPS,
@@ -168,8 +198,14 @@ TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
     State.HALTING: {
         **_STOPS,
         **_stays(State.HALTING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, Signal.CANCEL),
-        Signal.AT_REST: Step(State.ENDED),
+        Signal.AT_REST: Step(State.RESTORING),
         Signal.LATE: _ends(ErrorCode.EXECUTION_FAILED),
+    },
+    State.RESTORING: {
+        **{signal: Step(State.ENDED) for signal in STOPS},
+        **_stays(State.RESTORING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, Signal.CANCEL),
+        Signal.RESTORED: Step(State.ENDED),
+        Signal.LATE: Step(State.ENDED),
     },
     State.ENDED: {},
 })
@@ -186,6 +222,11 @@ class Order:
     #: When the last point is due [s]; None where the goal names no times.
     due: float | None = None
     T_base_frame: Pose = IDENTITY
+    #: The TCP that the plan found, the one that it needs (None = that one), and where the
+    #: controlled frame is behind it.
+    T_flange_active: Pose = IDENTITY
+    T_flange_tcp: Pose | None = None
+    T_tcp_controlled: Pose = IDENTITY
     path_tolerance: Tolerance = field(default_factory=Tolerance)
     goal_tolerance: Tolerance = field(default_factory=Tolerance)
     #: 0 = the default, negative = without end [s].
@@ -205,7 +246,10 @@ class TrajectoryMachine:
             [rad]; 0 = any way, any angle.
         """
         self.order = order
-        self.state = State.MOVING
+        self.state = State.MOVING if order.T_flange_tcp is None else State.ARMING
+        #: The TCP that was set for this goal. Where it is not ``returned`` at the end, whoever
+        #: carries out the commands has to see to it.
+        self.loan: TcpLoan | None = None
         self._tracker = PathTracker(order.reference)
         self._path_watch = Watch(order.path_tolerance, order.T_base_frame)
         self._goal_watch = Watch(order.goal_tolerance, order.T_base_frame)
@@ -223,16 +267,22 @@ class TrajectoryMachine:
         self._deadline = inf
         self._code: ErrorCode | None = None
         self._text = ''
+        #: Whether START was sent, and whether the end was decided.
+        self._started = self._over = False
 
     def start(self, state: RobotState) -> list[Command]:
         """
         Return the commands that start the motion: START, then the first points.
 
+        Before that the TCP, where the goal needs another one.
+
         :param state: the robot's newest packet.
         """
-        self._stale_begun = state.points_begun
-        return [SendControl(action=TrajectoryAction.START, count=self.order.points),
-                *self._release(0)]
+        lent = self.order.T_flange_tcp
+        if lent is None:
+            return self._begin(state)
+        self.loan = TcpLoan(self.order.T_flange_active, lent)
+        return [LendTcp(T_flange_tcp=lent)]
 
     def step(self, event: Event, now: float) -> list[Command]:
         """
@@ -242,6 +292,8 @@ class TrajectoryMachine:
         """
         if self.state is State.ENDED:
             return []
+        if self.state is State.ARMING:
+            self._deadline = min(self._deadline, now + TCP_BOUND)
         commands: list[Command] = []
         if isinstance(event, StateReceived):
             commands += self._observe(event.state, now)
@@ -275,13 +327,32 @@ class TrajectoryMachine:
     def _judge(self, state: RobotState, now: float) -> tuple[Signal | None, str]:
         """Return what a packet of a robot that runs means in the present state."""
         at_rest = _rests(state)
+        if self.state is State.ARMING and self._is_armed(state):
+            return Signal.ARMED, ''
         if self.state is State.MOVING:
             return self._plan_deviation(state) or self._path_violation(state)
         if self.state is State.SETTLING and at_rest and self._goal_error(state) is None:
             return Signal.SETTLED, ''
         if self.state is State.HALTING and at_rest:
             return Signal.AT_REST, ''
+        if self.state is State.RESTORING and self.loan is not None and self.loan.returned:
+            return Signal.RESTORED, ''
         return self._late(now)
+
+    def _is_armed(self, state: RobotState) -> bool:
+        """Tell whether the robot has the TCP of the goal, also in what else it reports."""
+        assert self.loan is not None
+        return self.loan.has_robot(state) and self._off_start(state) is None
+
+    def _off_start(self, state: RobotState) -> str | None:
+        """Return a clause that says how far the arm is from where the plan begins, or None."""
+        start = pose_from_row(self.order.reference.poses[0])
+        apart, angle = start.distance_to(state.actual_tcp_pose), start.angle_to(
+            state.actual_tcp_pose)
+        if apart <= START_POSITION and angle <= START_ANGLE:
+            return None
+        return (f'the arm is {apart:.4f} m and {angle:.4f} rad away from where the plan begins: '
+                'it moved meanwhile')
 
     def _plan_deviation(self, state: RobotState) -> tuple[Signal, str] | None:
         """Return that the controller does something else than the plan, or None."""
@@ -301,13 +372,18 @@ class TrajectoryMachine:
     def _path_violation(self, state: RobotState) -> tuple[Signal | None, str]:
         if not (self._path_watch and self._under_way):
             return None, ''
-        clause = self._path_watch.violation(self._desired(state), state)
+        clause = self._violation(self._path_watch, self._desired(state), state)
         if clause is None:
             return None, ''
         return Signal.VIOLATION, f'on the way to point {self._tracker.waypoint()} {clause}'
 
     def _goal_error(self, state: RobotState) -> str | None:
-        return self._goal_watch.violation(self._tracker.pose(), state)
+        return self._violation(self._goal_watch, self._tracker.pose(), state)
+
+    def _violation(self, watch: Watch, desired: Pose, state: RobotState) -> str | None:
+        """Return what a watch says of the controlled frame; ``desired`` is of the TCP."""
+        T_tcp_controlled = self.order.T_tcp_controlled
+        return watch.violation(desired @ T_tcp_controlled, seen_at(state, T_tcp_controlled))
 
     def _desired(self, state: RobotState) -> Pose:
         """Return where the tool should be: around its progress, or at the end."""
@@ -330,6 +406,10 @@ class TrajectoryMachine:
         if self.state is State.MOVING:
             self._deadline = inf
             return _RESULTS[TrajectoryResult.CANCELED] if self._has_not_begun() else (None, '')
+        if self.state is State.ARMING:
+            return Signal.LATE, self._why_not_armed()
+        if self.state is State.RESTORING:
+            return Signal.LATE, ''
         if self.state is State.SETTLING:
             missing = self._goal_error(self._latest) if self._latest is not None else None
             return Signal.LATE, missing or 'the arm did not come to rest'
@@ -337,6 +417,13 @@ class TrajectoryMachine:
             return Signal.UNANSWERED, ''
         return Signal.LATE, (f'the robot did not confirm the stop within {STOP_BOUND:g} s, '
                              'its program was ended')
+
+    def _why_not_armed(self) -> str:
+        state = self._latest
+        if state is not None and self.loan is not None and self.loan.has_robot(state):
+            return self._off_start(state) or ''
+        return (f'the robot did not take the TCP of the goal within {TCP_BOUND:g} s: its program '
+                'is paused, or does not know that command; nothing was moved')
 
     # ---- from signals to commands -------------------------------------------------------------
 
@@ -348,6 +435,17 @@ class TrajectoryMachine:
         if step.state is before:
             return []
         return _ENTER[step.state](self, signal, now)
+
+    def _enter_moving(self, signal: Signal, now: float) -> list[Command]:
+        assert self._latest is not None
+        return self._begin(self._latest)
+
+    def _begin(self, state: RobotState) -> list[Command]:
+        self._deadline = inf
+        self._started = True
+        self._stale_begun = state.points_begun
+        return [SendControl(action=TrajectoryAction.START, count=self.order.points),
+                *self._release(0)]
 
     def _enter_settling(self, signal: Signal, now: float) -> list[Command]:
         self._tracker.finish()
@@ -368,7 +466,17 @@ class TrajectoryMachine:
         self._deadline = now + STOP_BOUND
         return []
 
+    def _enter_restoring(self, signal: Signal, now: float) -> list[Command]:
+        """Have the TCP put back; a goal that changed none is at its end."""
+        self._over = True
+        if self.loan is None:
+            return self._apply(Signal.RESTORED, '', now)
+        self._deadline = now + TCP_BOUND
+        return [*self._last_report(), ReturnTcp(T_flange_tcp=self.loan.T_flange_before)]
+
     def _enter_ended(self, signal: Signal, now: float) -> list[Command]:
+        if self._over:  # nothing of the motion is left that could go on
+            return self._finish()
         commands: list[Command] = []
         unconfirmed = signal is Signal.LATE and self._code is ErrorCode.EXECUTION_FAILED
         if signal in _PAUSES or unconfirmed:
@@ -379,15 +487,32 @@ class TrajectoryMachine:
 
     def _finish(self) -> list[Command]:
         code = self._code if self._code is not None else ErrorCode.EXECUTION_FAILED
-        text = self._sentence(code)
-        report = [self._progress_report()] if self._latest is not None else []
-        return [*report, Finish(outcome=Outcome(code=code, text=text))]
+        return [*self._last_report(), Finish(outcome=Outcome(
+            code=code, text=self._sentence(code), report=self._about_tcp()))]
+
+    def _last_report(self) -> list[Report]:
+        return [self._progress_report()] if self._shows_goal() else []
+
+    def _shows_goal(self) -> bool:
+        """Tell whether the newest packet is about the TCP of the goal."""
+        state, loan = self._latest, self.loan
+        return state is not None and (loan is None or loan.has_robot(state))
+
+    def _about_tcp(self) -> tuple[str, ...]:
+        if self.loan is None:
+            return ()
+        if self.loan.returned:
+            return ('the TCP of the robot was set for the goal, and is what it was before',)
+        return ('the TCP of the robot was set for the goal, and is not back yet: no goal is taken '
+                'until it is',)
 
     def _sentence(self, code: ErrorCode) -> str:
         if code is ErrorCode.SUCCESSFUL:
             return (f'All {self.order.points} points were executed in '
                     f'{self._scaled_time:.3f} s.')
         where = f'on the way to point {self._tracker.waypoint()}'
+        if not self._started:
+            where = 'before anything moved'
         if code is ErrorCode.GOAL_TOLERANCE_VIOLATED:
             where = 'at the last point'
         text = self._text if where in self._text else f'{self._text} ({where})'
@@ -398,6 +523,8 @@ class TrajectoryMachine:
     def _observe(self, state: RobotState, now: float) -> list[Command]:
         """Take a packet: time, place on the path, points to send, progress to report."""
         before, self._latest = self._latest, state
+        if self.loan is not None:
+            self.loan.observe(state, now)
         if before is None or self.state is not State.MOVING:
             passed = 0.0
         else:
@@ -407,7 +534,7 @@ class TrajectoryMachine:
         if self.state is State.MOVING:
             self._follow(before, state, passed)
         commands = self._release(max(self._begun(state), self._tracker.waypoint()))
-        if now >= self._next_report:
+        if now >= self._next_report and self._shows_goal():
             self._next_report = now + self._feedback_period
             commands.append(self._progress_report())
         return commands
@@ -441,16 +568,19 @@ class TrajectoryMachine:
     def _progress_report(self) -> Report:
         state, order = self._latest, self.order
         assert state is not None
+        seen = seen_at(state, order.T_tcp_controlled)
         time = self._tracker.time()
         buffered_from = min(self._window.sent, order.points)
         last = int(np.searchsorted(order.reference.point, buffered_from - 1, side='right')) - 1
         return Report(progress=Progress(
             waypoint=self._tracker.waypoint(),
             fraction=1.0 if order.duration <= 0.0 else min(1.0, time / order.duration),
-            desired_pose=self._desired(state),
-            desired_twist=state.target_tcp_twist,
-            actual_pose=state.actual_tcp_pose,
-            actual_twist=state.actual_tcp_twist,
+            desired_pose=self._desired(state) @ order.T_tcp_controlled,
+            desired_twist=seen.target_tcp_twist,
+            desired_acceleration=seen.target_tcp_acceleration,
+            actual_pose=seen.actual_tcp_pose,
+            actual_twist=seen.actual_tcp_twist,
+            actual_acceleration=seen.actual_tcp_acceleration,
             actual_q=state.actual_q,
             time=time,
             time_remaining=max(0.0, order.duration - time),
@@ -499,8 +629,10 @@ _RESULTS: Mapping[TrajectoryResult, tuple[Signal, str]] = MappingProxyType({
 
 _ENTER: Mapping[State, Callable[[TrajectoryMachine, Signal, float], list[Command]]] = (
     MappingProxyType({
+        State.MOVING: TrajectoryMachine._enter_moving,
         State.SETTLING: TrajectoryMachine._enter_settling,
         State.STOPPING: TrajectoryMachine._enter_stopping,
         State.HALTING: TrajectoryMachine._enter_halting,
+        State.RESTORING: TrajectoryMachine._enter_restoring,
         State.ENDED: TrajectoryMachine._enter_ended,
     }))

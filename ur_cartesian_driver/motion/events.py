@@ -61,7 +61,11 @@ Event: TypeAlias = StateReceived | TrajectoryEnded | CancelRequested | LinkLost 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
-    """Where a running motion is: poses and twists of the TCP in the robot's base."""
+    """
+    Where a running motion is.
+
+    Poses, twists and accelerations are those of the controlled frame, in the robot's base.
+    """
 
     #: Index of the waypoint the tool is on its way to.
     waypoint: int
@@ -69,8 +73,11 @@ class Progress:
     fraction: float
     desired_pose: Pose
     desired_twist: Vector6 = ZERO6
+    #: None = the robot does not report accelerations.
+    desired_acceleration: Vector6 | None = None
     actual_pose: Pose
     actual_twist: Vector6 = ZERO6
+    actual_acceleration: Vector6 | None = None
     actual_q: Vector6 = ZERO6
     #: Expected time of the desired pose from the start of the motion [s].
     time: float = 0.0

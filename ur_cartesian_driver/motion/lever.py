@@ -45,7 +45,7 @@ def seen_at(state: RobotState, T_tcp_frame: Pose) -> RobotState:
 
     The wrench stays that of the TCP.
     """
-    if T_tcp_frame is IDENTITY:
+    if T_tcp_frame == IDENTITY:
         return state
     actual = rotate(state.actual_tcp_pose.quaternion, T_tcp_frame.position)
     target = rotate(state.target_tcp_pose.quaternion, T_tcp_frame.position)
