@@ -337,7 +337,7 @@ def test_progress_is_reported_at_its_rate():
 @pytest.mark.parametrize('state', list(State))
 @pytest.mark.parametrize('signal', list(Signal))
 def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
-    own = {State.SETTLING: {Signal.SETTLED, Signal.LATE},
+    own = {State.SETTLING: {Signal.SETTLED, Signal.LATE, Signal.DEVIATION},
            State.STOPPING: {Signal.LATE, Signal.UNANSWERED},
            State.HALTING: {Signal.AT_REST, Signal.LATE},
            State.ARMING: {Signal.ARMED, Signal.LATE},

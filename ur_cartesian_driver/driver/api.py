@@ -45,9 +45,11 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.primitive import OptimoveJ, OptimoveL
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.program.render import has_feature
+from ur_cartesian_driver.protocol.dialects import NEWEST
 from ur_cartesian_driver.protocol.trajectory import encode_points
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.status import DriverStatus
@@ -260,7 +262,8 @@ class Driver:
                 raise RobotNotReady(reason)
             motion = Motion(self, next(self._numbers), plan.report, on_progress)
             self._motions[motion.number] = motion
-        self._send(StartMotion(motion=motion.number, order=order_of(plan), points=points))
+        self._send(StartMotion(motion=motion.number, points=points, order=replace(
+            order_of(plan), reports_begun=self.config.dialect is NEWEST)))
         return motion
 
     def execute(self, goal: Goal, on_progress: OnProgress | None = None,
@@ -400,7 +403,9 @@ def order_of(plan: Plan) -> Order:
         points=len(plan.segments), reference=plan.reference, duration=plan.duration,
         due=times if times > 0.0 else None, T_base_frame=goal.T_base_frame,
         path_tolerance=goal.path_tolerance, goal_tolerance=goal.goal_tolerance,
-        goal_time_tolerance=goal.goal_time_tolerance)
+        goal_time_tolerance=goal.goal_time_tolerance,
+        knows_pace=not any(isinstance(segment.primitive, OptimoveJ | OptimoveL)
+                           for segment in plan.segments))
 
 
 __all__ = ['Driver', 'DriverError', 'Motion', 'order_of']

@@ -14,7 +14,8 @@ signal means in the present state: the next state and how the goal ends, if it d
   the arm by itself (safety, program, connection) ends the goal at once, because nothing that we
   could send would be read; a reason of ours to stop (cancel, tolerance) leads to STOPPING.
 * **SETTLING**: the program says that the last point is reached. The arm has to be inside the goal
-  tolerance and at rest, within the goal's time tolerance.
+  tolerance and at rest, within the goal's time tolerance. Where the controller's own target is
+  elsewhere, the program left something out (DEVIATION).
 * **STOPPING**: CANCEL is on the wire. The program brakes, discards the points that it has not run
   and answers CANCELED. A SUCCESS in this state means that the last point was reached before the
   program read the CANCEL; it is no answer, CANCELED still follows.
@@ -55,6 +56,7 @@ from ur_cartesian_driver.execution.commands import (
 )
 from ur_cartesian_driver.execution.flow import Window
 from ur_cartesian_driver.execution.monitor import PathTracker, speed
+from ur_cartesian_driver.execution.pace import Pace
 from ur_cartesian_driver.execution.tcp_loan import REST_SPEED, TcpLoan
 from ur_cartesian_driver.execution.tolerances import Watch
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -185,6 +187,7 @@ TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
         **_STOPS,
         **_stays(State.SETTLING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
         Signal.CANCEL: _judged(ErrorCode.CANCELLED),
+        Signal.DEVIATION: _judged(ErrorCode.EXECUTION_FAILED),
         Signal.SETTLED: _judged(ErrorCode.SUCCESSFUL),
         Signal.LATE: _judged(ErrorCode.GOAL_TOLERANCE_VIOLATED),
     },
@@ -231,6 +234,10 @@ class Order:
     goal_tolerance: Tolerance = field(default_factory=Tolerance)
     #: 0 = the default, negative = without end [s].
     goal_time_tolerance: float = 0.0
+    #: Whether the robot program tells how many points it has begun; if not, nobody looks there.
+    reports_begun: bool = True
+    #: Whether the plan knows its speeds: not those of OPTIMIZED moves.
+    knows_pace: bool = True
 
 
 class TrajectoryMachine:
@@ -251,6 +258,7 @@ class TrajectoryMachine:
         #: carries out the commands has to see to it.
         self.loan: TcpLoan | None = None
         self._tracker = PathTracker(order.reference)
+        self._pace = Pace(order.reference) if order.knows_pace else None
         self._path_watch = Watch(order.path_tolerance, order.T_base_frame)
         self._goal_watch = Watch(order.goal_tolerance, order.T_base_frame)
         self._max_plan_deviation = max_plan_deviation
@@ -265,6 +273,8 @@ class TrajectoryMachine:
         #: Time since the start in which the controller's own clock ran [s].
         self._scaled_time = 0.0
         self._deadline = inf
+        #: When the controller's target has to be at the end, once the program says so.
+        self._arrival_due = inf
         self._code: ErrorCode | None = None
         self._text = ''
         #: Whether START was sent, and whether the end was decided.
@@ -330,9 +340,10 @@ class TrajectoryMachine:
         if self.state is State.ARMING and self._is_armed(state):
             return Signal.ARMED, ''
         if self.state is State.MOVING:
-            return self._plan_deviation(state) or self._path_violation(state)
-        if self.state is State.SETTLING and at_rest and self._goal_error(state) is None:
-            return Signal.SETTLED, ''
+            return (self._plan_deviation(state) or self._wrong_pace(state)
+                    or self._path_violation(state))
+        if self.state is State.SETTLING and at_rest:
+            return self._arrival(state, now)
         if self.state is State.HALTING and at_rest:
             return Signal.AT_REST, ''
         if self.state is State.RESTORING and self.loan is not None and self.loan.returned:
@@ -368,6 +379,28 @@ class TrajectoryMachine:
                     f'{limit:.6f} {unit}: the arm is on another branch, or something else than '
                     'this goal moves it')
         return None
+
+    def _wrong_pace(self, state: RobotState) -> tuple[Signal, str] | None:
+        """Return that a program which tells no progress goes much faster or slower, or None."""
+        if self._pace is None or self._stale_begun is None:
+            return None
+        clause = self._pace.violation(
+            state.target_tcp_twist, self._scaled_time, self._tracker.time())
+        return None if clause is None else (Signal.DEVIATION, clause)
+
+    def _arrival(self, state: RobotState, now: float) -> tuple[Signal | None, str]:
+        """Return what it means that the arm rests after the program's SUCCESS."""
+        off = [value for value, limit in zip(
+            self._tracker.deviation(state.target_tcp_pose), self._max_plan_deviation, strict=True)
+            if 0.0 < limit < value]
+        if off and now >= self._arrival_due:
+            return Signal.DEVIATION, (
+                f'the robot program reports the end {off[0]:.4f} m or rad away from the last '
+                'point: it left out motions that it does not know; set wire_dialect to the '
+                'version of that program')
+        if not off and self._goal_error(state) is None:
+            return Signal.SETTLED, ''
+        return self._late(now)
 
     def _path_violation(self, state: RobotState) -> tuple[Signal | None, str]:
         if not (self._path_watch and self._under_way):
@@ -451,6 +484,7 @@ class TrajectoryMachine:
         self._tracker.finish()
         tolerance = self._time_tolerance()
         self._deadline = inf if tolerance < 0.0 else now + tolerance
+        self._arrival_due = min(self._deadline, now + DEFAULT_GOAL_TIME_TOLERANCE)
         late = 0.0 if self.order.due is None else self._scaled_time - self.order.due
         if 0.0 <= tolerance < late:
             return self._apply(Signal.LATE, (
@@ -554,7 +588,7 @@ class TrajectoryMachine:
         The register keeps the count of the goal before until the robot program has read START, so
         it is believed once it changes.
         """
-        if state.points_begun == self._stale_begun:
+        if not self.order.reports_begun or state.points_begun == self._stale_begun:
             return 0
         self._stale_begun = None
         return state.points_begun
