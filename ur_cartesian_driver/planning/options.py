@@ -8,10 +8,12 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import Literal, TypeAlias
 
+from ur_cartesian_driver.planning.workspace import parse_planes
 from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
 
 Choice: TypeAlias = Literal['refuse', 'slow']
 PostureChoice: TypeAlias = Literal['refuse', 'movej']
+CollisionChoice: TypeAlias = Literal['off', 'warn', 'refuse', 'auto']
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,8 +37,23 @@ class PlanningOptions:
     max_tool_speed: float = 0.25
     #: What happens to a goal whose times need more speed than the limits allow.
     on_too_fast: Choice = 'refuse'
-    #: What happens to a straight move or an arc that cannot arrive in the posture asked for.
+    #: What happens to a straight move or an arc that cannot arrive in the posture asked for, or
+    #: cannot be gone although its end can be reached.
     on_posture_change: PostureChoice = 'refuse'
+    #: What happens to a goal on whose way the arm comes too near to itself; auto: meshes refuse,
+    #: capsules, which are thicker than the arm, warn.
+    self_collision: CollisionChoice = 'auto'
+    #: How near that is [m].
+    min_clearance: float = 0.005
+    #: Radius of a tool between the flange and the TCP, for these checks [m]; 0 = none.
+    tool_radius: float = 0.0
+    #: Planes that the arm must not cross, each 'name x y z nx ny nz [margin]' in base.
+    workspace_planes: tuple[str, ...] = ()
+    #: How near a straight line or an arc may come to a singularity: angle of wrist 2 [rad], angle
+    #: of the elbow [rad], wrist centre in front of the plane of the axes 1 and 2 [m]; 0 = off.
+    singularity_margin_wrist: float = 0.05
+    singularity_margin_elbow: float = 0.05
+    singularity_margin_shoulder: float = 0.02
     #: Whether the TCP of the robot may be set to the controlled frame for the time of a goal.
     allow_tcp_change: bool = True
     #: Whether the kinematics is the robot's own; if not, arcs are never sent as joint positions.
@@ -105,5 +122,9 @@ class PlanningOptions:
         if self.on_posture_change not in ('refuse', 'movej'):
             raise ValueError(
                 f"on_posture_change is {self.on_posture_change!r}; it must be 'refuse' or 'movej'")
+        if self.self_collision not in ('off', 'warn', 'refuse', 'auto'):
+            raise ValueError(f"self_collision is {self.self_collision!r}; it must be 'off', "
+                             "'warn', 'refuse' or 'auto'")
+        parse_planes(self.workspace_planes)
         if self.max_points < 1:
             raise ValueError(f'max_points is {self.max_points}; it must be at least 1')

@@ -167,12 +167,35 @@ DECLARATIONS: tuple[Declaration, ...] = (
     Declaration('max_approach_distance',
                 'Longest way of the tool to the first point [m]; 0: without bound.', 0.0, 10.0),
     Declaration('on_posture_change',
-                'A straight line or arc that cannot arrive in the posture asked for: refuse the '
-                'goal, or go there by a joint motion.', choices=('refuse', 'movej')),
+                'A straight line or arc that cannot arrive in the posture asked for, or cannot be '
+                'gone although its end can be reached: refuse the goal, or go there by a joint '
+                'motion.', choices=('refuse', 'movej')),
+    Declaration('singularity_margin_wrist',
+                'How near straight lines and arcs may come to a straight wrist [rad]; 0: without '
+                'limit.', 0.0, 1.0),
+    Declaration('singularity_margin_elbow',
+                'How near straight lines and arcs may come to a stretched arm [rad]; 0: without '
+                'limit.', 0.0, 1.0),
+    Declaration('singularity_margin_shoulder',
+                'How near straight lines and arcs may bring the centre of the wrist to the place '
+                'above or below the shoulder, measured along the arm [m]; 0: without limit.',
+                0.0, 1.0),
     Declaration('allow_tcp_change',
                 'Set the TCP of the robot to the controlled frame of a goal for the time of the '
                 'goal. False: a goal whose controlled frame is not the TCP must not turn it on '
                 'straight or circular segments.'),
+    Declaration('self_collision',
+                'A goal on whose way the arm comes too near to itself: off, warn in its report, '
+                'refuse it, or auto: refuse where meshes tell (UR3, UR5, UR10), warn where only '
+                'capsules do.', choices=('auto', 'off', 'warn', 'refuse')),
+    Declaration('min_clearance', 'How near the arm may come to itself [m].', 0.0, 1.0),
+    Declaration('tool_radius',
+                'Radius of a tool between flange and TCP, for self_collision and '
+                'workspace_planes [m]; 0: no tool.', 0.0, 1.0),
+    Declaration('workspace_planes',
+                'Planes that neither arm, tool nor TCP may cross, each as "name x y z nx ny nz '
+                '[margin]" [m]: a point on it and its normal into the allowed side, both in '
+                'base (not base_link). Empty texts are skipped.'),
     Declaration('stamp_tolerance',
                 'How old the stamp of a goal may be when it arrives [s].', 0.0, 3600.0),
     Declaration('goal_time_tolerance',

@@ -1,0 +1,374 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How much room the arm takes: every link as a few cylinders, for many configurations at once.
+
+A look ahead asks tens of thousands of configurations whether the arm meets itself or a plane.
+Cylinders in capsules (all points within a radius of a segment) answer that in numpy for every
+model. They contain the true shape, so what they clear is clear; what they do not clear may still
+be, and :mod:`~.meshes` tells exactly for the models whose meshes there are.
+
+The DH table has one lateral length, d4, which is the sum of three: the upper arm lies beside the
+axis of joint 1 by the *shoulder offset* s, the forearm by the *elbow offset* e, and wrist 1 ends
+at d4. All joint housings are cylinders about their own joint's axis, and all tubes run from axis
+to axis; so each end of a body is a place on an axis, and a calibrated arm needs no other table.
+
+Sources. Radii and lengths of the housings: measured on the collision meshes of UR3, UR5 and UR10
+in the package example-robot-data (:data:`_SIZES`); a test proves that these cylinders contain
+them. e-Series arms have the joints of the CB3 arm of the same size. The larger ones are a UR10's
+scaled by the footprints of the data sheets (190 mm; UR15 and its relatives 204 mm, UR20 and UR30
+245 mm). s and e: the offsets in the configuration files of the ROS 2 description package of
+Universal Robots, but for the UR15 and its relatives, for which it has the planes in which the
+links meet; there s and e are these plus the half widths of the housings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass
+from enum import IntEnum
+from math import hypot
+from types import MappingProxyType
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.chain import Arm, FramesOf
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+
+Floats: TypeAlias = NDArray[np.float64]
+
+
+class Link(IntEnum):
+    """What moves as one: link i is behind joint i."""
+
+    BASE = 0
+    SHOULDER = 1
+    UPPER_ARM = 2
+    FOREARM = 3
+    WRIST_1 = 4
+    WRIST_2 = 5
+    WRIST_3 = 6
+    TOOL = 7
+
+    def __str__(self) -> str:
+        """Return the name in a sentence."""
+        return self.name.lower().replace('_', ' ')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Size:
+    """
+    The housings of one size of arm [m].
+
+    ``_in`` and ``_out`` are how far a housing goes along its axis: towards the link before it
+    (where the two meet) and away from it, from the tube's axis or, at the wrists, from the next
+    joint's.
+    """
+
+    base_radius: float
+    base_top: float
+    shoulder_radius: float
+    shoulder_below: float
+    shoulder_above: float
+    #: Both ends of the upper arm, from its tube.
+    upper_shoulder_in: float
+    upper_shoulder_out: float
+    upper_elbow_radius: float
+    upper_elbow_in: float
+    upper_elbow_out: float
+    upper_tube: float
+    #: Both ends of the forearm, from its tube.
+    elbow_radius: float
+    elbow_in: float
+    elbow_out: float
+    fore_tube: float
+    fore_wrist_in: float
+    fore_wrist_out: float
+    #: Wrists 1 and 2 are alike: a housing about the joint behind, one about the joint in front.
+    wrist_radius: float
+    wrist_in: float
+    wrist_out: float
+    wrist_back: float
+    wrist_front: float
+    tool_flange_radius: float
+
+    def scaled(self, factor: float) -> Size:
+        """Return the housings of a larger or smaller arm."""
+        return Size(**{name: factor * value for name, value in zip(
+            self.__slots__, astuple(self), strict=True)})
+
+
+_UR3 = Size(
+    base_radius=0.0645, base_top=0.0865, shoulder_radius=0.0468, shoulder_below=0.0665,
+    shoulder_above=0.0575, upper_shoulder_in=0.066, upper_shoulder_out=0.058,
+    upper_elbow_radius=0.0395, upper_elbow_in=0.051, upper_elbow_out=0.058, upper_tube=0.047,
+    elbow_radius=0.038, elbow_in=0.051, elbow_out=0.047, fore_tube=0.0378, fore_wrist_in=0.0425,
+    fore_wrist_out=0.047, wrist_radius=0.0343, wrist_in=0.047, wrist_out=0.031, wrist_back=0.0484,
+    wrist_front=0.0425, tool_flange_radius=0.0385)
+_UR5 = Size(
+    base_radius=0.0745, base_top=0.0215, shoulder_radius=0.0608, shoulder_below=0.0655,
+    shoulder_above=0.069, upper_shoulder_in=0.0655, upper_shoulder_out=0.069,
+    upper_elbow_radius=0.0605, upper_elbow_in=0.0655, upper_elbow_out=0.069, upper_tube=0.059,
+    elbow_radius=0.059, elbow_in=0.055, elbow_out=0.0575, fore_tube=0.0448, fore_wrist_in=0.0453,
+    fore_wrist_out=0.0575, wrist_radius=0.0397, wrist_in=0.046, wrist_out=0.04, wrist_back=0.0575,
+    wrist_front=0.048, tool_flange_radius=0.0444)
+_UR10 = Size(
+    base_radius=0.0952, base_top=0.0385, shoulder_radius=0.0772, shoulder_below=0.0895,
+    shoulder_above=0.0885, upper_shoulder_in=0.0904, upper_shoulder_out=0.0879,
+    upper_elbow_radius=0.0628, upper_elbow_in=0.0601, upper_elbow_out=0.0692, upper_tube=0.0763,
+    elbow_radius=0.0628, elbow_in=0.068, elbow_out=0.07, fore_tube=0.06, fore_wrist_in=0.0537,
+    fore_wrist_out=0.07, wrist_radius=0.0474, wrist_in=0.0545, wrist_out=0.0468, wrist_back=0.0578,
+    wrist_front=0.0625, tool_flange_radius=0.0475)
+_UR15 = _UR10.scaled(204 / 190)
+_UR20 = _UR10.scaled(245 / 190)
+
+#: Of each model: its housings, shoulder offset and elbow offset [m].
+_SIZES: Mapping[str, tuple[Size, float, float]] = MappingProxyType({
+    'ur3': (_UR3, 0.1198, 0.0273),
+    'ur5': (_UR5, 0.13585, 0.01615),
+    'ur10': (_UR10, 0.1758, 0.0486),
+    'ur3e': (_UR3, 0.12, 0.027),
+    'ur5e': (_UR5, 0.138, 0.007),
+    'ur7e': (_UR5, 0.138, 0.007),
+    'ur10e': (_UR10, 0.1762, 0.0393),
+    'ur12e': (_UR10, 0.1762, 0.0393),
+    'ur16e': (_UR10, 0.176, 0.04),
+    'ur15': (_UR15, 0.202, 0.061),
+    'ur18': (_UR15, 0.202, 0.061),
+    'ur8long': (_UR15, 0.202, 0.061),
+    'ur20': (_UR20, 0.26, 0.043),
+    'ur30': (_UR20, 0.26, 0.043),
+})
+
+# The base of the UR5 goes a little below its frame [m].
+_BASE_BOTTOM = -0.0035
+# Where links meet one reaches a little into the other [m].
+_OVERLAP = 0.002
+# A capsule with the axis of a cylinder sticks out by its radius at both ends. One that is 1.1
+# times as thick may be shorter, and sticks out by 0.64 of it.
+_WIDER = 1.1
+_SHORTER = (_WIDER ** 2 - 1.0) ** 0.5
+# Rows whose distances are computed together: their numbers stay in the cache.
+_BLOCK = 256
+# Squared sine of the angle below which segments count as parallel: an error of 1e-6 of a length.
+_PARALLEL = 1e-12
+_TINY = 1e-300
+
+#: Pairs of links that are checked. Left out are neighbours, which share a joint that turns freely,
+#: and those that turn past each other whatever the joints do, as the tests show with the meshes:
+#: base and upper arm (only joint 2 matters), forearm and wrist 2, wrist 1 and wrist 3 (which are
+#: d5 apart), and also wrist 2 and the tool, which stands on wrist 3 and only turns about its axis.
+PAIRS: tuple[tuple[Link, Link], ...] = tuple(
+    (a, b) for a in Link for b in Link
+    if b - a >= 2 and (a, b) not in (
+        (Link.BASE, Link.UPPER_ARM), (Link.FOREARM, Link.WRIST_2), (Link.WRIST_1, Link.WRIST_3),
+        (Link.WRIST_2, Link.TOOL)))
+
+
+@dataclass(frozen=True, slots=True)
+class _Body:
+    """A cylinder between two places on axes: the axis (0..5) and how far along it [m]."""
+
+    link: Link
+    start: tuple[int, float]
+    end: tuple[int, float]
+    radius: float
+    #: Whether its ends lie inside housings, so that caps on them add nothing.
+    tube: bool = False
+
+
+class Bodies:
+    """
+    The cylinders of one arm and its tool. Immutable.
+
+    :param arm: nominal or calibrated.
+    :param T_flange_tcp: where the tool ends.
+    :param tool_radius: radius of a cylinder from the flange to the TCP [m]; 0 = no tool.
+    """
+
+    def __init__(self, arm: Arm, T_flange_tcp: Pose = IDENTITY, tool_radius: float = 0.0) -> None:
+        """Prepare the places of all ends on their axes."""
+        self.arm, self._tcp = arm, T_flange_tcp.position
+        bodies = _bodies(arm)
+        self._places = _places(arm, bodies)
+        links, radii = [body.link for body in bodies], [body.radius for body in bodies]
+        covers = [_cover(arm, body) for body in bodies]
+        self._has_tool = tool_radius > 0.0 and hypot(*self._tcp) > 0.0
+        if self._has_tool:
+            links.append(Link.TOOL)
+            radii.append(tool_radius)
+            covers.append((0.0, tool_radius))
+        #: The link and the radius [m] of each cylinder.
+        self.links, self.radii = tuple(links), np.array(radii)
+        self._cut, self.capsule_radii = np.array(covers).T
+        self.pairs = tuple(pair for pair in PAIRS if Link.TOOL not in pair or self._has_tool)
+        self._first, self._second, self._begins = _combined(self.links, self.pairs)
+
+    def cylinders(self, q: Floats) -> Floats:
+        """Return both ends of every cylinder (n, k, 2, 3) in base [m], at joints (n, 6)."""
+        ends: Floats = self._ends(self.arm.frames_rows(q)).transpose(3, 2, 0, 1)
+        return ends
+
+    def capsules(self, q: Floats) -> Floats:
+        """Return the ends (n, k, 2, 3) [m] of capsules that contain the cylinders."""
+        start, way = self._capsules(self._ends(self.arm.frames_rows(q)))
+        ends: Floats = np.stack([start, start + way]).transpose(3, 2, 0, 1)
+        return ends
+
+    def distances(self, q: Floats) -> Floats:
+        """
+        Return how far the links of each of :attr:`pairs` are apart at least.
+
+        :param q: (n, 6) [rad].
+        :returns: (n, pairs) between their capsules [m]; negative where these overlap.
+        """
+        result = np.empty((len(q), len(self.pairs)))
+        sums = (self.capsule_radii[self._first] + self.capsule_radii[self._second])[:, None]
+        for begin in range(0, len(q), _BLOCK):
+            rows = slice(begin, begin + _BLOCK)
+            start, way = self._capsules(self._ends(self.arm.frames_rows(q[rows])))
+            apart = segment_distance(start[:, self._first], way[:, self._first],
+                                     start[:, self._second], way[:, self._second])
+            result[rows] = np.minimum.reduceat(apart - sums, self._begins).T
+        return result
+
+    def heights(self, q: Floats, normals: Floats) -> Floats:
+        """
+        Return the lowest point of every cylinder in some directions.
+
+        :param q: (n, 6) [rad].
+        :param normals: (m, 3) unit vectors in base.
+        :returns: (n, m, k): least normal . point of the cylinder [m].
+        """
+        result = np.empty((len(q), len(normals), len(self.links)))
+        for begin in range(0, len(q), _BLOCK):
+            rows = slice(begin, begin + _BLOCK)
+            start, end = self._ends(self.arm.frames_rows(q[rows]))
+            way = end - start
+            square = np.maximum(np.einsum('ckn,ckn->kn', way, way), _TINY)
+            for m, normal in enumerate(normals):
+                low, rise = (np.tensordot(normal, v, axes=1) for v in (start, way))
+                # A disc across the unit vector u reaches r sqrt(1 - (n u)^2) down.
+                disc = np.sqrt(np.maximum(0.0, 1.0 - rise ** 2 / square))
+                result[rows, m] = (
+                    low + np.minimum(rise, 0.0) - self.radii[:, None] * disc).T
+        return result
+
+    def _ends(self, frames: FramesOf[Floats]) -> Floats:
+        """Return both ends of every cylinder, coordinates and rows last: (2, 3, k, n)."""
+        origins, axes = np.array(frames.origins), np.array(frames.axes)  # (6, 3, n)
+        index, along = self._places
+        ends = origins[index] + along[:, :, None, None] * axes[index]  # (2, k, 3, n)
+        if self._has_tool:
+            flange = np.array(frames.position)
+            tcp = flange + sum(
+                length * np.array(axis) for length, axis in zip(
+                    self._tcp, (frames.x, frames.y, frames.z), strict=True))
+            ends = np.concatenate([ends, np.stack([flange, tcp])[:, None]], axis=1)
+        ordered: Floats = ends.transpose(0, 2, 1, 3)
+        return ordered
+
+    def _capsules(self, ends: Floats) -> tuple[Floats, Floats]:
+        """Return the start of each capsule's segment and the way to its end, each (3, k, n)."""
+        start, end = ends
+        way = end - start
+        cut = self._cut[:, None]
+        return start + cut * way, (1.0 - 2.0 * cut) * way
+
+
+def segment_distance(start_1: Floats, way_1: Floats, start_2: Floats, way_2: Floats) -> Floats:
+    """
+    Return the distance of segments; parallel ones and points are segments too.
+
+    The minimum of a convex quadratic form over the unit square (Ericson, Real-Time Collision
+    Detection, 5.1.9).
+
+    :param start_1: (3, ...) [m]; the segment goes from there by ``way_1``.
+    """
+    r = start_1 - start_2
+    a, e = _dot(way_1, way_1), _dot(way_2, way_2)
+    b, c, f = _dot(way_1, way_2), _dot(way_1, r), _dot(way_2, r)
+    denominator = a * e - b * b
+    crossing = denominator > _PARALLEL * a * e
+    s = np.where(crossing, (b * f - c * e) / np.where(crossing, denominator, 1.0), 0.0)
+    t = np.clip((b * np.clip(s, 0.0, 1.0) + f) / np.maximum(e, _TINY), 0.0, 1.0)
+    s = np.clip((b * t - c) / np.maximum(a, _TINY), 0.0, 1.0)
+    gap = r + s * way_1 - t * way_2
+    distance: Floats = np.sqrt(_dot(gap, gap))
+    return distance
+
+
+def _dot(u: Floats, v: Floats) -> Floats:
+    product: Floats = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+    return product
+
+
+def _bodies(arm: Arm) -> list[_Body]:
+    """Return the cylinders of a model, by the joint axes that they lie on."""
+    g = arm.model.geometry
+    d1, d4, d5, d6 = g.d[0], *g.d[3:]
+    z, s, e = _SIZES[arm.model.name]
+    return [
+        _Body(Link.BASE, (0, _BASE_BOTTOM), (0, z.base_top), z.base_radius),
+        _Body(Link.SHOULDER, (0, d1 - z.shoulder_below), (0, d1 + z.shoulder_above),
+              z.shoulder_radius),
+        _Body(Link.SHOULDER, (1, 0.0), (1, s - z.upper_shoulder_in + _OVERLAP), z.shoulder_radius),
+        _Body(Link.UPPER_ARM, (1, s - z.upper_shoulder_in), (1, s + z.upper_shoulder_out),
+              z.shoulder_radius),
+        _Body(Link.UPPER_ARM, (1, s), (2, s), z.upper_tube, tube=True),
+        _Body(Link.UPPER_ARM, (2, s - z.upper_elbow_in), (2, s + z.upper_elbow_out),
+              z.upper_elbow_radius),
+        _Body(Link.FOREARM, (2, e - z.elbow_out), (2, e + z.elbow_in), z.elbow_radius),
+        _Body(Link.FOREARM, (2, e), (3, e), z.fore_tube, tube=True),
+        _Body(Link.FOREARM, (3, e - z.fore_wrist_out), (3, d4 - z.fore_wrist_in), z.wrist_radius),
+        _Body(Link.WRIST_1, (3, d4 - z.wrist_in), (3, d4 + z.wrist_out), z.wrist_radius),
+        _Body(Link.WRIST_1, (4, -z.wrist_back), (4, z.wrist_front), z.wrist_radius),
+        _Body(Link.WRIST_2, (4, d5 - z.wrist_in), (4, d5 + z.wrist_out), z.wrist_radius),
+        _Body(Link.WRIST_2, (5, -z.wrist_back), (5, z.wrist_front), z.wrist_radius),
+        _Body(Link.WRIST_3, (5, z.wrist_front - _OVERLAP), (5, d6), z.tool_flange_radius),
+    ]
+
+
+def _places(arm: Arm, bodies: list[_Body]) -> tuple[NDArray[np.intp], Floats]:
+    """
+    Return axis and place of both ends of each body, (2, k) each.
+
+    The origin of a calibrated table lies anywhere on its axis, hundreds of metres away where
+    axes are nearly parallel. With all joints at 0 the true axis is next to the nominal one; the
+    foot of the nominal origin on it is where the bodies count from.
+    """
+    ends = [[body.start for body in bodies], [body.end for body in bodies]]
+    index = np.array([[axis for axis, _ in row] for row in ends], dtype=np.intp)
+    along = np.array([[place for _, place in row] for row in ends])
+    true, nominal = arm.frames((0.0,) * 6), Arm(arm.model).frames((0.0,) * 6)
+    shift = np.einsum('ic,ic->i', np.subtract(nominal.origins, true.origins), np.array(true.axes))
+    return index, along + shift[index]
+
+
+def _cover(arm: Arm, body: _Body) -> tuple[float, float]:
+    """Return the part of a cylinder's axis to cut off at each end, and its capsule's radius."""
+    (axis, begin), (other, end) = body.start, body.end
+    if body.tube or axis != other:
+        return 0.0, body.radius
+    length = end - begin
+    if length <= 2.0 * _SHORTER * body.radius:
+        return 0.5, hypot(body.radius, 0.5 * length)
+    return _SHORTER * body.radius / length, _WIDER * body.radius
+
+
+def _combined(links: tuple[Link, ...], pairs: tuple[tuple[Link, Link], ...]
+              ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+    """Return the bodies to compare, first and second, and where each pair of links begins."""
+    first: list[int] = []
+    second: list[int] = []
+    begins: list[int] = []
+    for a, b in pairs:
+        begins.append(len(first))
+        for i, of in enumerate(links):
+            same = [j for j, other in enumerate(links) if of == a and other == b]
+            first += [i] * len(same)
+            second += same
+    return (np.array(first, dtype=np.intp), np.array(second, dtype=np.intp),
+            np.array(begins, dtype=np.intp))

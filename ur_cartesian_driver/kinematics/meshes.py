@@ -1,0 +1,164 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Exact distances between the links of a UR3, UR5 or UR10, from the manufacturer's meshes.
+
+The meshes are those of the package example-robot-data, pinocchio measures between them. Both are
+optional; without them the capsules of :mod:`~.bodies` have the last word. e-Series arms have
+another shape, so they have no meshes here.
+
+The meshes are put on the axes of our own kinematics, so that a calibrated arm carries them where
+its links really are: with all joints at 0 every mesh stands where the robot description puts it,
+and from there it moves with its joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+import os
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.bodies import Link
+from ur_cartesian_driver.kinematics.chain import Arm, pinocchio_model
+
+Floats: TypeAlias = NDArray[np.float64]
+Flags: TypeAlias = NDArray[np.bool_]
+
+#: The models that have meshes.
+WITH_MESHES = ('ur3', 'ur5', 'ur10')
+
+_DESCRIPTION = Path('example-robot-data', 'robots', 'ur_description', 'urdf')
+#: In the robot description, by link.
+_FRAMES = ('base_link', 'shoulder_link', 'upper_arm_link', 'forearm_link', 'wrist_1_link',
+           'wrist_2_link', 'wrist_3_link')
+
+
+class Meshes:
+    """The meshes of one arm, on its axes. Not for two threads at once."""
+
+    def __init__(self, arm: Arm) -> None:
+        """
+        Load the meshes and put them on the axes.
+
+        :raises ValueError: the model has none.
+        :raises ImportError: pinocchio is not installed.
+        :raises FileNotFoundError: example-robot-data is not installed.
+        """
+        if arm.model.name not in WITH_MESHES:
+            raise ValueError(f'There are no meshes of a {arm.model.name}.')
+        self._model = pinocchio_model(arm)
+        import pinocchio
+        self._pinocchio, self._data = pinocchio, self._model.createData()
+        self._geometry = pinocchio.GeometryModel()
+        zero = np.zeros(6)
+        pinocchio.forwardKinematics(self._model, self._data, zero)
+        for link, (shape, T_base_link) in enumerate(_described(arm.model.name)):
+            T_base_joint = self._data.oMi[link]
+            self._geometry.addGeometryObject(pinocchio.GeometryObject(
+                Link(link).name, link, T_base_joint.inverse() * T_base_link, shape))
+        self._pairs: dict[tuple[Link, Link], int] = {}
+        for a in range(len(_FRAMES)):
+            for b in range(a + 1, len(_FRAMES)):
+                self._pairs[Link(a), Link(b)] = len(self._pairs)
+                self._geometry.addCollisionPair(pinocchio.CollisionPair(a, b))
+        self._placed = pinocchio.GeometryData(self._geometry)
+
+    @classmethod
+    def of(cls, arm: Arm) -> Meshes | None:
+        """Return the meshes of an arm, None where there are none or what they need is missing."""
+        try:
+            return cls(arm)
+        except (ValueError, ImportError, FileNotFoundError):
+            return None
+
+    def distances(self, pair: tuple[Link, Link], q: Floats) -> Floats:
+        """
+        Return how far two links are apart.
+
+        :param pair: the lower link first.
+        :param q: (n, 6) [rad].
+        :returns: (n,) [m]; 0 where they touch or overlap.
+        """
+        index = self._pairs[pair]
+        result = np.empty(len(q))
+        for row, joints in enumerate(q):
+            self._place(joints)
+            found = self._pinocchio.computeDistance(self._geometry, self._placed, index)
+            result[row] = max(0.0, found.min_distance)
+        return result
+
+    def nearer_than(self, bound: float, pair: tuple[Link, Link], q: Floats
+                    ) -> tuple[Flags, Floats]:
+        """
+        Return where two links are nearer than a bound [m]; several times faster than distances.
+
+        :returns: (n,) whether they are, and (n,) a lower bound of the distance where not [m].
+        """
+        index = self._pairs[pair]
+        self._placed.collisionRequests[index].security_margin = bound
+        near, least = np.zeros(len(q), dtype=np.bool_), np.zeros(len(q))
+        for row, joints in enumerate(q):
+            self._place(joints)
+            near[row] = self._pinocchio.computeCollision(self._geometry, self._placed, index)
+            # It counts from the bound.
+            least[row] = bound + max(
+                0.0, self._placed.collisionResults[index].distance_lower_bound)
+        return near, least
+
+    def T_base_meshes(self, q: Floats) -> Floats:
+        """Return where the meshes of all links are at joints (6,) [rad]: matrices (7, 4, 4)."""
+        self._place(q)
+        return np.array([T.homogeneous for T in self._placed.oMg])
+
+    def _place(self, q: Floats) -> None:
+        self._pinocchio.updateGeometryPlacements(
+            self._model, self._data, self._geometry, self._placed, q)
+
+
+@lru_cache
+def _described(name: str) -> list[tuple[Any, Any]]:
+    """Return shape and place (in base, all joints at 0) of each link's mesh."""
+    import pinocchio
+    share = _share()
+    urdf = str(share / _DESCRIPTION / f'{name}_robot.urdf')
+    model = pinocchio.buildModelFromUrdf(urdf)
+    geometry = pinocchio.buildGeomFromUrdf(
+        model, urdf, pinocchio.GeometryType.COLLISION, package_dirs=[str(share)])
+    data, placed = model.createData(), pinocchio.GeometryData(geometry)
+    pinocchio.updateGeometryPlacements(model, data, geometry, placed, np.zeros(6))
+    pinocchio.updateFramePlacements(model, data)
+    T_world_base = data.oMf[model.getFrameId('base')]
+    found = []
+    for frame in _FRAMES:
+        index = geometry.getGeometryId(f'{frame}_0')
+        found.append((geometry.geometryObjects[index].geometry,
+                      T_world_base.inverse() * placed.oMg[index]))
+    return found
+
+
+def _share() -> Path:
+    """
+    Return the directory that holds example-robot-data.
+
+    :raises FileNotFoundError: there is none.
+    """
+    for share in _candidates():
+        if (share / _DESCRIPTION).is_dir():
+            return share
+    raise FileNotFoundError(
+        'The meshes of the robots are not installed; the extra `collision` brings them.')
+
+
+def _candidates() -> Iterator[Path]:
+    """Return where wheels and ROS installations keep shared files."""
+    import pinocchio
+    for parent in Path(pinocchio.__file__).parents:
+        yield parent / 'share'
+    for prefix in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep):
+        if prefix:
+            yield Path(prefix, 'share')

@@ -1,0 +1,265 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whether the arm stays clear of itself and of the workspace planes on its whole way.
+
+Capsules tell it for every row; where they come near, the meshes tell exactly, for the models
+that have them (:mod:`~ur_cartesian_driver.kinematics.meshes`). The arm shall be able to leave a
+place where it is too near already: rows are let pass as long as what is too near at the start only
+goes away from it, until it is free; from then on the rule is the same as for all else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.bodies import Bodies, Link
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.meshes import Meshes
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.workspace import parse_planes, Plane
+
+Floats: TypeAlias = NDArray[np.float64]
+Flags: TypeAlias = NDArray[np.bool_]
+
+# Rows that are judged together: bounds memory, and ends early where the way is refused.
+_BLOCK = 4096
+# What counts as not coming nearer [m]: samples of a way are not exact.
+_STEADY = 1e-4
+# Rounding of a tool that works on a plane with no margin [m].
+_ON_PLANE = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Violation:
+    """The first row at which something is too near."""
+
+    #: Index into the rows that were given.
+    row: int
+    #: A clause: what is too near to what, how near, and what is asked for.
+    text: str
+    #: What would help.
+    help: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Clear:
+    """How clear a way is."""
+
+    #: What refuses the goal ...
+    violation: Violation | None
+    #: ... and what is only worth saying, because capsules are thicker than the arm.
+    warning: Violation | None
+    #: The smallest distance of all rows [m], negative where capsules overlap or a plane is
+    #: crossed, infinite where nothing is checked; between capsules it is a lower bound.
+    margin: float
+    #: Between what it is.
+    what: str
+
+
+class Clearance:
+    """
+    The clearance of one arm with one tool.
+
+    :param T_flange_tcp: the TCP of the goal; from the flange to it goes the tool's capsule.
+    :param options: self_collision, min_clearance, tool_radius, workspace_planes.
+    """
+
+    def __init__(self, arm: Arm, T_flange_tcp: Pose, options: PlanningOptions) -> None:
+        """Prepare bodies and planes, and load the meshes where they are asked for."""
+        bodies = Bodies(arm, T_flange_tcp, options.tool_radius)
+        self._watches: list[_Pairs | _Planes] = []
+        if options.self_collision != 'off':
+            self._watches.append(_Pairs(bodies, options))
+        if planes := parse_planes(options.workspace_planes):
+            self._watches.append(_Planes(bodies, arm, T_flange_tcp, planes))
+
+    def check(self, q: Floats, q_start: Joints) -> Clear:
+        """
+        Return the first row that is too near, and the smallest distance.
+
+        :param q: (n, 6) [rad], all configurations of a goal, in the order of time.
+        :param q_start: where the arm stands; what is too near there may go away.
+        """
+        violation: Violation | None = None
+        warning: Violation | None = None
+        margin, what = inf, ''
+        start = np.array([q_start])
+        paces = [_Pace(watch, start) for watch in self._watches]
+        for begin in range(0, len(q), _BLOCK):
+            for watch, pace in zip(self._watches, paces, strict=True):
+                lower, distances = watch.measure(q[begin:begin + _BLOCK], pace.held)
+                row, column = np.unravel_index(np.argmin(distances), distances.shape)
+                if distances[row, column] < margin:
+                    margin, what = float(distances[row, column]), watch.what[column]
+                refused = pace.refused(lower, distances)
+                found, remark = (
+                    _first(watch, refused & columns, distances, q[begin:], begin)
+                    for columns in (watch.refuses, ~watch.refuses))
+                violation, warning = _earlier(violation, found), _earlier(warning, remark)
+            if violation is not None:
+                break
+        return Clear(violation=violation, warning=warning, margin=margin, what=what)
+
+
+class _Pace:
+    """What was too near at the start and is not free yet; one column for each thing watched."""
+
+    def __init__(self, watch: _Pairs | _Planes, start: Floats) -> None:
+        lower, distances = watch.measure(start, np.ones(len(watch.bounds), dtype=np.bool_))
+        self._bounds = watch.bounds
+        #: What is still too near, by column.
+        self.held: Flags = distances[0] < watch.bounds
+        self._lower, self._reached = lower[0], distances[0]
+
+    def refused(self, lower: Floats, distances: Floats) -> Flags:
+        """
+        Return which (rows, columns) are refused.
+
+        :param lower: distances of capsules, which go on changing while meshes touch.
+        :param distances: those that count.
+        """
+        near = distances < self._bounds
+        free = np.logical_or.accumulate(np.vstack([~self.held, ~near]))
+        self._lower, of_capsules = _steady(lower, self._lower)
+        self._reached, exact = _steady(distances, self._reached)
+        leaving = ~free[:-1] & np.where(distances > 0.0, exact, of_capsules)
+        self.held = ~free[-1]
+        refused: Flags = near & ~leaving
+        return refused
+
+
+def _steady(values: Floats, reached: Floats) -> tuple[Floats, Flags]:
+    """Return the largest values, and where one is not below all before it; by columns."""
+    largest = np.maximum.accumulate(np.vstack([reached, values]))
+    steady: Flags = values >= largest[:-1] - _STEADY
+    return largest[-1], steady
+
+
+class _Pairs:
+    """The links of the arm, and the tool, against each other."""
+
+    def __init__(self, bodies: Bodies, options: PlanningOptions) -> None:
+        self._bodies = bodies
+        self._meshes = Meshes.of(bodies.arm)
+        self._bound = options.min_clearance
+        exact = np.array([self._has_mesh(pair) for pair in bodies.pairs], dtype=np.bool_)
+        choice = options.self_collision
+        #: By column: the distance asked for, whether less is refused, and its name.
+        self.bounds = np.full(len(bodies.pairs), self._bound)
+        self.refuses: Flags = exact if choice == 'auto' else np.full(
+            len(exact), choice == 'refuse')
+        self.what = [f'{a} and {b}' for a, b in bodies.pairs]
+
+    def _has_mesh(self, pair: tuple[Link, Link]) -> bool:
+        return self._meshes is not None and Link.TOOL not in pair
+
+    def measure(self, q: Floats, held: Flags) -> tuple[Floats, Floats]:
+        """
+        Return distances (n, columns) of the capsules, and those that count.
+
+        :param held: the columns of which exact distances are wanted; of others it is enough to
+            know whether they are below the bound (then they are 0), because that is faster.
+        """
+        lower = self._bodies.distances(q)
+        if self._meshes is None:
+            return lower, lower
+        distances = lower.copy()
+        for column, pair in enumerate(self._bodies.pairs):
+            rows = np.flatnonzero(lower[:, column] < self._bound)
+            if not len(rows) or Link.TOOL in pair:
+                continue
+            if held[column]:
+                distances[rows, column] = self._meshes.distances(pair, q[rows])
+            else:
+                near, least = self._meshes.nearer_than(self._bound, pair, q[rows])
+                distances[rows, column] = np.where(near, 0.0, least)
+        return lower, distances
+
+    def violation(self, row: int, column: int, distance: float, q: Floats) -> Violation:
+        """Return the words for a row, whose joints are ``q`` (1, 6)."""
+        a, b = self._bodies.pairs[column]
+        between = advice = ''
+        if self._meshes is not None and Link.TOOL not in (a, b):
+            distance = float(self._meshes.distances((a, b), q)[0])
+        else:
+            between = ' (measured between capsules, which are thicker than the arm)'
+            advice = '; self_collision says what happens where capsules meet'
+        near = f'come within {distance:.4f} m of each other' if distance > 0.0 else 'touch'
+        return Violation(
+            row=row, text=f'{a} and {b} {near}{between}, {self._bound:.4f} m is asked for',
+            help=f'take another way or posture, or lower min_clearance{advice}')
+
+
+class _Planes:
+    """All of the arm beyond its base, the tool and the TCP against the workspace planes."""
+
+    def __init__(self, bodies: Bodies, arm: Arm, T_flange_tcp: Pose, planes: Sequence[Plane]
+                 ) -> None:
+        self._bodies, self._arm, self._planes = bodies, arm, planes
+        self._tcp = T_flange_tcp.position
+        self._normals = np.array([plane.normal for plane in planes])
+        self._offsets = np.array([np.dot(plane.normal, plane.point) for plane in planes])
+        moving = [k for k, link in enumerate(bodies.links) if link != Link.BASE]
+        links = [bodies.links[k] for k in moving]
+        self._moving = slice(moving[0], None)
+        # Bodies of one link follow each other.
+        self._begins = [i for i, link in enumerate(links) if i == 0 or links[i - 1] != link]
+        self._names = [str(links[i]) for i in self._begins] + ['TCP']
+        self.what = [f'{name} and the plane "{plane.name}"'
+                     for plane in planes for name in self._names]
+        self.bounds = np.repeat([plane.margin - _ON_PLANE for plane in planes], len(self._names))
+        self.refuses: Flags = np.ones(len(self.what), dtype=np.bool_)
+
+    def measure(self, q: Floats, held: Flags) -> tuple[Floats, Floats]:
+        """Return how far above the planes all links and the TCP are, (n, columns), twice."""
+        low = self._bodies.heights(q, self._normals)[:, :, self._moving]
+        links = np.minimum.reduceat(low, self._begins, axis=2)
+        frames = self._arm.frames_rows(q)
+        tcp = np.array(frames.position) + sum(
+            length * np.array(axis) for length, axis in zip(
+                self._tcp, (frames.x, frames.y, frames.z), strict=True))
+        heights = np.concatenate([links, (self._normals @ tcp).T[:, :, None]], axis=2)
+        distances = (heights - self._offsets[:, None]).reshape(len(q), -1)
+        return distances, distances
+
+    def violation(self, row: int, column: int, distance: float, q: Floats) -> Violation:
+        """Return the words for a row."""
+        number, which = divmod(column, len(self._names))
+        plane, name = self._planes[number], self._names[which]
+        name = 'the TCP' if name == 'TCP' else name
+        if distance < -_ON_PLANE:
+            text = f'{name} goes {-distance:.4f} m beyond the workspace plane "{plane.name}"'
+        else:
+            text = f'{name} comes within {distance:.4f} m of the workspace plane "{plane.name}"'
+        if plane.margin > 0.0:
+            text += f', {plane.margin:.4f} m is asked for'
+        return Violation(row=row, text=text, help=(
+            'stay on the side of the plane to which its normal points, or change '
+            'workspace_planes'))
+
+
+def _first(watch: _Pairs | _Planes, refused: Flags, distances: Floats, q: Floats, begin: int
+           ) -> Violation | None:
+    """Return the nearest thing in the first row that is refused."""
+    rows = np.flatnonzero(refused.any(axis=1))
+    if not len(rows):
+        return None
+    row = int(rows[0])
+    column = int(np.argmin(np.where(refused[row], distances[row] - watch.bounds, inf)))
+    return watch.violation(
+        begin + row, column, float(distances[row, column]), q[row:row + 1])
+
+
+def _earlier(one: Violation | None, other: Violation | None) -> Violation | None:
+    if one is None or other is None:
+        return one or other
+    return other if other.row < one.row else one

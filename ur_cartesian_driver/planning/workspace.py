@@ -1,0 +1,67 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The planes that the arm must not cross, as a parameter gives them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot, isfinite
+
+
+@dataclass(frozen=True, slots=True)
+class Plane:
+    """A plane with the arm on one side of it: a table, a wall, the border of a cell."""
+
+    name: str
+    #: A point on it, in ``base`` (the frame of the controller, not ``base_link``) [m].
+    point: tuple[float, float, float]
+    #: Unit vector in ``base`` into the side that is allowed.
+    normal: tuple[float, float, float]
+    #: How far the arm keeps away from it [m].
+    margin: float = 0.0
+
+    @classmethod
+    def parse(cls, text: str) -> Plane:
+        """
+        Read ``name x y z nx ny nz [margin]`` in ``base`` [m]; the normal may have any length.
+
+        :raises ValueError: the text has another form; the sentence says what is wrong.
+        """
+        words = text.split()
+        if len(words) not in (7, 8):
+            raise ValueError(
+                f'workspace_planes: "{text}" has {len(words)} words instead of 7 or 8; write '
+                '"name x y z nx ny nz [margin]" [m], a point on the plane and the normal into '
+                'the allowed side, both in base.')
+        name, *texts = words
+        try:
+            x, y, z, nx, ny, nz, *rest = (float(number) for number in texts)
+        except ValueError as error:
+            raise ValueError(f'workspace_planes: "{name}": {error}.') from None
+        margin = rest[0] if rest else 0.0
+        if not all(isfinite(v) for v in (x, y, z, nx, ny, nz, margin)):
+            raise ValueError(f'workspace_planes: "{name}" has a number that is not finite.')
+        if margin < 0.0:
+            raise ValueError(
+                f'workspace_planes: the margin {margin:g} of "{name}" is negative; move the '
+                'point instead.')
+        length = hypot(nx, ny, nz)
+        if length < 1e-6:
+            raise ValueError(
+                f'workspace_planes: the normal of "{name}" is zero; it points into the allowed '
+                'side.')
+        return cls(name, (x, y, z), (nx / length, ny / length, nz / length), margin)
+
+
+def parse_planes(texts: tuple[str, ...]) -> tuple[Plane, ...]:
+    """
+    Read all planes.
+
+    :raises ValueError: one cannot be read, or two have one name.
+    """
+    planes = tuple(Plane.parse(text) for text in texts)
+    names = [plane.name for plane in planes]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f'workspace_planes: "{name}" is there twice.')
+    return planes
