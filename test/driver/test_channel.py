@@ -13,7 +13,10 @@ from ur_cartesian_driver.execution import Order
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.plan import ReferencePath
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.robot import calls
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from ur_cartesian_driver.robot.status import Gaps
 
 MESSAGES = [
     channel.Configure(config=DriverConfig(robot_ip='10.0.0.1', headless_mode=True)),
@@ -22,6 +25,9 @@ MESSAGES = [
     channel.MotionEnded(motion=3, outcome=Outcome(code=ErrorCode.SUCCESSFUL, text='Done.')),
     channel.StatusChanged(status=DriverStatus(
         state=ConnectionState.READY, ports={'reverse_port': 50001})),
+    channel.CallRobot(number=2, call=calls.SetTcp(T_flange_tcp=Pose((0.0, 0.0, 0.1)))),
+    channel.CallAnswered(number=2, answer=calls.Answer(ok=True, text='The TCP is set.')),
+    channel.Alive(gaps=Gaps(reports=0.002, keepalives=0.021)),
     channel.LogLine(level=30, text='a line')]
 
 

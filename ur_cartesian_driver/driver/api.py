@@ -16,6 +16,9 @@ from typing import TypeVar
 
 from ur_cartesian_driver.driver import channel, host
 from ur_cartesian_driver.driver.channel import (
+    Alive,
+    CallAnswered,
+    CallRobot,
     CancelMotion,
     Configure,
     GeometryKnown,
@@ -27,10 +30,12 @@ from ur_cartesian_driver.driver.channel import (
     Request,
     ResendProgram,
     Shutdown,
+    SignalsChanged,
     StartMotion,
     StatusChanged,
 )
 from ur_cartesian_driver.driver.config import DriverConfig
+from ur_cartesian_driver.driver.services import RobotServices
 from ur_cartesian_driver.execution import Order
 from ur_cartesian_driver.execution.trajectory import STOP_BOUND
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -46,13 +51,15 @@ from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.primitive import OptimoveJ, OptimoveL
+from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.protocol.dialects import NEWEST
 from ur_cartesian_driver.protocol.trajectory import encode_points
+from ur_cartesian_driver.robot.calls import Answer, Call
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.status import DriverStatus
+from ur_cartesian_driver.robot.status import DriverStatus, Gaps
 
 LOG = logging.getLogger('ur_cartesian_driver')
 
@@ -111,7 +118,7 @@ class Motion:
             self._future.set_result(replace(outcome, report=self._plan_report))
 
 
-class Driver:
+class Driver(RobotServices):
     """
     One robot. Thread-safe; open it, or use it as a context manager.
 
@@ -136,6 +143,9 @@ class Driver:
         self._status_listeners: list[Callable[[DriverStatus], None]] = []
         self._ready = threading.Event()
         self._motions: dict[int, Motion] = {}
+        self._calls: dict[int, Future[Answer]] = {}
+        self._signals: Signals | None = None
+        self._gaps = Gaps()
         self._numbers = itertools.count(1)
         # Guards the pipe (several threads send), the running motions and opening and closing.
         self._lock = threading.RLock()
@@ -204,6 +214,16 @@ class Driver:
             return running.memory.read()
         except ValueError:  # closed at this moment
             return None
+
+    @property
+    def signals(self) -> Signals | None:
+        """Inputs, outputs and tool; None before the first report and when the robot is lost."""
+        return self._signals
+
+    @property
+    def gaps(self) -> Gaps:
+        """How steady the connection was lately."""
+        return self._gaps
 
     @property
     def arm(self) -> Arm:
@@ -295,6 +315,19 @@ class Driver:
         """Upload the robot program again; the way on after somebody stopped it."""
         self._send(ResendProgram())
 
+    def call(self, call: Call) -> Future[Answer]:
+        """Ask the robot for something and return at once; the answer comes in any case."""
+        future: Future[Answer] = Future()
+        future.set_running_or_notify_cancel()
+        with self._lock:
+            if self._host is not None and not self._closed.is_set():
+                number = next(self._numbers)
+                self._calls[number] = future
+                self._send(CallRobot(number=number, call=call))
+                return future
+        future.set_result(Answer(ok=False, text='The driver is closed; open it.'))
+        return future
+
     # ---- inside -------------------------------------------------------------------------------
 
     def _start_thread(self, name: str, target: Callable[[], None]) -> None:
@@ -341,6 +374,7 @@ class Driver:
         with self._lock:
             if self._host is None or self._closed.is_set():
                 return
+            self._abandon_calls(text)  # also those that were sent since
             self._host.join()
             self._host = host.start(self.config.robot_loop)
             self._send(Configure(config=self.config, may_upload=may_upload))
@@ -355,8 +389,17 @@ class Driver:
                     motion = self._motions.pop(number, None)
                 if motion is not None:
                     motion._end(outcome)
+            case CallAnswered(number=number, answer=answer):
+                with self._lock:
+                    call = self._calls.pop(number, None)
+                if call is not None:
+                    call.set_result(answer)
             case StatusChanged(status=status):
                 self._set_status(status)
+            case SignalsChanged(signals=signals):
+                self._signals = signals
+            case Alive(gaps=gaps):
+                self._gaps = gaps
             case GeometryKnown(geometry=geometry):
                 self._arm = Arm(self._arm.model, geometry)
             case LogLine(level=level, text=text):
@@ -364,6 +407,8 @@ class Driver:
 
     def _set_status(self, status: DriverStatus) -> None:
         self._status = status
+        if status.state is ConnectionState.DISCONNECTED:
+            self._signals, self._gaps = None, Gaps()
         if status.state is ConnectionState.READY:
             self._ready.set()
         else:
@@ -372,11 +417,18 @@ class Driver:
             _call(listener, status)
 
     def _abandon(self, text: str) -> None:
-        """End all motions of a robot loop that cannot tell their ends any more."""
+        """End all motions and calls of a robot loop that cannot tell their ends any more."""
+        self._abandon_calls(text)
         with self._lock:
             motions, self._motions = self._motions, {}
         for motion in motions.values():
             motion._end(Outcome(code=ErrorCode.CONNECTION_LOST, text=text))
+
+    def _abandon_calls(self, text: str) -> None:
+        with self._lock:
+            calls, self._calls = self._calls, {}
+        for call in calls.values():
+            call.set_result(Answer(ok=False, text=text))
 
 
 def _call(callback: Callable[[T], None], argument: T) -> None:

@@ -10,7 +10,7 @@ the right choice here, and it moves the arrays of a large plan as they are.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 import pickle
 import socket
 import struct
@@ -20,7 +20,9 @@ from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.execution import Order
 from ur_cartesian_driver.kinematics.robots import Geometry
 from ur_cartesian_driver.motion.events import Outcome, Progress
-from ur_cartesian_driver.robot.status import DriverStatus
+from ur_cartesian_driver.motion.signals import Signals
+from ur_cartesian_driver.robot.calls import Answer, Call
+from ur_cartesian_driver.robot.status import DriverStatus, Gaps
 
 LENGTH = struct.Struct('>I')
 
@@ -54,6 +56,14 @@ class CancelMotion:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResendProgram:
     """Upload the robot program (again)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CallRobot:
+    """Ask the robot for something beside motions."""
+
+    number: int
+    call: Call
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -97,8 +107,25 @@ class MotionEnded:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class CallAnswered:
+    """How a call ended."""
+
+    number: int
+    answer: Answer
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SignalsChanged:
+    """Inputs, outputs or tool of the robot changed."""
+
+    signals: Signals
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Alive:
-    """The robot loop is alive."""
+    """The robot loop is alive; how steady it was since the last time."""
+
+    gaps: Gaps = field(default_factory=Gaps)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,9 +137,10 @@ class LogLine:
 
 
 Request: TypeAlias = (
-    Configure | StartMotion | CancelMotion | ResendProgram | Heartbeat | Shutdown)
+    Configure | StartMotion | CancelMotion | ResendProgram | CallRobot | Heartbeat | Shutdown)
 Notice: TypeAlias = (
-    Alive | StatusChanged | GeometryKnown | MotionProgress | MotionEnded | LogLine)
+    Alive | StatusChanged | SignalsChanged | GeometryKnown | MotionProgress | MotionEnded
+    | CallAnswered | LogLine)
 
 
 def pack(message: Request | Notice) -> bytes:

@@ -15,14 +15,17 @@ program brakes and ends when they do.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from functools import partial
 import logging
+from math import inf
 import socket
 from typing import TypeVar
 
 from ur_cartesian_driver.driver.channel import (
     Alive,
+    CallAnswered,
+    CallRobot,
     CancelMotion,
     Configure,
     GeometryKnown,
@@ -36,6 +39,7 @@ from ur_cartesian_driver.driver.channel import (
     Request,
     ResendProgram,
     Shutdown,
+    SignalsChanged,
     StartMotion,
     StatusChanged,
     unpack,
@@ -60,9 +64,11 @@ from ur_cartesian_driver.motion.events import (
 )
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.protocol.trajectory import POINT_SIZE
+from ur_cartesian_driver.robot.call_desk import CallDesk
+from ur_cartesian_driver.robot.calls import Answer, Dashboard
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import RobotLink
-from ur_cartesian_driver.robot.status import DriverStatus
+from ur_cartesian_driver.robot.status import DriverStatus, Gaps
 
 #: How often time alone is looked at [s].
 TICK = 0.02
@@ -70,6 +76,8 @@ TICK = 0.02
 SIGN_OF_LIFE = 0.5
 #: What takes longer than a few milliseconds to unpack or prepare [bytes].
 LARGE = 1 << 18
+#: How many calls are carried out at a time.
+MOST_CALLS = 32
 T = TypeVar('T')
 
 
@@ -90,7 +98,13 @@ class RobotLoop:
         self._link = RobotLink(
             config, on_state=self._keep_state, on_event=self._handle_event,
             on_status=self._status_changed, on_geometry=self._geometry_known,
+            on_signals=lambda signals: self._notify(SignalsChanged(signals=signals)),
             on_log=self._log, may_upload=configure.may_upload)
+        self._desk = CallDesk(config, config.dashboard_port, self._link)
+        self._calls: set[asyncio.Task[None]] = set()
+        self._connection = ConnectionState.DISCONNECTED
+        self._last_report = inf
+        self._longest_gap = 0.0
 
     async def run(self, requests: asyncio.StreamReader) -> None:
         """Serve until the owner shuts down, hangs up or falls silent."""
@@ -100,8 +114,8 @@ class RobotLoop:
                 link = tasks.create_task(self._link.run())
                 ticks = tasks.create_task(self._tick())
                 await self._serve(requests)
-                link.cancel()
-                ticks.cancel()
+                for task in (link, ticks, *self._calls):
+                    task.cancel()
         finally:
             self._end_motion('The driver was shut down.')
             self._link.close()
@@ -130,6 +144,8 @@ class RobotLoop:
                     self._handle_event(CancelRequested())
             case ResendProgram():
                 self._link.upload_program()
+            case CallRobot():
+                self._call(request)
             case Heartbeat():
                 pass
             case _:
@@ -155,9 +171,37 @@ class RobotLoop:
         assert self._latest is not None  # else the link is not ready
         self._carry_out(machine.start(self._latest))
 
+    # ---- calls --------------------------------------------------------------------------------
+
+    def _call(self, request: CallRobot) -> None:
+        """Carry out a call beside everything else."""
+        if len(self._calls) < MOST_CALLS:
+            self._spawn(self._answer(request))
+        else:
+            self._notify(CallAnswered(number=request.number, answer=Answer(
+                ok=False, text=f'{MOST_CALLS} calls are being carried out; wait for some.')))
+
+    async def _answer(self, request: CallRobot) -> None:
+        answer = await self._desk.answer(request.call)
+        self._notify(CallAnswered(number=request.number, answer=answer))
+
+    async def _ask_serial_number(self) -> None:
+        """Fetch the serial number; a robot without a dashboard does not tell it."""
+        answer = await self._desk.answer(Dashboard(command='get serial number'))
+        if answer.ok:
+            self._link.set_serial_number(answer.text)
+
+    def _spawn(self, work: Coroutine[None, None, None]) -> None:
+        task = asyncio.create_task(work)
+        self._calls.add(task)
+        task.add_done_callback(self._calls.discard)
+
     # ---- events of the robot ------------------------------------------------------------------
 
     def _keep_state(self, state: RobotState) -> None:
+        now = self._now()
+        self._longest_gap = max(self._longest_gap, now - self._last_report)
+        self._last_report = now
         self._latest = state
         self._memory.write(state)
 
@@ -199,7 +243,9 @@ class RobotLoop:
             self._handle_event(Tick())
             if self._now() - last_sign >= SIGN_OF_LIFE:
                 last_sign = self._now()
-                self._notify(Alive())
+                self._notify(Alive(gaps=Gaps(
+                    reports=self._longest_gap, keepalives=self._link.keepalive_gap())))
+                self._longest_gap = 0.0
             if self._now() - self._last_heartbeat > self._config.node_timeout:
                 self._last_heartbeat = self._now()
                 if self._machine is not None:
@@ -213,6 +259,11 @@ class RobotLoop:
     def _status_changed(self, status: DriverStatus) -> None:
         if status.state is ConnectionState.DISCONNECTED:
             self._memory.clear()
+            self._last_report = inf
+        before, self._connection = self._connection, status.state
+        if (before, status.state) == (ConnectionState.CONNECTING, ConnectionState.CONNECTED) \
+                and not status.serial_number:
+            self._spawn(self._ask_serial_number())
         self._notify(StatusChanged(status=status))
 
     def _geometry_known(self, geometry: Geometry) -> None:

@@ -173,6 +173,8 @@ def _of_program(situation: Situation, runtime: RuntimeState) -> Next:
 def _unless_local(wanted: Next, situation: Situation) -> Next:
     """Leave to a person what the robot does for nobody else in local control."""
     if situation.remote_control is False and wanted.step in WORDS:
-        return Next(Step.PERSON, 'The robot is in local control: switch it to remote control, or '
-                                 f'{WORDS[wanted.step]} on the pendant.')
+        at_hand = '' if wanted.step is Step.SEND_PROGRAM else (
+            f', or {WORDS[wanted.step]} on the pendant')
+        return Next(Step.PERSON, 'The robot is in local control: switch it to remote control'
+                                 f'{at_hand}.')
     return wanted

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import nan
 
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
@@ -35,6 +36,19 @@ class DriverStatus:
         if self.state is ConnectionState.READY:
             return ''
         return self.message or f'The connection is {self.state.name}.'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Gaps:
+    """
+    The longest pauses lately [s].
+
+    :param reports: between two reports of the robot.
+    :param keepalives: between two signs of life for the robot program.
+    """
+
+    reports: float = nan
+    keepalives: float = nan
 
 
 def is_stopped(robot: RobotState) -> bool:
