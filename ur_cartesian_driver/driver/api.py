@@ -55,7 +55,7 @@ from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.program.render import has_feature
-from ur_cartesian_driver.protocol.dialects import NEWEST
+from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
 from ur_cartesian_driver.protocol.trajectory import encode_points
 from ur_cartesian_driver.robot.calls import Answer, Call
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
@@ -282,8 +282,8 @@ class Driver(RobotServices):
                 raise RobotNotReady(reason)
             motion = Motion(self, next(self._numbers), plan.report, on_progress)
             self._motions[motion.number] = motion
-        self._send(StartMotion(motion=motion.number, points=points, order=replace(
-            order_of(plan), reports_begun=self.config.dialect is NEWEST)))
+        self._send(StartMotion(motion=motion.number, points=points,
+                                order=order_of(plan, self.config.dialect)))
         return motion
 
     def execute(self, goal: Goal, on_progress: OnProgress | None = None,
@@ -447,7 +447,7 @@ def software_version(text: str) -> tuple[int, int, int]:
     return major, minor, bugfix
 
 
-def order_of(plan: Plan) -> Order:
+def order_of(plan: Plan, dialect: Dialect = NEWEST) -> Order:
     """Return what of a plan the robot loop needs."""
     goal = plan.goal
     times = goal.waypoints[-1].time
@@ -456,6 +456,7 @@ def order_of(plan: Plan) -> Order:
         due=times if times > 0.0 else None, T_base_frame=goal.T_base_frame,
         path_tolerance=goal.path_tolerance, goal_tolerance=goal.goal_tolerance,
         goal_time_tolerance=goal.goal_time_tolerance,
+        reports_begun=dialect is NEWEST,
         knows_pace=not any(isinstance(segment.primitive, OptimoveJ | OptimoveL)
                            for segment in plan.segments))
 
