@@ -47,7 +47,7 @@ states = st.builds(
     robot_status=st.integers(0, 15).map(RobotStatus),
     safety_status=st.integers(0, 0xFFF).map(SafetyStatus),
     points_begun=st.integers(0, 2**31 - 1), actual_tcp_acceleration=st.none() | vectors,
-    target_tcp_acceleration=st.none() | vectors)
+    target_tcp_acceleration=st.none() | vectors, joint_torque=st.none() | vectors)
 
 
 @given(states)
@@ -95,4 +95,4 @@ def test_a_reader_never_sees_half_of_a_state(memories):
 
 def test_the_layout_holds_every_field_of_the_state():
     """A field that is added to RobotState has to be added to the memory too."""
-    assert len(fields(RobotState)) == 21
+    assert len(fields(RobotState)) == 22

@@ -29,9 +29,9 @@ from ur_cartesian_driver.motion.state import (
 
 _COUNTER = struct.Struct('<Q')
 #: valid, timestamp, q qd (actual, target), TCP pose and twist (actual, target), wrench, TCP
-#: offset, two scalings, accelerations (actual, target; NaN: not reported), modes, bits, points
-#: begun.
-_DATA = struct.Struct('<?d6d6d6d6d7d6d7d6d6d7ddd6d6d6i')
+#: offset, two scalings, accelerations (actual, target) and joint torques (NaN: not reported),
+#: modes, bits, points begun.
+_DATA = struct.Struct('<?d6d6d6d6d7d6d7d6d6d7ddd6d6d6d6i')
 _SIZE = mmap.PAGESIZE
 _UNKNOWN = (nan,) * 6
 
@@ -71,8 +71,9 @@ class StateMemory:
             *state.target_tcp_pose.row(), *state.target_tcp_twist, *state.actual_tcp_wrench,
             *state.T_flange_tcp.row(), state.speed_scaling, state.target_speed_fraction,
             *(state.actual_tcp_acceleration or _UNKNOWN),
-            *(state.target_tcp_acceleration or _UNKNOWN), state.robot_mode, state.safety_mode,
-            state.runtime_state, state.robot_status, state.safety_status, state.points_begun))
+            *(state.target_tcp_acceleration or _UNKNOWN), *(state.joint_torque or _UNKNOWN),
+            state.robot_mode, state.safety_mode, state.runtime_state,
+            state.robot_status, state.safety_status, state.points_begun))
 
     def read(self) -> RobotState | None:
         """Return the newest state, None when there is none."""
@@ -123,6 +124,7 @@ def _state(values: tuple[float, ...]) -> RobotState | None:
         target_tcp_pose=pose(), target_tcp_twist=vector(), actual_tcp_wrench=vector(),
         T_flange_tcp=pose(), speed_scaling=take(1)[0], target_speed_fraction=take(1)[0],
         actual_tcp_acceleration=known(), target_tcp_acceleration=known(),
+        joint_torque=known(),
         robot_mode=RobotMode(number()), safety_mode=SafetyMode(number()),
         runtime_state=RuntimeState(number()), robot_status=RobotStatus(number()),
         safety_status=SafetyStatus(number()), points_begun=number())

@@ -110,6 +110,8 @@ class RobotState:
     #: Linear [m/s^2] and angular [rad/s^2], as the twists; None = the robot does not report it.
     actual_tcp_acceleration: Vector6 | None = None
     target_tcp_acceleration: Vector6 | None = None
+    #: Torque of each joint [Nm], measured by its current; None = the robot does not report it.
+    joint_torque: Vector6 | None = None
     #: Force [N] and torque [Nm] at the TCP in base axes.
     actual_tcp_wrench: Vector6 = ZERO6
     #: The active TCP in the flange frame.

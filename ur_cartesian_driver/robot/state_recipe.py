@@ -30,7 +30,8 @@ REQUIRED = (
     'speed_scaling', 'target_speed_fraction', 'robot_mode', 'safety_mode', 'runtime_state',
     'robot_status_bits', 'safety_status_bits')
 #: Old software does not have these.
-OPTIONAL = ('tcp_offset', 'actual_TCP_acceleration', 'target_TCP_acceleration', POINTS_BEGUN)
+OPTIONAL = ('tcp_offset', 'actual_TCP_acceleration', 'target_TCP_acceleration',
+            'actual_current_as_torque', POINTS_BEGUN)
 
 _ROBOT_MODES = {mode.value: mode for mode in RobotMode}
 _SAFETY_MODES = {mode.value: mode for mode in SafetyMode}
@@ -52,6 +53,7 @@ def robot_state(values: Mapping[str, Any]) -> RobotState:
         target_tcp_twist=values['target_TCP_speed'],
         actual_tcp_acceleration=values.get('actual_TCP_acceleration'),
         target_tcp_acceleration=values.get('target_TCP_acceleration'),
+        joint_torque=values.get('actual_current_as_torque'),
         actual_tcp_wrench=values['actual_TCP_force'],
         T_flange_tcp=IDENTITY if offset is None else Pose.from_rotation_vector(offset),
         speed_scaling=values['speed_scaling'],

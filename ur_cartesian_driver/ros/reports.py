@@ -75,12 +75,17 @@ def result_message(outcome: Outcome) -> FollowCartesianTrajectory.Result:
 
 
 def joint_state_message(state: RobotState, names: tuple[str, ...], stamp: Time) -> JointState:
-    """Return positions [rad] and velocities [rad/s]; the robot reports no joint torques here."""
+    """
+    Return positions [rad], velocities [rad/s] and efforts [Nm].
+
+    Efforts are left out where the software of the robot does not report them.
+    """
     message = JointState()
     message.header.stamp = stamp
     message.name = list(names)
     message.position = list(state.actual_q)
     message.velocity = list(state.actual_qd)
+    message.effort = list(state.joint_torque or ())
     return message
 
 
