@@ -124,7 +124,7 @@ class RobotCell:
         self.loop, self.headless = loop, headless
         self._settings = settings
         self.owner = Owner()
-        self.robot = self.robot_task = self.loop_task = self.memory = None
+        self.robot = self.robot_task = self.loop_task = self.memory = self._pipe = None
         self.config = None
 
     # ---- life ---------------------------------------------------------------------------------
@@ -137,12 +137,12 @@ class RobotCell:
             realtime_port=30003, interpreter_port=30020))
         self.config = DriverConfig(headless_mode=self.headless, **self._settings)
         await asyncio.start_server(self.owner.serve, HOST, OWNER_PORT)
-        reader, writer = await asyncio.open_connection(HOST, OWNER_PORT)
+        reader, self._pipe = await asyncio.open_connection(HOST, OWNER_PORT)
         descriptor = snapshot.create()
         self.memory = snapshot.StateMemory(descriptor)
         os.close(descriptor)
         self.loop_task = asyncio.create_task(RobotLoop(
-            Configure(config=self.config), self.memory, writer).run(reader))
+            Configure(config=self.config), self.memory, self._pipe).run(reader))
         if not self.headless:
             await self.until(lambda: self.status.state is ConnectionState.CONNECTED)
             await self.load_pendant_program()
@@ -181,6 +181,7 @@ class RobotCell:
         await asyncio.wait({self.loop_task}, timeout=5.0)
         self.loop_task.cancel()
         await asyncio.gather(self.loop_task, return_exceptions=True)
+        self._pipe.close()
         await self.crash_robot()
         self.memory.close()
 
