@@ -20,7 +20,9 @@ from ur_cartesian_driver.execution import (
 )
 from ur_cartesian_driver.execution.tcp_loan import CARRIED_OUT
 from ur_cartesian_driver.execution.trajectory import (
+    GATHER,
     Signal,
+    STALL_BOUND,
     State,
     STOP_BOUND,
     STOPS,
@@ -109,6 +111,8 @@ def brought_to(state):
         machine.step(CancelRequested(), 1.0)
     if state is State.HALTING:
         machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 1.1)
+    if state is State.ENDING:
+        machine.step(LinkLost(link='program', reason='it hung up'), 1.0)
     if state is State.ENDED:
         machine.step(TrajectoryEnded(result=TrajectoryResult.FAILURE), 1.0)
     assert machine.state is state
@@ -342,10 +346,10 @@ def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
            State.HALTING: {Signal.AT_REST, Signal.LATE},
            State.ARMING: {Signal.ARMED, Signal.LATE},
            State.RESTORING: {Signal.RESTORED, Signal.LATE},
-           State.MOVING: {Signal.VIOLATION, Signal.DEVIATION}}
+           State.MOVING: {Signal.VIOLATION, Signal.DEVIATION, Signal.STALLED},
+           State.ENDING: {Signal.LATE}}
     judged = {Signal.ARMED, Signal.RESTORED, Signal.SETTLED, Signal.AT_REST, Signal.LATE,
-              Signal.UNANSWERED, Signal.VIOLATION,
-              Signal.DEVIATION}
+              Signal.UNANSWERED, Signal.VIOLATION, Signal.DEVIATION, Signal.STALLED}
     possible = state is not State.ENDED and (
         signal not in judged or signal in own.get(state, set()))
     assert (signal in TRANSITIONS[state]) == possible
@@ -369,8 +373,8 @@ STOPPED_STATES = [
 @pytest.mark.parametrize('state', RUNNING)
 def test_a_robot_that_stops_by_itself_ends_the_goal_in_every_state(state, changes, signal):
     machine = brought_to(state)
-    commands = machine.step(robot(0.5, **changes), 1.2)
-    assert outcome(commands).code is STOPS[signal]
+    commands = machine.step(robot(0.5, **changes), 1.05)
+    assert outcome(commands + machine.step(Tick(), 1.05 + GATHER)).code is STOPS[signal]
     assert machine.state is State.ENDED
 
 
@@ -378,9 +382,45 @@ def test_a_robot_that_stops_by_itself_ends_the_goal_in_every_state(state, change
                                         ('RTDE', ErrorCode.CONNECTION_LOST)])
 @pytest.mark.parametrize('state', RUNNING)
 def test_a_lost_link_ends_the_goal_in_every_state_and_says_who_hung_up(state, link, code):
-    end = outcome(brought_to(state).step(LinkLost(link=link, reason='it closed'), 1.2))
+    machine = brought_to(state)
+    commands = machine.step(LinkLost(link=link, reason='it closed'), 1.05)
+    end = outcome(commands + machine.step(Tick(), 1.05 + GATHER))
     assert end.code is code
-    assert 'it closed' in end.text
+    assert 'it closed' in end.text or state is State.ENDING
+
+
+@pytest.mark.parametrize('deeper', [
+    LinkLost(link='RTDE', reason='it closed'), robot(0.5, safety_status=SafetyStatus.FAULT),
+    robot(0.5, safety_status=SafetyStatus.EMERGENCY_STOPPED)])
+def test_what_took_the_program_with_it_is_the_reason_whichever_is_heard_of_first(deeper):
+    gone = LinkLost(link='program', reason='it hung up')
+    first, then = started(), started()
+    expected = outcome(first.step(deeper, 1.0)).code
+    assert then.step(gone, 1.0) == []
+    assert then.step(robot(0.5, runtime_state=RuntimeState.STOPPED), 1.01)[1:] == []
+    assert outcome(then.step(deeper, 1.02)).code is expected is not ErrorCode.PROGRAM_STOPPED
+
+
+def standing(machine, seconds, **changes):
+    """Let the arm stand in the middle of the path; return the commands."""
+    times = [0.1 * i for i in range(1, round(10.0 * seconds) + 1)]
+    return [command for t in times
+            for command in machine.step(robot(0.5, timestamp=t, qd=REST, **changes), t)]
+
+
+def test_an_arm_that_stands_for_no_reason_does_not_stand_for_ever():
+    commands = standing(started(), STALL_BOUND + 0.3)
+    assert outcome(commands).code is ErrorCode.EXECUTION_FAILED
+    assert any(isinstance(c, StopProgram) for c in commands)
+
+
+@pytest.mark.parametrize('reason', [
+    {'runtime_state': RuntimeState.PAUSED}, {'speed_scaling': 0.0},
+    {'target_speed_fraction': 0.0}])
+def test_an_arm_that_is_held_may_stand_as_long_as_it_likes(reason):
+    machine = started()
+    assert not [c for c in standing(machine, 20.0, **reason) if isinstance(c, Finish)]
+    assert machine.state is State.MOVING
 
 
 def test_a_protective_stop_ends_the_program_so_that_the_motion_cannot_resume():

@@ -11,8 +11,8 @@ signal means in the present state: the next state and how the goal ends, if it d
   there is on the wire. Nothing moves before the robot reports it, and itself where the plan
   begins. Goals about the TCP itself begin in MOVING.
 * **MOVING**: the robot program runs points. The result SUCCESS leads to SETTLING; whatever stops
-  the arm by itself (safety, program, connection) ends the goal at once, because nothing that we
-  could send would be read; a reason of ours to stop (cancel, tolerance) leads to STOPPING.
+  the arm by itself (safety, connection) ends the goal at once, because nothing that we could send
+  would be read; a reason of ours to stop (cancel, tolerance) leads to STOPPING.
 * **SETTLING**: the program says that the last point is reached. The arm has to be inside the goal
   tolerance and at rest, within the goal's time tolerance. Where the controller's own target is
   elsewhere, the program left something out (DEVIATION).
@@ -23,6 +23,9 @@ signal means in the present state: the next state and how the goal ends, if it d
 * **RESTORING**: how the goal ends is decided, and nothing moves; the TCP of before is on the wire.
   The outcome waits until the robot reports it, so the next goal finds it. Goals that changed no
   TCP pass through at once.
+* **ENDING**: the robot program is gone. Programs end because the safety system, the power or the
+  whole controller has gone as well, and which of them we hear of first is chance: so for
+  :data:`GATHER` a deeper reason still counts.
 * **ENDED**: the outcome is out. Later events mean nothing.
 
 Everything has a bound: an answer that does not come in STOPPING or HALTING ends the goal after
@@ -30,8 +33,10 @@ Everything has a bound: an answer that does not come in STOPPING or HALTING ends
 the arm stands, and the goal ends as it was to end (UNANSWERED); an arm that still moves is a
 failure (LATE). A TCP that is not set in time ends the goal before it began; one that is not back
 in time, or not at the end because the robot stopped, is the business of whoever carries out the
-commands: see :attr:`TrajectoryMachine.loan`. Only MOVING has none, because a speed slider at
-zero is not an error; there, RTDE packets that stop coming are reported as a lost connection.
+commands: see :attr:`TrajectoryMachine.loan`. MOVING has none, because a speed slider at zero is
+not an error; but an arm that stands for :data:`STALL_BOUND` while nothing holds it waits for
+something that will not come: a command or a result was lost (STALLED). RTDE packets that stop
+coming are reported as a lost connection.
 """
 
 from __future__ import annotations
@@ -90,6 +95,11 @@ EARLY_ANSWER = 1.0
 #: How long the arm may need from the program's SUCCESS to rest inside its goal tolerance, when
 #: the goal does not say [s].
 DEFAULT_GOAL_TIME_TOLERANCE = 1.0
+#: How long a deeper reason for the end of the robot program is waited for [s]: what dies together
+#: is reported by different connections, some cycles apart.
+GATHER = 0.1
+#: How long the target may stand still in the middle of a goal that nothing holds [s].
+STALL_BOUND = 2.0
 #: How far the controller's own target may be from the plan [m], [rad].
 MAX_PLAN_DEVIATION = (0.002, 0.02)
 
@@ -103,6 +113,7 @@ class State(Enum):
     STOPPING = auto()
     HALTING = auto()
     RESTORING = auto()
+    ENDING = auto()
     ENDED = auto()
 
 
@@ -115,6 +126,7 @@ class Signal(Enum):
     CANCEL = auto()
     VIOLATION = auto()
     DEVIATION = auto()
+    STALLED = auto()
     PROTECTIVE_STOP = auto()
     EMERGENCY_STOP = auto()
     PROGRAM_STOPPED = auto()
@@ -127,7 +139,8 @@ class Signal(Enum):
     UNANSWERED = auto()
 
 
-#: What ends a goal in every state but ENDED, and the code it ends with where none is decided yet.
+#: What stops the arm in every state but ENDED, and the code that the goal ends with where none is
+#: decided yet.
 STOPS: Mapping[Signal, ErrorCode] = MappingProxyType({
     Signal.PROTECTIVE_STOP: ErrorCode.PROTECTIVE_STOP,
     Signal.EMERGENCY_STOP: ErrorCode.EMERGENCY_STOP,
@@ -144,8 +157,9 @@ class Step:
     code: ErrorCode | None = None
 
 
-#: After these the robot program is paused, and not ended.
-_PAUSES = frozenset({Signal.PROTECTIVE_STOP, Signal.EMERGENCY_STOP, Signal.UNANSWERED})
+#: After these the robot program is paused or deaf, and not ended.
+_PAUSES = frozenset({Signal.PROTECTIVE_STOP, Signal.EMERGENCY_STOP, Signal.UNANSWERED,
+                     Signal.STALLED})
 
 
 def _ends(code: ErrorCode) -> Step:
@@ -156,7 +170,8 @@ def _judged(code: ErrorCode) -> Step:
     return Step(State.RESTORING, code)
 
 
-_STOPS = {signal: _ends(code) for signal, code in STOPS.items()}
+_STOPS = {signal: _ends(code) for signal, code in STOPS.items()} | {
+    Signal.PROGRAM_STOPPED: Step(State.ENDING, ErrorCode.PROGRAM_STOPPED)}
 
 
 def _stays(state: State, *signals: Signal) -> dict[Signal, Step]:
@@ -182,6 +197,7 @@ TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
         Signal.CANCEL: Step(State.STOPPING, ErrorCode.CANCELLED),
         Signal.VIOLATION: Step(State.STOPPING, ErrorCode.PATH_TOLERANCE_VIOLATED),
         Signal.DEVIATION: Step(State.STOPPING, ErrorCode.EXECUTION_FAILED),
+        Signal.STALLED: _ends(ErrorCode.EXECUTION_FAILED),
     },
     State.SETTLING: {
         **_STOPS,
@@ -208,6 +224,12 @@ TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
         **{signal: Step(State.ENDED) for signal in STOPS},
         **_stays(State.RESTORING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, Signal.CANCEL),
         Signal.RESTORED: Step(State.ENDED),
+        Signal.LATE: Step(State.ENDED),
+    },
+    State.ENDING: {
+        **_STOPS,
+        **_stays(State.ENDING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, Signal.CANCEL,
+                 Signal.PROGRAM_STOPPED),
         Signal.LATE: Step(State.ENDED),
     },
     State.ENDED: {},
@@ -272,6 +294,8 @@ class TrajectoryMachine:
         self._stale_begun: int | None = None
         #: Time since the start in which the controller's own clock ran [s].
         self._scaled_time = 0.0
+        #: How long the target has stood still while nothing held it [s].
+        self._stalled_time = 0.0
         self._deadline = inf
         #: When the controller's target has to be at the end, once the program says so.
         self._arrival_due = inf
@@ -340,7 +364,7 @@ class TrajectoryMachine:
         if self.state is State.ARMING and self._is_armed(state):
             return Signal.ARMED, ''
         if self.state is State.MOVING:
-            return (self._plan_deviation(state) or self._wrong_pace(state)
+            return (self._plan_deviation(state) or self._wrong_pace(state) or self._stall()
                     or self._path_violation(state))
         if self.state is State.SETTLING and at_rest:
             return self._arrival(state, now)
@@ -402,6 +426,15 @@ class TrajectoryMachine:
             return Signal.SETTLED, ''
         return self._late(now)
 
+    def _stall(self) -> tuple[Signal, str] | None:
+        """Return that the arm stands for no reason, or None."""
+        if self._stalled_time < STALL_BOUND:
+            return None
+        return Signal.STALLED, (
+            f'the arm has stood still for {STALL_BOUND:g} s, nothing holds it, and the robot '
+            'program has not reported the end: a message to it or from it was lost, so it was '
+            'ended')
+
     def _path_violation(self, state: RobotState) -> tuple[Signal | None, str]:
         if not (self._path_watch and self._under_way):
             return None, ''
@@ -441,7 +474,7 @@ class TrajectoryMachine:
             return _RESULTS[TrajectoryResult.CANCELED] if self._has_not_begun() else (None, '')
         if self.state is State.ARMING:
             return Signal.LATE, self._why_not_armed()
-        if self.state is State.RESTORING:
+        if self.state in (State.RESTORING, State.ENDING):
             return Signal.LATE, ''
         if self.state is State.SETTLING:
             missing = self._goal_error(self._latest) if self._latest is not None else None
@@ -508,6 +541,10 @@ class TrajectoryMachine:
         self._deadline = now + TCP_BOUND
         return [*self._last_report(), ReturnTcp(T_flange_tcp=self.loan.T_flange_before)]
 
+    def _enter_ending(self, signal: Signal, now: float) -> list[Command]:
+        self._deadline = now + GATHER
+        return []
+
     def _enter_ended(self, signal: Signal, now: float) -> list[Command]:
         if self._over:  # nothing of the motion is left that could go on
             return self._finish()
@@ -567,6 +604,7 @@ class TrajectoryMachine:
                 self._scaled_time += passed * state.speed_scaling
         if self.state is State.MOVING:
             self._follow(before, state, passed)
+            self._stalled_time = self._stalled_time + passed if _stands(before, state) else 0.0
         commands = self._release(max(self._begun(state), self._tracker.waypoint()))
         if now >= self._next_report and self._shows_goal():
             self._next_report = now + self._feedback_period
@@ -631,6 +669,14 @@ def _rests(state: RobotState) -> bool:
     return max(map(abs, state.actual_qd)) < REST_SPEED
 
 
+def _stands(before: RobotState | None, state: RobotState) -> bool:
+    """Tell whether the target stands although neither slider nor pause holds it."""
+    return (before is not None and state.target_q == before.target_q
+            and state.target_tcp_pose == before.target_tcp_pose
+            and state.speed_scaling > 0.0 and state.target_speed_fraction > 0.0
+            and state.runtime_state is RuntimeState.PLAYING)
+
+
 def stop_in(state: RobotState) -> tuple[Signal, str] | None:
     """Return why the robot cannot go on by itself, or None when it can."""
     safety = state.safety_status
@@ -668,5 +714,6 @@ _ENTER: Mapping[State, Callable[[TrajectoryMachine, Signal, float], list[Command
         State.STOPPING: TrajectoryMachine._enter_stopping,
         State.HALTING: TrajectoryMachine._enter_halting,
         State.RESTORING: TrajectoryMachine._enter_restoring,
+        State.ENDING: TrajectoryMachine._enter_ending,
         State.ENDED: TrajectoryMachine._enter_ended,
     }))
