@@ -7,17 +7,24 @@ import threading
 from time import monotonic
 
 from action_msgs.msg import GoalStatus
-from geometry_msgs.msg import PoseStamped
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, WrenchStamped
 import pytest
 import rclpy
 from rclpy.context import Context
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, Float64, Int8
+from std_msgs.msg import Bool, Float64
 from std_srvs.srv import Trigger
 
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.msg import DriverStatus
+from ur_cartesian_driver.msg import (
+    DriverStatus,
+    IOStates,
+    RobotMode,
+    SafetyMode,
+    ToolData,
+)
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros.client import GoalClient, load_goal
@@ -30,9 +37,13 @@ ABORTED = GoalStatus.STATUS_ABORTED
 TOPICS = {
     'joint_states': (JointState, STATE),
     'ur_cartesian_driver/tcp_pose': (PoseStamped, STATE),
+    'ur_cartesian_driver/wrench': (WrenchStamped, STATE),
+    'ur_cartesian_driver/io_states': (IOStates, LATCHED),
+    'ur_cartesian_driver/tool_data': (ToolData, LATCHED),
+    'diagnostics': (DiagnosticArray, STATE),
     'ur_cartesian_driver/speed_scaling': (Float64, STATE),
-    'ur_cartesian_driver/robot_mode': (Int8, LATCHED),
-    'ur_cartesian_driver/safety_mode': (Int8, LATCHED),
+    'ur_cartesian_driver/robot_mode': (RobotMode, LATCHED),
+    'ur_cartesian_driver/safety_mode': (SafetyMode, LATCHED),
     'ur_cartesian_driver/robot_program_running': (Bool, LATCHED),
     'ur_cartesian_driver/status': (DriverStatus, LATCHED),
 }
@@ -61,10 +72,12 @@ def test_the_state_of_the_robot_is_published(single_cell):
     assert pose.header.frame_id == 'base'
     assert pose.pose.position.x == pytest.approx(cell.T_base_tcp.position[0])
     assert newest['ur_cartesian_driver/speed_scaling'].data == 1.0
-    assert newest['ur_cartesian_driver/robot_mode'].data == 7
-    assert newest['ur_cartesian_driver/safety_mode'].data == 1
+    assert newest['ur_cartesian_driver/robot_mode'].name == 'RUNNING'
+    assert newest['ur_cartesian_driver/safety_mode'].name == 'NORMAL'
     status = newest['ur_cartesian_driver/status']
     assert status.robot_model == 'ur5e'
+    cell.spin_until(lambda: newest['ur_cartesian_driver/status'].serial_number == '20000000000')
+    assert newest['ur_cartesian_driver/wrench'].header.frame_id == 'tool0_controller'
 
 
 def test_a_protective_stop_is_published(single_cell):
@@ -72,7 +85,7 @@ def test_a_protective_stop_is_published(single_cell):
     newest = subscribe(cell, ['ur_cartesian_driver/safety_mode', 'ur_cartesian_driver/status'])
     cell.spin_until(lambda: len(newest) == 2)
     cell.sim.protective_stop()
-    cell.spin_until(lambda: newest['ur_cartesian_driver/safety_mode'].data == 3)
+    cell.spin_until(lambda: newest['ur_cartesian_driver/safety_mode'].mode == 3)
     cell.spin_until(lambda: newest['ur_cartesian_driver/status'].state == DriverStatus.STOPPED)
     assert newest['ur_cartesian_driver/status'].message
 

@@ -17,7 +17,7 @@ from math import dist, isnan
 from typing import Protocol
 
 from ur_cartesian_driver.motion.errors import DriverError
-from ur_cartesian_driver.motion.pose import angle_between
+from ur_cartesian_driver.motion.pose import angle_between, normalize, Pose
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol import primary, script_command
@@ -264,7 +264,7 @@ class CallDesk:
         return None
 
     async def _set_tcp(self, call: SetTcp) -> Answer:
-        wanted = call.T_flange_tcp
+        wanted = Pose(call.T_flange_tcp.position, normalize(call.T_flange_tcp.quaternion))
 
         def seen(robot: RobotState) -> bool:
             there = robot.T_flange_tcp

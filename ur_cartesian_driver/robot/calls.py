@@ -9,7 +9,7 @@ Values are checked when a call is made, so that one which exists can be sent.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
+from math import hypot, isfinite
 from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
@@ -21,6 +21,11 @@ from ur_cartesian_driver.protocol.dashboard import Request
 #: How many outputs there are of each kind.
 PINS = {OutputKind.STANDARD_DIGITAL: 8, OutputKind.CONFIGURABLE_DIGITAL: 8,
         OutputKind.TOOL_DIGITAL: 2, OutputKind.STANDARD_ANALOG: 2}
+
+#: No tool is longer [m].
+LARGEST_TOOL = 5.0
+#: How far the length of a quaternion may be off 1.
+UNIT_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,6 +71,18 @@ class SetTcp:
     """Set the active TCP, given in the flange frame."""
 
     T_flange_tcp: Pose
+
+    def __post_init__(self) -> None:
+        """Check that it is a pose, and not one in millimetres."""
+        position, quaternion = self.T_flange_tcp.position, self.T_flange_tcp.quaternion
+        if not max(map(abs, position)) <= LARGEST_TOOL:
+            raise LocalProtocolError(
+                f'The TCP is at {position} m in the flange, farther than {LARGEST_TOOL:g} m; '
+                'give its position in metres.')
+        if not abs(hypot(*quaternion) - 1.0) <= UNIT_TOLERANCE:
+            raise LocalProtocolError(
+                f'The orientation of the TCP is {quaternion}, which is no unit quaternion (x, y, '
+                'z, w).')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -26,11 +26,11 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
-from std_srvs.srv import Trigger
 
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.ros.action_server import CartesianActionServer
 from ur_cartesian_driver.ros.parameters import declare, overrides, ParameterError, Value
+from ur_cartesian_driver.ros.services import Services
 from ur_cartesian_driver.ros.state_publisher import StatePublisher
 
 #: How often the driver hears that the executor of the node is alive [s].
@@ -86,23 +86,12 @@ class CartesianDriverNode(Node):
         self.action_server = CartesianActionServer(self, self.driver, settings)
         self._parts.append(self.action_server)
         self._publisher.start()
-        self.create_service(Trigger, '~/resend_robot_program', self._resend_robot_program)
+        self._call_services = Services(self, self.driver, lambda: self.action_server.idle)
         self.create_timer(
             HEARTBEAT_PERIOD, self.driver.heartbeat,
             # Of its own, and on a clock that no simulation stops.
             callback_group=MutuallyExclusiveCallbackGroup(),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
-
-    def _resend_robot_program(self, request: Trigger.Request,
-                              response: Trigger.Response) -> Trigger.Response:
-        response.success = self.driver.config.headless_mode
-        if response.success:
-            self.driver.resend_robot_program()
-            response.message = 'The robot program is being sent; ~/status tells when it runs.'
-        else:
-            response.message = ('The parameter headless_mode is false: play a program with '
-                                'External Control on the pendant.')
-        return response
 
     def destroy_node(self) -> None:
         """Stop the arm if it moves, end all goals, threads and connections, then the node."""

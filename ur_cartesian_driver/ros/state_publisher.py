@@ -6,56 +6,62 @@ The topics that tell the state of the robot, published from a thread of their ow
 A timer of the executor would cost twice as much and wait behind every other callback. The thread
 also notices changes, so there is one place that publishes and nothing to lock.
 
-==========================  ======================  ===========================================
-topic                       type                    content
-==========================  ======================  ===========================================
-``joint_states``            sensor_msgs/JointState  measured positions [rad], velocities [rad/s]
-``~/tcp_pose``              geometry_msgs/          measured pose of the active TCP in ``base``
-                            PoseStamped
-``~/speed_scaling``         std_msgs/Float64        part of the nominal speed at which the
-                                                    controller runs, 0 (stands) to 1
-``~/robot_mode``            std_msgs/Int8, latched  number of the controller, 7 = RUNNING; -2 =
-                                                    not reported (``DriverStatus`` names them)
-``~/safety_mode``           std_msgs/Int8, latched  number of the controller, 1 = NORMAL; 0 = not
-                                                    reported
-``~/robot_program_running`` std_msgs/Bool, latched  our program runs on the robot
-``~/status``                DriverStatus, latched   all of it, and what is needed; on each change
-                                                    and once a second
-==========================  ======================  ===========================================
+Names, types, units and rates: ``doc/ros_interface.md``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from math import nan
+import importlib
 import threading
 from time import monotonic
+from types import ModuleType
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PoseStamped
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.action.server import RCLError
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Bool, Float64, Int8
+from std_msgs.msg import Bool, Float64
 
 from ur_cartesian_driver.driver import Driver
-from ur_cartesian_driver.driver import DriverStatus as Connection
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
+from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.msg import DriverStatus
+from ur_cartesian_driver.msg import DriverStatus, IOStates, RobotMode, SafetyMode, ToolData
+from ur_cartesian_driver.ros.diagnostics import diagnostics_message
 from ur_cartesian_driver.ros.parameters import Settings
 from ur_cartesian_driver.ros.reports import joint_state_message, tcp_pose_message
+from ur_cartesian_driver.ros.state_messages import (
+    io_states_message,
+    robot_mode_message,
+    safety_mode_message,
+    status_message,
+    tcp_transform,
+    tool_data_message,
+    wrench_message,
+)
 
 #: The newest value is enough, but a reliable subscriber shall be served too.
 STATE = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 #: Who comes late gets the last value at once.
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
                      durability=DurabilityPolicy.TRANSIENT_LOCAL)
+#: As tf2 wants it.
+TF = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 #: How often an unchanged status is confirmed [s].
 CONFIRMATION = 1.0
+
+
+def tf_messages() -> ModuleType | None:
+    """Return ``tf2_msgs.msg`` where it is installed; it does not come from PyPI."""
+    try:
+        return importlib.import_module('tf2_msgs.msg')
+    except ImportError:
+        return None
 
 
 class StatePublisher:
@@ -66,24 +72,12 @@ class StatePublisher:
         self._clock = node.get_clock()
         self._driver = driver
         self._period = 1.0 / settings.node.state_publish_rate
-        self._joint_names = tuple(settings.planning.tf_prefix + name for name in JOINT_NAMES)
-        self._base = settings.frames.base
-
-        self._joint_states = node.create_publisher(JointState, 'joint_states', STATE)
-        self._tcp_pose = node.create_publisher(PoseStamped, '~/tcp_pose', STATE)
-        self._speed_scaling = node.create_publisher(Float64, '~/speed_scaling', STATE)
-        self._status = node.create_publisher(DriverStatus, '~/status', LATCHED)
-        self._confirmed = -CONFIRMATION
-        self._last_status: object = None
-        self._last_state: RobotState | None = None
-        self._on_change: tuple[_OnChange, ...] = (
-            _OnChange(node, Int8, '~/robot_mode', lambda status: status.robot_mode),
-            _OnChange(node, Int8, '~/safety_mode', lambda status: status.safety_mode),
-            _OnChange(node, Bool, '~/robot_program_running',
-                      lambda status: status.program_running),
-        )
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._run, name='state publisher', daemon=True)
+        self._steady = _Steady(node, settings)
+        self._changes = _Changes(node)
+        self._signals = _Signals(node)
+        self._diagnostics = _Diagnostics(node, settings.node.diagnostics_rate)
 
     def start(self) -> None:
         """Start the thread."""
@@ -106,55 +100,103 @@ class StatePublisher:
             due += self._period * max(1.0, (monotonic() - due) // self._period)
 
     def _publish(self, now: float) -> None:
-        state, connection = self._driver.state, self._driver.status
-        stamp = self._clock.now().to_msg()
-        if state is not None and state != self._last_state:
-            self._joint_states.publish(joint_state_message(state, self._joint_names, stamp))
-            self._tcp_pose.publish(tcp_pose_message(state, self._base, stamp))
-            self._speed_scaling.publish(Float64(data=state.speed_scaling))
-        self._last_state = state
-
-        mode = None if state is None else (state.robot_mode, state.safety_mode)
-        if (connection, mode) != self._last_status or now - self._confirmed >= CONFIRMATION:
-            self._last_status, self._confirmed = (connection, mode), now
-            status = status_message(connection, state, stamp)
-            self._status.publish(status)
-            for topic in self._on_change:
-                topic.publish(status)
+        driver, stamp = self._driver, self._clock.now().to_msg()
+        state = driver.state
+        self._steady.publish(state, stamp)
+        self._changes.publish(driver, state, now, stamp)
+        self._signals.publish(driver.signals, stamp)
+        self._diagnostics.publish(driver, now, stamp)
 
 
-class _OnChange:
-    """A latched topic with one value of the status."""
+class _Steady:
+    """What is published with each new state of the robot."""
 
-    def __init__(self, node: Node, kind: Any, name: str,
-                 value: Callable[[DriverStatus], Any]) -> None:
-        self._publisher = node.create_publisher(kind, name, LATCHED)
-        self._kind, self._value, self._last = kind, value, None
+    def __init__(self, node: Node, settings: Settings) -> None:
+        self._joint_names = tuple(settings.planning.tf_prefix + name for name in JOINT_NAMES)
+        self._base, self._tcp = settings.frames.base, settings.frames.tcp
+        self._joint_states = node.create_publisher(JointState, 'joint_states', STATE)
+        self._tcp_pose = node.create_publisher(PoseStamped, '~/tcp_pose', STATE)
+        self._wrench = node.create_publisher(WrenchStamped, '~/wrench', STATE)
+        self._speed_scaling = node.create_publisher(Float64, '~/speed_scaling', STATE)
+        tf = tf_messages()
+        self._tf_kind: Any = None if tf is None else tf.TFMessage
+        self._tf = None if tf is None else node.create_publisher(tf.TFMessage, '/tf', TF)
+        self._last: RobotState | None = None
 
-    def publish(self, status: DriverStatus) -> None:
-        value = self._value(status)
-        if value != self._last:
-            self._last = value
-            self._publisher.publish(self._kind(data=value))
+    def publish(self, state: RobotState | None, stamp: Time) -> None:
+        last, self._last = self._last, state
+        if state is None or (last is not None and state.timestamp == last.timestamp):
+            return
+        self._joint_states.publish(joint_state_message(state, self._joint_names, stamp))
+        self._tcp_pose.publish(tcp_pose_message(state, self._base, stamp))
+        self._wrench.publish(wrench_message(state, self._tcp, stamp))
+        self._speed_scaling.publish(Float64(data=state.speed_scaling))
+        if self._tf is not None:
+            self._tf.publish(self._tf_kind(
+                transforms=[tcp_transform(state, self._base, self._tcp, stamp)]))
 
 
-def status_message(connection: Connection, state: RobotState | None, stamp: Time) -> DriverStatus:
-    """Return how far the connection is, with the modes of the robot."""
-    message = DriverStatus(
-        state=int(connection.state),
-        message=connection.message,
-        last_error=connection.last_error,
-        robot_mode=DriverStatus.ROBOT_MODE_UNKNOWN,
-        safety_mode=DriverStatus.SAFETY_MODE_UNKNOWN,
-        program_running=connection.program_running,
-        speed_scaling=nan,
-        robot_model=connection.robot_model,
-        polyscope_version=connection.polyscope_version,
-        calibration_known=connection.calibration_known,
-    )
-    message.header.stamp = stamp
-    if state is not None:
-        message.robot_mode = int(state.robot_mode)
-        message.safety_mode = int(state.safety_mode)
-        message.speed_scaling = state.speed_scaling
-    return message
+class _Changes:
+    """What is published when it changes: latched."""
+
+    def __init__(self, node: Node) -> None:
+        self._status = node.create_publisher(DriverStatus, '~/status', LATCHED)
+        self._robot_mode = node.create_publisher(RobotMode, '~/robot_mode', LATCHED)
+        self._safety_mode = node.create_publisher(SafetyMode, '~/safety_mode', LATCHED)
+        self._program = node.create_publisher(Bool, '~/robot_program_running', LATCHED)
+        self._last: dict[Any, object] = {}
+        self._confirmed = -CONFIRMATION
+
+    def publish(self, driver: Driver, state: RobotState | None, now: float, stamp: Time) -> None:
+        connection = driver.status
+        robot_mode = None if state is None else state.robot_mode
+        safety_mode = None if state is None else state.safety_mode
+        overdue = now - self._confirmed >= CONFIRMATION
+        if self._is_new(self._status, (connection, robot_mode, safety_mode)) or overdue:
+            self._confirmed = now
+            self._status.publish(status_message(connection, state, stamp))
+        if self._is_new(self._robot_mode, robot_mode):
+            self._robot_mode.publish(robot_mode_message(state))
+        if self._is_new(self._safety_mode, safety_mode):
+            self._safety_mode.publish(safety_mode_message(state))
+        if self._is_new(self._program, connection.program_running):
+            self._program.publish(Bool(data=connection.program_running))
+
+    def _is_new(self, topic: Any, value: object) -> bool:
+        """Tell whether a topic has another value than before, or none yet."""
+        if topic in self._last and self._last[topic] == value:
+            return False
+        self._last[topic] = value
+        return True
+
+
+class _Signals:
+    """Inputs, outputs and tool: when something of them changes, latched."""
+
+    def __init__(self, node: Node) -> None:
+        self._io_states = node.create_publisher(IOStates, '~/io_states', LATCHED)
+        self._tool_data = node.create_publisher(ToolData, '~/tool_data', LATCHED)
+        self._last: Signals | None = None
+
+    def publish(self, signals: Signals | None, stamp: Time) -> None:
+        last, self._last = self._last, signals
+        if signals is None or signals is last:
+            return
+        self._io_states.publish(io_states_message(signals, stamp))
+        self._tool_data.publish(tool_data_message(signals, stamp))
+
+
+class _Diagnostics:
+    """``/diagnostics``, at a rate of its own."""
+
+    def __init__(self, node: Node, rate: float) -> None:
+        self._name = node.get_fully_qualified_name().strip('/')
+        self._period = 1.0 / rate if rate > 0.0 else 0.0
+        self._topic = node.create_publisher(DiagnosticArray, '/diagnostics', STATE) \
+            if rate > 0.0 else None
+        self._due = 0.0
+
+    def publish(self, driver: Driver, now: float, stamp: Time) -> None:
+        if self._topic is not None and now >= self._due:
+            self._due = now + self._period
+            self._topic.publish(diagnostics_message(driver, self._name, stamp))
