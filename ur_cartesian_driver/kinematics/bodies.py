@@ -15,11 +15,12 @@ to axis; so each end of a body is a place on an axis, and a calibrated arm needs
 
 Sources. Radii and lengths of the housings: measured on the collision meshes of UR3, UR5 and UR10
 in the package example-robot-data (:data:`_SIZES`); a test proves that these cylinders contain
-them. e-Series arms have the joints of the CB3 arm of the same size. The larger ones are a UR10's
-scaled by the footprints of the data sheets (190 mm; UR15 and its relatives 204 mm, UR20 and UR30
-245 mm). s and e: the offsets in the configuration files of the ROS 2 description package of
-Universal Robots, but for the UR15 and its relatives, for which it has the planes in which the
-links meet; there s and e are these plus the half widths of the housings.
+them, but for the plug of the cable at the base. e-Series arms have the joints of the CB3 arm of
+the same size. The larger ones are a UR10's scaled by the footprints of the data sheets (190 mm;
+UR15 and its relatives 204 mm, UR20 and UR30 245 mm). s and e: the offsets in the configuration
+files of the ROS 2 description package of Universal Robots, but for the UR15 and its relatives, for
+which it has the planes in which the links meet; there s and e are these plus the half widths of
+the housings. The UR10's are the middles of its tubes in the meshes.
 """
 
 from __future__ import annotations
@@ -104,7 +105,7 @@ _UR3 = Size(
     base_radius=0.0645, base_top=0.0865, shoulder_radius=0.0468, shoulder_below=0.0665,
     shoulder_above=0.0575, upper_shoulder_in=0.066, upper_shoulder_out=0.058,
     upper_elbow_radius=0.0395, upper_elbow_in=0.051, upper_elbow_out=0.058, upper_tube=0.047,
-    elbow_radius=0.038, elbow_in=0.051, elbow_out=0.047, fore_tube=0.0378, fore_wrist_in=0.0425,
+    elbow_radius=0.0395, elbow_in=0.051, elbow_out=0.047, fore_tube=0.0378, fore_wrist_in=0.0425,
     fore_wrist_out=0.047, wrist_radius=0.0343, wrist_in=0.047, wrist_out=0.031, wrist_back=0.0484,
     wrist_front=0.0425, tool_flange_radius=0.0385)
 _UR5 = Size(
@@ -158,8 +159,9 @@ _TINY = 1e-300
 
 #: Pairs of links that are checked. Left out are neighbours, which share a joint that turns freely,
 #: and those that turn past each other whatever the joints do, as the tests show with the meshes:
-#: base and upper arm (only joint 2 matters), forearm and wrist 2, wrist 1 and wrist 3 (which are
-#: d5 apart), and also wrist 2 and the tool, which stands on wrist 3 and only turns about its axis.
+#: base and upper arm (only joint 2 matters), forearm and wrist 2 (which wrist 3 reaches before),
+#: wrist 1 and wrist 3 (which are d5 apart). Also wrist 2 and the tool, which stands on wrist 3 and
+#: only turns about its axis.
 PAIRS: tuple[tuple[Link, Link], ...] = tuple(
     (a, b) for a in Link for b in Link
     if b - a >= 2 and (a, b) not in (

@@ -1,0 +1,246 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A way is refused at the first place where the arm is too near, and never for leaving it."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.kinematics.bodies import Bodies, Link
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.meshes import Meshes
+from ur_cartesian_driver.kinematics.robots import MODELS
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.planning.clearance import Clearance
+from ur_cartesian_driver.planning.options import PlanningOptions
+
+H = pi / 2
+HOME = (0.0, -H, H, -H, -H, 0.0)
+#: The elbow closed so far that wrist 1 is in the upper arm.
+FOLDED = (0.0, -H, 2.95, -1.8, -H, 0.0)
+TOOL = Pose((0.0, 0.0, 0.1), (0.0, 0.0, 0.0, 1.0))
+
+
+def way(start, end, n=60):
+    """Joint rows from the first after the start to the end."""
+    return np.array(start) + np.linspace(0, 1, n + 1)[1:, None] * np.subtract(end, start)
+
+
+def check(q, start=HOME, model='ur5e', tcp=IDENTITY, **options):
+    return Clearance(Arm(MODELS[model]), tcp, PlanningOptions(**options)).check(q, start)
+
+
+def needs_meshes(model='ur5'):
+    if Meshes.of(Arm(MODELS[model])) is None:
+        pytest.skip('the meshes are not installed')
+
+
+# -- self-collision -------------------------------------------------------------------------------
+
+@pytest.mark.parametrize('choice', ['warn', 'auto', 'refuse', 'off'])
+def test_capsules_warn_unless_they_are_told_to_refuse(choice):
+    clear = check(way(HOME, FOLDED), self_collision=choice)
+    assert (clear.warning is not None) == (choice in ('warn', 'auto'))
+    assert (clear.violation is not None) == (choice == 'refuse')
+    if choice == 'off':
+        assert (clear.margin, clear.what) == (np.inf, '')
+        return
+    found = clear.violation or clear.warning
+    assert found.text.startswith('upper arm and wrist 1 come within 0.00')
+    assert 'measured between capsules' in found.text
+    assert found.text.endswith('0.0050 m is asked for')
+    assert 'self_collision' in found.help
+
+
+@pytest.mark.parametrize('choice', ['warn', 'auto', 'refuse', 'off'])
+def test_meshes_refuse_unless_they_are_told_to_warn(choice):
+    needs_meshes()
+    clear = check(way(HOME, FOLDED), model='ur5', self_collision=choice)
+    assert (clear.warning is not None) == (choice == 'warn')
+    assert (clear.violation is not None) == (choice in ('auto', 'refuse'))
+    if found := clear.violation or clear.warning:
+        assert 'capsules' not in found.text
+
+
+def test_the_first_row_too_near_is_named_and_the_smallest_distance():
+    q = way(HOME, FOLDED, 5000)  # more than is judged at once
+    clear = check(q)
+    bodies = Bodies(Arm(MODELS['ur5e']))
+    distances = bodies.distances(q)
+    assert clear.warning.row == np.flatnonzero(distances.min(axis=1) < 0.005)[0] > 4096
+    assert clear.margin == distances.min()
+    a, b = bodies.pairs[distances.min(axis=0).argmin()]
+    assert clear.what == f'{a} and {b}'
+
+
+def test_meshes_let_pass_what_only_capsules_refuse():
+    """Of all configurations that capsules refuse meshes refuse those that are really too near."""
+    needs_meshes()
+    arm = Arm(MODELS['ur5'])
+    bodies, meshes = Bodies(arm), Meshes(arm)
+    q = np.random.default_rng(7).uniform(-pi, pi, (60, 6))
+    lower = bodies.distances(q)
+    q, lower = q[lower.min(axis=1) < 0.005], lower[lower.min(axis=1) < 0.005]
+    passed = 0
+    for row, least in zip(q, lower, strict=True):
+        exact = min(meshes.distances(pair, row[None])[0]
+                    for pair, d in zip(bodies.pairs, least, strict=True) if d < 0.005)
+        clear = check(row[None], model='ur5')
+        assert (clear.violation is None) == (exact >= 0.005)
+        passed += clear.violation is None
+    assert 0 < passed < len(q)
+
+
+def test_min_clearance_is_how_near_it_may_come():
+    q = way(HOME, FOLDED)
+    rows = [check(q, min_clearance=bound).warning.row for bound in (0.0, 0.005, 0.03)]
+    assert rows == sorted(rows, reverse=True)
+    assert len(set(rows)) == 3
+    assert check(way(HOME, HOME), min_clearance=0.0).warning is None
+
+
+@pytest.mark.parametrize('model', MODELS)
+def test_an_everyday_way_is_clear(model):
+    for end in ((0.5, -2.0, 2.2, -1.8, -H, 0.3), (0, -0.8, 1.2, -2.0, -H, 0),
+                (0, -H, 0, -H, 0, 0)):
+        clear = check(way(HOME, end), model=model, tcp=TOOL, tool_radius=0.04)
+        assert clear.violation is None
+        assert clear.warning is None
+        assert clear.margin > 0.005
+        assert clear.what
+
+
+def test_a_tool_is_checked_against_the_arm():
+    back = (0.0, -2.2, 2.4, -0.2, -H, 0.0)
+    long = Pose((0.0, 0.0, 0.6), (0.0, 0.0, 0.0, 1.0))
+    assert check(way(HOME, back), tcp=long).warning is None
+    warning = check(way(HOME, back), tcp=long, tool_radius=0.03).warning
+    assert warning.text.startswith('upper arm and tool ')
+    needs_meshes()  # which know of no tool, so it does not refuse
+    clear = check(way(HOME, back), model='ur5', tcp=long, tool_radius=0.03)
+    assert clear.warning is not None
+    assert clear.violation is None
+
+
+# -- planes ---------------------------------------------------------------------------------------
+
+def test_a_plane_refuses_the_side_that_its_normal_does_not_point_into():
+    """HOME has the flange at x < 0 and z > 0 in ``base``."""
+    x, _, z = Arm(MODELS['ur5e']).forward(HOME).position
+    for text, inside in (
+            (f'p 0 0 {-0.05} 0 0 1', True), (f'p 0 0 {z - 0.05} 0 0 -1', False),
+            (f'p {x - 0.2} 0 0 1 0 0', True), (f'p {x + 0.01} 0 0 1 0 0', False),
+            (f'p {x - 0.2} 0 0 -1 0 0', False)):
+        margin = check(way(HOME, HOME), self_collision='off', workspace_planes=(text,)).margin
+        assert (margin > 0.0) == inside, text
+
+
+def test_planes_are_given_in_base_not_in_base_link():
+    pose = Arm(MODELS['ur5e']).forward((0,) * 6)
+    assert pose.position[0] < -0.8  # base_link would have it at +0.8
+    beyond = check(np.zeros((1, 6)), workspace_planes=('front -0.8 0 0 1 0 0',))
+    assert beyond.violation is not None
+    assert check(np.zeros((1, 6)), workspace_planes=('behind 0.8 0 0 -1 0 0',)).violation is None
+
+
+def test_the_margin_of_a_plane_is_kept():
+    arm, q = Arm(MODELS['ur5e']), np.array([HOME])
+    z = (arm.forward(HOME) @ TOOL).position[2]
+    near = (f'table 0 0 {z - 0.03} 0 0 1',)
+    assert check(q, start=(0, -H, 0, -H, 0, 0), tcp=TOOL, workspace_planes=near).violation is None
+    wider = (f'table 0 0 {z - 0.03} 0 0 1 0.04',)
+    found = check(q, start=(0, -H, 0, -H, 0, 0), tcp=TOOL, workspace_planes=wider).violation
+    assert found.text == ('the TCP comes within 0.0300 m of the workspace plane "table", '
+                          '0.0400 m is asked for')
+    assert 'workspace_planes' in found.help
+
+
+def test_a_tool_may_work_on_a_plane_and_go_no_deeper():
+    """The TCP on the table, its cylinder flat at the end."""
+    arm = Arm(MODELS['ur5e'])
+    z = (arm.forward(HOME) @ TOOL).position[2]
+    for depth, passes in ((0.0, True), (0.001, False)):
+        clear = check(way(HOME, HOME)[:1], start=(0, -H, 0, -H, 0, 0), tcp=TOOL, tool_radius=0.03,
+                      workspace_planes=(f'table 0 0 {z + depth} 0 0 1',))
+        assert (clear.violation is None) == passes
+
+
+def test_the_base_may_stand_in_a_plane_and_the_elbow_may_not():
+    table = ('table 0 0 0 0 0 1',)
+    assert check(way(HOME, HOME), workspace_planes=table).violation is None
+    low = (0.0, 0.6, 0.9, -3.0, -H, 0.0)
+    found = check(way(HOME, low), workspace_planes=table).violation
+    assert 'beyond the workspace plane "table"' in found.text
+
+
+def test_of_two_watches_the_earlier_row_counts():
+    q = way(HOME, FOLDED)
+    alone = check(q, self_collision='refuse').violation
+    x = Arm(MODELS['ur5e']).forward(q[10]).position[0]
+    both = check(q, self_collision='refuse', workspace_planes=(f'p {x - 0.05} 0 0 -1 0 0',))
+    assert both.violation.row < alone.row
+    assert '"p"' in both.violation.text
+
+
+# -- starting inside ------------------------------------------------------------------------------
+
+MODES = [('ur5e', {'self_collision': 'refuse'}), ('ur5', {})]
+
+
+@pytest.mark.parametrize(('model', 'options'), MODES, ids=['capsules', 'meshes'])
+def test_what_starts_too_near_may_leave(model, options):
+    if model == 'ur5':
+        needs_meshes()
+    assert check(way(FOLDED, HOME), start=FOLDED, model=model, **options).violation is None
+
+
+@pytest.mark.parametrize(('model', 'options'), MODES, ids=['capsules', 'meshes'])
+def test_what_starts_too_near_may_not_go_nearer(model, options):
+    if model == 'ur5':
+        needs_meshes()
+    deeper = (0.0, -H, 3.1, -1.8, -H, 0.0)
+    found = check(way(FOLDED, deeper), start=FOLDED, model=model, **options).violation
+    assert found.row < 5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(('model', 'options'), MODES, ids=['capsules', 'meshes'])
+def test_what_has_left_may_not_come_back(model, options):
+    if model == 'ur5':
+        needs_meshes()
+    out = way(FOLDED, HOME, 400)
+    clear = check(np.concatenate([out, out[::-1]]), start=FOLDED, model=model, **options)
+    first = check(out[::-1], start=HOME, model=model, **options).violation
+    assert clear.violation.row == 400 + first.row
+    assert clear.violation.text == first.text
+
+
+def test_turning_back_before_it_is_free_is_refused():
+    out = way(FOLDED, HOME, 3000)[:200]
+    clear = check(np.concatenate([out, out[::-1]]), start=FOLDED, self_collision='refuse')
+    assert 200 <= clear.violation.row < 230
+
+
+def test_leaving_one_thing_is_no_leave_to_run_into_another():
+    x = Arm(MODELS['ur5e']).forward(HOME).position[0]
+    plane = (f'wall {x + 0.02} 0 0 1 0 0',)  # the flange begins 2 cm beyond it
+    level = way(HOME, (0.0, -H, 2.95, -2.95, -H, 0.0))
+    found = check(level, self_collision='refuse', workspace_planes=plane).violation
+    assert found is not None
+    assert found == check(level, self_collision='refuse').violation
+
+
+def test_a_start_beyond_a_plane_may_return_and_not_go_on():
+    arm = Arm(MODELS['ur5e'])
+    x = arm.forward(HOME).position[0]
+    plane = (f'wall {x + 0.02} 0 0 1 0 0',)  # the flange is 2 cm beyond it
+    back, on = (0.0, -H, 1.9, -1.9, -H, 0.0), (0.0, -1.2, H, -1.2 - H / 2, -H, 0.0)
+    assert check(way(HOME, back), workspace_planes=plane).violation is None
+    found = check(way(HOME, on), workspace_planes=plane).violation
+    assert found.row < 3
+    assert 'beyond the workspace plane "wall"' in found.text
+
+
+def test_links_have_names_that_read_well():
+    assert f'{Link.UPPER_ARM} and {Link.WRIST_2}' == 'upper arm and wrist 2'
