@@ -50,7 +50,7 @@ from ur_cartesian_driver.planning.postures import (
 )
 from ur_cartesian_driver.planning.reference import reference_path
 from ur_cartesian_driver.planning.report import ignored, note
-from ur_cartesian_driver.planning.spoken import poses_only, spoken, spoken_radius, spoken_times
+from ur_cartesian_driver.planning.spoken import poses_only, spoken, spoken_radius
 from ur_cartesian_driver.planning.timing import Leg, schedule, Timing
 from ur_cartesian_driver.planning.tolerances import with_default_tolerances
 from ur_cartesian_driver.planning.validate import (
@@ -119,8 +119,9 @@ class _Planner:
         self.why: dict[int, list[str]] = {}
         self.targets = [goal.T_base_frame @ point.pose for point in goal.waypoints]
         self.timed = is_timed(goal)
-        self.times = spoken_times([point.time for point in goal.waypoints], options.dialect,
-                                  self.remarks)
+        if self.timed and options.dialect.is_coarse:
+            self.remarks.append(f'all points: times are kept by speeds, because robot programs '
+                                f'of wire dialect {options.dialect.name} count in milliseconds')
         self._check_robot()
 
     # -- before the first segment ----------------------------------------------------------------
@@ -192,11 +193,11 @@ class _Planner:
         for i in range(begin, len(self.goal.waypoints)):
             leg = self._leg(i, T_base_tcp, q)
             if self.timed and leg.time is None:
-                leg = replace(leg, time=self.times[i] - before)
+                leg = replace(leg, time=self.goal.waypoints[i].time - before)
             if leg.path.length <= SAME_POSITION and self._no_way(leg):
                 leg = self._already_there(leg)
             legs.append(leg)
-            T_base_tcp, q, before = leg.path.end, leg.joints, self.times[i]
+            T_base_tcp, q, before = leg.path.end, leg.joints, self.goal.waypoints[i].time
         return legs
 
     def _leg(self, i: int, T_base_tcp: Pose, q: Joints) -> Leg:

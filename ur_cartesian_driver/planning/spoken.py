@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.errors import NotAvailable
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import (
     Joints,
@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.primitive import (
     Spline,
 )
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.validate import point_field, segment_field
+from ur_cartesian_driver.planning.validate import segment_field
 from ur_cartesian_driver.protocol.dialects import Dialect
 from ur_cartesian_driver.protocol.trajectory import motion_type, MotionType
 
@@ -69,25 +69,6 @@ def poses_only(options: PlanningOptions) -> str:
     if MotionType.MOVEC_JOINT not in options.dialect.motion_types:
         return f'wire dialect {options.dialect.name} has no arcs with joint positions'
     return ''
-
-
-def spoken_times(times: list[float], dialect: Dialect, remarks: list[str]) -> list[float]:
-    """
-    Return the times of all points as the wire carries their differences, so no error adds up.
-
-    :raises InvalidGoal: two points are nearer to each other than the wire can tell.
-    """
-    rounded = [dialect.whole_time(time) for time in times]
-    for i in range(1, len(rounded)):
-        if times[i] > times[i - 1] and rounded[i] <= rounded[i - 1]:
-            raise InvalidGoal(
-                point_field(i, 'time_from_start'), f'is {times[i] - times[i - 1]:.6f} s after the '
-                f'point before, but wire dialect {dialect.name} counts in '
-                f'{1.0 / dialect.time_scale:g} s', 'give it more time')
-    if max(abs(a - b) for a, b in zip(times, rounded, strict=True)) > 1e-6:
-        remarks.append(f'all points: times are rounded to {1.0 / dialect.time_scale:g} s, in '
-                       f'which wire dialect {dialect.name} counts')
-    return rounded
 
 
 def spoken_radius(radius: float, point: int, dialect: Dialect, remarks: list[str]) -> float:

@@ -42,6 +42,8 @@ _OPTIMIZED_JOINT_ACCELERATION = 40.0
 _TIME_SAYS_SO = 'its time_from_start says so'
 #: Where the robot stands at the first point already, the way there counts as this.
 _NO_WAY = 1e-9
+#: Motions whose messages have a time.
+_HAVE_TIMES = (SegmentType.LINEAR, SegmentType.JOINT)
 #: Rounds in which speeds and the times in corners are made to agree.
 _ROUNDS = 12
 
@@ -122,7 +124,7 @@ def schedule(legs: Sequence[Leg], options: PlanningOptions, model: RobotModel) -
     timings = [_first_guess(leg, length, unit, options, model)
                for leg, (length, unit) in zip(legs, measures, strict=True)]
     derived = [k for k, leg in enumerate(legs)
-               if leg.time is not None and not _takes_time(leg.kind)]
+               if leg.time is not None and not _takes_time(leg.kind, options)]
     # The time in a corner depends on the speeds on both of its sides, so go round a few times.
     for _ in range(_ROUNDS if any(_is_blended(legs[k]) for k in derived) else 1):
         changed = 0.0
@@ -205,8 +207,19 @@ def measure(leg: Leg, model: RobotModel) -> tuple[float, str]:
     return max(length, _NO_WAY), unit
 
 
-def _takes_time(kind: SegmentType) -> bool:
-    return kind in (SegmentType.LINEAR, SegmentType.JOINT)
+def _takes_time(kind: SegmentType, options: PlanningOptions) -> bool:
+    """
+    Tell whether the wire carries a time for a motion.
+
+    Never in the dialect that counts in milliseconds: a robot program that counts in microseconds
+    would run a segment a thousand times too fast, and nobody can ask a program how it counts.
+    """
+    return kind in _HAVE_TIMES and not options.dialect.is_coarse
+
+
+def _own_acceleration(leg: Leg) -> float:
+    """Return the acceleration of a timed leg that the goal may choose, 0 = it has none."""
+    return 0.0 if leg.kind in _HAVE_TIMES else leg.segment.acceleration
 
 
 def _is_blended(leg: Leg) -> bool:
@@ -233,7 +246,7 @@ def _first_guess(leg: Leg, length: float, unit: str, options: PlanningOptions,
                  model: RobotModel) -> Timing:
     if leg.time is None:
         return _by_speed(leg, length, unit, options, model)
-    if _takes_time(leg.kind):
+    if _takes_time(leg.kind, options):
         return _by_time(leg, length, unit, options, model)
     return _for_time(leg, (length, unit), 0.0, options, model, strict=False)
 
@@ -312,7 +325,10 @@ def _turning_line(leg: Leg, angle: float, velocity: float, acceleration: float, 
     time = max(least_time(leg.path.length, velocity, acceleration),
                least_time(angle, options.angular_velocity, options.angular_acceleration))
     profile = timed(angle * _share(leg), time * _share(leg), *_stands(leg))
-    return Timing(velocity=velocity, acceleration=acceleration, wire_time=time, unit='rad',
+    wire_time = time
+    if not _takes_time(leg.kind, options):
+        velocity, acceleration, wire_time = profile.cruise, profile.acceleration, 0.0
+    return Timing(velocity=velocity, acceleration=acceleration, wire_time=wire_time, unit='rad',
                   profile=profile, duration=time, reason=f'{reason} and it turns on the way',
                   remark=remark)
 
@@ -354,7 +370,7 @@ def _for_time(leg: Leg, measured: tuple[float, str], in_corners: float, options:
     if strict and time < least * (1.0 - 1e-9):
         time, remark = _slowed(leg, length, unit, least, limits, options)
     between = max(time - in_corners, 0.05 * time)
-    acceleration = leg.segment.acceleration or max(
+    acceleration = _own_acceleration(leg) or max(
         _default_acceleration(leg, unit, options),
         # A third each of speeding up, cruising and braking; and no braking before a blend.
         min(bound, 4.5 * way / between ** 2),
@@ -393,8 +409,8 @@ def _least_by_speed(leg: Leg, way: float, speed: float, acceleration: float) -> 
 
 def _bound(leg: Leg, limits: _Limits) -> float:
     """Return the largest acceleration that a time may lead to."""
-    if leg.segment.acceleration and not _takes_time(leg.kind):
-        return min(leg.segment.acceleration, limits.acceleration)
+    if own := _own_acceleration(leg):
+        return min(own, limits.acceleration)
     return limits.acceleration
 
 

@@ -71,10 +71,6 @@ class Dialect:
         """Tell whether times and radii are rounded to an extent that matters."""
         return self.time_scale < FIXED_POINT
 
-    def whole_time(self, time: float) -> float:
-        """Return the nearest time that the wire carries [s]."""
-        return round(time * self.time_scale) / self.time_scale if self.is_coarse else time
-
     def whole_radius(self, radius: float) -> float:
         """Return the largest radius that the wire carries and that is not larger [m]."""
         if not self.is_coarse:
