@@ -43,3 +43,9 @@ def test_only_the_robot_program_makes_the_driver_ready(state, change):
 def test_a_refused_robot_stays_refused_until_it_is_gone(change):
     state = after(ConnectionState.REFUSED, change)
     assert (state is ConnectionState.REFUSED) == (change is not Change.ROBOT_LOST)
+
+
+@pytest.mark.parametrize('state', [ConnectionState.READY, ConnectionState.EXECUTING])
+def test_a_tcp_that_is_owed_keeps_goals_away_until_the_program_is_reviewed(state):
+    assert after(state, Change.TCP_OWED) is ConnectionState.CONNECTED
+    assert after(ConnectionState.CONNECTED, Change.GOAL_ENDED) is ConnectionState.CONNECTED

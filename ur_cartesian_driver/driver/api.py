@@ -33,6 +33,8 @@ from ur_cartesian_driver.driver.channel import (
     SignalsChanged,
     StartMotion,
     StatusChanged,
+    TcpLent,
+    TcpReturned,
 )
 from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.driver.services import RobotServices
@@ -115,7 +117,8 @@ class Motion:
 
     def _end(self, outcome: Outcome) -> None:
         if not self._future.done():
-            self._future.set_result(replace(outcome, report=self._plan_report))
+            self._future.set_result(replace(
+                outcome, report=(*self._plan_report, *outcome.report)))
 
 
 class Driver(RobotServices):
@@ -143,6 +146,8 @@ class Driver(RobotServices):
         self._status_listeners: list[Callable[[DriverStatus], None]] = []
         self._ready = threading.Event()
         self._motions: dict[int, Motion] = {}
+        #: The TCP that a goal has set and that is not back yet.
+        self._loan: TcpLent | None = None
         self._calls: dict[int, Future[Answer]] = {}
         self._signals: Signals | None = None
         self._gaps = Gaps()
@@ -377,7 +382,7 @@ class Driver(RobotServices):
             self._abandon_calls(text)  # also those that were sent since
             self._host.join()
             self._host = host.start(self.config.robot_loop)
-            self._send(Configure(config=self.config, may_upload=may_upload))
+            self._send(Configure(config=self.config, may_upload=may_upload, loan=self._loan))
 
     def _handle(self, notice: Notice | Request) -> None:
         match notice:
@@ -402,6 +407,10 @@ class Driver(RobotServices):
                 self._gaps = gaps
             case GeometryKnown(geometry=geometry):
                 self._arm = Arm(self._arm.model, geometry)
+            case TcpLent():
+                self._loan = notice
+            case TcpReturned():
+                self._loan = None
             case LogLine(level=level, text=text):
                 LOG.log(level, text)
 
@@ -454,6 +463,8 @@ def order_of(plan: Plan, dialect: Dialect = NEWEST) -> Order:
     return Order(
         points=len(plan.segments), reference=plan.reference, duration=plan.duration,
         due=times if times > 0.0 else None, T_base_frame=goal.T_base_frame,
+        T_flange_active=plan.T_flange_active, T_flange_tcp=plan.T_flange_tcp,
+        T_tcp_controlled=plan.T_tcp_controlled,
         path_tolerance=goal.path_tolerance, goal_tolerance=goal.goal_tolerance,
         goal_time_tolerance=goal.goal_time_tolerance,
         reports_begun=dialect is NEWEST,

@@ -20,11 +20,25 @@ from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.execution import Order
 from ur_cartesian_driver.kinematics.robots import Geometry
 from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.robot.calls import Answer, Call
 from ur_cartesian_driver.robot.status import DriverStatus, Gaps
 
 LENGTH = struct.Struct('>I')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TcpLent:
+    """The robot's TCP is set for a goal."""
+
+    T_flange_before: Pose
+    T_flange_lent: Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TcpReturned:
+    """It is what it was before, or somebody has set another one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +49,8 @@ class Configure:
     #: Whether the robot program may be sent on the first connection; not where an earlier loop of
     #: the same owner has seen somebody stop it.
     may_upload: bool = True
+    #: A TCP that an earlier loop of the same owner had set for a goal, and may not have put back.
+    loan: TcpLent | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -140,7 +156,7 @@ Request: TypeAlias = (
     Configure | StartMotion | CancelMotion | ResendProgram | CallRobot | Heartbeat | Shutdown)
 Notice: TypeAlias = (
     Alive | StatusChanged | SignalsChanged | GeometryKnown | MotionProgress | MotionEnded
-    | CallAnswered | LogLine)
+    | CallAnswered | TcpLent | TcpReturned | LogLine)
 
 
 def pack(message: Request | Notice) -> bytes:

@@ -42,16 +42,23 @@ from ur_cartesian_driver.driver.channel import (
     SignalsChanged,
     StartMotion,
     StatusChanged,
+    TcpLent,
+    TcpReturned,
     unpack,
 )
 from ur_cartesian_driver.driver.snapshot import StateMemory
 from ur_cartesian_driver.execution import (
     Command,
     Finish,
+    LendTcp,
+    Order,
     Report,
+    ReturnTcp,
+    same_tcp,
     SendControl,
     SendPoints,
     StopProgram,
+    TcpLoan,
     TrajectoryMachine,
 )
 from ur_cartesian_driver.kinematics.robots import Geometry
@@ -60,8 +67,10 @@ from ur_cartesian_driver.motion.events import (
     CancelRequested,
     Event,
     Outcome,
+    StateReceived,
     Tick,
 )
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.protocol.trajectory import POINT_SIZE
 from ur_cartesian_driver.robot.call_desk import CallDesk
@@ -94,6 +103,8 @@ class RobotLoop:
         self._motion = 0
         self._latest: RobotState | None = None
         self._points = memoryview(b'')
+        #: The TCP that an ended goal had set, until it is back.
+        self._loan: TcpLoan | None = None
         self._last_heartbeat = 0.0
         self._link = RobotLink(
             config, on_state=self._keep_state, on_event=self._handle_event,
@@ -103,8 +114,11 @@ class RobotLoop:
         self._desk = CallDesk(config, config.dashboard_port, self._link)
         self._calls: set[asyncio.Task[None]] = set()
         self._connection = ConnectionState.DISCONNECTED
+        self._program_running = False
         self._last_report = inf
         self._longest_gap = 0.0
+        if configure.loan is not None:
+            self._owe(TcpLoan(configure.loan.T_flange_before, configure.loan.T_flange_lent))
 
     async def run(self, requests: asyncio.StreamReader) -> None:
         """Serve until the owner shuts down, hangs up or falls silent."""
@@ -118,6 +132,10 @@ class RobotLoop:
                     task.cancel()
         finally:
             self._end_motion('The driver was shut down.')
+            if self._loan is not None and self._latest is not None \
+                    and self._loan.is_due(self._latest, self._now()):
+                # Ours does it by itself, but this may be another robot program.
+                self._link.return_tcp(self._loan.T_flange_before)
             self._link.close()
             self._memory.clear()
 
@@ -161,6 +179,8 @@ class RobotLoop:
         reason = self._link.not_ready()
         if self._machine is not None:
             reason = 'Another motion is running; wait for its end or cancel it.'
+        elif not reason:
+            reason = self._tcp_changed(request.order)
         if reason:
             self._notify(MotionEnded(motion=request.motion, outcome=Outcome(
                 code=ErrorCode.ROBOT_NOT_READY, text=reason)))
@@ -170,6 +190,14 @@ class RobotLoop:
         self._link.set_busy(True)
         assert self._latest is not None  # else the link is not ready
         self._carry_out(machine.start(self._latest))
+
+    def _tcp_changed(self, order: Order) -> str:
+        """Return that the plan was made for another TCP than the robot has; empty if not."""
+        state = self._latest
+        if state is None or same_tcp(state.T_flange_tcp, order.T_flange_active):
+            return ''
+        return ('The TCP of the robot was changed after the goal had been planned; send the goal '
+                'again.')
 
     # ---- calls --------------------------------------------------------------------------------
 
@@ -209,6 +237,8 @@ class RobotLoop:
         """Feed the machine, and do what it answers."""
         if self._machine is not None:
             self._carry_out(self._machine.step(event, self._now()))
+        elif self._loan is not None and isinstance(event, StateReceived):
+            self._pursue(self._loan, event.state)
 
     def _carry_out(self, commands: list[Command]) -> None:
         for command in commands:
@@ -218,6 +248,10 @@ class RobotLoop:
                 case SendPoints(first=first, end=end):
                     points = self._points[first * POINT_SIZE:end * POINT_SIZE]
                     self._link.send_points(bytes(points))
+                case LendTcp(T_flange_tcp=T_flange_tcp):
+                    self._lend(T_flange_tcp)
+                case ReturnTcp(T_flange_tcp=T_flange_tcp):
+                    self._link.return_tcp(T_flange_tcp)
                 case StopProgram(reason=reason):
                     self._link.stop_program(reason)
                 case Report(progress=progress):
@@ -226,14 +260,48 @@ class RobotLoop:
                     self._finish(outcome)
 
     def _finish(self, outcome: Outcome) -> None:
-        motion, self._motion, self._machine = self._motion, 0, None
+        machine, motion = self._machine, self._motion
+        self._motion, self._machine = 0, None
         self._points = memoryview(b'')
+        if machine is not None and machine.loan is not None:
+            if machine.loan.returned:
+                self._notify(TcpReturned())
+            else:
+                self._owe(machine.loan)
         self._link.set_busy(False)
         self._notify(MotionEnded(motion=motion, outcome=outcome))
 
     def _end_motion(self, text: str) -> None:
         if self._machine is not None:
             self._finish(Outcome(code=ErrorCode.CANCELLED, text=text))
+
+    # ---- the TCP of a goal --------------------------------------------------------------------
+
+    def _lend(self, T_flange_tcp: Pose) -> None:
+        """Set the TCP for a goal; the owner hears of it and remembers it, should we die."""
+        assert self._machine is not None
+        assert self._machine.loan is not None
+        loan = self._machine.loan
+        self._notify(TcpLent(T_flange_before=loan.T_flange_before,
+                             T_flange_lent=loan.T_flange_lent))
+        self._link.lend_tcp(T_flange_tcp)
+
+    def _owe(self, loan: TcpLoan) -> None:
+        """See to it that the TCP of an ended goal is put back, before another one runs."""
+        self._loan = loan
+        self._link.owe_tcp(True)
+
+    def _pursue(self, loan: TcpLoan, state: RobotState) -> None:
+        """Put the TCP back when that is possible, again and again, until the robot has it."""
+        now = self._now()
+        loan.observe(state, now)
+        if loan.returned:
+            self._loan = None
+            self._link.owe_tcp(False)
+            self._notify(TcpReturned())
+            self._log(logging.INFO, 'the TCP that the last goal had set is not set any more')
+        elif loan.is_due(state, now):
+            self._link.return_tcp(loan.T_flange_before)
 
     async def _tick(self) -> None:
         """Let time pass where nothing else happens, and watch the owner."""
@@ -260,6 +328,9 @@ class RobotLoop:
         if status.state is ConnectionState.DISCONNECTED:
             self._memory.clear()
             self._last_report = inf
+        if self._loan is not None and status.program_running != self._program_running:
+            self._loan.hurry()
+        self._program_running = status.program_running
         before, self._connection = self._connection, status.state
         if (before, status.state) == (ConnectionState.CONNECTING, ConnectionState.CONNECTED) \
                 and not status.serial_number:

@@ -6,7 +6,8 @@ The connection to the robot as a table: where it is, and what brings it further.
 * **DISCONNECTED**: the robot does not answer; dialled again by itself.
 * **CONNECTING**: RTDE answers; the primary interface and the robot's report of itself are missing.
 * **CONNECTED**: the robot reports its state and is the one that was configured; the robot program
-  is not connected to us, or paused: it would run a goal that it is sent now at some later time.
+  is not connected to us, or paused: it would run a goal that it is sent now at some later time; or
+  the TCP that a goal had set is still to be put back.
 * **READY**: the robot program is connected and takes goals.
 * **EXECUTING**: a goal runs; it may be paused and resumed.
 * **STOPPED**: a person, another client or the safety system stopped the robot. Nothing starts by
@@ -49,6 +50,7 @@ class Change(Enum):
     ROBOT_FREE = auto()
     GOAL_STARTED = auto()
     GOAL_ENDED = auto()
+    TCP_OWED = auto()
 
 
 S, C = ConnectionState, Change
@@ -70,12 +72,14 @@ TRANSITIONS: Mapping[ConnectionState, Mapping[Change, ConnectionState]] = Mappin
         C.GOAL_STARTED: S.EXECUTING,
         C.PROGRAM_PAUSED: S.CONNECTED,
         C.PROGRAM_LOST: S.CONNECTED,
+        C.TCP_OWED: S.CONNECTED,
         C.ROBOT_STOPPED: S.STOPPED,
         C.ROBOT_LOST: S.DISCONNECTED,
     },
     S.EXECUTING: {
         C.GOAL_ENDED: S.READY,
         C.PROGRAM_LOST: S.CONNECTED,
+        C.TCP_OWED: S.CONNECTED,
         C.ROBOT_STOPPED: S.STOPPED,
         C.ROBOT_LOST: S.DISCONNECTED,
     },

@@ -28,13 +28,16 @@ from typing import NoReturn
 from ur_cartesian_driver.kinematics.robots import Geometry, MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, TrajectoryEnded
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.signals import Signals
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, RobotStatus
+from ur_cartesian_driver.motion.state import RobotMode, RobotState, RobotStatus, RuntimeState
 from ur_cartesian_driver.program import as_program, ProgramSettings, render
-from ur_cartesian_driver.protocol import primary
+from ur_cartesian_driver.program.secondary import tcp_program
+from ur_cartesian_driver.protocol import primary, script_command
 from ur_cartesian_driver.protocol.dialects import NEWEST
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.rtde import ControllerVersion
+from ur_cartesian_driver.protocol.script_command import TcpHold
 from ur_cartesian_driver.robot.lifecycle import after, Change, ConnectionState
 from ur_cartesian_driver.robot.primary_client import PrimaryClient, PrimaryListener
 from ur_cartesian_driver.robot.program_sockets import ProgramListener, ProgramSockets
@@ -51,6 +54,9 @@ _OUT_OF_REACH = frozenset({ConnectionState.DISCONNECTED, ConnectionState.REFUSED
 _WITHOUT_MOTION = frozenset({RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE})
 #: How long it may take [s].
 POWER_UP_TIMEOUT = 30.0
+
+#: A program runs, whoever sent it.
+_RUNS = frozenset({RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.RESUMING})
 
 #: How long a robot has to wait for its program before the log says so [s]: a program that is on
 #: its way there needs nobody's help.
@@ -87,6 +93,8 @@ class RobotLink:
         self._robot: RobotState | None = None
         self._signals: Signals | None = None
         self._powering_up = False
+        #: The TCP that a goal had set is still to be put back.
+        self._tcp_owed = False
         self._first_connection = may_upload
         self._primary = PrimaryClient(PrimaryListener(
             configuration=self._on_configuration, geometry=self._on_kinematics,
@@ -154,6 +162,39 @@ class RobotLink:
         """Say whether a goal runs: its keepalives are another message."""
         self._program.busy = busy
         self._change(Change.GOAL_STARTED if busy else Change.GOAL_ENDED)
+
+    def lend_tcp(self, T_flange_tcp: Pose) -> None:
+        """Have the robot program set the TCP for the time of a goal."""
+        self._send_tcp(T_flange_tcp, TcpHold.LENT)
+
+    def return_tcp(self, T_flange_tcp: Pose) -> None:
+        """
+        Have the TCP put back to what it was before a goal.
+
+        The robot program does it where it is there and not paused. Else a program of its own does,
+        where we may send one, but never beside a program of somebody else.
+        """
+        robot = self._robot
+        if robot is None:
+            return
+        if self._program.connected and not is_paused(robot):
+            self._send_tcp(T_flange_tcp, TcpHold.BACK)
+        elif self._settings.headless_mode and robot.runtime_state not in _RUNS:
+            self._primary.send(primary.upload(tcp_program(T_flange_tcp.rotation_vector())))
+
+    def _send_tcp(self, T_flange_tcp: Pose, hold: TcpHold) -> None:
+        self._program.send_command(script_command.encode(script_command.SetTcpOffset(
+            offset=T_flange_tcp.rotation_vector(), hold=hold)))
+
+    def owe_tcp(self, owed: bool) -> None:
+        """Say whether the TCP is still to be put back: until it is, no goal is taken."""
+        if owed == self._tcp_owed:
+            return
+        self._tcp_owed = owed
+        if owed:
+            self._change(Change.TCP_OWED)
+        else:
+            self._review()
 
     def stop_program(self, reason: str) -> None:
         """End the robot program, so that nothing of it can resume."""
@@ -343,7 +384,7 @@ class RobotLink:
         self._start_program_once(robot)
         if is_paused(robot):
             self._change(Change.PROGRAM_PAUSED)
-        elif self._program.connected:
+        elif self._program.connected and not self._tcp_owed:
             self._change(Change.PROGRAM_CONNECTED)
 
     def _change(self, change: Change, **news: object) -> None:
@@ -355,7 +396,7 @@ class RobotLink:
         if status.state not in _OUT_OF_REACH:
             status = replace(status, message=what_is_needed(
                 status.state, self._robot, program_connected=self._program.connected,
-                headless_mode=self._settings.headless_mode))
+                headless_mode=self._settings.headless_mode, tcp_owed=self._tcp_owed))
         if status != self._status:
             before, self._status = self._status, status
             self._on_status(status)

@@ -62,11 +62,12 @@ def is_paused(robot: RobotState) -> bool:
 
 
 def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_connected: bool,
-                   headless_mode: bool) -> str:
+                   headless_mode: bool, tcp_owed: bool = False) -> str:
     """
     Return the sentence that says what is needed before a goal can run; empty when nothing is.
 
     :param robot: what the robot reported last; None = nothing yet.
+    :param tcp_owed: the TCP that a goal had set is still to be put back.
     """
     if state is ConnectionState.CONNECTING or robot is None:
         return 'The robot answers; waiting for its report of itself.'
@@ -78,7 +79,10 @@ def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_
         return (f'The arm is in mode {robot.robot_mode.name}; switch it on and release its '
                 'brakes, then start the robot program.')
     if program_connected:
-        return 'The robot program is paused; play it on the pendant.' if is_paused(robot) else ''
+        if is_paused(robot):
+            return 'The robot program is paused; play it on the pendant.'
+        return ('The TCP that the last goal had set is still to be put back; should it stay, set '
+                'the right one on the robot.') if tcp_owed else ''
     if headless_mode:
         return ('The robot program does not run; call resend_robot_program when the arm may '
                 'move.')
