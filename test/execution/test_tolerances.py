@@ -91,7 +91,7 @@ def test_each_axis_trips_alone_and_is_named(name, axis, sign, frame):
 @pytest.mark.parametrize(('name', 'axis'), AXES)
 @pytest.mark.parametrize('bound', [0.0, -1.0, -1e-9, 0.0022])
 def test_zero_negative_and_larger_limits_let_it_pass(name, axis, bound):
-    limits = [-1.0] * 3
+    limits = [0.001] * 3  # so that the quantity is watched
     limits[axis] = bound
     assert Watch(limit(name, limits, 0.0), IDENTITY).violation(
         WANTED, disturbed(name, axis, 0.0021)) is None
