@@ -71,9 +71,11 @@ class Meshes:
     @classmethod
     def of(cls, arm: Arm) -> Meshes | None:
         """Return the meshes of an arm, None where there are none or what they need is missing."""
+        if arm.model.name not in WITH_MESHES:
+            return None
         try:
             return cls(arm)
-        except (ValueError, ImportError, FileNotFoundError):
+        except (ImportError, FileNotFoundError):
             return None
 
     def distances(self, pair: tuple[Link, Link], q: Floats) -> Floats:
