@@ -6,8 +6,8 @@ The connection to the robot as a table: where it is, and what brings it further.
 * **DISCONNECTED**: the robot does not answer; dialled again by itself.
 * **CONNECTING**: RTDE answers; the primary interface and the robot's report of itself are missing.
 * **CONNECTED**: the robot reports its state and is the one that was configured; the robot program
-  is not connected to us, or paused: it would run a goal that it is sent now at some later time; or
-  the TCP that a goal had set is still to be put back.
+  is not connected to us, or has ended, or is paused: then it would run a goal that it is sent now
+  at some later time; or the TCP that a goal had set is still to be put back.
 * **READY**: the robot program is connected and takes goals.
 * **EXECUTING**: a goal runs; it may be paused and resumed.
 * **STOPPED**: a person, another client or the safety system stopped the robot. Nothing starts by

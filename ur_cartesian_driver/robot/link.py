@@ -23,6 +23,7 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import replace
 import logging
+from math import inf
 from typing import NoReturn
 
 from ur_cartesian_driver.kinematics.robots import Geometry, MODELS
@@ -44,7 +45,13 @@ from ur_cartesian_driver.robot.program_sockets import ProgramListener, ProgramSo
 from ur_cartesian_driver.robot.settings import LinkSettings
 from ur_cartesian_driver.robot.signal_stream import SignalStream
 from ur_cartesian_driver.robot.state_stream import StateStream
-from ur_cartesian_driver.robot.status import DriverStatus, is_paused, is_stopped, what_is_needed
+from ur_cartesian_driver.robot.status import (
+    DriverStatus,
+    has_ended,
+    is_paused,
+    is_stopped,
+    what_is_needed,
+)
 from ur_cartesian_driver.robot.transport import Retry
 
 #: In these states nobody knows the robot, or it is the wrong one: the reason is the message.
@@ -61,6 +68,10 @@ _RUNS = frozenset({RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.RESU
 #: How long a robot has to wait for its program before the log says so [s]: a program that is on
 #: its way there needs nobody's help.
 NOTEWORTHY = 1.0
+
+
+#: How long a program may hold its sockets after the robot has reported its end [s].
+GHOST = 0.5
 
 
 class RobotLink:
@@ -95,6 +106,8 @@ class RobotLink:
         self._powering_up = False
         #: The TCP that a goal had set is still to be put back.
         self._tcp_owed = False
+        #: Since when the robot reports that no program runs while one is connected [s].
+        self._ghost_since = inf
         self._first_connection = may_upload
         self._primary = PrimaryClient(PrimaryListener(
             configuration=self._on_configuration, geometry=self._on_kinematics,
@@ -161,7 +174,10 @@ class RobotLink:
     def set_busy(self, busy: bool) -> None:
         """Say whether a goal runs: its keepalives are another message."""
         self._program.busy = busy
-        self._change(Change.GOAL_STARTED if busy else Change.GOAL_ENDED)
+        if busy:
+            self._change(Change.GOAL_STARTED)
+        else:
+            self._change(Change.GOAL_ENDED if self._program_reads() else Change.PROGRAM_LOST)
 
     def lend_tcp(self, T_flange_tcp: Pose) -> None:
         """Have the robot program set the TCP for the time of a goal."""
@@ -326,6 +342,7 @@ class RobotLink:
     def _on_state(self, robot: RobotState) -> None:
         before, self._robot = self._robot, robot
         self._tell_state(robot)
+        self._look_for_ghost(robot)
         if before is None or _modes(before) != _modes(robot):
             self._review()
         self._on_event(StateReceived(state=robot))
@@ -333,6 +350,15 @@ class RobotLink:
     def _on_signals(self, signals: Signals) -> None:
         self._signals = signals
         self._tell_signals(signals)
+
+    def _look_for_ghost(self, robot: RobotState) -> None:
+        """Hang up on a program that has ended without a word, as behind a cable that was cut."""
+        if not (self._program.connected and has_ended(robot)):
+            self._ghost_since = inf
+        else:
+            self._ghost_since = min(self._ghost_since, robot.timestamp)
+            if robot.timestamp - self._ghost_since > GHOST:
+                self._program.drop('the robot reports that no program runs')
 
     def _on_configuration(self, configuration: primary.ConfigurationData) -> None:
         """Take the robot's report of itself: accept the robot, or refuse it."""
@@ -368,6 +394,7 @@ class RobotLink:
     def _on_robot_lost(self, reason: str) -> None:
         """Take note that the robot is gone, or never was there."""
         before, self._robot, self._signals = self._robot, None, None
+        self._program.deaf = False  # nobody knows; too many messages are better than none
         self._change(Change.ROBOT_LOST, calibration_known=False, last_error=reason,
                      message=f"No connection to the robot: {reason.rstrip('.')}.")
         if before is not None:
@@ -382,10 +409,17 @@ class RobotLink:
             return
         self._change(Change.ROBOT_STOPPED if is_stopped(robot) else Change.ROBOT_FREE)
         self._start_program_once(robot)
-        if is_paused(robot):
+        self._program.deaf = is_paused(robot)
+        if not self._program_reads():
             self._change(Change.PROGRAM_PAUSED)
-        elif self._program.connected and not self._tcp_owed:
+        elif not self._tcp_owed:
             self._change(Change.PROGRAM_CONNECTED)
+
+    def _program_reads(self) -> bool:
+        """Tell whether the robot program would act now on what it is sent."""
+        robot = self._robot
+        return (robot is not None and self._program.connected
+                and not is_paused(robot) and not has_ended(robot))
 
     def _change(self, change: Change, **news: object) -> None:
         """Go where the table of the life cycle leads, and tell it with other news."""

@@ -20,6 +20,9 @@ from ur_cartesian_driver.robot.transport import Connection, dial, Retry
 
 #: How long the robot may take to report its configuration [s].
 REPORT_TIMEOUT = 5.0
+#: A robot reports its state ten times a second; a connection that is silent for so long is dead
+#: [s], and what would be sent on it (stop program) would be lost.
+SILENCE = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +47,7 @@ class PrimaryClient:
         self._listener = listener
         self._frames = primary.PrimaryDecoder()
         self._connection: Connection | None = None
-        self._reported = False
+        self._reported = self._heard = False
 
     def send(self, data: bytes) -> bool:
         """Send a program or command; False while there is no connection."""
@@ -83,12 +86,18 @@ class PrimaryClient:
             await asyncio.wait({closed}, timeout=REPORT_TIMEOUT)
             if not self._reported and not closed.done():
                 raise OSError(f'{host} port {port}: the robot does not report its configuration')
-            return await closed
+            while not closed.done():
+                self._heard = False
+                await asyncio.wait({closed}, timeout=SILENCE)
+                if not self._heard and not closed.done():
+                    return f'{host} port {port}: the robot sent nothing for {SILENCE:g} s'
+            return closed.result()
         finally:
             self._connection.close()
             self._connection = None
 
     def _on_data(self, data: bytes) -> None:
+        self._heard = True
         try:
             frames = self._frames.feed(data)
         except ProtocolError as error:

@@ -54,6 +54,9 @@ class ProgramSockets:
         self.text = ''
         #: A goal runs: its keepalives are another message.
         self.busy = False
+        #: The program is paused and reads nothing: it is not sent more than it can read at once,
+        #: because a START must not stand behind the keepalives of an hour.
+        self.deaf = False
         self.connected = False
         #: The longest pause between two keepalives since somebody reset it [s].
         self.longest_gap = 0.0
@@ -113,6 +116,14 @@ class ProgramSockets:
         return self.connected and self._commands.connection is not None \
             and self._commands.connection.send(data)
 
+    def drop(self, reason: str) -> None:
+        """Hang up on a program, and say that it is lost."""
+        for port in self._program_ports:
+            port.hang_up()
+        if self.connected:
+            self.connected = False
+            self._listener.lost(reason)
+
     def send_stop(self) -> None:
         """Ask the robot program to stop the arm and to end."""
         self._send(reverse.stop())
@@ -121,15 +132,21 @@ class ProgramSockets:
         """Send the message that keeps the robot program running at a steady pace."""
         loop = asyncio.get_running_loop()
         due = last = loop.time()
+        was_deaf = False
         while True:
             last, before = loop.time(), last
             self.longest_gap = max(self.longest_gap, last - before)
-            if self.busy:
-                self.send_control(TrajectoryAction.NOOP, 0)
-            else:
-                self._send(reverse.keepalive(self._read_timeout))
+            if not (self.deaf and was_deaf):  # one more, for the read that is under way
+                self._send_keepalive()
+            was_deaf = self.deaf
             due = max(due + self._settings.keepalive_period, loop.time())
             await asyncio.sleep(due - loop.time())
+
+    def _send_keepalive(self) -> None:
+        if self.busy:
+            self.send_control(TrajectoryAction.NOOP, 0)
+        else:
+            self._send(reverse.keepalive(self._read_timeout))
 
     def _send(self, message: reverse.ReverseMessage) -> None:
         if self.connected and self._reverse.connection is not None:
@@ -149,11 +166,7 @@ class ProgramSockets:
 
     def _on_closed(self, name: str, reason: str) -> None:
         """Take the loss of one of the program's sockets as the loss of all of them."""
-        for port in self._program_ports:
-            port.hang_up()
-        if self.connected:
-            self.connected = False
-            self._listener.lost(f'{name}: {reason}')
+        self.drop(f'{name}: {reason}')
 
     def _on_results(self, data: bytes) -> None:
         try:

@@ -61,6 +61,11 @@ def is_paused(robot: RobotState) -> bool:
     return robot.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
 
 
+def has_ended(robot: RobotState) -> bool:
+    """Tell whether no program runs, whatever its sockets say."""
+    return robot.runtime_state in (RuntimeState.STOPPING, RuntimeState.STOPPED)
+
+
 def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_connected: bool,
                    headless_mode: bool, tcp_owed: bool = False) -> str:
     """
@@ -78,7 +83,7 @@ def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_
     if robot.robot_mode is not RobotMode.RUNNING:
         return (f'The arm is in mode {robot.robot_mode.name}; switch it on and release its '
                 'brakes, then start the robot program.')
-    if program_connected:
+    if program_connected and not has_ended(robot):
         if is_paused(robot):
             return 'The robot program is paused; play it on the pendant.'
         return ('The TCP that the last goal had set is still to be put back; should it stay, set '
