@@ -69,7 +69,6 @@ class Size:
     """
 
     base_radius: float
-    base_top: float
     shoulder_radius: float
     shoulder_below: float
     shoulder_above: float
@@ -102,21 +101,21 @@ class Size:
 
 
 _UR3 = Size(
-    base_radius=0.0645, base_top=0.0865, shoulder_radius=0.0468, shoulder_below=0.0665,
+    base_radius=0.0645, shoulder_radius=0.0468, shoulder_below=0.0665,
     shoulder_above=0.0575, upper_shoulder_in=0.066, upper_shoulder_out=0.058,
     upper_elbow_radius=0.0395, upper_elbow_in=0.051, upper_elbow_out=0.058, upper_tube=0.047,
     elbow_radius=0.0395, elbow_in=0.051, elbow_out=0.047, fore_tube=0.0378, fore_wrist_in=0.0425,
     fore_wrist_out=0.047, wrist_radius=0.0343, wrist_in=0.047, wrist_out=0.031, wrist_back=0.0484,
     wrist_front=0.0425, tool_flange_radius=0.0385)
 _UR5 = Size(
-    base_radius=0.0745, base_top=0.0215, shoulder_radius=0.0608, shoulder_below=0.0655,
+    base_radius=0.0745, shoulder_radius=0.0608, shoulder_below=0.0655,
     shoulder_above=0.069, upper_shoulder_in=0.0655, upper_shoulder_out=0.069,
     upper_elbow_radius=0.0605, upper_elbow_in=0.0655, upper_elbow_out=0.069, upper_tube=0.059,
     elbow_radius=0.059, elbow_in=0.055, elbow_out=0.0575, fore_tube=0.0448, fore_wrist_in=0.0453,
     fore_wrist_out=0.0575, wrist_radius=0.0397, wrist_in=0.046, wrist_out=0.04, wrist_back=0.0575,
     wrist_front=0.048, tool_flange_radius=0.0444)
 _UR10 = Size(
-    base_radius=0.0952, base_top=0.0385, shoulder_radius=0.0772, shoulder_below=0.0895,
+    base_radius=0.0952, shoulder_radius=0.0772, shoulder_below=0.0895,
     shoulder_above=0.0885, upper_shoulder_in=0.0904, upper_shoulder_out=0.0879,
     upper_elbow_radius=0.0628, upper_elbow_in=0.0601, upper_elbow_out=0.0692, upper_tube=0.0763,
     elbow_radius=0.0628, elbow_in=0.068, elbow_out=0.07, fore_tube=0.06, fore_wrist_in=0.0537,
@@ -312,15 +311,18 @@ def _bodies(arm: Arm) -> list[_Body]:
     g = arm.model.geometry
     d1, d4, d5, d6 = g.d[0], *g.d[3:]
     z, s, e = _SIZES[arm.model.name]
+    # The upper arm begins where the forearm ends.
+    elbow = min(s - z.upper_elbow_in, e + z.elbow_in)
     return [
-        _Body(Link.BASE, (0, _BASE_BOTTOM), (0, z.base_top), z.base_radius),
+        _Body(Link.BASE, (0, _BASE_BOTTOM), (0, d1 - z.shoulder_below + _OVERLAP),
+              z.base_radius),
         _Body(Link.SHOULDER, (0, d1 - z.shoulder_below), (0, d1 + z.shoulder_above),
               z.shoulder_radius),
         _Body(Link.SHOULDER, (1, 0.0), (1, s - z.upper_shoulder_in + _OVERLAP), z.shoulder_radius),
         _Body(Link.UPPER_ARM, (1, s - z.upper_shoulder_in), (1, s + z.upper_shoulder_out),
               z.shoulder_radius),
         _Body(Link.UPPER_ARM, (1, s), (2, s), z.upper_tube, tube=True),
-        _Body(Link.UPPER_ARM, (2, s - z.upper_elbow_in), (2, s + z.upper_elbow_out),
+        _Body(Link.UPPER_ARM, (2, elbow), (2, s + z.upper_elbow_out),
               z.upper_elbow_radius),
         _Body(Link.FOREARM, (2, e - z.elbow_out), (2, e + z.elbow_in), z.elbow_radius),
         _Body(Link.FOREARM, (2, e), (3, e), z.fore_tube, tube=True),
