@@ -57,6 +57,8 @@ EFFECT_TIMEOUT = 5.0
 SETTING_TIMEOUT = 1.0
 #: How long a robot may be on its way without another step, in a recovery [s].
 STEP_TIMEOUT = 35.0
+#: The same for a robot that is not connected, and never was meanwhile [s].
+LOST_TIMEOUT = 2.0
 #: How often an effect is looked for, and an unlock that came too early repeated [s].
 LOOK, REPEAT = 0.02, 0.5
 #: How far a TCP may be from the one that was set [m], [rad]: it goes through 32-bit integers.
@@ -338,7 +340,7 @@ class CallDesk:
             if following.step is Step.WAIT:
                 # A robot that was never there will not come by waiting.
                 lost = self._robot.robot is None and not done
-                if loop.time() - moved_on > (EFFECT_TIMEOUT if lost else STEP_TIMEOUT):
+                if loop.time() - moved_on > (LOST_TIMEOUT if lost else STEP_TIMEOUT):
                     return _no(_report(done, following.text or self._modes()))
                 await asyncio.sleep(LOOK)
                 continue

@@ -1,0 +1,267 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a robot is asked for beside motions: done, refused in a sentence, or explained."""
+
+import os
+import signal
+import socket
+
+import pytest
+from waiting import wait_for
+
+from ur_cartesian_driver.driver import ConnectionState
+from ur_cartesian_driver.motion.goal import Goal, OutputKind, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.signals import AnalogDomain
+from ur_cartesian_driver.motion.state import RobotMode
+from ur_cartesian_driver.protocol.rtde import RtdeClient
+from ur_cartesian_driver.robot.calls import Dashboard, Recover, SetTcp
+from ur_cartesian_driver.sim.modes import SafetyEvent
+
+pytestmark = [pytest.mark.slow, pytest.mark.acceptance]
+
+READY = 10.0
+NOZZLE = Pose((0.01, -0.02, 0.15), (0.0, 0.6, 0.0, 0.8))
+QUICK = pytest.mark.ur_sim(unlock_delay=0.3, power_on_time=0.05, brake_release_time=0.05)
+ACTIONS = ('power on', 'power off', 'brake release', 'stop', 'pause', 'unlock protective stop',
+           'restart safety', 'close popup')
+
+
+def test_settings_are_done_when_the_robot_reports_them(driver, ur_sim):
+    assert driver.set_tcp(NOZZLE).ok
+    assert ur_sim.state().T_flange_tcp.distance_to(NOZZLE) < 1e-5
+    assert ur_sim.state().T_flange_tcp.angle_to(NOZZLE) < 1e-5
+    assert driver.set_payload(1.5, (0.0, 0.0, 0.05)).ok
+    assert ur_sim.call(lambda c: c.payload.mass) == 1.5
+    assert driver.set_speed_slider(0.37).ok
+    assert ur_sim.state().speed_slider == pytest.approx(0.37)
+    assert driver.zero_ftsensor().ok
+
+
+@pytest.mark.parametrize(('kind', 'pin', 'bit'), [
+    (OutputKind.STANDARD_DIGITAL, 2, 2), (OutputKind.CONFIGURABLE_DIGITAL, 7, 15),
+    (OutputKind.TOOL_DIGITAL, 1, 17)], ids=lambda value: getattr(value, 'name', str(value)))
+def test_a_digital_output_is_set_and_no_other(driver, ur_sim, kind, pin, bit):
+    assert driver.set_digital_output(kind, pin, True).ok
+    assert ur_sim.state().digital_outputs == 1 << bit
+    wait_for(lambda: any((*driver.signals.outputs.standard, *driver.signals.outputs.configurable,
+                          *driver.signals.outputs.tool)))
+    assert driver.set_digital_output(kind, pin, False).ok
+    assert ur_sim.state().digital_outputs == 0
+
+
+def test_an_analog_output_is_set_in_its_domain(driver, ur_sim):
+    assert driver.set_analog_output(1, 0.25, AnalogDomain.VOLTAGE).ok
+    assert ur_sim.call(lambda c: list(c.signals.analog_out)) == [0.0, 2.5]
+    assert driver.set_analog_output(0, 0.5, AnalogDomain.CURRENT).ok
+    assert ur_sim.call(lambda c: c.signals.analog_out[0]) == pytest.approx(0.012)
+    wait_for(lambda: driver.signals.analog_outputs[0].domain is AnalogDomain.CURRENT)
+
+
+def test_inputs_that_another_client_holds_are_named(driver, ur_sim):
+    with socket.create_connection(('127.0.0.1', ur_sim.ports.rtde)) as other:
+        client = RtdeClient(['timestamp'], inputs=['speed_slider_mask', 'speed_slider_fraction'])
+        other.sendall(client.start())
+        while client.state.name != 'READY':
+            client.feed(other.recv(65536))
+            other.sendall(client.data_to_send())
+        answer = driver.set_speed_slider(0.5)
+    assert not answer.ok
+    assert 'in use by another client' in answer.text
+    assert driver.status.state is ConnectionState.READY
+
+
+def test_settings_wait_for_the_end_of_a_goal(driver, home):
+    motion = driver.start(driver.plan(Goal(waypoints=(Waypoint(time=3.0, pose=home(z=0.05)),))))
+    wait_for(lambda: driver.status.state is ConnectionState.EXECUTING)
+    for answer in (driver.set_tcp(NOZZLE), driver.set_payload(1.0),
+                   driver.dashboard('load installation', 'default.installation')):
+        assert not answer.ok
+        assert answer.text.startswith('A goal is running')
+    assert driver.set_speed_slider(0.9).ok  # it only slows the goal
+    motion.cancel()
+    motion.result(5.0)
+    assert driver.set_tcp(NOZZLE).ok
+
+
+def test_a_setting_needs_the_robot_program(driver, ur_sim):
+    ur_sim.pause_program()
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    answer = driver.set_tcp(NOZZLE)
+    assert not answer.ok
+    assert 'PAUS' in answer.text
+    ur_sim.stop_program()
+    wait_for(lambda: not driver.status.program_running)
+    answer = driver.set_payload(1.0)
+    assert not answer.ok
+    assert 'resend_robot_program' in answer.text
+    assert driver.set_speed_slider(0.5).ok
+
+
+@QUICK
+def test_dashboard_commands_are_done_when_the_robot_reports_them(driver, ur_sim):
+    assert driver.status.serial_number == '20000000000'
+    assert driver.dashboard('robotmode').text == 'RUNNING'
+    assert driver.dashboard('pause').ok
+    assert driver.dashboard('play').ok
+    assert driver.dashboard('stop').ok
+    refused = driver.dashboard('play')
+    assert not refused.ok
+    assert 'load_program' in refused.text
+    assert driver.dashboard('power off').ok
+    assert ur_sim.state().robot_mode is RobotMode.POWER_OFF
+    assert driver.dashboard('power on').ok
+    assert ur_sim.state().robot_mode is RobotMode.IDLE
+    assert driver.dashboard('brake release').ok
+    assert ur_sim.state().robot_mode is RobotMode.RUNNING
+    assert driver.dashboard('popup', 'Hello').ok
+    assert ur_sim.state().popups == ('Hello',)
+    assert driver.dashboard('close popup').ok
+    assert not ur_sim.state().popups
+    assert 'folder of programs' in driver.dashboard('load', 'nothing.urp').text
+    assert driver.dashboard_line('get robot model').text == 'UR5'
+
+
+@QUICK
+@pytest.mark.parametrize('stop', ['protective stop', 'power off', 'program stopped', 'fault'])
+def test_recover_brings_the_robot_back(driver, ur_sim, stop):
+    {'protective stop': ur_sim.protective_stop,
+     'power off': lambda: ur_sim.call(lambda c: c.power_off()),
+     'program stopped': ur_sim.stop_program,
+     'fault': lambda: ur_sim.call(lambda c: c.safety_event(SafetyEvent.FAULT)),
+     }[stop]()
+    wait_for(lambda: driver.status.state is not ConnectionState.READY)
+    answer = driver.recover()
+    assert answer.ok, answer.text
+    assert 'Done: ' in answer.text
+    assert driver.status.state is ConnectionState.READY
+
+
+@QUICK
+def test_recover_goes_no_further_than_it_may(driver, ur_sim):
+    q = ur_sim.state().q
+    ur_sim.emergency_stop()
+    wait_for(lambda: driver.status.state is ConnectionState.STOPPED)
+    answer = driver.recover()
+    assert not answer.ok
+    assert 'release the button' in answer.text
+    assert ur_sim.state().robot_mode is RobotMode.POWER_OFF
+    ur_sim.call(lambda c: setattr(c, 'remote_control', False))
+    ur_sim.release_emergency_stop()
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    answer = driver.recover()
+    assert not answer.ok
+    assert 'local control' in answer.text
+    assert ur_sim.state().robot_mode is RobotMode.POWER_OFF
+    ur_sim.call(lambda c: setattr(c, 'remote_control', True))
+    assert driver.recover().ok
+    assert ur_sim.state().q == q
+    assert 'ready for goals' in driver.recover().text
+
+
+@QUICK
+def test_a_recovery_after_a_goal_does_not_go_on_with_it(driver, ur_sim, home):
+    motion = driver.start(driver.plan(Goal(waypoints=(Waypoint(time=4.0, pose=home(z=0.1)),))))
+    wait_for(lambda: max(map(abs, ur_sim.state().qd)) > 0.01)
+    ur_sim.protective_stop()
+    assert motion.result(5.0).code.name == 'PROTECTIVE_STOP'
+    wait_for(lambda: max(map(abs, ur_sim.state().qd)) < 1e-6)
+    q = ur_sim.state().q
+    assert driver.recover().ok
+    assert ur_sim.state().q == q
+
+
+@QUICK
+def test_recover_leaves_another_program_alone(driver, ur_sim):
+    ur_sim.run_script('def foreign():\n  while True:\n    sync()\n  end\nend\n')
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    answer = driver.recover()
+    assert not answer.ok
+    assert 'Another program' in answer.text
+    assert ur_sim.state().program == 'foreign'
+
+
+@pytest.mark.ur_sim(polyscope='10.11.0', unlock_delay=0.0)
+def test_polyscope_x_has_no_dashboard_and_the_rest_works(make_driver, ur_sim):
+    driver = make_driver()
+    driver.wait_ready(READY)
+    for command in ACTIONS:
+        answer = driver.dashboard(command)
+        assert not answer.ok
+        assert 'PolyScope X has no dashboard' in answer.text
+    assert not driver.dashboard_line('running').ok
+    assert driver.set_speed_slider(0.5).ok
+    assert driver.set_tcp(NOZZLE).ok
+    ur_sim.protective_stop()
+    wait_for(lambda: driver.status.state is ConnectionState.STOPPED)
+    answer = driver.recover()
+    assert answer.ok, answer.text
+
+
+def test_a_robot_whose_dashboard_is_closed_works_and_says_so(make_driver):
+    with socket.create_server(('127.0.0.1', 0)) as closed:
+        port = closed.getsockname()[1]
+    driver = make_driver(dashboard_port=port)
+    driver.wait_ready(READY)
+    answer = driver.dashboard('power on')
+    assert not answer.ok
+    assert f'127.0.0.1 port {port}' in answer.text
+    assert driver.set_tcp(NOZZLE).ok
+    assert driver.status.serial_number == ''
+
+
+def test_every_call_to_a_robot_that_is_not_there_is_answered(make_driver):
+    with socket.create_server(('127.0.0.1', 0)) as closed:
+        port = closed.getsockname()[1]
+    driver = make_driver(rtde_port=port, primary_port=port, dashboard_port=port)
+    for answer in (driver.dashboard('power on'), driver.dashboard_line('running'),
+                   driver.set_tcp(NOZZLE), driver.set_payload(1.0), driver.zero_ftsensor(),
+                   driver.set_speed_slider(0.5), driver.recover(),
+                   driver.set_digital_output(OutputKind.TOOL_DIGITAL, 0, True)):
+        assert not answer.ok
+        assert answer.text.endswith('.')
+
+
+def test_a_wrong_robot_is_not_touched(make_driver, ur_sim):
+    driver = make_driver(ur_type='ur10e')
+    wait_for(lambda: driver.status.state is ConnectionState.REFUSED)
+    for answer in (driver.dashboard('power off'), driver.set_speed_slider(0.5), driver.recover()):
+        assert not answer.ok
+        assert 'ur10e' in answer.text
+    assert driver.dashboard('robotmode').text == 'RUNNING'
+    assert ur_sim.state().speed_slider == 1.0
+
+
+@pytest.mark.ur_sim(power='off', power_on_time=100.0)
+def test_calls_are_answered_when_the_robot_loop_dies_or_the_driver_closes(make_driver):
+    driver = make_driver(robot_loop='process')
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    pending = driver.call(Dashboard(command='power on'))
+    os.kill(driver._host.pid, signal.SIGKILL)
+    assert 'robot loop ended unexpectedly' in pending.result(5.0).text
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    pending = driver.call(Recover())
+    driver.close()
+    assert not pending.result(5.0).ok
+    assert driver.call(SetTcp(T_flange_tcp=NOZZLE)).result(0.0).text == (
+        'The driver is closed; open it.')
+
+
+@pytest.mark.ur_sim(power='off', power_on_time=0.05, brake_release_time=0.05)
+def test_auto_power_is_for_the_first_connection_only(make_driver, ur_sim):
+    driver = make_driver(auto_power=True)
+    driver.wait_ready(READY)
+    ur_sim.call(lambda c: c.power_off())
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    ur_sim.inject('drop rtde')
+    wait_for(lambda: driver.status.state is ConnectionState.DISCONNECTED)
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    assert driver.dashboard('robotmode').text == 'POWER_OFF'
+
+
+@pytest.mark.ur_sim(power='off')
+def test_nothing_is_switched_on_unasked(make_driver):
+    driver = make_driver()
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    wait_for(lambda: driver.status.serial_number)
+    assert driver.dashboard('robotmode').text == 'POWER_OFF'
