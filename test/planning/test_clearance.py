@@ -11,8 +11,9 @@ from ur_cartesian_driver.kinematics.bodies import Bodies, Link
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.meshes import Meshes
 from ur_cartesian_driver.kinematics.robots import MODELS
+from ur_cartesian_driver.motion.errors import CollisionPredicted
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.planning.clearance import Clearance
+from ur_cartesian_driver.planning.clearance import Clearance, remarks
 from ur_cartesian_driver.planning.options import PlanningOptions
 
 H = pi / 2
@@ -244,3 +245,30 @@ def test_a_start_beyond_a_plane_may_return_and_not_go_on():
 
 def test_links_have_names_that_read_well():
     assert f'{Link.UPPER_ARM} and {Link.WRIST_2}' == 'upper arm and wrist 2'
+
+
+# -- what is said ---------------------------------------------------------------------------------
+
+SEGMENT = np.repeat([2, 3], 30).astype(np.int32)
+FRACTION = np.tile(np.arange(1, 31) / 30, 2)
+
+
+def test_a_refusal_names_segment_and_fraction():
+    clear = check(way(HOME, FOLDED), self_collision='refuse')
+    with pytest.raises(CollisionPredicted) as refusal:
+        remarks(clear, SEGMENT, FRACTION)
+    percent = 100 * FRACTION[clear.violation.row]
+    assert clear.violation.row >= 30
+    assert str(refusal.value) == (
+        f'trajectory.points[3].pose: {percent:.1f} % of the way to it {clear.violation.text}; '
+        f'{clear.violation.help}.')
+
+
+def test_a_warning_goes_into_the_report_with_the_smallest_distance():
+    warned = remarks(check(way(HOME, FOLDED)), SEGMENT, FRACTION)
+    assert warned[0].startswith('point 3: ')
+    assert 'upper arm and wrist 1 come within' in warned[0]
+    assert warned[1] == 'all points: nearest to each other come upper arm and wrist 1'
+    assert remarks(check(way(HOME, HOME)), SEGMENT, FRACTION) == [
+        'all points: the smallest distance is at least 0.043 m, between forearm and wrist 3']
+    assert remarks(check(way(HOME, HOME), self_collision='off'), SEGMENT, FRACTION) == []

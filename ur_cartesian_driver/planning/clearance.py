@@ -22,9 +22,11 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.bodies import Bodies, Link
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.meshes import Meshes
+from ur_cartesian_driver.motion.errors import CollisionPredicted
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.validate import point_field
 from ur_cartesian_driver.planning.workspace import parse_planes, Plane
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -108,6 +110,31 @@ class Clearance:
             if violation is not None:
                 break
         return Clear(violation=violation, warning=warning, margin=margin, what=what)
+
+
+def remarks(clear: Clear, segment: NDArray[np.int32], fraction: Floats) -> list[str]:
+    """
+    Return what the report says of the clearance.
+
+    :param segment: (n,) the waypoint to which the motion of each row leads.
+    :param fraction: (n,) how much of the way to it is gone, 0..1.
+    :raises CollisionPredicted: a row is refused.
+    """
+    if clear.violation is not None:
+        row = clear.violation.row
+        raise CollisionPredicted(
+            f'{point_field(int(segment[row]), "pose")}: {100.0 * fraction[row]:.1f} % of the way '
+            f'to it {clear.violation.text}; {clear.violation.help}.')
+    said = []
+    if clear.warning is not None:
+        row = clear.warning.row
+        said.append(f'point {segment[row]}: {100.0 * fraction[row]:.1f} % of the way to it '
+                    f'{clear.warning.text}')
+    if clear.what:
+        said.append(f'all points: the smallest distance is at least {clear.margin:.3f} m, between '
+                    f'{clear.what}' if clear.margin > 0.0 else
+                    f'all points: nearest to each other come {clear.what}')
+    return said
 
 
 class _Pace:
