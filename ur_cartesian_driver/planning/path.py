@@ -15,7 +15,6 @@ from math import asin, atan2, ceil, hypot, pi, sqrt
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.goal import ArcMode
@@ -29,6 +28,13 @@ from ur_cartesian_driver.motion.pose import (
     Vector3,
 )
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.planning.pose_rows import (
+    compose_rows,
+    Floats,
+    interpolate_rows,
+    multiply_rows,
+    normalized_rows,
+)
 
 #: Below these two poses are the same, and a motion between them none: the resolution of the wire.
 SAME_POSITION = 1e-6
@@ -64,6 +70,10 @@ class Line:
     def pose(self, u: float) -> Pose:
         """Return the pose at ``u``."""
         return self.start.interpolate(self.end, u)
+
+    def rows(self, u: Floats) -> Floats:
+        """Return the poses (n, 7) at many ``u`` (n,)."""
+        return interpolate_rows(np.array([self.start.row()]), np.array([self.end.row()]), u)
 
     def trim(self, radius: float) -> float:
         """Return the ``u`` at which the line has left a ball of that radius around its start."""
@@ -131,6 +141,18 @@ class Arc:
         swing = Pose(self.center, turn) @ Pose(_minus(self.start.position, self.center))
         return Pose(swing.position, self._orientation(turn, u))
 
+    def rows(self, u: Floats) -> Floats:
+        """Return the poses (n, 7) at many ``u`` (n,)."""
+        rows = interpolate_rows(np.array([self.start.row()]), np.array([self.end.row()]), u)
+        spoke = _minus(self.start.position, self.center)  # at a right angle to the axis
+        angle, across = u[:, None] * self.sweep, _cross(self.axis, spoke)
+        rows[:, :3] = self.center + np.cos(angle) * spoke + np.sin(angle) * across
+        if self.mode is ArcMode.FIXED:
+            turn = np.concatenate([np.sin(0.5 * angle) * self.axis, np.cos(0.5 * angle)], axis=1)
+            rows[:, 3:] = normalized_rows(
+                multiply_rows(turn, np.array([self.start.quaternion])))
+        return rows
+
     def trim(self, radius: float) -> float:
         """Return the ``u`` at which the arc has left a ball of that radius around its start."""
         return min(1.0, 2.0 * asin(min(1.0, 0.5 * radius / self.radius)) / self.sweep)
@@ -193,11 +215,15 @@ class JointLine:
         """Return the pose at ``u``."""
         return self.arm.forward(self.joints(u)) @ self.T_flange_tcp
 
-    def rows(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the poses (n, 7) at many ``u`` (n,)."""
+    def joint_rows(self, u: Floats) -> Floats:
+        """Return the joint positions (n, 6) [rad] at many ``u`` (n,)."""
         q_start, q_end = np.array(self.q_start), np.array(self.q_end)
-        q = q_start + np.outer(u, q_end - q_start)
-        return tcp_rows(self.arm, self.T_flange_tcp, q)
+        rows: Floats = q_start + np.outer(u, q_end - q_start)
+        return rows
+
+    def rows(self, u: Floats) -> Floats:
+        """Return the poses (n, 7) at many ``u`` (n,)."""
+        return tcp_rows(self.arm, self.T_flange_tcp, self.joint_rows(u))
 
     def trim(self, radius: float) -> float:
         """Return the first ``u`` at which the tool has left a ball of that radius."""
@@ -228,22 +254,9 @@ def trim_end(path: Path, radius: float) -> float:
     return 1.0 - path.trim(radius)
 
 
-def tcp_rows(arm: Arm, T_flange_tcp: Pose, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def tcp_rows(arm: Arm, T_flange_tcp: Pose, q: Floats) -> Floats:
     """Return ``T_base_tcp`` (n, 7) of joint positions (n, 6) [rad]."""
-    flange = arm.forward_rows(q)
-    ax, ay, az, aw = flange[:, 3:].T
-    x, y, z = T_flange_tcp.position
-    bx, by, bz, bw = T_flange_tcp.quaternion
-    # v + 2 u x (u x v + w v), and the product of the quaternions, as in motion.pose.
-    tx, ty, tz = 2.0 * (ay * z - az * y), 2.0 * (az * x - ax * z), 2.0 * (ax * y - ay * x)
-    return np.stack((
-        flange[:, 0] + x + aw * tx + ay * tz - az * ty,
-        flange[:, 1] + y + aw * ty + az * tx - ax * tz,
-        flange[:, 2] + z + aw * tz + ax * ty - ay * tx,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz), axis=1)
+    return compose_rows(arm.forward_rows(q), T_flange_tcp)
 
 
 def same(a: Pose, b: Pose) -> bool:

@@ -10,16 +10,12 @@ the report. The first reason to refuse that is met is raised; nothing has been s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-from math import degrees
+from itertools import pairwise
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import (
     InvalidGoal,
     InvalidPosture,
-    JointLimitExceeded,
-    NearSingularity,
     RobotNotReady,
 )
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
@@ -38,48 +34,31 @@ from ur_cartesian_driver.motion.primitive import (
 )
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.controlled import carried
-from ur_cartesian_driver.planning.corner import Corner
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.path import Arc, JointLine, Line, Path, same, SAME_POSITION
+from ur_cartesian_driver.planning.path import Arc
 from ur_cartesian_driver.planning.postures import (
     full,
     missed,
     named_joints,
     Reach,
-    Trace,
 )
 from ur_cartesian_driver.planning.reference import reference_path
-from ur_cartesian_driver.planning.report import ignored, note
-from ur_cartesian_driver.planning.spoken import poses_only, spoken, spoken_radius
+from ur_cartesian_driver.planning.report import ignored, note, smallest
+from ur_cartesian_driver.planning.route import Route, SAME_SOLUTION
+from ur_cartesian_driver.planning.spoken import poses_only, spoken
 from ur_cartesian_driver.planning.timing import Leg, schedule, Timing
 from ur_cartesian_driver.planning.tolerances import with_default_tolerances
 from ur_cartesian_driver.planning.validate import (
-    arc_of,
     check,
-    check_blends_fit,
     is_timed,
-    no_way,
-    PLAIN,
     point_field,
     segment_field,
-    segment_of,
 )
 
 #: How far the reported TCP may be from where the kinematics puts it [m], [rad]. Calibration moves
 #: it by some millimetres; another model or another TCP moves it by much more.
 LARGEST_MISMATCH_POSITION = 0.015
 LARGEST_MISMATCH_ANGLE = 0.05
-#: Solutions that differ by less are one [rad].
-_SAME_SOLUTION = 1e-6
-
-_LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
-_OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
-#: Motions that can only be blended into from some others; all else stops before them.
-_BLENDS_FROM = {
-    SegmentType.JOINT: (_LINEAR, _JOINT),
-    SegmentType.OPTIMIZED_LINEAR: (_LINEAR, _JOINT, *_OPTIMIZED),
-    SegmentType.OPTIMIZED_JOINT: (_LINEAR, _JOINT, *_OPTIMIZED),
-}
 
 
 def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
@@ -96,12 +75,12 @@ def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> P
     about = carried(goal, state, options)
     goal, state = about.goal, about.state
     planner = _Planner(goal, state, arm, options)
-    legs = planner.blended(planner.legs())
+    legs = planner.legs()
     timings = schedule(legs, options, arm.model)
     segments = tuple(planner.segment(leg, timing)
                      for leg, timing in zip(legs, timings, strict=True))
     remarks = [*about.remarks, *planner.remarks, *ignored(goal),
-               *(timing.remark for timing in timings if timing.remark)]
+               *(timing.remark for timing in timings if timing.remark), smallest(legs)]
     return Plan(goal=goal, segments=segments, start=state.actual_q, remarks=tuple(remarks),
                 reference=reference_path(state.actual_tcp_pose, legs, timings),
                 T_flange_active=T_flange_active, T_flange_tcp=about.T_flange_tcp,
@@ -122,6 +101,7 @@ class _Planner:
         if self.timed and options.dialect.is_coarse:
             self.remarks.append(f'all points: times are kept by speeds, because robot programs '
                                 f'of wire dialect {options.dialect.name} count in milliseconds')
+        self.route = Route(goal, self.targets, self.reach, options, self.remarks, self.why)
         self._check_robot()
 
     # -- before the first segment ----------------------------------------------------------------
@@ -182,140 +162,12 @@ class _Planner:
                 raise InvalidPosture(f'{point_field(0, "posture")} is not the one in which the '
                                      f'robot stands: {clause}; give the first point a time.')
 
-    # -- ways ------------------------------------------------------------------------------------
-
     def legs(self) -> list[Leg]:
         """Return the way of every segment and the configuration it arrives in."""
-        legs: list[Leg] = []
-        T_base_tcp, q = self.state.actual_tcp_pose, self.state.actual_q
         begin = 1 if self._stands_at_first() else 0
-        before = 0.0
-        for i in range(begin, len(self.goal.waypoints)):
-            leg = self._leg(i, T_base_tcp, q)
-            if self.timed and leg.time is None:
-                leg = replace(leg, time=self.goal.waypoints[i].time - before)
-            if leg.path.length <= SAME_POSITION and self._no_way(leg):
-                leg = self._already_there(leg)
-            legs.append(leg)
-            T_base_tcp, q, before = leg.path.end, leg.joints, self.goal.waypoints[i].time
-        return legs
-
-    def _leg(self, i: int, T_base_tcp: Pose, q: Joints) -> Leg:
-        """Return the way of one segment from a pose and a configuration."""
-        goal, target = self.goal, self.targets[i]
-        segment = segment_of(goal, i)
-        kind = _LINEAR if segment.type == SegmentType.AUTO else SegmentType(segment.type)
-        path: Path
-        if kind in (_JOINT, SegmentType.OPTIMIZED_JOINT):
-            path, trace = self._joint_way(i, q)
-        else:
-            if kind == SegmentType.CIRCULAR:
-                assert segment.via is not None
-                via = goal.T_base_frame @ segment.via
-                path = arc_of(i, T_base_tcp, via, target, segment.arc_mode)
-                self._say_fixed(i, path)
-            else:
-                path = Line.between(T_base_tcp, target)
-            kind, path, trace = self._followed(i, kind, path, q)
-        return Leg(index=i, kind=kind, waypoint=goal.waypoints[i], segment=segment, path=path,
-                   q_start=q, trace=trace, time=None)
-
-    def _say_fixed(self, i: int, arc: Arc) -> None:
-        """Say where an arc that keeps to its tangent ends in another orientation than asked."""
-        off = arc.end.angle_to(self.targets[i])
-        if off > self.options.start_tolerance_angle:
-            self.remarks.append(
-                f'point {i}: the orientation of the point is ignored, because arc_mode FIXED '
-                f'keeps it to the tangent; it arrives {degrees(off):.1f} degrees off')
-
-    def _joint_way(self, i: int, q: Joints) -> tuple[JointLine, Trace]:
-        """Return the joint line to a point, in the posture where one is given."""
-        posture, place = self.goal.waypoints[i].posture, point_field(i, 'pose')
-        if posture:
-            named = named_joints(posture, self.options.tf_prefix)
-            chosen = self.reach.chosen(self.targets[i], named, q, place)
-        else:
-            chosen = self.reach.nearest(self.targets[i], q, place)
-        path = JointLine.between(self.reach.arm, self.reach.T_flange_tcp, q, chosen)
-        return path, [(1.0, chosen)]
-
-    def _followed(self, i: int, kind: SegmentType, path: Path, q: Joints
-                  ) -> tuple[SegmentType, Path, Trace]:
-        """
-        Return a straight or circular way with its configurations, or the joint move in its place.
-
-        :raises InvalidPosture: it does not arrive in the posture.
-        """
-        posture = self.goal.waypoints[i].posture
-        try:
-            trace = self.reach.follow(path, q, point_field(i, 'pose'))
-            if posture:
-                self._check_arrival(i, path, trace[-1][1])
-        except (InvalidPosture, NearSingularity, JointLimitExceeded) as refusal:
-            if not posture or self.options.on_posture_change != 'movej':
-                raise
-            self.remarks.append(f'point {i}: JOINT instead of {kind.name} '
-                                f'(on_posture_change = movej), because otherwise: {refusal}')
-            self.why.setdefault(i, []).append('the posture needs a joint move')
-            return (_JOINT, *self._joint_way(i, q))
-        return kind, path, trace
-
-    def _check_arrival(self, i: int, path: Path, q: Joints) -> None:
-        named = named_joints(self.goal.waypoints[i].posture, self.options.tf_prefix)
-        chosen = self.reach.chosen(path.end, named, q, point_field(i, 'pose'))
-        if clause := missed(q, chosen, named):
-            raise InvalidPosture(
-                f'{point_field(i, "posture")} cannot be reached by a straight or circular move: '
-                f'{clause}; use a JOINT segment, or set on_posture_change to movej.')
-
-    def _no_way(self, leg: Leg) -> bool:
-        if isinstance(leg.path, JointLine):
-            return max(leg.path.travel) <= _SAME_SOLUTION
-        return same(leg.path.start, leg.path.end)
-
-    def _already_there(self, leg: Leg) -> Leg:
-        """Return the leg to a first point at which the robot stands; others are refused."""
-        i = leg.index
-        if i > 0:
-            raise no_way(self.goal, i)
-        waits = f'; its {leg.time:g} s are not waited' if leg.time else ''
-        self.remarks.append(f'point 0: the robot stands there already{waits}')
-        self.why[0] = ['the robot stands there already']
-        kind = leg.kind if leg.kind == _JOINT else _LINEAR
-        return replace(leg, kind=kind, time=None, segment=replace(
-            PLAIN, type=leg.segment.type), waypoint=replace(leg.waypoint, twist=(0.0,) * 6))
-
-    # -- blends ----------------------------------------------------------------------------------
-
-    def blended(self, legs: list[Leg]) -> list[Leg]:
-        """Return the legs with the corners between them."""
-        if legs[0].segment.blend_radius > 0.0 and len(legs) > 1:
-            check_blends_fit(self.goal, legs[0].index, legs[0].path.start.distance_to(
-                legs[0].path.end), 0.0, legs[0].segment.blend_radius)
-        for k in range(len(legs) - 1):
-            first, second = legs[k], legs[k + 1]
-            radius = spoken_radius(first.segment.blend_radius, first.index,
-                                   self.options.dialect, self.remarks)
-            if radius <= SAME_POSITION or not self._can_blend(first, second):
-                continue  # the wire rounds so small a radius to none
-            process = first.kind == second.kind == SegmentType.PROCESS
-            corner = Corner.between(first.path, second.path, radius, fillet=process)
-            legs[k], legs[k + 1] = replace(first, after=corner), replace(second, before=corner)
-        for leg in legs:
-            if leg.u_before > leg.u_after + 1e-9:
-                raise InvalidGoal(segment_field(leg.index, 'blend_radius'),
-                                  f'is too large: the blends at both ends of the segment to '
-                                  f'point {leg.index} overlap', 'make them smaller')
-        return legs
-
-    def _can_blend(self, first: Leg, second: Leg) -> bool:
-        allowed = _BLENDS_FROM.get(second.kind)
-        if allowed is None or first.kind in allowed:
-            return True
-        self.remarks.append(
-            f'point {first.index}: stops instead of blending, because the robot cannot blend '
-            f'from {first.kind.name} into {second.kind.name}')
-        return False
+        stops = [0.0, *(point.time for point in self.goal.waypoints)][begin:]
+        times = [after - before if self.timed else None for before, after in pairwise(stops)]
+        return self.route.legs(begin, self.state.actual_tcp_pose, self.state.actual_q, times)
 
     # -- primitives ------------------------------------------------------------------------------
 
@@ -360,7 +212,7 @@ class _Planner:
         if wanted is not None:
             place = point_field(leg.index, 'pose')
             found = self.reach.nearest(self.targets[leg.index], wanted, place)
-            if max(abs(a - b) for a, b in zip(found, leg.joints, strict=True)) <= _SAME_SOLUTION:
+            if max(abs(a - b) for a, b in zip(found, leg.joints, strict=True)) <= SAME_SOLUTION:
                 return wanted
         return leg.joints
 
@@ -394,7 +246,7 @@ class _Planner:
         """
         assert isinstance(leg.path, Arc)
         place = segment_field(leg.index, 'via')
-        passing = _at(leg.trace, leg.q_start, leg.path.u_via)
+        passing = self.route.survey.samples().joints_at(leg.index, leg.path.u_via)
         # The orientation of the via does not shape the arc, so go on from there to its pose.
         q = self.reach.nearest(via, passing, place)
         named = named_joints(segment.via_posture, self.options.tf_prefix)
@@ -405,9 +257,3 @@ class _Planner:
                 f'the arm goes along the arc: {clause}; leave it empty, or go to the start of '
                 'the arc in that configuration.')
         return chosen
-
-
-def _at(trace: Sequence[tuple[float, Joints]], q_start: Joints, u: float) -> Joints:
-    """Return the configuration of the place of a trace that is nearest to ``u``."""
-    return min([(0.0, q_start), *trace], key=lambda place: abs(place[0] - u))[1]
-

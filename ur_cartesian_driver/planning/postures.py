@@ -1,20 +1,22 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-In which joint configuration the arm goes along, and arrives.
+In which joint configuration the arm arrives, and why it cannot.
 
 The robot is told poses; which of up to eight configurations it takes follows from where it comes
 from. So the configuration is predicted segment by segment: along a straight line or an arc by
-following the inverse kinematics in small steps, for a joint move by choosing the solution that is
-then sent along as ``q_near``.
+following the inverse kinematics (:mod:`~.lookahead`), for a joint move by choosing the solution
+that is then sent along as ``q_near``.
 """
 
 from __future__ import annotations
 
-from math import ceil, degrees, dist, pi, sin
-from typing import TypeAlias
+from math import degrees, dist, hypot, pi
+
+import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.closed_form_rows import BRANCHES
 from ur_cartesian_driver.kinematics.inverse import (
     nearest,
     nearest_in,
@@ -22,6 +24,7 @@ from ur_cartesian_driver.kinematics.inverse import (
     why_unreachable,
 )
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
+from ur_cartesian_driver.kinematics.rows import postures
 from ur_cartesian_driver.motion.errors import (
     GoalRefused,
     JointLimitExceeded,
@@ -31,22 +34,15 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.goal import Posture
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.path import Path
 
 #: The named joints have to arrive this near to the chosen solution, turns included [rad].
 ARRIVAL = 0.01
-#: Longest steps along a path to begin with [m], [rad].
-_FIRST_LENGTH = 0.02
-_FIRST_ANGLE = 0.2
-#: A step along a path is halved until no joint turns more than this in it [rad] ...
-_STEP = 0.2
-#: ... or it is this short [m], [rad]: a joint that still turns more than _JUMP jumps.
-_LEAST_LENGTH = 0.0001
-_LEAST_ANGLE = 0.05 * pi / 180.0
-_JUMP = 0.5
-
-#: Places on the way: the path's ``u`` and the joint positions there.
-Trace: TypeAlias = list[tuple[float, Joints]]
+#: A continued configuration is one that no joint turns farther to than this [rad].
+_CONTINUED = 0.5
+#: Rounding of a configuration [rad].
+_HERE = 1e-6
+# How near to the middle of its range a measure of a branch is, to compare the three [m].
+_ARM_LENGTH = 0.3
 
 
 class Reach:
@@ -61,11 +57,15 @@ class Reach:
         """Prepare the way from the TCP back to the flange."""
         self.arm = arm
         self.T_flange_tcp = T_flange_tcp
-        self._T_tcp_flange = T_flange_tcp.inverse()
+        self.T_tcp_flange = T_flange_tcp.inverse()
 
     def flange(self, T_base_tcp: Pose) -> Pose:
         """Return where the flange is when the TCP is there."""
-        return T_base_tcp @ self._T_tcp_flange
+        return T_base_tcp @ self.T_tcp_flange
+
+    def solution(self, T_base_tcp: Pose, q_near: Joints) -> Joints | None:
+        """Return the solution nearest to a configuration, None if there is none."""
+        return nearest(self.arm, self.flange(T_base_tcp), q_near)
 
     def nearest(self, T_base_tcp: Pose, q_near: Joints, place: str) -> Joints:
         """
@@ -75,9 +75,9 @@ class Reach:
         :raises Unreachable: there is none.
         :raises JointLimitExceeded: each of them is outside the range of a joint.
         """
-        q = nearest(self.arm, self.flange(T_base_tcp), q_near)
+        q = self.solution(T_base_tcp, q_near)
         if q is None:
-            raise self._no_solution(T_base_tcp, place)
+            raise self.no_solution(T_base_tcp, place)
         return q
 
     def chosen(self, T_base_tcp: Pose, named: dict[int, float], q_before: Joints,
@@ -88,60 +88,30 @@ class Reach:
         Of all solutions those nearest in the named joints, of them the one nearest to the
         configuration before. Raises as :meth:`nearest`.
         """
+        # Where the arm is already as near as counts, that is the one.
+        if hypot(*(q_before[k] - value for k, value in named.items())) <= ARRIVAL:
+            here = self.solution(T_base_tcp, q_before)
+            if here is not None and dist(here, q_before) < _HERE:
+                return here
         q = nearest_in(self.arm, self.flange(T_base_tcp), named, q_before)
         if q is None:
-            raise self._no_solution(T_base_tcp, place)
+            raise self.no_solution(T_base_tcp, place)
         return q
 
-    def follow(self, path: Path, q_start: Joints, place: str) -> Trace:
-        """
-        Return configurations along a straight line or an arc, the last one at its end.
-
-        Steps are halved where the joints turn fast, so a short segment costs one inverse
-        kinematics, and a difficult one as many as it needs.
-
-        :raises Unreachable: the path leaves the reach.
-        :raises JointLimitExceeded: a joint comes to the end of its range.
-        :raises NearSingularity: a joint would have to turn at once.
-        """
-        trace: Trace = []
-        u, q = 0.0, q_start
-        least = _least_step(path)
-        pieces = _pieces(path)
-        # Piece by piece: a path to the moon has no end that could be listed.
-        begun, ends = 0, list[float]()
-        while ends or begun < pieces:
-            if not ends:
-                begun += 1
-                ends.append(begun / pieces)
-            end = ends[-1]
-            where = place if end == 1.0 else f'{place}, {100.0 * end:.1f} % of the way to it,'
-            pose = path.end if end == 1.0 else path.pose(end)
-            q_next = self.nearest(pose, q, where)
-            turn = max(abs(b - a) for a, b in zip(q, q_next, strict=True))
-            if (turn > _STEP or _changes_branch(q, q_next)) and end - u > least:
-                ends.append(0.5 * (u + end))
-                continue
-            if turn > _JUMP:
-                raise self._jump(pose, q, q_next, where)
-            u, q = end, q_next
-            trace.append((u, q))
-            ends.pop()
-        return trace
-
-    def _no_solution(self, T_base_tcp: Pose, place: str) -> GoalRefused:
+    def no_solution(self, T_base_tcp: Pose, place: str) -> GoalRefused:
+        """Tell why a pose has no solution: out of reach, or outside of the joints' ranges."""
         T_base_flange = self.flange(T_base_tcp)
         why = why_unreachable(self.arm, T_base_flange)
         if solutions(self.arm, T_base_flange):
             return JointLimitExceeded(f'{place} cannot be reached: {why}.')
         return Unreachable(f'{place} cannot be reached: {why}.')
 
-    def _jump(self, T_base_tcp: Pose, q: Joints, q_next: Joints, place: str) -> GoalRefused:
+    def jump(self, T_base_tcp: Pose, q: Joints, q_next: Joints, place: str) -> GoalRefused:
         """Tell why the configuration cannot be continued: end of a range, or a singularity."""
         goes_on = self._continued(T_base_tcp, q)
         limits = self.arm.model.position_limits
         for k, (low, high) in enumerate(limits):
-            if max(abs(b - a) for a, b in zip(q, goes_on, strict=True)) <= _JUMP and not (
+            if max(abs(b - a) for a, b in zip(q, goes_on, strict=True)) <= _CONTINUED and not (
                     low <= goes_on[k] <= high):
                 return JointLimitExceeded(
                     f'{place} needs {JOINT_NAMES[k]} at {goes_on[k]:.3f} rad, outside its range '
@@ -149,9 +119,27 @@ class Reach:
                     'there with a JOINT segment.')
         joint = max(range(6), key=lambda k: abs(q_next[k] - q[k]))
         return NearSingularity(
-            f'{place} lies behind a singularity: {JOINT_NAMES[joint]} would have to turn '
+            f'{place} lies behind the {self.nearest_singularity(q)} singularity: '
+            f'{JOINT_NAMES[joint]} would have to turn '
             f'by {degrees(abs(q_next[joint] - q[joint])):.0f} degrees at once; keep away from '
             'it, or use a JOINT segment.')
+
+    def nearest_singularity(self, q: Joints) -> str:
+        """Return which singularity a configuration is nearest to: wrist, elbow or shoulder."""
+        measures = postures(self.arm, np.array([q]))
+        distances = {'wrist': abs(float(measures.wrist[0])),
+                     'elbow': abs(float(measures.elbow[0])),
+                     'shoulder': abs(float(measures.shoulder[0])) / _ARM_LENGTH}
+        return min(distances, key=lambda name: distances[name])
+
+    def flips(self, q: Joints, q_other: Joints) -> str:
+        """Return what has to flip from one configuration to another, '' if nothing does."""
+        first, second = postures(self.arm, np.array([q, q_other])).branch
+        a, b = BRANCHES[first], BRANCHES[second]
+        names = [name for name, x, y in zip(
+            ('a crossing of the shoulder', 'a flip of the elbow', 'a flip of the wrist'),
+            a, b, strict=True) if x != y]
+        return ' and '.join(names)
 
     def _continued(self, T_base_tcp: Pose, q: Joints) -> Joints:
         """Return the solution nearest to a configuration, the limits of the joints aside."""
@@ -188,28 +176,3 @@ def missed(q: Joints, chosen: Joints, named: dict[int, float]) -> str:
             return (f'{JOINT_NAMES[k]} arrives at {q[k]:.3f} rad, and the solution for the '
                     f'posture has it at {chosen[k]:.3f} rad')
     return ''
-
-
-def _changes_branch(q: Joints, q_next: Joints) -> bool:
-    """
-    Tell whether elbow or wrist 2 change sides.
-
-    Beside a singularity the other branch is the nearer one after a long step, while the arm that
-    goes there in small steps swings round and stays on its own.
-    """
-    return sin(q[2]) * sin(q_next[2]) < 0.0 or sin(q[4]) * sin(q_next[4]) < 0.0
-
-
-def _pieces(path: Path) -> int:
-    """Return the number of steps to begin with, so that nothing is stepped over."""
-    return max(1, ceil(path.length / _FIRST_LENGTH), ceil(path.angle / _FIRST_ANGLE))
-
-
-def _least_step(path: Path) -> float:
-    """Return the shortest step in ``u``."""
-    least = 1.0
-    if path.length > 0.0:
-        least = min(least, _LEAST_LENGTH / path.length)
-    if path.angle > 0.0:
-        least = min(least, _LEAST_ANGLE / path.angle)
-    return least

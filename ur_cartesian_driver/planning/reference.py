@@ -4,20 +4,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from math import ceil
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.planning.corner import Corner
-from ur_cartesian_driver.planning.path import JointLine
+from ur_cartesian_driver.planning.corner import Corner, corner_rows, path_rows
+from ur_cartesian_driver.planning.path import JointLine, Path
+from ur_cartesian_driver.planning.pose_rows import Floats
 from ur_cartesian_driver.planning.timing import Leg, Timing
-
-_Row: TypeAlias = tuple[float, ...]
 
 #: The fewest pieces of a joint move, for the sake of its times.
 _LEAST_OF_JOINTS = 8
@@ -30,28 +28,65 @@ def reference_path(start: Pose, legs: Sequence[Leg], timings: Sequence[Timing]) 
     Lines have their ends and the places where they change speed, curves as many samples as keep
     the chords near (see :mod:`~.path`), and nothing turns by more than 10 degrees from row to row.
     """
-    rows: list[_Row] = [start.row()]
-    points: list[int] = [legs[0].index]
-    times: list[float] = [0.0]
-    room: list[tuple[float, float]] = [(0.0, 0.0)]
-    now = 0.0
-    for k, (leg, timing) in enumerate(zip(legs, timings, strict=True)):
-        u = _places(leg, timing)
-        rows.extend(_poses(leg, u))
-        points.extend([leg.index] * len(u))
-        span, way = leg.u_after - leg.u_before, timing.profile.length
-        times.extend(now + timing.profile.time_at(way * (x - leg.u_before) / span)
-                     if span > 0.0 else now for x in u)
-        now += timing.profile.duration
-        room.extend([(0.0, 0.0)] * len(u))
-        if leg.after is not None:
-            now = _append_corner(leg.after, (leg.index, legs[k + 1].index), now, timing.corner,
-                                 rows, points, times)
-            room.extend([leg.after.room] * leg.after.samples)
-    poses = np.array(rows)
+    sections = list(_sections(legs, timings))
+    count = [len(section.at) for section in sections]
+    now = np.repeat(np.array([section.now for section in sections]), count)
+    times = now + np.concatenate([section.after for section in sections])
+    points = np.concatenate([section.points for section in sections])
+    room = np.repeat(np.array([section.room for section in sections]), count, axis=0)
+    poses = np.concatenate([[start.row()], _poses(sections)])
     _keep_hemisphere(poses)
-    return ReferencePath(poses=poses, point=np.array(points, dtype=np.int32),
-                         time=np.maximum.accumulate(np.array(times)), room=np.array(room))
+    return ReferencePath(
+        poses=poses, point=np.concatenate([[legs[0].index], points]).astype(np.int32),
+        time=np.maximum.accumulate(np.concatenate([[0.0], times])),
+        room=np.concatenate([[(0.0, 0.0)], room]))
+
+
+@dataclass(frozen=True, slots=True)
+class _Section:
+    """The rows of one path or of one corner."""
+
+    curve: Path | Corner
+    #: Where on it.
+    at: list[float]
+    #: When it begins, and how long after that each row is [s].
+    now: float
+    after: list[float]
+    points: list[int]
+    room: tuple[float, float] = (0.0, 0.0)
+
+
+def _sections(legs: Sequence[Leg], timings: Sequence[Timing]) -> Iterator[_Section]:
+    now = 0.0
+    for leg, timing in zip(legs, timings, strict=True):
+        u, profile = _places(leg, timing), timing.profile
+        span = leg.u_after - leg.u_before
+        after = [profile.time_at(profile.length * (x - leg.u_before) / span)
+                 if span > 0.0 else 0.0 for x in u]
+        yield _Section(leg.path, u, now, after, [leg.index] * len(u))
+        now += profile.duration
+        if leg.after is not None:
+            n = leg.after.samples
+            s = [k / n for k in range(1, n + 1)]
+            yield _Section(leg.after, s, now, [x * timing.corner for x in s],
+                           [leg.index + (x > 0.5) for x in s], leg.after.room)
+            now += timing.corner
+
+
+def _poses(sections: Sequence[_Section]) -> Floats:
+    """Return the poses (n, 7) of all rows."""
+    count = [len(section.at) for section in sections]
+    at = np.concatenate([section.at for section in sections])
+    is_corner = np.array([isinstance(section.curve, Corner) for section in sections])
+    number = np.where(is_corner, np.cumsum(is_corner), np.cumsum(~is_corner)) - 1
+    of, rounds = np.repeat(number, count), np.repeat(is_corner, count)
+    paths = [section.curve for section in sections if not isinstance(section.curve, Corner)]
+    corners = [section.curve for section in sections if isinstance(section.curve, Corner)]
+    poses = np.empty((len(at), 7))
+    poses[~rounds] = path_rows(paths, of[~rounds], at[~rounds])
+    if corners:
+        poses[rounds] = corner_rows(corners, of[rounds], at[rounds])
+    return poses
 
 
 def _places(leg: Leg, timing: Timing) -> list[float]:
@@ -67,28 +102,7 @@ def _places(leg: Leg, timing: Timing) -> list[float]:
     return [*sorted(places), end]
 
 
-def _poses(leg: Leg, places: list[float]) -> list[_Row]:
-    path = leg.path
-    if isinstance(path, JointLine):
-        return [tuple(row) for row in path.rows(np.array(places)).tolist()]
-    rows: list[_Row] = [path.pose(u).row() for u in places[:-1]]
-    last = path.end if places[-1] == 1.0 else path.pose(places[-1])
-    return [*rows, last.row()]
-
-
-def _append_corner(corner: Corner, indices: tuple[int, int], now: float, lasts: float,
-                   rows: list[_Row], points: list[int], times: list[float]) -> float:
-    """Append the rows of a corner; return the time at its end."""
-    n = corner.samples
-    for k in range(1, n + 1):
-        s = k / n
-        rows.append(corner.pose(s).row())
-        points.append(indices[s > 0.5])
-        times.append(now + s * lasts)
-    return now + lasts
-
-
-def _keep_hemisphere(poses: NDArray[np.float64]) -> None:
+def _keep_hemisphere(poses: Floats) -> None:
     """Turn signs of quaternions (q and -q are one orientation) so that rows do not jump."""
     dots = np.einsum('ij,ij->i', poses[1:, 3:], poses[:-1, 3:])
     signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0))

@@ -29,7 +29,13 @@ def note(leg: Leg, timing: Timing, primitive: Primitive, why: Sequence[str]) -> 
     if leg.after is not None:
         parts.append(f'blend {1e3 * leg.after.radius:g} mm')
     parts.append('because ' + ' and '.join([*why, timing.reason]))
-    return ', '.join(parts)
+    return f'{", ".join(parts)}; nearest: {leg.nearest}'
+
+
+def smallest(legs: Sequence[Leg]) -> str:
+    """Return the remark about what comes nearest to its bound in the whole goal."""
+    leg = min(legs, key=lambda leg: leg.nearest.share)
+    return f'nearest of all: {leg.nearest} of the way to point {leg.index}'
 
 
 def ignored(goal: Goal) -> list[str]:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from math import hypot, inf, sqrt
 
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, RobotModel
@@ -21,9 +20,9 @@ from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.goal import ArcMode, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.corner import Corner
+from ur_cartesian_driver.planning.margins import Nearest
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.path import Arc, JointLine, Path, SAME_POSITION
-from ur_cartesian_driver.planning.postures import Trace
 from ur_cartesian_driver.planning.profile import (
     cruise_for,
     least_time,
@@ -48,6 +47,19 @@ _HAVE_TIMES = (SegmentType.LINEAR, SegmentType.JOINT)
 _ROUNDS = 12
 
 
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How long a segment takes at the least, at the pace of the place where joints are fastest."""
+
+    #: [s].
+    time: float
+    #: The number of the joint, and where on the segment.
+    joint: int
+    fraction: float
+    #: How long the busiest joint needs at its limit for all of it [s].
+    mean: float
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Leg:
     """A segment whose way is decided and whose speed is not."""
@@ -58,19 +70,16 @@ class Leg:
     waypoint: Waypoint
     segment: Segment
     path: Path
-    #: Configurations before, along and at the end.
-    q_start: Joints
-    trace: Trace
+    #: Configuration at the end [rad].
+    joints: Joints
+    #: What the joints and the singularities say about it.
+    pace: Pace
+    nearest: Nearest
     #: Time that the goal gives it [s]; None = speeds decide.
     time: float | None
     #: The corners at its ends; None = it stands there.
     before: Corner | None = None
     after: Corner | None = None
-
-    @property
-    def joints(self) -> Joints:
-        """Configuration at the end [rad]."""
-        return self.trace[-1][1]
 
     @property
     def u_before(self) -> float:
@@ -197,7 +206,7 @@ def measure(leg: Leg, model: RobotModel) -> tuple[float, str]:
     """
     path = leg.path
     if is_optimized(leg.kind):
-        length, unit = _slowest_joint(leg, model), 's'
+        length, unit = leg.pace.time, 's'
     elif isinstance(path, JointLine):
         length, unit = max(path.travel), 'rad'
     elif path.length >= path.angle or (isinstance(path, Arc) and path.mode == ArcMode.FIXED):
@@ -450,11 +459,12 @@ def _limits(leg: Leg, length: float, options: PlanningOptions, model: RobotModel
             if way > 0.0 and model.max_joint_speed[k] * length / way < speed:
                 speed = model.max_joint_speed[k] * length / way
                 name = f'the limit of {JOINT_NAMES[k]}, {model.max_joint_speed[k]:.3f} rad/s'
+        speed, name = _in_blends(leg, length, speed, name)
         return _Limits(speed=speed, name=name, acceleration=options.max_joint_acceleration)
     if not is_optimized(leg.kind):
-        least = _slowest_joint(leg, model)
+        least = leg.pace.time
         if least > 0.0 and length / least < speed:
-            speed, name = length / least, 'the speed limits of the joints'
+            speed, name = length / least, _joint_limit(leg.pace)
     bound = (options.max_linear_acceleration * length / leg.path.length
              if _moves(leg) else inf)
     if leg.path.angle > 0.0:
@@ -462,19 +472,26 @@ def _limits(leg: Leg, length: float, options: PlanningOptions, model: RobotModel
     return _Limits(speed=speed, name=name, acceleration=bound)
 
 
+def _in_blends(leg: Leg, length: float, speed: float, name: str) -> tuple[float, str]:
+    """Return the bound of a joint move, whose joints may turn faster where it is blended."""
+    least = leg.pace.time
+    if _is_blended(leg) and least > 0.0 and length / least < speed * (1.0 - 1e-9):
+        return length / least, _joint_limit(leg.pace)
+    return speed, name
+
+
+def _joint_limit(pace: Pace) -> str:
+    return (f'the speed limits of the joints, {JOINT_NAMES[pace.joint]} at '
+            f'{100.0 * pace.fraction:.0f} % of the way')
+
+
 def _tool_per_unit(leg: Leg, length: float) -> float:
     """Return the most metres that the tool goes per unit of the leading quantity."""
     path = leg.path
+    if is_optimized(leg.kind):  # the tool is fastest where the joints have the least to do
+        length = max(leg.pace.mean, _NO_WAY)
     uneven = path.unevenness if isinstance(path, JointLine) else 1.0
     return path.length * uneven / length
-
-
-def _slowest_joint(leg: Leg, model: RobotModel) -> float:
-    """Return the time of a leg at the pace that its most burdened joint allows [s]."""
-    places = [(0.0, leg.q_start), *leg.trace]
-    return max(abs(b - a) / limit / (after - before)
-               for (before, p), (after, q) in pairwise(places)
-               for a, b, limit in zip(p, q, model.max_joint_speed, strict=True))
 
 
 def _moves(leg: Leg) -> bool:

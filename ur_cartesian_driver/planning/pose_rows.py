@@ -1,0 +1,84 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Poses by the ten thousand: the formulas of :mod:`~ur_cartesian_driver.motion.pose` for rows.
+
+A row is x y z [m] and the unit quaternion x y z w; arrays are (n, 7). Looking ahead along a goal
+needs so many poses that one object for each would take longer than the inverse kinematics.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.pose import Pose
+
+Floats = NDArray[np.float64]
+
+_SMALL_ANGLE = 1e-9
+
+
+def multiply_rows(a: Floats, b: Floats) -> Floats:
+    """Return the rotations ``b`` followed by ``a`` (n, 4), not normalised."""
+    ax, ay, az, aw = a.T
+    bx, by, bz, bw = b.T
+    return np.stack((
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz), axis=1)
+
+
+def conjugate_rows(a: Floats) -> Floats:
+    """Return the inverse rotations (n, 4) of unit quaternions."""
+    inverse: Floats = a * np.array((-1.0, -1.0, -1.0, 1.0))
+    return inverse
+
+
+def angle_rows(a: Floats, b: Floats) -> Floats:
+    """Return the angles between orientations (n, 4) [rad], within [0, pi]."""
+    turn = multiply_rows(conjugate_rows(a), b)
+    angle: Floats = 2.0 * np.arctan2(np.linalg.norm(turn[:, :3], axis=1), np.abs(turn[:, 3]))
+    return angle
+
+
+def compose_rows(T_a_b: Floats, T_b_c: Pose) -> Floats:
+    """Return ``T_a_c`` (n, 7) of rows ``T_a_b`` (n, 7) and one pose behind all of them."""
+    ax, ay, az, aw = T_a_b[:, 3:].T
+    x, y, z = T_b_c.position
+    # v + 2 u x (u x v + w v), as in motion.pose.
+    tx, ty, tz = 2.0 * (ay * z - az * y), 2.0 * (az * x - ax * z), 2.0 * (ax * y - ay * x)
+    rows = np.empty((len(T_a_b), 7))
+    rows[:, 0] = T_a_b[:, 0] + x + aw * tx + ay * tz - az * ty
+    rows[:, 1] = T_a_b[:, 1] + y + aw * ty + az * tx - ax * tz
+    rows[:, 2] = T_a_b[:, 2] + z + aw * tz + ax * ty - ay * tx
+    rows[:, 3:] = multiply_rows(T_a_b[:, 3:], np.array([T_b_c.quaternion]))
+    return rows
+
+
+def interpolate_rows(a: Floats, b: Floats, fraction: Floats) -> Floats:
+    """
+    Return the poses at fractions (n,) of the ways from ``a`` to ``b`` (n, 7).
+
+    Straight line, shortest rotation.
+    """
+    f = fraction[:, None]
+    rows = a + f * (b - a)
+    dot = np.einsum('ij,ij->i', a[:, 3:], b[:, 3:])
+    angle = np.arccos(np.minimum(1.0, np.abs(dot)))
+    sine = np.sin(angle)
+    turns = angle >= _SMALL_ANGLE
+    safe = np.where(turns, sine, 1.0)
+    # q and -q are one orientation: take the short way.
+    sign = np.where(dot < 0.0, -1.0, 1.0)
+    wa = np.where(turns, np.sin((1.0 - fraction) * angle) / safe, 1.0 - fraction)
+    wb = np.where(turns, np.sin(fraction * angle) / safe, fraction) * sign
+    rows[:, 3:] = normalized_rows(wa[:, None] * a[:, 3:] + wb[:, None] * b[:, 3:])
+    return rows
+
+
+def normalized_rows(quaternions: Floats) -> Floats:
+    """Return quaternions (n, 4) scaled to length 1."""
+    lengths: Floats = np.linalg.norm(quaternions, axis=1)
+    return quaternions / lengths[:, None]
