@@ -8,6 +8,7 @@ nothing with the driver's program or codecs. Everything runs in virtual time.
 """
 
 import asyncio
+from dataclasses import replace
 from math import hypot
 
 import pytest
@@ -35,13 +36,16 @@ JOINT, LINEAR, CIRCULAR = SegmentType.JOINT, SegmentType.LINEAR, SegmentType.CIR
 class SavedCell(RobotCell):
     """A cell whose robot has a program of its own, and never asks for ours."""
 
-    def __init__(self, loop, program, dialect):
+    def __init__(self, loop, program, dialect, turned):
         super().__init__(loop, headless=False, settings={'wire_dialect': dialect})
         self.arm = Arm(robot_model('ur5e'))
         self.dialect = DIALECTS[dialect]
-        self._program = saved_program(program, HOST)
+        self._program, self._turned = saved_program(program, HOST), turned
         #: The fastest that the tool was, and the farthest from where it started [m/s], [m].
         self.fastest = self.farthest = 0.0
+
+    async def start_robot(self, config):
+        await super().start_robot(replace(config, q=(self._turned, *config.q[1:])))
 
     async def load_pendant_program(self):
         assert not self.robot.controller.programs.load(PENDANT_PROGRAM, self._program)
@@ -84,12 +88,22 @@ class SavedCell(RobotCell):
         return made, motion.outcome
 
 
-def run_saved(scenario, program, dialect=None):
+class OneThreadLoop(VirtualLoop):
+    """Does at once what would be done in another thread, whose time is not virtual."""
+
+    def run_in_executor(self, executor, function, *arguments):
+        del executor
+        future = self.create_future()
+        future.set_result(function(*arguments))
+        return future
+
+
+def run_saved(scenario, program, dialect=None, turned=0.0):
     """Run a scenario in a cell with the program of one dialect and a driver of another."""
-    loop = VirtualLoop()
+    loop = OneThreadLoop()
 
     async def run():
-        cell = SavedCell(loop, program, dialect or program)
+        cell = SavedCell(loop, program, dialect or program, turned)
         try:
             await cell.start()
             return await scenario(cell)
@@ -119,7 +133,8 @@ def test_each_dialect_runs_joint_moves_lines_blends_and_arcs(name):
         assert here.distance_to(corners[3]) < 1e-5
         assert cell.fastest < 0.2
         # In the times of the plan: a program of that dialect reads the speeds that were meant.
-        assert float(outcome.text.split()[-2]) == pytest.approx(made.duration, rel=0.05, abs=0.1)
+        took = float(outcome.text.split()[-2])
+        assert took == pytest.approx(made.duration, rel=0.05, abs=0.1)
 
         begin = cell.loop.time()
         _, outcome = await cell.run_goal(
@@ -128,3 +143,80 @@ def test_each_dialect_runs_joint_moves_lines_blends_and_arcs(name):
         assert outcome.code is ErrorCode.SUCCESSFUL, outcome.text
         assert cell.loop.time() - begin == pytest.approx(1.25, abs=0.1)
     run_saved(scenario, name)
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_each_dialect_cancels_and_goes_on(name):
+    async def scenario(cell):
+        _, motion = cell.start_goal(
+            *((Waypoint(pose=cell.pose(y=0.1 * (i + 1) / 50)), Segment()) for i in range(50)))
+        await cell.until(lambda: cell.memory.read().target_tcp_twist[1] > 0.01)
+        cell.owner.cancel()
+        await cell.until(lambda: motion.outcome is not None)
+        assert motion.outcome.code is ErrorCode.CANCELLED
+        assert cell.at_rest()
+        # All that was on its way to the old goal has been read.
+        _, outcome = await cell.run_goal((Waypoint(pose=cell.pose(x=0.02)), Segment()))
+        assert outcome.code is ErrorCode.SUCCESSFUL, outcome.text
+    run_saved(scenario, name)
+
+
+def test_two_thousand_points_reach_a_program_that_tells_no_progress():
+    """More than four windows of points: they move on with the place on the path."""
+    async def scenario(cell):
+        home = cell.pose()
+        x, y, z = home.position
+        points = [(Waypoint(pose=type(home)((x + 1e-4 * i, y + 5e-5 * (i % 2), z),
+                                            home.quaternion), time=0.008 * i), Segment())
+                  for i in range(1, 2001)]
+        made, outcome = await cell.run_goal(*points)
+        assert outcome.code is ErrorCode.SUCCESSFUL, outcome.text
+        assert cell.memory.read().points_begun == 0
+        assert len(made.segments) == 2000
+    run_saved(scenario, '2.10')
+
+
+# ---- the wrong program ------------------------------------------------------------------------
+
+#: By kind of motion: the segment, and whether the goal has times.
+KINDS = {'timed line': (Segment(), True), 'line': (Segment(velocity=0.05), False),
+         'timed joint move': (Segment(type=JOINT), True),
+         'joint move': (Segment(type=JOINT), False)}
+#: Driver, program: the kinds that this program reads as they were meant, or nearly.
+HARMLESS = {
+    ('2.0', '2.10'): {*KINDS}, ('2.10', '2.0'): {'line', 'joint move'},
+    ('2.10', '2.12'): {'timed line', 'timed joint move', 'joint move'},
+    ('2.0', '2.14'): {'joint move'}, ('2.14', '2.0'): set(), ('2.14', '2.10'): {'timed line'},
+}
+
+
+@pytest.mark.parametrize(('kind', 'driver', 'program', 'turned'), [
+    *((kind, *pair, 0.0) for kind in KINDS for pair in HARMLESS),
+    ('line', '2.14', '2.0', 0.6), ('line', '2.14', '2.10', 0.6)])
+def test_a_wrong_program_makes_no_wild_move(kind, driver, program, turned):
+    """
+    A program of another dialect ends the goal, unless it does what is meant.
+
+    Where the base is turned the first joint, which an old program takes for the speed, is
+    positive.
+    """
+    segment, timed = KINDS[kind]
+
+    async def scenario(cell):
+        target = cell.pose(y=0.05)
+        _, outcome = await cell.run_goal((Waypoint(
+            pose=target, posture=cell.posture(target), time=1.0 if timed else 0.0), segment))
+        assert cell.fastest < 0.25
+        assert cell.farthest < 0.0501
+        if kind in HARMLESS[driver, program]:
+            assert outcome.code is ErrorCode.SUCCESSFUL, outcome.text
+            assert cell.robot.controller.motion.T_base_tcp.distance_to(target) < 1e-4
+        elif outcome.code is ErrorCode.SUCCESSFUL:
+            # Its acceleration was the speed: on so short a way it does not become too fast.
+            assert (kind, turned > 0.0) == ('line', True)
+        elif outcome.code is ErrorCode.EXECUTION_FAILED:
+            assert 'wire_dialect' in outcome.text
+        else:
+            assert outcome.code is ErrorCode.PROGRAM_STOPPED
+            assert 'v is' in cell.status.last_error
+    run_saved(scenario, program, driver, turned)
