@@ -1,0 +1,197 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Points as older robot programs read them.
+
+The library's own bytes (golden/trajectory_points.json) are those of 2.14. Arcs and splines never
+changed but for the time scale, so they are golden for all dialects; the moves of before 2.12 are
+written here word by word, from the table of the format.
+"""
+
+import json
+from pathlib import Path
+import struct
+
+from hypothesis import given
+from hypothesis import strategies as st
+import pytest
+
+from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.goal import ZERO6
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.primitive import (
+    MoveC,
+    MoveJ,
+    MoveL,
+    MoveP,
+    OptimoveJ,
+    OptimoveL,
+    Spline,
+)
+from ur_cartesian_driver.protocol.dialects import DIALECTS, NEWEST
+from ur_cartesian_driver.protocol.reverse import trajectory, TrajectoryAction
+from ur_cartesian_driver.protocol.trajectory import (
+    decode_point,
+    encode_fields,
+    encode_point,
+    encode_points,
+    MotionType,
+)
+
+GOLDEN = json.loads((Path(__file__).parent / 'golden' / 'trajectory_points.json').read_text())
+SENT = [case for case in GOLDEN['cases'] if case['hex'] and case['type'] is not None]
+#: A primitive can be read from these: an unknown arc mode, or nothing of an optimove, is none.
+READABLE = [case for case in SENT if case.get('mode', 0) in (0, 1)
+            and not case['note'].startswith('fraction above zero that encodes as 0')]
+UNCHANGED = [case for case in SENT if case['type'] in (3, 51)]
+Q = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
+POSE = Pose((0.1, 0.2, 0.3))
+MICRO = 1_000_000
+
+
+def words(primitive, dialect):
+    return struct.unpack('>21i', encode_point(primitive, DIALECTS[dialect]))
+
+
+def fields_of(case):
+    if case['type'] == 51:
+        return (*case['target'], *case['target_velocities'],
+                *(case['target_accelerations'] or ZERO6), case['duration'], case['ints'][19], 51)
+    return (*case['target'], *case['via'], case['velocity'], case['acceleration'], case['mode'],
+            0, 0, 0, 0, case['blend_radius'], 3)
+
+
+def test_the_newest_is_the_last():
+    assert list(DIALECTS) == ['2.0', '2.10', '2.12', '2.14']
+    assert list(DIALECTS.values())[-1] is NEWEST
+    assert set(MotionType) == NEWEST.motion_types
+
+
+@pytest.mark.parametrize('case', READABLE, ids=lambda case: f'{case["name"]} {case["note"]}')
+def test_the_points_of_2_12_are_those_of_2_14(case):
+    data = bytes.fromhex(case['hex'])
+    assert decode_point(data, DIALECTS['2.12']) == decode_point(data)
+
+
+@pytest.mark.parametrize('name', ['2.10', '2.12'])
+@pytest.mark.parametrize('case', UNCHANGED, ids=lambda case: f'{case["name"]} {case["note"]}')
+def test_arcs_and_splines_have_the_bytes_of_the_library_since_2_10(case, name):
+    assert encode_fields(fields_of(case), DIALECTS[name]).hex() == case['hex']
+
+
+@pytest.mark.parametrize('case', [
+    case for case in UNCHANGED if not 0.0 < case.get('duration', 0.0) < 0.0005
+], ids=lambda case: f'{case["name"]} {case["note"]}')
+def test_before_2_10_only_duration_and_blend_differ(case):
+    fields = fields_of(case)
+    old = struct.unpack('>21i', encode_fields(fields, DIALECTS['2.0']))
+    assert list(old[:18]) == case['ints'][:18]
+    assert abs(old[18] - 1000.0 * fields[18]) <= 0.5
+    assert old[19] == case['ints'][19] if case['type'] == 51 else (
+        abs(old[19] - 1000.0 * fields[19]) <= 0.5)
+
+
+#: Primitive, words 6-17, duration and blend as they were meant.
+MOVES = [
+    (MoveJ(target=Q, velocity=0.7, acceleration=0.9, duration=1.5, blend_radius=0.02), 0, 1.5),
+    (MoveL(target=POSE, velocity=0.7, acceleration=0.9, duration=1.5, blend_radius=0.02), 1, 1.5),
+    (MoveP(target=POSE, velocity=0.7, acceleration=0.9, blend_radius=0.02), 2, 0.0),
+    (OptimoveJ(target=Q, velocity=0.7, acceleration=0.9, blend_radius=0.02), 4, 0.0),
+    (OptimoveL(target=POSE, velocity=0.7, acceleration=0.9, blend_radius=0.02), 5, 0.0),
+]
+
+
+@pytest.mark.parametrize(('name', 'scale', 'move', 'kind', 'duration'), [
+    (name, scale, *move) for name, scale, kinds in (('2.0', 1000, 3), ('2.10', MICRO, 5))
+    for move in MOVES[:kinds]], ids=lambda x: x if isinstance(x, str) else type(x).__name__)
+def test_moves_repeat_velocity_and_acceleration_before_2_12(name, scale, move, kind, duration):
+    sent = words(move, name)
+    assert sent[6:12] == (700_000,) * 6
+    assert sent[12:18] == (900_000,) * 6
+    assert sent[18:] == (round(duration * scale), round(0.02 * scale), kind)
+    back = decode_point(struct.pack('>21i', *sent), DIALECTS[name])
+    assert (back.velocity, back.acceleration, back.blend_radius) == (0.7, 0.9, 0.02)
+
+
+@pytest.mark.parametrize(('name', 'primitive', 'what'), [
+    ('2.0', OptimoveJ(target=Q), r'OPTIMOVEJ \(motion type 4\)'),
+    ('2.0', MoveJ(target=POSE), 'MOVEJ_POSE'), ('2.10', MoveJ(target=POSE), 'MOVEJ_POSE'),
+    ('2.10', MoveL(target=Q), 'MOVEL_JOINT'), ('2.10', MoveC(target=Q, via=Q), 'MOVEC_JOINT'),
+    ('2.10', MoveL(target=POSE, q_near=Q), 'q_near')])
+def test_what_a_dialect_does_not_have_is_refused_with_its_name(name, primitive, what):
+    for encode in (encode_point, lambda p, d: encode_points([p], d)):
+        with pytest.raises(LocalProtocolError, match=f'{what} .*wire dialect {name}'):
+            encode(primitive, DIALECTS[name])
+
+
+def test_a_motion_type_from_the_future_is_refused():
+    data = encode_point(MoveJ(target=POSE, q_near=Q))
+    with pytest.raises(RemoteProtocolError, match=r'6 is an unknown motion type .* 2\.10'):
+        decode_point(data, DIALECTS['2.10'])
+
+
+BOUNDS = [
+    ('2.0', {'duration': 2_147_483.7}, 'duration', '2147483.647'),
+    ('2.0', {'duration': 0.0004}, 'duration', '0.001'),
+    ('2.10', {'duration': 2147.49}, 'duration', '2147.483647'),
+    ('2.14', {'duration': 4e-7}, 'duration', '1e-06'),
+    ('2.0', {'blend_radius': 3e6}, 'blend_radius', '2147483.647'),
+    ('2.10', {'blend_radius': 3e6}, 'blend_radius', '2147.483647'),
+    ('2.0', {'velocity': 3e6}, 'velocity', '2147.483647'),
+    ('2.10', {'acceleration': -1.0}, 'acceleration', 'negative'),
+]
+
+
+@pytest.mark.parametrize(('name', 'values', 'field', 'bound'), BOUNDS)
+def test_the_error_names_field_value_bound_and_dialect(name, values, field, bound):
+    line = MoveL(target=POSE, **values)
+    for encode in (encode_point, lambda p, d: encode_points([p], d)):
+        with pytest.raises(LocalProtocolError) as error:
+            encode(line, DIALECTS[name])
+        for part in (field, repr(*values.values()), bound):
+            assert part in str(error.value)
+        if field == 'duration':
+            assert f'wire dialect {name}' in str(error.value)
+
+
+def test_the_longest_durations_fit():
+    for name, longest in (('2.0', 2_147_483.647), ('2.10', 2147.483647)):
+        assert words(MoveL(target=POSE, duration=longest), name)[18] == 2 ** 31 - 1
+
+
+@pytest.mark.parametrize('name', DIALECTS)
+@given(st.floats(0.001, 2000.0), st.floats(0.0, 2.0), st.floats(0.0, 10.0))
+def test_reading_what_was_written_is_the_same_within_half_a_unit(name, duration, blend, v):
+    line = MoveL(target=POSE, velocity=v, acceleration=2.0 * v, duration=duration,
+                 blend_radius=blend)
+    dialect = DIALECTS[name]
+    data = encode_point(line, dialect)
+    assert encode_points([line], dialect) == data
+    back = decode_point(data, dialect)
+    half = 0.5 / dialect.time_scale + 1e-9
+    assert back.duration == pytest.approx(duration, rel=0.0, abs=half)
+    assert back.blend_radius == pytest.approx(blend, rel=0.0, abs=half)
+    assert back.velocity == pytest.approx(v, rel=0.0, abs=0.5e-6 + 1e-9)
+
+
+@given(st.floats(0.0, 2.0))
+def test_a_radius_that_the_wire_carries_is_never_larger(radius):
+    whole = DIALECTS['2.0'].whole_radius(radius)
+    assert radius - 0.001 < whole <= radius + 1e-9
+    assert words(MoveP(target=POSE, blend_radius=whole), '2.0')[19] == round(whole * 1000)
+    assert NEWEST.whole_radius(radius) == radius
+
+
+def test_splines_are_known_to_all():
+    for name in DIALECTS:
+        assert words(Spline(target=Q, velocities=ZERO6, duration=1.0), name)[19:] == (1, 51)
+
+
+@pytest.mark.parametrize('action', TrajectoryAction)
+@pytest.mark.parametrize('name', DIALECTS)
+def test_only_the_newest_has_streams(name, action):
+    if name == '2.14' or 'STREAM' not in action.name:
+        assert trajectory(action, 7, dialect=DIALECTS[name]) == trajectory(action, 7)
+    else:
+        with pytest.raises(LocalProtocolError, match=f'{action.name} .*{name}'):
+            trajectory(action, 7, dialect=DIALECTS[name])
