@@ -52,8 +52,9 @@ WRONG = [
 def arrived(late=0.0, **order):
     """A machine that was told SUCCESS, so long after the goal was due; and what it answered."""
     machine = TrajectoryMachine(replace(POINT, **order), max_plan_deviation=(0.0, 0.0))
-    machine.start(AT_REST)
-    machine.step(StateReceived(state=AT_REST), 0.0)
+    on_the_way = replace(AT_REST, target_q=(0.1,) + (0.0,) * 5)
+    machine.start(on_the_way)
+    machine.step(StateReceived(state=on_the_way), 0.0)
     machine.step(StateReceived(state=replace(AT_REST, timestamp=DUE + late)), DUE + late)
     return machine, machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), DUE)
 

@@ -328,12 +328,13 @@ class TrajectoryMachine:
             return []
         if self.state is State.ARMING:
             self._deadline = min(self._deadline, now + TCP_BOUND)
-        commands: list[Command] = []
         if isinstance(event, StateReceived):
-            commands += self._observe(event.state, now)
+            self._observe(event.state, now)
         signal, text = self._signal(event, now)
-        if signal is not None:
-            commands += self._apply(signal, text, now)
+        commands = [] if signal is None else self._apply(signal, text, now)
+        if isinstance(event, StateReceived):
+            # Last: a CANCEL does not wait until a report is packed.
+            commands += self._inform(event.state, now)
         return commands
 
     # ---- from events to signals ---------------------------------------------------------------
@@ -591,8 +592,8 @@ class TrajectoryMachine:
 
     # ---- observing ----------------------------------------------------------------------------
 
-    def _observe(self, state: RobotState, now: float) -> list[Command]:
-        """Take a packet: time, place on the path, points to send, progress to report."""
+    def _observe(self, state: RobotState, now: float) -> None:
+        """Take a packet: time, and place on the path."""
         before, self._latest = self._latest, state
         if self.loan is not None:
             self.loan.observe(state, now)
@@ -605,6 +606,11 @@ class TrajectoryMachine:
         if self.state is State.MOVING:
             self._follow(before, state, passed)
             self._stalled_time = self._stalled_time + passed if _stands(before, state) else 0.0
+
+    def _inform(self, state: RobotState, now: float) -> list[Command]:
+        """Return the points to send and the progress to report after a packet."""
+        if self.state is State.ENDED:
+            return []
         commands = self._release(max(self._begun(state), self._tracker.waypoint()))
         if now >= self._next_report and self._shows_goal():
             self._next_report = now + self._feedback_period
