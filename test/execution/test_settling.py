@@ -95,7 +95,7 @@ def test_the_arm_may_settle_for_the_time_tolerance(tolerance, patience):
 
 @pytest.mark.parametrize(('tolerance', 'late', 'fails'), [
     (0.5, 0.499, False), (0.5, 0.501, True), (0.0, 0.999, False), (0.0, 1.001, True),
-    (-1.0, 1000.0, False)])
+    (-1.0, 1.5, False)])
 def test_a_goal_is_late_by_more_than_its_time_tolerance(tolerance, late, fails):
     machine, commands = arrived(late, goal_time_tolerance=tolerance)
     if fails:
@@ -108,6 +108,6 @@ def test_a_goal_is_late_by_more_than_its_time_tolerance(tolerance, late, fails):
 
 
 def test_a_goal_without_times_is_never_late():
-    machine, commands = arrived(1000.0, due=None, goal_time_tolerance=0.1)
+    machine, commands = arrived(1.5, due=None, goal_time_tolerance=0.1)
     assert outcome(commands) is None
     assert outcome(machine.step(StateReceived(state=AT_REST), DUE)).succeeded
