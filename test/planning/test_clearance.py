@@ -268,7 +268,7 @@ def test_a_warning_goes_into_the_report_with_the_smallest_distance():
     warned = remarks(check(way(HOME, FOLDED)), SEGMENT, FRACTION)
     assert warned[0].startswith('point 3: ')
     assert 'upper arm and wrist 1 come within' in warned[0]
-    assert warned[1] == 'all points: nearest to each other come upper arm and wrist 1'
+    assert warned[1] == 'clearance: none between upper arm and wrist 1'
     assert remarks(check(way(HOME, HOME)), SEGMENT, FRACTION) == [
-        'all points: the smallest distance is at least 0.043 m, between forearm and wrist 3']
+        'clearance: at least 0.043 m between forearm and wrist 3']
     assert remarks(check(way(HOME, HOME), self_collision='off'), SEGMENT, FRACTION) == []

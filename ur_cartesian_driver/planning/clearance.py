@@ -131,9 +131,8 @@ def remarks(clear: Clear, segment: NDArray[np.int32], fraction: Floats) -> list[
         said.append(f'point {segment[row]}: {100.0 * fraction[row]:.1f} % of the way to it '
                     f'{clear.warning.text}')
     if clear.what:
-        said.append(f'all points: the smallest distance is at least {clear.margin:.3f} m, between '
-                    f'{clear.what}' if clear.margin > 0.0 else
-                    f'all points: nearest to each other come {clear.what}')
+        least = f'at least {clear.margin:.3f} m' if clear.margin > 0.0 else 'none'
+        said.append(f'clearance: {least} between {clear.what}')
     return said
 
 
