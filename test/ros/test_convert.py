@@ -1,5 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
+from dataclasses import replace
 from math import inf, isnan, nan
 from time import perf_counter
 
@@ -15,7 +16,6 @@ from ur_cartesian_driver.motion.errors import (
     ErrorCode,
     GoalRefused,
     InvalidGoal,
-    NotAvailable,
 )
 from ur_cartesian_driver.motion.goal import ArcMode, ExecutionMode, OutputKind, SegmentType
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
@@ -26,8 +26,8 @@ from ur_cartesian_driver.msg import (
     MotionSegment,
 )
 from ur_cartesian_driver.planning import check, PlanningOptions
-from ur_cartesian_driver.ros.convert import goal_from_message, seconds
-from ur_cartesian_driver.ros.frames import Frames
+from ur_cartesian_driver.ros.convert import goal_from_message, placed, seconds
+from ur_cartesian_driver.ros.frames import Frames, Stand
 
 NOW = 1_800_000_000_123_456_789
 
@@ -155,12 +155,44 @@ def test_frames_are_looked_up():
         converted(message)
 
 
-def test_the_controlled_frame_is_checked_against_the_active_tcp():
+def test_the_controlled_frame_is_where_its_name_says():
     message = goal(point())
     message.trajectory.controlled_frame = 'tool0'
-    assert converted(message, T_flange_tcp=IDENTITY).controlled_frame == ''
-    with pytest.raises(NotAvailable, match='controlled_frame'):
-        converted(message, T_flange_tcp=Pose((0.0, 0.0, 0.2)))
+    converted_goal = converted(message)
+    assert converted_goal.controlled_frame == 'tool0'
+    assert converted_goal.T_flange_controlled == IDENTITY
+    message.trajectory.controlled_frame = 'tool0_controller'
+    converted_goal = converted(message)
+    assert converted_goal.controlled_frame == ''
+    assert converted_goal.T_flange_controlled is None
+    message.trajectory.controlled_frame = 'moon'
+    with pytest.raises(InvalidGoal, match='controlled_frame is "moon"'):
+        converted(message)
+
+
+def test_a_goal_on_the_arm_goes_with_it_until_it_is_planned():
+    message = goal(point())
+    message.trajectory.header.frame_id = 'tool0'
+    first, then = (Stand(Pose((0.1, 0.2, z)), IDENTITY) for z in (0.3, 0.4))
+    before = converted(message, stand=first)
+    assert before.T_base_frame == first.T_base_flange
+    after = placed(before, message.trajectory, Frames(), now=NOW, stand=then)
+    assert after == replace(before, T_base_frame=then.T_base_flange)
+
+
+@pytest.mark.parametrize(('sec', 'asked'), [
+    (0, 0), (1_799_999_999, 1_799_999_999 * 10**9), (1_800_000_009, 0)])
+def test_frames_of_tf_are_looked_up_at_the_stamp_once_it_has_come(sec, asked):
+    class Recorder:
+        def T_target_source(self, field, target, source, at):
+            self.at = at
+            return IDENTITY
+
+    recorder, message = Recorder(), goal(point())
+    message.trajectory.header.frame_id = 'camera'
+    message.trajectory.header.stamp.sec = sec
+    goal_from_message(message, Frames().with_transforms(recorder), now=NOW)
+    assert recorder.at == asked
 
 
 def _nan_position(message):

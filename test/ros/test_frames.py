@@ -1,12 +1,27 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-from math import pi, sqrt
+from math import sqrt
 
 import pytest
 
-from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.ros.frames import Frames, StaticFrame, T_TOOL0_FLANGE
+from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.ros.frames import Frames, Stand, StaticFrame, T_TOOL0_FLANGE
+
+T_BASE_FLANGE = Pose((0.4, 0.1, 0.5), quaternion_from_rotation_vector((1.0, 2.0, 0.5)))
+T_FLANGE_TCP = Pose((0.0, 0.02, 0.1), quaternion_from_rotation_vector((0.0, 0.3, 0.0)))
+STAND = Stand(T_BASE_FLANGE, T_FLANGE_TCP)
+TOOLS = [StaticFrame.parse('tip nozzle 0 0 0.02 0 0 0 1'),
+         StaticFrame.parse('nozzle flange 0.1 0 0 0 0 0 1'),
+         StaticFrame.parse('drop tool0_controller 0 0 0.005 0 0 0 1'),
+         StaticFrame.parse('table base_link 1 0 0 0 0 0 1')]
+T_FLANGE_TIP = T_TOOL0_FLANGE @ Pose((0.1, 0.0, 0.02))
+
+
+def assert_same(a, b):
+    assert a.distance_to(b) < 1e-12
+    assert a.angle_to(b) < 1e-9
 
 
 @pytest.mark.parametrize('prefix', ['', 'left_'])
@@ -59,34 +74,59 @@ def test_malformed_static_frames_say_what_is_wrong(texts, sentence):
         Frames('', [StaticFrame.parse(text) for text in texts])
 
 
-@pytest.mark.parametrize('name', ['', 'tool0_controller'])
-def test_the_active_tcp_is_always_a_controlled_frame(name):
-    Frames().check_controlled(name, Pose((0.0, 0.0, 0.1)))
-    Frames().check_controlled(name, None)
+@pytest.mark.parametrize(('name', 'expected'), [
+    ('tool0', T_BASE_FLANGE),
+    ('flange', T_BASE_FLANGE @ T_TOOL0_FLANGE),
+    ('tool0_controller', T_BASE_FLANGE @ T_FLANGE_TCP),
+    ('tip', T_BASE_FLANGE @ T_FLANGE_TIP),
+    ('drop', T_BASE_FLANGE @ T_FLANGE_TCP @ Pose((0.0, 0.0, 0.005)))])
+def test_frames_on_the_arm_are_where_it_stands(name, expected):
+    assert_same(Frames('', TOOLS).T_base_frame(name, STAND), expected)
 
 
-def test_tool0_and_flange_are_controlled_frames_while_the_tcp_is_there():
-    frames = Frames('left_')
-    frames.check_controlled('left_tool0', IDENTITY)
-    frames.check_controlled('left_flange', T_TOOL0_FLANGE)
+@pytest.mark.parametrize('name', ['tool0', 'flange', 'tool0_controller', 'tip', 'drop'])
+def test_frames_on_an_arm_that_nobody_knows_are_waited_for(name):
+    with pytest.raises(RobotNotReady, match=rf'frame_id is "{name}", which moves with the arm'):
+        Frames('', TOOLS).T_base_frame(name)
+
+
+def test_the_stand_is_the_robot_s_own_report():
+    state = RobotState(timestamp=0.0, actual_q=(0.0,) * 6, T_flange_tcp=T_FLANGE_TCP,
+                       actual_tcp_pose=T_BASE_FLANGE @ T_FLANGE_TCP)
+    assert_same(Stand.of(state).T_base_flange, T_BASE_FLANGE)
+
+
+@pytest.mark.parametrize(('prefix', 'name'), [
+    ('', ''), ('', 'tool0_controller'), ('left_', 'left_tool0_controller')])
+def test_the_active_tcp_is_a_controlled_frame_whatever_it_is(prefix, name):
+    assert Frames(prefix).T_flange_frame(name) is None
+
+
+@pytest.mark.parametrize(('name', 'expected'), [
+    ('tool0', IDENTITY), ('flange', T_TOOL0_FLANGE), ('tip', T_FLANGE_TIP),
+    ('drop', T_FLANGE_TCP @ Pose((0.0, 0.0, 0.005)))])
+def test_what_is_fixed_behind_the_flange_can_be_controlled(name, expected):
+    T = Frames('', TOOLS).T_flange_frame(name, STAND)
+    assert T is not None
+    assert_same(T, expected)
+
+
+def test_what_is_behind_a_tcp_that_nobody_knows_is_waited_for():
+    with pytest.raises(RobotNotReady, match='controlled_frame is "drop"'):
+        Frames('', TOOLS).T_flange_frame('drop')
+
+
+@pytest.mark.parametrize(('name', 'sentence'), [
+    ('nozle', r'controlled_frame is "nozle", which is not a known frame; .*tool0_controller, '
+              r'tool0, flange, nozzle, tip, drop;.*static_frames'),
+    ('table', r'is "table", which does not move with the arm.*tool0'),
+    ('base', r'is "base", which does not move with the arm')])
+def test_what_is_not_behind_the_flange_is_refused_with_the_known_frames(name, sentence):
+    with pytest.raises(InvalidGoal, match=sentence):
+        Frames('', TOOLS).T_flange_frame(name, STAND)
 
 
 def test_flange_has_the_axes_of_rep_103():
     # x of flange is z of tool0, the direction that the tool points in; z of flange is its y.
     assert T_TOOL0_FLANGE.apply((1.0, 0.0, 0.0)) == pytest.approx((0.0, 0.0, 1.0))
     assert T_TOOL0_FLANGE.apply((0.0, 0.0, 1.0)) == pytest.approx((0.0, 1.0, 0.0))
-
-
-@pytest.mark.parametrize(('name', 'T_flange_tcp', 'sentence'), [
-    ('tool0', Pose((0.0, 0.0, 0.1)), r'100\.0 mm and 0\.000 rad away'),
-    ('flange', IDENTITY, rf'0\.0 mm and {2 * pi / 3:.3f} rad away'),
-    ('tool0', None, 'has not said yet'),
-])
-def test_another_controlled_frame_is_not_available(name, T_flange_tcp, sentence):
-    with pytest.raises(NotAvailable, match=sentence):
-        Frames().check_controlled(name, T_flange_tcp)
-
-
-def test_an_unknown_controlled_frame_is_refused_by_its_name():
-    with pytest.raises(InvalidGoal, match=r'controlled_frame is "nozzle"'):
-        Frames().check_controlled('nozzle', IDENTITY)

@@ -78,6 +78,21 @@ def test_what_nobody_knows_is_nan():
     assert isnan(message.lag)
 
 
+def test_accelerations_are_reported_where_the_robot_does():
+    progress = replace(PROGRESS, desired_acceleration=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0),
+                       actual_acceleration=(0.5,) * 6)
+    frame = replace(FRAME, frame_id='base_link',
+                    T_frame_base=Frames().T_base_frame('base_link').inverse())
+    message = feedback_message(progress, frame, STAMP)
+    assert vector(message.desired.acceleration.linear) == pytest.approx((-1.0, -2.0, 3.0))
+    assert vector(message.desired.acceleration.angular) == pytest.approx((-4.0, -5.0, 6.0))
+    assert vector(message.actual.acceleration.linear) == pytest.approx((-0.5, -0.5, 0.5))
+    assert vector(message.error.acceleration.angular) == pytest.approx((-3.5, -4.5, 5.5))
+    half = feedback_message(replace(progress, actual_acceleration=None), frame, STAMP)
+    assert all(map(isnan, vector(half.error.acceleration.linear)))
+    assert not any(map(isnan, vector(half.desired.acceleration.linear)))
+
+
 def test_feedback_comes_in_the_frame_of_the_goal():
     frame = replace(FRAME, frame_id='base_link',
                     T_frame_base=Frames().T_base_frame('base_link').inverse())

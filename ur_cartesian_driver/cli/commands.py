@@ -167,7 +167,8 @@ def validate(arguments: argparse.Namespace) -> int:
     state = standing_at(arm, arguments.joints or SimulatorConfig().q)
     message = client.load_goal(goal_file(arguments.file))
     try:
-        goal = convert.goal_from_message(message, frames.Frames(), now=0)
+        goal = convert.goal_from_message(
+            message, frames.Frames(), now=0, stand=frames.Stand.of(state))
         found = plan(goal, state, arm, PlanningOptions(max_tool_speed=arguments.max_tool_speed))
     except GoalRefused as refusal:
         print(f'refused: {refusal}', file=sys.stderr)

@@ -42,9 +42,11 @@ from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.planning.validate import check
-from ur_cartesian_driver.ros.convert import goal_from_message, nanoseconds
+from ur_cartesian_driver.ros.convert import goal_from_message, nanoseconds, placed
+from ur_cartesian_driver.ros.frames import Stand
 from ur_cartesian_driver.ros.parameters import Settings
 from ur_cartesian_driver.ros.reports import feedback_message, FeedbackFrame, result_message
+from ur_cartesian_driver.ros.transforms import listen
 
 GoalHandle: TypeAlias = Any
 
@@ -71,6 +73,8 @@ class CartesianActionServer:
         self._clock = node.get_clock()
         self._driver = driver
         self._settings = settings
+        self._transforms = listen(node, settings.node.tf_max_age)
+        self._frames = settings.frames.with_transforms(self._transforms)
         self._joint_names = tuple(settings.planning.tf_prefix + name for name in JOINT_NAMES)
         # Guards what follows: the goals that have not ended, and which of them may move the arm.
         self._lock = threading.Lock()
@@ -111,6 +115,8 @@ class CartesianActionServer:
         for run in runs:
             run.thread.join(PATIENCE)
         self._server.destroy()
+        if self._transforms is not None:
+            self._transforms.close()
 
     # ---- called by the executor ---------------------------------------------------------------
 
@@ -149,11 +155,18 @@ class CartesianActionServer:
 
     def converted(self, run: GoalRun) -> Goal:
         """Return the goal of a run, in our own terms."""
-        state = self._driver.state
         return goal_from_message(
-            run.handle.request, self._settings.frames, now=run.received,
-            T_flange_tcp=None if state is None else state.T_flange_tcp,
+            run.handle.request, self._frames, now=run.received, stand=self._stand(),
             time_tolerance=self._settings.node.goal_time_tolerance)
+
+    def placed(self, run: GoalRun, goal: Goal) -> Goal:
+        """Return a goal with its frames where they are now: the arm may have moved since."""
+        return placed(goal, run.handle.request.trajectory, self._frames,
+                      now=self._clock.now().nanoseconds, stand=self._stand())
+
+    def _stand(self) -> Stand | None:
+        state = self._driver.state
+        return None if state is None else Stand.of(state)
 
     def plan(self, goal: Goal) -> Plan:
         """Plan from where the robot stands now."""
@@ -192,7 +205,7 @@ class CartesianActionServer:
 
     def feedback_frame(self, run: GoalRun, plan: Plan) -> FeedbackFrame:
         """Return what all feedback of a goal has in common."""
-        trajectory, frames = run.handle.request.trajectory, self._settings.frames
+        trajectory, frames = run.handle.request.trajectory, self._frames
         return FeedbackFrame(
             frame_id=trajectory.header.frame_id or frames.base,
             controlled_frame=trajectory.controlled_frame or frames.tcp,
@@ -272,7 +285,7 @@ class GoalRun:
             server.wait(start_time, self._given_up)
             goal = replace(goal, age=0.0)
         server.occupy(self, goal)
-        return self._moved(self._checked(server.plan(goal)))
+        return self._moved(self._checked(server.plan(server.placed(self, goal))))
 
     def _checked(self, plan: Plan) -> Plan:
         """

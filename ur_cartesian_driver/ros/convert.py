@@ -11,6 +11,7 @@ there counts.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import IntEnum
 from typing import Any, TypeAlias, TypeVar
 
@@ -29,7 +30,7 @@ from ur_cartesian_driver.motion.goal import (
     ZERO6,
 )
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector3, Vector6
-from ur_cartesian_driver.ros.frames import Frames
+from ur_cartesian_driver.ros.frames import Frames, Stand
 
 #: Generated message classes carry no types.
 Message: TypeAlias = Any
@@ -40,27 +41,23 @@ _ANALOG_DOMAINS = 2
 
 
 def goal_from_message(message: Message, frames: Frames, *, now: int,
-                      T_flange_tcp: Pose | None = None, time_tolerance: float = 0.0) -> Goal:
+                      stand: Stand | None = None, time_tolerance: float = 0.0) -> Goal:
     """
     Return the goal of a ``FollowCartesianTrajectory.Goal``.
 
     :param now: time of the node's clock when the goal was received [ns].
-    :param T_flange_tcp: the robot's active TCP, None while it is unknown.
+    :param stand: where the arm stands, None while it is unknown.
     :param time_tolerance: what a ``goal_time_tolerance`` of zero means [s].
     :raises InvalidGoal: a frame is unknown or an enumeration has no such value; the text names
         the field.
-    :raises NotAvailable: the controlled frame is not the active TCP.
+    :raises RobotNotReady: a frame moves with the arm, and nobody knows where that stands.
     """
     trajectory = message.trajectory
-    frames.check_controlled(trajectory.controlled_frame, T_flange_tcp)
-    return Goal(
+    return placed(Goal(
         waypoints=tuple(map(_waypoint, trajectory.points)),
         segments=tuple(
             _segment(segment, f'segments[{i}]') for i, segment in enumerate(message.segments)),
-        T_base_frame=frames.T_base_frame(trajectory.header.frame_id),
         frame_id=trajectory.header.frame_id,
-        # The active TCP, by whatever name it was given.
-        controlled_frame='',
         age=_age(trajectory.header.stamp, now),
         path_tolerance=_tolerance(message.path_tolerance),
         goal_tolerance=_tolerance(message.goal_tolerance),
@@ -70,7 +67,30 @@ def goal_from_message(message: Message, frames: Frames, *, now: int,
             _io_command(command, f'io_commands[{i}]')
             for i, command in enumerate(message.io_commands)),
         keep_open=message.keep_open,
-    )
+    ), trajectory, frames, now=now, stand=stand)
+
+
+def placed(goal: Goal, trajectory: Message, frames: Frames, *, now: int,
+           stand: Stand | None) -> Goal:
+    """
+    Return a goal whose frames are where they are at this moment.
+
+    A stamp in the future is looked at when it has come; until then the newest transforms do.
+
+    :param trajectory: the ``CartesianTrajectory`` from which the goal was made.
+    :param now: time of the node's clock [ns].
+    :raises InvalidGoal: a frame is unknown.
+    :raises RobotNotReady: it moves with the arm, and nobody knows where that stands.
+    """
+    stamp = nanoseconds(trajectory.header.stamp)
+    T_flange_controlled = frames.T_flange_frame(trajectory.controlled_frame, stand)
+    return replace(
+        goal,
+        T_base_frame=frames.T_base_frame(
+            trajectory.header.frame_id, stand, at=stamp if stamp <= now else 0),
+        T_flange_controlled=T_flange_controlled,
+        # Empty: the active TCP, by whatever name it was given.
+        controlled_frame='' if T_flange_controlled is None else trajectory.controlled_frame)
 
 
 def seconds(duration: Message) -> float:

@@ -4,21 +4,28 @@
 The frames that a goal may name: in which it is given, and which one it moves.
 
 Poses go to the robot in ``base``, the frame that its own controller counts in. ``base_link`` of
-the robot description is the same point turned by pi about z. Other frames are the fixed ones of
-the parameter ``static_frames``; a frame that moves cannot be had without tf2.
+the robot description is the same point turned by pi about z.
 
 ``tool0`` is the controller's flange. ``flange`` of the robot description has the same origin and
 the axes of REP-103 (x forward), that is tool0 turned back by rpy (pi/2, 0, pi/2).
+``tool0_controller`` is the robot's active TCP. A goal that is given in one of these three is given
+from where the robot stands when it is planned: a relative motion.
+
+The parameter ``static_frames`` adds frames behind all of these. Frames that nobody has named so
+are looked up in tf2 where it is installed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+import copy
 from dataclasses import dataclass
 from math import isfinite, sqrt
 
-from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.ros.transforms import Transforms
 
 #: ``base_link`` in ``base``.
 T_BASE_BASE_LINK = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
@@ -29,8 +36,7 @@ BASE, BASE_LINK = 'base', 'base_link'
 TOOL0, FLANGE, TCP = 'tool0', 'flange', 'tool0_controller'
 
 _UNIT_TOLERANCE = 1e-3
-#: How near the active TCP has to be to a frame to be the same one [m], [rad].
-_SAME_POSITION, _SAME_ANGLE = 1e-6, 1e-5
+_FRAME_ID, _CONTROLLED = 'trajectory.header.frame_id', 'trajectory.controlled_frame'
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,85 +74,126 @@ class StaticFrame:
         return cls(name, parent, Pose((x, y, z), normalize((qx, qy, qz, qw))))
 
 
+@dataclass(frozen=True, slots=True)
+class Stand:
+    """Where the arm stands, and the TCP that it has."""
+
+    T_base_flange: Pose
+    T_flange_tcp: Pose
+
+    @classmethod
+    def of(cls, state: RobotState) -> Stand:
+        """Return it by the robot's own report, which knows the arm's calibration."""
+        return cls(state.actual_tcp_pose @ state.T_flange_tcp.inverse(), state.T_flange_tcp)
+
+
 class Frames:
     """The frames that are known to this driver, with the robot's ``tf_prefix`` in their names."""
 
     def __init__(self, tf_prefix: str = '', static_frames: Iterable[StaticFrame] = ()) -> None:
         """
-        Resolve all static frames down to the base.
+        Resolve all static frames down to the base, the flange or the TCP.
 
         :raises ValueError: a static frame has an unknown parent, a name that is taken, or is its
             own ancestor.
         """
         self.base = tf_prefix + BASE
         self.tcp = tf_prefix + TCP
-        self._behind_flange = {
-            tf_prefix + TOOL0: IDENTITY,
-            tf_prefix + FLANGE: T_TOOL0_FLANGE,
-        }
-        self._T_base = _resolved(
-            {self.base: IDENTITY, tf_prefix + BASE_LINK: T_BASE_BASE_LINK}, static_frames)
+        self.tool0 = tf_prefix + TOOL0
+        self._transforms: Transforms | None = None
+        resolved = _resolved({
+            self.base: (self.base, IDENTITY),
+            tf_prefix + BASE_LINK: (self.base, T_BASE_BASE_LINK),
+            self.tool0: (self.tool0, IDENTITY),
+            tf_prefix + FLANGE: (self.tool0, T_TOOL0_FLANGE),
+            self.tcp: (self.tcp, IDENTITY),
+        }, static_frames)
+        self._T_base, self._T_flange, self._T_tcp = (
+            {name: T for name, (root, T) in resolved.items() if root == of}
+            for of in (self.base, self.tool0, self.tcp))
 
-    def T_base_frame(self, name: str) -> Pose:
+    def with_transforms(self, transforms: Transforms | None) -> Frames:
+        """Return the same frames, and those of tf2."""
+        frames = copy.copy(self)
+        frames._transforms = transforms
+        return frames
+
+    def T_base_frame(self, name: str, stand: Stand | None = None, at: int = 0) -> Pose:
         """
         Return where a frame is in the robot's base; the empty name is the base itself.
 
-        :raises InvalidGoal: the frame is unknown.
+        :param stand: for frames that move with the arm; None while nobody knows.
+        :param at: when, for frames of tf2 [ns]; 0 = as new as there is.
+        :raises InvalidGoal: the frame is unknown, or tf2 does not know where it is (any more).
+        :raises RobotNotReady: it moves with the arm, and nobody knows where that stands.
         """
-        pose = self._T_base.get(name or self.base)
-        if pose is None:
-            raise InvalidGoal(
-                'trajectory.header.frame_id', f'is "{name}", which is not a known frame',
-                f'known are {", ".join(self._T_base)}; others can be named in the parameter '
-                'static_frames')
-        return pose
+        name = name or self.base
+        if name in self._T_base:
+            return self._T_base[name]
+        if name in self._T_flange:
+            return _known(stand, _FRAME_ID, name).T_base_flange @ self._T_flange[name]
+        if name in self._T_tcp:
+            known = _known(stand, _FRAME_ID, name)
+            return known.T_base_flange @ known.T_flange_tcp @ self._T_tcp[name]
+        if self._transforms is not None:
+            return self._transforms.T_target_source(_FRAME_ID, self.base, name, at)
+        raise InvalidGoal(
+            _FRAME_ID, f'is "{name}", which is not a known frame',
+            f'known are {", ".join([*self._T_base, *self._T_flange, *self._T_tcp])}; others can '
+            'be named in the parameter static_frames')
 
-    def check_controlled(self, name: str, T_flange_tcp: Pose | None) -> None:
+    def T_flange_frame(self, name: str, stand: Stand | None = None) -> Pose | None:
         """
-        Let a controlled frame pass if it is the robot's active TCP.
+        Return where a controlled frame is behind the flange; None for the robot's active TCP.
 
-        :param T_flange_tcp: the active TCP, None while the robot has not reported it.
-        :raises NotAvailable: it is another frame behind the flange.
-        :raises InvalidGoal: there is no such frame.
+        :param stand: for frames behind the active TCP; None while nobody knows.
+        :raises InvalidGoal: there is no such frame, or it is not behind the flange.
+        :raises RobotNotReady: it is behind the TCP, and nobody knows where that is.
         """
         if name in ('', self.tcp):
-            return
-        T_flange_frame = self._behind_flange.get(name)
-        if T_flange_frame is None:
+            return None
+        if name in self._T_flange:
+            return self._T_flange[name]
+        if name in self._T_tcp:
+            return _known(stand, _CONTROLLED, name).T_flange_tcp @ self._T_tcp[name]
+        known = ', '.join([self.tcp, *self._T_flange, *list(self._T_tcp)[1:]])
+        if name in self._T_base:
             raise InvalidGoal(
-                'trajectory.controlled_frame', f'is "{name}", which is not a known frame',
-                f'leave it empty or name {self.tcp} for the active TCP of the robot; also known '
-                f'are {", ".join(self._behind_flange)}')
-        if T_flange_tcp is None:
-            raise NotAvailable(
-                'trajectory.controlled_frame', f'is "{name}", and the robot has not said yet '
-                'where its active TCP is', 'wait for the connection to the robot')
-        distance = T_flange_tcp.distance_to(T_flange_frame)
-        angle = T_flange_tcp.angle_to(T_flange_frame)
-        if distance > _SAME_POSITION or angle > _SAME_ANGLE:
-            raise NotAvailable(
-                'trajectory.controlled_frame', f'is "{name}", but the active TCP of the robot is '
-                f'{1000.0 * distance:.1f} mm and {angle:.3f} rad away from it, and this version '
-                'moves the active TCP only',
-                f'set the TCP on the robot, or give the poses of {self.tcp}')
+                _CONTROLLED, f'is "{name}", which does not move with the arm',
+                f'leave it empty for the active TCP of the robot, or name one of {known}')
+        if self._transforms is not None:
+            return self._transforms.T_rigid(_CONTROLLED, self.tool0, name)
+        raise InvalidGoal(
+            _CONTROLLED, f'is "{name}", which is not a known frame',
+            f'leave it empty for the active TCP of the robot, or name one of {known}; others can '
+            f'be named in the parameter static_frames, with {self.tool0} as their parent')
 
 
-def _resolved(known: Mapping[str, Pose], static_frames: Iterable[StaticFrame]) -> dict[str, Pose]:
-    """Return the known frames and all static ones, each in the base, whatever their order."""
-    T_base = dict(known)
+def _known(stand: Stand | None, field: str, name: str) -> Stand:
+    if stand is None:
+        raise RobotNotReady(f'{field} is "{name}", which moves with the arm, and the robot has '
+                            'not said yet where it stands; wait for the connection to the robot.')
+    return stand
+
+
+def _resolved(known: Mapping[str, tuple[str, Pose]], static_frames: Iterable[StaticFrame]
+              ) -> dict[str, tuple[str, Pose]]:
+    """Return each frame's root and where it is there, whatever the order of the static ones."""
+    frames = dict(known)
     waiting: dict[str, StaticFrame] = {}
     for frame in static_frames:
-        if frame.name in T_base or frame.name in waiting:
+        if frame.name in frames or frame.name in waiting:
             raise ValueError(f'static_frames: "{frame.name}" is there twice.')
         waiting[frame.name] = frame
     while waiting:
-        ready = [frame for frame in waiting.values() if frame.parent in T_base]
+        ready = [frame for frame in waiting.values() if frame.parent in frames]
         if not ready:
             frame = next(iter(waiting.values()))
             raise ValueError(
                 f'static_frames: the parent "{frame.parent}" of "{frame.name}" does not lead '
-                f'to {next(iter(known))}.')
+                f'to {", ".join(dict.fromkeys(root for root, _ in known.values()))}.')
         for frame in ready:
-            T_base[frame.name] = T_base[frame.parent] @ frame.T_parent_frame
+            root, T_root_parent = frames[frame.parent]
+            frames[frame.name] = root, T_root_parent @ frame.T_parent_frame
             del waiting[frame.name]
-    return T_base
+    return frames

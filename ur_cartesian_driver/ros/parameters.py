@@ -52,6 +52,7 @@ class NodeSettings:
     state_publish_rate: float = 50.0
     diagnostics_rate: float = 1.0
     static_frames: tuple[str, ...] = ()
+    tf_max_age: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,9 +139,13 @@ DECLARATIONS: tuple[Declaration, ...] = (
     Declaration('robot_ip', 'Address of the robot.'),
     Declaration('tf_prefix', 'Prefix of joint and frame names, for example left_.'),
     Declaration('static_frames',
-                'Fixed frames in which goals may be given, each as "name parent x y z qx qy qz '
-                'qw" [m, unit quaternion]; the parent is base, base_link or another one of them. '
-                'Empty texts are skipped.'),
+                'Fixed frames in which goals may be given, and tools that they may move, each as '
+                '"name parent x y z qx qy qz qw" [m, unit quaternion]; the parent is base, '
+                'base_link, tool0, flange, tool0_controller or another one of them. Empty texts '
+                'are skipped.'),
+    Declaration('tf_max_age',
+                'How old the newest transform of a frame of tf2 may be when a goal is planned '
+                '[s]; static ones are never old.', 0.001, 3600.0),
     # -- the robot program
     Declaration('headless_mode',
                 'Send the robot program directly (needs remote control), instead of serving it '

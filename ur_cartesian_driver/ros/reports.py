@@ -3,8 +3,8 @@
 """
 From the driver's reports to messages: feedback, result, robot state.
 
-Feedback goes back in the frame of the goal. NaN stands for what nobody measures or plans
-(acceleration, jerk, joint positions of the plan).
+Feedback goes back in the frame of the goal and about its controlled frame. NaN stands for what
+nobody measures or plans: jerk, and acceleration where the robot's software does not report it.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 
 _MAX_SECONDS = 2**31 - 1
+_UNKNOWN: Vector6 = (nan,) * 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,12 +49,16 @@ def feedback_message(progress: Progress, frame: FeedbackFrame,
     actual = frame.T_frame_base @ progress.actual_pose
     desired_twist = _turned(frame.T_frame_base, progress.desired_twist)
     actual_twist = _turned(frame.T_frame_base, progress.actual_twist)
-    message.desired = _point(progress.time, desired, desired_twist)
-    message.actual = _point(progress.time, actual, actual_twist)
+    desired_acceleration = _turned(
+        frame.T_frame_base, progress.desired_acceleration or _UNKNOWN)
+    actual_acceleration = _turned(frame.T_frame_base, progress.actual_acceleration or _UNKNOWN)
+    message.desired = _point(progress.time, desired, desired_twist, desired_acceleration)
+    message.actual = _point(progress.time, actual, actual_twist, actual_acceleration)
     message.actual.posture.posture_joint_names = list(frame.joint_names)
     message.actual.posture.posture_joint_values = list(progress.actual_q)
     message.error = _point(
-        0.0, pose_error(desired, actual), _difference(desired_twist, actual_twist))
+        0.0, pose_error(desired, actual), _difference(desired_twist, actual_twist),
+        _difference(desired_acceleration, actual_acceleration))
 
     message.point_index = progress.waypoint
     message.progress = progress.fraction
@@ -111,23 +116,25 @@ def duration_message(time: float) -> Duration:
     return Duration(sec=sec, nanosec=nanosec)
 
 
-def _point(time: float, pose: Pose, twist: Vector6) -> CartesianTrajectoryPoint:
+def _point(time: float, pose: Pose, twist: Vector6,
+           acceleration: Vector6) -> CartesianTrajectoryPoint:
     vx, vy, vz, wx, wy, wz = twist
     return CartesianTrajectoryPoint(
         time_from_start=duration_message(time),
         pose=pose_message(pose),
         twist=Twist(linear=Vector3(x=vx, y=vy, z=vz), angular=Vector3(x=wx, y=wy, z=wz)),
-        acceleration=_unknown(),
-        jerk=_unknown(),
+        acceleration=_accel(acceleration),
+        jerk=_accel(_UNKNOWN),
     )
 
 
-def _unknown() -> Accel:
-    return Accel(linear=Vector3(x=nan, y=nan, z=nan), angular=Vector3(x=nan, y=nan, z=nan))
+def _accel(values: Vector6) -> Accel:
+    ax, ay, az, ex, ey, ez = values
+    return Accel(linear=Vector3(x=ax, y=ay, z=az), angular=Vector3(x=ex, y=ey, z=ez))
 
 
 def _turned(T_frame_base: Pose, twist: Vector6) -> Vector6:
-    """Return a twist along the axes of the goal's frame, which does not move."""
+    """Return a twist (or acceleration) along the axes of the goal's frame, which stands still."""
     vx, vy, vz, wx, wy, wz = twist
     q = T_frame_base.quaternion
     return (*rotate(q, (vx, vy, vz)), *rotate(q, (wx, wy, wz)))

@@ -1,0 +1,129 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Frames that others publish, by tf2 where it is installed; it does not come from PyPI.
+
+A transform that is missing or old refuses the goal: an arm that goes to where a part was some time
+ago is worse than one that stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import importlib
+from typing import Any, Protocol, TypeAlias
+
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.time import Time
+
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.pose import normalize, Pose
+
+#: Generated message classes carry no types.
+Message: TypeAlias = Any
+
+#: How long a transform is waited for [s]: one for this moment is published in the next.
+PATIENCE = 0.5
+
+
+class Buffer(Protocol):
+    """What is used of ``tf2_ros.Buffer``."""
+
+    def lookup_transform(self, target_frame: str, source_frame: str, time: Time,
+                         timeout: Duration) -> Message:
+        """Return a ``TransformStamped`` that maps coordinates of the source to the target."""
+
+
+class Transforms:
+    """A buffer of transforms, asked on behalf of goals."""
+
+    def __init__(self, buffer: Buffer, errors: type[Exception] | tuple[type[Exception], ...], *,
+                 now: Callable[[], int], max_age: float,
+                 close: Callable[[], None] = lambda: None) -> None:
+        """
+        Use a buffer.
+
+        :param errors: what the buffer raises when it does not know a transform.
+        :param now: the node's clock [ns].
+        :param max_age: how old the newest transform of a frame may be [s].
+        """
+        self._buffer = buffer
+        self._errors = errors
+        self._now = now
+        self._max_age = max_age
+        self.close = close
+
+    def T_target_source(self, field: str, target: str, source: str, at: int = 0) -> Pose:
+        """
+        Return where a frame is in another one.
+
+        :param field: of the goal, for the text of the refusal.
+        :param at: when [ns]; 0 = as new as there is, if that is not too old. What never changes
+            has the stamp 0 and is never old.
+        :raises InvalidGoal: there is no such transform, or only an old one.
+        """
+        message = self._looked_up(field, target, source, at)
+        stamp = _nanoseconds(message.header.stamp)
+        if at == 0 and stamp != 0:
+            self._check_age(field, target, source, stamp)
+        return _pose(message.transform)
+
+    def _check_age(self, field: str, target: str, source: str, stamp: int) -> None:
+        age = (self._now() - stamp) / 1e9
+        if age > self._max_age:
+            raise InvalidGoal(
+                field, f'is "{source}", and its newest transform to "{target}" is {age:.3f} s '
+                f'old, tf_max_age is {self._max_age:g} s',
+                'see why it is not published any more, or raise the parameter')
+
+    def T_rigid(self, field: str, target: str, source: str) -> Pose:
+        """
+        Return where a frame is that is fixed to another one.
+
+        :raises InvalidGoal: there is no such transform, or the frames move against each other.
+        """
+        message = self._looked_up(field, target, source, 0)
+        if _nanoseconds(message.header.stamp) != 0:
+            raise InvalidGoal(
+                field, f'is "{source}", which is not fixed to "{target}": tf2 has only a '
+                'transform between them that changes', 'publish it as a static transform if it '
+                'does not, or name it in the parameter static_frames')
+        return _pose(message.transform)
+
+    def _looked_up(self, field: str, target: str, source: str, at: int) -> Message:
+        try:
+            return self._buffer.lookup_transform(
+                target, source, Time(nanoseconds=at), Duration(seconds=PATIENCE))
+        except self._errors as error:
+            when = ' for the stamp of the goal' if at else ''
+            raise InvalidGoal(
+                field, f'is "{source}", and tf2 has no transform from it to "{target}"{when} '
+                f'({str(error).rstrip(".")})', 'see that it is published, or name the frame in '
+                'the parameter static_frames') from None
+
+
+def listen(node: Node, max_age: float) -> Transforms | None:
+    """
+    Return the transforms that a node hears of; None where tf2 is not installed.
+
+    :param max_age: how old the newest transform of a frame may be [s].
+    """
+    try:
+        tf2_ros = importlib.import_module('tf2_ros')
+    except ImportError:
+        return None
+    buffer = tf2_ros.Buffer()
+    listener = tf2_ros.TransformListener(buffer, node)
+    return Transforms(
+        buffer, tf2_ros.TransformException, max_age=max_age, close=listener.unregister,
+        now=lambda: int(node.get_clock().now().nanoseconds))
+
+
+def _nanoseconds(stamp: Message) -> int:
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def _pose(transform: Message) -> Pose:
+    p, q = transform.translation, transform.rotation
+    return Pose((p.x, p.y, p.z), normalize((q.x, q.y, q.z, q.w)))
