@@ -300,6 +300,8 @@ class CallDesk:
         if not self._settings.headless_mode:
             return _no('The parameter headless_mode is false: play a program with External '
                        'Control on the pendant.')
+        if self._robot.robot is None:
+            return _no(self._robot.status.message)
         self._robot.upload_program()
         if await self._until(lambda _: self._robot.status.state is ConnectionState.READY,
                              EFFECT_TIMEOUT):

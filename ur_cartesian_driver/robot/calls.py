@@ -22,6 +22,8 @@ from ur_cartesian_driver.protocol.dashboard import Request
 PINS = {OutputKind.STANDARD_DIGITAL: 8, OutputKind.CONFIGURABLE_DIGITAL: 8,
         OutputKind.TOOL_DIGITAL: 2, OutputKind.STANDARD_ANALOG: 2}
 
+#: Longest text for the dashboard: as lines of any alphabet the server takes it.
+LONGEST_TEXT = 1000
 #: No tool is longer [m].
 LARGEST_TOOL = 5.0
 #: How far the length of a quaternion may be off 1.
@@ -49,8 +51,9 @@ class Dashboard:
     argument: str = ''
 
     def __post_init__(self) -> None:
-        """Check that there is such a command."""
+        """Check that there is such a command, and that it fits into a line."""
         Request(name=self.command, argument=self.argument)
+        _check_length(self.argument)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +67,7 @@ class DashboardLine:
         if not self.line.strip() or '\n' in self.line or '\r' in self.line:
             raise LocalProtocolError(
                 f'A request to the dashboard is one line of text, not {self.line!r:.100}.')
+        _check_length(self.line)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,7 +79,7 @@ class SetTcp:
     def __post_init__(self) -> None:
         """Check that it is a pose, and not one in millimetres."""
         position, quaternion = self.T_flange_tcp.position, self.T_flange_tcp.quaternion
-        if not max(map(abs, position)) <= LARGEST_TOOL:
+        if not all(abs(value) <= LARGEST_TOOL for value in position):  # NaN neither
             raise LocalProtocolError(
                 f'The TCP is at {position} m in the flange, farther than {LARGEST_TOOL:g} m; '
                 'give its position in metres.')
@@ -161,6 +165,12 @@ class SendProgram:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recover:
     """Bring a stopped robot back to where it takes goals, as far as software may."""
+
+
+def _check_length(text: str) -> None:
+    if len(text) > LONGEST_TEXT:
+        raise LocalProtocolError(
+            f'A text for the dashboard has at most {LONGEST_TEXT} characters, not {len(text)}.')
 
 
 Call: TypeAlias = (Dashboard | DashboardLine | SetTcp | SetPayload | ZeroFtSensor | SetOutput
