@@ -19,3 +19,16 @@ def test_a_value_out_of_range_is_named(field, value):
 def test_keepalives_have_to_come_within_the_timeout():
     with pytest.raises(ValueError, match=r'0\.1 s.*0\.09 s'):
         DriverConfig(robot_receive_timeout=0.1, keepalive_period=0.09)
+
+
+def test_an_unknown_dialect_is_answered_with_those_that_there_are():
+    with pytest.raises(ValueError, match=r"wire_dialect is '2\.1', .* 2\.0, 2\.10, 2\.12, 2\.14"):
+        DriverConfig(wire_dialect='2.1')
+
+
+@pytest.mark.parametrize('dialect', ['2.0', '2.10', '2.12'])
+def test_our_own_program_is_not_sent_to_a_robot_with_an_older_one(dialect):
+    DriverConfig(wire_dialect=dialect)
+    with pytest.raises(ValueError, match='headless_mode') as error:
+        DriverConfig(wire_dialect=dialect, headless_mode=True)
+    assert f"wire_dialect is '{dialect}'" in str(error.value)

@@ -223,6 +223,16 @@ def test_the_program_is_served_to_a_request_in_pieces_and_to_the_next_caller():
     asyncio.run(scene())
 
 
+def test_a_program_is_not_served_where_the_robot_has_its_own():
+    async def scene():
+        async with cell() as here:
+            _, writer = await here.dial('script_sender_port')
+            writer.write(b'request_program\n')
+            assert 'wire_dialect' in await here.next()
+
+    asyncio.run(scene())
+
+
 def test_nonsense_at_the_script_sender_is_reported_and_answered_by_hanging_up():
     async def scene():
         async with cell() as here:
