@@ -33,6 +33,8 @@ from ur_cartesian_driver.motion.primitive import (
     Target,
 )
 from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.planning.clearance import Clearance
+from ur_cartesian_driver.planning.clearance import remarks as clearance_remarks
 from ur_cartesian_driver.planning.controlled import carried
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.path import Arc
@@ -76,11 +78,14 @@ def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> P
     goal, state = about.goal, about.state
     planner = _Planner(goal, state, arm, options)
     legs = planner.legs()
+    samples = planner.route.survey.samples()
+    clear = Clearance(arm, state.T_flange_tcp, options).check(samples.q, state.actual_q)
+    said = clearance_remarks(clear, samples.segment, samples.fraction)
     timings = schedule(legs, options, arm.model)
     segments = tuple(planner.segment(leg, timing)
                      for leg, timing in zip(legs, timings, strict=True))
     remarks = [*about.remarks, *planner.remarks, *ignored(goal),
-               *(timing.remark for timing in timings if timing.remark), smallest(legs)]
+               *(timing.remark for timing in timings if timing.remark), *said, smallest(legs)]
     return Plan(goal=goal, segments=segments, start=state.actual_q, remarks=tuple(remarks),
                 reference=reference_path(state.actual_tcp_pose, legs, timings),
                 T_flange_active=T_flange_active, T_flange_tcp=about.T_flange_tcp,
