@@ -5,13 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 from figures import Figure, seconds
 from kinematics import pinocchio_or_none
 import numpy as np
 from numpy.typing import NDArray
+import paths
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
@@ -30,7 +30,7 @@ def run(quick: bool) -> Iterator[Figure]:
     """Follow a path of a UR5e, nominal and calibrated, whose joint positions are known."""
     rows = ROWS // 10 if quick else ROWS
     joints = np.array(START) + np.linspace(0.0, 1.0, rows)[:, None] * np.array(WAY)
-    for name, arm in ('nominal', Arm(robot_model('ur5e'))), ('calibrated', _calibrated()):
+    for name, arm in ('nominal', Arm(robot_model('ur5e'))), ('calibrated', paths.calibrated_arm()):
         poses = arm.forward_rows(joints)
         follow(arm, poses[:1], START)  # the fit of the ideal arm is made once for each arm
         yield from _followed(name, arm, poses, joints)
@@ -60,18 +60,3 @@ def _one_by_one(reference: Any, poses: Rows) -> None:
     before: Any = START
     for pose in poses:
         before = reference.inverse(pose_from_row(pose), before)
-
-
-def _calibrated() -> Arm:
-    """Return an arm that is off its model by about a millimetre in every length, and a mrad."""
-    model = robot_model('ur5e')
-    draw = np.random.default_rng(1)
-
-    def off(column: Vector6, by: float) -> Vector6:
-        a, b, c, d, e, f = (value + float(draw.normal(0.0, by)) for value in column)
-        return (a, b, c, d, e, f)
-
-    nominal = model.geometry
-    return Arm(model, replace(
-        nominal, a=off(nominal.a, 1e-3), d=off(nominal.d, 1e-3), alpha=off(nominal.alpha, 1e-3),
-        theta=off(nominal.theta, 1e-3)))

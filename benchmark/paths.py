@@ -5,11 +5,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
-from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.goal import Goal, Segment, Waypoint
+from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.sim.config import HOME
 
@@ -36,9 +39,11 @@ def meander(points: int) -> Iterator[Pose]:
                     z - 0.15 + STEP * layer), home.quaternion)
 
 
-def goal(points: int) -> Goal:
-    """Return a goal through the meander; the speeds are the driver's own."""
-    return Goal(waypoints=tuple(Waypoint(pose=pose) for pose in meander(points)))
+def goal(points: int, blend_radius: float = 0.0) -> Goal:
+    """Return a goal through the meander, to a stop at its end; the speeds are the driver's own."""
+    segments = [Segment(blend_radius=blend_radius)] * (points - 1) + [Segment()]
+    return Goal(waypoints=tuple(Waypoint(pose=pose) for pose in meander(points)),
+                segments=tuple(segments) if blend_radius > 0.0 else ())
 
 
 def at_home(arm: Arm) -> RobotState:
@@ -46,3 +51,17 @@ def at_home(arm: Arm) -> RobotState:
     pose = arm.forward(HOME)
     return RobotState(timestamp=0.0, actual_q=HOME, target_q=HOME, actual_tcp_pose=pose,
                       target_tcp_pose=pose)
+
+def calibrated_arm() -> Arm:
+    """Return an arm that is off its model by about a millimetre in every length, and a mrad."""
+    model = robot_model(MODEL)
+    draw = np.random.default_rng(1)
+
+    def off(column: Vector6, by: float) -> Vector6:
+        a, b, c, d, e, f = (value + float(draw.normal(0.0, by)) for value in column)
+        return (a, b, c, d, e, f)
+
+    nominal = model.geometry
+    return Arm(model, replace(
+        nominal, a=off(nominal.a, 1e-3), d=off(nominal.d, 1e-3), alpha=off(nominal.alpha, 1e-3),
+        theta=off(nominal.theta, 1e-3)))
