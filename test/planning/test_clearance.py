@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A way is refused at the first place where the arm is too near, and never for leaving it."""
 
+from dataclasses import replace
 from math import pi
+import re
 
 import numpy as np
 import pytest
@@ -10,11 +12,13 @@ import pytest
 from ur_cartesian_driver.kinematics.bodies import Bodies, Link
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.meshes import Meshes
-from ur_cartesian_driver.kinematics.robots import MODELS
-from ur_cartesian_driver.motion.errors import CollisionPredicted
+from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, MODELS
+from ur_cartesian_driver.motion.errors import CODES, CollisionPredicted, ErrorCode
+from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.planning.clearance import Clearance, remarks
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.plan import plan
 
 H = pi / 2
 HOME = (0.0, -H, H, -H, -H, 0.0)
@@ -260,7 +264,7 @@ def test_a_refusal_names_segment_and_fraction():
     percent = 100 * FRACTION[clear.violation.row]
     assert clear.violation.row >= 30
     assert str(refusal.value) == (
-        f'trajectory.points[3].pose: {percent:.1f} % of the way to it {clear.violation.text}; '
+        f'trajectory.points[3].pose, {percent:.1f} % of the way to it: {clear.violation.text}; '
         f'{clear.violation.help}.')
 
 
@@ -272,3 +276,65 @@ def test_a_warning_goes_into_the_report_with_the_smallest_distance():
     assert remarks(check(way(HOME, HOME)), SEGMENT, FRACTION) == [
         'clearance: at least 0.043 m between forearm and wrist 3']
     assert remarks(check(way(HOME, HOME), self_collision='off'), SEGMENT, FRACTION) == []
+
+
+# -- whole goals ----------------------------------------------------------------------------------
+
+def posture(q):
+    return Posture(names=JOINT_NAMES, values=tuple(q))
+
+
+def folding(cell):
+    """A goal that moves a little and then closes the elbow, from where the cell's arm stands."""
+    start = cell.state.actual_q
+    near = tuple(np.add(start, (0.1, 0, 0, 0, 0, 0)))
+    points = tuple(Waypoint(pose=cell.tool(q), posture=posture(q))
+                   for q in (near, FOLDED))
+    return Goal(waypoints=points, segments=(Segment(type=SegmentType.JOINT),) * 2)
+
+
+FREE = PlanningOptions(max_approach_distance=0.0, max_tool_speed=0.0)
+
+
+def test_a_goal_that_folds_the_arm_into_itself_is_a_collision(make_cell):
+    needs_meshes()
+    cell = make_cell(model='ur5')
+    with pytest.raises(CollisionPredicted) as refusal:
+        plan(folding(cell), cell.state, cell.arm, FREE)
+    assert CODES[type(refusal.value)] == ErrorCode.COLLISION == -10
+    assert re.match(r'trajectory\.points\[1\]\.pose, 9\d\.\d % of the way to it: upper arm and '
+                    r'wrist 1 come within 0\.00\d\d m of each other, 0\.0050 m is asked for; ',
+                    str(refusal.value))
+
+
+def test_where_only_capsules_tell_the_report_warns(make_cell):
+    cell = make_cell(model='ur5e')
+    made = plan(folding(cell), cell.state, cell.arm, FREE)
+    assert [remark for remark in made.remarks if re.match(
+        r'point 1: 9\d\.\d % of the way to it, upper arm and wrist 1 come within', remark)]
+    assert 'clearance: none between upper arm and wrist 1' in made.remarks
+    refusing = replace(FREE, self_collision='refuse')
+    with pytest.raises(CollisionPredicted, match=r'trajectory\.points\[1\]'):
+        plan(folding(cell), cell.state, cell.arm, refusing)
+
+
+def test_a_goal_that_crosses_a_plane_is_a_collision(cell):
+    z = cell.home.position[2]
+    goal = Goal(waypoints=(cell.point(0.05), cell.point(0.05, z=-0.1)))
+    for depth in (0.025, 0.05):
+        options = PlanningOptions(workspace_planes=(f'table 0 0 {z - depth} 0 0 1',))
+        with pytest.raises(CollisionPredicted) as refusal:
+            plan(goal, cell.state, cell.arm, options)
+        said = re.match(r'trajectory\.points\[1\]\.pose, (.*) % of the way to it: the TCP goes '
+                        r'0\.00.. m beyond the workspace plane "table"; ', str(refusal.value))
+        assert 0.0 < float(said[1]) / 100 - depth / 0.1 < 0.021  # a sample each 2 mm
+    options = PlanningOptions(workspace_planes=(f'table 0 0 {z - 0.11} 0 0 1',))
+    assert plan(goal, cell.state, cell.arm, options).segments
+
+
+def test_a_goal_may_lead_out_of_a_collision(make_cell):
+    needs_meshes()
+    cell = make_cell(FOLDED, model='ur5')
+    goal = Goal(waypoints=(Waypoint(pose=cell.tool(HOME), posture=posture(HOME)),),
+                segments=(Segment(type=SegmentType.JOINT),))
+    assert plan(goal, cell.state, cell.arm, FREE).segments

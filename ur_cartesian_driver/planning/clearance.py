@@ -123,12 +123,12 @@ def remarks(clear: Clear, segment: NDArray[np.int32], fraction: Floats) -> list[
     if clear.violation is not None:
         row = clear.violation.row
         raise CollisionPredicted(
-            f'{point_field(int(segment[row]), "pose")}: {100.0 * fraction[row]:.1f} % of the way '
-            f'to it {clear.violation.text}; {clear.violation.help}.')
+            f'{point_field(int(segment[row]), "pose")}, {100.0 * fraction[row]:.1f} % of the way '
+            f'to it: {clear.violation.text}; {clear.violation.help}.')
     said = []
     if clear.warning is not None:
         row = clear.warning.row
-        said.append(f'point {segment[row]}: {100.0 * fraction[row]:.1f} % of the way to it '
+        said.append(f'point {segment[row]}: {100.0 * fraction[row]:.1f} % of the way to it, '
                     f'{clear.warning.text}')
     if clear.what:
         least = f'at least {clear.margin:.3f} m' if clear.margin > 0.0 else 'none'
