@@ -158,3 +158,15 @@ def test_the_target_is_compared_with_the_plan_apart_from_the_room_of_corners():
         tracker = PathTracker(path(*corner, **({} if allowed is None else {'room': allowed})))
         tracker.update(beside, 0.2)
         assert tracker.deviation(beside) == pytest.approx(expected, abs=1e-6)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_few_edges_are_searched_as_many_are(seed):
+    draw = np.random.default_rng(seed)
+    quaternions = draw.normal(size=(4, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
+    tracker = PathTracker(path(*draw.normal(size=(4, 3)), quaternions=list(quaternions)))
+    point, lowest, highest = draw.normal(size=7), draw.uniform(0.0, 0.5), draw.uniform(0.5, 1.0)
+    many = tracker._nearest(point, 0, 3, lowest, highest)
+    few = tracker._nearest_of_few(point.tolist(), 0, 3, lowest, highest)
+    assert (few.row, few.fraction) == (many.row, pytest.approx(many.fraction, abs=1e-12))

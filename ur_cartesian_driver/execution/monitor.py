@@ -15,6 +15,8 @@ on while the arm is pushed along its path, so that is an error too, beyond the l
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +32,8 @@ SLACK = 0.005
 #: the target [s], and this far [m]. Position controllers of arms lag by some cycles.
 LAG_TIME = 0.02
 LAG_WAY = 0.0005
+#: Up to so many edges are looked at one by one.
+FEW = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,6 +188,8 @@ class PathTracker:
         :param lowest: where it may be on the first edge at the earliest.
         :param highest: where it may be on the last edge at the latest.
         """
+        if end - first <= FEW:
+            return self._nearest_of_few(point.tolist(), first, end, lowest, highest)
         start = self._rows[first:end]
         edge = self._rows[first + 1:end + 1] - start
         away = point - start
@@ -197,6 +203,27 @@ class PathTracker:
         best = int(np.argmin(np.einsum('ij,ij->i', miss, miss)))
         at = float(fraction[best])
         return Place(first + best + 1, 0.0) if at >= 1.0 else Place(first + best, at)
+
+    def _nearest_of_few(self, point: list[float], first: int, end: int, lowest: float,
+                        highest: float) -> Place:
+        """Return the same without arrays, whose overhead is most of the time for a few edges."""
+        rows = self._rows[first:end + 1].tolist()
+        nearest, place = inf, Place(first, 0.0)
+        for row, (start, stop) in enumerate(pairwise(rows), first):
+            edge = [b - a for a, b in zip(start, stop, strict=True)]
+            away = [b - a for a, b in zip(start, point, strict=True)]
+            square = sum([e * e for e in edge])
+            along = sum([e * a for e, a in zip(edge, away, strict=True)])
+            at = min(1.0, max(0.0, along / square)) if square > 0.0 else 1.0
+            if row == end - 1:
+                at = min(at, highest)
+            if row == first:
+                at = max(at, lowest)
+            miss = sum([(a - at * e) ** 2 for a, e in zip(away, edge, strict=True)])
+            if miss < nearest:
+                nearest = miss
+                place = Place(row + 1, 0.0) if at >= 1.0 else Place(row, at)
+        return place
 
 
 def _continuous_signs(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
