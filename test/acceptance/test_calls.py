@@ -98,6 +98,15 @@ def test_a_setting_needs_the_robot_program(driver, ur_sim):
     assert driver.set_speed_slider(0.5).ok
 
 
+def test_no_goal_begins_while_its_tcp_is_being_set(driver, home, ur_sim):
+    plan = driver.plan(Goal(waypoints=(Waypoint(time=1.0, pose=home(z=0.05)),)))
+    pending = driver.call(SetTcp(T_flange_tcp=NOZZLE))
+    outcome = driver.start(plan).result(5.0)
+    assert outcome.code.name == 'ROBOT_NOT_READY'
+    assert 'being set' in outcome.text or 'was changed' in outcome.text
+    assert pending.result(5.0).ok
+
+
 @QUICK
 def test_dashboard_commands_are_done_when_the_robot_reports_them(driver, ur_sim):
     assert driver.status.serial_number == '20000000000'

@@ -179,6 +179,8 @@ class RobotLoop:
         reason = self._link.not_ready()
         if self._machine is not None:
             reason = 'Another motion is running; wait for its end or cancel it.'
+        elif self._desk.is_setting:
+            reason = 'TCP or payload are being set at this moment; send the goal again.'
         elif not reason:
             reason = self._tcp_changed(request.order)
         if reason:

@@ -92,6 +92,10 @@ class Robot(Protocol):
     def program_connected(self) -> bool:
         """Whether the robot program holds its sockets."""
 
+    @property
+    def tcp_owed(self) -> bool:
+        """Whether the TCP of a goal is still to be put back."""
+
     def send_primary(self, command: primary.Command) -> bool:
         """Send a command to the primary interface; False = there is no connection."""
 
@@ -169,6 +173,12 @@ class CallDesk:
         self._robot = robot
         self._dashboard = DashboardClient(settings.robot_ip, dashboard_port)
         self._recovering = False
+        self._settings_under_way = 0
+
+    @property
+    def is_setting(self) -> bool:
+        """Tell whether something that a goal counts on is being set right now."""
+        return self._settings_under_way > 0
 
     async def answer(self, call: Call) -> Answer:
         """Carry out a call; what goes wrong is an answer too."""
@@ -187,10 +197,8 @@ class CallDesk:
                 return await self._ask_dashboard(call)
             case DashboardLine():
                 return await self._ask_raw(call)
-            case SetTcp():
-                return await self._set_tcp(call)
-            case SetPayload():
-                return await self._set_payload(call)
+            case SetTcp() | SetPayload():
+                return await self._set(call)
             case ZeroFtSensor():
                 return self._command(script_command.ZeroFtSensor()) or _yes(
                     'The robot program was told to zero the force sensor.')
@@ -212,6 +220,9 @@ class CallDesk:
             return None
         if status.state is ConnectionState.REFUSED:
             return _no(status.message)
+        if isinstance(call, SetTcp) and self._robot.tcp_owed:
+            return _no('The TCP that a goal has lent is being put back; try again when the status '
+                       'is READY.')
         if status.state is ConnectionState.EXECUTING and (
                 isinstance(call, SetTcp | SetPayload | SendProgram)
                 or (isinstance(call, Dashboard) and call.command in DISTURBING)):
@@ -264,6 +275,15 @@ class CallDesk:
             return _no('The robot program does not run, and it is what does this. '
                        f'{self._robot.status.message}'.rstrip())
         return None
+
+    async def _set(self, call: SetTcp | SetPayload) -> Answer:
+        """Set something; no goal begins meanwhile."""
+        self._settings_under_way += 1
+        try:
+            return await (self._set_tcp(call) if isinstance(call, SetTcp)
+                          else self._set_payload(call))
+        finally:
+            self._settings_under_way -= 1
 
     async def _set_tcp(self, call: SetTcp) -> Answer:
         wanted = Pose(call.T_flange_tcp.position, normalize(call.T_flange_tcp.quaternion))

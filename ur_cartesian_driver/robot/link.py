@@ -144,6 +144,11 @@ class RobotLink:
         """Whether the robot program holds its sockets."""
         return self._program.connected
 
+    @property
+    def tcp_owed(self) -> bool:
+        """Whether the TCP of a goal is still to be put back."""
+        return self._tcp_owed
+
     def keepalive_gap(self) -> float:
         """Return the longest pause between two keepalives since the last call [s]."""
         gap, self._program.longest_gap = self._program.longest_gap, 0.0
