@@ -4,8 +4,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
 
 #: With a time the robot keeps its profile to itself; taken is a third each for accelerating,
 #: cruising and braking.
@@ -64,6 +68,27 @@ class Profile:
         """Return the time for the first part of a ramp from a speed: s = u t + a t^2 / 2."""
         a = self.acceleration
         return (sqrt(speed * speed + 2.0 * a * way) - speed) / a
+
+
+def times_at(profiles: Sequence[Profile], which: NDArray[np.intp], way: NDArray[np.float64]
+             ) -> NDArray[np.float64]:
+    """
+    Return :meth:`Profile.time_at` of many ways (n,).
+
+    :param which: (n,) the number of the profile of each.
+    """
+    length, enter, cruise, leave, a = np.array([
+        (p.length, p.enter, p.cruise, p.leave, p.acceleration) for p in profiles]).T[:, which]
+    way, cruise = np.clip(way, 0.0, length), np.maximum(cruise, 1e-300)
+    way_in, way_out = ((cruise + v) * (cruise - v) / (2.0 * a) for v in (enter, leave))
+    left = length - way
+    speeding = (np.sqrt(enter * enter + 2.0 * a * np.minimum(way, way_in)) - enter) / a
+    even = np.clip(way - way_in, 0.0, length - way_in - way_out) / cruise
+    # What braking takes from its beginning: all of it less what is still to come.
+    to_come = (np.sqrt(leave * leave + 2.0 * a * np.minimum(left, way_out)) - leave) / a
+    braking = np.where(left < way_out, (cruise - leave) / a - to_come, 0.0)
+    times: NDArray[np.float64] = speeding + even + braking
+    return times
 
 
 def trapezoid(length: float, velocity: float, acceleration: float, enter: float = 0.0,

@@ -6,15 +6,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from math import ceil
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning.corner import Corner, corner_rows, path_rows
 from ur_cartesian_driver.planning.path import JointLine, Path
 from ur_cartesian_driver.planning.pose_rows import Floats
+from ur_cartesian_driver.planning.profile import Profile, times_at
 from ur_cartesian_driver.planning.timing import Leg, Timing
 
 #: The fewest pieces of a joint move, for the sake of its times.
@@ -30,15 +33,17 @@ def reference_path(start: Pose, legs: Sequence[Leg], timings: Sequence[Timing]) 
     """
     sections = list(_sections(legs, timings))
     count = [len(section.at) for section in sections]
-    now = np.repeat(np.array([section.now for section in sections]), count)
-    times = now + np.concatenate([section.after for section in sections])
-    points = np.concatenate([section.points for section in sections])
-    room = np.repeat(np.array([section.room for section in sections]), count, axis=0)
-    poses = np.concatenate([[start.row()], _poses(sections)])
+    of = np.repeat(np.arange(len(sections)), count)
+    at = np.fromiter(chain.from_iterable(section.at for section in sections), dtype=np.float64)
+    is_corner = np.array([isinstance(section.curve, Corner) for section in sections])
+    points = np.array([section.index for section in sections])[of] + (is_corner[of] & (at > 0.5))
+    room = np.array([section.curve.room if isinstance(section.curve, Corner) else (0.0, 0.0)
+                     for section in sections])[of]
+    poses = np.concatenate([[start.row()], _poses(sections, is_corner, of, at)])
     _keep_hemisphere(poses)
     return ReferencePath(
         poses=poses, point=np.concatenate([[legs[0].index], points]).astype(np.int32),
-        time=np.maximum.accumulate(np.concatenate([[0.0], times])),
+        time=np.maximum.accumulate(np.concatenate([[0.0], _times(sections, of, at)])),
         room=np.concatenate([[(0.0, 0.0)], room]))
 
 
@@ -47,45 +52,48 @@ class _Section:
     """The rows of one path or of one corner."""
 
     curve: Path | Corner
-    #: Where on it.
+    index: int
+    #: Where on it, and where it begins.
     at: list[float]
-    #: When it begins, and how long after that each row is [s].
+    begin: float
+    #: When it begins [s], how its length passes, and what of that one unit of ``at`` is.
     now: float
-    after: list[float]
-    points: list[int]
-    room: tuple[float, float] = (0.0, 0.0)
+    profile: Profile
+    rate: float
 
 
 def _sections(legs: Sequence[Leg], timings: Sequence[Timing]) -> Iterator[_Section]:
     now = 0.0
     for leg, timing in zip(legs, timings, strict=True):
-        u, profile = _places(leg, timing), timing.profile
-        span = leg.u_after - leg.u_before
-        after = [profile.time_at(profile.length * (x - leg.u_before) / span)
-                 if span > 0.0 else 0.0 for x in u]
-        yield _Section(leg.path, u, now, after, [leg.index] * len(u))
+        profile, span = timing.profile, leg.u_after - leg.u_before
+        yield _Section(leg.path, leg.index, _places(leg, timing), leg.u_before, now, profile,
+                       profile.length / span if span > 0.0 else 0.0)
         now += profile.duration
         if leg.after is not None:
-            n = leg.after.samples
-            s = [k / n for k in range(1, n + 1)]
-            yield _Section(leg.after, s, now, [x * timing.corner for x in s],
-                           [leg.index + (x > 0.5) for x in s], leg.after.room)
+            n, even = leg.after.samples, Profile(timing.corner, 1.0, 1.0, 1.0, 1.0)
+            yield _Section(leg.after, leg.index, [k / n for k in range(1, n + 1)], 0.0, now, even,
+                           timing.corner)
             now += timing.corner
 
 
-def _poses(sections: Sequence[_Section]) -> Floats:
+def _times(sections: Sequence[_Section], of: NDArray[np.intp], at: Floats) -> Floats:
+    """Return when each row is expected (n,) [s]."""
+    now, begin, rate = np.array([(x.now, x.begin, x.rate) for x in sections])[of].T
+    times: Floats = now + times_at([x.profile for x in sections], of, rate * (at - begin))
+    return times
+
+
+def _poses(sections: Sequence[_Section], is_corner: NDArray[np.bool_], of: NDArray[np.intp],
+           at: Floats) -> Floats:
     """Return the poses (n, 7) of all rows."""
-    count = [len(section.at) for section in sections]
-    at = np.concatenate([section.at for section in sections])
-    is_corner = np.array([isinstance(section.curve, Corner) for section in sections])
     number = np.where(is_corner, np.cumsum(is_corner), np.cumsum(~is_corner)) - 1
-    of, rounds = np.repeat(number, count), np.repeat(is_corner, count)
+    rounds = is_corner[of]
     paths = [section.curve for section in sections if not isinstance(section.curve, Corner)]
     corners = [section.curve for section in sections if isinstance(section.curve, Corner)]
     poses = np.empty((len(at), 7))
-    poses[~rounds] = path_rows(paths, of[~rounds], at[~rounds])
+    poses[~rounds] = path_rows(paths, number[of[~rounds]], at[~rounds])
     if corners:
-        poses[rounds] = corner_rows(corners, of[rounds], at[rounds])
+        poses[rounds] = corner_rows(corners, number[of[rounds]], at[rounds])
     return poses
 
 
