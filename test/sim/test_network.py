@@ -14,6 +14,7 @@ import threading
 import time
 
 import pytest
+from rtde_requests import setup_outputs, START, VERSION_2
 
 from ur_cartesian_driver.motion.state import RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.primary import (
@@ -108,18 +109,12 @@ def robot():
         yield robot
 
 
-def setup_outputs(*names: str, frequency: float = 500.0) -> bytes:
-    payload = struct.pack('>d', frequency) + ','.join(names).encode()
-    return struct.pack('>HB', 3 + len(payload), ord('O')) + payload
-
-
 def setup_inputs(*names: str) -> bytes:
     payload = ','.join(names).encode()
     return struct.pack('>HB', 3 + len(payload), ord('I')) + payload
 
 
-VERSION_2 = struct.pack('>HBH', 5, ord('V'), 2)
-START, PAUSE = struct.pack('>HB', 3, ord('S')), struct.pack('>HB', 3, ord('P'))
+PAUSE = struct.pack('>HB', 3, ord('P'))
 
 
 @pytest.mark.parametrize('name', ['handshake', 'handshake_with_types'])
