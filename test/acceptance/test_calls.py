@@ -14,6 +14,7 @@ from ur_cartesian_driver.motion.goal import Goal, OutputKind, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.motion.state import RobotMode
+from ur_cartesian_driver.program.render import as_program
 from ur_cartesian_driver.protocol.rtde import RtdeClient
 from ur_cartesian_driver.robot.calls import Dashboard, Recover, SetTcp
 from ur_cartesian_driver.sim.modes import SafetyEvent
@@ -178,6 +179,36 @@ def test_a_recovery_after_a_goal_does_not_go_on_with_it(driver, ur_sim, home):
     q = ur_sim.state().q
     assert driver.recover().ok
     assert ur_sim.state().q == q
+
+
+def served_program(driver):
+    """Fetch the robot program as the External Control node does."""
+    with socket.create_connection(('127.0.0.1', driver.status.ports['script_sender_port'])) as s:
+        s.settimeout(5.0)
+        s.sendall(b'request_program\n')
+        text = ''
+        while '# NODE_CONTROL_LOOP_ENDS' not in text:
+            text += s.recv(65536).decode()
+    return as_program(text)
+
+
+@QUICK
+def test_recover_plays_the_program_of_the_pendant_where_that_is_how_it_comes(
+        make_driver, ur_sim):
+    driver = make_driver(headless_mode=False)
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    answer = driver.recover()
+    assert not answer.ok
+    assert 'load_program' in answer.text
+    program = served_program(driver)
+    assert ur_sim.call(lambda c: c.programs.load('pendant.urp', program)) == ''
+    assert driver.recover().ok
+    assert driver.status.state is ConnectionState.READY
+    ur_sim.protective_stop()
+    wait_for(lambda: driver.status.state is ConnectionState.STOPPED)
+    answer = driver.recover()
+    assert answer.ok, answer.text
+    assert 'play the loaded program' in answer.text
 
 
 @QUICK

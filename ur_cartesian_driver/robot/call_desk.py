@@ -395,6 +395,10 @@ class CallDesk:
         while not answer.ok and TOO_EARLY in answer.text:
             await asyncio.sleep(REPEAT)
             answer = await self._ask_dashboard(Dashboard(command=command))
+        if answer.ok and step is Step.PLAY and not await self._until(
+                lambda _: self._robot.program_connected, EFFECT_TIMEOUT):
+            return _no('it plays, but has not come to its External Control node within '
+                       f'{EFFECT_TIMEOUT:g} s.')
         return answer
 
     async def _do_without_dashboard(self, step: Step, effect: Effect) -> Answer:
