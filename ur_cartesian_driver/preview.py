@@ -38,7 +38,7 @@ def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
     """
     Return the expected motion of tool and joints.
 
-    :param T_flange_tcp: the TCP with which the plan was made.
+    :param T_flange_tcp: the TCP of the robot, where the plan does not need another one.
     :param period: time between two samples [s].
     :raises ValueError: the period is not positive.
     """
@@ -54,7 +54,8 @@ def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
     share = np.clip((time - reference.time[row]) / np.where(span > 0.0, span, 1.0), 0.0, 1.0)
     share[time >= end] = 1.0
     poses = [_between(reference, int(k), float(f)) for k, f in zip(row, share, strict=True)]
-    joints = _joints(plan, arm, T_flange_tcp.inverse(), poses, row + share)
+    tcp = T_flange_tcp if plan.T_flange_tcp is None else plan.T_flange_tcp
+    joints = _joints(plan, arm, tcp.inverse(), poses, row + share)
     return Preview(time=time, poses=np.array([pose.row() for pose in poses]), joints=joints)
 
 

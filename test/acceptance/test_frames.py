@@ -300,6 +300,21 @@ def test_the_robot_program_puts_the_tcp_back_when_the_driver_dies(make_driver, u
 
 
 @pytest.mark.ur_sim(frequency=125.0)
+def test_a_robot_loop_that_follows_a_dead_one_pays_its_debts(make_driver, ur_sim):
+    """Program and robot loop die at once, so that nobody is left who could do it."""
+    set_tcp(ur_sim, TCP)
+    driver = make_driver(robot_loop='process')
+    driver.wait_ready(10.0)
+    motion = moving(driver)
+    os.kill(driver._host.pid, signal.SIGSTOP)
+    ur_sim.stop_program()
+    os.kill(driver._host.pid, signal.SIGKILL)
+    assert motion.result(5.0).code is ErrorCode.CONNECTION_LOST
+    assert not has_own_tcp(ur_sim, 1e-3)
+    wait_for(lambda: has_own_tcp(ur_sim, 1e-11))
+
+
+@pytest.mark.ur_sim(frequency=125.0)
 def test_a_driver_that_is_closed_during_a_goal_leaves_the_tcp_as_it_was(make_driver, ur_sim):
     set_tcp(ur_sim, TCP)
     driver = make_driver()
