@@ -78,6 +78,13 @@ def values(**known):
     return dict.fromkeys(REQUIRED, 0) | known
 
 
+def test_old_software_reports_what_it_has():
+    message = io_states_message(signals(values()), STAMP)
+    assert not any(message.standard_digital_inputs)
+    assert all(map(isnan, message.analog_inputs))
+    assert not set(OPTIONAL) & set(values())
+
+
 @pytest.mark.parametrize('bit', range(18))
 def test_every_digital_channel_has_its_place(bit):
     message = io_states_message(signals(values(
@@ -112,7 +119,7 @@ def test_tool_data_say_what_is_not_known():
     assert isnan(message.payload)
     assert isnan(message.payload_center_of_gravity.x)
     known = tool_data_message(
-        signals(values(**dict(zip(OPTIONAL, (1.5, (0.0, 0.0, 0.1)), strict=True)))), STAMP)
+        signals(values(payload=1.5, payload_cog=(0.0, 0.0, 0.1))), STAMP)
     assert (known.payload, known.payload_center_of_gravity.z) == (1.5, 0.1)
 
 

@@ -9,7 +9,7 @@ Values are checked when a call is made, so that one which exists can be sent.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot, isfinite
+from math import hypot
 from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
@@ -24,8 +24,8 @@ PINS = {OutputKind.STANDARD_DIGITAL: 8, OutputKind.CONFIGURABLE_DIGITAL: 8,
 
 #: Longest text for the dashboard: as lines of any alphabet the server takes it.
 LONGEST_TEXT = 1000
-#: No tool is longer [m].
-LARGEST_TOOL = 5.0
+#: No tool is longer [m], and no arm carries more [kg].
+LARGEST_TOOL, LARGEST_MASS = 5.0, 100.0
 #: How far the length of a quaternion may be off 1.
 UNIT_TOLERANCE = 1e-3
 
@@ -98,10 +98,11 @@ class SetPayload:
 
     def __post_init__(self) -> None:
         """Check that the mass can be one."""
-        if not 0.0 <= self.mass < 1000.0 or not all(map(isfinite, self.cog)):
+        if not 0.0 <= self.mass <= LARGEST_MASS \
+                or not all(abs(value) <= LARGEST_TOOL for value in self.cog):  # NaN neither
             raise LocalProtocolError(
-                f'The payload has a mass of {self.mass} kg at {self.cog}; the mass must not be '
-                'negative, and all numbers finite.')
+                f'The payload is {self.mass} kg at {self.cog} m; the mass has to be 0 to '
+                f'{LARGEST_MASS:g} kg, and each coordinate at most {LARGEST_TOOL:g} m.')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

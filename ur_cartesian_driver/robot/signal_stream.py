@@ -24,13 +24,13 @@ from ur_cartesian_driver.protocol.rtde import RtdeClient
 from ur_cartesian_driver.robot.rtde_connection import RtdeConnection, SILENCE
 from ur_cartesian_driver.robot.transport import Retry
 
-REQUIRED = (
-    'actual_digital_input_bits', 'actual_digital_output_bits', 'analog_io_types',
-    'standard_analog_input0', 'standard_analog_input1', 'standard_analog_output0',
-    'standard_analog_output1', 'tool_mode', 'tool_analog_input_types', 'tool_analog_input0',
-    'tool_analog_input1', 'tool_output_voltage', 'tool_output_current', 'tool_temperature')
-#: Old software does not have these.
-OPTIONAL = ('payload', 'payload_cog')
+REQUIRED = ('actual_digital_input_bits', 'actual_digital_output_bits')
+#: Old software does not have all of these.
+OPTIONAL = (
+    'analog_io_types', 'standard_analog_input0', 'standard_analog_input1',
+    'standard_analog_output0', 'standard_analog_output1', 'tool_mode', 'tool_analog_input_types',
+    'tool_analog_input0', 'tool_analog_input1', 'tool_output_voltage', 'tool_output_current',
+    'tool_temperature', 'payload', 'payload_cog')
 
 
 class SignalStream:
@@ -76,12 +76,13 @@ class SignalStream:
 
 
 def signals(values: Mapping[str, Any]) -> Signals:
-    """Return the snapshot of one data package, given by the names above."""
-    types, tool_types = values['analog_io_types'], values['tool_analog_input_types']
+    """Return the snapshot of one data package, given by those of the names above that it has."""
+    types, tool_types = values.get('analog_io_types', 0), values.get('tool_analog_input_types', 0)
 
     def pair(name: str, domains: int) -> tuple[AnalogChannel, AnalogChannel]:
-        first, second = (AnalogChannel(
-            domain=AnalogDomain(domains >> i & 1), value=values[f'{name}{i}']) for i in (0, 1))
+        first, second = (
+            AnalogChannel(domain=AnalogDomain(domains >> i & 1),
+                          value=values.get(f'{name}{i}', nan)) for i in (0, 1))
         return first, second
 
     return Signals(
@@ -90,6 +91,8 @@ def signals(values: Mapping[str, Any]) -> Signals:
         analog_inputs=pair('standard_analog_input', types),
         analog_outputs=pair('standard_analog_output', types >> 2),
         tool_analog_inputs=pair('tool_analog_input', tool_types),
-        tool_voltage=values['tool_output_voltage'], tool_current=values['tool_output_current'],
-        tool_temperature=values['tool_temperature'], tool_mode=values['tool_mode'],
+        tool_voltage=values.get('tool_output_voltage', 0),
+        tool_current=values.get('tool_output_current', nan),
+        tool_temperature=values.get('tool_temperature', nan),
+        tool_mode=values.get('tool_mode', 0),
         payload=values.get('payload', nan), payload_cog=values.get('payload_cog', (nan,) * 3))
