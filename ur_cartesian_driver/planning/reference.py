@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import chain
 from math import ceil
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,7 @@ def reference_path(start: Pose, legs: Sequence[Leg], timings: Sequence[Timing]) 
     of = np.repeat(np.arange(len(sections)), count)
     at = np.fromiter(chain.from_iterable(section.at for section in sections), dtype=np.float64)
     is_corner = np.array([isinstance(section.curve, Corner) for section in sections])
-    points = np.array([section.index for section in sections])[of] + (is_corner[of] & (at > 0.5))
+    points = np.array([section.point for section in sections])[of] + (is_corner[of] & (at > 0.5))
     room = np.array([section.curve.room if isinstance(section.curve, Corner) else (0.0, 0.0)
                      for section in sections])[of]
     poses = np.concatenate([[start.row()], _poses(sections, is_corner, of, at)])
@@ -47,12 +47,11 @@ def reference_path(start: Pose, legs: Sequence[Leg], timings: Sequence[Timing]) 
         room=np.concatenate([[(0.0, 0.0)], room]))
 
 
-@dataclass(frozen=True, slots=True)
-class _Section:
+class _Section(NamedTuple):
     """The rows of one path or of one corner."""
 
     curve: Path | Corner
-    index: int
+    point: int
     #: Where on it, and where it begins.
     at: list[float]
     begin: float
@@ -60,6 +59,12 @@ class _Section:
     now: float
     profile: Profile
     rate: float
+    #: How long the profile's second lasts [s].
+    second: float = 1.0
+
+
+#: In corners ``s`` passes evenly.
+_EVENLY = Profile(1.0, 1.0, 1.0, 1.0, 1.0)
 
 
 def _sections(legs: Sequence[Leg], timings: Sequence[Timing]) -> Iterator[_Section]:
@@ -70,16 +75,18 @@ def _sections(legs: Sequence[Leg], timings: Sequence[Timing]) -> Iterator[_Secti
                        profile.length / span if span > 0.0 else 0.0)
         now += profile.duration
         if leg.after is not None:
-            n, even = leg.after.samples, Profile(timing.corner, 1.0, 1.0, 1.0, 1.0)
-            yield _Section(leg.after, leg.index, [k / n for k in range(1, n + 1)], 0.0, now, even,
-                           timing.corner)
+            n = leg.after.samples
+            yield _Section(leg.after, leg.index, [k / n for k in range(1, n + 1)], 0.0, now,
+                           _EVENLY, 1.0, timing.corner)
             now += timing.corner
 
 
 def _times(sections: Sequence[_Section], of: NDArray[np.intp], at: Floats) -> Floats:
     """Return when each row is expected (n,) [s]."""
-    now, begin, rate = np.array([(x.now, x.begin, x.rate) for x in sections])[of].T
-    times: Floats = now + times_at([x.profile for x in sections], of, rate * (at - begin))
+    now, begin, rate, second = np.array([
+        (x.now, x.begin, x.rate, x.second) for x in sections])[of].T
+    times: Floats = now + second * times_at(
+        [x.profile for x in sections], of, rate * (at - begin))
     return times
 
 

@@ -448,7 +448,8 @@ class Route:
             i = draft.index
             leg = Leg(index=i, kind=draft.kind, waypoint=self.goal.waypoints[i],
                       segment=draft.segment, path=draft.way, joints=draft.arrives, time=time,
-                      pace=paces[i], nearest=nearest[i], before=draft.before, after=draft.after)
+                      pace=paces[i], nearest=nearest[i], before=draft.before, after=draft.after,
+                      u_before=draft.begin, u_after=draft.after.leave if draft.after else 1.0)
             yield self._already_there(leg) if self._goes_nowhere(leg) else leg
 
     def _goes_nowhere(self, leg: Leg) -> bool:

@@ -80,16 +80,9 @@ class Leg:
     #: The corners at its ends; None = it stands there.
     before: Corner | None = None
     after: Corner | None = None
-
-    @property
-    def u_before(self) -> float:
-        """Where the path is joined after the corner before."""
-        return self.before.join if self.before else 0.0
-
-    @property
-    def u_after(self) -> float:
-        """Where the path is left for the corner after."""
-        return self.after.leave if self.after else 1.0
+    #: Where the path is joined after the corner before, and left for the corner after.
+    u_before: float = 0.0
+    u_after: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,7 +142,10 @@ def schedule(legs: Sequence[Leg], options: PlanningOptions, model: RobotModel) -
     for k in range(1, len(legs)):
         if legs[k].before is not None and legs[k].time is None:
             timings[k] = _from_corner(legs, timings, k)
-    return [_whole(legs, timings, k) for k in range(len(legs))]
+    corners = [corner_duration(legs[k], timings[k], legs[k + 1], timings[k + 1])
+               if legs[k].after is not None else 0.0 for k in range(len(legs))]
+    return [_whole(leg, timing, before, after) for leg, timing, before, after in zip(
+        legs, timings, [0.0, *corners[:-1]], corners, strict=True)]
 
 
 def _check_least(leg: Leg, timing: Timing) -> None:
@@ -184,17 +180,18 @@ def _from_corner(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> Timi
     return replace(timings[k], profile=profile)
 
 
-def _whole(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> Timing:
-    """Return the timing with its expected duration, half of each corner included."""
-    timing, in_corners = timings[k], _corner_time(legs, timings, k)
+def _whole(leg: Leg, timing: Timing, before: float, after: float) -> Timing:
+    """
+    Return the timing with its expected duration, half of each corner included.
+
+    :param before: time in the corners before and after it [s].
+    """
+    in_corners, profile = 0.5 * (before + after), timing.profile
     if timing.wire_time > 0.0 and in_corners > 0.0:
         # What is sent as a time is kept in sum: corners are shorter, so what is left has longer.
         left = max(timing.wire_time - in_corners, 0.05 * timing.wire_time)
-        timing = replace(timing, profile=timed(timing.profile.length, left, *_stands(legs[k])))
-    corner = 0.0
-    if legs[k].after is not None:
-        corner = corner_duration(legs[k], timings[k], legs[k + 1], timings[k + 1])
-    return replace(timing, duration=timing.profile.duration + in_corners, corner=corner)
+        profile = timed(profile.length, left, *_stands(leg))
+    return replace(timing, profile=profile, duration=profile.duration + in_corners, corner=after)
 
 
 def measure(leg: Leg, model: RobotModel) -> tuple[float, str]:
