@@ -106,6 +106,8 @@ class RobotLink:
         self._powering_up = False
         #: The TCP that a goal had set is still to be put back.
         self._tcp_owed = False
+        #: The robot program that is connected is the one that has set it.
+        self._program_remembers = False
         #: Since when the robot reports that no program runs while one is connected [s].
         self._ghost_since = inf
         self._first_connection = may_upload
@@ -186,21 +188,24 @@ class RobotLink:
 
     def lend_tcp(self, T_flange_tcp: Pose) -> None:
         """Have the robot program set the TCP for the time of a goal."""
+        self._program_remembers = True
         self._send_tcp(T_flange_tcp, TcpHold.LENT)
 
     def return_tcp(self, T_flange_tcp: Pose) -> None:
         """
         Have the TCP put back to what it was before a goal.
 
-        The robot program does it where it is there and not paused. Else a program of its own does,
-        where we may send one, but never beside a program of somebody else.
+        The robot program does it where it is there, not paused, and remembers that TCP to the last
+        digit. Else a program of its own does, where we may send one, but never beside a program of
+        somebody else; and where we may not, the robot program by the digits of the wire.
         """
         robot = self._robot
         if robot is None:
             return
-        if self._program.connected and not is_paused(robot):
+        listens = self._program.connected and not is_paused(robot)
+        if listens and (self._program_remembers or not self._settings.headless_mode):
             self._send_tcp(T_flange_tcp, TcpHold.BACK)
-        elif self._settings.headless_mode and robot.runtime_state not in _RUNS:
+        elif self._settings.headless_mode and (listens or robot.runtime_state not in _RUNS):
             self._primary.send(primary.upload(tcp_program(T_flange_tcp.rotation_vector())))
 
     def _send_tcp(self, T_flange_tcp: Pose, hold: TcpHold) -> None:
@@ -393,6 +398,7 @@ class RobotLink:
         self._review()
 
     def _on_program_lost(self, reason: str) -> None:
+        self._program_remembers = False
         self._change(Change.PROGRAM_LOST, program_running=False)
         self._on_event(LinkLost(link='program', reason=reason))
 
