@@ -19,11 +19,13 @@ from ur_cartesian_driver.protocol.rtde import RtdeClient
 from ur_cartesian_driver.robot.calls import Dashboard, Recover, SetTcp
 from ur_cartesian_driver.sim.modes import SafetyEvent
 
-pytestmark = [pytest.mark.slow, pytest.mark.acceptance]
+# A slow controller does the same for less.
+pytestmark = [pytest.mark.slow, pytest.mark.acceptance, pytest.mark.ur_sim(frequency=125.0)]
 
 READY = 10.0
 NOZZLE = Pose((0.01, -0.02, 0.15), (0.0, 0.6, 0.0, 0.8))
-QUICK = pytest.mark.ur_sim(unlock_delay=0.3, power_on_time=0.05, brake_release_time=0.05)
+QUICK = pytest.mark.ur_sim(frequency=125.0, unlock_delay=0.3, power_on_time=0.05,
+                           brake_release_time=0.05)
 ACTIONS = ('power on', 'power off', 'brake release', 'stop', 'pause', 'unlock protective stop',
            'restart safety', 'close popup')
 
@@ -39,16 +41,16 @@ def test_settings_are_done_when_the_robot_reports_them(driver, ur_sim):
     assert driver.zero_ftsensor().ok
 
 
-@pytest.mark.parametrize(('kind', 'pin', 'bit'), [
-    (OutputKind.STANDARD_DIGITAL, 2, 2), (OutputKind.CONFIGURABLE_DIGITAL, 7, 15),
-    (OutputKind.TOOL_DIGITAL, 1, 17)], ids=lambda value: getattr(value, 'name', str(value)))
-def test_a_digital_output_is_set_and_no_other(driver, ur_sim, kind, pin, bit):
-    assert driver.set_digital_output(kind, pin, True).ok
-    assert ur_sim.state().digital_outputs == 1 << bit
-    wait_for(lambda: any((*driver.signals.outputs.standard, *driver.signals.outputs.configurable,
-                          *driver.signals.outputs.tool)))
-    assert driver.set_digital_output(kind, pin, False).ok
-    assert ur_sim.state().digital_outputs == 0
+def test_a_digital_output_is_set_and_no_other(driver, ur_sim):
+    for kind, pin, bit in ((OutputKind.STANDARD_DIGITAL, 2, 2),
+                           (OutputKind.CONFIGURABLE_DIGITAL, 7, 15),
+                           (OutputKind.TOOL_DIGITAL, 1, 17)):
+        assert driver.set_digital_output(kind, pin, True).ok
+        assert ur_sim.state().digital_outputs == 1 << bit
+        assert driver.set_digital_output(kind, pin, False).ok
+        assert ur_sim.state().digital_outputs == 0
+    driver.set_digital_output(OutputKind.TOOL_DIGITAL, 1, True)
+    wait_for(lambda: driver.signals.outputs.tool == (False, True))
 
 
 def test_an_analog_output_is_set_in_its_domain(driver, ur_sim):
@@ -221,7 +223,7 @@ def test_recover_leaves_another_program_alone(driver, ur_sim):
     assert ur_sim.state().program == 'foreign'
 
 
-@pytest.mark.ur_sim(polyscope='10.11.0', unlock_delay=0.0)
+@pytest.mark.ur_sim(frequency=125.0, polyscope='10.11.0', unlock_delay=0.0)
 def test_polyscope_x_has_no_dashboard_and_the_rest_works(make_driver, ur_sim):
     driver = make_driver()
     driver.wait_ready(READY)
@@ -272,7 +274,7 @@ def test_a_wrong_robot_is_not_touched(make_driver, ur_sim):
     assert ur_sim.state().speed_slider == 1.0
 
 
-@pytest.mark.ur_sim(power='off', power_on_time=100.0)
+@pytest.mark.ur_sim(frequency=125.0, power='off', power_on_time=100.0)
 def test_calls_are_answered_when_the_robot_loop_dies_or_the_driver_closes(make_driver):
     driver = make_driver(robot_loop='process')
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
@@ -287,7 +289,7 @@ def test_calls_are_answered_when_the_robot_loop_dies_or_the_driver_closes(make_d
         'The driver is closed; open it.')
 
 
-@pytest.mark.ur_sim(power='off', power_on_time=0.05, brake_release_time=0.05)
+@pytest.mark.ur_sim(frequency=125.0, power='off', power_on_time=0.05, brake_release_time=0.05)
 def test_auto_power_is_for_the_first_connection_only(make_driver, ur_sim):
     driver = make_driver(auto_power=True)
     driver.wait_ready(READY)
@@ -299,7 +301,7 @@ def test_auto_power_is_for_the_first_connection_only(make_driver, ur_sim):
     assert driver.dashboard('robotmode').text == 'POWER_OFF'
 
 
-@pytest.mark.ur_sim(power='off')
+@pytest.mark.ur_sim(frequency=125.0, power='off')
 def test_nothing_is_switched_on_unasked(make_driver):
     driver = make_driver()
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)

@@ -31,8 +31,8 @@ UNIT = Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
 
 @pytest.fixture
 def sim():
-    config = SimulatorConfig(rtde_port=0, primary_port=0, dashboard_port=0, unlock_delay=0.2,
-                             power_on_time=0.3, brake_release_time=0.1)
+    config = SimulatorConfig(rtde_port=0, primary_port=0, dashboard_port=0, frequency=125.0,
+                             unlock_delay=0.2, power_on_time=0.3, brake_release_time=0.1)
     with SimulatedRobot(config) as robot:
         yield robot
 

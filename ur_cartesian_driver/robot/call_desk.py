@@ -44,7 +44,7 @@ from ur_cartesian_driver.robot.dashboard_client import (
     why_not_available,
 )
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.recovery import next_step, Situation, Step, WORDS
+from ur_cartesian_driver.robot.recovery import Next, next_step, Situation, Step, WORDS
 from ur_cartesian_driver.robot.settings import LinkSettings
 from ur_cartesian_driver.robot.status import DriverStatus
 
@@ -59,6 +59,8 @@ SETTING_TIMEOUT = 1.0
 STEP_TIMEOUT = 35.0
 #: The same for a robot that is not connected, and never was meanwhile [s].
 LOST_TIMEOUT = 2.0
+#: How long the reports of a robot may contradict each other after a change [s].
+SETTLING = 0.3
 #: How often an effect is looked for, and an unlock that came too early repeated [s].
 LOOK, REPEAT = 0.02, 0.5
 #: How far a TCP may be from the one that was set [m], [rad]: it goes through 32-bit integers.
@@ -354,7 +356,7 @@ class CallDesk:
         loop = asyncio.get_running_loop()
         moved_on = loop.time()
         while True:
-            following = next_step(self._situation(remote))
+            following = await self._settled(remote)
             if following.step is Step.DONE:
                 return _yes(_report(done, following.text))
             if following.step is Step.PERSON:
@@ -373,6 +375,21 @@ class CallDesk:
                 return _no(_report(done, f'Could not {WORDS[following.step]}: {answer.text}'))
             done.append(WORDS[following.step])
             moved_on = loop.time()
+
+    async def _settled(self, remote: bool | None) -> Next:
+        """
+        Return the next step; one for a person only when it stays so.
+
+        Sockets and reports of the robot tell of a change one after the other, and a program that
+        has just been started has not called yet.
+        """
+        loop = asyncio.get_running_loop()
+        following = next_step(self._situation(remote))
+        end = loop.time() + SETTLING
+        while following.step is Step.PERSON and loop.time() < end:
+            await asyncio.sleep(LOOK)
+            following = next_step(self._situation(remote))
+        return following
 
     def _situation(self, remote: bool | None) -> Situation:
         robot = self._robot
