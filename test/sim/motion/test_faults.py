@@ -7,6 +7,10 @@ from math import pi
 import numpy as np
 import pytest
 
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.sim.motion import MotionGenerator
+
 HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 CYCLE = 0.002
 STILL = (0.0,) * 6
@@ -69,6 +73,25 @@ def test_exact_wrist_singularity_is_a_fault(recorder, shifted):
     if r.generator.fault is None:
         assert r.generator.T_base_tcp.angle_to(
             r.generator.arm.forward((*q[:4], -0.3, q[5]))) < 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('cycle', [0.002, 0.008, 0.02, 0.04])
+@pytest.mark.parametrize(('begin', 'end'), [
+    # A milliradian beside a straight wrist: the forearm swings round by half a turn.
+    ((-0.2779, 1.4236, 2.0608, -0.3522, 0.1176, -0.9574),
+     (-0.0597, 1.9699, 2.2753, -4.2343, 0.1006, 2.164)),
+    # 10 um beside the column over the base, where the two shoulders are 1 mm apart.
+    ((1.5708, -2.4704, 2.3683, -1.8101, -1.4204, 1.3913),
+     (3.1366, -2.4763, 2.3303, -1.586, -1.9074, 2.9037)),
+])
+def test_a_line_beside_a_singularity_ends_the_same_whatever_the_cycle(cycle, begin, end):
+    generator = MotionGenerator(Arm(robot_model('ur20')), cycle, begin)
+    move = generator.movel(generator.arm.forward(end), a=1.0, v=1.0)
+    while not move.returned and generator.fault is None:
+        generator.step(1.0)
+    assert generator.fault is None
+    assert generator.q == pytest.approx(end, abs=1e-3)
 
 
 @pytest.mark.parametrize('call', [

@@ -16,7 +16,7 @@ none the arm creeps up to the place and stops there with a fault.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf
+from math import ceil, inf, log, log2
 from typing import TypeAlias
 
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -61,12 +61,19 @@ STEADY_AFTER = 0.5
 # Cycles are shortened this often before a place counts as out of reach.
 _ATTEMPTS = 12
 _WITHIN = 1.0 + 1e-6
+# Beside a singularity half a step hardly turns the joints less than the whole one, so that it is
+# shortened by a power, at most this one, of what it is too long, and at most so many times that.
+_HIGHEST_POWER, _DEEPEST = 4.0, 2.0
 # The rest of a leg is walked in so many steps, none of which turns a joint by more [rad].
 _WALK = 8
 _JUMP = 0.7
-# A tool motion at less than this part of its speed for so long [s] has met a wall.
+# A tool motion at less than this part of its speed for so long [s] has met a wall, unless a joint
+# turns at more than this part of what it can: then it passes a singularity.
 _STALLED = 0.01
 _STALLED_AFTER = 1.0
+_TURNING = 0.2
+# Steps in which the arm changes sides are cut to this length [m, rad].
+_FINE = 5e-5
 # A joint line does not begin where the tool's path before it ends if it is so much too fast.
 _JUMP_RATIO = 50.0
 # Blends that touch do not overlap [m].
@@ -263,10 +270,10 @@ class MotionGenerator:
     def _attempt(self, motion: _Motion, h: float) -> tuple[Vector6, Pose] | None:
         """Advance by ``h`` seconds or as far as the arm can follow; None: not at all."""
         place: Place = self.q
-        requested = h
+        requested, before = h, (h, 0.0)
         for _ in range(_ATTEMPTS):
             place, state = motion.preview(h)
-            q = self._joints(place)
+            q = self._solved(motion, place, h)
             if q is None:
                 h *= 0.5
                 continue
@@ -274,7 +281,7 @@ class MotionGenerator:
             joints = self._reach.overspeed(q, self.q)
             ratio = max(joints, self._tool_overspeed(pose))
             if ratio <= _WITHIN or (ratio < inf and isinstance(motion, JointStop)):
-                if self._stalls(place, h, requested):
+                if joints < _TURNING and self._stalls(place, h, requested):
                     break
                 motion.accept(state)
                 self._rate = h / self.cycle
@@ -285,7 +292,7 @@ class MotionGenerator:
             # A jump to another branch does not shrink with the step: creep up to its place.
             jump = is_singular(self.q, q, self.T_base_tcp, place) if isinstance(
                 place, Pose) else self._on_tool_path and joints > _JUMP_RATIO
-            h /= 2.0 if jump else ratio
+            before, h = (h, ratio), h / (2.0 if jump else _cut((h, ratio), before))
         if isinstance(motion, ToolStop):
             # No straight line left: brake in joint space.
             stop = self._motion = JointStop(self.q, self._real_joint_speed(), motion.acceleration)
@@ -306,6 +313,36 @@ class MotionGenerator:
         if not isinstance(place, Pose):
             return place
         return self._reach.joints(place @ self._T_tcp_flange, self.q)
+
+    def _solved(self, motion: _Motion, place: Place, h: float) -> Vector6 | None:
+        """Return the joints at the end of a step of ``h`` seconds."""
+        q = self._joints(place)
+        if q is None or not isinstance(place, Pose) or not self._reach.changes_sides(self.q, q):
+            return q
+        way = self.T_base_tcp.distance_to(place) + self.T_base_tcp.angle_to(place)
+        return self._continued(motion, self.q, 0.0, h, ceil(log2(max(way / _FINE, 1.0))))
+
+    def _continued(self, motion: _Motion, q: Vector6, begin: float, end: float, halvings: int
+                   ) -> Vector6 | None:
+        """
+        Return the joints at the end of a step, come to in small steps where the arm changes sides.
+
+        Beside a singularity the solution on the other side is the nearer one after a long step,
+        while an arm that passes there swings round and stays on its side.
+
+        :param q: the joints at ``begin``, which like ``end`` counts from the last target [s].
+        """
+        place, _ = motion.preview(end)
+        if not isinstance(place, Pose):
+            return place
+        after = self._reach.joints(place @ self._T_tcp_flange, q)
+        if halvings <= 0 or after is None or not self._reach.changes_sides(q, after):
+            return after
+        middle = 0.5 * (begin + end)
+        half = self._continued(motion, q, begin, middle, halvings - 1)
+        if half is None:
+            return None
+        return self._continued(motion, half, middle, end, halvings - 1)
 
     def _tool_overspeed(self, pose: Pose) -> float:
         """Return by which factor the way to the pose is too long for one cycle."""
@@ -554,6 +591,19 @@ class MotionGenerator:
         if self._motion is None or self._scale <= 0.0:
             return _STILL
         return rate_of(speed, _STILL, 1.0 / self._scale)
+
+
+def _cut(step: tuple[float, float], before: tuple[float, float]) -> float:
+    """
+    Return by what to divide a step so that it is not too long: a secant in logarithms.
+
+    :param step: the step and by which factor it is too long; ``before``: the last one.
+    """
+    (h, ratio), (h_before, ratio_before) = step, before
+    if ratio_before <= ratio:
+        return ratio
+    power = log(h_before / h) / log(ratio_before / ratio)
+    return min(float(ratio ** min(max(power, 1.0), _HIGHEST_POWER)), _DEEPEST * ratio)
 
 
 def _length(start: Pose, leg: Leg) -> float:

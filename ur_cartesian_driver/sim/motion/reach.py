@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import cos, inf, sin, sqrt
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
@@ -51,12 +51,30 @@ class Reach:
         """Take the limits of the arm's model."""
         self._arm, self._cycle = arm, cycle
         self._speeds, self._limits = arm.model.max_joint_speed, arm.model.position_limits
+        nominal = arm.model.geometry
+        self._lengths = nominal.a[1], nominal.a[2], nominal.d[4]
 
     def joints(self, T_base_flange: Pose, q_near: Vector6) -> Vector6 | None:
         """Return the nearest solution within the limits."""
         if not max(map(abs, T_base_flange.position)) < _FAR:
             return None  # absurd speeds lead there; squares of such numbers overflow
         return nearest(self._arm, T_base_flange, q_near)
+
+    def changes_sides(self, q: Vector6, q_next: Vector6) -> bool:
+        """Return whether shoulder, elbow or wrist 2 go over to their other solution."""
+        return any(a * b < 0.0 for a, b in zip(self._sides(q), self._sides(q_next), strict=True))
+
+    def _sides(self, q: Vector6) -> tuple[float, float, float]:
+        """
+        Return three numbers whose signs are the branch.
+
+        How far the wrist centre is in front of the shoulder [m], of the nominal arm (near enough
+        for a sign); the sines of elbow and wrist 2.
+        """
+        upper_arm, forearm, wrist = self._lengths
+        angle = q[1] + q[2]
+        return (upper_arm * cos(q[1]) + forearm * cos(angle) + wrist * sin(angle + q[3]),
+                sin(q[2]), sin(q[4]))
 
     def overspeed(self, q: Vector6, q_before: Vector6) -> float:
         """
