@@ -16,6 +16,7 @@ import json
 from math import atan2, cos, pi, sin
 from pathlib import Path
 
+from forward_model import dh_forward, dh_matrix
 import numpy as np
 import pytest
 
@@ -49,24 +50,6 @@ def turn_about(axis, angle):
     x, y, z = axis
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.eye(3) + sin(angle) * K + (1 - cos(angle)) * K @ K
-
-
-def dh_matrix(theta, d, a, alpha):
-    """The textbook matrix of one link in the distal convention."""
-    ct, st, ca, sa = cos(theta), sin(theta), cos(alpha), sin(alpha)
-    return np.array([[ct, -st * ca, st * sa, a * ct],
-                     [st, ct * ca, -ct * sa, a * st],
-                     [0, sa, ca, d],
-                     [0, 0, 0, 1]])
-
-
-def dh_forward(geometry, q):
-    """The product of the link matrices."""
-    T = np.eye(4)
-    for i in range(6):
-        T = T @ dh_matrix(geometry.theta[i] + q[i], geometry.d[i], geometry.a[i],
-                          geometry.alpha[i])
-    return T
 
 
 def nominal_lines(geometry):
