@@ -41,6 +41,8 @@ from ur_cartesian_driver.robot.status import DriverStatus
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 CYCLE = 0.008
+#: How long the owner may be silent [s]; the real one is 5 s.
+NODE_TIMEOUT = 0.4
 OWNER_PORT = 1
 REVERSE, SENDER, TRAJECTORY, COMMANDS = 50001, 50002, 50003, 50004
 RTDE, PRIMARY, DASHBOARD = 30004, 30001, 29999
@@ -84,7 +86,7 @@ class Owner:
         while True:
             if not self.silent:
                 self.send(Heartbeat())
-            await asyncio.sleep(0.5)
+            await asyncio.sleep(NODE_TIMEOUT / 3.0)
 
     def send(self, request):
         self._writer.write(pack(request))
@@ -135,7 +137,8 @@ class RobotCell:
             frequency=1.0 / CYCLE, remote_control=self.headless, unlock_delay=0.05,
             power_on_time=0.05, brake_release_time=0.05, secondary_port=30002,
             realtime_port=30003, interpreter_port=30020))
-        self.config = DriverConfig(headless_mode=self.headless, **self._settings)
+        self.config = DriverConfig(
+            headless_mode=self.headless, node_timeout=NODE_TIMEOUT, **self._settings)
         await asyncio.start_server(self.owner.serve, HOST, OWNER_PORT)
         reader, self._pipe = await asyncio.open_connection(HOST, OWNER_PORT)
         descriptor = snapshot.create()
@@ -148,6 +151,8 @@ class RobotCell:
             await self.load_pendant_program()
             self.robot.play_program()
         await self.until(self.is_ready, 3.0)
+        await self.until(self.control_messages)
+        await self.sleep(2.0 * CYCLE)  # the program has read it, and waits for the next in time
 
     async def start_robot(self, config):
         """Start the controller, or another one in the place of one that has crashed."""
@@ -158,6 +163,7 @@ class RobotCell:
 
     async def crash_robot(self):
         """Let the controller die with all its sockets; the arm stands where it is then."""
+        self.robot.controller.power_off()  # brakes hold what no controller moves
         self.robot_task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await self.robot_task
@@ -202,7 +208,7 @@ class RobotCell:
         """Tell whether no joint moves."""
         return max(map(abs, self.robot.controller.qd)) < 1e-6
 
-    async def until(self, condition, bound=2.0):
+    async def until(self, condition, bound=2.0, purpose=''):
         """
         Wait for a condition, which is looked at twice in each cycle; return the time it took [s].
 
@@ -211,17 +217,21 @@ class RobotCell:
         begin = self.loop.time()
         while not condition():
             assert self.loop.time() - begin < bound, (
-                f'waited {bound} s in vain; {self.status}; {self.owner.log}; '
+                f'{purpose}: waited {bound} s in vain; {self.status}; {self.owner.log}; '
                 f'{list(self.robot.controller.announcements.log)}')
             await asyncio.sleep(0.5 * CYCLE)
         return self.loop.time() - begin
 
-    def control_messages(self):
-        """Return what the driver has said on the reverse socket since it was connected."""
+    def control_messages(self, first=0):
+        """Return what the driver has said on the reverse socket, beginning with a message."""
         (end,) = self.loop.open_ends(REVERSE)
         data = end.received
         return [ReverseMessage.decode(bytes(data[i:i + MESSAGE_SIZE]))
-                for i in range(0, len(data), MESSAGE_SIZE)]
+                for i in range(first * MESSAGE_SIZE, len(data), MESSAGE_SIZE)]
+
+    async def sleep(self, seconds):
+        """Let time pass [s]."""
+        await asyncio.sleep(seconds)
 
     # ---- what people and other clients do -----------------------------------------------------
 

@@ -362,8 +362,9 @@ class RobotLink:
         self._tell_signals(signals)
 
     def _look_for_ghost(self, robot: RobotState) -> None:
-        """Hang up on a program that has ended without a word, as behind a cable that was cut."""
-        if not (self._program.connected and has_ended(robot)):
+        """Hang up on a program that has ended without a word."""
+        self._program.ended = has_ended(robot)
+        if not (self._program.connected and self._program.ended):
             self._ghost_since = inf
         else:
             self._ghost_since = min(self._ghost_since, robot.timestamp)

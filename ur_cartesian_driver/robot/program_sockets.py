@@ -57,6 +57,9 @@ class ProgramSockets:
         #: The program is paused and reads nothing: it is not sent more than it can read at once,
         #: because a START must not stand behind the keepalives of an hour.
         self.deaf = False
+        #: The robot reports that no program runs: who holds the sockets has gone without a word,
+        #: as behind a cable that was cut, and whoever calls may have them.
+        self.ended = False
         self.connected = False
         #: The longest pause between two keepalives since somebody reset it [s].
         self.longest_gap = 0.0
@@ -74,7 +77,7 @@ class ProgramSockets:
     def _program_port(self, name: str, on_data: Callable[[bytes], None]) -> Listener:
         return Listener(name, on_open=self._on_open, on_data=on_data,
                         on_closed=partial(self._on_closed, name),
-                        on_refused=self._listener.warning, is_taken=lambda: self.connected)
+                        on_refused=self._listener.warning, is_taken=lambda: self.connected and not self.ended)
 
     @property
     def ports(self) -> Mapping[str, int]:
@@ -155,6 +158,9 @@ class ProgramSockets:
     # ---- what comes in ------------------------------------------------------------------------
 
     def _on_open(self, connection: Connection) -> None:
+        if self.connected:
+            self.connected = False
+            self._listener.lost('another robot program calls')
         called = [port.connection for port in self._program_ports].index(connection)
         for port in self._program_ports[called + 1:]:
             port.hang_up()  # a stranger, or a program that died while it connected

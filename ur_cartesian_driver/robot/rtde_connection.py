@@ -20,7 +20,7 @@ from ur_cartesian_driver.protocol.rtde import (
 from ur_cartesian_driver.robot.transport import Connection, dial
 
 #: How long the robot may take to agree on what it streams [s].
-ANSWER_TIMEOUT = 5.0
+ANSWER_TIMEOUT = 2.0
 #: A robot that streams nothing for that long is lost [s].
 SILENCE = 1.0
 

@@ -18,6 +18,7 @@ run, and a refused program leaves the running one alone.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
+from functools import lru_cache
 import logging
 from typing import Any, Protocol
 
@@ -27,6 +28,9 @@ from ur_cartesian_driver.sim.builtins import timeless
 from ur_cartesian_driver.urscript import CompileError, Machine, parse, Program, RuntimeException
 
 _log = logging.getLogger(__name__)
+
+#: Clients send the same program again and again; its tree is immutable.
+_parsed = lru_cache(maxsize=8)(parse)
 
 #: What happens to the arm and to the modes around a program.
 RUNNING = frozenset({RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.PAUSED,
@@ -102,7 +106,7 @@ class Programs:
         :param line_offset: lines that were put before the text that was sent.
         """
         try:
-            program = parse(text)
+            program = _parsed(text)
             secondary = program.kind == 'sec'
             machine = Machine(program,
                               self._secondary_builtins if secondary else self._builtins)
@@ -127,7 +131,7 @@ class Programs:
         if self.running:
             return 'a program is running'
         try:
-            self._loaded = parse(text)
+            self._loaded = _parsed(text)
             Machine(self._loaded, self._builtins)
         except CompileError as error:
             return str(error)

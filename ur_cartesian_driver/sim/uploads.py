@@ -13,6 +13,7 @@ Everything else is one line each: a command, or a statement.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from ur_cartesian_driver.urscript.errors import CompileError
 from ur_cartesian_driver.urscript.scanner import Kind, scan
@@ -83,6 +84,7 @@ class Uploads:
         return ProgramText(text)
 
 
+@lru_cache(maxsize=1024)  # clients send the same program again and again
 def _balance(line: str) -> int:
     """Return how many more blocks a line opens than it closes."""
     try:

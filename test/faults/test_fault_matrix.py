@@ -1,0 +1,35 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Every fault in every phase of a goal: the matrix of doc/faults.md, in virtual time."""
+
+from fault_cell import scenario
+from fault_table import HEADLESS, LOCAL, PHASES
+import pytest
+from robot_cell import run_cell
+
+from ur_cartesian_driver.sim import faults
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.mark.parametrize(
+    ('row', 'headless'),
+    [pytest.param(row, True, id=row.fault) for row in HEADLESS]
+    + [pytest.param(row, False, id=f'in local control: {row.fault}') for row in LOCAL])
+def test_a_goal_ends_as_the_table_says_and_the_next_one_works(row, headless):
+    async def all_phases(cell):
+        for phase in PHASES:
+            await scenario(cell, row.at(phase), phase)
+
+    run_cell(all_phases, headless=headless)
+
+
+def test_every_fault_that_can_be_injected_is_in_the_table():
+    causes = ' '.join(cause for row in HEADLESS for cause in row.cause)
+    words = set(causes.split())
+    assert {action.value for action in faults.Action} <= words
+    assert {'slider', 'foreign_motion', 'drop', 'half_open', 'silence', 'delay', 'throttle',
+            'garbage', *faults.SHAPES} <= words
+    for interface in ('rtde', 'primary', 'sockets'):
+        for kind in ('drop', 'half_open', 'silence', 'delay', 'throttle', 'garbage'):
+            assert f'{kind} {interface}' in causes

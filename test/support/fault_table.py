@@ -1,0 +1,220 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What becomes of a goal when something goes wrong: the table of the fault matrix.
+
+One row for each fault. The tests run each row in each phase of a goal, and ``doc/faults.md`` is
+made from it by ``scripts/make_faults.py``. Times are [s].
+"""
+
+from dataclasses import dataclass, field, replace
+
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+
+E, S = ErrorCode, ConnectionState
+
+#: When in the life of a goal the fault happens, and what that means.
+PHASES = {
+    'idle': 'no goal runs; one is sent when the fault is 0.1 s old',
+    'planning': 'the goal is planned already; it is sent to the robot one cycle after the fault',
+    'arming': 'START is on the wire, the robot program has not begun the first point',
+    'first point': 'on the way to the first of three points',
+    'mid-segment': 'on the straight part of the second segment',
+    'in a blend': 'in the corner at the first point',
+    'last point': 'on the second half of the way to the last point',
+    'settling': 'the robot program has reported the end, the arm is not yet inside the tolerance',
+    'cancelling': 'CANCEL is on the wire, the arm still moves',
+}
+BEFORE = ('idle', 'planning')
+MOVING = ('arming', 'first point', 'mid-segment', 'in a blend', 'last point')
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One fault and what is expected of robot and driver."""
+
+    #: What happens, for people.
+    fault: str
+    #: The same for the test: texts of the simulator's faults, or names of faults of its own.
+    cause: tuple[str, ...]
+    #: How the goal ends.
+    code: ErrorCode
+    #: From the fault, or from sending the goal if that is later, to the result.
+    bound: float = 0.3
+    #: From the fault until the arm stands.
+    rest: float = 0.5
+    #: The goal goes on when the steps are done.
+    waits: bool = False
+    #: Where the connection is when the goal has ended, before anybody does anything.
+    then: ConnectionState = S.READY
+    #: What somebody has to do until the next goal can run.
+    steps: tuple[str, ...] = ()
+    #: From there until the driver is ready.
+    back: float = 1.5
+    #: Joint travel from the stand after the fault to the end of the steps [rad].
+    travel: float = 0.0
+    #: What is different in some phases: name -> value.
+    differs: dict[str, dict[str, object]] = field(default_factory=dict)
+
+    def at(self, phase: str) -> 'Row':
+        """Return what is expected in a phase."""
+        return replace(self, differs={}, **self.differs.get(phase, {}))
+
+
+def _in(phases: tuple[str, ...], **changes: object) -> dict[str, dict[str, object]]:
+    return dict.fromkeys(phases, changes)
+
+
+#: The robot is known not to take a goal.
+REFUSED = _in(BEFORE, code=E.ROBOT_NOT_READY)
+CANCELLED = _in(('cancelling',), code=E.CANCELLED)
+#: Time for a goal and its end, where the fault does not disturb it.
+UNDISTURBED = {'bound': 1.2, 'rest': 1.2}
+POWER_UP = ('power on', 'release the brakes')
+
+#: A goal that is sent to a robot whose program is only paused is refused, and play is enough.
+_PAUSED = {phase: {'code': E.ROBOT_NOT_READY, 'steps': ('unlock', 'play')} for phase in BEFORE}
+
+
+def _safety(fault: str, cause: str, code: ErrorCode, *steps: str, play: bool = True) -> Row:
+    """Return the row of a stop by the safety system; ``play``: the program is only paused."""
+    before = {'code': E.ROBOT_NOT_READY} | ({'steps': (*steps, 'play')} if play else {})
+    return Row(fault=fault, cause=(cause,), code=code, then=S.STOPPED,
+               steps=(*steps, 'play', 'resend'), differs=_in(BEFORE, **before))
+
+
+def _harmless(fault: str, *cause: str, steps: tuple[str, ...] = ()) -> Row:
+    return Row(fault=fault, cause=cause, code=E.SUCCESSFUL, **UNDISTURBED, steps=steps,
+               differs=CANCELLED)
+
+
+def _hangs_up(fault: str, cause: str) -> Row:
+    return Row(fault=fault, cause=(cause,), code=E.PROGRAM_STOPPED, then=S.CONNECTED,
+               steps=('resend',), differs=REFUSED)
+
+
+#: The stopped program never runs again by itself, whoever unlocks or plays.
+HEADLESS = (
+    _safety('protective stop', 'protective_stop', E.PROTECTIVE_STOP, 'unlock'),
+    _safety('safeguard stop', 'safeguard_stop', E.PROTECTIVE_STOP, 'reset the safeguard'),
+    _safety('emergency stop', 'emergency_stop', E.EMERGENCY_STOP, 'release the button',
+            *POWER_UP),
+    _safety('violation of a safety limit', 'violation', E.PROTECTIVE_STOP, 'restart safety',
+            *POWER_UP, play=False),
+    _safety('fault of the safety system', 'fault', E.PROTECTIVE_STOP, 'restart safety',
+            *POWER_UP, play=False),
+    Row(fault='somebody stops the program', cause=('stop',), code=E.PROGRAM_STOPPED,
+        then=S.CONNECTED, steps=('play', 'resend'), differs=REFUSED),
+    Row(fault='somebody switches the arm off', cause=('power_off',), code=E.PROGRAM_STOPPED,
+        then=S.CONNECTED, steps=(*POWER_UP, 'play', 'resend'), differs=REFUSED),
+    Row(fault="another client's program replaces ours", cause=('foreign_motion z 0.02',),
+        code=E.PROGRAM_STOPPED, then=S.CONNECTED, rest=2.0, steps=('resend',), differs=REFUSED),
+    Row(fault='somebody pauses the program', cause=('pause',), code=E.SUCCESSFUL, waits=True,
+        steps=('play',), differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False,
+                                     then=S.CONNECTED) | {
+            'cancelling': {'code': E.CANCELLED, 'waits': False, 'bound': 3.3,
+                           'then': S.CONNECTED, 'steps': ('play', 'resend')}}),
+    Row(fault='the speed slider is moved to 0', cause=('slider 0',), code=E.SUCCESSFUL,
+        waits=True, steps=('move the slider up',),
+        differs={'cancelling': {'code': E.CANCELLED, 'waits': False}}),
+    _harmless('somebody plays or unlocks what is not stopped', 'play', 'unlock',
+              'reset_safeguard', 'release_emergency_stop'),
+    Row(fault='the controller crashes', cause=('crash',), code=E.CONNECTION_LOST,
+        then=S.DISCONNECTED, steps=('start the controller', *POWER_UP, 'resend'),
+        differs=REFUSED),
+    Row(fault='the network cable is cut', cause=('freeze all',), code=E.CONNECTION_LOST,
+        bound=1.3, rest=0.7, then=S.CONNECTED, steps=('resend',)),
+    Row(fault='RTDE is cut', cause=('drop rtde',), code=E.CONNECTION_LOST, differs=REFUSED),
+    Row(fault='RTDE is half-open', cause=('half_open rtde',), code=E.CONNECTION_LOST, bound=1.3,
+        rest=1.7),
+    Row(fault='RTDE is silent for 1.5 s', cause=('silence rtde for 1.5 s',),
+        code=E.CONNECTION_LOST, bound=1.3, rest=1.7, then=S.DISCONNECTED, back=4.0),
+    _harmless('RTDE is 0.1 s late', 'delay rtde 0.1 s', steps=('wait until it is over',)),
+    _harmless('RTDE carries less than it should', 'throttle rtde 60000',
+              steps=('wait until it is over',)),
+    Row(fault='RTDE carries next to nothing', cause=('throttle rtde 300',),
+        code=E.CONNECTION_LOST, bound=2.3, rest=2.7, then=S.DISCONNECTED,
+        steps=('wait until it is over',), back=4.0),
+    Row(fault='garbage on RTDE', cause=('garbage rtde 64',), code=E.CONNECTION_LOST, bound=2.0,
+        rest=2.0),
+    _harmless('the primary interface is cut', 'drop primary'),
+    _harmless('the primary interface is half-open', 'half_open primary'),
+    _harmless('the primary interface is silent', 'silence primary',
+              steps=('wait until it is over',)),
+    _harmless('the primary interface is late and slow', 'delay primary 0.1 s',
+              'throttle primary 1000', steps=('wait until it is over',)),
+    _harmless('garbage on the primary interface', 'garbage primary 64'),
+    _harmless('all other interfaces are cut', 'drop secondary', 'drop realtime',
+              'drop dashboard', 'drop interpreter'),
+    _hangs_up("the program's sockets are cut", 'drop sockets'),
+    Row(fault="the program's sockets are half-open", cause=('half_open sockets',),
+        code=E.PROGRAM_STOPPED, bound=0.7, rest=0.7, then=S.CONNECTED, steps=('resend',)),
+    Row(fault="the program's answers are lost", cause=('silence sockets',),
+        code=E.EXECUTION_FAILED, bound=3.5, rest=1.2, then=S.CONNECTED,
+        steps=('wait until it is over', 'resend'), differs={
+            'settling': {'code': E.SUCCESSFUL, 'then': S.READY,
+                         'steps': ('wait until it is over',)},
+            'cancelling': {'code': E.CANCELLED}}),
+    _harmless("the program's sockets are 0.05 s late", 'delay sockets 0.05 s',
+              steps=('wait until it is over',)),
+    _harmless("the program's sockets carry 2500 bytes/s", 'throttle sockets 2500',
+              steps=('wait until it is over',)),
+    _hangs_up("garbage on the program's sockets", 'garbage sockets 64'),
+    *(_hangs_up(f'the {name} socket is cut', f'cut {name}')
+      for name in ('reverse', 'trajectory', 'script command')),
+    Row(fault='the reverse socket is half-open', cause=('freeze reverse',),
+        code=E.PROGRAM_STOPPED, bound=0.7, rest=0.7, then=S.CONNECTED, steps=('resend',),
+        differs=CANCELLED | {'last point': {'code': E.SUCCESSFUL}}),
+    Row(fault='the trajectory socket is half-open', cause=('freeze trajectory',),
+        code=E.EXECUTION_FAILED, bound=3.5, rest=1.2, then=S.CONNECTED, steps=('resend',),
+        differs={'settling': {'code': E.SUCCESSFUL, 'then': S.READY},
+                 'cancelling': {'code': E.CANCELLED}}),
+    _harmless('the script command socket is half-open', 'freeze script command'),
+    Row(fault='the pose is measured 6 mm off', cause=('offset pose z 0.006',),
+        code=E.PATH_TOLERANCE_VIOLATED, bound=0.7, steps=('wait until it is over',),
+        differs=CANCELLED | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'bound': 1.7}}),
+    Row(fault='the measured pose drifts off', cause=('ramp pose z 0.1',),
+        code=E.PATH_TOLERANCE_VIOLATED, bound=0.7, rest=0.7, steps=('wait until it is over',),
+        differs=CANCELLED | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'bound': 1.7}}),
+    _harmless('the pose is measured with noise of 0.1 mm', 'noise pose z 0.0001',
+              steps=('wait until it is over',)),
+    Row(fault='the twist is measured 0.5 m/s off for 0.3 s',
+        cause=('offset twist z 0.5 for 0.3 s',), code=E.PATH_TOLERANCE_VIOLATED, bound=0.7,
+        differs=CANCELLED | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'bound': 1.7}}),
+    Row(fault='the node is silent', cause=('silent owner',), code=E.CANCELLED, bound=0.9,
+        rest=1.0, steps=('wait until it is over',),
+        differs={'last point': {'code': E.SUCCESSFUL}}),
+)
+
+
+def _paused_by(fault: str, cause: str, code: ErrorCode, *steps: str) -> Row:
+    """
+    Return the row of a stop that pauses a program on the pendant.
+
+    The interface takes no 'stop program', so the old motion goes on with the play until the
+    program reads the message that ends it; after that it has to be played again.
+    """
+    return Row(fault=fault, cause=(cause,), code=code, then=S.STOPPED, travel=0.01,
+               steps=(*steps, 'play', 'play'),
+               differs=_in(BEFORE, code=E.ROBOT_NOT_READY, steps=(*steps, 'play'), travel=0.0)
+               | {'settling': {'travel': 0.0}})
+
+
+LOCAL = (
+    _paused_by('protective stop', 'protective_stop', E.PROTECTIVE_STOP, 'unlock'),
+    _paused_by('safeguard stop', 'safeguard_stop', E.PROTECTIVE_STOP, 'reset the safeguard'),
+    _paused_by('emergency stop', 'emergency_stop', E.EMERGENCY_STOP, 'release the button',
+               *POWER_UP),
+    Row(fault='somebody stops the program', cause=('stop',), code=E.PROGRAM_STOPPED,
+        then=S.CONNECTED, steps=('play',), differs=REFUSED),
+    Row(fault='somebody pauses the program', cause=('pause',), code=E.SUCCESSFUL, waits=True,
+        steps=('play',), differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False,
+                                     then=S.CONNECTED) | {
+            'cancelling': {'code': E.CANCELLED, 'waits': False, 'bound': 3.3, 'travel': 0.01,
+                           'then': S.CONNECTED, 'steps': ('play', 'play')}}),
+    Row(fault='the network cable is cut', cause=('freeze all',), code=E.CONNECTION_LOST,
+        bound=1.3, rest=0.7, then=S.CONNECTED, steps=('play',)),
+    Row(fault="the program's sockets are cut", cause=('drop sockets',), code=E.PROGRAM_STOPPED,
+        then=S.CONNECTED, steps=('play',), differs=REFUSED),
+)
