@@ -77,7 +77,8 @@ class ProgramSockets:
     def _program_port(self, name: str, on_data: Callable[[bytes], None]) -> Listener:
         return Listener(name, on_open=self._on_open, on_data=on_data,
                         on_closed=partial(self._on_closed, name),
-                        on_refused=self._listener.warning, is_taken=lambda: self.connected and not self.ended)
+                        on_refused=self._listener.warning,
+                        is_taken=lambda: self.connected and not self.ended)
 
     @property
     def ports(self) -> Mapping[str, int]:
