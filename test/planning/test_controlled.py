@@ -8,7 +8,7 @@ from math import radians
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.errors import CollisionPredicted, InvalidGoal
 from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import (
     IDENTITY,
@@ -158,3 +158,21 @@ def test_a_first_point_at_time_zero_is_where_the_controlled_frame_stands(cell, o
     goal = replace(goal, waypoints=tuple(
         replace(point, time=time) for point, time in zip(goal.waypoints, times, strict=True)))
     assert len(plan(goal, cell.state, cell.arm, options).segments) == 1
+
+
+@pytest.mark.parametrize('options', [CHANGE, KEEP])
+@pytest.mark.parametrize(('beyond', 'refused'), [(0.01, None), (-0.01, CollisionPredicted)])
+def test_the_tool_that_is_mounted_keeps_clear_also_when_the_flange_is_moved(
+        cell, options, beyond, refused):
+    """The TCP points down and goes down by 5 cm, to a table a little below or above."""
+    tcp = cell.state.actual_tcp_pose.position[2]
+    flange = cell.arm.forward(cell.state.actual_q)
+    assert flange.position[2] > tcp + 0.09
+    options = replace(options, self_collision='off', workspace_planes=(
+        f'table 0 0 {tcp - 0.05 - beyond} 0 0 1 0',))
+    goal = replace(goal_of(moved(flange, y=0.02, z=-0.05)), T_flange_controlled=IDENTITY)
+    if refused is None:
+        assert plan(goal, cell.state, cell.arm, options).segments
+    else:
+        with pytest.raises(refused, match='table'):
+            plan(goal, cell.state, cell.arm, options)

@@ -69,6 +69,18 @@ def carried(goal: Goal, state: RobotState, options: PlanningOptions) -> Carried:
                  'must not change (allow_tcp_change is false)',))
 
 
+def tools(goal: Goal, T_flange_active: Pose) -> tuple[Pose, ...]:
+    """
+    Return to where tools reach behind the flange: the active TCP, and the controlled frame.
+
+    What is mounted there stays mounted when a goal is about the bare flange.
+    """
+    T_flange_controlled = goal.T_flange_controlled
+    if T_flange_controlled is None or _same(T_flange_controlled, T_flange_active):
+        return (T_flange_active,)
+    return T_flange_active, T_flange_controlled
+
+
 def _same(a: Pose, b: Pose) -> bool:
     return a.distance_to(b) <= SAME_TCP and a.angle_to(b) <= SAME_TCP
 

@@ -35,7 +35,7 @@ from ur_cartesian_driver.motion.primitive import (
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.clearance import Clearance
 from ur_cartesian_driver.planning.clearance import remarks as clearance_remarks
-from ur_cartesian_driver.planning.controlled import carried
+from ur_cartesian_driver.planning.controlled import carried, tools
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.path import Arc
 from ur_cartesian_driver.planning.postures import (
@@ -79,8 +79,11 @@ def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> P
     planner = _Planner(goal, state, arm, options)
     legs = planner.legs()
     samples = planner.route.survey.samples()
-    clear = Clearance(arm, state.T_flange_tcp, options).check(samples.q, state.actual_q)
-    said = clearance_remarks(clear, samples.segment, samples.fraction)
+    said = list(dict.fromkeys(
+        line for T_flange_tcp in tools(goal, T_flange_active)
+        for line in clearance_remarks(
+            Clearance(arm, T_flange_tcp, options).check(samples.q, state.actual_q),
+            samples.segment, samples.fraction)))
     timings = schedule(legs, options, arm.model)
     segments = tuple(planner.segment(leg, timing)
                      for leg, timing in zip(legs, timings, strict=True))
