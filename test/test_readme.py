@@ -106,7 +106,7 @@ def test_send_goal_is_the_goal_of_the_square_example(send_goal):
 
 
 def test_send_goal_passes_planning_from_home_and_takes_ten_seconds(send_goal):
-    from ur_cartesian_driver.cli.commands import standing_at
+    from ur_cartesian_driver.cli.plans import standing_at
     from ur_cartesian_driver.kinematics.chain import Arm
     from ur_cartesian_driver.kinematics.robots import robot_model
     from ur_cartesian_driver.planning import plan, PlanningOptions
@@ -123,7 +123,8 @@ def test_send_goal_passes_planning_from_home_and_takes_ten_seconds(send_goal):
 
 
 def test_what_where_prints_is_a_point_of_a_goal():
-    from ur_cartesian_driver.cli.commands import point_as_yaml, standing_at
+    from ur_cartesian_driver.cli.commands import point_as_yaml
+    from ur_cartesian_driver.cli.plans import standing_at
     from ur_cartesian_driver.kinematics.chain import Arm
     from ur_cartesian_driver.kinematics.robots import robot_model
     from ur_cartesian_driver.ros.client import load_goal

@@ -60,12 +60,11 @@ def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
 
 
 def table(plan: Plan) -> str:
-    """Return the plan as lines of text: one for each segment, the remarks, the sum."""
+    """Return the plan as lines of text: one for each segment, and the sum."""
     length = sum(segment.length for segment in plan.segments)
     lines = [f'{"point":>5}  {"command":<10} {"length":>9} {"turn":>8} {"time":>9} {"blend":>7}']
     lines += [_line(segment) for segment in plan.segments]
     lines.append(f'{"sum":>5}  {"":<10} {length:7.3f} m {"":>8} {plan.duration:7.3f} s')
-    lines += [f'  {remark}' for remark in plan.remarks]
     return '\n'.join(lines)
 
 
@@ -73,7 +72,7 @@ def _line(segment: PlannedSegment) -> str:
     primitive = segment.primitive
     blend = 1e3 * getattr(primitive, 'blend_radius', 0.0)
     return (f'{segment.waypoint:>5}  {type(primitive).__name__:<10} {segment.length:7.3f} m '
-            f'{degrees(segment.angle):6.1f}\N{DEGREE SIGN} {segment.duration:8.3f} s '
+            f'{degrees(segment.angle):6.1f}\N{DEGREE SIGN} {segment.duration:7.3f} s '
             f'{blend:4.0f} mm')
 
 

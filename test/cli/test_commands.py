@@ -12,7 +12,8 @@ import pytest
 import yaml
 
 from ur_cartesian_driver.cli import main, picture
-from ur_cartesian_driver.cli.commands import goal_file, standing_at
+from ur_cartesian_driver.cli.commands import goal_file
+from ur_cartesian_driver.cli.plans import standing_at
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, robot_model
 from ur_cartesian_driver.ros.client import load_goal
@@ -39,6 +40,48 @@ def test_validate_refuses_with_a_sentence_and_a_status(tmp_path, capsys):
     file.write_text(yaml.safe_dump(goal))
     assert main(['validate', str(file)]) == 1
     assert 'trajectory.points[2]' in capsys.readouterr().err
+
+
+def test_validate_names_the_code_of_a_refusal(capsys):
+    assert main(['validate', 'square', '-p', 'max_tool_speed:=0.05']) == 1
+    error = capsys.readouterr().err
+    assert error.startswith('refused, INVALID_GOAL (-1): trajectory.points[0].time_from_start')
+    assert 'max_tool_speed = 0.05 m/s' in error
+
+
+def test_validate_takes_the_parameters_of_a_file_and_single_ones_before_those(tmp_path, capsys):
+    file = tmp_path / 'cell.yaml'
+    file.write_text('/**/ur_cartesian_driver:\n  ros__parameters:\n    ur_type: ur10e\n'
+                    '    max_approach_distance: 0.1\n    on_too_fast: slow\n')
+    options = ['validate', 'square', '--params-file', str(file)]
+    assert main(options) == 1
+    assert 'max_approach_distance = 0.1 m' in capsys.readouterr().err
+    assert main([*options, '-p', 'max_approach_distance:=0.0', '-p', 'max_tool_speed:=0.1']) == 0
+    plan = capsys.readouterr().out
+    assert plan.startswith('ur10e')
+    assert 'because of max_tool_speed = 0.1 m/s' in plan
+
+
+@pytest.mark.parametrize(('words', 'says'), [
+    (['-p', 'max_tool_sped:=1.0'], 'did you mean max_tool_speed?'),
+    (['-p', 'max_tool_speed'], 'NAME:=VALUE'),
+    (['-p', 'max_tool_speed:=1'], 'write 1.0'),
+    (['-p', 'static_frames:=[a b'], 'not YAML'),
+    (['--params-file', 'package.xml'], 'no parameters for a node'),
+])
+def test_validate_refuses_parameters_as_the_node_does(words, says, capsys, tmp_path):
+    if words[0] == '--params-file':
+        (tmp_path / words[1]).write_text('other:\n  ros__parameters: {}\n')
+        words = [words[0], str(tmp_path / words[1])]
+    assert main(['validate', 'square', *words]) == 1
+    assert says in capsys.readouterr().err
+
+
+def test_validate_takes_tcp_and_calibration(capsys):
+    assert main(['validate', 'square', '--tcp', '0,0,0.1,0,0,0', '--calibration-seed', '3']) == 0
+    first, *_ = capsys.readouterr().out.splitlines()
+    assert first == ('ur5e with its calibration, joints 0 -1.571 1.571 -1.571 -1.571 0 rad, '
+                     'TCP 0 0 0.1 0 0 0')
 
 
 def test_a_goal_that_is_nowhere_is_named_with_the_examples(capsys):

@@ -12,10 +12,11 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Sequence
 import logging
+from pathlib import Path
 import signal
 import sys
 
-from ur_cartesian_driver.cli import commands
+from ur_cartesian_driver.cli import commands, plans
 from ur_cartesian_driver.kinematics.robots import MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.sim.fault_text import parse_fault
@@ -72,6 +73,10 @@ def _add_demo(sub: Commands[argparse.ArgumentParser]) -> None:
                       help='a goal file, or the name of one of config/examples')
     demo.add_argument('--picture', default='demo.png',
                       help='where to draw planned and executed path')
+    demo.add_argument('--arms', type=int, choices=(1, 2), default=1,
+                      help='2 = another robot, driver and client beside them')
+    demo.add_argument('--second-goal', default='square', metavar='GOAL',
+                      help='what the second arm does')
     demo.add_argument('--model', default='ur5e', choices=sorted(MODELS), help='model of the robot')
 
 
@@ -89,12 +94,7 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
             help=f'0 = any free port; left out: {port} if the primary port is 30001, else any')
     sim.add_argument('--joints', type=_six_numbers, metavar='Q1,...,Q6',
                      help='joint positions at the start [rad]')
-    calibration = sim.add_mutually_exclusive_group()
-    calibration.add_argument(
-        '--calibration', metavar='FILE',
-        help='kinematics of this arm, in the YAML of ur_calibration of the UR ROS driver')
-    calibration.add_argument('--calibration-seed', type=int, metavar='N',
-                             help='a made-up calibration, for each number another')
+    _add_calibration(sim)
     sim.add_argument('--rate', type=float, default=1.0,
                      help='how fast time passes; 2 = twice as fast, 0 = as fast as it can')
     sim.add_argument(
@@ -106,26 +106,47 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
                      help='local control: no scripts over the network')
 
 
+def _add_calibration(command: argparse.ArgumentParser) -> None:
+    calibration = command.add_mutually_exclusive_group()
+    calibration.add_argument(
+        '--calibration', metavar='FILE',
+        help='kinematics of this arm, in the YAML of ur_calibration of the UR ROS driver')
+    calibration.add_argument('--calibration-seed', type=int, metavar='N',
+                             help='a made-up calibration, for each number another')
+
+
 def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
     send = _add(sub, 'send', commands.send, 'send a goal to a running driver and wait for its end')
     send.add_argument(
         'file', help='goal in the YAML of `ros2 action send_goal`; - = standard input')
     send.add_argument('--driver', default='ur_cartesian_driver',
                       help='name of the driver node, with its namespace if it has one')
+    send.add_argument('--tf-prefix', default='',
+                      help='put before the names of frames and joints in the file')
     send.add_argument('--wait', type=float, default=10.0, metavar='SECONDS',
                       help='how long the driver may need until it is ready; 0 = do not look')
     send.add_argument('--validate-only', action='store_true', help='plan, but do not move')
+    send.add_argument('--report', action='store_true',
+                      help='print what is done and why, as --validate-only does')
     send.add_argument('--record', metavar='FILE', help='write the feedback as JSON lines')
 
 
 def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
-    validate = _add(sub, 'validate', commands.validate,
+    validate = _add(sub, 'validate', plans.validate,
                     'check and plan a goal with neither motion nor robot, and print the plan')
     validate.add_argument('file', help='goal in the YAML of `ros2 action send_goal`')
-    validate.add_argument('--ur-type', default='ur5e', choices=sorted(MODELS), help='model')
+    validate.add_argument('--ur-type', choices=sorted(MODELS),
+                          help='model; left out: the parameter ur_type')
     validate.add_argument('--joints', type=_six_numbers, metavar='Q1,...,Q6',
                           help='where the arm stands [rad]; home when left out')
-    validate.add_argument('--max-tool-speed', type=float, default=0.25, help='[m/s]')
+    validate.add_argument('--tcp', type=_six_numbers, metavar='X,Y,Z,RX,RY,RZ',
+                          help='active TCP in the flange, as the pendant shows it [m, rad]; '
+                               'the flange when left out')
+    validate.add_argument('--params-file', type=Path, action='append', default=[],
+                          metavar='FILE', help='parameters of the driver, as driver.yaml')
+    validate.add_argument('-p', '--param', action='append', default=[], metavar='NAME:=VALUE',
+                          help='one parameter of the driver; may be given several times')
+    _add_calibration(validate)
 
 
 def _add_where(sub: Commands[argparse.ArgumentParser]) -> None:

@@ -13,9 +13,13 @@ import sys
 from time import monotonic
 from typing import Any
 
-from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import Geometry, JOINT_NAMES, robot_model
-from ur_cartesian_driver.motion.errors import GoalRefused
+from ur_cartesian_driver.kinematics.robots import (
+    Geometry,
+    JOINT_NAMES,
+    robot_model,
+    RobotModel,
+)
+from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.resources import share_path
@@ -25,10 +29,17 @@ from ur_cartesian_driver.sim.calibration import random_calibration, read_calibra
 
 
 def demo(arguments: argparse.Namespace) -> int:
-    """Run all the processes, one goal, and draw the picture."""
-    from ur_cartesian_driver.cli.demo import run
+    """Run all the processes, a goal for each arm, and draw the pictures."""
+    from ur_cartesian_driver.cli.demo import Arm, run
 
-    return run(goal_file(arguments.goal), arguments.model, Path(arguments.picture))
+    picture = Path(arguments.picture)
+    goal = goal_file(arguments.goal)
+    if arguments.arms == 1:
+        return run([Arm(goal=goal, model=arguments.model, drawing=picture)])
+    return run([
+        Arm(name=name, goal=its_goal, model=arguments.model,
+            drawing=picture.with_stem(f'{picture.stem}_{name}'))
+        for name, its_goal in (('left', goal), ('right', goal_file(arguments.second_goal)))])
 
 
 def sim(arguments: argparse.Namespace) -> int:
@@ -51,13 +62,12 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
         realtime_port=arguments.realtime_port, interpreter_port=arguments.interpreter_port,
         power='off' if arguments.power_off else 'running',
         remote_control=not arguments.local, rate=arguments.rate, faults=arguments.faults,
-        geometry=_calibration(arguments),
+        geometry=calibration(arguments, robot_model(arguments.model)),
         **({'q': arguments.joints} if arguments.joints else {}))
 
 
-def _calibration(arguments: argparse.Namespace) -> Geometry | None:
+def calibration(arguments: argparse.Namespace, model: RobotModel) -> Geometry | None:
     """Return the table of the arm that is asked for; None = that of the model."""
-    model = robot_model(arguments.model)
     if arguments.calibration is not None:
         return read_calibration(Path(arguments.calibration), model)
     if arguments.calibration_seed is not None:
@@ -92,8 +102,9 @@ def send(arguments: argparse.Namespace) -> int:
     """Send a goal, show its progress, and wait for its end."""
     from ur_cartesian_driver.ros import client
 
-    goal = client.load_goal(sys.stdin.read() if arguments.file == '-' else
-                            goal_file(arguments.file))
+    goal = client.with_prefix(client.load_goal(
+        sys.stdin.read() if arguments.file == '-' else goal_file(arguments.file)),
+        arguments.tf_prefix)
     goal.validate_only = goal.validate_only or arguments.validate_only
     with Recorder(arguments.record) as recorder, client.GoalClient(arguments.driver) as sender:
         if arguments.wait > 0.0:
@@ -101,10 +112,18 @@ def send(arguments: argparse.Namespace) -> int:
         code, result = sender.send(goal, recorder.take)
     status = client.STATUS_NAMES[code]
     clear_line()
-    if goal.validate_only:
+    if (goal.validate_only or arguments.report) and result.report:
         print(*result.report, sep='\n')
+    if result.error_code:
+        status += f', {code_text(result.error_code)}'
     print(f'{status}: {result.error_string}')
     return 0 if status == 'SUCCEEDED' else 1
+
+
+def code_text(number: int) -> str:
+    """Return an error code with its name and number, as doc/errors.md heads its sections."""
+    code = ErrorCode(number)
+    return f'{code.name} ({code.value})'
 
 
 def clear_line() -> None:
@@ -157,41 +176,11 @@ class Recorder:
             print(line, flush=True)
 
 
-def validate(arguments: argparse.Namespace) -> int:
-    """Plan a goal from where the arm is said to stand, and print the plan."""
-    from ur_cartesian_driver.planning import plan, PlanningOptions
-    from ur_cartesian_driver.preview import table
-    from ur_cartesian_driver.ros import client, convert, frames
-
-    arm = Arm(robot_model(arguments.ur_type))
-    state = standing_at(arm, arguments.joints or SimulatorConfig().q)
-    message = client.load_goal(goal_file(arguments.file))
-    try:
-        goal = convert.goal_from_message(
-            message, frames.Frames(), now=0, stand=frames.Stand.of(state))
-        found = plan(goal, state, arm, PlanningOptions(max_tool_speed=arguments.max_tool_speed))
-    except GoalRefused as refusal:
-        print(f'refused: {refusal}', file=sys.stderr)
-        return 1
-    print(table(found))
-    print(*found.report, sep='\n')
-    return 0
-
-
 def where(arguments: argparse.Namespace) -> int:
     """Print pose, joints and TCP of a robot."""
     state = asyncio.run(read_state(arguments.robot_ip, arguments.rtde_port))
     print(point_as_yaml(state))
     return 0
-
-
-def standing_at(arm: Arm, q: tuple[float, ...]) -> RobotState:
-    """Return the state of an arm that stands still, its TCP at the flange."""
-    pose = arm.forward(q)
-    a, b, c, d, e, f = q
-    joints = (a, b, c, d, e, f)
-    return RobotState(timestamp=0.0, actual_q=joints, target_q=joints, actual_tcp_pose=pose,
-                      target_tcp_pose=pose)
 
 
 def point_as_yaml(state: RobotState) -> str:

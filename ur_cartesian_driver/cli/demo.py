@@ -4,13 +4,15 @@
 The whole way in one command: simulated controller, driver node and client, a process each.
 
 Nothing here is special to the demo: the three processes are the commands that a user starts by
-hand, only their ports are free ones, so that the demo disturbs nothing that runs.
+hand, only their ports are free ones, so that the demo disturbs nothing that runs. Two arms are
+twice the same, each driver in a namespace and with a ``tf_prefix`` of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, ExitStack
+from dataclasses import dataclass
 import os
 from pathlib import Path
 import re
@@ -18,6 +20,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 
 from ur_cartesian_driver.cli import picture
 
@@ -27,46 +30,109 @@ END_TIMEOUT = 10.0
 _PORTS = re.compile(r'RTDE (\d+), primary (\d+), dashboard (\d+)')
 
 
-def run(goal: Path, model: str, drawing: Path) -> int:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Arm:
     """
-    Run the demo.
+    One of the arms.
 
-    :param goal: file of the goal.
-    :param drawing: where the picture goes.
-    :returns: 0 only if the goal succeeded.
+    :param name: its namespace; empty = none, it is the only arm.
+    """
+
+    name: str = ''
+    goal: Path
+    model: str
+    drawing: Path
+
+    @property
+    def driver(self) -> str:
+        """Return the name of its node."""
+        return f'{self.name}/ur_cartesian_driver'.lstrip('/')
+
+    @property
+    def tf_prefix(self) -> str:
+        """Return what its frames and joints begin with."""
+        return f'{self.name}_' if self.name else ''
+
+    @property
+    def label(self) -> str:
+        """Return what its lines of output begin with."""
+        return f'{self.name}: ' if self.name else ''
+
+
+def run(arms: Sequence[Arm]) -> int:
+    """
+    Run the demo; all arms move at the same time.
+
+    :returns: 0 only if all goals succeeded.
     """
     environment = _environment()
-    with tempfile.TemporaryDirectory(prefix='ur_cartesian_demo_') as scratch, \
-            process('sim', '--model', model, *_any_ports('rtde', 'primary', 'dashboard'),
-                    environment=environment, stdout=subprocess.PIPE) as simulator:
-        rtde, primary, dashboard = _ports(simulator)
-        parameters = {
-            'robot_ip': '127.0.0.1', 'ur_type': model, 'headless_mode': 'true',
-            'rtde_port': rtde, 'primary_port': primary, 'dashboard_port': dashboard,
-            'reverse_port': 0, 'script_sender_port': 0, 'trajectory_port': 0,
-            'script_command_port': 0}
-        settings = [word for name, value in parameters.items()
-                    for word in ('-p', f'{name}:={value}')]
-        print(f'simulated {model}, driver node and client are starting ...', flush=True)
-        with process(*['--ros-args', *settings], module='ur_cartesian_driver.ros.node',
-                     environment=environment):
-            print('\nplan:', flush=True)
-            planned = _client(goal, environment, '--validate-only')
-            if planned != 0:
-                return planned
-            print('\nmotion:', flush=True)
-            record = Path(scratch) / 'feedback.jsonl'
-            status = _client(goal, environment, '--record', str(record))
-            if record.is_file() and record.stat().st_size:
-                picture.draw(record, drawing, title=f'{model}: {goal.stem}')
-                print(f'picture of planned and executed path: {drawing}')
-            return status
+    with ExitStack() as stack:
+        scratch = Path(stack.enter_context(
+            tempfile.TemporaryDirectory(prefix='ur_cartesian_demo_')))
+        print(f"simulated {' and '.join(arm.model for arm in arms)}, driver node and client are "
+              'starting ...', flush=True)
+        for arm in arms:
+            _start(arm, environment, stack)
+        print('\nplan:', flush=True)
+        planned = _clients({arm: ['--validate-only'] for arm in arms}, environment)
+        if planned != 0:
+            return planned
+        print('\nmotion:', flush=True)
+        records = {arm: scratch / f'{i}.jsonl' for i, arm in enumerate(arms)}
+        status = _clients({arm: ['--record', str(record)] for arm, record in records.items()},
+                          environment)
+        for arm, record in records.items():
+            _draw(arm, record)
+        return status
 
 
-def _client(goal: Path, environment: dict[str, str], *options: str) -> int:
-    """Send the goal from a process of its own and return its exit status."""
-    with process('send', str(goal), *options, environment=environment) as client:
-        return client.wait()
+def _start(arm: Arm, environment: dict[str, str], stack: ExitStack) -> None:
+    """Start the simulated robot of an arm, and its driver."""
+    simulator = stack.enter_context(process(
+        'sim', '--model', arm.model, *_any_ports('rtde', 'primary', 'dashboard'),
+        environment=environment, stdout=subprocess.PIPE))
+    rtde, primary, dashboard = _ports(simulator)
+    parameters = {
+        'robot_ip': '127.0.0.1', 'ur_type': arm.model, 'headless_mode': 'true',
+        'rtde_port': rtde, 'primary_port': primary, 'dashboard_port': dashboard,
+        'reverse_port': 0, 'script_sender_port': 0, 'trajectory_port': 0,
+        'script_command_port': 0}
+    if arm.name:  # without a value, a parameter has no type
+        parameters['tf_prefix'] = arm.tf_prefix
+    names = ['-r', f'__ns:=/{arm.name}'] if arm.name else []
+    settings = [word for name, value in parameters.items()
+                for word in ('-p', f'{name}:={value}')]
+    stack.enter_context(process('--ros-args', *names, *settings,
+                                module='ur_cartesian_driver.ros.node', environment=environment))
+
+
+def _clients(options: Mapping[Arm, Sequence[str]], environment: dict[str, str]) -> int:
+    """Send the goals of all arms at once; return the first exit status that is not 0, or 0."""
+    with ExitStack() as stack:
+        clients = []
+        for arm, more in options.items():
+            client = stack.enter_context(process(
+                'send', str(arm.goal), '--driver', arm.driver, '--tf-prefix', arm.tf_prefix, *more,
+                environment=environment,
+                # A terminal shows the progress of one client in one line.
+                stdout=subprocess.PIPE if arm.label else None))
+            clients.append(client)
+            if arm.label:
+                threading.Thread(target=_pass_on, args=(client, arm.label), daemon=True).start()
+        return next((status for client in clients if (status := client.wait()) != 0), 0)
+
+
+def _pass_on(client: subprocess.Popen[str], label: str) -> None:
+    """Print what a client says, each line behind the name of its arm."""
+    assert client.stdout is not None
+    for line in client.stdout:
+        print(f'{label}{line}', end='', flush=True)
+
+
+def _draw(arm: Arm, record: Path) -> None:
+    if record.is_file() and record.stat().st_size:
+        picture.draw(record, arm.drawing, title=f'{arm.label}{arm.model}: {arm.goal.stem}')
+        print(f'picture of planned and executed path: {arm.drawing}')
 
 
 @contextmanager

@@ -326,6 +326,22 @@ def declare(node: Node) -> Settings:
     return settings(values)
 
 
+def checked(given: Mapping[str, Value]) -> Settings:
+    """
+    Return values and, for all that are not given, the defaults; without a node.
+
+    :raises ParameterError: a name is unknown or a value cannot be.
+    """
+    values = defaults()
+    _refuse_unknown(given, values)
+    for declaration in DECLARATIONS:
+        if declaration.name in given:
+            value = given[declaration.name]
+            declaration.check(value, values[declaration.name])
+            values[declaration.name] = value
+    return settings(values)
+
+
 def settings(values: Mapping[str, Value]) -> Settings:
     """
     Return parameter values, sorted by who uses them.
