@@ -15,10 +15,10 @@ export ROS_DOMAIN_ID
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH
 
-.PHONY: help setup demo test lint bench clean
+.PHONY: help setup demo demo-two test lint bench clean
 
 help:  ## Show this list
-	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 8
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 8
 
 setup: $(stamp)  ## Make .venv with ROS 2, the tools and this package (PYTHON=python3.12 chooses one)
 
@@ -31,6 +31,9 @@ $(stamp): $(wildcard msg/* srv/* action/* cmake/*) CMakeLists.txt setup.py packa
 
 demo: $(stamp)  ## Simulated robot, driver and a client that moves it; draws the path
 	$(bin)/ur-cartesian demo
+
+demo-two: $(stamp)  ## The same with two arms at once, each with a goal of its own
+	$(bin)/ur-cartesian demo --arms 2
 
 test: lint  ## Lint, then all tests (PYTEST_ARGS='-k name' chooses)
 	$(bin)/pytest $(PYTEST_ARGS)

@@ -25,6 +25,10 @@ LAUNCH_ARGUMENTS = {
         'ur_type', 'robot_ip', 'reverse_ip', 'headless_mode', 'tf_prefix', 'reverse_port',
         'script_sender_port', 'trajectory_port', 'script_command_port', 'namespace', 'config_file',
     },
+    'two_arms.launch.py': {
+        'left_robot_ip', 'right_robot_ip', 'left_ur_type', 'right_ur_type', 'headless_mode',
+        'config_file',
+    },
     'simulated_robot.launch.py': {'ur_type', 'robot_ip', 'polyscope', 'tf_prefix', 'namespace'},
 }
 

@@ -198,7 +198,7 @@ def test_commands_exist(document):
         elif words[0].startswith('scripts/'):
             assert (CHECKOUT / words[0]).is_file()
         elif words[0] == 'make':
-            targets = re.findall(r'^(\w+):', (CHECKOUT / 'Makefile').read_text(), re.MULTILINE)
+            targets = re.findall(r'^([\w-]+):', (CHECKOUT / 'Makefile').read_text(), re.MULTILINE)
             assert words[1] in targets
         elif words[:2] == ['ros2', 'launch']:
             check_launch(words)

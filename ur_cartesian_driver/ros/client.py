@@ -81,6 +81,24 @@ def load_goal(source: str | os.PathLike[str]) -> FollowCartesianTrajectory.Goal:
     return goal
 
 
+def with_prefix(goal: FollowCartesianTrajectory.Goal,
+                tf_prefix: str) -> FollowCartesianTrajectory.Goal:
+    """Change a goal to the frames and joints of an arm with a ``tf_prefix``; return it."""
+    trajectory = goal.trajectory
+    trajectory.header.frame_id = _prefixed(tf_prefix, trajectory.header.frame_id)
+    trajectory.controlled_frame = _prefixed(tf_prefix, trajectory.controlled_frame)
+    postures = [point.posture for point in trajectory.points]
+    postures += [segment.via_posture for segment in goal.segments]
+    for posture in postures:
+        posture.posture_joint_names = [
+            _prefixed(tf_prefix, name) for name in posture.posture_joint_names]
+    return goal
+
+
+def _prefixed(tf_prefix: str, name: str) -> str:
+    return tf_prefix + name if name else ''
+
+
 def _fill(message: Message, values: object, key: str) -> None:
     """Set the fields of a message that are named; the others keep their defaults."""
     if not isinstance(values, dict):

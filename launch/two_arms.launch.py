@@ -1,0 +1,64 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Start the drivers of two robots, `left` and `right`.
+
+Each has a namespace, so that topics, services and the action have names of their own, a tf_prefix,
+so that joints and frames have, and ports of its own on this computer. For more arms, or other
+names, take this file as a pattern.
+"""
+
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+from launch_ros.substitutions import FindPackageShare
+
+PACKAGE = 'ur_cartesian_driver'
+
+ARGUMENTS = [
+    DeclareLaunchArgument('left_robot_ip', description='Address of the left robot.'),
+    DeclareLaunchArgument('right_robot_ip', description='Address of the right robot.'),
+    DeclareLaunchArgument('left_ur_type', default_value='ur5e', description='Its model.'),
+    DeclareLaunchArgument('right_ur_type', default_value='ur5e', description='Its model.'),
+    DeclareLaunchArgument(
+        'headless_mode', default_value='false', choices=['true', 'false'],
+        description='Send the robot programs directly, instead of serving them to the External '
+                    'Control URCap. Needs remote control on the pendants.'),
+    DeclareLaunchArgument(
+        'config_file',
+        default_value=PathJoinSubstitution([FindPackageShare(PACKAGE), 'config', 'driver.yaml']),
+        description='YAML file with parameters for both; what is said here goes before it.'),
+]
+PORTS = ['reverse_port', 'script_sender_port', 'trajectory_port', 'script_command_port']
+#: The pendant has to know the script sender: 50002 of the left robot, 50012 of the right one.
+FIRST_PORT = {'left': 50001, 'right': 50011}
+
+
+def driver(side):
+    """Return the node of one side."""
+    def text(name):
+        # Without a type, launch would read a value as YAML: robot_ip 10 would become a number.
+        return ParameterValue(LaunchConfiguration(f'{side}_{name}'), value_type=str)
+
+    parameters = {
+        'robot_ip': text('robot_ip'),
+        'ur_type': text('ur_type'),
+        'tf_prefix': f'{side}_',
+        'headless_mode': ParameterValue(LaunchConfiguration('headless_mode'), value_type=bool),
+        **{name: FIRST_PORT[side] + i for i, name in enumerate(PORTS)},
+    }
+    return Node(
+        package=PACKAGE,
+        executable='driver',
+        namespace=side,
+        parameters=[LaunchConfiguration('config_file'), parameters],
+        output='screen',
+        emulate_tty=True,
+    )
+
+
+def generate_launch_description():
+    """Return the arguments and the two nodes."""
+    return LaunchDescription([*ARGUMENTS, driver('left'), driver('right')])
