@@ -3,8 +3,8 @@
 """
 Places along the way of a goal, as the robot will go it: parts of paths, and the corners between.
 
-A place every 2 mm and every degree, and at least eight on each piece. Pieces shorter than 10 mm
-and 5 degrees have fewer, one every 1.3 mm and 0.7 degrees: a path of 5 mm steps has four places on
+A place every 2 mm and every degree, and at least eight on each piece. Pieces shorter than 13 mm
+and 6 degrees have fewer, one every 1.6 mm and 0.8 degrees: a path of 5 mm steps has four places on
 each of them. Where the joints turn fast :mod:`~.lookahead` adds places.
 """
 
@@ -31,7 +31,7 @@ STEP_ANGLE = pi / 180.0
 #: The least number of places on a piece, and how much finer than the largest distance they then
 #: are at most.
 LEAST_PLACES = 8
-_FINER = 1.5
+_FINER = 1.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
