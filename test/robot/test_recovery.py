@@ -7,9 +7,9 @@ from itertools import product
 import pytest
 
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
-from ur_cartesian_driver.robot.call_desk import COMMANDS
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.recovery import next_step, POWER, SAFETY, Situation, Step, WORDS
+from ur_cartesian_driver.robot.way_back import COMMANDS
 
 FREE = (SafetyMode.NORMAL, SafetyMode.REDUCED)
 ACTIONS = set(WORDS)

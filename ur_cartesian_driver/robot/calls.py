@@ -168,6 +168,16 @@ class Recover:
     """Bring a stopped robot back to where it takes goals, as far as software may."""
 
 
+def yes(text: str) -> Answer:
+    """Return that it is done, or what was asked for."""
+    return Answer(ok=True, text=text)
+
+
+def no(text: str) -> Answer:
+    """Return why it is not done."""
+    return Answer(ok=False, text=text)
+
+
 def _check_length(text: str) -> None:
     if len(text) > LONGEST_TEXT:
         raise LocalProtocolError(
