@@ -112,7 +112,7 @@ def test_no_goal_begins_while_its_tcp_is_being_set(driver, home, ur_sim):
 
 @QUICK
 def test_dashboard_commands_are_done_when_the_robot_reports_them(driver, ur_sim):
-    assert driver.status.serial_number == '20000000000'
+    wait_for(lambda: driver.status.serial_number == '20000000000')
     assert driver.dashboard('robotmode').text == 'RUNNING'
     assert driver.dashboard('pause').ok
     assert driver.dashboard('play').ok

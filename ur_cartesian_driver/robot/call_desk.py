@@ -185,9 +185,12 @@ class CallDesk:
                       'Control on the pendant.')
         if self._robot.robot is None:
             return no(self._robot.status.message)
+        replaces = self._robot.program_connected
         self._robot.upload_program()
+        if replaces:  # its predecessor hangs up first
+            await until(self._robot, lambda _: not self._robot.program_connected, SETTING_TIMEOUT)
         if await until(self._robot, lambda _: self._robot.status.state is ConnectionState.READY,
-                             EFFECT_TIMEOUT):
+                       EFFECT_TIMEOUT):
             return yes('The robot program runs.')
         return no(f'The robot program has not called within {EFFECT_TIMEOUT:g} s. '
                   f'{self._robot.status.message}'.rstrip())

@@ -66,7 +66,7 @@ class DashboardCalls:
         reply = await self._client.ask(call.command, call.argument)
         if not reply.ok:
             return no(explain(call.command, reply.text, self._robot.robot,
-                               await self.remote_control()))
+                              await self.remote_control()))
         effect = EFFECTS.get(call.command)
         if effect is not None and not await until(self._robot, effect.seen, effect.timeout):
             return no(f'The robot answers {reply.text!r}, but is not {effect.words} after '
