@@ -169,5 +169,5 @@ def test_ros_packages_that_pip_installs_are_dependencies_of_the_ros_package():
                for element in package_xml().iter(kind)}
     assert ros - depends == set()
     # Not on PyPI; the driver does without them there.
-    assert depends - ros == {'launch', 'launch_ros', 'tf2_ros', 'pinocchio', 'python3-matplotlib',
-                             'python3-numpy', 'python3-yaml'}
+    assert depends - ros == {'launch', 'launch_ros', 'tf2_msgs', 'tf2_ros', 'pinocchio',
+                             'python3-matplotlib', 'python3-numpy', 'python3-yaml'}

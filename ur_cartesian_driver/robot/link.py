@@ -229,15 +229,22 @@ class RobotLink:
         self._program.send_stop()
 
     def upload_program(self) -> None:
-        """Upload the robot program; it replaces whatever program runs."""
+        """Upload the robot program, in the place of ours, never of somebody else's."""
         if self._status.state in (*_OUT_OF_REACH, ConnectionState.CONNECTING):
             self._warn(f'the robot program is not sent: {self._status.message}')
+        elif self._foreign_program_runs():
+            self._warn('the robot program is not sent: another program runs on the robot, maybe '
+                       'of another driver; let it end, or stop it')
         elif not self._program.text:
             self._warn('the robot program is not sent: wire_dialect says that the robot has an '
                        'older one of its own; play that on the pendant')
         elif not self._primary.send(primary.upload(as_program(self._program.text))):
             self._warn('the robot program is not sent: there is no connection to the primary '
                        'interface of the robot')
+
+    def _foreign_program_runs(self) -> bool:
+        return (self._robot is not None and self._robot.runtime_state in _RUNS
+                and not self._program.connected)
 
     def not_ready(self) -> str:
         """Return why no goal can run now; empty when one can."""

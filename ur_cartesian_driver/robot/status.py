@@ -88,6 +88,11 @@ def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_
             return 'The robot program is paused; play it on the pendant.'
         return ('The TCP that the last goal had set is still to be put back; should it stay, set '
                 'the right one on the robot.') if tcp_owed else ''
+    if robot.runtime_state is RuntimeState.PLAYING and not program_connected:
+        return ('A program runs on the robot, and it has not called this driver: it is another '
+                'one, or it belongs to another driver. Let it end, or stop it; then '
+                + ('call resend_robot_program.' if headless_mode else
+                   'play a program whose External Control node calls this computer.'))
     if headless_mode:
         return ('The robot program does not run; call resend_robot_program when the arm may '
                 'move.')

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+import errno
+import os
 import socket
 
 OnData = Callable[[bytes], None]
@@ -20,6 +22,12 @@ OnClosed = Callable[[str], None]
 #: Pauses between two attempts to connect [s]; the last one repeats.
 BACK_OFF = (0.1, 0.2, 0.5, 1.0, 2.0)
 CONNECT_TIMEOUT = 2.0
+
+#: What helps where a port cannot be opened.
+REMEDIES = {
+    errno.EADDRINUSE: 'another driver may use it; set {name} to a free port or to 0',
+    errno.EACCES: 'set {name} to a port above 1023 or to 0',
+}
 
 
 class Connection(asyncio.Protocol):
@@ -125,7 +133,14 @@ async def dial(connection: Connection, host: str, port: int) -> None:
     except TimeoutError:
         raise OSError(f'{host} port {port} does not answer within {CONNECT_TIMEOUT:g} s') from None
     except OSError as error:
-        raise OSError(f'{host} port {port}: {error.strerror or error}') from error
+        raise OSError(f'{host} port {port}: {cause(error)}') from error
+
+
+def cause(error: OSError) -> str:
+    """Return the system's own words: those of asyncio repeat the address, or count attempts."""
+    if error.errno is not None and error.errno in errno.errorcode:
+        return os.strerror(error.errno).lower()
+    return error.strerror or str(error)  # a name that is not known
 
 
 class Retry:
@@ -192,9 +207,10 @@ class Listener:
                 self._accept, host, port, backlog=4, reuse_address=True, start_serving=False)
             await self._server.start_serving()
         except OSError as error:
+            remedy = REMEDIES.get(error.errno or 0, 'set bind_address to an address of this '
+                                                    'computer').format(name=self.name)
             raise OSError(
-                f'cannot listen on {host} port {port} ({error.strerror or error}): another '
-                f'driver may use it; set {self.name} to a free port or to 0') from error
+                f'cannot listen on {host} port {port} ({cause(error)}): {remedy}') from error
         self.port = int(self._server.sockets[0].getsockname()[1])
 
     def close(self) -> None:
