@@ -16,7 +16,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TypeAlias
 
-from ur_cartesian_driver.execution import trajectory
+from ur_cartesian_driver.execution import states
 from ur_cartesian_driver.robot import lifecycle
 
 DIAGRAMS = Path(__file__).resolve().parents[1] / 'doc' / 'diagrams'
@@ -33,8 +33,8 @@ def pages() -> dict[str, str]:
             connection(), [change.name for change in lifecycle.Change]),
         'trajectory.md': page(
             'A goal on its way through the robot program',
-            'ur_cartesian_driver/execution/trajectory.py',
-            goal(), [signal.name for signal in trajectory.Signal]),
+            'ur_cartesian_driver/execution/states.py',
+            goal(), [signal.name for signal in states.Signal]),
     }
 
 
@@ -48,7 +48,7 @@ def goal() -> Table:
     """Return the table of a goal; the remark is the error code that is decided there."""
     return {state.name: {signal.name: (step.state.name, _name(step.code))
                          for signal, step in row.items()}
-            for state, row in trajectory.TRANSITIONS.items()}
+            for state, row in states.TRANSITIONS.items()}
 
 
 def page(title: str, source: str, table: Table, events: Sequence[str]) -> str:

@@ -1,49 +1,16 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-One goal on its way through the robot program, as a table.
+The machine that takes one goal through the robot program.
 
-The machine is fed with events and the time and answers with commands; it sends nothing itself. An
-event is first turned into a signal (:class:`Signal`), then :data:`TRANSITIONS` says what that
-signal means in the present state: the next state and how the goal ends, if it does.
-
-* **ARMING**: the goal moves another frame than the robot's TCP, and the message that sets the TCP
-  there is on the wire. Nothing moves before the robot reports it, and itself where the plan
-  begins. Goals about the TCP itself begin in MOVING.
-* **MOVING**: the robot program runs points. The result SUCCESS leads to SETTLING; whatever stops
-  the arm by itself (safety, connection) ends the goal at once, because nothing that we could send
-  would be read; a reason of ours to stop (cancel, tolerance) leads to STOPPING.
-* **SETTLING**: the program says that the last point is reached. The arm has to be inside the goal
-  tolerance and at rest, within the goal's time tolerance. Where the controller's own target is
-  elsewhere, the program left something out (DEVIATION).
-* **STOPPING**: CANCEL is on the wire. The program brakes, discards the points that it has not run
-  and answers CANCELED. A SUCCESS in this state means that the last point was reached before the
-  program read the CANCEL; it is no answer, CANCELED still follows.
-* **HALTING**: the program has answered; the arm is coming to rest.
-* **RESTORING**: how the goal ends is decided, and nothing moves; the TCP of before is on the wire.
-  The outcome waits until the robot reports it, so the next goal finds it. Goals that changed no
-  TCP pass through at once.
-* **ENDING**: the robot program is gone. Programs end because the safety system, the power or the
-  whole controller has gone as well, and which of them we hear of first is chance: so for
-  :data:`GATHER` a deeper reason still counts.
-* **ENDED**: the outcome is out. Later events mean nothing.
-
-Everything has a bound: an answer that does not come in STOPPING or HALTING ends the goal after
-:data:`STOP_BOUND` by ending the robot program. A program that somebody has paused reads nothing:
-the arm stands, and the goal ends as it was to end (UNANSWERED); an arm that still moves is a
-failure (LATE). A TCP that is not set in time ends the goal before it began; one that is not back
-in time, or not at the end because the robot stopped, is the business of whoever carries out the
-commands: see :attr:`TrajectoryMachine.loan`. MOVING has none, because a speed slider at zero is
-not an error; but an arm that stands for :data:`STALL_BOUND` while nothing holds it waits for
-something that will not come: a command or a result was lost (STALLED). RTDE packets that stop
-coming are reported as a lost connection.
+It is fed with events and the time and answers with commands; it sends nothing itself. The table of
+its states, and what they mean, is in :mod:`~.states`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from enum import auto, Enum
 from math import inf
 from types import MappingProxyType
 
@@ -62,7 +29,15 @@ from ur_cartesian_driver.execution.commands import (
 from ur_cartesian_driver.execution.flow import Window
 from ur_cartesian_driver.execution.monitor import PathTracker, speed
 from ur_cartesian_driver.execution.pace import Pace
-from ur_cartesian_driver.execution.tcp_loan import REST_SPEED, TcpLoan
+from ur_cartesian_driver.execution.states import (
+    PAUSES,
+    RESULTS,
+    Signal,
+    State,
+    stop_in,
+    TRANSITIONS,
+)
+from ur_cartesian_driver.execution.tcp_loan import REST_SPEED, same_tcp, TcpLoan
 from ur_cartesian_driver.execution.tolerances import Watch
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
@@ -80,7 +55,7 @@ from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.lever import seen_at
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyStatus
+from ur_cartesian_driver.motion.state import RobotState, RuntimeState
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 
 #: Longest time from CANCEL to the answer and to standstill [s]: the arm brakes within a second
@@ -102,138 +77,6 @@ GATHER = 0.1
 STALL_BOUND = 2.0
 #: How far the controller's own target may be from the plan [m], [rad].
 MAX_PLAN_DEVIATION = (0.002, 0.02)
-
-
-class State(Enum):
-    """Where a goal is."""
-
-    ARMING = auto()
-    MOVING = auto()
-    SETTLING = auto()
-    STOPPING = auto()
-    HALTING = auto()
-    RESTORING = auto()
-    ENDING = auto()
-    ENDED = auto()
-
-
-class Signal(Enum):
-    """What an event means to a goal."""
-
-    SUCCESS = auto()
-    CANCELED = auto()
-    FAILURE = auto()
-    CANCEL = auto()
-    VIOLATION = auto()
-    DEVIATION = auto()
-    STALLED = auto()
-    PROTECTIVE_STOP = auto()
-    EMERGENCY_STOP = auto()
-    PROGRAM_STOPPED = auto()
-    CONNECTION_LOST = auto()
-    ARMED = auto()
-    SETTLED = auto()
-    RESTORED = auto()
-    AT_REST = auto()
-    LATE = auto()
-    UNANSWERED = auto()
-
-
-#: What stops the arm in every state but ENDED, and the code that the goal ends with where none is
-#: decided yet.
-STOPS: Mapping[Signal, ErrorCode] = MappingProxyType({
-    Signal.PROTECTIVE_STOP: ErrorCode.PROTECTIVE_STOP,
-    Signal.EMERGENCY_STOP: ErrorCode.EMERGENCY_STOP,
-    Signal.PROGRAM_STOPPED: ErrorCode.PROGRAM_STOPPED,
-    Signal.CONNECTION_LOST: ErrorCode.CONNECTION_LOST,
-})
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """The next state, and the code of the outcome where it is decided here."""
-
-    state: State
-    code: ErrorCode | None = None
-
-
-#: After these the robot program is paused or deaf, and not ended.
-_PAUSES = frozenset({Signal.PROTECTIVE_STOP, Signal.EMERGENCY_STOP, Signal.UNANSWERED,
-                     Signal.STALLED})
-
-
-def _ends(code: ErrorCode) -> Step:
-    return Step(State.ENDED, code)
-
-
-def _judged(code: ErrorCode) -> Step:
-    return Step(State.RESTORING, code)
-
-
-_STOPS = {signal: _ends(code) for signal, code in STOPS.items()} | {
-    Signal.PROGRAM_STOPPED: Step(State.ENDING, ErrorCode.PROGRAM_STOPPED)}
-
-
-def _stays(state: State, *signals: Signal) -> dict[Signal, Step]:
-    return {signal: Step(state) for signal in signals}
-
-
-#: What each signal means in each state. ARMED, SETTLED, RESTORED, AT_REST, LATE and UNANSWERED are
-#: about the state they are given for, so they are not possible in the others.
-TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
-    State.ARMING: {
-        **_STOPS,
-        # Of a goal before this one.
-        **_stays(State.ARMING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
-        Signal.ARMED: Step(State.MOVING),
-        Signal.CANCEL: _judged(ErrorCode.CANCELLED),
-        Signal.LATE: _judged(ErrorCode.ROBOT_NOT_READY),
-    },
-    State.MOVING: {
-        **_STOPS,
-        Signal.SUCCESS: Step(State.SETTLING),
-        Signal.CANCELED: _judged(ErrorCode.EXECUTION_FAILED),
-        Signal.FAILURE: _judged(ErrorCode.EXECUTION_FAILED),
-        Signal.CANCEL: Step(State.STOPPING, ErrorCode.CANCELLED),
-        Signal.VIOLATION: Step(State.STOPPING, ErrorCode.PATH_TOLERANCE_VIOLATED),
-        Signal.DEVIATION: Step(State.STOPPING, ErrorCode.EXECUTION_FAILED),
-        Signal.STALLED: _ends(ErrorCode.EXECUTION_FAILED),
-    },
-    State.SETTLING: {
-        **_STOPS,
-        **_stays(State.SETTLING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
-        Signal.CANCEL: _judged(ErrorCode.CANCELLED),
-        Signal.DEVIATION: _judged(ErrorCode.EXECUTION_FAILED),
-        Signal.SETTLED: _judged(ErrorCode.SUCCESSFUL),
-        Signal.LATE: _judged(ErrorCode.GOAL_TOLERANCE_VIOLATED),
-    },
-    State.STOPPING: {
-        **_STOPS,
-        **_stays(State.STOPPING, Signal.SUCCESS, Signal.FAILURE, Signal.CANCEL),
-        Signal.CANCELED: Step(State.HALTING),
-        Signal.UNANSWERED: Step(State.ENDED),
-        Signal.LATE: _ends(ErrorCode.EXECUTION_FAILED),
-    },
-    State.HALTING: {
-        **_STOPS,
-        **_stays(State.HALTING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, Signal.CANCEL),
-        Signal.AT_REST: Step(State.RESTORING),
-        Signal.LATE: _ends(ErrorCode.EXECUTION_FAILED),
-    },
-    State.RESTORING: {
-        **{signal: Step(State.ENDED) for signal in STOPS},
-        **_stays(State.RESTORING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, Signal.CANCEL),
-        Signal.RESTORED: Step(State.ENDED),
-        Signal.LATE: Step(State.ENDED),
-    },
-    State.ENDING: {
-        **_STOPS,
-        **_stays(State.ENDING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, Signal.CANCEL,
-                 Signal.PROGRAM_STOPPED),
-        Signal.LATE: Step(State.ENDED),
-    },
-    State.ENDED: {},
-})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -346,7 +189,7 @@ class TrajectoryMachine:
                 self._deadline = now + EARLY_ANSWER
                 return None, ''
             case TrajectoryEnded(result=result):
-                return _RESULTS[result]
+                return RESULTS[result]
             case CancelRequested(reason=reason):
                 return Signal.CANCEL, reason
             case LinkLost(link='program', reason=reason):
@@ -472,7 +315,7 @@ class TrajectoryMachine:
             return None, ''
         if self.state is State.MOVING:
             self._deadline = inf
-            return _RESULTS[TrajectoryResult.CANCELED] if self._has_not_begun() else (None, '')
+            return RESULTS[TrajectoryResult.CANCELED] if self._has_not_begun() else (None, '')
         if self.state is State.ARMING:
             return Signal.LATE, self._why_not_armed()
         if self.state in (State.RESTORING, State.ENDING):
@@ -551,7 +394,7 @@ class TrajectoryMachine:
             return self._finish()
         commands: list[Command] = []
         unconfirmed = signal is Signal.LATE and self._code is ErrorCode.EXECUTION_FAILED
-        if signal in _PAUSES or unconfirmed:
+        if signal in PAUSES or unconfirmed:
             # A paused program reads no socket: without this the old motion would go on when
             # somebody unlocks the arm and plays the program.
             commands.append(StopProgram(reason=self._text))
@@ -574,7 +417,11 @@ class TrajectoryMachine:
         if self.loan is None:
             return ()
         if self.loan.returned:
-            return ('the TCP of the robot was set for the goal, and is what it was before',)
+            state = self._latest
+            if state is not None and same_tcp(state.T_flange_tcp, self.loan.T_flange_before):
+                return ('the TCP of the robot was set for the goal, and is what it was before',)
+            return ('the TCP of the robot was set for the goal; somebody else has set another one '
+                    'since, which is left alone',)
         return ('the TCP of the robot was set for the goal, and is not back yet: no goal is taken '
                 'until it is',)
 
@@ -682,36 +529,6 @@ def _stands(before: RobotState | None, state: RobotState) -> bool:
             and state.speed_scaling > 0.0 and state.target_speed_fraction > 0.0
             and state.runtime_state is RuntimeState.PLAYING)
 
-
-def stop_in(state: RobotState) -> tuple[Signal, str] | None:
-    """Return why the robot cannot go on by itself, or None when it can."""
-    safety = state.safety_status
-    emergency = (SafetyStatus.EMERGENCY_STOPPED | SafetyStatus.ROBOT_EMERGENCY_STOPPED
-                 | SafetyStatus.SYSTEM_EMERGENCY_STOPPED)
-    if safety & emergency:
-        return Signal.EMERGENCY_STOP, 'an emergency stop cut the power of the arm'
-    if safety & SafetyStatus.PROTECTIVE_STOPPED:
-        return Signal.PROTECTIVE_STOP, 'the robot made a protective stop'
-    if safety & SafetyStatus.SAFEGUARD_STOPPED:
-        return Signal.PROTECTIVE_STOP, 'the robot made a safeguard stop'
-    if safety & (SafetyStatus.VIOLATION | SafetyStatus.FAULT):
-        return Signal.PROTECTIVE_STOP, (
-            f'the safety system reports {state.safety_mode.name.lower()}')
-    if state.robot_mode is not RobotMode.RUNNING:
-        return Signal.PROGRAM_STOPPED, (
-            f'the arm left the mode RUNNING and is in {state.robot_mode.name}')
-    if state.runtime_state in (RuntimeState.STOPPING, RuntimeState.STOPPED):
-        return Signal.PROGRAM_STOPPED, 'the robot program was stopped'
-    return None
-
-
-_RESULTS: Mapping[TrajectoryResult, tuple[Signal, str]] = MappingProxyType({
-    TrajectoryResult.SUCCESS: (Signal.SUCCESS, ''),
-    TrajectoryResult.CANCELED: (
-        Signal.CANCELED, 'the robot program cancelled the trajectory by itself'),
-    TrajectoryResult.FAILURE: (
-        Signal.FAILURE, 'the robot program reported a failure; its log on the pendant says why'),
-})
 
 _ENTER: Mapping[State, Callable[[TrajectoryMachine, Signal, float], list[Command]]] = (
     MappingProxyType({
