@@ -34,7 +34,7 @@ arm stands, and the goal ends as it was to end (UNANSWERED); an arm that still m
 or not at the end because the robot stopped, is the business of whoever carries out the commands
 (the ``loan`` of the machine). MOVING has none, because a speed slider at zero is not an error; but
 an arm that stands for ``STALL_BOUND`` while nothing holds it waits for something that will not
-come: a command or a result was lost (STALLED). RTDE packets that stop coming are reported as a lost
+come: a command or a result was lost (STALLED). RTDE packets that stop coming are a lost
 connection.
 """
 
