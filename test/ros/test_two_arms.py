@@ -140,6 +140,28 @@ def check_names(cell):
     assert states == {'left': 'PLAYING', 'right': 'STOPPED'}
 
 
+@pytest.mark.slow
+def test_a_second_driver_of_the_same_name_is_told(no_thread_left, capfd):
+    nowhere = {'rtde_port': 1, 'robot_loop': 'thread'}
+    context = Context()
+    rclpy.init(args=[], context=context)
+    executor = SingleThreadedExecutor(context=context)
+    nodes = [CartesianDriverNode(context=context, parameter_overrides=nowhere) for _ in range(2)]
+    try:
+        executor.add_node(nodes[1])
+        deadline = monotonic() + 10.0
+        said = ''
+        while 'Another node is called /ur_cartesian_driver: ' not in said:
+            assert monotonic() < deadline
+            executor.spin_once(timeout_sec=0.1)
+            said += capfd.readouterr().err
+    finally:
+        for node in nodes:
+            node.destroy_node()
+        executor.shutdown()
+        rclpy.shutdown(context=context)
+
+
 def test_a_goal_file_is_used_for_an_arm_with_a_prefix():
     text = '{trajectory: {header: {frame_id: base}, controlled_frame: tool0, points: [{posture: ' \
            '{posture_joint_names: [elbow_joint]}}]}, segments: [{via_posture: ' \

@@ -35,6 +35,8 @@ from ur_cartesian_driver.ros.state_publisher import StatePublisher
 
 #: How often the driver hears that the executor of the node is alive [s].
 HEARTBEAT_PERIOD = 0.5
+#: How long the other nodes have to make themselves known [s].
+DISCOVERY = 2.0
 #: How long :func:`main` waits for the arm to stop and the results to be sent [s].
 SHUTDOWN_PATIENCE = 5.0
 
@@ -92,6 +94,18 @@ class CartesianDriverNode(Node):
             # Of its own, and on a clock that no simulation stops.
             callback_group=MutuallyExclusiveCallbackGroup(),
             clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._twin_timer = self.create_timer(
+            DISCOVERY, self._look_for_a_twin, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _look_for_a_twin(self) -> None:
+        """Say once that there is another driver of the same name: each would answer for both."""
+        self._twin_timer.cancel()
+        mine = self.get_name(), self.get_namespace()
+        if self.get_node_names_and_namespaces().count(mine) > 1:
+            self.get_logger().error(  # type: ignore[no-untyped-call]
+                f'Another node is called {self.get_fully_qualified_name()}: goals and calls may '
+                'reach the wrong robot. Give each driver a namespace, a tf_prefix and ports of '
+                'its own.')
 
     def destroy_node(self) -> None:
         """Stop the arm if it moves, end all goals, threads and connections, then the node."""
