@@ -19,7 +19,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.pose import pose_rows
 from ur_cartesian_driver.planning.path import (
     ARC_CHORD_ERROR,
     CURVE_CHORD_ERROR,
@@ -114,7 +113,7 @@ def corners(meetings: Sequence[Meeting]) -> list[Corner]:
     ends = [(trim_end(m.first, m.radius), m.second.trim(m.radius)) for m in meetings]
     start = _places((m.first for m in meetings), [leave for leave, _ in ends])
     end = _places((m.second for m in meetings), [join for _, join in ends])
-    middle = pose_rows(m.second.start for m in meetings)
+    middle = _starts([m.second for m in meetings])
     shapes = _Shapes(start, middle, end, np.array([m.radius for m in meetings]),
                      np.array([m.fillet for m in meetings]))
     lengths, samples, rooms = shapes.lengths(), shapes.samples(), shapes.rooms()
@@ -141,13 +140,24 @@ def _places(paths: Iterable[Path], u: Sequence[float]) -> Floats:
     rows = np.empty((len(every), 7))
     lines = [k for k, path in enumerate(every) if isinstance(path, Line)]
     if lines:
+        ends = _ends([path for path in every if isinstance(path, Line)])
         rows[lines] = interpolate_rows(
-            pose_rows(every[k].start for k in lines), pose_rows(every[k].end for k in lines),
-            np.array([u[k] for k in lines]))
+            ends[:, 0], ends[:, 1], np.array([u[k] for k in lines]))
     for k, path in enumerate(every):
         if not isinstance(path, Line):
             rows[k] = path.pose(u[k]).row()
     return rows
+
+
+def _starts(paths: Sequence[Path]) -> Floats:
+    """Return the poses (n, 7) at which paths begin."""
+    return np.array([path.ends[0] if isinstance(path, Line) else path.start.row()
+                     for path in paths])
+
+
+def _ends(lines: Sequence[Line]) -> Floats:
+    """Return both ends (n, 2, 7) of lines."""
+    return np.array([line.ends for line in lines])
 
 
 class _Shapes:
@@ -223,7 +233,7 @@ def _crossing_rows(all_corners: Sequence[Corner], which: NDArray[np.intp], s: Fl
     a, b = crossing(leave, join, s)
     first = path_rows([c.first for c in all_corners], which, a)
     second = path_rows([c.second for c in all_corners], which, b)
-    middle = pose_rows(c.second.start for c in all_corners)[which]
+    middle = _starts([c.second for c in all_corners])[which]
     rows = first + second - middle
     rows[:, 3:] = normalized_rows(multiply_rows(
         multiply_rows(first[:, 3:], conjugate_rows(middle[:, 3:])), second[:, 3:]))
@@ -250,11 +260,9 @@ def path_rows(paths: Sequence[Path], which: NDArray[np.intp], u: Floats) -> Floa
     on_line = is_line[which]
     if on_line.any():
         number = np.cumsum(is_line) - 1
-        lines = [path for path in paths if isinstance(path, Line)]
-        index = number[which[on_line]]
-        rows[on_line] = interpolate_rows(
-            pose_rows(line.start for line in lines)[index],
-            pose_rows(line.end for line in lines)[index], u[on_line])
+        ends = _ends([path for path in paths if isinstance(path, Line)])
+        of = ends[number[which[on_line]]]
+        rows[on_line] = interpolate_rows(of[:, 0], of[:, 1], u[on_line])
     for k in np.unique(which[~on_line]):
         first, last = np.searchsorted(which, (k, k + 1))
         rows[first:last] = paths[k].rows(u[first:last])

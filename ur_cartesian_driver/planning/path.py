@@ -10,7 +10,7 @@ corner: what a blend makes of the corner is the business of :mod:`~.corner`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import asin, atan2, ceil, hypot, pi, sqrt
 from typing import TypeAlias
 
@@ -56,11 +56,14 @@ class Line:
     end: Pose
     length: float
     angle: float
+    #: (2, 7) both ends, so that thousands of lines are soon one array.
+    ends: Floats = field(compare=False, repr=False)
 
     @classmethod
     def between(cls, start: Pose, end: Pose) -> Line:
         """Return the line from one pose to another."""
-        return cls(start, end, start.distance_to(end), start.angle_to(end))
+        return cls(start, end, start.distance_to(end), start.angle_to(end),
+                   np.array((start.row(), end.row())))
 
     @property
     def samples(self) -> int:
@@ -73,7 +76,7 @@ class Line:
 
     def rows(self, u: Floats) -> Floats:
         """Return the poses (n, 7) at many ``u`` (n,)."""
-        return interpolate_rows(np.array([self.start.row()]), np.array([self.end.row()]), u)
+        return interpolate_rows(self.ends[:1], self.ends[1:], u)
 
     def trim(self, radius: float) -> float:
         """Return the ``u`` at which the line has left a ball of that radius around its start."""

@@ -99,6 +99,11 @@ class _Draft:
         return self.before.join if self.before else 0.0
 
     @property
+    def leaves(self) -> float:
+        """The ``u`` where its path is left, once its corner is known."""
+        return self.after.leave if self.after else 1.0
+
+    @property
     def way(self) -> Path:
         """Its path, which is known by now."""
         assert self.path is not None
@@ -449,7 +454,8 @@ class Route:
             leg = Leg(index=i, kind=draft.kind, waypoint=self.goal.waypoints[i],
                       segment=draft.segment, path=draft.way, joints=draft.arrives, time=time,
                       pace=paces[i], nearest=nearest[i], before=draft.before, after=draft.after,
-                      u_before=draft.begin, u_after=draft.after.leave if draft.after else 1.0)
+                      u_before=draft.begin, u_after=draft.leaves,
+                      share=max(draft.leaves - draft.begin, 1e-9))
             yield self._already_there(leg) if self._goes_nowhere(leg) else leg
 
     def _goes_nowhere(self, leg: Leg) -> bool:

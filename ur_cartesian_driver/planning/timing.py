@@ -12,7 +12,7 @@ larger of both numbers (for joint moves the joint that turns farthest).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import hypot, inf, sqrt
 
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, RobotModel
@@ -83,6 +83,8 @@ class Leg:
     #: Where the path is joined after the corner before, and left for the corner after.
     u_before: float = 0.0
     u_after: float = 1.0
+    #: The part of it between its corners; blends that touch leave nearly nothing.
+    share: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -169,15 +171,15 @@ def _from_corner(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> Timi
     r2 s^2, so s' may grow to sqrt(a / 2r) of either.
     """
     before, old = timings[k - 1].profile, timings[k].profile
-    r1 = (1.0 - legs[k - 1].u_after) * before.length / _share(legs[k - 1])
-    r2 = legs[k].u_before * old.length / _share(legs[k])
+    r1 = (1.0 - legs[k - 1].u_after) * before.length / legs[k - 1].share
+    r2 = legs[k].u_before * old.length / legs[k].share
     pace = max(before.leave / (2.0 * r1),
                sqrt(min(before.acceleration / r1, old.acceleration / r2) / 2.0))
     enter = min(timings[k].velocity, 2.0 * r2 * pace, sqrt(
         2.0 * old.acceleration * old.length + old.leave ** 2))
     profile = trapezoid(old.length, timings[k].velocity, old.acceleration, enter,
                         0.5 * old.leave ** 2 / old.acceleration)
-    return replace(timings[k], profile=profile)
+    return _with(timings[k], profile)
 
 
 def _whole(leg: Leg, timing: Timing, before: float, after: float) -> Timing:
@@ -191,7 +193,14 @@ def _whole(leg: Leg, timing: Timing, before: float, after: float) -> Timing:
         # What is sent as a time is kept in sum: corners are shorter, so what is left has longer.
         left = max(timing.wire_time - in_corners, 0.05 * timing.wire_time)
         profile = timed(profile.length, left, *_stands(leg))
-    return replace(timing, profile=profile, duration=profile.duration + in_corners, corner=after)
+    return _with(timing, profile, profile.duration + in_corners, after)
+
+
+def _with(timing: Timing, profile: Profile, duration: float = 0.0, corner: float = 0.0) -> Timing:
+    """Return the timing with another profile; ``replace`` takes twice as long, for each leg."""
+    return Timing(velocity=timing.velocity, acceleration=timing.acceleration,
+                  wire_time=timing.wire_time, unit=timing.unit, profile=profile,
+                  duration=duration, corner=corner, reason=timing.reason, remark=timing.remark)
 
 
 def measure(leg: Leg, model: RobotModel) -> tuple[float, str]:
@@ -243,11 +252,6 @@ def _tail(leg: Leg, length: float) -> float:
     return length * (1.0 - leg.u_after)
 
 
-def _share(leg: Leg) -> float:
-    """Return the part of the leg between its corners; blends that touch leave nearly nothing."""
-    return max(leg.u_after - leg.u_before, 1e-9)
-
-
 def _first_guess(leg: Leg, length: float, unit: str, options: PlanningOptions,
                  model: RobotModel) -> Timing:
     if leg.time is None:
@@ -279,7 +283,7 @@ def _by_speed(leg: Leg, length: float, unit: str, options: PlanningOptions,
     rate = acceleration
     if is_optimized(leg.kind):
         rate *= _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed)
-    profile = trapezoid(length * _share(leg), velocity, rate,
+    profile = trapezoid(length * leg.share, velocity, rate,
                         inf if leg.before else 0.0, _tail(leg, length))
     return Timing(velocity=velocity, acceleration=acceleration, wire_time=0.0, unit=unit,
                   profile=profile, duration=profile.duration, reason=reason, remark=remark)
@@ -330,7 +334,7 @@ def _turning_line(leg: Leg, angle: float, velocity: float, acceleration: float, 
         velocity = options.max_tool_speed
     time = max(least_time(leg.path.length, velocity, acceleration),
                least_time(angle, options.angular_velocity, options.angular_acceleration))
-    profile = timed(angle * _share(leg), time * _share(leg), *_stands(leg))
+    profile = timed(angle * leg.share, time * leg.share, *_stands(leg))
     wire_time = time
     if not _takes_time(leg.kind, options):
         velocity, acceleration, wire_time = profile.cruise, profile.acceleration, 0.0
@@ -351,7 +355,7 @@ def _by_time(leg: Leg, length: float, unit: str, options: PlanningOptions,
     time, remark = leg.time, ''
     if time < least * (1.0 - 1e-9):
         time, remark = _slowed(leg, length, unit, least, limits, options)
-    profile = timed(length * _share(leg), time * _share(leg), *_stands(leg))
+    profile = timed(length * leg.share, time * leg.share, *_stands(leg))
     # The robot ignores speed and acceleration when it has a time; they say what it will need.
     return Timing(velocity=profile.cruise, acceleration=profile.acceleration, wire_time=time,
                   unit=unit, profile=profile, duration=time, reason=_TIME_SAYS_SO,
@@ -369,7 +373,7 @@ def _for_time(leg: Leg, measured: tuple[float, str], in_corners: float, options:
     assert leg.time is not None
     length, unit = measured
     limits = _limits(leg, length, options, model)
-    way, tail = length * _share(leg), _tail(leg, length)
+    way, tail = length * leg.share, _tail(leg, length)
     bound = _bound(leg, limits)
     time, remark = leg.time, ''
     least = in_corners + _least_by_speed(leg, way, limits.speed, bound)
@@ -436,9 +440,9 @@ def _corner_time(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> floa
 def corner_duration(first: Leg, timing: Timing, second: Leg, next_timing: Timing) -> float:
     """Return the time in the corner between two legs [s]; the tool's speed changes evenly."""
     assert first.after is not None
-    speeds = (timing.profile.leave * first.path.length / timing.profile.length * _share(first)
+    speeds = (timing.profile.leave * first.path.length / timing.profile.length * first.share
               + next_timing.profile.enter * second.path.length / next_timing.profile.length
-              * _share(second))
+              * second.share)
     return 2.0 * first.after.length / max(speeds, 1e-9)
 
 
