@@ -288,15 +288,58 @@ def test_a_tcp_that_somebody_else_sets_after_a_stop_is_theirs(driver, ur_sim):
 
 
 @pytest.mark.ur_sim(frequency=125.0)
-@pytest.mark.parametrize('number', [signal.SIGKILL, signal.SIGTERM])
-def test_the_robot_program_puts_the_tcp_back_when_the_driver_dies(make_driver, ur_sim, number):
+def test_the_robot_program_puts_the_tcp_back_when_the_driver_dies(make_driver, ur_sim):
     set_tcp(ur_sim, TCP)
     driver = make_driver(robot_loop='process')
     driver.wait_ready(10.0)
     motion = moving(driver)
-    os.kill(driver._host.pid, number)
+    os.kill(driver._host.pid, signal.SIGKILL)
     assert motion.result(5.0).code is ErrorCode.CONNECTION_LOST
     wait_for(lambda: has_own_tcp(ur_sim))
+
+
+@pytest.mark.ur_sim(frequency=125.0)
+@pytest.mark.parametrize(('interface', 'code'), [
+    ('rtde', ErrorCode.CONNECTION_LOST), ('reverse', ErrorCode.PROGRAM_STOPPED)])
+def test_a_wire_that_breaks_leaves_the_tcp_as_it_was(tooled, ur_sim, interface, code):
+    motion = moving(tooled)
+    if interface == 'rtde':
+        ur_sim.inject('drop rtde')
+    else:
+        ur_sim.call(lambda controller: controller.sockets.close_all())
+    assert motion.result(5.0).code is code
+    wait_for(lambda: has_own_tcp(ur_sim))
+
+
+@pytest.mark.ur_sim(frequency=125.0)
+@pytest.mark.parametrize(('stop', 'code', 'text'), [
+    (None, ErrorCode.ROBOT_NOT_READY, 'did not take the TCP of the goal'),
+    ('cancel', ErrorCode.CANCELLED, 'before anything moved'),
+    ('protective_stop', ErrorCode.PROTECTIVE_STOP, 'before anything moved')])
+def test_nothing_moves_on_a_robot_that_does_not_take_the_tcp(
+        make_driver, ur_sim, stop, code, text):
+    set_tcp(ur_sim, TCP)
+    driver = make_driver(headless_mode=False)
+    wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
+    program = served_program(driver)
+    line = 'set_tcp_for(pose_at(command, 2), command[8])'
+    assert line in program
+    ur_sim.run_script(program.replace(line, 'textmsg("no TCP")'))
+    driver.wait_ready(5.0)
+    q = ur_sim.state().q
+    start = stand(driver, NOZZLE)
+    motion = driver.start(driver.plan(goal_of(
+        [(2.0, moved(start, y=0.1, turn=QUARTER))], IDENTITY, NOZZLE)))
+    wait_for(lambda: 'no TCP' in ur_sim.state().messages)
+    if stop == 'cancel':
+        motion.cancel()
+    elif stop is not None:
+        getattr(ur_sim, stop)()
+    outcome = motion.result(5.0)
+    assert outcome.code is code, outcome.text
+    assert text in outcome.text
+    assert ur_sim.state().q == q
+    assert has_own_tcp(ur_sim)
 
 
 @pytest.mark.ur_sim(frequency=125.0)
