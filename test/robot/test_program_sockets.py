@@ -10,8 +10,16 @@ import pytest
 
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.protocol import reverse
+from ur_cartesian_driver.protocol.script_sender import REQUEST
+from ur_cartesian_driver.robot import transport
 from ur_cartesian_driver.robot.program_sockets import ProgramListener, ProgramSockets
 from ur_cartesian_driver.robot.settings import LinkSettings
+from ur_cartesian_driver.robot.transport import (
+    Complaints,
+    LINES_PERIOD,
+    MOST_LINES,
+    plain_address,
+)
 
 HOST = '127.0.0.1'
 PROGRAM_PORTS = ('trajectory_port', 'script_command_port', 'reverse_port')
@@ -135,6 +143,83 @@ def test_a_stranger_is_turned_away_with_the_parameter_that_would_let_him_in():
         async with cell(frozenset({'192.0.2.1'})) as here:
             await here.dial('reverse_port')
             assert 'allowed_peers' in await here.next()
+
+    asyncio.run(scene())
+
+
+def test_a_flood_of_strangers_is_none_of_lines_and_keeps_the_program():
+    async def scene():
+        async with cell(frozenset({'192.0.2.1'})) as here:
+            readers = [(await here.dial('script_sender_port'))[0] for _ in range(200)]
+            for reader in readers:
+                with contextlib.suppress(ConnectionError):
+                    assert await asyncio.wait_for(reader.read(), 5.0) == b''
+            assert here.news.qsize() == MOST_LINES
+            assert here.sockets._sender.connection is None
+
+    asyncio.run(scene())
+
+
+def test_lines_that_were_left_out_are_counted():
+    told = []
+    complaints = Complaints(told.append)
+    for i in range(MOST_LINES + 5):
+        complaints.add(f'call {i}', 1.0)
+    complaints.add('one more', 1.0 + LINES_PERIOD)
+    assert told[:-1] == [f'call {i}' for i in range(MOST_LINES)]
+    assert told[-1] == 'one more (5 more lines like this were left out)'
+
+
+@pytest.mark.parametrize(('written', 'plain'), [
+    ('192.0.2.1', '192.0.2.1'), ('::ffff:192.0.2.1', '192.0.2.1'),
+    ('2001:db8:0::1', '2001:db8::1'), ('robot.local', 'robot.local'), ('', '')])
+def test_an_address_is_the_same_in_each_way_of_writing_it(written, plain):
+    assert plain_address(written) == plain
+
+
+@pytest.mark.parametrize('peer', ['', 'robot.local', '192.0.2.0/24', '192.0.2'])
+def test_a_peer_that_is_no_address_is_refused(peer):
+    with pytest.raises(ValueError, match=r'allowed_peers has .* which is no address'):
+        LinkSettings(allowed_peers=(peer,))
+
+
+def test_a_caller_that_asks_and_does_not_read_is_hung_up_on():
+    """Else each request would be a copy of the program in memory."""
+    async def scene():
+        async with cell() as here:
+            here.sockets.text = 'x' * 100_000
+            reader, writer = await here.dial('script_sender_port')
+            reader._transport.pause_reading()
+            writer.write(REQUEST * 300)
+            await asyncio.sleep(0.05)
+            reader._transport.resume_reading()
+            sent = 0
+            with contextlib.suppress(ConnectionError):
+                while data := await asyncio.wait_for(reader.read(1 << 20), 5.0):
+                    sent += len(data)
+            assert sent < 300 * 100_001
+
+    asyncio.run(scene())
+
+
+def test_a_connection_that_is_closed_does_not_wait_for_a_side_that_does_not_read(monkeypatch):
+    monkeypatch.setattr(transport, 'LINGER', 0.05)
+
+    async def scene():
+        async with cell() as here:
+            program = await here.connect()
+            program['trajectory_port'][0]._transport.pause_reading()
+            unread = here.sockets._trajectory.connection._transport
+            for _ in range(100):
+                here.sockets.send_points(bytes(100_000))
+                if unread.get_write_buffer_size():
+                    break
+            here.sockets.close()
+            assert unread.get_write_buffer_size()
+            begin = asyncio.get_running_loop().time()
+            while unread.get_write_buffer_size():
+                await asyncio.sleep(0.01)
+                assert asyncio.get_running_loop().time() - begin < 1.0
 
     asyncio.run(scene())
 

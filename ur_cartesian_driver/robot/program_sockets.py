@@ -193,16 +193,17 @@ class ProgramSockets:
         try:
             wanted = self._requests.feed(data)
         except ProtocolError as error:
-            self._listener.warning(f'script_sender_port: {error}')
+            self._sender.complain(str(error))
             connection.abort(str(error))
             return
         if not self.text:
-            self._listener.warning(
-                'script_sender_port: the robot asks for a robot program, but wire_dialect says '
-                'that it has an older one of its own; leave wire_dialect out to have ours run')
+            self._sender.complain(
+                'the robot asks for a robot program, but wire_dialect says that it has an older '
+                'one of its own; leave wire_dialect out to have ours run')
             return
         for _ in range(wanted):
-            connection.send(script_sender.reply(self.text))
+            if not connection.send(script_sender.reply(self.text)):
+                return
 
 
 def _ignore(_: object) -> None:

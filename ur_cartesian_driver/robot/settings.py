@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+import ipaddress
 
 from ur_cartesian_driver.protocol.dialects import Dialect, DIALECTS, NEWEST
 
@@ -54,6 +55,8 @@ class LinkSettings:
         :raises ValueError: names the field, its value and the bound.
         """
         self._check_dialect()
+        for address in self.allowed_peers:
+            _require_address('allowed_peers', address)
         self._require_positive('robot_receive_timeout', 'keepalive_period', 'stop_deceleration')
         if self.robot_receive_timeout < 2.0 * self.keepalive_period:
             raise ValueError(
@@ -82,3 +85,16 @@ class LinkSettings:
             value = getattr(self, name)
             if not value > 0.0:
                 raise ValueError(f'{name} is {value}, it has to be greater than 0.')
+
+
+def _require_address(name: str, text: str) -> None:
+    """
+    Refuse a name or a network: it is compared with the addresses of those who call.
+
+    :raises ValueError: names the field and the text.
+    """
+    try:
+        ipaddress.ip_address(text)
+    except ValueError:
+        raise ValueError(f'{name} has {text!r}, which is no address; write it in numbers, such as '
+                         '192.168.56.101.') from None

@@ -13,6 +13,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 import errno
+import ipaddress
+from math import inf
 import os
 import socket
 
@@ -22,6 +24,14 @@ OnClosed = Callable[[str], None]
 #: Pauses between two attempts to connect [s]; the last one repeats.
 BACK_OFF = (0.1, 0.2, 0.5, 1.0, 2.0)
 CONNECT_TIMEOUT = 2.0
+
+#: How much may wait for a side that does not read [bytes]; more than a window of points has, and
+#: it bounds the memory.
+MOST_UNSENT = 1 << 20
+#: How long a connection may take to get rid of what is unsent, once it is closed [s].
+LINGER = 1.0
+#: So many callers that are turned away get a line in the log, each time [s].
+MOST_LINES, LINES_PERIOD = 3, 60.0
 
 #: What helps where a port cannot be opened.
 REMEDIES = {
@@ -98,17 +108,26 @@ class Connection(asyncio.Protocol):
         return str(peer[0]) if peer else ''
 
     def send(self, data: bytes) -> bool:
-        """Send bytes; False when the connection is gone."""
+        """Send bytes; False when the connection is gone, or gets lost by that."""
         if self._transport is None or self._transport.is_closing():
+            return False
+        if self._transport.get_write_buffer_size() > MOST_UNSENT:
+            self.abort(f'the other side did not read {MOST_UNSENT} bytes')
             return False
         self._transport.write(data)
         return True
 
     def close(self, reason: str = '') -> None:
-        """Close after what was sent has gone out; ``reason`` is what ``on_closed`` is told."""
+        """
+        Close after what was sent has gone out, if it does within :data:`LINGER`.
+
+        :param reason: what ``on_closed`` is told.
+        """
         self._reason = self._reason or reason
         if self._transport is not None:
             self._transport.close()
+            if self._transport.get_write_buffer_size():
+                asyncio.get_running_loop().call_later(LINGER, self._transport.abort)
 
     def abort(self, reason: str) -> None:
         """Close at once, whatever is still unsent."""
@@ -160,6 +179,27 @@ class Retry:
         self._attempt += 1
 
 
+class Complaints:
+    """Lines for the log about callers, so few that a flood of calls is none of lines."""
+
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        """Tell nothing yet."""
+        self._tell = tell
+        self._begin = -inf
+        self._count = 0
+
+    def add(self, text: str, now: float) -> None:
+        """Tell it, or only count it."""
+        if now - self._begin >= LINES_PERIOD:
+            unsaid = self._count - MOST_LINES
+            self._begin, self._count = now, 0
+            if unsaid > 0:
+                text += f' ({unsaid} more lines like this were left out)'
+        self._count += 1
+        if self._count <= MOST_LINES:
+            self._tell(text)
+
+
 class Listener:
     """
     A TCP port on which the robot program calls; one caller at a time.
@@ -183,7 +223,8 @@ class Listener:
         self.port = 0
         self.connection: Connection | None = None
         self._on_open, self._on_data, self._on_closed = on_open, on_data, on_closed
-        self._on_refused, self._is_taken = on_refused, is_taken
+        self._is_taken = is_taken
+        self._complaints = Complaints(on_refused)
         self._server: asyncio.Server | None = None
         self._allowed: frozenset[str] = frozenset()
 
@@ -200,7 +241,7 @@ class Listener:
         :param allowed: addresses that may call; empty = all.
         :raises OSError: the port is taken; the text names the parameter to change.
         """
-        self._allowed = allowed
+        self._allowed = frozenset(map(plain_address, allowed))
         try:
             # In two steps, so that there is something to close when we are cancelled between.
             self._server = await asyncio.get_running_loop().create_server(
@@ -232,25 +273,39 @@ class Listener:
         return connection
 
     def _opened(self, connection: Connection) -> None:
-        peer = connection.peer_address
+        peer = plain_address(connection.peer_address)
         if not self.is_open or not peer:  # closed, or hung up, between the call and here
             connection.abort('nobody is left on one side')
         elif self._allowed and peer not in self._allowed:
-            self._turn_away(connection, f'{self.name}: {peer} may not connect; add it to '
-                                        'allowed_peers if it is the robot')
+            self._turn_away(connection, f'{peer} may not connect; add it to allowed_peers if it '
+                                        'is the robot')
         elif self.connection is not None and self._is_taken():
-            self._turn_away(connection, f'{self.name}: {peer} was turned away, the robot program '
-                                        'is connected already')
+            self._turn_away(connection, f'{peer} was turned away, the robot program is connected '
+                                        'already')
         else:
             self.hang_up()
             self.connection = connection
             self._on_open(connection)
 
+    def complain(self, text: str) -> None:
+        """Tell what is wrong with a caller, unless too much of that was told already."""
+        self._complaints.add(f'{self.name}: {text}', asyncio.get_running_loop().time())
+
     def _turn_away(self, connection: Connection, text: str) -> None:
         connection.abort(text)
-        self._on_refused(text)
+        self.complain(text)
 
     def _ended(self, connection: Connection, reason: str) -> None:
         if connection is self.connection:  # not one that was turned away or hung up on
             self.connection = None
             self._on_closed(reason)
+
+
+def plain_address(text: str) -> str:
+    """Return an address in one way of writing it: an IPv4 peer of an IPv6 port has two."""
+    try:
+        address = ipaddress.ip_address(text)
+    except ValueError:
+        return text  # a name
+    mapped = getattr(address, 'ipv4_mapped', None)
+    return str(mapped or address)
