@@ -73,9 +73,6 @@ CANCELLED = _in(('cancelling',), code=E.CANCELLED)
 UNDISTURBED = {'bound': 1.2, 'rest': 1.2}
 POWER_UP = ('power on', 'release the brakes')
 
-#: A goal that is sent to a robot whose program is only paused is refused, and play is enough.
-_PAUSED = {phase: {'code': E.ROBOT_NOT_READY, 'steps': ('unlock', 'play')} for phase in BEFORE}
-
 
 def _safety(fault: str, cause: str, code: ErrorCode, *steps: str, play: bool = True) -> Row:
     """Return the row of a stop by the safety system; ``play``: the program is only paused."""
@@ -86,7 +83,7 @@ def _safety(fault: str, cause: str, code: ErrorCode, *steps: str, play: bool = T
 
 def _harmless(fault: str, *cause: str, steps: tuple[str, ...] = ()) -> Row:
     return Row(fault=fault, cause=cause, code=E.SUCCESSFUL, **UNDISTURBED, steps=steps,
-               differs=CANCELLED)
+               differs=_in(('cancelling',), code=E.CANCELLED, bound=0.7, rest=0.7))
 
 
 def _hangs_up(fault: str, cause: str) -> Row:
@@ -195,7 +192,7 @@ def _paused_by(fault: str, cause: str, code: ErrorCode, *steps: str) -> Row:
     The interface takes no 'stop program', so the old motion goes on with the play until the
     program reads the message that ends it; after that it has to be played again.
     """
-    return Row(fault=fault, cause=(cause,), code=code, then=S.STOPPED, travel=0.01,
+    return Row(fault=fault, cause=(cause,), code=code, then=S.STOPPED, travel=0.001,
                steps=(*steps, 'play', 'play'),
                differs=_in(BEFORE, code=E.ROBOT_NOT_READY, steps=(*steps, 'play'), travel=0.0)
                | {'settling': {'travel': 0.0}})
@@ -211,7 +208,7 @@ LOCAL = (
     Row(fault='somebody pauses the program', cause=('pause',), code=E.SUCCESSFUL, waits=True,
         steps=('play',), differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False,
                                      then=S.CONNECTED) | {
-            'cancelling': {'code': E.CANCELLED, 'waits': False, 'bound': 3.3, 'travel': 0.01,
+            'cancelling': {'code': E.CANCELLED, 'waits': False, 'bound': 3.3, 'travel': 0.001,
                            'then': S.CONNECTED, 'steps': ('play', 'play')}}),
     Row(fault='the network cable is cut', cause=('freeze all',), code=E.CONNECTION_LOST,
         bound=1.3, rest=0.7, then=S.CONNECTED, steps=('play',)),

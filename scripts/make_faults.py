@@ -1,0 +1,113 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Write doc/faults.md from the table that the tests of the fault matrix run.
+
+What users are told about faults is what is tested, word by word. A test compares the file with the
+table; this script brings it up to date::
+
+    python scripts/make_faults.py
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+import sys
+from typing import TYPE_CHECKING
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+PAGE = CHECKOUT / 'doc' / 'faults.md'
+
+if TYPE_CHECKING:
+    from fault_table import Row
+
+HEAD = """# What goes wrong, and what becomes of the goal
+
+Made by `scripts/make_faults.py` from the table that `test/faults` runs against the simulated
+controller: every fault in every phase of a goal. Do not edit.
+
+Whatever happens, the goal ends with its [code and sentence](errors.md), the arm comes to rest, and
+what was interrupted does not go on by itself: not when somebody unlocks the robot, not when
+somebody plays the program. Then `~/status` says what is needed, and after the steps of the last
+column the next goal works.
+
+Times count from the fault, or from the goal if it is sent later; "as without" is a goal that takes
+no notice. They hold for the parameters as they are by default, but for `node_timeout`, which is
+0.4 s instead of 5 s, and for goals with a `goal_time_tolerance` of 1.4 s and a `path_tolerance`
+of 4 mm. The sockets of the robot program are called as the parameters of their ports. "Half-open":
+the connection seems to be there, and nothing comes through.
+
+"""
+
+HEADLESS_HEAD = """## Headless operation
+
+The driver sends the robot program, and stops it after a stop of the robot. So no joint moves
+between the fault and the next goal, also when a third client unlocks the arm and plays.
+
+"""
+
+LOCAL_HEAD = """## Local control
+
+The program stands on the pendant, and the robot takes no commands from the network. A program that
+is only paused goes on with the play, until it reads in its next cycles the message that ends it.
+By then a joint has moved by {travel:g} rad at most (the simulated ones do not move at all, real
+ones begin slowly); after that it has to be played again.
+
+"""
+
+TITLES = ('fault', 'the goal ends', 'result within', 'arm stands within', 'then the driver is',
+          'what to do')
+
+
+def page() -> str:
+    """Return the text of doc/faults.md."""
+    from fault_table import HEADLESS, LOCAL, PHASES
+
+    travel = max(row.at(phase).travel for row in LOCAL for phase in PHASES)
+    return ''.join((
+        HEAD, '## Phases\n\n', _table(('phase', 'when'), PHASES.items()), '\n',
+        HEADLESS_HEAD, _table(TITLES, map(_cells, HEADLESS)), '\n',
+        LOCAL_HEAD.format(travel=travel),
+        _table(TITLES, map(_cells, LOCAL))))
+
+
+def _cells(row: Row) -> Sequence[str]:
+    return (row.fault, _by_phase(row, lambda at: ('goes on, ' if at.waits else '') + at.code.name),
+            _by_phase(row, lambda at: f'{at.bound:g} s' if _disturbs(at) else 'as without'),
+            _by_phase(row, lambda at: (
+                f'{at.rest:g} s' if _disturbs(at) or at.waits else 'as without')),
+            _by_phase(row, lambda at: at.then.name),
+            _by_phase(row, lambda at: ', '.join(_needed(at.steps)) or 'nothing'))
+
+
+def _disturbs(row: Row) -> bool:
+    return row.code.name != 'SUCCESSFUL'
+
+
+def _needed(steps: Sequence[str]) -> list[str]:
+    """Return the steps without the vain play of a third client."""
+    return [step for i, step in enumerate(steps) if tuple(steps[i:i + 2]) != ('play', 'resend')]
+
+
+def _by_phase(row: Row, tell: Callable[[Row], str]) -> str:
+    """Return what is told of a row, and the phases in which something else is."""
+    from fault_table import PHASES
+
+    usual = tell(row)
+    phases_of: dict[str, list[str]] = {}
+    for phase in PHASES:
+        phases_of.setdefault(tell(row.at(phase)), []).append(phase)
+    phases_of.pop(usual, None)
+    return '<br>'.join([usual, *(f'{", ".join(phases)}: {text}'
+                                 for text, phases in phases_of.items())])
+
+
+def _table(titles: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = (titles, ['---'] * len(titles), *rows)
+    return ''.join('| ' + ' | '.join(cells) + ' |\n' for cells in lines)
+
+
+if __name__ == '__main__':
+    sys.path[:0] = [str(CHECKOUT), str(CHECKOUT / 'test' / 'support')]
+    PAGE.write_text(page(), encoding='utf-8')

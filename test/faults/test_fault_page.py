@@ -1,0 +1,21 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What users are told about faults is what is tested."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+SCRIPT = CHECKOUT / 'scripts' / 'make_faults.py'
+
+pytestmark = pytest.mark.skipif(not SCRIPT.exists(), reason='tests of a package, not a checkout')
+
+
+def test_the_page_about_faults_is_that_of_the_table():
+    spec = importlib.util.spec_from_file_location('make_faults', SCRIPT)
+    make_faults = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(make_faults)
+    assert make_faults.PAGE.read_text(encoding='utf-8') == make_faults.page(), \
+        'run python scripts/make_faults.py'
