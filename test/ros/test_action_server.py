@@ -37,7 +37,7 @@ def test_a_goal_moves_the_arm_and_tells_about_it(cell):
     start = cell.T_base_tcp
     status, result = cell.run(cell.goal((0.6, 0.03, 0.0, 0.0), (1.2, 0.03, 0.03, 0.0)))
     assert (status, result.error_code) == (SUCCEEDED, ErrorCode.SUCCESSFUL), result.error_string
-    assert len(result.report) == 2
+    assert [line[:8] for line in result.report[:3]] == ['point 0:', 'point 1:', 'clearanc']
     x, y, z = start.position
     assert cell.T_base_tcp.position == pytest.approx((x + 0.03, y + 0.03, z), abs=1e-4)
     assert len(cell.feedback) > 10
@@ -118,7 +118,7 @@ def test_validate_only_plans_and_moves_nothing(single_cell):
     status, result = single_cell.run(
         single_cell.goal((0.5, 0.02, 0.0, 0.0), validate_only=True))
     assert (status, result.error_code) == (SUCCEEDED, 0)
-    assert len(result.report) == 1
+    assert [line[:8] for line in result.report[:2]] == ['point 0:', 'clearanc']
     assert single_cell.sim.state().q == q
     assert not single_cell.feedback
 
