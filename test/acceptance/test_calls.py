@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.motion.state import RobotMode
 from ur_cartesian_driver.program.render import as_program
 from ur_cartesian_driver.protocol.rtde import RtdeClient
-from ur_cartesian_driver.robot.calls import Dashboard, Recover, SetTcp
+from ur_cartesian_driver.robot.calls import Dashboard, Recover, SetPayload, SetTcp
 from ur_cartesian_driver.sim.modes import SafetyEvent
 
 # A slow controller does the same for less.
@@ -287,6 +287,15 @@ def test_calls_are_answered_when_the_robot_loop_dies_or_the_driver_closes(make_d
     assert not pending.result(5.0).ok
     assert driver.call(SetTcp(T_flange_tcp=NOZZLE)).result(0.0).text == (
         'The driver is closed; open it.')
+
+
+def test_a_defect_of_ours_is_an_answer_too(driver):
+    broken = SetPayload(mass=1.0)
+    object.__setattr__(broken, 'mass', 'heavy')
+    answer = driver.call(broken).result(5.0)
+    assert not answer.ok
+    assert answer.text.startswith('The driver has a defect')
+    assert driver.set_payload(1.0).ok
 
 
 @pytest.mark.ur_sim(frequency=125.0, power='off', power_on_time=0.05, brake_release_time=0.05)

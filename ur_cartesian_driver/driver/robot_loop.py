@@ -212,7 +212,12 @@ class RobotLoop:
                 ok=False, text=f'{MOST_CALLS} calls are being carried out; wait for some.')))
 
     async def _answer(self, request: CallRobot) -> None:
-        answer = await self._desk.answer(request.call)
+        try:
+            answer = await self._desk.answer(request.call)
+        except Exception as error:  # who called waits for an answer
+            text = f'The driver has a defect, {type(error).__name__}: {error}.'
+            self._log(logging.ERROR, f'{text} It was asked for {request.call}.')
+            answer = Answer(ok=False, text=text)
         self._notify(CallAnswered(number=request.number, answer=answer))
 
     async def _ask_serial_number(self) -> None:
