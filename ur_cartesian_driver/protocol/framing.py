@@ -218,6 +218,20 @@ def decode_text(data: bytes) -> str:
     return data.decode('utf-8', 'backslashreplace')
 
 
+#: Longest text of a robot that is shown to people.
+_SHOWN = 400
+
+
+def one_line(text: str) -> str:
+    """
+    Return a text of a robot as it may stand in a log or a message: one line, of bounded length.
+
+    Control characters could forge lines, or speak to the terminal.
+    """
+    shown = ''.join(c if c.isprintable() else ' ' for c in text[:_SHOWN]).strip()
+    return f'{shown}...' if len(text) > _SHOWN else shown
+
+
 def cut_off(what: str, rest: bytes) -> RemoteProtocolError:
     """Return the error for a stream that ended too early."""
     return RemoteProtocolError(f'The stream ended inside a {what}: {quote(rest)}.')

@@ -16,6 +16,7 @@ from typing import NoReturn
 from ur_cartesian_driver.kinematics.robots import Geometry
 from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.protocol import primary
+from ur_cartesian_driver.protocol.framing import one_line
 from ur_cartesian_driver.robot.transport import Connection, dial, Retry
 
 #: How long the robot may take to report its configuration [s].
@@ -124,9 +125,10 @@ class PrimaryClient:
         match message:
             case primary.ErrorCodeMessage(level=level) if (
                     primary.ReportLevel.WARNING <= level <= primary.ReportLevel.CRITICAL_FAULT):
-                self._listener.error(f'the robot reports {message.label} {message.text}'.rstrip())
+                self._listener.error(f'the robot reports {message.label} '
+                                     f'{one_line(message.text)}'.rstrip())
             case primary.RuntimeExceptionMessage():
                 self._listener.error(f'the robot program failed in line {message.line}, column '
-                                     f'{message.column}: {message.text}')
+                                     f'{message.column}: {one_line(message.text)}')
             case primary.TextMessage():
-                self._listener.text(message.text)
+                self._listener.text(one_line(message.text))
