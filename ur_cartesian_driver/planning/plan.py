@@ -36,6 +36,7 @@ from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.clearance import Clearance
 from ur_cartesian_driver.planning.clearance import remarks as clearance_remarks
 from ur_cartesian_driver.planning.controlled import carried, tools
+from ur_cartesian_driver.planning.leg import Leg, Timing
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.path import Arc
 from ur_cartesian_driver.planning.postures import (
@@ -48,7 +49,7 @@ from ur_cartesian_driver.planning.reference import reference_path
 from ur_cartesian_driver.planning.report import ignored, note, smallest
 from ur_cartesian_driver.planning.route import Route, SAME_SOLUTION
 from ur_cartesian_driver.planning.spoken import poses_only, spoken
-from ur_cartesian_driver.planning.timing import Leg, schedule, Timing
+from ur_cartesian_driver.planning.timing import schedule
 from ur_cartesian_driver.planning.tolerances import with_default_tolerances
 from ur_cartesian_driver.planning.validate import (
     check,
@@ -175,7 +176,9 @@ class _Planner:
         begin = 1 if self._stands_at_first() else 0
         stops = [0.0, *(point.time for point in self.goal.waypoints)][begin:]
         times = [after - before if self.timed else None for before, after in pairwise(stops)]
-        return self.route.legs(begin, self.state.actual_tcp_pose, self.state.actual_q, times)
+        legs = self.route.legs(begin, self.state.actual_tcp_pose, self.state.actual_q, times)
+        self.samples = self.route.survey.samples()
+        return legs
 
     # -- primitives ------------------------------------------------------------------------------
 
@@ -254,7 +257,7 @@ class _Planner:
         """
         assert isinstance(leg.path, Arc)
         place = segment_field(leg.index, 'via')
-        passing = self.route.survey.samples().joints_at(leg.index, leg.path.u_via)
+        passing = self.samples.joints_at(leg.index, leg.path.u_via)
         # The orientation of the via does not shape the arc, so go on from there to its pose.
         q = self.reach.nearest(via, passing, place)
         named = named_joints(segment.via_posture, self.options.tf_prefix)

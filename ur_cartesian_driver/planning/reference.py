@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning.corner import Corner, corner_rows, path_rows
+from ur_cartesian_driver.planning.leg import Leg, Timing
 from ur_cartesian_driver.planning.path import JointLine, Path
 from ur_cartesian_driver.planning.pose_rows import Floats
 from ur_cartesian_driver.planning.profile import Profile, times_at
-from ur_cartesian_driver.planning.timing import Leg, Timing
 
 #: The fewest pieces of a joint move, for the sake of its times.
 _LEAST_OF_JOINTS = 8

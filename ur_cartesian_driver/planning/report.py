@@ -10,7 +10,7 @@ from math import degrees
 from ur_cartesian_driver.motion.goal import Goal, SegmentType
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, OptimoveJ, Primitive
-from ur_cartesian_driver.planning.timing import Leg, Timing
+from ur_cartesian_driver.planning.leg import Leg, Timing
 from ur_cartesian_driver.planning.validate import is_optimized, is_timed, segment_of
 
 #: How many points a remark lists before it counts the rest.

@@ -12,8 +12,7 @@ move (``on_posture_change: movej``): it is put in its place, and the rest is loo
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from math import degrees
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,17 +25,17 @@ from ur_cartesian_driver.motion.errors import (
     NearSingularity,
     Unreachable,
 )
-from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
+from ur_cartesian_driver.motion.goal import Goal, SegmentType
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.corner import Corner, corners, Meeting
+from ur_cartesian_driver.planning.drafts import can_blend, Draft, Drafts, IN_JOINTS
+from ur_cartesian_driver.planning.leg import Leg
 from ur_cartesian_driver.planning.lookahead import farthest_way, Followed, followed, in_joints
 from ur_cartesian_driver.planning.margins import too_near
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.path import (
     JointLine,
-    Line,
-    Path,
     same,
     SAME_POSITION,
     trim_end,
@@ -44,17 +43,12 @@ from ur_cartesian_driver.planning.path import (
 from ur_cartesian_driver.planning.pose_rows import compose_rows
 from ur_cartesian_driver.planning.postures import missed, named_joints, Reach
 from ur_cartesian_driver.planning.samples import Piece, segments_of
-from ur_cartesian_driver.planning.spoken import spoken_radius
 from ur_cartesian_driver.planning.survey import Survey, Surveyed
-from ur_cartesian_driver.planning.timing import Leg
 from ur_cartesian_driver.planning.validate import (
-    arc_of,
-    check_blends_fit,
     no_way,
     PLAIN,
     point_field,
     segment_field,
-    segment_of,
 )
 
 #: Solutions that differ by less are one [rad].
@@ -64,56 +58,9 @@ _SAME_LINE = 0.05
 #: Legs of the first run where lines may turn into joint moves; of later ones ever more.
 _FIRST_RUN = 8
 
-_LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
-_OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
-_IN_JOINTS = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
-#: Motions that can only be blended into from some others; all else stops before them.
-_BLENDS_FROM = {
-    SegmentType.JOINT: (_LINEAR, _JOINT),
-    SegmentType.OPTIMIZED_LINEAR: (_LINEAR, _JOINT, *_OPTIMIZED),
-    SegmentType.OPTIMIZED_JOINT: (_LINEAR, _JOINT, *_OPTIMIZED),
-}
+_JOINT = SegmentType.JOINT
 #: Why a line or an arc may become a joint move.
 _NO_STRAIGHT_WAY = (InvalidPosture, NearSingularity, JointLimitExceeded, Unreachable)
-
-
-@dataclass(slots=True)
-class _Draft:
-    """A leg in the making."""
-
-    index: int
-    kind: SegmentType
-    segment: Segment
-    radius: float
-    #: None = a joint move whose start is not known yet.
-    path: Path | None = None
-    joints: Joints | None = None
-    before: Corner | None = None
-    after: Corner | None = None
-    #: How far its path has been looked at, where that ends before the leg does.
-    seen: float = 1.0
-
-    @property
-    def begin(self) -> float:
-        """The ``u`` where its path is joined."""
-        return self.before.join if self.before else 0.0
-
-    @property
-    def leaves(self) -> float:
-        """The ``u`` where its path is left, once its corner is known."""
-        return self.after.leave if self.after else 1.0
-
-    @property
-    def way(self) -> Path:
-        """Its path, which is known by now."""
-        assert self.path is not None
-        return self.path
-
-    @property
-    def arrives(self) -> Joints:
-        """Its configuration at the end, which is known by now."""
-        assert self.joints is not None
-        return self.joints
 
 
 class Route:
@@ -132,6 +79,7 @@ class Route:
         self.goal, self.targets, self.reach, self.options = goal, targets, reach, options
         self.remarks, self.why = remarks, why
         self.survey = Survey(reach.arm)
+        self._drafting = Drafts(goal, targets, options, remarks)
         self._farthest = farthest_way(reach)
         self._replaces = options.on_posture_change == 'movej'
 
@@ -144,11 +92,11 @@ class Route:
         :param times: of each leg [s]; None = speeds decide.
         :raises GoalRefused: the arm cannot go there.
         """
-        self._start, self._q_start, self._q = T_base_tcp, q, q
-        self._drafts = self._drafted(begin)
+        self._q_start = self._q = q
+        self._drafts = self._drafting.all(begin, T_base_tcp)
         k, limit = 0, _FIRST_RUN if self._replaces else len(self._drafts)
         while k < len(self._drafts):
-            if self._drafts[k].kind in _IN_JOINTS:
+            if self._drafts[k].kind in IN_JOINTS:
                 self._joint_move(k)
                 k += 1
                 continue
@@ -159,55 +107,12 @@ class Route:
         self._say_what_stops()
         return list(self._made(times))
 
-    # -- drafts ----------------------------------------------------------------------------------
-
-    def _drafted(self, begin: int) -> list[_Draft]:
-        drafts: list[_Draft] = []
-        start, last = self._start, len(self.goal.waypoints) - 1
-        for i in range(begin, last + 1):
-            segment = segment_of(self.goal, i)
-            kind = _LINEAR if segment.type == SegmentType.AUTO else SegmentType(segment.type)
-            radius = 0.0 if i == last else spoken_radius(
-                segment.blend_radius, i, self.options.dialect, self.remarks)
-            draft = _Draft(i, kind, segment, radius)
-            if kind not in _IN_JOINTS:
-                draft.path = self._straight(i, kind, segment, start)
-            drafts.append(draft)
-            start = draft.path.end if draft.path else self.targets[i]
-        self._check_first_blend(drafts)
-        return drafts
-
-    def _straight(self, i: int, kind: SegmentType, segment: Segment, start: Pose) -> Path:
-        """Return the line or the arc of a segment."""
-        if kind != SegmentType.CIRCULAR:
-            return Line.between(start, self.targets[i])
-        assert segment.via is not None
-        arc = arc_of(i, start, self.goal.T_base_frame @ segment.via, self.targets[i],
-                     segment.arc_mode)
-        off = arc.end.angle_to(self.targets[i])
-        if off > self.options.start_tolerance_angle:
-            self.remarks.append(
-                f'point {i}: the orientation of the point is ignored, because arc_mode FIXED '
-                f'keeps it to the tangent; it arrives {degrees(off):.1f} degrees off')
-        return arc
-
-    def _check_first_blend(self, drafts: list[_Draft]) -> None:
-        first = drafts[0]
-        if first.radius <= 0.0:
-            return
-        target = self.targets[first.index]
-        if same(self._start, target) and not self.goal.waypoints[first.index].posture:
-            first.radius = 0.0  # the robot stands there already, and the report says so
-            return
-        check_blends_fit(self.goal, first.index, self._start.distance_to(target), 0.0,
-                         first.radius)
-
     # -- runs ------------------------------------------------------------------------------------
 
     def _end_of_run(self, k: int, limit: int) -> int:
         stop = k + 1
         while (stop < len(self._drafts) and stop - k < limit
-               and self._drafts[stop].kind not in _IN_JOINTS):
+               and self._drafts[stop].kind not in IN_JOINTS):
             stop += 1
         return stop
 
@@ -294,7 +199,7 @@ class Route:
             return draft.after.leave
         return trim_end(draft.way, draft.radius) if self._blends(n) else 1.0
 
-    def _arrivals(self, drafts: list[_Draft], found: Followed, segments: np.ndarray
+    def _arrivals(self, drafts: list[Draft], found: Followed, segments: np.ndarray
                   ) -> list[Joints]:
         """Return the configuration of the waypoint at the end of each leg, as far as found."""
         last = np.searchsorted(segments, [draft.index for draft in drafts], side='right') - 1
@@ -311,13 +216,13 @@ class Route:
             q[rounded] = np.where(np.isnan(there), q[rounded], there)
         return [(a, b, c, d, e, f) for a, b, c, d, e, f in q.tolist()]
 
-    def _leave(self, draft: _Draft, found: Followed) -> None:
+    def _leave(self, draft: Draft, found: Followed) -> None:
         draft.seen = self._end(draft.index - self._drafts[0].index)
         if len(found.q):
             a, b, c, d, e, f = found.q[-1].tolist()
             self._q = (a, b, c, d, e, f)
 
-    def _misses(self, draft: _Draft, q: Joints) -> InvalidPosture | None:
+    def _misses(self, draft: Draft, q: Joints) -> InvalidPosture | None:
         """Return the refusal of a straight or circular leg that misses its posture."""
         posture = self.goal.waypoints[draft.index].posture
         if not posture:
@@ -346,8 +251,7 @@ class Route:
         draft.kind, draft.path, draft.before = _JOINT, None, None
         if n + 1 < len(self._drafts) and self._drafts[n + 1].path is not None:
             after = self._drafts[n + 1]
-            after.path = self._straight(after.index, after.kind, after.segment,
-                                        self.targets[draft.index])
+            after.path = self._drafting.straight(after, self.targets[draft.index])
 
     # -- joint moves -----------------------------------------------------------------------------
 
@@ -424,11 +328,7 @@ class Route:
         """Tell whether a leg is blended into the next one."""
         if n + 1 >= len(self._drafts) or self._drafts[n].radius <= SAME_POSITION:
             return False  # the wire rounds so small a radius to none
-        return self._can_blend(self._drafts[n], self._drafts[n + 1])
-
-    def _can_blend(self, first: _Draft, second: _Draft) -> bool:
-        allowed = _BLENDS_FROM.get(second.kind)
-        return allowed is None or first.kind in allowed
+        return can_blend(self._drafts[n], self._drafts[n + 1])
 
     def _check_overlap(self, n: int) -> None:
         draft = self._drafts[n]
@@ -440,7 +340,7 @@ class Route:
     def _say_what_stops(self) -> None:
         for n, draft in enumerate(self._drafts[:-1]):
             after = self._drafts[n + 1]
-            if draft.radius > SAME_POSITION and not self._can_blend(draft, after):
+            if draft.radius > SAME_POSITION and not can_blend(draft, after):
                 self.remarks.append(
                     f'point {draft.index}: stops instead of blending, because the robot cannot '
                     f'blend from {draft.kind.name} into {after.kind.name}')
@@ -473,6 +373,6 @@ class Route:
         waits = f'; its {leg.time:g} s are not waited' if leg.time else ''
         self.remarks.append(f'point 0: the robot stands there already{waits}')
         self.why[0] = ['the robot stands there already']
-        kind = leg.kind if leg.kind == _JOINT else _LINEAR
+        kind = leg.kind if leg.kind == _JOINT else SegmentType.LINEAR
         return replace(leg, kind=kind, time=None, segment=replace(
             PLAIN, type=leg.segment.type), waypoint=replace(leg.waypoint, twist=(0.0,) * 6))

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.corner import Corner
+from ur_cartesian_driver.planning.leg import Pace
 from ur_cartesian_driver.planning.lookahead import Followed
 from ur_cartesian_driver.planning.margins import measured, Nearest, nearest_of
 from ur_cartesian_driver.planning.pose_rows import Floats
 from ur_cartesian_driver.planning.samples import Ints, Piece, Samples
-from ur_cartesian_driver.planning.timing import Pace
 
 # Places nearer than this are one, and say nothing about a speed.
 _NO_WAY = 1e-12

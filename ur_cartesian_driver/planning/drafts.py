@@ -1,0 +1,139 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Legs in the making: what a goal alone says of its segments, before the arm is asked.
+
+Lines and arcs are known from the points; joint moves are not, because they begin in the
+configuration in which the way before them arrives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import degrees
+
+from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.planning.corner import Corner
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.path import Line, Path, same
+from ur_cartesian_driver.planning.spoken import spoken_radius
+from ur_cartesian_driver.planning.validate import arc_of, check_blends_fit, segment_of
+
+_LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
+_OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
+#: Motions on straight lines in joint space.
+IN_JOINTS = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
+#: Motions that can only be blended into from some others; all else stops before them.
+_BLENDS_FROM = {
+    SegmentType.JOINT: (_LINEAR, _JOINT),
+    SegmentType.OPTIMIZED_LINEAR: (_LINEAR, _JOINT, *_OPTIMIZED),
+    SegmentType.OPTIMIZED_JOINT: (_LINEAR, _JOINT, *_OPTIMIZED),
+}
+
+
+@dataclass(slots=True)
+class Draft:
+    """A leg in the making."""
+
+    index: int
+    kind: SegmentType
+    segment: Segment
+    radius: float
+    #: None = a joint move whose start is not known yet.
+    path: Path | None = None
+    joints: Joints | None = None
+    before: Corner | None = None
+    after: Corner | None = None
+    #: How far its path has been looked at, where that ends before the leg does.
+    seen: float = 1.0
+
+    @property
+    def begin(self) -> float:
+        """The ``u`` where its path is joined."""
+        return self.before.join if self.before else 0.0
+
+    @property
+    def leaves(self) -> float:
+        """The ``u`` where its path is left, once its corner is known."""
+        return self.after.leave if self.after else 1.0
+
+    @property
+    def way(self) -> Path:
+        """Its path, which is known by now."""
+        assert self.path is not None
+        return self.path
+
+    @property
+    def arrives(self) -> Joints:
+        """Its configuration at the end, which is known by now."""
+        assert self.joints is not None
+        return self.joints
+
+
+class Drafts:
+    """
+    Makes the drafts of one goal.
+
+    :param targets: the poses of all waypoints in base.
+    :param remarks: what is ignored or changed is added to these.
+    """
+
+    def __init__(self, goal: Goal, targets: Sequence[Pose], options: PlanningOptions,
+                 remarks: list[str]) -> None:
+        """Take what the legs are made of."""
+        self._goal, self._targets, self._options = goal, targets, options
+        self._remarks = remarks
+
+    def all(self, begin: int, start: Pose) -> list[Draft]:
+        """
+        Return the drafts from a waypoint on.
+
+        :param start: where the tool is [base].
+        """
+        drafts: list[Draft] = []
+        before, last = start, len(self._goal.waypoints) - 1
+        for i in range(begin, last + 1):
+            segment = segment_of(self._goal, i)
+            kind = _LINEAR if segment.type == SegmentType.AUTO else SegmentType(segment.type)
+            radius = 0.0 if i == last else spoken_radius(
+                segment.blend_radius, i, self._options.dialect, self._remarks)
+            draft = Draft(i, kind, segment, radius)
+            if kind not in IN_JOINTS:
+                draft.path = self.straight(draft, before)
+            drafts.append(draft)
+            before = draft.path.end if draft.path else self._targets[i]
+        self._check_first_blend(drafts[0], start)
+        return drafts
+
+    def straight(self, draft: Draft, start: Pose) -> Path:
+        """Return the line or the arc of a segment from a pose."""
+        i, segment = draft.index, draft.segment
+        if draft.kind != SegmentType.CIRCULAR:
+            return Line.between(start, self._targets[i])
+        assert segment.via is not None
+        arc = arc_of(i, start, self._goal.T_base_frame @ segment.via, self._targets[i],
+                     segment.arc_mode)
+        off = arc.end.angle_to(self._targets[i])
+        if off > self._options.start_tolerance_angle:
+            self._remarks.append(
+                f'point {i}: the orientation of the point is ignored, because arc_mode FIXED '
+                f'keeps it to the tangent; it arrives {degrees(off):.1f} degrees off')
+        return arc
+
+    def _check_first_blend(self, first: Draft, start: Pose) -> None:
+        if first.radius <= 0.0:
+            return
+        target = self._targets[first.index]
+        if same(start, target) and not self._goal.waypoints[first.index].posture:
+            first.radius = 0.0  # the robot stands there already, and the report says so
+            return
+        check_blends_fit(self._goal, first.index, start.distance_to(target), 0.0, first.radius)
+
+
+def can_blend(first: Draft, second: Draft) -> bool:
+    """Tell whether the robot can blend from the motion of one leg into that of the next."""
+    allowed = _BLENDS_FROM.get(second.kind)
+    return allowed is None or first.kind in allowed

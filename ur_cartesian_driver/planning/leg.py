@@ -1,0 +1,75 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the planner knows of one segment: its way first, then how fast it goes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ur_cartesian_driver.motion.goal import Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.planning.corner import Corner
+from ur_cartesian_driver.planning.margins import Nearest
+from ur_cartesian_driver.planning.path import Path
+from ur_cartesian_driver.planning.profile import Profile
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How long a segment takes at the least, at the pace of the place where joints are fastest."""
+
+    #: [s].
+    time: float
+    #: The number of the joint, and where on the segment.
+    joint: int
+    fraction: float
+    #: How long the busiest joint needs at its limit for all of it [s].
+    mean: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Leg:
+    """A segment whose way is decided and whose speed is not."""
+
+    index: int
+    #: What will be sent: AUTO resolved, JOINT where a posture cannot be reached otherwise.
+    kind: SegmentType
+    waypoint: Waypoint
+    segment: Segment
+    path: Path
+    #: Configuration at the end [rad].
+    joints: Joints
+    #: What the joints and the singularities say about it.
+    pace: Pace
+    nearest: Nearest
+    #: Time that the goal gives it [s]; None = speeds decide.
+    time: float | None
+    #: The corners at its ends; None = it stands there.
+    before: Corner | None = None
+    after: Corner | None = None
+    #: Where the path is joined after the corner before, and left for the corner after.
+    u_before: float = 0.0
+    u_after: float = 1.0
+    #: The part of it between its corners; blends that touch leave nearly nothing.
+    share: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Timing:
+    """How fast one leg goes."""
+
+    #: What the wire carries; ``wire_time`` 0 = speed and acceleration count.
+    velocity: float
+    acceleration: float
+    wire_time: float
+    #: The leading quantity, its unit, and the motion between the corners.
+    unit: str
+    profile: Profile
+    #: Expected time, half of each corner included [s].
+    duration: float
+    #: Time in the corner after it [s], 0 without one.
+    corner: float = 0.0
+    #: Why, as the end of "because ...".
+    reason: str = ''
+    #: What was changed, empty if nothing.
+    remark: str = ''
