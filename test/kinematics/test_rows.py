@@ -14,7 +14,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.closed_form import wrist_centre
 from ur_cartesian_driver.kinematics.inverse import nearest, solutions
 from ur_cartesian_driver.kinematics.robots import MODELS
-from ur_cartesian_driver.kinematics.rows import branches, follow, postures
+from ur_cartesian_driver.kinematics.rows import branches, follow, nearest_rows, postures
 from ur_cartesian_driver.kinematics.shape import shape_of
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row, pose_rows
 
@@ -167,6 +167,18 @@ def test_poses_without_any_order_are_followed_as_the_nearest_too():
     poses = UR5E.forward_rows(random_rows(100, seed=3))
     path = follow(UR5E, poses, READY)
     np.testing.assert_allclose(path.q, one_by_one(UR5E, poses, READY), atol=1e-6)
+
+
+@pytest.mark.parametrize('is_calibrated', [False, True])
+def test_the_nearest_of_many_are_the_nearest_of_each(is_calibrated, calibrated_arm):
+    arm = calibrated_arm('ur10e') if is_calibrated else Arm(MODELS['ur10e'])
+    rows = random_rows(60, seed=5)
+    near = rows + np.random.default_rng(6).uniform(-0.3, 0.3, rows.shape)
+    poses = arm.forward_rows(rows)
+    poses[::10, 2] += 3.0  # out of reach
+    wanted = [nearest(arm, pose_from_row(pose), tuple(q)) or (nan,) * 6
+              for pose, q in zip(poses, near, strict=True)]
+    np.testing.assert_allclose(nearest_rows(arm, poses, near), wanted, atol=1e-6)
 
 
 @pytest.mark.parametrize('name', MODELS)
