@@ -28,6 +28,25 @@ def test_every_change_has_an_outcome_in_every_state(state, change):
 
 
 @pytest.mark.parametrize('state', list(ConnectionState))
+def test_every_state_can_come_about_and_has_a_way_to_a_goal(state):
+    def reachable(start):
+        seen, ahead = set(), {start}
+        while ahead:
+            seen |= ahead
+            ahead = {after(s, change) for s in ahead for change in Change} - seen
+        return seen
+
+    assert state in reachable(ConnectionState.DISCONNECTED)
+    assert ConnectionState.EXECUTING in reachable(state)
+
+
+@pytest.mark.parametrize('change', list(Change))
+def test_a_stopped_robot_takes_goals_only_when_it_is_free_and_its_program_reads(change):
+    assert after(ConnectionState.STOPPED, change) in (
+        ConnectionState.STOPPED, ConnectionState.CONNECTED, ConnectionState.DISCONNECTED)
+
+
+@pytest.mark.parametrize('state', list(ConnectionState))
 def test_a_lost_robot_is_always_disconnected(state):
     assert after(state, Change.ROBOT_LOST) is ConnectionState.DISCONNECTED
 

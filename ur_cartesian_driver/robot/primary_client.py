@@ -23,7 +23,7 @@ from ur_cartesian_driver.robot.transport import Connection, dial, Retry
 REPORT_TIMEOUT = 5.0
 #: A robot reports its state ten times a second; a connection that is silent for so long is dead
 #: [s], and what would be sent on it (stop program) would be lost.
-SILENCE = 2.0
+SILENCE = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,18 +84,28 @@ class PrimaryClient:
             self._on_data, lambda reason: None if closed.done() else closed.set_result(reason))
         try:
             await dial(self._connection, host, port)
-            await asyncio.wait({closed}, timeout=REPORT_TIMEOUT)
-            if not self._reported and not closed.done():
-                raise OSError(f'{host} port {port}: the robot does not report its configuration')
-            while not closed.done():
+            begin = asyncio.get_running_loop().time()
+            while True:
                 self._heard = False
                 await asyncio.wait({closed}, timeout=SILENCE)
-                if not self._heard and not closed.done():
-                    return f'{host} port {port}: the robot sent nothing for {SILENCE:g} s'
-            return closed.result()
+                if closed.done():
+                    return closed.result()
+                self._watch(f'{host} port {port}', asyncio.get_running_loop().time() - begin)
         finally:
             self._connection.close()
             self._connection = None
+
+    def _watch(self, where: str, age: float) -> None:
+        """
+        Look at a connection once in a while.
+
+        :param age: how long it has been there [s].
+        :raises OSError: it is dead, or not one to a robot.
+        """
+        if not self._reported and age > REPORT_TIMEOUT:
+            raise OSError(f'{where}: the robot does not report its configuration')
+        if self._reported and not self._heard:
+            raise OSError(f'{where}: the robot sent nothing for {SILENCE:g} s')
 
     def _on_data(self, data: bytes) -> None:
         self._heard = True

@@ -49,6 +49,8 @@ def _elbow_velocity(controller: Controller) -> Vector3:
 def _tcp_acceleration(controller: Controller) -> Vector6:
     """Return linear and angular acceleration of the TCP [m/s^2, rad/s^2]."""
     motion = controller.motion
+    if not any(motion.qd) and not any(motion.qdd):
+        return _ZERO6  # most arms stand most of the time
     frames = controller.arm.frames(motion.q)
     tcp = point_motion(frames, motion.qd, motion.qdd,
                        flange_point(frames, motion.T_flange_tcp.position))

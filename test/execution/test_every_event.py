@@ -1,0 +1,107 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Whatever happens to a goal, in whatever order, it ends once, with a code and a sentence."""
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.execution import Finish, Order, SendPoints, TrajectoryMachine
+from ur_cartesian_driver.execution.trajectory import State, TRANSITIONS
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.events import (
+    CancelRequested,
+    LinkLost,
+    StateReceived,
+    Tick,
+    TrajectoryEnded,
+    TrajectoryResult,
+)
+from ur_cartesian_driver.motion.goal import Tolerance
+from ur_cartesian_driver.motion.plan import ReferencePath
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyStatus
+
+POINTS = 3
+NOZZLE = Pose((0.0, 0.0, 0.1), (0.0, 0.0, 0.0, 1.0))
+#: What any goal may take to its end once its robot is gone for good [s].
+BOUND = 10.0
+
+
+def machine(T_flange_tcp):
+    poses = np.array([[0.1 * i, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0] for i in range(POINTS + 1)])
+    return TrajectoryMachine(Order(
+        points=POINTS, duration=3.0, T_flange_tcp=T_flange_tcp, reference=ReferencePath(
+            poses=poses, point=np.maximum(np.arange(POINTS + 1) - 1, 0).astype(np.int32),
+            time=np.arange(POINTS + 1.0)),
+        path_tolerance=Tolerance(position=(0.01,) * 3),
+        goal_tolerance=Tolerance(position=(0.001,) * 3)))
+
+
+def robot(part=0.0, off=0.0, speed=0.0, begun=0, T_flange_tcp=IDENTITY, **changes):
+    """Return a packet of a robot so far along its path [0..1] and so far beside it [m]."""
+    target = Pose((0.3 * part, 0.0, 0.2), (0.0, 0.0, 0.0, 1.0))
+    actual = Pose((0.3 * part, off, 0.2), (0.0, 0.0, 0.0, 1.0))
+    return RobotState(
+        actual_q=(0.0,) * 6, actual_qd=(speed, 0.0, 0.0, 0.0, 0.0, 0.0), target_tcp_pose=target,
+        actual_tcp_pose=actual, target_tcp_twist=(speed, 0.0, 0.0, 0.0, 0.0, 0.0),
+        points_begun=begun, T_flange_tcp=T_flange_tcp,
+        **{'timestamp': 0.0, 'runtime_state': RuntimeState.PLAYING} | changes)
+
+
+SAFETY = [SafetyStatus.NORMAL_MODE, SafetyStatus.NORMAL_MODE, SafetyStatus.PROTECTIVE_STOPPED,
+          SafetyStatus.EMERGENCY_STOPPED, SafetyStatus.FAULT]
+PACKETS = st.builds(
+    robot, part=st.floats(0.0, 1.0), off=st.sampled_from([0.0, 0.0, 0.005, 0.02]),
+    speed=st.sampled_from([0.0, 0.1]), begun=st.integers(0, POINTS),
+    T_flange_tcp=st.sampled_from([IDENTITY, NOZZLE]), safety_status=st.sampled_from(SAFETY),
+    runtime_state=st.sampled_from([RuntimeState.PLAYING] * 4 + list(RuntimeState)),
+    robot_mode=st.sampled_from([RobotMode.RUNNING] * 4 + [RobotMode.POWER_OFF]),
+    speed_scaling=st.sampled_from([1.0, 0.0]))
+EVENTS = st.one_of(
+    PACKETS.map(lambda state: StateReceived(state=state)), st.just(Tick()),
+    st.sampled_from([TrajectoryEnded(result=result) for result in TrajectoryResult]),
+    st.just(CancelRequested()),
+    st.sampled_from([LinkLost(link=link, reason='it closed') for link in ('program', 'RTDE')]))
+
+
+def timed(event, now):
+    """Return the event as it is at a time: packets tell the robot's."""
+    if not isinstance(event, StateReceived):
+        return event
+    changes = {name: getattr(event.state, name) for name in event.state.__slots__}
+    return StateReceived(state=RobotState(**changes | {'timestamp': now}))
+
+
+@pytest.mark.slow
+@given(events=st.lists(st.tuples(EVENTS, st.floats(0.001, 2.0)), max_size=25),
+       lends=st.booleans())
+@settings(max_examples=150, deadline=None)
+def test_a_goal_ends_once_whatever_happens(events, lends):
+    goal, now = machine(NOZZLE if lends else None), 0.0
+    commands = goal.start(robot())
+    for event, later in events:
+        now += later
+        commands += goal.step(timed(event, now), now)
+    commands += goal.step(LinkLost(link='RTDE', reason='the end of the test'), now)
+    for _ in range(round(BOUND / 0.02)):
+        now += 0.02
+        commands += goal.step(Tick(), now)
+    (end,) = [command for command in commands if isinstance(command, Finish)]
+    assert isinstance(end.outcome.code, ErrorCode)
+    assert end.outcome.text.endswith('.')
+    assert goal.state is State.ENDED
+    sent = [index for command in commands if isinstance(command, SendPoints)
+            for index in range(command.first, command.end)]
+    assert sent == list(range(len(sent))), 'each point once, in order'
+    assert len(sent) <= POINTS
+
+
+@pytest.mark.parametrize('state', [state for state in State if state is not State.ENDED])
+def test_every_state_has_a_way_to_the_end(state):
+    seen, ahead = set(), {state}
+    while ahead:
+        seen |= ahead
+        ahead = {step.state for s in ahead for step in TRANSITIONS[s].values()} - seen
+    assert State.ENDED in seen

@@ -1,0 +1,95 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What faults leave behind when they last: queues, dead connections, and who notices."""
+
+from fault_cell import do, GoalInTrouble, let_happen
+import pytest
+import robot_cell
+from robot_cell import run_cell
+
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from ur_cartesian_driver.robot.primary_client import SILENCE
+
+pytestmark = pytest.mark.slow
+
+
+def unread(cell):
+    """What the robot program has not read of what the driver says on the reverse socket."""
+    (end,) = cell.loop.open_ends(robot_cell.REVERSE)
+    return len(end.protocol.incoming) // robot_cell.MESSAGE_SIZE
+
+
+def test_a_pause_leaves_no_queue_behind_which_a_goal_would_wait():
+    async def scenario(cell):
+        cell.robot.pause_program()
+        await cell.sleep(5.0)
+        assert 1 <= unread(cell) <= 3, 'one for the read that is under way, and no more'
+        await do(cell, 'play')
+        await cell.until(cell.is_ready)
+        goal = GoalInTrouble(cell)
+        goal.send()
+        await cell.until(lambda: not cell.at_rest(), 0.1)
+        await cell.until(lambda: goal.motion.outcome)
+        assert goal.motion.outcome.succeeded, goal.motion.outcome
+
+    run_cell(scenario)
+
+
+@pytest.mark.parametrize('fault', ['half_open primary', 'drop primary for 1 s'])
+def test_a_stop_is_followed_up_also_when_the_primary_interface_was_dead(fault):
+    """Nothing else can end a program that is paused by a protective stop."""
+    async def scenario(cell):
+        await let_happen(cell, fault)
+        await cell.sleep(2.0 * SILENCE + 0.5)
+        goal = GoalInTrouble(cell)
+        await goal.reach('mid-segment')
+        cell.robot.protective_stop()
+        await cell.until(lambda: goal.motion.outcome, 0.2)
+        await cell.until(lambda: cell.robot.state().runtime_state is RuntimeState.STOPPED, 0.5)
+        await cell.until(lambda: cell.status.state is ConnectionState.STOPPED)
+
+    run_cell(scenario)
+
+
+def test_who_pulls_the_cable_for_a_moment_is_not_taken_for_ready():
+    """The sockets of a program that has ended behind a cut cable look as if it was there."""
+    async def scenario(cell):
+        await let_happen(cell, 'freeze all')
+        await cell.until(lambda: cell.status.state is ConnectionState.DISCONNECTED)
+        statuses = len(cell.owner.statuses)
+        await cell.sleep(1.5)
+        states = {status.state for status in cell.owner.statuses[statuses:]}
+        assert ConnectionState.READY not in states
+        assert ConnectionState.CONNECTED in states
+        assert not cell.status.program_running
+        assert 'resend' in cell.status.message
+
+    run_cell(scenario)
+
+
+def test_an_owner_that_hangs_up_stops_the_arm_and_the_program():
+    async def scenario(cell):
+        await GoalInTrouble(cell).reach('mid-segment')
+        cell.owner.hang_up()
+        assert await cell.until(cell.at_rest, 0.5) > 0.0
+        await cell.until(lambda: cell.robot.state().runtime_state is RuntimeState.STOPPED, 0.5)
+
+    run_cell(scenario)
+
+
+@pytest.mark.parametrize('moment', ['before', 'after'])
+def test_a_cancel_and_a_protective_stop_at_the_same_time_end_in_the_stop(moment):
+    async def scenario(cell):
+        goal = GoalInTrouble(cell)
+        await goal.reach('mid-segment')
+        if moment == 'before':
+            cell.owner.cancel()
+        cell.robot.protective_stop()
+        if moment == 'after':
+            cell.owner.cancel()
+        await cell.until(lambda: goal.motion.outcome, 0.3)
+        assert goal.motion.outcome.code is ErrorCode.PROTECTIVE_STOP
+
+    run_cell(scenario)
