@@ -192,6 +192,7 @@ async def do(cell: RobotCell, step: str):
             cell.robot.clear_faults()
             cell.owner.silent = False
             await cell.sleep(2.0 * CYCLE)
+            await cell.until(lambda: cell.loop.open_ends(robot_cell.PRIMARY))
         case _:
             raise AssertionError(f'nobody knows how to {step}')
 
@@ -232,7 +233,7 @@ async def scenario(cell: RobotCell, row: Row, phase: str):
     assert outcome.text, here
     await cell.until(cell.at_rest, max(0.0, begin + row.rest - cell.loop.time()), here)
     if not row.waits:
-        await cell.until(lambda: cell.status.state is row.then, 0.3, here)
+        await cell.until(lambda: cell.status.state is row.then, row.then_within, here)
         assert cell.is_ready() or cell.status.message, here
         if phase == 'settling':
             await do(cell, 'wait until it is over')

@@ -48,6 +48,8 @@ class Row:
     waits: bool = False
     #: Where the connection is when the goal has ended, before anybody does anything.
     then: ConnectionState = S.READY
+    #: How long it may take to get there.
+    then_within: float = 0.3
     #: What somebody has to do until the next goal can run.
     steps: tuple[str, ...] = ()
     #: From there until the driver is ready.
@@ -91,6 +93,12 @@ def _hangs_up(fault: str, cause: str) -> Row:
                steps=('resend',), differs=REFUSED)
 
 
+#: The messages that the program finds when it goes on tell it that its goal is over.
+UNSEEN_STOP = Row(
+    fault='protective stop that the driver does not see', cause=(
+        'drop rtde for 0.3 s', 'protective_stop'), code=E.CONNECTION_LOST, then=S.STOPPED,
+    then_within=1.5, steps=('unlock', 'play'), travel=0.001, differs=REFUSED)
+
 #: The stopped program never runs again by itself, whoever unlocks or plays.
 HEADLESS = (
     _safety('protective stop', 'protective_stop', E.PROTECTIVE_STOP, 'unlock'),
@@ -122,6 +130,16 @@ HEADLESS = (
         differs=REFUSED),
     Row(fault='the network cable is cut', cause=('freeze all',), code=E.CONNECTION_LOST,
         bound=1.3, rest=0.7, then=S.CONNECTED, steps=('resend',)),
+    *(Row(fault=f'all connections are cut for 0.1 s, {first} first',
+          cause=tuple(f'drop {name} for 0.1 s' for name in order), code=E.CONNECTION_LOST,
+          then=S.CONNECTED, then_within=1.0, steps=('resend',), differs=REFUSED)
+      for first, order in (('RTDE', ('rtde', 'primary', 'sockets')),
+                           ('the program', ('sockets', 'primary', 'rtde')))),
+    UNSEEN_STOP,
+    Row(fault='protective stop while the primary interface is down', cause=(
+        'drop primary for 0.5 s', 'protective_stop'), code=E.PROTECTIVE_STOP, then=S.STOPPED,
+        steps=('unlock', 'play', 'wait until it is over', 'resend'), travel=0.001,
+        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, steps=('unlock', 'play'))),
     Row(fault='RTDE is cut', cause=('drop rtde',), code=E.CONNECTION_LOST, differs=REFUSED),
     Row(fault='RTDE is half-open', cause=('half_open rtde',), code=E.CONNECTION_LOST, bound=1.3,
         rest=1.7),
@@ -203,6 +221,7 @@ LOCAL = (
     _paused_by('safeguard stop', 'safeguard_stop', E.PROTECTIVE_STOP, 'reset the safeguard'),
     _paused_by('emergency stop', 'emergency_stop', E.EMERGENCY_STOP, 'release the button',
                *POWER_UP),
+    UNSEEN_STOP,
     Row(fault='somebody stops the program', cause=('stop',), code=E.PROGRAM_STOPPED,
         then=S.CONNECTED, steps=('play',), differs=REFUSED),
     Row(fault='somebody pauses the program', cause=('pause',), code=E.SUCCESSFUL, waits=True,
