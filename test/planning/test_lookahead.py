@@ -7,12 +7,14 @@ from __future__ import annotations
 from dataclasses import replace
 from math import hypot, pi
 import re
+from time import process_time
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
 
+from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.closed_form import closed_form, wrist_centre
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
@@ -279,6 +281,19 @@ def test_a_blended_corner_is_looked_at_and_not_the_point_that_it_leaves_out(make
     assert 'points[0].pose' in refusal(Unreachable, cell, goal(0.0), NO_MARGINS)
     wide = 0.9 * min(line.length, cell.home.distance_to(corner), corner.distance_to(end))
     assert len(plan(goal(wide), cell.state, cell.arm, NO_MARGINS).segments) == 2
+
+
+def test_two_thousand_points_in_a_wrong_frame_are_refused_at_once(cell):
+    geometry = cell.arm.geometry
+    measured = Arm(cell.arm.model, replace(geometry, a=tuple(a - 2e-4 for a in geometry.a)))
+    assert measured.calibrated
+    state = replace(cell.state, actual_tcp_pose=measured.forward(cell.state.actual_q)
+                    @ cell.T_flange_tcp)
+    goal = Goal(waypoints=tuple(cell.point(0.005 * i) for i in range(1, 2001)))
+    begin = process_time()
+    with pytest.raises(GoalRefused):
+        plan(goal, state, measured, NO_MARGINS)
+    assert process_time() - begin < 5.0
 
 
 # -- speed ----------------------------------------------------------------------------------------

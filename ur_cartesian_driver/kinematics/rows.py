@@ -149,7 +149,7 @@ def _searched(arm: Arm, pose: Floats, wrist_3: float) -> tuple[Floats, Flags]:
 
 # --- Along a path ----------------------------------------------------------------------------
 
-def follow(arm: Arm, poses: Floats, q_start: Joints) -> JointPath:
+def follow(arm: Arm, poses: Floats, q_start: Joints, *, over_gaps: bool = True) -> JointPath:
     """
     Return the joint positions along a path, each the nearest to those of the row before.
 
@@ -158,6 +158,8 @@ def follow(arm: Arm, poses: Floats, q_start: Joints) -> JointPath:
 
     :param poses: (n, 7).
     :param q_start: from where the first row is reached [rad].
+    :param over_gaps: False ends the search at the first row without solution: of a calibrated arm
+        each such row takes some milliseconds.
     """
     q = np.full((len(poses), 6), np.nan)
     before, row, block, singly = q_start, 0, _BLOCK, 1
@@ -173,8 +175,14 @@ def follow(arm: Arm, poses: Floats, q_start: Joints) -> JointPath:
             solution = nearest(arm, pose_from_row(poses[index]), before)
             if solution is not None:
                 q[index] = before = solution
+            elif not over_gaps:
+                return _path(q, q_start)
         # Of a long stretch that is not certain few rows are tried in vain.
         row, block, singly = row + singly, _FIRST_BLOCK, min(2 * singly, _FIRST_BLOCK)
+    return _path(q, q_start)
+
+
+def _path(q: Floats, q_start: Joints) -> JointPath:
     found = ~np.isnan(q[:, 0])
     return JointPath(q=q, found=found, step=_steps(q, found, q_start))
 

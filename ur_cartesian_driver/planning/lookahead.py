@@ -135,7 +135,7 @@ def followed(reach: Reach, pieces: Sequence[Piece], q_start: Joints) -> Followed
 
 def _ahead(reach: Reach, poses: Floats, q: Joints) -> tuple[Floats, list[int]]:
     """Return the joints (n, 6) of places, and the rows to which the way has to be looked at."""
-    path = follow(reach.arm, compose_rows(poses, reach.T_tcp_flange), q)
+    path = follow(reach.arm, compose_rows(poses, reach.T_tcp_flange), q, over_gaps=False)
     rows = np.concatenate([np.array([q]), path.q])
     measures = postures(reach.arm, rows)
     branch = measures.branch
