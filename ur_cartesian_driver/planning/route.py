@@ -281,9 +281,16 @@ class Route:
         before = self._drafts[k - 1]
         if before.seen == 1.0:
             return before.arrives
-        # A blended waypoint may lie out of reach, but not one at which a joint line begins.
-        return self.reach.nearest(before.way.end, before.arrives,
-                                  point_field(before.index, 'pose'))
+        if isinstance(before.way, JointLine):
+            return before.arrives
+        # A blended waypoint may lie out of reach, but not one at which a joint line begins: there
+        # the robot has to know the joints to which the rest of the leg would bring it.
+        rest = followed(self.reach, [Piece.part(before.index, before.way, before.seen, 1.0)],
+                        self._q)
+        if rest.refusal is not None:
+            raise rest.refusal
+        a, b, c, d, e, f = rest.q[-1].tolist()
+        return (a, b, c, d, e, f)
 
     def _enter(self, k: int) -> None:
         """Look along what leads into a joint move."""
