@@ -61,7 +61,7 @@ from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
 from ur_cartesian_driver.protocol.trajectory import encode_points
 from ur_cartesian_driver.robot.calls import Answer, Call
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.status import DriverStatus, Gaps
+from ur_cartesian_driver.robot.status import DriverStatus, Gaps, stamped
 
 LOG = logging.getLogger('ur_cartesian_driver')
 
@@ -372,7 +372,7 @@ class Driver(RobotServices):
         text = 'The robot loop ended unexpectedly, or hangs; the robot program stops the arm.'
         # A program that somebody stopped stays stopped.
         may_upload = self._status.program_running
-        self._set_status(DriverStatus(message=text, last_error=text))
+        self._set_status(DriverStatus(message=text, last_error=stamped(text)))
         self._abandon(text)
         if self._closed.wait(RESTART_PAUSE):
             return

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
+from dataclasses import replace
 from functools import partial
 import logging
 from math import inf
@@ -85,6 +86,14 @@ TICK = 0.02
 SIGN_OF_LIFE = 0.5
 #: What takes longer than a few milliseconds to unpack or prepare [bytes].
 LARGE = 1 << 18
+#: How a goal can end that wants an explanation beyond its sentence.
+EXPLAINED = frozenset({
+    ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP, ErrorCode.PROGRAM_STOPPED,
+    ErrorCode.CONNECTION_LOST, ErrorCode.EXECUTION_FAILED})
+#: Of these the robot tells the reason, on another connection, in the same cycle or the next ones;
+#: so long it is waited for [s].
+REASONED = frozenset({ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP})
+REASON_TIMEOUT = 0.05
 #: How many calls are carried out at a time.
 MOST_CALLS = 32
 T = TypeVar('T')
@@ -117,6 +126,8 @@ class RobotLoop:
         self._program_running = False
         self._last_report = inf
         self._longest_gap = 0.0
+        #: The end of a motion, until its reason is there.
+        self._unexplained: MotionEnded | None = None
         if configure.loan is not None:
             self._owe(TcpLoan(configure.loan.T_flange_before, configure.loan.T_flange_lent))
 
@@ -132,6 +143,7 @@ class RobotLoop:
                     task.cancel()
         finally:
             self._end_motion('The driver was shut down.')
+            self._tell_unexplained()
             if self._loan is not None and self._latest is not None \
                     and self._loan.is_due(self._latest, self._now()):
                 # Ours does it by itself, but this may be another robot program.
@@ -177,7 +189,7 @@ class RobotLoop:
             max_plan_deviation=(self._config.max_plan_deviation,
                                 self._config.max_plan_deviation_angle)))
         reason = self._link.not_ready()
-        if self._machine is not None:
+        if self._machine is not None or self._unexplained is not None:
             reason = 'Another motion is running; wait for its end or cancel it.'
         elif self._desk.is_setting:
             reason = 'TCP or payload are being set at this moment; send the goal again.'
@@ -276,7 +288,29 @@ class RobotLoop:
             else:
                 self._owe(machine.loan)
         self._link.set_busy(False)
-        self._notify(MotionEnded(motion=motion, outcome=outcome))
+        if outcome.code in REASONED and not self._link.robot_error():
+            self._unexplained = MotionEnded(motion=motion, outcome=outcome)
+            asyncio.get_running_loop().call_later(REASON_TIMEOUT, self._tell_unexplained)
+        else:
+            self._tell_end(MotionEnded(motion=motion, outcome=outcome))
+
+    def _tell_unexplained(self) -> None:
+        """Tell the end of a motion, whose reason has come meanwhile or will not come."""
+        ended, self._unexplained = self._unexplained, None
+        if ended is not None:
+            self._tell_end(ended)
+
+    def _tell_end(self, ended: MotionEnded) -> None:
+        """Tell the end of a motion, with what led to it where that is not in its sentence."""
+        outcome = ended.outcome
+        if outcome.code in EXPLAINED:
+            error = self._link.robot_error()
+            text = f"{outcome.text} {error[:1].upper()}{error[1:].rstrip('.')}." if error \
+                else outcome.text
+            outcome = replace(outcome, text=text, report=(
+                *outcome.report, *(f'why: {line}' for line in self._link.chain())))
+            self._link.explain(text)
+        self._notify(replace(ended, outcome=outcome))
 
     def _end_motion(self, text: str) -> None:
         if self._machine is not None:

@@ -39,6 +39,7 @@ from ur_cartesian_driver.protocol.dialects import NEWEST
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.rtde import ControllerVersion
 from ur_cartesian_driver.protocol.script_command import TcpHold
+from ur_cartesian_driver.robot.chronicle import changes, Chronicle, Pulse, standing
 from ur_cartesian_driver.robot.lifecycle import after, Change, ConnectionState
 from ur_cartesian_driver.robot.primary_client import PrimaryClient, PrimaryListener
 from ur_cartesian_driver.robot.program_sockets import ProgramListener, ProgramSockets
@@ -50,6 +51,7 @@ from ur_cartesian_driver.robot.status import (
     has_ended,
     is_paused,
     is_stopped,
+    stamped,
     what_is_needed,
 )
 from ur_cartesian_driver.robot.transport import Retry
@@ -68,6 +70,10 @@ _RUNS = frozenset({RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.RESU
 #: How long a robot has to wait for its program before the log says so [s]: a program that is on
 #: its way there needs nobody's help.
 NOTEWORTHY = 1.0
+
+
+#: How long after a loss its reasons are waited for [s]: each comes by a connection of its own.
+GATHER = 0.1
 
 
 #: How long a program may hold its sockets after the robot has reported its end [s].
@@ -111,9 +117,19 @@ class RobotLink:
         #: Since when the robot reports that no program runs while one is connected [s].
         self._ghost_since = inf
         self._first_connection = may_upload
+        #: The program that runs on the robot has called us, even if it has hung up since.
+        self._program_is_ours = False
+        self._chronicle = Chronicle()
+        #: The last report of the robot, also when it is gone.
+        self._reported: RobotState | None = None
+        #: When the robot reported last, and the longest pause between keepalives until the last
+        #: time that somebody asked for it [s].
+        self._last_report, self._gap_before = inf, 0.0
+        self._explanation: asyncio.TimerHandle | None = None
         self._primary = PrimaryClient(PrimaryListener(
             configuration=self._on_configuration, geometry=self._on_kinematics,
-            error=self._error, text=lambda text: self._on_log(logging.INFO, f'robot: {text}')))
+            error=self._robot_error, trouble=self._error,
+            text=lambda text: self._on_log(logging.INFO, f'robot: {text}')))
         self._program = ProgramSockets(settings, ProgramListener(
             connected=self._on_program_connected, lost=self._on_program_lost,
             result=lambda result: self._on_event(TrajectoryEnded(result=result)),
@@ -153,8 +169,24 @@ class RobotLink:
 
     def keepalive_gap(self) -> float:
         """Return the longest pause between two keepalives since the last call [s]."""
-        gap, self._program.longest_gap = self._program.longest_gap, 0.0
-        return gap
+        self._gap_before, self._program.longest_gap = self._program.longest_gap, 0.0
+        return self._gap_before
+
+    def chain(self) -> tuple[str, ...]:
+        """Return what led to what has just ended, the first thing first, and how all stands."""
+        now = asyncio.get_running_loop().time()
+        return (*self._chronicle.lines(now), *standing(self._reported, self._pulse(now)))
+
+    def robot_error(self) -> str:
+        """Return what the robot itself said lately is wrong; empty when it said nothing."""
+        return self._chronicle.robot_error(asyncio.get_running_loop().time())
+
+    def explain(self, text: str) -> None:
+        """Take something that has ended, and why, for the last error of the status."""
+        if self._explanation is not None:
+            self._explanation.cancel()
+            self._explanation = None
+        self._tell(last_error=stamped(f"{text} {'; '.join(self.chain())}."))
 
     def set_serial_number(self, serial_number: str) -> None:
         """Take note of the serial number of the robot."""
@@ -164,6 +196,8 @@ class RobotLink:
 
     def send_control(self, action: TrajectoryAction, count: int) -> None:
         """Send a trajectory action to the robot program."""
+        if action is TrajectoryAction.CANCEL:
+            self._note('the driver sent CANCEL')
         self._program.send_control(action, count)
 
     def send_points(self, data: bytes) -> None:
@@ -225,6 +259,7 @@ class RobotLink:
     def stop_program(self, reason: str) -> None:
         """End the robot program, so that nothing of it can resume."""
         self._warn(f'the robot program is stopped: {reason}')
+        self._note('the driver ended the robot program')
         self._primary.send(primary.command(primary.Command.STOP_PROGRAM))
         self._program.send_stop()
 
@@ -241,10 +276,12 @@ class RobotLink:
         elif not self._primary.send(primary.upload(as_program(self._program.text))):
             self._warn('the robot program is not sent: there is no connection to the primary '
                        'interface of the robot')
+        else:
+            self._note('the driver sent the robot program')
 
     def _foreign_program_runs(self) -> bool:
         return (self._robot is not None and self._robot.runtime_state in _RUNS
-                and not self._program.connected)
+                and not self._program.connected and not self._program_is_ours)
 
     def not_ready(self) -> str:
         """Return why no goal can run now; empty when one can."""
@@ -252,6 +289,8 @@ class RobotLink:
 
     def close(self) -> None:
         """Close everything; the robot program stops the arm, at the latest when we hang up."""
+        if self._explanation is not None:
+            self._explanation.cancel()
         self._program.close()
 
     # ---- life ---------------------------------------------------------------------------------
@@ -358,8 +397,17 @@ class RobotLink:
 
     def _on_state(self, robot: RobotState) -> None:
         before, self._robot = self._robot, robot
+        self._reported = robot
+        self._last_report = asyncio.get_running_loop().time()
         self._tell_state(robot)
+        if before is not None:
+            for change in changes(before, robot):
+                self._note(change)
         self._look_for_ghost(robot)
+        if has_ended(robot):
+            self._program_is_ours = False
+        elif self._program.connected:
+            self._program_is_ours = True
         if before is None or _modes(before) != _modes(robot):
             self._review()
         self._on_event(StateReceived(state=robot))
@@ -402,19 +450,28 @@ class RobotLink:
             self._tell(calibration_known=True)
 
     def _on_program_connected(self) -> None:
+        self._note('the robot program has connected')
         self._tell(program_running=True)
         self._review()
 
     def _on_program_lost(self, reason: str) -> None:
+        self._note(f'{reason}, {self._pulse(asyncio.get_running_loop().time()).sign:.3f} s after '
+                   'the last sign of life that it was sent')
+        if self._explanation is None:
+            self._explanation = asyncio.get_running_loop().call_later(
+                GATHER, self.explain, 'The robot program is gone.')
         self._program_remembers = False
         self._change(Change.PROGRAM_LOST, program_running=False)
         self._on_event(LinkLost(link='program', reason=reason))
 
     def _on_robot_lost(self, reason: str) -> None:
         """Take note that the robot is gone, or never was there."""
+        self._note(reason)
+        news = stamped(reason, self._status.last_error) if self._robot is None else stamped(
+            f"The robot is gone. {'; '.join(self.chain())}.")
         before, self._robot, self._signals = self._robot, None, None
         self._program.deaf = False  # nobody knows; too many messages are better than none
-        self._change(Change.ROBOT_LOST, calibration_known=False, last_error=reason,
+        self._change(Change.ROBOT_LOST, calibration_known=False, last_error=news,
                      message=f"No connection to the robot: {reason.rstrip('.')}.")
         if before is not None:
             self._on_event(LinkLost(link='RTDE', reason=reason))
@@ -449,7 +506,8 @@ class RobotLink:
         if status.state not in _OUT_OF_REACH:
             status = replace(status, message=what_is_needed(
                 status.state, self._robot, program_connected=self._program.connected,
-                headless_mode=self._settings.headless_mode, tcp_owed=self._tcp_owed))
+                headless_mode=self._settings.headless_mode, tcp_owed=self._tcp_owed,
+                foreign_program=self._foreign_program_runs()))
         if status != self._status:
             before, self._status = self._status, status
             self._on_status(status)
@@ -470,8 +528,22 @@ class RobotLink:
         if self._status.message == message:
             self._on_log(logging.INFO, message)
 
+    def _pulse(self, now: float) -> Pulse:
+        return Pulse(
+            report=now - self._last_report, sign=now - self._program.last_keepalive,
+            longest=max(self._gap_before, self._program.longest_gap),
+            timeout=self._settings.robot_receive_timeout)
+
+    def _note(self, text: str, *, is_robot_error: bool = False) -> None:
+        self._chronicle.add(text, asyncio.get_running_loop().time(), is_robot_error=is_robot_error)
+
+    def _robot_error(self, text: str) -> None:
+        """Take what the robot says is wrong."""
+        self._note(text, is_robot_error=True)
+        self._error(text)
+
     def _error(self, text: str) -> None:
-        self._tell(last_error=text)
+        self._tell(last_error=stamped(text))
         self._on_log(logging.ERROR, text)
 
     def _warn(self, text: str) -> None:

@@ -34,8 +34,10 @@ class PrimaryListener:
     configuration: Callable[[primary.ConfigurationData], None]
     #: Its calibrated geometry, as often as it is reported.
     geometry: Callable[[Geometry], None]
-    #: Something is wrong: with the robot, its program or this connection.
+    #: The robot says that something is wrong, with it or its program.
     error: Callable[[str], None]
+    #: Something is wrong with this connection.
+    trouble: Callable[[str], None]
     #: A text that the robot program wrote.
     text: Callable[[str], None]
 
@@ -67,7 +69,7 @@ class PrimaryClient:
                 reason = str(error)
             if reason != complaint:  # once, not with each attempt
                 complaint = reason
-                self._listener.error(f'primary interface: {reason}')
+                self._listener.trouble(f'primary interface: {reason}')
             await retry.pause()
 
     async def _one_connection(self, host: str, port: int) -> str:

@@ -18,6 +18,7 @@ import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from math import inf
 from typing import NoReturn
 
 from ur_cartesian_driver.motion.errors import ProtocolError
@@ -63,6 +64,8 @@ class ProgramSockets:
         self.connected = False
         #: The longest pause between two keepalives since somebody reset it [s].
         self.longest_gap = 0.0
+        #: When the last keepalive was sent to the program that is there, or was last [s].
+        self.last_keepalive = -inf
         self._read_timeout = round(1000.0 * settings.robot_receive_timeout)
         self._results = ResultDecoder()
         self._requests = script_sender.RequestDecoder()
@@ -151,6 +154,8 @@ class ProgramSockets:
             self.send_control(TrajectoryAction.NOOP, 0)
         else:
             self._send(reverse.keepalive(self._read_timeout))
+        if self.connected:
+            self.last_keepalive = asyncio.get_running_loop().time()
 
     def _send(self, message: reverse.ReverseMessage) -> None:
         if self.connected and self._reverse.connection is not None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import datetime, UTC
 from math import nan
 
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
@@ -19,7 +20,7 @@ class DriverStatus:
     state: ConnectionState = ConnectionState.DISCONNECTED
     #: What is needed, in a sentence; empty when nothing is.
     message: str = ''
-    #: The last thing that went wrong.
+    #: The last thing that went wrong, its time before it and what led to it behind it.
     last_error: str = ''
     #: What the robot says it is; empty until it has said so.
     robot_model: str = ''
@@ -51,6 +52,17 @@ class Gaps:
     keepalives: float = nan
 
 
+def stamped(text: str, before: str = '') -> str:
+    """
+    Return a text behind the present time; the same text keeps the time that it has.
+
+    :param before: the stamped text that would be replaced.
+    """
+    if before.endswith(f' UTC: {text}'):
+        return before
+    return f'{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC: {text}'
+
+
 def is_stopped(robot: RobotState) -> bool:
     """Tell whether the safety system keeps the arm from moving."""
     return robot.safety_mode not in (SafetyMode.NORMAL, SafetyMode.REDUCED)
@@ -67,12 +79,14 @@ def has_ended(robot: RobotState) -> bool:
 
 
 def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_connected: bool,
-                   headless_mode: bool, tcp_owed: bool = False) -> str:
+                   headless_mode: bool, tcp_owed: bool = False,
+                   foreign_program: bool = False) -> str:
     """
     Return the sentence that says what is needed before a goal can run; empty when nothing is.
 
     :param robot: what the robot reported last; None = nothing yet.
     :param tcp_owed: the TCP that a goal had set is still to be put back.
+    :param foreign_program: a program runs on the robot that has not called us.
     """
     if state is ConnectionState.CONNECTING or robot is None:
         return 'The robot answers; waiting for its report of itself.'
@@ -88,7 +102,7 @@ def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_
             return 'The robot program is paused; play it on the pendant.'
         return ('The TCP that the last goal had set is still to be put back; should it stay, set '
                 'the right one on the robot.') if tcp_owed else ''
-    if robot.runtime_state is RuntimeState.PLAYING and not program_connected:
+    if foreign_program:
         return ('A program runs on the robot, and it has not called this driver: it is another '
                 'one, or it belongs to another driver. Let it end, or stop it; then '
                 + ('call resend_robot_program.' if headless_mode else

@@ -1,0 +1,91 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""When something ended, the result and the status say what led to it."""
+
+import pytest
+from robot_cell import REVERSE, run_cell, TRAJECTORY
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.planning import plan, PlanningOptions
+
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+
+
+def ended_by(fault, **settings):
+    """Run a goal that something ends half-way; return outcome and the last status."""
+    async def scene(cell):
+        state = cell.memory.read()
+        (x, y, z), turn = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
+        made = plan(Goal(waypoints=(Waypoint(pose=Pose((x, y + 0.2, z), turn), time=2.0),)),
+                    state, Arm(robot_model('ur5e')), PlanningOptions(max_tool_speed=1.0))
+        motion = cell.owner.start(made)
+        await cell.until(lambda: not cell.at_rest())
+        await fault(cell)
+        await cell.until(lambda: motion.outcome is not None, 5.0)
+        await cell.until(lambda: motion.outcome.text in cell.status.last_error)
+        return motion.outcome, cell.status
+
+    return run_cell(scene, **settings)
+
+
+def whys(outcome):
+    return [line.removeprefix('why: ') for line in outcome.report if line.startswith('why: ')]
+
+
+async def cut_reverse(cell):
+    cell.loop.cut(REVERSE)
+
+
+async def cut_trajectory(cell):
+    cell.loop.cut(TRAJECTORY)
+
+
+async def freeze_reverse(cell):
+    cell.loop.freeze(REVERSE)
+
+
+async def stop_by_dashboard(cell):
+    await cell.dashboard('stop')
+
+
+async def protective_stop(cell):
+    cell.robot.inject('protective_stop')
+
+
+async def emergency_stop(cell):
+    cell.robot.emergency_stop()
+
+
+async def crash(cell):
+    await cell.crash_robot()
+
+
+async def exception(cell):
+    cell.robot.inject('program_fault')
+
+
+@pytest.mark.parametrize(('fault', 'code', 'links'), [
+    (cut_reverse, ErrorCode.PROGRAM_STOPPED, ['reverse_port: ', 'program PLAYING -> STOP']),
+    (cut_trajectory, ErrorCode.PROGRAM_STOPPED, ['trajectory_port: ', 'program PLAYING -> STOP']),
+    (freeze_reverse, ErrorCode.PROGRAM_STOPPED, ['the other side closed', 'PLAYING -> STOP']),
+    (stop_by_dashboard, ErrorCode.PROGRAM_STOPPED,
+     ['the other side closed', 'program PLAYING -> STOP']),
+    (protective_stop, ErrorCode.PROTECTIVE_STOP,
+     ['safety mode NORMAL -> PROTECTIVE_STOP', 'the robot reports C']),
+    (emergency_stop, ErrorCode.EMERGENCY_STOP, ['-> ROBOT_EMERGENCY_STOP']),
+    (crash, ErrorCode.CONNECTION_LOST, ['RTDE: ']),
+], ids=lambda value: getattr(value, '__name__', ''))
+def test_the_chain_says_who_did_what_and_when(fault, code, links):
+    outcome, status = ended_by(fault)
+    assert outcome.code is code, outcome
+    chain = whys(outcome)
+    print(outcome.text, *chain, status.last_error, sep='\n')
+    for link in links:
+        assert any(link in line for line in chain), (link, chain)
+    assert 'it waits 0.2 s for one, the longest pause between two was 0.02' in chain[-1]
+    for line in chain:
+        assert line.partition(' before: ')[2] in status.last_error
