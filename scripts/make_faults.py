@@ -56,20 +56,27 @@ ones begin slowly); after that it has to be played again.
 
 """
 
+CONTINUED_HEAD = """## With `after_robot_stop: continue`
+
+Then a protective or safeguard stop holds the goal as a pause does. Everything else is as above.
+
+"""
+
 TITLES = ('fault', 'the goal ends', 'result within', 'arm stands within', 'then the driver is',
           'what to do')
 
 
 def page() -> str:
     """Return the text of doc/faults.md."""
-    from fault_table import HEADLESS, LOCAL, PHASES
+    from fault_table import CONTINUED, HEADLESS, LOCAL, PHASES
 
     travel = max(row.at(phase).travel for row in LOCAL for phase in PHASES)
     return ''.join((
         HEAD, '## Phases\n\n', _table(('phase', 'when'), PHASES.items()), '\n',
         HEADLESS_HEAD, _table(TITLES, map(_cells, HEADLESS)), '\n',
         LOCAL_HEAD.format(travel=travel),
-        _table(TITLES, map(_cells, LOCAL))))
+        _table(TITLES, map(_cells, LOCAL)), '\n',
+        CONTINUED_HEAD, _table(TITLES, map(_cells, CONTINUED))))
 
 
 def _cells(row: Row) -> Sequence[str]:

@@ -3,7 +3,7 @@
 """Every fault in every phase of a goal: the matrix of doc/faults.md, in virtual time."""
 
 from fault_cell import scenario
-from fault_table import HEADLESS, LOCAL, PHASES
+from fault_table import CONTINUED, HEADLESS, LOCAL, PHASES
 import pytest
 from robot_cell import run_cell
 
@@ -13,15 +13,18 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.mark.parametrize(
-    ('row', 'headless'),
-    [pytest.param(row, True, id=row.fault) for row in HEADLESS]
-    + [pytest.param(row, False, id=f'in local control: {row.fault}') for row in LOCAL])
-def test_a_goal_ends_as_the_table_says_and_the_next_one_works(row, headless):
+    ('row', 'settings'),
+    [pytest.param(row, {}, id=row.fault) for row in HEADLESS]
+    + [pytest.param(row, {'headless': False}, id=f'in local control: {row.fault}')
+       for row in LOCAL]
+    + [pytest.param(row, {'after_robot_stop': 'continue'}, id=f'continued: {row.fault}')
+       for row in CONTINUED])
+def test_a_goal_ends_as_the_table_says_and_the_next_one_works(row, settings):
     async def all_phases(cell):
         for phase in PHASES:
             await scenario(cell, row.at(phase), phase)
 
-    run_cell(all_phases, headless=headless)
+    run_cell(all_phases, **settings)
 
 
 def test_every_fault_that_can_be_injected_is_in_the_table():

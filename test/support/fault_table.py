@@ -97,7 +97,7 @@ def _hangs_up(fault: str, cause: str) -> Row:
 UNSEEN_STOP = Row(
     fault='protective stop that the driver does not see', cause=(
         'drop rtde for 0.3 s', 'protective_stop'), code=E.CONNECTION_LOST, then=S.STOPPED,
-    then_within=1.5, steps=('unlock', 'play'), travel=0.001, differs=REFUSED)
+    then_within=1.5, steps=('unlock', 'play'), differs=REFUSED)
 
 #: The stopped program never runs again by itself, whoever unlocks or plays.
 HEADLESS = (
@@ -138,7 +138,7 @@ HEADLESS = (
     UNSEEN_STOP,
     Row(fault='protective stop while the primary interface is down', cause=(
         'drop primary for 0.5 s', 'protective_stop'), code=E.PROTECTIVE_STOP, then=S.STOPPED,
-        steps=('unlock', 'play', 'wait until it is over', 'resend'), travel=0.001,
+        steps=('unlock', 'play', 'wait until it is over', 'resend'),
         differs=_in(BEFORE, code=E.ROBOT_NOT_READY, steps=('unlock', 'play'))),
     Row(fault='RTDE is cut', cause=('drop rtde',), code=E.CONNECTION_LOST, differs=REFUSED),
     Row(fault='RTDE is half-open', cause=('half_open rtde',), code=E.CONNECTION_LOST, bound=1.3,
@@ -201,6 +201,16 @@ HEADLESS = (
         rest=1.0, steps=('wait until it is over',),
         differs={'last point': {'code': E.SUCCESSFUL}}),
 )
+
+
+#: With ``after_robot_stop: continue``, for those who want what the robot does by itself.
+CONTINUED = tuple(
+    Row(fault=fault, cause=(cause,), code=E.SUCCESSFUL, waits=True, steps=(step, 'play'),
+        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False, then=S.STOPPED) | {
+            'cancelling': {'code': E.CANCELLED, 'waits': False, 'bound': 3.3,
+                           'then': S.STOPPED, 'steps': (step, 'play', 'resend')}})
+    for fault, cause, step in (('protective stop', 'protective_stop', 'unlock'),
+                               ('safeguard stop', 'safeguard_stop', 'reset the safeguard')))
 
 
 def _paused_by(fault: str, cause: str, code: ErrorCode, *steps: str) -> Row:

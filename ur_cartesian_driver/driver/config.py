@@ -19,6 +19,9 @@ class DriverConfig(LinkSettings):
     #: How far the controller's own target may be from the plan, corners apart [m], [rad]; 0 = any.
     max_plan_deviation: float = MAX_PLAN_DEVIATION[0]
     max_plan_deviation_angle: float = MAX_PLAN_DEVIATION[1]
+    #: What becomes of a goal when the robot makes a protective or safeguard stop: ``abort``, or
+    #: ``continue`` when somebody has unlocked the robot and plays its program.
+    after_robot_stop: str = 'abort'
     #: Progress reports per second.
     feedback_rate: float = 25.0
     #: The arm is stopped when the owner of the driver is silent for that long [s].
@@ -36,6 +39,9 @@ class DriverConfig(LinkSettings):
         if self.robot_loop not in ('process', 'thread'):
             raise ValueError(
                 f"robot_loop is {self.robot_loop!r}, it has to be 'process' or 'thread'.")
+        if self.after_robot_stop not in ('abort', 'continue'):
+            raise ValueError(f'after_robot_stop is {self.after_robot_stop!r}, it has to be '
+                             "'abort' or 'continue'.")
         self._require_positive('feedback_rate', 'node_timeout')
         for name in ('max_plan_deviation', 'max_plan_deviation_angle'):
             if not getattr(self, name) >= 0.0:

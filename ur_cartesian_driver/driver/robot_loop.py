@@ -187,7 +187,8 @@ class RobotLoop:
         machine = await _apart(len(request.points), partial(
             TrajectoryMachine, request.order, feedback_period=1.0 / self._config.feedback_rate,
             max_plan_deviation=(self._config.max_plan_deviation,
-                                self._config.max_plan_deviation_angle)))
+                                self._config.max_plan_deviation_angle),
+            continues=self._config.after_robot_stop == 'continue'))
         reason = self._link.not_ready()
         if self._machine is not None or self._unexplained is not None:
             reason = 'Another motion is running; wait for its end or cancel it.'

@@ -192,9 +192,18 @@ RESULTS: Mapping[TrajectoryResult, tuple[Signal, str]] = MappingProxyType({
 })
 
 
-def stop_in(state: RobotState) -> tuple[Signal, str] | None:
-    """Return why the robot cannot go on by itself, or None when it can."""
-    safety = state.safety_status
+NO_STOP = SafetyStatus(0)
+#: Stops after which a robot goes on with its program, where somebody unlocks and plays it.
+HOLDS = SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED
+
+
+def stop_in(state: RobotState, borne: SafetyStatus = NO_STOP) -> tuple[Signal, str] | None:
+    """
+    Return why the robot cannot go on by itself, or None when it can.
+
+    :param borne: stops of the safety system that are not taken for a reason.
+    """
+    safety = state.safety_status & ~borne
     emergency = (SafetyStatus.EMERGENCY_STOPPED | SafetyStatus.ROBOT_EMERGENCY_STOPPED
                  | SafetyStatus.SYSTEM_EMERGENCY_STOPPED)
     if safety & emergency:

@@ -30,6 +30,8 @@ from ur_cartesian_driver.execution.flow import Window
 from ur_cartesian_driver.execution.monitor import PathTracker, speed
 from ur_cartesian_driver.execution.pace import Pace
 from ur_cartesian_driver.execution.states import (
+    HOLDS,
+    NO_STOP,
     PAUSES,
     RESULTS,
     Signal,
@@ -109,14 +111,18 @@ class TrajectoryMachine:
     """The table above for one goal; see the module's description."""
 
     def __init__(self, order: Order, *, feedback_period: float = 0.04,
-                 max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION) -> None:
+                 max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION,
+                 continues: bool = False) -> None:
         """
         Take an order; nothing happens before :meth:`start`.
 
         :param feedback_period: time between two progress reports [s].
         :param max_plan_deviation: how far the controller's own target may be from the plan [m],
             [rad]; 0 = any way, any angle.
+        :param continues: a protective or safeguard stop holds the goal, as a pause does, until
+            somebody unlocks the robot and plays its program.
         """
+        self._borne = HOLDS if continues else NO_STOP
         self.order = order
         self.state = State.MOVING if order.T_flange_tcp is None else State.ARMING
         #: The TCP that was set for this goal. Where it is not ``returned`` at the end, whoever
@@ -197,7 +203,7 @@ class TrajectoryMachine:
             case LinkLost(link=link, reason=reason):
                 return Signal.CONNECTION_LOST, f'the {link} connection was lost: {reason}'
             case StateReceived(state=state):
-                return stop_in(state) or self._judge(state, now)
+                return stop_in(state, self._borne) or self._judge(state, now)
             case Tick():
                 return self._late(now)
         raise TypeError(f'unknown event {event!r}')

@@ -490,6 +490,8 @@ class RobotLink:
             self._change(Change.PROGRAM_PAUSED)
         elif not self._tcp_owed:
             self._change(Change.PROGRAM_CONNECTED)
+            if self._program.busy:  # after a stop that the goal has outlived
+                self._change(Change.GOAL_STARTED)
 
     def _program_reads(self) -> bool:
         """Tell whether the robot program would act now on what it is sent."""

@@ -169,6 +169,11 @@ DECLARATIONS: tuple[Declaration, ...] = (
     Declaration('on_too_fast',
                 'A goal whose times need more speed than the limits allow: refuse it, or slow '
                 'it down.', choices=('refuse', 'slow')),
+    Declaration('after_robot_stop',
+                'What becomes of a goal when the robot makes a protective or safeguard stop: '
+                'abort it, and the old motion never goes on; or continue it when somebody has '
+                'unlocked the robot and plays its program, as the robot itself does.',
+                choices=('abort', 'continue')),
     Declaration('max_approach_distance',
                 'Longest way of the tool to the first point [m]; 0: without bound.', 0.0, 10.0),
     Declaration('on_posture_change',
