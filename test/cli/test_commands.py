@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line: what it prints, and its exit status."""
 
+from io import StringIO
 import json
 import os
 import signal
@@ -82,6 +83,13 @@ def test_validate_takes_tcp_and_calibration(capsys):
     first, *_ = capsys.readouterr().out.splitlines()
     assert first == ('ur5e with its calibration, joints 0 -1.571 1.571 -1.571 -1.571 0 rad, '
                      'TCP 0 0 0.1 0 0 0')
+
+
+def test_validate_reads_standard_input_and_puts_a_prefix_before_names(capsys, monkeypatch):
+    monkeypatch.setattr('sys.stdin', StringIO(goal_file('postures').read_text()))
+    assert main(['validate', '-', '--tf-prefix', 'left_', '-p', 'tf_prefix:=left_']) == 0
+    assert main(['validate', 'postures', '-p', 'tf_prefix:=left_']) == 1
+    assert 'left_base' in capsys.readouterr().err
 
 
 def test_a_goal_that_is_nowhere_is_named_with_the_examples(capsys):

@@ -106,6 +106,13 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
                      help='local control: no scripts over the network')
 
 
+def _add_goal(command: argparse.ArgumentParser) -> None:
+    command.add_argument('file', help='goal in the YAML of `ros2 action send_goal`, or the name '
+                                      'of an example; - = standard input')
+    command.add_argument('--tf-prefix', default='',
+                         help='put before the names of frames and joints in the file')
+
+
 def _add_calibration(command: argparse.ArgumentParser) -> None:
     calibration = command.add_mutually_exclusive_group()
     calibration.add_argument(
@@ -117,12 +124,9 @@ def _add_calibration(command: argparse.ArgumentParser) -> None:
 
 def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
     send = _add(sub, 'send', commands.send, 'send a goal to a running driver and wait for its end')
-    send.add_argument(
-        'file', help='goal in the YAML of `ros2 action send_goal`; - = standard input')
+    _add_goal(send)
     send.add_argument('--driver', default='ur_cartesian_driver',
                       help='name of the driver node, with its namespace if it has one')
-    send.add_argument('--tf-prefix', default='',
-                      help='put before the names of frames and joints in the file')
     send.add_argument('--wait', type=float, default=10.0, metavar='SECONDS',
                       help='how long the driver may need until it is ready; 0 = do not look')
     send.add_argument('--validate-only', action='store_true', help='plan, but do not move')
@@ -134,7 +138,7 @@ def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
 def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
     validate = _add(sub, 'validate', plans.validate,
                     'check and plan a goal with neither motion nor robot, and print the plan')
-    validate.add_argument('file', help='goal in the YAML of `ros2 action send_goal`')
+    _add_goal(validate)
     validate.add_argument('--ur-type', choices=sorted(MODELS),
                           help='model; left out: the parameter ur_type')
     validate.add_argument('--joints', type=_six_numbers, metavar='Q1,...,Q6',

@@ -102,9 +102,7 @@ def send(arguments: argparse.Namespace) -> int:
     """Send a goal, show its progress, and wait for its end."""
     from ur_cartesian_driver.ros import client
 
-    goal = client.with_prefix(client.load_goal(
-        sys.stdin.read() if arguments.file == '-' else goal_file(arguments.file)),
-        arguments.tf_prefix)
+    goal = read_goal(arguments)
     goal.validate_only = goal.validate_only or arguments.validate_only
     with Recorder(arguments.record) as recorder, client.GoalClient(arguments.driver) as sender:
         if arguments.wait > 0.0:
@@ -120,8 +118,17 @@ def send(arguments: argparse.Namespace) -> int:
     return 0 if status == 'SUCCEEDED' else 1
 
 
+def read_goal(arguments: argparse.Namespace) -> Any:
+    """Return the goal of a file, an example or standard input, as a message."""
+    from ur_cartesian_driver.ros import client
+
+    return client.with_prefix(client.load_goal(
+        sys.stdin.read() if arguments.file == '-' else goal_file(arguments.file)),
+        arguments.tf_prefix)
+
+
 def code_text(number: int) -> str:
-    """Return an error code with its name and number, as doc/errors.md heads its sections."""
+    """Return an error code by its name and number, ``INVALID_GOAL (-1)``."""
     code = ErrorCode(number)
     return f'{code.name} ({code.value})'
 

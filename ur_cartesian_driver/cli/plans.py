@@ -15,7 +15,7 @@ from dataclasses import replace
 import sys
 from time import time_ns
 
-from ur_cartesian_driver.cli.commands import calibration, code_text, goal_file
+from ur_cartesian_driver.cli.commands import calibration, code_text, read_goal
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import code_of, GoalRefused
@@ -28,7 +28,7 @@ def validate(arguments: argparse.Namespace) -> int:
     """Plan a goal from where the arm is said to stand, and print the plan."""
     from ur_cartesian_driver.planning import plan
     from ur_cartesian_driver.preview import table
-    from ur_cartesian_driver.ros import client, convert, frames
+    from ur_cartesian_driver.ros import convert, frames
     from ur_cartesian_driver.ros.parameter_files import read_settings
 
     settings = read_settings(arguments.params_file, arguments.param)
@@ -39,7 +39,7 @@ def validate(arguments: argparse.Namespace) -> int:
     dialect = settings.driver.dialect
     options = replace(settings.planning, dialect=dialect,
                       allow_tcp_change=settings.planning.allow_tcp_change and dialect.sets_tcp)
-    message = client.load_goal(goal_file(arguments.file))
+    message = read_goal(arguments)
     try:
         goal = convert.goal_from_message(
             message, settings.frames, now=time_ns(), stand=frames.Stand.of(state),
