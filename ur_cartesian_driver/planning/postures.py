@@ -103,8 +103,10 @@ class Reach:
         T_base_flange = self.flange(T_base_tcp)
         why = why_unreachable(self.arm, T_base_flange)
         if solutions(self.arm, T_base_flange):
-            return JointLimitExceeded(f'{place} cannot be reached: {why}.')
-        return Unreachable(f'{place} cannot be reached: {why}.')
+            return JointLimitExceeded(
+                f'{place} cannot be reached: {why}; turn the tool in another way.')
+        return Unreachable(f'{place} cannot be reached: {why}; check the frame and the TCP, or '
+                           'move the point or the robot.')
 
     def jump(self, T_base_tcp: Pose, q: Joints, q_next: Joints, place: str) -> GoalRefused:
         """Tell why the configuration cannot be continued: end of a range, or a singularity."""
