@@ -90,17 +90,21 @@ def child(target: Callable[..., None], *arguments: Any) -> Iterator[Child]:
 
 
 @contextmanager
-def simulator() -> Iterator[Child]:
-    """Run a simulated robot; calls: ``ports``, ``state``, ``inject``, ``begin``, ..."""
-    with child(_simulate) as robot:
+def simulator(**settings: Any) -> Iterator[Child]:
+    """
+    Run a simulated robot; calls: ``ports``, ``state``, ``inject``, ``begin``, ...
+
+    :param settings: fields of its configuration.
+    """
+    with child(_simulate, settings) as robot:
         yield robot
 
 
-def _simulate(connection: Connection) -> None:
+def _simulate(connection: Connection, settings: dict[str, Any]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
     any_port: dict[str, Any] = {
         field.name: 0 for field in fields(SimulatorConfig) if field.name.endswith('_port')}
-    config = SimulatorConfig(**any_port)
+    config = SimulatorConfig(**any_port | settings)
     with SimulatedRobot(config) as robot:
         beginnings = note_cycles(robot)
         answer_calls(connection, {

@@ -22,8 +22,8 @@ import time
 
 from figures import as_json, Figure, machine, table
 
-#: The one that is told how long to measure.
-RTDE_RATE = 'rtde_rate'
+#: Those that are told how long to measure; the soak is no part of a usual run.
+RTDE_RATE, SOAK = 'rtde_rate', 'soak'
 #: In the order of the table: what is measured with many processes first.
 MODULES = ('goal_on_wire', 'violation_to_cancel', 'keepalive', 'points', 'load', RTDE_RATE,
            'planning', 'kinematics', 'kinematics_rows', 'codecs_rtde', 'urscript_frames')
@@ -41,7 +41,9 @@ def main() -> int:
     failed = False
     for name in arguments.only or MODULES:
         try:
-            options = {} if name != RTDE_RATE else {'seconds': arguments.seconds}
+            options = {'seconds': arguments.seconds} if name in (RTDE_RATE, SOAK) else {}
+            if name == SOAK:
+                options['goals'] = arguments.goals
             measured = list(import_module(name).run(arguments.quick, **options))
         except Exception as error:
             # The others can still be measured.
@@ -60,12 +62,16 @@ def main() -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description='Measure the driver and the simulated robot.')
-    parser.add_argument('--only', action='append', choices=MODULES, metavar='NAME',
-                        help=f'only this one (may be repeated): {", ".join(MODULES)}')
+    parser.add_argument('--only', action='append', choices=(*MODULES, SOAK), metavar='NAME',
+                        help='only this one (may be repeated): '
+                             f'{", ".join((*MODULES, SOAK))}')
     parser.add_argument('--quick', action='store_true',
                         help='smaller goals, shorter times: to see that it runs')
     parser.add_argument('--seconds', type=float, default=30.0,
-                        help=f'how long {RTDE_RATE} measures (600 for the record)')
+                        help=f'how long {RTDE_RATE} measures (600 for the record), and {SOAK} '
+                             'lasts (1800)')
+    parser.add_argument('--goals', type=int, default=10_000,
+                        help=f'after so many goals {SOAK} ends sooner')
     parser.add_argument('--json', metavar='FILE', help='write the figures as JSON, - = print them')
     return parser
 
