@@ -13,6 +13,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
     LinkLost,
+    PreemptRequested,
     StateReceived,
     Tick,
     TrajectoryEnded,
@@ -62,7 +63,7 @@ PACKETS = st.builds(
 EVENTS = st.one_of(
     PACKETS.map(lambda state: StateReceived(state=state)), st.just(Tick()),
     st.sampled_from([TrajectoryEnded(result=result) for result in TrajectoryResult]),
-    st.just(CancelRequested()),
+    st.sampled_from([CancelRequested(), PreemptRequested()]),
     st.sampled_from([LinkLost(link=link, reason='it closed') for link in ('program', 'RTDE')]))
 
 

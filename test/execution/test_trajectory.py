@@ -25,6 +25,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
     LinkLost,
+    PreemptRequested,
     StateReceived,
     Tick,
     TrajectoryEnded,
@@ -167,6 +168,31 @@ def test_cancel_brakes_waits_for_the_answer_and_for_rest():
     machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 1.1)
     assert not any(isinstance(c, Finish) for c in machine.step(robot(0.3, qd=MOVING), 1.2))
     assert outcome(machine.step(robot(0.3, qd=REST), 1.3)).code is ErrorCode.CANCELLED
+
+
+@pytest.mark.parametrize(('first', 'second', 'code'), [
+    (PreemptRequested(by='goal 7'), CancelRequested(), ErrorCode.PREEMPTED),
+    (CancelRequested(), PreemptRequested(), ErrorCode.CANCELLED)])
+def test_of_a_cancel_and_a_preemption_the_first_counts(first, second, code):
+    machine = started()
+    cancel = SendControl(action=TrajectoryAction.CANCEL, count=1)
+    assert cancel in machine.step(first, 1.0)
+    assert machine.step(second, 1.01) == []
+    machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 1.1)
+    assert machine.step(second, 1.15) == []
+    end = outcome(machine.step(robot(0.3, qd=REST), 1.3))
+    assert end.code is code
+    if code is ErrorCode.PREEMPTED:
+        assert end.text == 'Goal 7 took the place of this one (on the way to point 0).'
+
+
+@pytest.mark.parametrize('state', [State.ARMING, State.SETTLING])
+def test_a_motion_that_is_preempted_where_nothing_is_to_be_stopped_ends_at_once(state):
+    machine = brought_to(state)
+    commands = machine.step(PreemptRequested(by='goal 7'), 1.1)
+    assert not any(isinstance(c, SendControl) for c in commands)
+    commands += machine.step(with_tcp(OWN), 3.0)
+    assert outcome(commands).code is ErrorCode.PREEMPTED
 
 
 def test_a_success_that_overtakes_the_cancel_is_not_its_answer():
@@ -421,7 +447,7 @@ def test_a_protective_stop_ends_the_program_so_that_the_motion_cannot_resume():
 
 
 @pytest.mark.parametrize('event', [
-    CancelRequested(), Tick(), robot(0.5), LinkLost(link='RTDE', reason=''),
+    CancelRequested(), PreemptRequested(), Tick(), robot(0.5), LinkLost(link='RTDE', reason=''),
     *(TrajectoryEnded(result=result) for result in TrajectoryResult)])
 def test_nothing_happens_after_the_end(event):
     assert brought_to(State.ENDED).step(event, 9.0) == []

@@ -11,7 +11,8 @@ means in the present state: the next state and how the goal ends, if it does.
   begins. Goals about the TCP itself begin in MOVING.
 * **MOVING**: the robot program runs points. The result SUCCESS leads to SETTLING; whatever stops
   the arm by itself (safety, connection) ends the goal at once, because nothing that we could send
-  would be read; a reason of ours to stop (cancel, tolerance) leads to STOPPING.
+  would be read; a reason of ours to stop (cancel, preemption, tolerance)
+  leads to STOPPING.
 * **SETTLING**: the program says that the last point is reached. The arm has to be inside the goal
   tolerance and at rest, within the goal's time tolerance. Where the controller's own target is
   elsewhere, the program left something out (DEVIATION).
@@ -70,6 +71,7 @@ class Signal(Enum):
     CANCELED = auto()
     FAILURE = auto()
     CANCEL = auto()
+    PREEMPT = auto()
     VIOLATION = auto()
     DEVIATION = auto()
     STALLED = auto()
@@ -124,6 +126,9 @@ def _stays(state: State, *signals: Signal) -> dict[Signal, Step]:
     return {signal: Step(state) for signal in signals}
 
 
+#: What people ask for; the first of them says how the goal ends.
+_WISHES = (Signal.CANCEL, Signal.PREEMPT)
+
 #: What each signal means in each state. ARMED, SETTLED, RESTORED, AT_REST, LATE and UNANSWERED are
 #: about the state they are given for, so they are not possible in the others.
 TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
@@ -133,6 +138,7 @@ TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
         **_stays(State.ARMING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
         Signal.ARMED: Step(State.MOVING),
         Signal.CANCEL: _judged(ErrorCode.CANCELLED),
+        Signal.PREEMPT: _judged(ErrorCode.PREEMPTED),
         Signal.LATE: _judged(ErrorCode.ROBOT_NOT_READY),
     },
     State.MOVING: {
@@ -141,6 +147,7 @@ TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
         Signal.CANCELED: _judged(ErrorCode.EXECUTION_FAILED),
         Signal.FAILURE: _judged(ErrorCode.EXECUTION_FAILED),
         Signal.CANCEL: Step(State.STOPPING, ErrorCode.CANCELLED),
+        Signal.PREEMPT: Step(State.STOPPING, ErrorCode.PREEMPTED),
         Signal.VIOLATION: Step(State.STOPPING, ErrorCode.PATH_TOLERANCE_VIOLATED),
         Signal.DEVIATION: Step(State.STOPPING, ErrorCode.EXECUTION_FAILED),
         Signal.STALLED: _ends(ErrorCode.EXECUTION_FAILED),
@@ -149,32 +156,33 @@ TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
         **_STOPS,
         **_stays(State.SETTLING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
         Signal.CANCEL: _judged(ErrorCode.CANCELLED),
+        Signal.PREEMPT: _judged(ErrorCode.PREEMPTED),
         Signal.DEVIATION: _judged(ErrorCode.EXECUTION_FAILED),
         Signal.SETTLED: _judged(ErrorCode.SUCCESSFUL),
         Signal.LATE: _judged(ErrorCode.GOAL_TOLERANCE_VIOLATED),
     },
     State.STOPPING: {
         **_STOPS,
-        **_stays(State.STOPPING, Signal.SUCCESS, Signal.FAILURE, Signal.CANCEL),
+        **_stays(State.STOPPING, Signal.SUCCESS, Signal.FAILURE, *_WISHES),
         Signal.CANCELED: Step(State.HALTING),
         Signal.UNANSWERED: Step(State.ENDED),
         Signal.LATE: _ends(ErrorCode.EXECUTION_FAILED),
     },
     State.HALTING: {
         **_STOPS,
-        **_stays(State.HALTING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, Signal.CANCEL),
+        **_stays(State.HALTING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, *_WISHES),
         Signal.AT_REST: Step(State.RESTORING),
         Signal.LATE: _ends(ErrorCode.EXECUTION_FAILED),
     },
     State.RESTORING: {
         **{signal: Step(State.ENDED) for signal in STOPS},
-        **_stays(State.RESTORING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, Signal.CANCEL),
+        **_stays(State.RESTORING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, *_WISHES),
         Signal.RESTORED: Step(State.ENDED),
         Signal.LATE: Step(State.ENDED),
     },
     State.ENDING: {
         **_STOPS,
-        **_stays(State.ENDING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, Signal.CANCEL,
+        **_stays(State.ENDING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, *_WISHES,
                  Signal.PROGRAM_STOPPED),
         Signal.LATE: Step(State.ENDED),
     },

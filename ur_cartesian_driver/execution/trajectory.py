@@ -47,6 +47,7 @@ from ur_cartesian_driver.motion.events import (
     Event,
     LinkLost,
     Outcome,
+    PreemptRequested,
     Progress,
     StateReceived,
     Tick,
@@ -198,6 +199,8 @@ class TrajectoryMachine:
                 return RESULTS[result]
             case CancelRequested(reason=reason):
                 return Signal.CANCEL, reason
+            case PreemptRequested(by=by):
+                return Signal.PREEMPT, f'{by} took the place of this one'
             case LinkLost(link='program', reason=reason):
                 return Signal.PROGRAM_STOPPED, f'the robot program hung up: {reason}'
             case LinkLost(link=link, reason=reason):

@@ -44,6 +44,14 @@ class CancelRequested:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PreemptRequested:
+    """Another motion is to take the place of this one, which has to stop for it."""
+
+    #: Who takes its place, as part of a sentence.
+    by: str = 'a newer motion'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LinkLost:
     """A connection that the motion needs is gone; the reason is a clause for the error text."""
 
@@ -56,7 +64,8 @@ class Tick:
     """Time passed; sent at least every 20 ms so that bounds hold when nothing else happens."""
 
 
-Event: TypeAlias = StateReceived | TrajectoryEnded | CancelRequested | LinkLost | Tick
+Event: TypeAlias = (
+    StateReceived | TrajectoryEnded | CancelRequested | PreemptRequested | LinkLost | Tick)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
