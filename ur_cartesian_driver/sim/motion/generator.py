@@ -64,16 +64,18 @@ _WITHIN = 1.0 + 1e-6
 # Beside a singularity half a step hardly turns the joints less than the whole one, so that it is
 # shortened by a power, at most this one, of what it is too long, and at most so many times that.
 _HIGHEST_POWER, _DEEPEST = 4.0, 2.0
-# The rest of a leg is walked in so many steps, none of which turns a joint by more [rad].
+# The rest of a leg is walked in so many steps, or in shorter ones, down to this part of it, so
+# that none turns a joint by more [rad].
 _WALK = 8
-_JUMP = 0.7
+_LEAST_WALK = 1e-4
+_JUMP = 0.3
 # A tool motion at less than this part of its speed for so long [s] has met a wall, unless a joint
 # turns at more than this part of what it can: then it passes a singularity.
 _STALLED = 0.01
 _STALLED_AFTER = 1.0
 _TURNING = 0.2
 # Steps in which the arm changes sides are cut to this length [m, rad].
-_FINE = 5e-5
+_FINE = 1e-5
 # A joint line does not begin where the tool's path before it ends if it is so much too fast.
 _JUMP_RATIO = 50.0
 # Blends that touch do not overlap [m].
@@ -488,13 +490,16 @@ class MotionGenerator:
         if isinstance(leg, JointLine):
             return leg.end
         here, there = self.T_base_tcp, leg.pose(leg.length)
-        q = self.q
-        for i in range(1, _WALK + 1):
-            pose = here.interpolate(there, i / _WALK)
+        q, done, step = self.q, 0.0, 1.0 / _WALK
+        while done < 1.0:
+            pose = here.interpolate(there, min(done + step, 1.0))
             after = self._reach.joints(pose @ self._T_tcp_flange, q)
-            if after is None or lead(after, q) > _JUMP:
+            if after is not None and lead(after, q) <= _JUMP:
+                q, done, step = after, done + step, min(2.0 * step, 1.0 / _WALK)
+            elif step < _LEAST_WALK:
                 return None
-            q = after
+            else:
+                step *= 0.5
         return q
 
     def _run(self, before: Track | None, track: Track, call: Call, room: float) -> None:
