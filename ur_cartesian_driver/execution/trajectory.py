@@ -267,17 +267,22 @@ class TrajectoryMachine:
 
     def _arrival(self, state: RobotState, now: float) -> tuple[Signal | None, str]:
         """Return what it means that the arm rests after the program's SUCCESS."""
+        missed = self._missed_end(state)
+        if missed and now >= self._arrival_due:
+            return Signal.DEVIATION, missed
+        if not missed and self._goal_error(state) is None:
+            return Signal.SETTLED, ''
+        return self._late(now)
+
+    def _missed_end(self, state: RobotState) -> str:
+        """Return that the controller's target is not at the end, as a clause, or nothing."""
         off = [value for value, limit in zip(
             self._tracker.deviation(state.target_tcp_pose), self._max_plan_deviation, strict=True)
             if 0.0 < limit < value]
-        if off and now >= self._arrival_due:
-            return Signal.DEVIATION, (
-                f'the robot program reports the end {off[0]:.4f} m or rad away from the last '
-                'point: it left out motions that it does not know; set wire_dialect to the '
-                'version of that program')
-        if not off and self._goal_error(state) is None:
-            return Signal.SETTLED, ''
-        return self._late(now)
+        return '' if not off else (
+            f'the robot program reports the end {off[0]:.4f} m or rad away from the last point: '
+            'it left out motions that it does not know; set wire_dialect to the version of that '
+            'program')
 
     def _stall(self) -> tuple[Signal, str] | None:
         """Return that the arm stands for no reason, or None."""
@@ -330,12 +335,20 @@ class TrajectoryMachine:
         if self.state in (State.RESTORING, State.ENDING):
             return Signal.LATE, ''
         if self.state is State.SETTLING:
-            missing = self._goal_error(self._latest) if self._latest is not None else None
-            return Signal.LATE, missing or 'the arm did not come to rest'
+            return self._unsettled()
         if self.state is State.STOPPING and self._latest is not None and _rests(self._latest):
             return Signal.UNANSWERED, ''
         return Signal.LATE, (f'the robot did not confirm the stop within {STOP_BOUND:g} s, '
                              'its program was ended')
+
+    def _unsettled(self) -> tuple[Signal, str]:
+        """Return what has kept the arm from arriving until now."""
+        state = self._latest
+        if state is None or not _rests(state):
+            return Signal.LATE, 'the arm did not come to rest'
+        if missed := self._missed_end(state):
+            return Signal.DEVIATION, missed
+        return Signal.LATE, self._goal_error(state) or 'the arm did not come to rest'
 
     def _why_not_armed(self) -> str:
         state = self._latest
