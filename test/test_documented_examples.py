@@ -29,6 +29,7 @@ from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.convert import goal_from_message
 from ur_cartesian_driver.ros.frames import Frames, Stand
 from ur_cartesian_driver.sim import SimulatedRobot
+from ur_cartesian_driver.sim.faults import After
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(
@@ -130,6 +131,8 @@ def test_a_goal_ends_as_the_document_shows(commands, shown):
     started = parser().parse_args([*sim, '--rtde-port', '0', '--primary-port', '0',
                                    '--dashboard-port', '0'])
     request = parser().parse_args(send)
+    # A reader needs some time between the commands.
+    assert not [fault for fault in started.faults if isinstance(fault.when, After)]
     if started.power_off:
         outcome = by_a_robot_that_is_not_ready(started, request)
     else:
