@@ -108,7 +108,8 @@ def too_near(pieces: Sequence[Piece], found: Followed, measures: Floats,
             continue
         row, k = min(((int(r), int(c)) for r, c in np.argwhere(near[rows])),
                      key=lambda at: measures[rows[at[0]], at[1]] / bounds[at[1]])
-        value, measure, bound = float(measures[rows[row], k]), MEASURES[k], float(bounds[k])
+        value = round(float(measures[rows[row], k]), 6)
+        measure, bound = MEASURES[k], float(bounds[k])
         where = place(int(segment), float(fractions[rows[row]]))
         return NearSingularity(
             f'{where} comes within {value:.3g} {measure.unit} of the {measure.name} singularity '

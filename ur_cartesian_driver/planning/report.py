@@ -11,6 +11,7 @@ from ur_cartesian_driver.motion.goal import Goal, SegmentType
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, OptimoveJ, Primitive
 from ur_cartesian_driver.planning.leg import Leg, Timing
+from ur_cartesian_driver.planning.path import JointLine
 from ur_cartesian_driver.planning.validate import is_optimized, is_timed, segment_of
 
 #: How many points a remark lists before it counts the rest.
@@ -99,6 +100,9 @@ def _duration(leg: Leg, timing: Timing) -> str:
     about = 'about ' if is_optimized(leg.kind) else ''
     if leg.path.length > 1e-6:
         speed = f'{leg.path.length / max(timing.duration, 1e-9):.3f} m/s on average'
+    elif isinstance(leg.path, JointLine):  # another posture of the same pose
+        speed = (f'{max(leg.path.travel) / max(timing.duration, 1e-9):.3f} rad/s of the leading '
+                 'joint on average')
     else:
         speed = f'{leg.path.angle / max(timing.duration, 1e-9):.3f} rad/s on average'
     return f'{about}{timing.duration:.3f} s ({speed})'
