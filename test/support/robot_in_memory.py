@@ -1,0 +1,129 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A simulated robot that runs our program, without network and without time.
+
+The bytes are those that the driver sends, the program is the one that it uploads, and the
+controller is the one behind ``ur-cartesian sim``; only the sockets are lists, and a cycle passes
+when somebody asks for it. So a motion costs what its cycles cost, and nothing else.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ur_cartesian_driver.motion.events import TrajectoryResult
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.state import RobotState, RuntimeState
+from ur_cartesian_driver.program import as_program, ProgramSettings, render
+from ur_cartesian_driver.protocol.reverse import keepalive, trajectory, TrajectoryAction
+from ur_cartesian_driver.protocol.trajectory import encode_points, ResultDecoder
+from ur_cartesian_driver.sim.config import SimulatorConfig
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.modes import OPERATIONAL, SafetyEvent
+from ur_cartesian_driver.sim.script_sockets import MemorySockets
+
+REVERSE, TRAJECTORY, COMMAND = 1, 2, 3
+#: What the controller may say while all is well: that a movep is slower than asked for.
+HARMLESS = 'C196A0:'
+#: No motion of a test takes longer [s].
+PATIENCE = 5000.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """How a trajectory ended."""
+
+    #: What the controller said when it stopped; empty if the trajectory was run to its end.
+    trouble: str
+    #: Where the arm stands then [rad], and where the controller says that its TCP is.
+    q: tuple
+    pose: Pose
+    #: Every target on the way: joint positions (n, 6) [rad], and the pose of the TCP to each.
+    joints: np.ndarray
+    poses: list
+    #: Time that it took [s].
+    duration: float
+
+
+class RobotInMemory:
+    """One robot, on which trajectories are run one after the other from anywhere."""
+
+    def __init__(self, model, frequency=None, geometry=None):
+        self.model, self.geometry = model, geometry
+        config = SimulatorConfig(model=model, frequency=frequency, geometry=geometry,
+                                 unlock_delay=0.0)
+        self._sockets = MemorySockets()
+        self._accepted = {
+            port: self._sockets.listen(port) for port in (REVERSE, TRAJECTORY, COMMAND)}
+        self.controller = Controller(config, self._sockets)
+        program = render(ProgramSettings(
+            host='driver', reverse_port=REVERSE, trajectory_port=TRAJECTORY,
+            script_command_port=COMMAND, version=config.version[:3]))
+        refusal = self.controller.programs.load('driver', as_program(program))
+        assert refusal == '', refusal
+
+    @cached_property
+    def slow(self):
+        """The same robot with a fifth of the cycles, for motions that take minutes."""
+        return RobotInMemory(self.model, 0.2 / self.controller.cycle, self.geometry)
+
+    def place(self, q, T_flange_tcp):
+        """Put the arm and its tool somewhere at rest; return what RTDE would report."""
+        self._ready()
+        motion = self.controller.motion
+        motion.T_flange_tcp = T_flange_tcp
+        self.controller.teleport(q)
+        return RobotState(timestamp=0.0, actual_q=q, target_q=q, T_flange_tcp=T_flange_tcp,
+                          actual_tcp_pose=motion.T_base_tcp, target_tcp_pose=motion.T_base_tcp)
+
+    def run(self, primitives):
+        """Send the primitives as the driver does, and wait for the end of the motion."""
+        self._socket(TRAJECTORY).feed(encode_points(primitives))
+        self._command(trajectory(TrajectoryAction.START, len(primitives), read_timeout=0))
+        results, motion = ResultDecoder(), self.controller.motion
+        joints, poses = [], []
+        self.controller.announcements.log.clear()
+        begun = self.controller.time
+        while True:
+            self.controller.step()
+            joints.append(motion.q)
+            poses.append(motion.T_base_tcp)
+            said = self._socket(TRAJECTORY).take()
+            ended = results.feed(said) if said else []
+            if ended or motion.fault is not None or not self.controller.programs.running:
+                break
+            assert self.controller.time - begun < PATIENCE, f'{primitives} do not end'
+        log = [line for line in self.controller.announcements.log
+               if not line.startswith(HARMLESS)]
+        failed = ended != [TrajectoryResult.SUCCESS] or log
+        return Run(trouble='; '.join(log) or str(ended) if failed else '', q=motion.q,
+                   pose=motion.T_base_tcp, joints=np.array(joints), poses=poses,
+                   duration=self.controller.time - begun)
+
+    # -- between trajectories --------------------------------------------------------------------
+
+    def _ready(self):
+        """Let the program wait for a trajectory, whatever the last one did to the controller."""
+        controller = self.controller
+        if controller.safety.mode not in OPERATIONAL:
+            controller.programs.stop()
+            assert controller.safety_event(SafetyEvent.UNLOCK) == ''
+        while controller.programs.state is RuntimeState.STOPPING:
+            controller.step()
+        if not controller.programs.running:
+            assert controller.programs.play() == ''
+            for accepted in self._accepted.values():
+                accepted.clear()
+            while not all(self._accepted.values()):
+                controller.step()
+            self._command(keepalive(0))
+
+    def _command(self, message):
+        self._socket(REVERSE).feed(message.encode())
+        while self._socket(REVERSE).incoming:
+            self.controller.step()
+
+    def _socket(self, port):
+        return self._accepted[port][-1]
