@@ -43,6 +43,24 @@ def test_after_a_timeout_the_arm_is_free_for_the_next_goal(driver, home, short_g
     assert driver.execute(short_goal, timeout=5.0).succeeded
 
 
+def test_a_newer_goal_takes_the_place_of_a_running_one(driver, home):
+    motion = driver.start(driver.plan(Goal(waypoints=(
+        Waypoint(pose=home(y=0.2), time=4.0),))))
+    wait_for(lambda: max(map(abs, driver.state.target_qd)) > 0.05)
+    beyond = Goal(waypoints=(Waypoint(pose=home(z=-5.0), time=60.0),))
+    assert driver.execute(beyond, preempt=True).code is ErrorCode.INVALID_GOAL
+    assert driver.execute(Goal(waypoints=(Waypoint(pose=home(), time=1.0),))
+                          ).code is ErrorCode.ROBOT_NOT_READY
+    assert driver.rest_state.actual_q != driver.state.actual_q
+    assert not motion.done()
+    back = Goal(waypoints=(Waypoint(pose=home(), time=1.0),))
+    assert driver.execute(back, preempt=True, timeout=10.0).succeeded
+    old = motion.result(0.0)
+    assert old.code is ErrorCode.PREEMPTED
+    assert old.text == 'A newer motion took the place of this one (on the way to point 0).'
+    assert driver.rest_state.actual_q == driver.state.actual_q
+
+
 def test_the_way_there_and_the_way_back_keep_a_tight_path_tolerance(driver, home):
     """The count of points of the goal before is still in the register when the next one starts."""
     tolerance = Tolerance(position=(0.002,) * 3)

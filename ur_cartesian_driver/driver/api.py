@@ -38,7 +38,7 @@ from ur_cartesian_driver.driver.channel import (
 )
 from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.driver.services import RobotServices
-from ur_cartesian_driver.execution import Order
+from ur_cartesian_driver.execution import Order, same_tcp
 from ur_cartesian_driver.execution.trajectory import STOP_BOUND
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
@@ -51,17 +51,19 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.lever import seen_at
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.primitive import OptimoveJ, OptimoveL
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.rest import come_to_rest
 from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
 from ur_cartesian_driver.protocol.trajectory import encode_points
 from ur_cartesian_driver.robot.calls import Answer, Call
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.status import DriverStatus, Gaps, stamped
+from ur_cartesian_driver.robot.status import DriverStatus, Gaps, is_paused, is_stopped, stamped
 
 LOG = logging.getLogger('ur_cartesian_driver')
 
@@ -72,6 +74,8 @@ RESTART_PAUSE = 0.5
 
 OnProgress = Callable[[Progress], None]
 
+NO_STATE = 'The robot does not report its state.'
+
 #: How long a cancelled motion may need to its outcome [s], whatever the robot does.
 STOP_PATIENCE = 2.0 * STOP_BOUND + 1.0
 
@@ -79,20 +83,31 @@ STOP_PATIENCE = 2.0 * STOP_BOUND + 1.0
 class Motion:
     """A running motion; its outcome comes whatever happens to the robot."""
 
-    def __init__(self, driver: Driver, number: int, report: tuple[str, ...],
+    def __init__(self, driver: Driver, number: int, plan: Plan,
                  on_progress: OnProgress | None) -> None:
         """Be made by :meth:`Driver.start`."""
         self._driver = driver
         self._future: Future[Outcome] = Future()
         self._on_progress = on_progress
         self.number = number
-        self._plan_report = report
+        self._plan_report = plan.report
+        #: The TCP that the robot has as long as this motion runs.
+        self._loan = None if plan.T_flange_tcp is None else TcpLent(
+            T_flange_before=plan.T_flange_active, T_flange_lent=plan.T_flange_tcp)
         #: The newest report, None before the first.
         self.progress: Progress | None = None
 
     def cancel(self) -> None:
         """Ask the arm to stop; the outcome follows when it stands. May be called twice."""
         self._driver._send(CancelMotion(motion=self.number))
+
+    def preempt(self, by: str = 'a newer motion') -> None:
+        """
+        Ask the arm to stop, as :meth:`cancel` does, because another motion is to follow.
+
+        :param by: which one, as part of the outcome's sentence.
+        """
+        self._driver._send(CancelMotion(motion=self.number, preempted_by=by))
 
     def done(self) -> bool:
         """Tell whether the outcome is there."""
@@ -221,6 +236,24 @@ class Driver(RobotServices):
             return None
 
     @property
+    def rest_state(self) -> RobotState | None:
+        """
+        The state in which the arm is between motions: now, or if it were stopped now.
+
+        None as for :attr:`state`.
+        """
+        state = self.state
+        if state is None:
+            return None
+        with self._lock:
+            loan = next((motion._loan for motion in self._motions.values()), self._loan)
+        state = come_to_rest(state, self._arm, self.config.stop_deceleration)
+        if loan is None or not same_tcp(state.T_flange_tcp, loan.T_flange_lent):
+            return state
+        return replace(seen_at(state, state.T_flange_tcp.inverse() @ loan.T_flange_before),
+                       T_flange_tcp=loan.T_flange_before)
+
+    @property
     def signals(self) -> Signals | None:
         """Inputs, outputs and tool; None before the first report and when the robot is lost."""
         return self._signals
@@ -253,13 +286,15 @@ class Driver(RobotServices):
 
     def plan(self, goal: Goal) -> Plan:
         """
-        Check a goal and choose its primitives, from where the robot stands now; nothing moves.
+        Check a goal and choose its primitives, from where the arm stands now; nothing moves.
+
+        While a motion runs: from where the arm would stand if it were stopped now.
 
         :raises GoalRefused: with the reason.
         """
-        state = self.state
+        state = self.rest_state
         if state is None:
-            raise RobotNotReady(self._status.message or 'The robot does not report its state.')
+            raise RobotNotReady(self._status.message or NO_STATE)
         status = self._status
         options = replace(
             self.options, calibration_known=status.calibration_known,
@@ -285,22 +320,62 @@ class Driver(RobotServices):
                 raise RobotNotReady('A motion is running; wait for its end or cancel it.')
             if reason := self._status.not_ready():
                 raise RobotNotReady(reason)
-            motion = Motion(self, next(self._numbers), plan.report, on_progress)
+            motion = Motion(self, next(self._numbers), plan, on_progress)
             self._motions[motion.number] = motion
         self._send(StartMotion(motion=motion.number, points=points,
                                 order=order_of(plan, self.config.dialect)))
         return motion
 
+    def make_way(self, by: str = 'a newer motion') -> bool:
+        """
+        Stop the running motion for another one; it ends PREEMPTED. Wait until its end.
+
+        :returns: whether there was one: what was planned while it ran has to be planned again.
+        :raises RobotNotReady: it cannot be stopped now so that another one could follow, and goes
+            on; or its end did not come.
+        """
+        with self._lock:
+            motions = list(self._motions.values())
+        if motions:
+            self.check_can_make_way()
+        for motion in motions:
+            motion.preempt(by)
+            try:
+                motion.result(STOP_PATIENCE)
+            except TimeoutError:
+                raise RobotNotReady('The motion before this one did not end.') from None
+        return bool(motions)
+
+    def check_can_make_way(self) -> None:
+        """
+        See that a motion that runs can be stopped for another one.
+
+        :raises RobotNotReady: the robot program is held: it would read neither the stop nor the
+            next motion.
+        """
+        state = self.state
+        if state is None:
+            raise RobotNotReady(self._status.message or NO_STATE)
+        if is_paused(state) or is_stopped(state):
+            raise RobotNotReady(
+                'A motion is running, and the robot program is held by a pause or a stop, so that '
+                'nothing else can take its place; let it go on, or cancel it.')
+
     def execute(self, goal: Goal, on_progress: OnProgress | None = None,
-                timeout: float | None = None) -> Outcome:
+                timeout: float | None = None, *, preempt: bool = False) -> Outcome:
         """
         Check, plan, run and wait; a refusal is an outcome too.
 
+        :param preempt: if a motion runs stop it for this goal, once the goal has passed all checks
+            from where the arm would come to rest; else the goal is refused while one runs.
         :raises TimeoutError: no outcome within ``timeout`` [s]; the motion was cancelled, and the
             arm stands.
         """
         try:
-            motion = self.start(self.plan(goal), on_progress)
+            planned = self.plan(goal)
+            if preempt and self.make_way():
+                planned = self.plan(goal)
+            motion = self.start(planned, on_progress)
         except GoalRefused as refusal:
             return Outcome(code=code_of(refusal), text=str(refusal))
         try:

@@ -67,6 +67,8 @@ class CancelMotion:
     """Stop the motion, if it is the one that runs."""
 
     motion: int
+    #: Who is to take its place, as part of a sentence; empty: nobody, it is cancelled.
+    preempted_by: str = ''
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

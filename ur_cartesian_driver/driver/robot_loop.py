@@ -68,6 +68,7 @@ from ur_cartesian_driver.motion.events import (
     CancelRequested,
     Event,
     Outcome,
+    PreemptRequested,
     StateReceived,
     Tick,
 )
@@ -169,9 +170,9 @@ class RobotLoop:
         match request:
             case StartMotion():
                 await self._start(request)
-            case CancelMotion(motion=motion):
+            case CancelMotion(motion=motion, preempted_by=by):
                 if motion == self._motion:
-                    self._handle_event(CancelRequested())
+                    self._handle_event(PreemptRequested(by=by) if by else CancelRequested())
             case ResendProgram():
                 self._link.upload_program()
             case CallRobot():

@@ -1,0 +1,44 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where a moving arm would come to rest: what a goal is checked from that is to follow another one.
+
+The robot program stops an arm along its joints (``stopj``): the leading joint brakes evenly and
+the others in proportion, so each goes on by half of what it would have gone in the time of the
+stop. That is where the next goal begins, in that configuration. It is looked at as if the stop
+began now. Checking takes a while in which the arm goes on, but nobody knows how long before it is
+done; so what passes is planned again when the arm stands.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.goal import ZERO6
+from ur_cartesian_driver.motion.pose import Vector6
+from ur_cartesian_driver.motion.state import RobotState
+
+
+def come_to_rest(state: RobotState, arm: Arm, deceleration: float) -> RobotState:
+    """
+    Return the state in which the arm would be if it were stopped now; itself where it stands.
+
+    :param deceleration: of the leading joint [rad/s^2].
+    """
+    leading = max(map(abs, state.target_qd))
+    if leading == 0.0:
+        return state
+    q = _moved(state.actual_q, state.target_qd, 0.5 * leading / deceleration)
+    # By the change of the pose: an arm whose calibration is unknown is off its model anyway.
+    T_flange_tcp_now = arm.forward(state.actual_q).inverse() @ state.actual_tcp_pose
+    T_base_tcp = arm.forward(q) @ T_flange_tcp_now
+    return replace(
+        state, actual_q=q, target_q=q, actual_qd=ZERO6, target_qd=ZERO6,
+        actual_tcp_pose=T_base_tcp, target_tcp_pose=T_base_tcp,
+        actual_tcp_twist=ZERO6, target_tcp_twist=ZERO6)
+
+
+def _moved(q: Vector6, qd: Vector6, time: float) -> Vector6:
+    a, b, c, d, e, f = (x + v * time for x, v in zip(q, qd, strict=True))
+    return a, b, c, d, e, f
