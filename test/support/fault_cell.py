@@ -155,6 +155,13 @@ async def let_happen(cell: RobotCell, cause: str):
         cell.robot.inject(cause)
 
 
+async def let_pass(cell: RobotCell):
+    """End the faults that last."""
+    cell.robot.clear_faults()
+    cell.owner.silent = False
+    await cell.sleep(2.0 * CYCLE)
+
+
 async def do(cell: RobotCell, step: str):
     """Do what somebody has to do, as another client or at the pendant, until it has happened."""
     controller = cell.robot.controller
@@ -189,9 +196,7 @@ async def do(cell: RobotCell, step: str):
             await cell.reboot_robot()
             await cell.until(lambda: cell.status.state is ConnectionState.CONNECTED, 5.0)
         case 'wait until it is over':
-            cell.robot.clear_faults()
-            cell.owner.silent = False
-            await cell.sleep(2.0 * CYCLE)
+            await let_pass(cell)
             await cell.until(lambda: cell.loop.open_ends(robot_cell.PRIMARY))
         case _:
             raise AssertionError(f'nobody knows how to {step}')
@@ -226,7 +231,7 @@ async def scenario(cell: RobotCell, row: Row, phase: str):
     if row.waits:
         await wait_on(cell, goal, row, here)
     elif phase == 'settling' and row.code is ErrorCode.SUCCESSFUL:
-        await do(cell, 'wait until it is over')  # what kept it from settling
+        await let_pass(cell)  # what kept it from settling
     await cell.until(lambda: goal.motion.outcome, row.bound if not row.waits else 2.0, here)
     outcome = goal.motion.outcome
     assert outcome.code is row.code, f'{here}: {outcome}'
@@ -236,7 +241,7 @@ async def scenario(cell: RobotCell, row: Row, phase: str):
         await cell.until(lambda: cell.status.state is row.then, row.then_within, here)
         assert cell.is_ready() or cell.status.message, here
         if phase == 'settling':
-            await do(cell, 'wait until it is over')
+            await let_pass(cell)
         travel = await recover(cell, row.steps)
         assert travel <= row.travel, f'{here}: a joint has moved by {travel} rad'
     await cell.until(cell.is_ready, row.back, here)
