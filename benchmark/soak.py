@@ -42,8 +42,7 @@ EVENTS: tuple[tuple[str, int], ...] = (
     ('', 60), ('cancel', 15), ('preempted', 5), ('slider 0.3 at 0.02 s', 4),
     ('slider 0 at 0.02 s', 2), ('pause at 0.02 s', 2), ('protective_stop at 0.02 s', 2),
     ('stop at 0.02 s', 3), ('drop rtde at 0.02 s for 0.1 s', 2),
-    ('drop primary at 0.02 s for 0.1 s', 2), ('drop reverse_port at 0.02 s for 0.1 s', 2),
-    ('drop trajectory_port at 0.02 s for 0.1 s', 2))
+    ('drop primary at 0.02 s for 0.1 s', 2), ('drop sockets at 0.02 s for 0.1 s', 4))
 
 
 @dataclass(frozen=True, slots=True)
