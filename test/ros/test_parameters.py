@@ -134,7 +134,7 @@ def test_every_number_has_a_range(declared):
     ({'ur_typo': 'ur5e'}, 'There is no parameter ur_typo; did you mean ur_type?'),
     ({'zzz': 1}, 'There is no parameter zzz; config/driver.yaml lists all there are.'),
     ({'ur_type': 'ur4'}, "Parameter ur_type is 'ur4'; it is one of ur3, ur5,"),
-    ({'ur_type': 5}, 'Parameter ur_type is 5, but it is a text.'),
+    ({'ur_type': 5}, 'Parameter ur_type is 5, but it is a text; put it in quotes'),
     ({'max_tool_speed': 1}, 'Parameter max_tool_speed is 1, but it is a number; write 1.0.'),
     ({'max_tool_speed': -0.1}, 'Parameter max_tool_speed is -0.1; it must lie between 0 and 10.'),
     ({'max_tool_speed': float('nan')}, 'Parameter max_tool_speed is nan; it must lie between'),
@@ -151,3 +151,10 @@ def test_bad_values_give_one_sentence(declared, values, sentence):
     with pytest.raises(ParameterError, match='^' + re.escape(sentence)) as error:
         declared(values)
     assert '\n' not in str(error.value)
+
+
+def test_a_bare_off_is_no_text_to_the_readers_of_parameters(declared):
+    with pytest.raises(ParameterError, match=r'self_collision is False, .* put it in quotes'):
+        declared(arguments=['--ros-args', '-p', 'self_collision:=off'])
+    settings, _ = declared(arguments=['--ros-args', '-p', "self_collision:='off'"])
+    assert settings.planning.self_collision == 'off'

@@ -98,6 +98,8 @@ class Declaration:
         wanted = type(default)
         if type(value) is not wanted:
             hint = f'; write {value}.0' if wanted is float and type(value) is int else ''
+            if wanted is str:  # YAML reads off as false, 2.14 as a number
+                hint = '; put it in quotes, which the shell must not take away'
             raise ParameterError(
                 f'Parameter {self.name} is {value!r}, but it is {_TYPE_NAMES[wanted]}{hint}.')
         if isinstance(value, (int, float)) and not self.low <= value <= self.high:
