@@ -416,7 +416,9 @@ def test_what_took_the_program_with_it_is_the_reason_whichever_is_heard_of_first
     expected = outcome(first.step(deeper, 1.0)).code
     assert then.step(gone, 1.0) == []
     assert then.step(robot(0.5, runtime_state=RuntimeState.STOPPED), 1.01)[1:] == []
-    assert outcome(then.step(deeper, 1.02)).code is expected is not ErrorCode.PROGRAM_STOPPED
+    end = outcome(then.step(deeper, 1.02))
+    assert end.code is expected is not ErrorCode.PROGRAM_STOPPED
+    assert 'it hung up' in end.text, 'what was heard of first is not forgotten'
 
 
 def standing(machine, seconds, **changes):

@@ -79,6 +79,18 @@ def test_an_owner_that_hangs_up_stops_the_arm_and_the_program():
     run_cell(scenario)
 
 
+def test_sending_the_program_does_not_take_it_away_from_a_goal():
+    async def scenario(cell):
+        goal = GoalInTrouble(cell)
+        await goal.reach('mid-segment')
+        cell.resend()
+        await cell.until(lambda: goal.motion.outcome)
+        assert goal.motion.outcome.succeeded, goal.motion.outcome
+        assert any('a goal is running' in line for line in cell.owner.log)
+
+    run_cell(scenario)
+
+
 @pytest.mark.parametrize('moment', ['before', 'after'])
 def test_a_cancel_and_a_protective_stop_at_the_same_time_end_in_the_stop(moment):
     async def scenario(cell):

@@ -363,6 +363,8 @@ class TrajectoryMachine:
         step = TRANSITIONS[self.state][signal]
         before, self.state = self.state, step.state
         if step.code is not None:
+            if before is State.ENDING:  # the end of the program came of it
+                text = f'{text}; before that was heard of, {self._text}'
             self._code, self._text = step.code, text
         if step.state is before:
             return []

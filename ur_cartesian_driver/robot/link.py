@@ -267,6 +267,8 @@ class RobotLink:
         """Upload the robot program, in the place of ours, never of somebody else's."""
         if self._status.state in (*_OUT_OF_REACH, ConnectionState.CONNECTING):
             self._warn(f'the robot program is not sent: {self._status.message}')
+        elif self._status.state is ConnectionState.EXECUTING:
+            self._warn('the robot program is not sent: a goal is running; cancel it first')
         elif self._foreign_program_runs():
             self._warn('the robot program is not sent: another program runs on the robot, maybe '
                        'of another driver; let it end, or stop it')
