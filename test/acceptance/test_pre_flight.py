@@ -1,0 +1,108 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the pre-flight says of a goal is what the robot does.
+
+Goals are drawn at the borders of what each arm can do. What passes is sent and has to arrive as
+planned; what is refused for reach, range or branch is sent all the same and has to fail. Both
+sides share the kinematics, so that the paths are also compared with one that owes nothing to it.
+
+``PRE_FLIGHT_GOALS`` is the number of goals of each model. From 1000 on also those are run that
+take minutes.
+"""
+
+from collections import Counter
+from itertools import pairwise
+from math import inf
+import os
+
+from agreement import at_the_border, judge, TOO_LONG
+from forward_model import dh_forward, pose_matrix
+import numpy as np
+import pytest
+from random_goals import random_case
+from robot_in_memory import RobotInMemory
+
+from ur_cartesian_driver.kinematics.robots import MODELS
+from ur_cartesian_driver.motion.goal import SegmentType
+
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+
+GOALS = int(os.environ.get('PRE_FLIGHT_GOALS', '208'))
+LONGEST = inf if GOALS >= 1000 else TOO_LONG
+#: What part of the goals has to be of a kind, so that not only easy ones are drawn, and may be.
+LEAST = {'passes': 0.3, 'reach': 0.04, 'limit': 0.015, 'branch': 0.06}
+MOST = {'other': 0.05, 'long': 0.15, 'border': 0.05}
+#: Of the executed paths, compared with the other kinematics; 14 models make 210.
+POSES_OF_A_MODEL = 15
+#: What rounding on the wire may add up to [m] + [rad].
+WIRE = 1e-5
+
+
+@pytest.fixture(scope='module')
+def robot_of():
+    """The robots in memory by model; CB3's cycles for all of them, because the test pays each."""
+    robots = {}
+    return lambda model: robots.setdefault(model, RobotInMemory(model, frequency=125.0))
+
+
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize('model', MODELS)
+def test_what_passes_arrives_and_what_is_refused_fails(model, robot_of, record_property):
+    robot, counts, wrong = robot_of(model), Counter(), []
+    for number in range(GOALS):
+        case = random_case(robot.controller.arm, number)
+        verdict = judge(robot, case, longest=LONGEST)
+        counts[verdict.planner] += 1
+        if verdict.agreed:
+            continue
+        if at_the_border(robot, case):
+            counts['border'] += 1
+        else:
+            wrong.append(f'{model} {number} ({case.family}): the planner says '
+                         f'{verdict.refusal or "yes"!r}, the robot {verdict.trouble or "yes"!r}')
+    line = f'{GOALS} goals: ' + ', '.join(f'{counts[kind]} {kind}' for kind in (*LEAST, *MOST))
+    print(f'{model}: {line}')
+    record_property('pre_flight', line)
+    assert not wrong, '\n'.join([line, *wrong])
+    assert all(counts[kind] >= int(part * GOALS) for kind, part in LEAST.items()), line
+    assert all(counts[kind] <= part * GOALS for kind, part in MOST.items()), line
+
+
+@pytest.mark.parametrize('model', MODELS)
+def test_paths_fit_a_kinematics_that_owes_nothing_to_ours(model, robot_of):
+    """Straight lines are straight and lead where the goal says, by the textbook's matrices."""
+    robot, rng, checked, number = robot_of(model), np.random.default_rng(4), 0, 0
+    geometry = MODELS[model].geometry
+    while checked < POSES_OF_A_MODEL:
+        case, number = random_case(robot.controller.arm, number), number + 1
+        if not all(is_straight(segment) for segment in case.goal.segments):
+            continue
+        verdict = judge(robot, case, longest=TOO_LONG)
+        if verdict.planner != 'passes' or verdict.trouble:
+            continue
+        tool, run = pose_matrix(case.T_flange_tcp), verdict.run
+        corners = [dh_forward(geometry, case.q) @ tool,
+                   *(pose_matrix(waypoint.pose) for waypoint in case.goal.waypoints)]
+        assert distances(dh_forward(geometry, run.q) @ tool, corners[-1]) < WIRE
+        for row in rng.integers(len(run.joints), size=3):
+            T_base_tcp = dh_forward(geometry, run.joints[row]) @ tool
+            assert distances(T_base_tcp, pose_matrix(run.poses[row])) < 1e-9
+            assert min(beside(T_base_tcp, a, b) for a, b in pairwise(corners)) < WIRE
+            checked += 1
+
+
+def is_straight(segment):
+    return segment.blend_radius == 0.0 and segment.type in (
+        SegmentType.LINEAR, SegmentType.PROCESS, SegmentType.OPTIMIZED_LINEAR)
+
+
+def distances(a, b):
+    """How far two poses are apart [m] + [rad]: |A - B| = 2 sqrt(2) sin(angle / 2)."""
+    chord = np.linalg.norm(a[:3, :3] - b[:3, :3]) / (2.0 * np.sqrt(2.0))
+    return np.linalg.norm(a[:3, 3] - b[:3, 3]) + 2.0 * np.arcsin(min(1.0, chord))
+
+
+def beside(pose, start, end):
+    """How much longer the way from start to end is by way of the pose [m] + [rad]."""
+    return distances(start, pose) + distances(pose, end) - distances(start, end)
