@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType,
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.preview import sample, table
+from ur_cartesian_driver.preview import postures, sample, table
 
 ARM = Arm(robot_model('ur5e'))
 TOOL = Pose((0.0, 0.0, 0.1))
@@ -71,3 +71,10 @@ def test_the_table_has_a_line_for_each_segment_and_the_sum():
     assert lines[3].split()[:2] == ['2', 'MoveJ']
     assert lines[4].split()[0] == 'sum'
     assert f'{PLAN.duration:.3f} s' in lines[4]
+
+
+def test_postures_are_those_of_the_start_and_of_each_segment():
+    _, *lines = (line.split() for line in postures(PLAN).splitlines())
+    assert [line[0] for line in lines] == ['start', *(str(s.waypoint) for s in PLAN.segments)]
+    assert [[float(q) for q in line[1:]] for line in lines] == [
+        pytest.approx(q, abs=5e-5) for q in (PLAN.start, *(s.joints for s in PLAN.segments))]

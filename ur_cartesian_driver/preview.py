@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
+from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.primitive import Joints, MoveJ, OptimoveJ
@@ -65,6 +66,17 @@ def table(plan: Plan) -> str:
     lines = [f'{"point":>5}  {"command":<10} {"length":>9} {"turn":>8} {"time":>9} {"blend":>7}']
     lines += [_line(segment) for segment in plan.segments]
     lines.append(f'{"sum":>5}  {"":<10} {length:7.3f} m {"":>8} {plan.duration:7.3f} s')
+    return '\n'.join(lines)
+
+
+def postures(plan: Plan) -> str:
+    """Return the joint positions [rad] in which the arm is predicted to arrive, line by line."""
+    names = [name.removesuffix('_joint') for name in JOINT_NAMES]
+    lines = [f'{"point":>5}  ' + ' '.join(f'{name:>13}' for name in names) + ' [rad]']
+    for point, joints in [('start', plan.start),
+                          *((str(segment.waypoint), segment.joints) for segment in plan.segments)]:
+        # + 0.0: no -0.0000
+        lines.append(f'{point:>5}  ' + ' '.join(f'{round(q, 4) + 0.0:13.4f}' for q in joints))
     return '\n'.join(lines)
 
 

@@ -150,6 +150,8 @@ def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
                           metavar='FILE', help='parameters of the driver, as driver.yaml')
     validate.add_argument('-p', '--param', action='append', default=[], metavar='NAME:=VALUE',
                           help='one parameter of the driver; may be given several times')
+    validate.add_argument('--postures', action='store_true',
+                          help='print the joint positions in which the arm arrives')
     _add_calibration(validate)
 
 

@@ -27,7 +27,7 @@ from ur_cartesian_driver.sim import SimulatorConfig
 def validate(arguments: argparse.Namespace) -> int:
     """Plan a goal from where the arm is said to stand, and print the plan."""
     from ur_cartesian_driver.planning import plan
-    from ur_cartesian_driver.preview import table
+    from ur_cartesian_driver.preview import postures, table
     from ur_cartesian_driver.ros import convert, frames
     from ur_cartesian_driver.ros.parameter_files import read_settings
 
@@ -51,6 +51,8 @@ def validate(arguments: argparse.Namespace) -> int:
     print(f'{model.name}{" with its calibration" if arm.calibrated else ""}, joints '
           f'{_numbers(state.actual_q)} rad, TCP {_numbers(T_flange_tcp.rotation_vector())}')
     print(table(found))
+    if arguments.postures:
+        print(postures(found))
     print(*found.report, sep='\n')
     return 0
 
