@@ -12,10 +12,10 @@ are taken by one process, of the same packets, while the same other processes ru
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
+import os
 import signal
 import socket
 import threading
@@ -24,14 +24,15 @@ import time
 from figures import Figure, percentile
 import paths
 from processes import answer_calls, Child, child, HOST, simulator
+import robot_loop_with_echo
 from wire_tap import Mark, Relay, TAP_HOST, Way
 
-from ur_cartesian_driver.driver import Driver, DriverConfig
+from ur_cartesian_driver.driver import Driver, DriverConfig, host
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.protocol.reverse import MESSAGE_SIZE, TrajectoryAction
+from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.rtde import OUTPUT_TYPES, Recipe
 from ur_cartesian_driver.robot.state_recipe import OPTIONAL, REQUIRED
 
@@ -50,8 +51,7 @@ ACTUAL, TARGET = NAMES.index('actual_TCP_pose'), NAMES.index('target_TCP_pose')
 
 def run(quick: bool) -> Iterator[Figure]:
     """Push the arm off its path again and again."""
-    with simulator() as robot, child(_echo) as echo, \
-            _relay(robot, echo) as (relay, settings), Driver(
+    with simulator() as robot, _relay(robot) as (relay, settings), _echo(relay), Driver(
                 DriverConfig(robot_ip=HOST, ur_type=paths.MODEL, headless_mode=True, **settings),
                 PlanningOptions(max_tool_speed=1.0)) as driver:
         driver.wait_ready(TIMEOUT)
@@ -96,70 +96,54 @@ def _reaction(marks: Sequence[Mark]) -> float:
     return 1e-6 * (cancel - pushed)
 
 
-# ---- the echo's process -----------------------------------------------------------------------
-
-
-def _echo(connection: Connection) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    asyncio.run(_serve(connection))
-
-
-async def _serve(connection: Connection) -> None:
-    loop = asyncio.get_running_loop()
-    server = await loop.create_server(_Echo, HOST, 0)
-    port = server.sockets[0].getsockname()[1]
-    await asyncio.to_thread(answer_calls, connection, {'port': lambda: port})
-    server.close()
-
-
-class _Echo(asyncio.Protocol):
-    """Answers whatever comes with bytes of the size of CANCEL."""
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        transport.get_extra_info('socket').setsockopt(
-            socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._transport = transport
-
-    def data_received(self, data: bytes) -> None:
-        self._transport.write(bytes(MESSAGE_SIZE))
-
-
 # ---- the relay's process ----------------------------------------------------------------------
 
 
 @contextmanager
-def _relay(robot: Child, echo: Child) -> Iterator[tuple[Child, dict[str, object]]]:
+def _relay(robot: Child) -> Iterator[tuple[Child, dict[str, object]]]:
     """Run the relay; yield it (calls: ``marks``, ``echoes``) and what the driver is told."""
     ports = robot.call('ports')
-    with child(_run_relay, ports.rtde, echo.call('port')) as relay:
+    with child(_run_relay, ports.rtde) as relay:
         yield relay, {
             'reverse_ip': TAP_HOST, 'primary_port': ports.primary, 'script_sender_port': 0,
             'dashboard_port': ports.dashboard, **relay.call('ports')}
 
 
-def _run_relay(connection: Connection, rtde_port: int, echo_port: int) -> None:
+def _run_relay(connection: Connection, rtde_port: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    relay = RelayWithEcho(rtde_port, echo_port)
+    relay = RelayWithEcho(rtde_port)
     threading.Thread(target=relay.run, daemon=True).start()
-    answer_calls(connection, {'ports': lambda: relay.ports, 'marks': relay.take,
-                              'echoes': relay.take_echoes})
+    answer_calls(connection, {
+        'ports': lambda: relay.ports, 'echo_port': lambda: relay.echo_port,
+        'marks': relay.take, 'echoes': relay.take_echoes})
+
+
+@contextmanager
+def _echo(relay: Child) -> Iterator[None]:
+    """Have drivers that are made meanwhile run their robot loop with an echo in it."""
+    module, host.MODULE = host.MODULE, robot_loop_with_echo.__name__
+    os.environ[robot_loop_with_echo.PORT] = str(relay.call('echo_port'))
+    try:
+        yield
+    finally:
+        host.MODULE = module
 
 
 class RelayWithEcho(Relay):
     """Passes on the robot's packets too, and tries some of them on the echo first."""
 
-    def __init__(self, rtde_port: int, echo_port: int) -> None:
+    def __init__(self, rtde_port: int) -> None:
         """
-        Listen, and call the echo.
+        Listen.
 
         :param rtde_port: the robot's own.
         """
         super().__init__()
         self._rtde_port = rtde_port
         self.listen(HOST, 'rtde_port')
-        self._echo = socket.create_connection((HOST, echo_port))
-        self.add_way(self._echo, self._echo, 'echo')
+        self._echo_listener = socket.create_server((HOST, 0))
+        self.echo_port = self._echo_listener.getsockname()[1]
+        self._echo: socket.socket | None = None
         self._echoes: list[int] = []
         self._marks_of_pushes: list[Mark] = []
         #: What waits for the echo: since when, and where it goes then.
@@ -177,8 +161,13 @@ class RelayWithEcho(Relay):
         return echoes
 
     def ways(self, name: str) -> tuple[int, str, str]:
-        """Let the robot be called for who calls its port."""
-        return (self._rtde_port, '', name) if name == 'rtde_port' else super().ways(name)
+        """Let the robot be called for who calls its port; the echo has called before."""
+        if name != 'rtde_port':
+            return super().ways(name)
+        if self._echo is None:
+            self._echo, _ = self._echo_listener.accept()
+            self.add_way(self._echo, self._echo, 'echo')
+        return self._rtde_port, '', name
 
     def pass_on(self, source: socket.socket, way: Way) -> None:
         """Treat the robot's packets and the echo's answers apart."""
@@ -201,7 +190,7 @@ class RelayWithEcho(Relay):
         if pushed:
             way.target.sendall(data)
             self._marks_of_pushes.append(Mark(now, 'rtde_port', len(data)))
-        elif self._packets % ECHOED == 0:
+        elif self._packets % ECHOED == 0 and self._echo is not None:
             self._held = now, data, way.target
             self._echo.sendall(data)
         else:

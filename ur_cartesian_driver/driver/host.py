@@ -21,6 +21,8 @@ from typing import Protocol
 from ur_cartesian_driver.driver import snapshot
 from ur_cartesian_driver.driver.robot_loop import serve
 
+#: The module that the process runs.
+MODULE = 'ur_cartesian_driver.driver'
 #: A robot loop that says nothing for that long hangs [s]; it says something every 0.5 s.
 SILENCE = 5.0
 #: How long the robot loop may need to stop the arm and end, before it is ended [s].
@@ -54,7 +56,7 @@ class ProcessHost:
         descriptor = snapshot.create()
         try:
             self._process = subprocess.Popen(
-                [sys.executable, '-m', __package__, str(theirs.fileno()), str(descriptor)],
+                [sys.executable, '-m', MODULE, str(theirs.fileno()), str(descriptor)],
                 pass_fds=(theirs.fileno(), descriptor), env=_environment(),
                 stdin=subprocess.DEVNULL,
                 # Ctrl-C is for the owner, which then ends us in order.
