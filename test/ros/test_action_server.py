@@ -60,7 +60,10 @@ def test_a_cancelled_goal_stops_the_arm_and_the_next_one_runs(cell):
     assert (status, result.error_code) == (SUCCEEDED, 0), result.error_string
 
 
-def test_a_second_goal_is_refused_and_disturbs_nothing(cell):
+def test_where_new_goals_are_rejected_a_second_one_disturbs_nothing(
+        no_thread_left, sim, make_cell):
+    cell = make_cell(sim, on_new_goal='reject')
+    cell.wait_ready()
     first = cell.send(cell.goal((1.5, 0.05, 0.0, 0.0)))
     cell.spin_until(lambda: moving(cell))
     status, result = cell.run(cell.goal((0.5, 0.0, 0.01, 0.0)))

@@ -142,7 +142,7 @@ def test_every_number_has_a_range(declared):
     ({'headless_mode': 1}, 'Parameter headless_mode is 1, but it is true or false.'),
     ({'reverse_port': 65536}, 'Parameter reverse_port is 65536; it must lie between 0 and 65535.'),
     ({'robot_loop': 'fork'}, "Parameter robot_loop is 'fork'; it is one of process, thread."),
-    ({'on_new_goal': 'preempt'}, "Parameter on_new_goal is 'preempt', which this version does"),
+    ({'on_new_goal': 'queue'}, "Parameter on_new_goal is 'queue'; it is one of preempt, reject"),
     ({'static_frames': ['table']}, 'Parameter static_frames: "table" has 1 words instead of 9'),
     ({'keepalive_period': 0.15}, 'Parameter robot_receive_timeout is 0.2 s, it has to be at least '
                                  'twice the keepalive_period'),

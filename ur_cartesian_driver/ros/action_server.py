@@ -18,11 +18,10 @@ from __future__ import annotations
 from collections.abc import Callable
 import contextlib
 from dataclasses import replace
-import gc
 import threading
 from typing import Any, TypeAlias
 
-from rclpy.action.server import ActionServer, CancelResponse, RCLError
+from rclpy.action.server import CancelResponse, RCLError
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
@@ -36,6 +35,8 @@ from ur_cartesian_driver.motion.errors import (
     code_of,
     DriverError,
     ErrorCode,
+    GoalRefused,
+    Preempted,
     RobotNotReady,
 )
 from ur_cartesian_driver.motion.events import Outcome, Progress
@@ -43,10 +44,12 @@ from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.planning.validate import check
 from ur_cartesian_driver.ros.convert import goal_from_message, nanoseconds, placed
+from ur_cartesian_driver.ros.deferring_server import DeferringActionServer
 from ur_cartesian_driver.ros.frames import Stand
 from ur_cartesian_driver.ros.parameters import Settings
 from ur_cartesian_driver.ros.reports import feedback_message, FeedbackFrame, result_message
 from ur_cartesian_driver.ros.transforms import listen
+from ur_cartesian_driver.ros.turns import Turn, Turns
 
 GoalHandle: TypeAlias = Any
 
@@ -76,12 +79,13 @@ class CartesianActionServer:
         self._transforms = listen(node, settings.node.tf_max_age)
         self._frames = settings.frames.with_transforms(self._transforms)
         self._joint_names = tuple(settings.planning.tf_prefix + name for name in JOINT_NAMES)
-        # Guards what follows: the goals that have not ended, and which of them may move the arm.
+        #: Which of the goals may move the arm.
+        self.turns = Turns()
+        # Guards what follows: the goals that have not ended.
         self._lock = threading.Lock()
         self._runs: dict[bytes, GoalRun] = {}
-        self._moving: GoalRun | None = None
         self._closing = False
-        self._server: Any = _DeferringActionServer(  # type: ignore[no-untyped-call]
+        self._server: Any = DeferringActionServer(  # type: ignore[no-untyped-call]
             node, FollowCartesianTrajectory, '~/follow_cartesian_trajectory', self._begin,
             # Of its own: goals and cancel requests are served while other callbacks run.
             callback_group=MutuallyExclusiveCallbackGroup(),
@@ -123,6 +127,8 @@ class CartesianActionServer:
     def _begin(self, handle: GoalHandle) -> None:
         """Give an accepted goal its thread."""
         run = GoalRun(self, handle, received=self._clock.now().nanoseconds)
+        if not (run.is_for_later or handle.request.validate_only):
+            self.turns.line_up(run.turn)  # here, where goals come one after the other
         with self._lock:
             self._runs[run.key] = run
             if self._closing:
@@ -165,11 +171,11 @@ class CartesianActionServer:
                       now=self._clock.now().nanoseconds, stand=self._stand())
 
     def _stand(self) -> Stand | None:
-        state = self._driver.state
+        state = self._driver.rest_state
         return None if state is None else Stand.of(state)
 
     def plan(self, goal: Goal) -> Plan:
-        """Plan from where the robot stands now."""
+        """Plan from where the arm stands, or would stand if it were stopped now."""
         return self._driver.plan(goal)
 
     def wait(self, until: int, given_up: threading.Event) -> None:
@@ -178,19 +184,32 @@ class CartesianActionServer:
             if given_up.wait(min(left / 1_000_000_000, CLOCK_PERIOD)):
                 return
 
-    def occupy(self, run: GoalRun, goal: Goal) -> None:
+    @property
+    def preempts(self) -> bool:
+        """Tell whether a new goal takes the place of the one that runs."""
+        return self._settings.node.on_new_goal == 'preempt'
+
+    def seize(self, run: GoalRun, goal: Goal) -> None:
         """
-        Give the arm to a goal.
+        Give the arm to a goal where none has it.
 
         :raises GoalRefused: another goal has it; if this one is malformed, that is said instead.
         """
-        with self._lock:
-            if self._moving is None:
-                self._moving = run
-                return
+        if self.turns.seize(run.turn):
+            return
         check(goal, self._settings.planning)
         raise RobotNotReady('Another goal is running and on_new_goal is reject; wait for its end '
                             'or cancel it, then send this goal again.')
+
+    def claim(self, run: GoalRun) -> None:
+        """
+        Have the goal that runs make way for this one, which has passed its checks; wait for it.
+
+        :raises RobotNotReady: the robot could not follow; the goal that runs goes on.
+        """
+        if self.turns.is_taken():
+            self._driver.check_can_make_way()
+        self.turns.claim(run.turn)
 
     def start(self, plan: Plan, on_progress: Callable[[Progress], None]) -> Motion:
         """Set the arm in motion."""
@@ -198,9 +217,7 @@ class CartesianActionServer:
 
     def ended(self, run: GoalRun, outcome: Outcome) -> None:
         """Give the arm free, and the outcome to the executor."""
-        with self._lock:
-            if self._moving is run:
-                self._moving = None
+        self.turns.leave(run.turn)
         self._server.finish(run.handle, lambda handle: self._finish(run, outcome))
 
     def feedback_frame(self, run: GoalRun, plan: Plan) -> FeedbackFrame:
@@ -233,13 +250,21 @@ class GoalRun:
         self.handle = handle
         self.key = _key(handle)
         self.received = received
+        #: When it is to start [ns]; 0 = at once.
+        self.start_time = nanoseconds(handle.request.trajectory.header.stamp)
+        self.turn = Turn(f'goal {self.key.hex()[:8]}', self._make_way)
         self.thread = threading.Thread(
-            target=self._run, name=f'goal {self.key.hex()[:8]}', daemon=True)
+            target=self._run, name=self.turn.name, daemon=True)
         self._server = server
         self._lock = threading.Lock()
         self._motion: Motion | None = None
         self._given_up = threading.Event()
         self._cancel_requested = False
+
+    @property
+    def is_for_later(self) -> bool:
+        """Tell whether its time is still to come when it is received."""
+        return self.start_time > self.received
 
     def cancel(self) -> None:
         """Stop, because the client wants it."""
@@ -254,14 +279,22 @@ class GoalRun:
         with self._lock:
             self._given_up.set()
             motion = self._motion
+        self._server.turns.withdraw(self.turn)
         if motion is not None:
             motion.cancel()
+
+    def _make_way(self) -> None:
+        """Stop for a newer goal."""
+        with self._lock:
+            motion = self._motion
+        if motion is not None:
+            motion.preempt(self.turn.successor)
 
     def _run(self) -> None:
         try:
             outcome = self._outcome()
         except DriverError as error:
-            outcome = Outcome(code=code_of(error), text=str(error))
+            outcome = Outcome(code=code_of(error), text=self._sentence(error))
         except Exception as error:
             # A goal always ends with a result; the traceback goes the way of all threads.
             self._server.ended(self, Outcome(
@@ -279,23 +312,57 @@ class GoalRun:
         if request.validate_only:
             return Outcome(code=ErrorCode.SUCCESSFUL, text='The goal passed all checks.',
                            report=self._checked(server.plan(goal)).report)
-        start_time = nanoseconds(request.trajectory.header.stamp)
-        if start_time > self.received:
+        if self.is_for_later:
             self._checked(server.plan(goal))
-            server.wait(start_time, self._given_up)
+            server.wait(self.start_time, self._given_up)
+            self._check_wanted()
+            server.turns.line_up(self.turn)
             goal = replace(goal, age=0.0)
-        server.occupy(self, goal)
-        return self._moved(self._checked(server.plan(server.placed(self, goal))))
+        return self._moved(self._preempted(goal) if server.preempts else self._waited(goal))
+
+    def _waited(self, goal: Goal) -> Plan:
+        """Return the plan of a goal that runs if no other one does."""
+        self._server.seize(self, goal)
+        return self._planned(goal)
+
+    def _preempted(self, goal: Goal) -> Plan:
+        """
+        Return the plan of a goal for which others make way, when they have.
+
+        It is checked first from where the arm would come to rest: refused, it has disturbed
+        nobody. When the arm has been somebody else's since it is planned again from where it is.
+        """
+        server = self._server
+        changes = server.turns.changes
+        plan = self._planned(goal)
+        server.claim(self)
+        self._check_wanted()
+        return plan if server.turns.changes == changes else self._planned(goal)
+
+    def _planned(self, goal: Goal) -> Plan:
+        return self._checked(self._server.plan(self._server.placed(self, goal)))
 
     def _checked(self, plan: Plan) -> Plan:
         """
         Return a plan that is still wanted.
 
-        :raises Cancelled: the goal was given up meanwhile.
+        :raises ExecutionEnded: see :meth:`_check_wanted`.
+        """
+        self._check_wanted()
+        return plan
+
+    def _check_wanted(self) -> None:
+        """
+        See that the goal is still wanted.
+
+        :raises Cancelled: it was given up meanwhile.
+        :raises Preempted: a newer one has taken its place.
         """
         if self._given_up.is_set():
             raise self._cancelled('before anything moved')
-        return plan
+        if successor := self.turn.successor:
+            raise Preempted(f'{successor.capitalize()} took the place of this one before anything '
+                            'moved.')
 
     def _moved(self, plan: Plan) -> Outcome:
         server = self._server
@@ -307,11 +374,21 @@ class GoalRun:
             given_up = self._given_up.is_set()
         if given_up:
             motion.cancel()
+        elif self.turn.successor:
+            motion.preempt(self.turn.successor)
         outcome = motion.result()
         if outcome.code is ErrorCode.CANCELLED and not self._cancel_requested \
                 and self._given_up.is_set():
             return replace(outcome, text=str(self._cancelled('and the arm was stopped')))
         return outcome
+
+    def _sentence(self, error: DriverError) -> str:
+        """Return what to say of a refusal; also that another goal had to go for nothing."""
+        predecessor = self.turn.predecessor
+        if not (isinstance(error, GoalRefused) and predecessor):
+            return str(error)
+        return (f'{error} The goal had passed all checks from where the arm was expected to come '
+                f'to rest, so {predecessor} has made way for it and is over.')
 
     def _cancelled(self, when: str) -> Cancelled:
         if self._cancel_requested:
@@ -330,54 +407,6 @@ class GoalRun:
             if self.handle.is_cancel_requested:
                 return
             tick.wait(0.001)
-
-
-class _DeferringActionServer(ActionServer):
-    """
-    An action server whose goals come to the executor when their outcome is there.
-
-    rclpy hands every accepted goal to :meth:`notify_execute`, which gives the executor a task that
-    waits for the callback. Here the callback begins the goal at once, and the task comes with
-    :meth:`finish`, from whatever thread.
-    """
-
-    _destroyed = False
-
-    def take_data(self) -> Any:
-        """
-        Take a request without a garbage collection in between.
-
-        A large goal makes hundreds of thousands of objects, none of which is garbage, and the
-        collector would walk through them again and again: 40 % of the time, in which no other
-        thread runs.
-        """
-        enabled = gc.isenabled()
-        gc.disable()
-        try:
-            return super().take_data()  # type: ignore[no-untyped-call]
-        finally:
-            if enabled:
-                gc.enable()
-
-    def notify_execute(self, goal_handle: GoalHandle, execute_callback: Any) -> None:
-        """Begin a goal; it is in the state EXECUTING."""
-        (execute_callback or self._execute_callback)(goal_handle)
-
-    def finish(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:
-        """Let the executor call back for the result and send it; from any thread."""
-        executor = self._node.executor
-        if executor is not None:  # None: nobody is left to send it
-            # A plain function first: a coroutine that no executor runs any more would complain.
-            executor.create_task(self._hand_over, goal_handle, callback)
-
-    def _hand_over(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:
-        if not self._destroyed:
-            super().notify_execute(goal_handle, callback)  # type: ignore[no-untyped-call]
-
-    def destroy(self) -> None:
-        """Send no more results."""
-        self._destroyed = True
-        super().destroy()  # type: ignore[no-untyped-call]
 
 
 def _key(handle: GoalHandle) -> bytes:

@@ -47,7 +47,7 @@ class ParameterError(ValueError):
 class NodeSettings:
     """What the node itself wants to know."""
 
-    on_new_goal: str = 'reject'
+    on_new_goal: str = 'preempt'
     goal_time_tolerance: float = 1.0
     state_publish_rate: float = 50.0
     diagnostics_rate: float = 1.0
@@ -161,9 +161,9 @@ DECLARATIONS: tuple[Declaration, ...] = (
                 choices=tuple(DIALECTS)),
     # -- what a goal may do
     Declaration('on_new_goal',
-                'What happens to a goal that comes while another one runs: reject it (it ends '
-                'ABORTED), or preempt the running one (not available yet).',
-                choices=('reject', 'preempt')),
+                'A goal that comes while another one runs: it may preempt that one once it has '
+                'passed all checks, or reject it (it ends ABORTED).',
+                choices=('preempt', 'reject')),
     Declaration('max_points', 'Longest list of points that a goal may have.', 1, 1_000_000),
     Declaration('max_tool_speed',
                 'Largest speed of the TCP [m/s]; 0: without bound. Motions without times are '
@@ -355,10 +355,6 @@ def settings(values: Mapping[str, Value]) -> Settings:
 
     :raises ParameterError: values do not go together.
     """
-    if values['on_new_goal'] == 'preempt':
-        raise ParameterError(
-            "Parameter on_new_goal is 'preempt', which this version does not do yet; set it to "
-            "'reject', and cancel the running goal before the next one.")
     try:
         planning = PlanningOptions(**_fields_of(PlanningOptions, values))
         node = NodeSettings(**_fields_of(NodeSettings, values))
