@@ -42,13 +42,13 @@ PORTS = {'reverse': robot_cell.REVERSE, 'trajectory': robot_cell.TRAJECTORY,
          'script command': robot_cell.COMMANDS}
 
 
-def planned(state, offsets, velocity, **goal):
+def planned(state, offsets, velocity, acceleration, **goal):
     """Return a plan through points beside where the tool stands, with blends between them."""
     (x, y, z), turned = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
     points = tuple(Waypoint(pose=Pose((x + dx, y + dy, z + dz), turned))
                    for dx, dy, dz in offsets)
     blends = [BLEND] * (len(points) - 1) + [0.0]
-    segments = tuple(Segment(velocity=velocity, acceleration=2.0, blend_radius=blend)
+    segments = tuple(Segment(velocity=velocity, acceleration=acceleration, blend_radius=blend)
                      for blend in blends)
     return plan(Goal(waypoints=points, segments=segments, **goal), state, ARM,
                 PlanningOptions(max_tool_speed=1.0))
@@ -72,7 +72,7 @@ class StartingPoint:
 def around_corners(start):
     """Return the plan of the goal in trouble."""
     return planned(
-        start.state, ((0.0, SIDE, 0.0), (SIDE, SIDE, 0.0), (SIDE, 0.0, 0.0)), 0.25,
+        start.state, ((0.0, SIDE, 0.0), (SIDE, SIDE, 0.0), (SIDE, 0.0, 0.0)), 0.25, 2.0,
         path_tolerance=Tolerance(position=(PATH_TOLERANCE,) * 3,
                                  twist=(TWIST_TOLERANCE,) * 3 + (-1.0,) * 3),
         goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3), goal_time_tolerance=SETTLING)
@@ -265,6 +265,6 @@ async def go_home(cell, home, here):
     x, y, z = (a - b for a, b in zip(home, cell.memory.read().actual_tcp_pose.position,
                                      strict=True))
     following = cell.owner.start(planned(cell.memory.read(), (
-        (x, y, z) if max(map(abs, (x, y, z))) > 1e-3 else (0.0, 0.01, 0.0),), 0.5))
+        (x, y, z) if max(map(abs, (x, y, z))) > 1e-3 else (0.0, 0.01, 0.0),), 0.8, 8.0))
     await cell.until(lambda: following.outcome, NEXT_BOUND, here)
     assert following.outcome.code is ErrorCode.SUCCESSFUL, f'after {here}: {following.outcome}'
