@@ -244,6 +244,21 @@ def test_the_first_millimetre_from_a_rest_does_not_count(make_cell):
     refusal(NearSingularity, cell, to(towards.pose(0.002 / towards.length)))
 
 
+def test_a_corner_that_leads_out_of_a_joint_move_is_no_start_at_rest(make_cell):
+    """Wrist 2 is straight where the corner begins: joints would turn by half a turn in it."""
+    cell = make_cell((0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0))
+    behind = make_cell((0.0, -pi / 2, pi / 2, -pi / 2, 0.3, 0.0))
+    straight = make_cell((0.0, -pi / 2, pi / 2, -pi / 2, -1e-4, 0.0))
+    radius = straight.home.distance_to(behind.home)
+    goal = Goal(waypoints=(Waypoint(pose=behind.home), Waypoint(pose=behind.pose(0.0, -0.1, 0.0))),
+                segments=(Segment(type=TYPE.JOINT, blend_radius=radius), Segment()))
+    text = refusal(NearSingularity, cell, goal)
+    assert text.startswith('trajectory.points[0].pose, ')
+    assert 'wrist' in text
+    stopping = replace(goal, segments=(Segment(type=TYPE.JOINT), Segment()))
+    plan(stopping, cell.state, cell.arm, FREE)
+
+
 def test_a_margin_of_0_is_none(make_cell):
     cell, end = across(make_cell, (0.0, -1.2, 1.6, -0.4 - pi / 2, 0.03, 0.4), (0.0, 1.0, 0.0))
     assert 'wrist' in refusal(NearSingularity, cell, to(end))

@@ -128,7 +128,8 @@ def _leaving(pieces: Sequence[Piece], found: Followed, rows: NDArray[np.intp], m
     """
     piece = pieces[int(found.piece[rows[0]])]
     excused = np.zeros((len(rows), len(MEASURES)), dtype=np.bool_)
-    if piece.begin > 0.0 or int(found.piece[rows[0]]) != _first_of(pieces, piece.index):
+    if piece.begin > 0.0 or _is_corner(piece) or (
+            int(found.piece[rows[0]]) != _first_of(pieces, piece.index)):
         return excused  # it comes out of a corner
     length, angle = piece.size
     on_it = found.piece[rows] == found.piece[rows[0]]
