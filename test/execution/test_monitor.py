@@ -167,6 +167,6 @@ def test_few_edges_are_searched_as_many_are(seed):
     quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
     tracker = PathTracker(path(*draw.normal(size=(4, 3)), quaternions=list(quaternions)))
     point, lowest, highest = draw.normal(size=7), draw.uniform(0.0, 0.5), draw.uniform(0.5, 1.0)
-    many = tracker._nearest(point, 0, 3, lowest, highest)
-    few = tracker._nearest_of_few(point.tolist(), 0, 3, lowest, highest)
+    many = tracker._nearest_of_many(tuple(point.tolist()), 0, 3, lowest, highest)
+    few = tracker._nearest(tuple(point.tolist()), 0, 3, lowest, highest)
     assert (few.row, few.fraction) == (many.row, pytest.approx(many.fraction, abs=1e-12))

@@ -10,13 +10,18 @@ Progress is that of the controller's own target, which has no noise and which no
 where *it* leaves the path does the robot another motion than it was told. What is desired of the
 tool is the place nearest to it within what a lag behind the target explains. The controller goes
 on while the arm is pushed along its path, so that is an error too, beyond the lag.
+
+All of this stands between a packet and a CANCEL, and most packets concern one or two edges of the
+path. So these are computed in plain floats: an array of seven numbers costs more than its numbers.
 """
 
 from __future__ import annotations
 
+from array import array
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
-from itertools import pairwise
 from math import inf
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +38,12 @@ SLACK = 0.005
 LAG_TIME = 0.02
 LAG_WAY = 0.0005
 #: Up to so many edges are looked at one by one.
-FEW = 2
+FEW = 8
+#: So many edges are kept in plain floats.
+KEPT = 256
+
+#: A pose in the coordinates of :class:`PathTracker`.
+Point: TypeAlias = tuple[float, float, float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +52,33 @@ class Place:
 
     row: int
     fraction: float
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A row of the path and the way to the next one, as poses and in the tracker's coordinates."""
+
+    start: Pose
+    end: Pose
+    origin: Point
+    vector: Point
+    #: Of the length.
+    square: float
+
+    def nearest(self, point: Point, lowest: float, highest: float) -> tuple[float, float]:
+        """Return the fraction of the way that is nearest, and the square of the distance there."""
+        px, py, pz, pa, pb, pc, pd = point
+        ox, oy, oz, oa, ob, oc, od = self.origin
+        ex, ey, ez, ea, eb, ec, ed = self.vector
+        x, y, z, a, b, c, d = px - ox, py - oy, pz - oz, pa - oa, pb - ob, pc - oc, pd - od
+        at = 1.0
+        if self.square > 0.0:
+            at = (x * ex + y * ey + z * ez + a * ea + b * eb + c * ec + d * ed) / self.square
+            at = 0.0 if at < 0.0 else 1.0 if at > 1.0 else at
+        at = max(lowest, min(at, highest))
+        return at, ((x - at * ex) ** 2 + (y - at * ey) ** 2 + (z - at * ez) ** 2
+                    + (a - at * ea) ** 2 + (b - at * eb) ** 2 + (c - at * ec) ** 2
+                    + (d - at * ed) ** 2)
 
 
 class PathTracker:
@@ -66,7 +103,11 @@ class PathTracker:
         self._rows = np.array(path.poses)
         self._rows[:, 3:] *= 2.0 * RADIAN * _continuous_signs(path.poses[:, 3:])[:, None]
         steps = np.linalg.norm(np.diff(self._rows, axis=0), axis=1)
-        self._arc = np.concatenate(([0.0], np.cumsum(steps)))
+        self._arc = _plain(np.concatenate(([0.0], np.cumsum(steps))))
+        self._time, self._points = _plain(path.time), array('i', path.point.tobytes())
+        self._is_roomy = bool(path.room.any())
+        self._edges: dict[int, Edge] = {}
+        self._end = pose_from_row(path.poses[-1])
         self.place = Place(0, 0.0)
 
     @property
@@ -97,8 +138,8 @@ class PathTracker:
         :param twist: of the target, which says how far a lag may reach.
         """
         here, lag = self._way(), LAG_WAY + LAG_TIME * speed(twist)
-        first = max(int(np.searchsorted(self._arc, here - lag, side='right')) - 1, 0)
-        end = min(int(np.searchsorted(self._arc, here + lag, side='left')), self.last_row)
+        first = max(bisect_right(self._arc, here - lag) - 1, 0)
+        end = min(bisect_left(self._arc, here + lag), self.last_row)
         if end <= first:
             return self.pose()
         place = self._nearest(self._coordinates(actual, first), first, end,
@@ -112,12 +153,13 @@ class PathTracker:
 
         In a corner whose shape only the robot knows, the room for that shape is taken off.
         """
-        here, row = self.pose(), self.place.row
-        room, angle = self.path.room[row]
-        if self.place.fraction > 0.0:
-            room, angle = np.maximum(self.path.room[row], self.path.room[row + 1])
-        return (max(0.0, here.distance_to(target) - float(room)),
-                max(0.0, here.angle_to(target) - float(angle)))
+        here = self.pose()
+        way, angle = here.distance_to(target), here.angle_to(target)
+        if not self._is_roomy:
+            return way, angle
+        row, fraction = self.place.row, self.place.fraction
+        room = self.path.room[row:row + (2 if fraction > 0.0 else 1)].max(axis=0)
+        return max(0.0, way - float(room[0])), max(0.0, angle - float(room[1]))
 
     def finish(self) -> Place:
         """Move on to the end of the path."""
@@ -127,60 +169,70 @@ class PathTracker:
     def pose(self, place: Place | None = None) -> Pose:
         """Return the planned pose at a place, the present one if none is given."""
         at = self.place if place is None else place
-        here = pose_from_row(self.path.poses[at.row])
-        if at.fraction == 0.0:
-            return here
-        return here.interpolate(pose_from_row(self.path.poses[at.row + 1]), at.fraction)
+        if at.row == self.last_row:
+            return self._end
+        edge = self._edge(at.row)
+        return edge.start.interpolate(edge.end, at.fraction) if at.fraction else edge.start
 
     def time(self) -> float:
         """Return the planned time at the place [s]."""
         row, fraction = self.place.row, self.place.fraction
-        here = float(self.path.time[row])
-        if fraction == 0.0:
-            return here
-        return here + fraction * (float(self.path.time[row + 1]) - here)
+        here = self._time[row]
+        return here + fraction * (self._time[row + 1] - here) if fraction else here
 
     def waypoint(self) -> int:
         """Return the index of the goal's point that the place leads to."""
         row = self.place.row + (1 if self.place.fraction > 0.0 else 0)
-        return int(self.path.point[min(row, self.last_row)])
+        return self._points[min(row, self.last_row)]
 
     def _window(self, reach: float, begun: int) -> tuple[int, int]:
         """Return the rows between which the tool may be."""
-        points = self.path.point
+        points = self._points
         if begun > 0:
             # The program runs the motion to point begun - 1, or is in the blend that leads to it:
             # what comes before was passed, perhaps between two packets.
-            passed = int(np.searchsorted(points, begun - 2, side='left')) - 1
+            passed = bisect_left(points, begun - 2) - 1
             if passed > self.place.row:
                 self.place = Place(passed, 0.0)
         first = self.place.row
-        end = int(np.searchsorted(self._arc, self._way() + reach + SLACK, side='left'))
+        end = bisect_left(self._arc, self._way() + reach + SLACK)
         end = min(max(end, first + 1), self.last_row)
         if begun > 0:
-            end = min(end, int(np.searchsorted(points, begun - 1, side='right')) - 1)
+            end = min(end, bisect_right(points, begun - 1) - 1)
         return first, max(end, first)
 
     def _way(self) -> float:
         """Return the length of the path up to the place [m]."""
         row, fraction = self.place.row, self.place.fraction
-        here = float(self._arc[row])
-        return here if fraction == 0.0 else here + fraction * (float(self._arc[row + 1]) - here)
+        here = self._arc[row]
+        return here + fraction * (self._arc[row + 1] - here) if fraction else here
 
     def _fraction(self, row: int, way: float) -> float:
         """Return where an edge has that much of the path behind it, within 0 to 1."""
-        start, end = float(self._arc[row]), float(self._arc[row + 1])
+        start, end = self._arc[row], self._arc[row + 1]
         return min(1.0, max(0.0, (way - start) / (end - start))) if end > start else 1.0
 
-    def _coordinates(self, pose: Pose, row: int) -> NDArray[np.float64]:
-        """Return the pose in the seven coordinates, its quaternion's sign as at the row."""
-        point = np.array(pose.row())
-        point[3:] *= 2.0 * RADIAN
-        if float(point[3:] @ self._rows[row, 3:]) < 0.0:
-            point[3:] *= -1.0
-        return point
+    def _edge(self, row: int) -> Edge:
+        """Return the edge that begins at a row."""
+        edge = self._edges.get(row)
+        if edge is None:
+            if len(self._edges) >= KEPT:
+                self._edges.clear()
+            start, end = self._rows[row:row + 2]
+            vector = end - start
+            edge = self._edges[row] = Edge(
+                pose_from_row(self.path.poses[row]), pose_from_row(self.path.poses[row + 1]),
+                tuple(start.tolist()), tuple(vector.tolist()), float(vector @ vector))
+        return edge
 
-    def _nearest(self, point: NDArray[np.float64], first: int, end: int, lowest: float,
+    def _coordinates(self, pose: Pose, row: int) -> Point:
+        """Return the pose in the seven coordinates, its quaternion's sign as at the row."""
+        (x, y, z), (a, b, c, d) = pose.position, pose.quaternion
+        _, _, _, ra, rb, rc, rd = self._edge(row).origin
+        scale = 2.0 * RADIAN if a * ra + b * rb + c * rc + d * rd >= 0.0 else -2.0 * RADIAN
+        return x, y, z, scale * a, scale * b, scale * c, scale * d
+
+    def _nearest(self, point: Point, first: int, end: int, lowest: float,
                  highest: float = 1.0) -> Place:
         """
         Return the nearest place on the edges ``first`` to ``end``, the earliest of equals.
@@ -188,11 +240,22 @@ class PathTracker:
         :param lowest: where it may be on the first edge at the earliest.
         :param highest: where it may be on the last edge at the latest.
         """
-        if end - first <= FEW:
-            return self._nearest_of_few(point.tolist(), first, end, lowest, highest)
+        if end - first > FEW:
+            return self._nearest_of_many(point, first, end, lowest, highest)
+        nearest, best, fraction = inf, first, 0.0
+        for row in range(first, end):
+            at, miss = self._edge(row).nearest(
+                point, lowest if row == first else 0.0, highest if row == end - 1 else 1.0)
+            if miss < nearest:
+                nearest, best, fraction = miss, row, at
+        return Place(best + 1, 0.0) if fraction >= 1.0 else Place(best, fraction)
+
+    def _nearest_of_many(self, point: Point, first: int, end: int, lowest: float,
+                         highest: float) -> Place:
+        """Return the same by arrays, whose overhead is nothing beside so many edges."""
         start = self._rows[first:end]
         edge = self._rows[first + 1:end + 1] - start
-        away = point - start
+        away = np.array(point) - start
         square = np.einsum('ij,ij->i', edge, edge)
         along = np.einsum('ij,ij->i', away, edge)
         fraction = np.divide(along, square, out=np.ones_like(along), where=square > 0.0)
@@ -204,26 +267,10 @@ class PathTracker:
         at = float(fraction[best])
         return Place(first + best + 1, 0.0) if at >= 1.0 else Place(first + best, at)
 
-    def _nearest_of_few(self, point: list[float], first: int, end: int, lowest: float,
-                        highest: float) -> Place:
-        """Return the same without arrays, whose overhead is most of the time for a few edges."""
-        rows = self._rows[first:end + 1].tolist()
-        nearest, place = inf, Place(first, 0.0)
-        for row, (start, stop) in enumerate(pairwise(rows), first):
-            edge = [b - a for a, b in zip(start, stop, strict=True)]
-            away = [b - a for a, b in zip(start, point, strict=True)]
-            square = sum([e * e for e in edge])
-            along = sum([e * a for e, a in zip(edge, away, strict=True)])
-            at = min(1.0, max(0.0, along / square)) if square > 0.0 else 1.0
-            if row == end - 1:
-                at = min(at, highest)
-            if row == first:
-                at = max(at, lowest)
-            miss = sum([(a - at * e) ** 2 for a, e in zip(away, edge, strict=True)])
-            if miss < nearest:
-                nearest = miss
-                place = Place(row + 1, 0.0) if at >= 1.0 else Place(row, at)
-        return place
+
+def _plain(values: NDArray[np.float64]) -> array[float]:
+    """Return an array that can be searched without making arrays of its numbers."""
+    return array('d', np.ascontiguousarray(values, dtype=np.float64).tobytes())
 
 
 def _continuous_signs(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -200,6 +200,12 @@ RESULTS: Mapping[TrajectoryResult, tuple[Signal, str]] = MappingProxyType({
 })
 
 
+_EMERGENCY = int(SafetyStatus.EMERGENCY_STOPPED | SafetyStatus.ROBOT_EMERGENCY_STOPPED
+                 | SafetyStatus.SYSTEM_EMERGENCY_STOPPED)
+#: In plain numbers, as this is looked at in every packet and operations on flags are slow.
+_STOPPED = _EMERGENCY | int(
+    SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED | SafetyStatus.VIOLATION
+    | SafetyStatus.FAULT)
 NO_STOP = SafetyStatus(0)
 #: Stops after which a robot goes on with its program, where somebody unlocks and plays it.
 HOLDS = SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED
@@ -211,21 +217,23 @@ def stop_in(state: RobotState, borne: SafetyStatus = NO_STOP) -> tuple[Signal, s
 
     :param borne: stops of the safety system that are not taken for a reason.
     """
-    safety = state.safety_status & ~borne
-    emergency = (SafetyStatus.EMERGENCY_STOPPED | SafetyStatus.ROBOT_EMERGENCY_STOPPED
-                 | SafetyStatus.SYSTEM_EMERGENCY_STOPPED)
-    if safety & emergency:
-        return Signal.EMERGENCY_STOP, 'an emergency stop cut the power of the arm'
-    if safety & SafetyStatus.PROTECTIVE_STOPPED:
-        return Signal.PROTECTIVE_STOP, 'the robot made a protective stop'
-    if safety & SafetyStatus.SAFEGUARD_STOPPED:
-        return Signal.PROTECTIVE_STOP, 'the robot made a safeguard stop'
-    if safety & (SafetyStatus.VIOLATION | SafetyStatus.FAULT):
-        return Signal.PROTECTIVE_STOP, (
-            f'the safety system reports {state.safety_mode.name.lower()}')
+    safety = int(state.safety_status) & _STOPPED & ~int(borne)
+    if safety:
+        return _safety_stop(safety, state)
     if state.robot_mode is not RobotMode.RUNNING:
         return Signal.PROGRAM_STOPPED, (
             f'the arm left the mode RUNNING and is in {state.robot_mode.name}')
     if state.runtime_state in (RuntimeState.STOPPING, RuntimeState.STOPPED):
         return Signal.PROGRAM_STOPPED, 'the robot program was stopped'
     return None
+
+
+def _safety_stop(safety: int, state: RobotState) -> tuple[Signal, str]:
+    """Return what a stop of the safety system means."""
+    if safety & _EMERGENCY:
+        return Signal.EMERGENCY_STOP, 'an emergency stop cut the power of the arm'
+    if safety & SafetyStatus.PROTECTIVE_STOPPED:
+        return Signal.PROTECTIVE_STOP, 'the robot made a protective stop'
+    if safety & SafetyStatus.SAFEGUARD_STOPPED:
+        return Signal.PROTECTIVE_STOP, 'the robot made a safeguard stop'
+    return Signal.PROTECTIVE_STOP, f'the safety system reports {state.safety_mode.name.lower()}'
