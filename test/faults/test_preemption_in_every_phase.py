@@ -1,6 +1,8 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A motion makes way for the next one in every phase: messages, brakes, and where the arm rests."""
+"""A motion makes way for the next one in every phase: messages, brakes, place of rest."""
+
+from itertools import pairwise
 
 from fault_cell import ARM, GoalInTrouble, planned
 import pytest
@@ -45,8 +47,8 @@ class Ways:
 
     def fastest_and_strongest(self):
         speeds = [[(b - a) / CYCLE for a, b in zip(*pair, strict=True)]
-                  for pair in zip(self.rows, self.rows[1:], strict=False)]
-        changes = [abs(b - a) / CYCLE for pair in zip(speeds, speeds[1:], strict=False)
+                  for pair in pairwise(self.rows)]
+        changes = [abs(b - a) / CYCLE for pair in pairwise(speeds)
                    for a, b in zip(*pair, strict=True)]
         return max(abs(v) for row in speeds for v in row), max(changes)
 
