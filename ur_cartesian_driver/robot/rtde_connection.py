@@ -15,6 +15,7 @@ from ur_cartesian_driver.protocol.rtde import (
     Ready,
     Recipe,
     RtdeClient,
+    RtdeEvent,
     Value,
 )
 from ur_cartesian_driver.robot.transport import Connection, dial
@@ -97,19 +98,21 @@ class RtdeConnection:
 
     def _on_data(self, data: bytes) -> None:
         try:
-            events = self._client.feed(data)
+            for event in self._client.feed(data):
+                self._take(event)
         except ProtocolError as error:
             self._connection.abort(str(error))
             return
         self._connection.send(self._client.data_to_send())
-        for event in events:
-            if isinstance(event, Ready):
-                self._names, self._inputs = event.outputs.names, event.inputs
-                self._version = event.controller_version
-                self._answered.set()
-            elif isinstance(event, DataReceived):
-                self._last_packet = asyncio.get_running_loop().time()
-                self._on_values(dict(zip(self._names, event.values, strict=True)))
+
+    def _take(self, event: RtdeEvent) -> None:
+        if isinstance(event, Ready):
+            self._names, self._inputs = event.outputs.names, event.inputs
+            self._version = event.controller_version
+            self._answered.set()
+        elif isinstance(event, DataReceived):
+            self._last_packet = asyncio.get_running_loop().time()
+            self._on_values(dict(zip(self._names, event.values, strict=True)))
 
     def _on_closed(self, reason: str) -> None:
         self._closed.set_result(reason)

@@ -9,8 +9,10 @@ Unknown numbers of modes (newer software) become the most careful one that there
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any
 
+from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.state import (
     RobotMode,
@@ -38,9 +40,21 @@ _SAFETY_MODES = {mode.value: mode for mode in SafetyMode}
 _RUNTIME_STATES = {state.value: state for state in RuntimeState}
 
 
+_VECTORS = REQUIRED[1:9]
+_NUMBERS = ('timestamp', 'speed_scaling', 'target_speed_fraction')
+
+
 def robot_state(values: Mapping[str, Any]) -> RobotState:
-    """Return the snapshot of one data package, given by the names above."""
+    """
+    Return the snapshot of one data package, given by the names above.
+
+    :raises RemoteProtocolError: a number is not finite: no comparison with it would ever be true,
+        so whoever watches the motion would see nothing.
+    """
     offset = values.get('tcp_offset')
+    if not isfinite(sum(map(sum, (values[name] for name in _VECTORS)))
+                    + sum(values[name] for name in _NUMBERS) + sum(offset or ())):
+        raise RemoteProtocolError(_not_finite(values))
     return RobotState(
         timestamp=values['timestamp'],
         actual_q=values['actual_q'],
@@ -64,3 +78,9 @@ def robot_state(values: Mapping[str, Any]) -> RobotState:
         robot_status=RobotStatus(values['robot_status_bits'] & 0xF),
         safety_status=SafetyStatus(values['safety_status_bits'] & 0xFFF),
         points_begun=values.get(POINTS_BEGUN) or 0)
+
+
+def _not_finite(values: Mapping[str, Any]) -> str:
+    names = [name for name in (*_VECTORS, *_NUMBERS, 'tcp_offset') if not isfinite(
+        sum(value) if isinstance(value := values.get(name) or 0.0, tuple) else value)]
+    return f"The robot reports numbers that are not finite: {', '.join(names)}."
