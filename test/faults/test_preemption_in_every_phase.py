@@ -81,7 +81,7 @@ async def preempted(cell, phase):
     back = tuple(a - b for a, b in zip(
         home, cell.robot.controller.motion.T_base_tcp.position, strict=True))
     following = cell.owner.start(planned(cell.memory.read(), (
-        (back if max(map(abs, back)) > 1e-3 else (0.0, 0.01, 0.0)),), 0.25))
+        back if max(map(abs, back)) > 1e-3 else (0.0, 0.01, 0.0),), 0.25, 2.0))
     await ways.until(lambda: following.outcome, 3.0)
     assert following.outcome.succeeded, f'{phase}: {following.outcome}'
     assert said(cell, first) == messages, phase
