@@ -78,6 +78,11 @@ def test_validate_refuses_parameters_as_the_node_does(words, says, capsys, tmp_p
     assert says in capsys.readouterr().err
 
 
+def test_the_first_of_six_numbers_may_be_negative(capsys):
+    assert main(['validate', 'relative', '--joints', '-0.1,-1.5,1.5,-1.5,-1.5,0']) == 0
+    assert 'joints -0.1 -1.5 ' in capsys.readouterr().out
+
+
 def test_validate_takes_tcp_and_calibration(capsys):
     assert main(['validate', 'square', '--tcp', '0,0,0.1,0,0,0', '--calibration-seed', '3']) == 0
     first, *_ = capsys.readouterr().out.splitlines()

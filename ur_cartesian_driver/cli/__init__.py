@@ -13,6 +13,7 @@ import argparse
 from collections.abc import Callable, Sequence
 import logging
 from pathlib import Path
+import re
 import signal
 import sys
 
@@ -54,6 +55,8 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
+_NUMBERS = re.compile(r'-[\d.][-+\d.,eE]*')
+
 Commands = argparse._SubParsersAction  # argparse has no public name for it
 
 
@@ -63,6 +66,8 @@ def _add(sub: Commands[argparse.ArgumentParser], name: str,
         name, help=text, description=text[0].upper() + text[1:] + '.',
         formatter_class=argparse.ArgumentDefaultsHelpFormatter)
     command.set_defaults(run=run)
+    # What begins with a minus is a value also where it is six numbers; argparse has no public way.
+    command._negative_number_matcher = _NUMBERS
     return command
 
 
