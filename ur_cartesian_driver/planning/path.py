@@ -41,6 +41,8 @@ SAME_POSITION = 1e-6
 SAME_ANGLE = 1e-6
 #: Least height of the via above the chord [m] at which three points still make a circle.
 LEAST_ARC_HEIGHT = 1e-5
+#: Arcs through points that are farther apart are refused [m]: no arm comes there.
+LARGEST_ARC = 1000.0
 #: Chord error of sampled arcs and of sampled joint lines [m].
 ARC_CHORD_ERROR = 5e-6
 CURVE_CHORD_ERROR = 20e-6
@@ -275,6 +277,8 @@ def _circle(a: Vector3, b: Vector3, c: Vector3) -> tuple[Vector3, Vector3, float
                         ('the via and the end', distance(b, c))):
         if apart < LEAST_ARC_HEIGHT:
             raise ValueError(f'{name} of the arc coincide ({1e3 * apart:.3f} mm apart)')
+    if max(chord, hypot(*ab)) > LARGEST_ARC:
+        raise ValueError(f'the points of the arc are more than {LARGEST_ARC:g} m apart')
     normal = _cross(ab, ac)
     area = hypot(*normal)
     if area / max(chord, hypot(*ab), distance(b, c)) < LEAST_ARC_HEIGHT:

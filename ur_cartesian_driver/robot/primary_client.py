@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from ur_cartesian_driver.kinematics.robots import Geometry
-from ur_cartesian_driver.motion.errors import ProtocolError
+from ur_cartesian_driver.motion.errors import ProtocolError, RemoteProtocolError
 from ur_cartesian_driver.protocol import primary
 from ur_cartesian_driver.protocol.framing import one_line
 from ur_cartesian_driver.robot.transport import Connection, dial, Retry
@@ -112,17 +112,15 @@ class PrimaryClient:
     def _on_data(self, data: bytes) -> None:
         self._heard = True
         try:
-            frames = self._frames.feed(data)
+            for frame in self._frames.feed(data):
+                if isinstance(frame, primary.RobotState):
+                    for package in frame.packages:
+                        self._on_package(package)
+                else:
+                    self._on_message(frame)
         except ProtocolError as error:
             if self._connection is not None:
                 self._connection.abort(str(error))
-            return
-        for frame in frames:
-            if isinstance(frame, primary.RobotState):
-                for package in frame.packages:
-                    self._on_package(package)
-            else:
-                self._on_message(frame)
 
     def _on_package(self, package: primary.StatePackage) -> None:
         match package:
@@ -130,8 +128,7 @@ class PrimaryClient:
                 self._reported = True
                 self._listener.configuration(package)
             case primary.KinematicsInfo():
-                self._listener.geometry(Geometry(
-                    a=package.a, d=package.d, alpha=package.alpha, theta=package.theta))
+                self._listener.geometry(_geometry(package))
 
     def _on_message(self, message: primary.Frame) -> None:
         match message:
@@ -144,3 +141,15 @@ class PrimaryClient:
                                      f'{message.column}: {one_line(message.text)}')
             case primary.TextMessage():
                 self._listener.text(one_line(message.text))
+
+
+def _geometry(package: primary.KinematicsInfo) -> Geometry:
+    """
+    Return the arm's own geometry.
+
+    :raises RemoteProtocolError: there cannot be such an arm.
+    """
+    try:
+        return Geometry(a=package.a, d=package.d, alpha=package.alpha, theta=package.theta)
+    except ValueError as error:
+        raise RemoteProtocolError(f'The robot reports impossible kinematics: {error}') from error
