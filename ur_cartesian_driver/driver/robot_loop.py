@@ -112,6 +112,8 @@ class RobotLoop:
         self._machine: TrajectoryMachine | None = None
         self._motion = 0
         self._latest: RobotState | None = None
+        #: Whether it is in the shared memory.
+        self._is_shared = True
         self._points = memoryview(b'')
         #: The TCP that an ended goal had set, until it is back.
         self._loan: TcpLoan | None = None
@@ -251,8 +253,18 @@ class RobotLoop:
         now = self._now()
         self._longest_gap = max(self._longest_gap, now - self._last_report)
         self._last_report = now
-        self._latest = state
-        self._memory.write(state)
+        self._latest, self._is_shared = state, False
+
+    def _share_state(self) -> None:
+        """
+        Write the newest state into the shared memory, if it is not there yet.
+
+        That comes behind what a packet leads to, as a CANCEL must not wait for it; but before
+        anything is told, so that who hears of it finds the state that belongs to it.
+        """
+        if not self._is_shared and self._latest is not None:
+            self._is_shared = True
+            self._memory.write(self._latest)
 
     def _handle_event(self, event: Event) -> None:
         """Feed the machine, and do what it answers."""
@@ -260,6 +272,7 @@ class RobotLoop:
             self._carry_out(self._machine.step(event, self._now()))
         elif self._loan is not None and isinstance(event, StateReceived):
             self._pursue(self._loan, event.state)
+        self._share_state()
 
     def _carry_out(self, commands: list[Command]) -> None:
         for command in commands:
@@ -387,6 +400,7 @@ class RobotLoop:
         self._notify(LogLine(level=level, text=text))
 
     def _notify(self, notice: Notice) -> None:
+        self._share_state()
         if not self._pipe.is_closing():
             self._pipe.write(pack(notice))
 

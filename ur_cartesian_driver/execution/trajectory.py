@@ -182,8 +182,9 @@ class TrajectoryMachine:
             self._observe(event.state, now)
         signal, text = self._signal(event, now)
         commands = [] if signal is None else self._apply(signal, text, now)
-        if isinstance(event, StateReceived):
-            # Last: a CANCEL does not wait until a report is packed.
+        brakes = signal is not None and self.state is State.STOPPING
+        if isinstance(event, StateReceived) and not brakes:
+            # A CANCEL does not wait until a report is made: that comes with the next packet.
             commands += self._inform(event.state, now)
         return commands
 

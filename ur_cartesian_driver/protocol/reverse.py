@@ -51,6 +51,7 @@ from ur_cartesian_driver.protocol.framing import (
     checked_size,
     from_fixed,
     INT32_MAX,
+    INT32_MIN,
     quote,
     RecordBuffer,
     to_fixed,
@@ -140,8 +141,9 @@ class ReverseMessage:
             raise LocalProtocolError(
                 f'read_timeout is {self.read_timeout} ms, but it must lie within 0 and '
                 f'{INT32_MAX}.')
-        for index, word in enumerate(self.payload, 1):
-            checked_int32(word, f'word {index} of a {self.mode.name} message')
+        if not INT32_MIN <= min(self.payload) <= max(self.payload) <= INT32_MAX:
+            for index, word in enumerate(self.payload, 1):
+                checked_int32(word, f'word {index} of a {self.mode.name} message')
 
     def encode(self) -> bytes:
         """Return the 32 bytes."""

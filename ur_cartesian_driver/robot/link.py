@@ -196,9 +196,9 @@ class RobotLink:
 
     def send_control(self, action: TrajectoryAction, count: int) -> None:
         """Send a trajectory action to the robot program."""
+        self._program.send_control(action, count)
         if action is TrajectoryAction.CANCEL:
             self._note('the driver sent CANCEL')
-        self._program.send_control(action, count)
 
     def send_points(self, data: bytes) -> None:
         """Send points to the robot program."""
