@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.goal import SegmentType
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
-GOALS = int(os.environ.get('PRE_FLIGHT_GOALS', '104'))
+GOALS = int(os.environ.get('PRE_FLIGHT_GOALS', '200'))
 LONGEST = inf if GOALS >= 1000 else TOO_LONG
 #: What part of the goals has to be of a kind, so that not only easy ones are drawn, and may be.
 LEAST = {'passes': 0.3, 'reach': 0.04, 'limit': 0.015, 'branch': 0.06}
@@ -46,6 +46,7 @@ def robot_of():
     return lambda model: robots.setdefault(model, RobotInMemory(model, frequency=125.0))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize('model', MODELS)
 def test_what_passes_arrives_and_what_is_refused_fails(model, robot_of, record_property):

@@ -219,6 +219,7 @@ def troubles(random, slider, duration):
     return faults, pause
 
 
+@pytest.mark.exhaustive
 @pytest.mark.parametrize('batch', range(BATCHES))
 def test_no_slider_and_no_pause_ever_fails_a_goal(batch):
     async def scenario(cell):

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every fault in every phase of a goal: the matrix of doc/faults.md, in virtual time."""
 
-from pathlib import Path
-
 from fault_cell import scenario
 from fault_table import CONTINUED, HEADLESS, LOCAL, PHASES
 import pytest
@@ -13,11 +11,8 @@ from ur_cartesian_driver.sim import faults
 
 pytestmark = pytest.mark.slow
 
-#: All of them in a checkout; an installed wheel is the same code, and a part has to do.
-IN_CHECKOUT = (Path(__file__).resolve().parents[2] / 'CMakeLists.txt').is_file()
-TESTED = tuple(PHASES) if IN_CHECKOUT else ('planning', 'mid-segment')
 
-
+@pytest.mark.exhaustive
 @pytest.mark.parametrize(
     ('row', 'settings'),
     [pytest.param(row, {}, id=row.fault) for row in HEADLESS]
@@ -27,7 +22,7 @@ TESTED = tuple(PHASES) if IN_CHECKOUT else ('planning', 'mid-segment')
        for row in CONTINUED])
 def test_a_goal_ends_as_the_table_says_and_the_next_one_works(row, settings):
     async def all_phases(cell):
-        for phase in TESTED:
+        for phase in PHASES:
             await scenario(cell, row.at(phase), phase)
 
     run_cell(all_phases, **settings)
