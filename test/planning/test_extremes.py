@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import pytest
 
-from ur_cartesian_driver.motion.errors import InvalidGoal, InvalidJoints, Unreachable
+from ur_cartesian_driver.kinematics.inverse import nearest
+from ur_cartesian_driver.motion.errors import InvalidGoal, InvalidJoints, TooFast, Unreachable
 from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
@@ -55,6 +56,42 @@ def test_a_posture_in_degrees_is_refused(cell, value):
     posture = Posture(names=('elbow_joint',), values=(value,))
     with pytest.raises(InvalidJoints, match='radians'):
         sent(cell, Goal(waypoints=(cell.point(0.01, posture=posture),)))
+
+
+def beside_the_wrist(make_cell, **fields):
+    """Return a robot whose wrist a line takes past 10 urad from straight, and the line's goal."""
+    cell = make_cell(q=(0.2, -1.2, 1.5, -1.4, 1e-5, 0.3))
+    (x, y, z), turn = cell.home.position, cell.home.quaternion
+    flange = Pose((x, y - 0.1, z - 0.03), turn) @ cell.T_flange_tcp.inverse()
+    there = make_cell(q=nearest(cell.arm, flange, cell.state.actual_q))
+    end = Waypoint(pose=Pose((x, y + 0.1, z + 0.03), turn), time=fields.pop('time', 0.0))
+    return there, Goal(waypoints=(end,), segments=(Segment(**fields),))
+
+
+@pytest.mark.parametrize('choice', ['slow', 'refuse'])
+def test_a_time_that_the_wire_cannot_carry_is_refused_and_not_proposed(make_cell, choice):
+    cell, goal = beside_the_wrist(make_cell, time=3.0)
+    with pytest.raises(TooFast, match=(
+            r'points\[0\]\.time_from_start .* because of .*wrist_1_joint at 50 % of the way it '
+            r'takes \d{5} s, more than max_segment_time = 2147 s; go around')):
+        sent(cell, goal, singularity_margin_wrist=0.0, on_too_fast=choice)
+
+
+def test_a_line_that_turns_so_slowly_that_no_time_carries_it_is_refused(cell):
+    goal = Goal(waypoints=(cell.point(0.1, turn=(0.0, 0.0, 0.5)),),
+                segments=(Segment(velocity=1e-5),))
+    with pytest.raises(InvalidGoal, match='more than max_segment_time = 2147 s; raise velocity'):
+        sent(cell, goal)
+
+
+def test_the_time_of_an_optimized_line_is_that_of_its_way_not_of_its_worst_place(make_cell):
+    """Beside a singularity the arm is slow for a moment; a movel is slow all the way."""
+    cell, goal = beside_the_wrist(make_cell, type=TYPE.OPTIMIZED_LINEAR)
+    made = sent(cell, goal, singularity_margin_wrist=0.0, max_tool_speed=0.0)
+    wrist = max(abs(b - a) / speed for a, b, speed in zip(
+        cell.state.actual_q, made.segments[0].joints, cell.arm.model.max_joint_speed,
+        strict=True))
+    assert wrist < 0.3 * made.duration < 2.0 * wrist
 
 
 def test_a_line_is_no_faster_than_the_joints(cell):

@@ -304,8 +304,8 @@ def test_nonsense_of_any_kind_ends_in_a_refusal_or_passes_but_never_in_another_e
 
 @pytest.mark.parametrize(('field', 'value'), [
     ('linear_velocity', 0.0), ('optimized_velocity', 1.5), ('max_tool_speed', -1.0),
-    ('on_too_fast', 'ignore'), ('on_posture_change', 'maybe'), ('max_points', 0),
-    ('stamp_tolerance', nan)])
+    ('max_segment_time', 2148.0), ('on_too_fast', 'ignore'), ('on_posture_change', 'maybe'),
+    ('max_points', 0), ('stamp_tolerance', nan)])
 def test_options_out_of_their_range_are_named(field, value):
     with pytest.raises(ValueError, match=field):
         PlanningOptions(**{field: value})

@@ -16,15 +16,16 @@ from ur_cartesian_driver.planning.profile import Profile
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """How long a segment takes at the least, at the pace of the place where joints are fastest."""
+    """How long the joints need for a segment, each of them at its limit at the most."""
 
-    #: [s].
+    #: All of it at the pace of the place where the joints are fastest [s].
     time: float
     #: The number of the joint, and where on the segment.
     joint: int
     fraction: float
-    #: How long the busiest joint needs at its limit for all of it [s].
-    mean: float
+    #: The same of the place where they are slowest, and with some joint at its limit everywhere.
+    quickest: float
+    whole: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

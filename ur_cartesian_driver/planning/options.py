@@ -125,6 +125,9 @@ class PlanningOptions:
         if self.self_collision not in ('off', 'warn', 'refuse', 'auto'):
             raise ValueError(f"self_collision is {self.self_collision!r}; it must be 'off', "
                              "'warn', 'refuse' or 'auto'")
+        if self.max_segment_time > NEWEST.max_duration:
+            raise ValueError(f'max_segment_time is {self.max_segment_time}; at most '
+                             f'{NEWEST.max_duration} s can be sent')
         parse_planes(self.workspace_planes)
         if self.max_points < 1:
             raise ValueError(f'max_points is {self.max_points}; it must be at least 1')

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,57 +71,58 @@ class Survey:
 
     def paces(self) -> dict[int, Pace]:
         """Return the time that the joints need for each whole segment, by segment."""
-        parts = [_paces(seen, self._arm.model.max_joint_speed) for seen in self._seen]
-        segment, time, joint, fraction = (
+        limits = np.array(self._arm.model.max_joint_speed)
+        parts = [_paces(seen, limits) for seen in self._seen]
+        segment, time, joint, fraction, burden, quick = (
             np.concatenate(column) for column in zip(*parts, strict=True))
         order = np.lexsort((time, segment))
-        last = order[np.flatnonzero(np.diff(segment[order], append=segment[order[-1]] + 1))]
-        mean = self._means()
-        return {index: Pace(t, k, at, mean[index]) for index, t, k, at in zip(
-            segment[last].tolist(), time[last].tolist(), joint[last].tolist(),
-            fraction[last].tolist(), strict=True)}
-
-    def _means(self) -> list[float]:
-        """Return the time that the busiest joint needs at its limit, by segment [s]."""
-        segments = np.concatenate([seen.segments for seen in self._seen])
-        burdens = np.concatenate([
-            _burdens(seen, self._arm.model.max_joint_speed) for seen in self._seen])
-        means: list[float] = np.max([np.bincount(segments, column) for column in burdens.T],
-                                    axis=0).tolist()
-        return means
+        bounds = np.flatnonzero(np.diff(segment[order], append=segment[order[-1]] + 1))
+        last = order[bounds]
+        quickest = np.minimum.reduceat(quick[order], np.concatenate([[0], bounds[:-1] + 1]))
+        columns = (time[last], joint[last], fraction[last], np.minimum(quickest, time[last]),
+                   np.bincount(segment, burden)[segment[last]])
+        return {index: Pace(*row) for index, *row in zip(
+            segment[last].tolist(), *(column.tolist() for column in columns), strict=True)}
 
 
-def _paces(seen: Surveyed, limits: Sequence[float]
-           ) -> tuple[Ints, Floats, NDArray[np.intp], Floats]:
-    """
-    Return for places the segment, and the time [s] of the whole segment at the pace there.
+class _Paces(NamedTuple):
+    """What places say of their segments, each (n,); those in corners do so of two."""
 
-    :returns: segment, time, the joint that is the slowest, fraction; each (n,). Places in corners
-        are there twice, once for each of their segments.
-    """
+    segment: Ints
+    #: The time of the whole segment at the pace there [s], and the joint that is the slowest.
+    time: Floats
+    joint: NDArray[np.intp]
+    fraction: Floats
+    #: The time from the place before [s]; half of it where that counts for two segments.
+    burden: Floats
+    #: The time at the pace there, inf in corners, where joints may turn round.
+    quick: Floats
+
+
+def _paces(seen: Surveyed, limits: Floats) -> _Paces:
+    """Return how fast a segment may go at each place."""
     found = seen.found
     begin = np.array([piece.begin for piece in seen.pieces])[found.piece]
     before = np.concatenate([[0.0], found.t[:-1]])
     is_first = np.diff(found.piece, prepend=-1) != 0
     way = found.t - np.where(is_first, begin, before)
-    burdens = _burdens(seen, limits)
+    change = np.abs(np.diff(found.q, axis=0, prepend=np.array([seen.q_start])))
+    burdens = change / limits
     joint = np.argmax(burdens, axis=1)
     burden = np.take_along_axis(burdens, joint[:, None], axis=1)[:, 0]
     pace = np.where(way > _NO_WAY, burden / np.maximum(way, _NO_WAY), 0.0)
+    quick = np.where(way > _NO_WAY, pace, np.inf)
     index = np.array([p.index for p in seen.pieces], dtype=np.int32)[found.piece]
     leaving, joining = (rate[found.piece] for rate in _rates(seen.pieces))
     rounds = np.flatnonzero(joining > 0.0)
-    return (np.concatenate([index, index[rounds] + 1]),
-            np.concatenate([pace / leaving, pace[rounds] / joining[rounds]]),
-            np.concatenate([joint, joint[rounds]]),
-            np.concatenate([seen.fractions, seen.fractions[rounds]]))
-
-
-def _burdens(seen: Surveyed, limits: Sequence[float]) -> Floats:
-    """Return the time that each joint needs from place to place (n, 6) [s]."""
-    change = np.abs(np.diff(seen.found.q, axis=0, prepend=np.array([seen.q_start])))
-    burdens: Floats = change / np.array(limits)
-    return burdens
+    burden[rounds] *= 0.5
+    quick[rounds] = np.inf
+    return _Paces(np.concatenate([index, index[rounds] + 1]),
+                  np.concatenate([pace / leaving, pace[rounds] / joining[rounds]]),
+                  np.concatenate([joint, joint[rounds]]),
+                  np.concatenate([seen.fractions, seen.fractions[rounds]]),
+                  np.concatenate([burden, burden[rounds]]),
+                  np.concatenate([quick, quick[rounds]]))
 
 
 def _rates(pieces: Sequence[Piece]) -> tuple[Floats, Floats]:

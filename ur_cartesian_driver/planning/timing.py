@@ -77,7 +77,7 @@ def schedule(legs: Sequence[Leg], options: PlanningOptions, model: RobotModel) -
         if changed < 1e-6:
             break
     for leg, timing in zip(legs, timings, strict=True):
-        _check_least(leg, timing)
+        _check_wire(leg, timing, options)
     for k in range(1, len(legs)):
         if legs[k].before is not None and legs[k].time is None:
             timings[k] = _from_corner(legs, timings, k)
@@ -87,8 +87,13 @@ def schedule(legs: Sequence[Leg], options: PlanningOptions, model: RobotModel) -
         legs, timings, [0.0, *corners[:-1]], corners, strict=True)]
 
 
-def _check_least(leg: Leg, timing: Timing) -> None:
-    """Refuse what would be zero on the wire, or next to it."""
+def _check_wire(leg: Leg, timing: Timing, options: PlanningOptions) -> None:
+    """Refuse what would be zero on the wire, or next to it, and times that it does not carry."""
+    if timing.wire_time > options.max_segment_time:
+        raise InvalidGoal(
+            point_field(leg.index), f'would be approached in {timing.wire_time:.4g} s, more than '
+            f'max_segment_time = {options.max_segment_time:.0f} s',
+            'raise velocity or acceleration')
     if timing.wire_time > 0.0:
         return
     unit = _speed_unit(timing.unit)
@@ -144,12 +149,12 @@ def measure(leg: Leg, model: RobotModel) -> tuple[float, str]:
     """
     Return the length of the leading quantity and its unit (m or rad; s for OPTIMIZED moves).
 
-    OPTIMIZED moves are measured by the time that they would take if some joint were at its limit
-    where the joints turn fastest.
+    OPTIMIZED moves are measured by the time that they would take with some joint at its limit
+    everywhere.
     """
     path = leg.path
     if is_optimized(leg.kind):
-        length, unit = leg.pace.time, 's'
+        length, unit = leg.pace.whole, 's'
     elif isinstance(path, JointLine):
         length, unit = max(path.travel), 'rad'
     elif path.length >= path.angle or (isinstance(path, Arc) and path.mode == ArcMode.FIXED):
@@ -334,6 +339,12 @@ def _slowed(leg: Leg, length: float, unit: str, least: float, limits: _Limits,
             options: PlanningOptions) -> tuple[float, str]:
     """Return the time that the limits allow and the remark, or refuse."""
     assert leg.time is not None
+    if least > options.max_segment_time:
+        raise TooFast(
+            point_field(leg.index, 'time_from_start'),
+            f'gives the segment {leg.time:.3f} s, but because of {limits.name} it takes '
+            f'{least:.0f} s, more than max_segment_time = {options.max_segment_time:.0f} s',
+            'go around the place where it has to be slow, or use a JOINT segment')
     if options.on_too_fast == 'slow':
         return least, (f'point {leg.index}: takes {least:.3f} s instead of {leg.time:.3f} s, '
                        f'because of {limits.name}')
@@ -427,7 +438,7 @@ def _tool_per_unit(leg: Leg, length: float) -> float:
     """Return the most metres that the tool goes per unit of the leading quantity."""
     path = leg.path
     if is_optimized(leg.kind):  # the tool is fastest where the joints have the least to do
-        length = max(leg.pace.mean, _NO_WAY)
+        length = max(leg.pace.quickest, _NO_WAY)
     uneven = path.unevenness if isinstance(path, JointLine) else 1.0
     return path.length * uneven / length
 
