@@ -223,9 +223,15 @@ def test_a_sub_package_comes_back_as_it_was_also_with_a_surplus(package):
 def test_a_sub_package_that_is_too_short_is_refused_with_its_bytes(package):
     if isinstance(package, RawState):
         return
-    body = package.encode()[:-1 - isinstance(package, RobotModeData)]
+    optional = {RobotModeData: 1, MasterboardData: 3}.get(type(package), 0)
+    body = package.encode()[:-1 - optional]
     with pytest.raises(RemoteProtocolError, match=body[:20].hex()):
         type(package).decode(body)
+
+
+def test_the_masterboard_of_older_software_has_no_selector():
+    board = MasterboardData(robot_current=1.5, safety_mode=2)
+    assert MasterboardData.decode(board.encode()[:-3]) == board
 
 
 def test_frames_are_read_from_a_stream_in_pieces():

@@ -233,7 +233,8 @@ class MasterboardData:
     domains, 2 f64 outputs, f32 temperature [deg C], voltage 48 V [V], current of the robot [A], of
     the IO [A], u8 safety mode, flag reduced, flag IMMI; with IMMI: u32 inputs, u32 outputs, f32
     voltage, f32 current; u32 reserved, u8 operational mode selector, flag three-position switch,
-    1 reserved. ``safety_mode`` is a number of :class:`SafetyMode`, or a newer one.
+    1 reserved. Older software ends before the selector. ``safety_mode`` is a number of
+    :class:`SafetyMode`, or a newer one.
     """
 
     sub_type: ClassVar = 3
@@ -279,6 +280,8 @@ class MasterboardData:
             i = unpack(_BOARD_IMMI, body, 'masterboard data', offset)
             immi = Immi(input_bits=i[0], output_bits=i[1], voltage_24v=i[2], current=i[3])
             offset += _BOARD_IMMI.size
+        if len(body) >= offset + 4:  # older software ends behind the reserved word
+            body = body.ljust(offset + _BOARD_TAIL.size, b'\0')
         tail = unpack(_BOARD_TAIL, body, 'masterboard data', offset)
         return cls(
             digital_input_bits=v[0], digital_output_bits=v[1], analog_input_range=v[2:4],
