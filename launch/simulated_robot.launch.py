@@ -22,7 +22,8 @@ ARGUMENTS = [
         'robot_ip', default_value='127.0.0.1',
         description='Address at which the simulated controller listens.'),
     DeclareLaunchArgument(
-        'polyscope', default_value='5.21', description='Version of the simulated controller.'),
+        'polyscope', default_value='',
+        description='Version of the simulated controller. Empty: the newest for the model.'),
     DeclareLaunchArgument(
         'tf_prefix', default_value='', description='Prefix of joint and frame names.'),
     DeclareLaunchArgument(

@@ -226,6 +226,15 @@ def test_recover_leaves_another_program_alone(driver, ur_sim):
     assert ur_sim.state().program == 'foreign'
 
 
+@pytest.mark.ur_sim(model='ur3')
+def test_a_robot_without_force_sensor_says_that_there_is_nothing_to_zero(make_driver):
+    driver = make_driver()
+    driver.wait_ready(READY)
+    answer = driver.zero_ftsensor()
+    assert not answer.ok
+    assert 'CB3' in answer.text
+
+
 @pytest.mark.ur_sim(frequency=125.0, polyscope='10.11.0', unlock_delay=0.0)
 def test_polyscope_x_has_no_dashboard_and_the_rest_works(make_driver, ur_sim):
     driver = make_driver()

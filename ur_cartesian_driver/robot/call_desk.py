@@ -49,6 +49,9 @@ TCP_TOLERANCE = 1e-5
 #: The same of mass and centre of gravity [kg, m].
 PAYLOAD_TOLERANCE = 1e-4
 
+#: The first software of robots with a force sensor.
+E_SERIES = 5
+
 #: Dashboard commands that only ask: also a robot that must not be moved answers them.
 QUESTIONS = frozenset({
     'running', 'robotmode', 'safetymode', 'safetystatus', 'get loaded program', 'isProgramSaved',
@@ -96,8 +99,7 @@ class CallDesk:
             case SetTcp() | SetPayload():
                 return await self._set(call)
             case ZeroFtSensor():
-                return self._command(script_command.ZeroFtSensor()) or yes(
-                    'The robot program was told to zero the force sensor.')
+                return self._zero_ftsensor()
             case SetOutput():
                 return await self._write(rtde_inputs.output(call), 'The output is set.')
             case SetSpeedSlider():
@@ -138,6 +140,14 @@ class CallDesk:
             return no('The robot program does not run, and it is what does this. '
                       f'{self._robot.status.message}'.rstrip())
         return None
+
+    def _zero_ftsensor(self) -> Answer:
+        version = self._robot.version
+        if version is not None and version.major < E_SERIES:
+            return no(f'A CB3 robot (software {version}) has no force sensor to be zeroed: '
+                      'it works forces out from the currents of its joints.')
+        return self._command(script_command.ZeroFtSensor()) or yes(
+            'The robot program was told to zero the force sensor.')
 
     async def _set(self, call: SetTcp | SetPayload) -> Answer:
         """Set something; no goal begins meanwhile."""
