@@ -10,7 +10,7 @@ import struct
 from figures import Figure, seconds_each
 
 from ur_cartesian_driver.protocol.rtde import OUTPUT_TYPES, Recipe
-from ur_cartesian_driver.robot.state_recipe import OPTIONAL, REQUIRED, robot_state
+from ur_cartesian_driver.robot.state_recipe import NAMES, robot_state
 
 NAME = 'RTDE, per package of the driver'
 
@@ -18,20 +18,18 @@ NAME = 'RTDE, per package of the driver'
 def run(quick: bool) -> Iterator[Figure]:
     """Pack and unpack the driver's own recipe."""
     budget = 0.1 if quick else 0.5
-    names = (*REQUIRED, *OPTIONAL)
-    recipe = Recipe(names, [OUTPUT_TYPES[name] for name in names])
+    recipe = Recipe(NAMES, [OUTPUT_TYPES[name] for name in NAMES])
     values = recipe.zeros()
     frame = recipe.pack(values)
     payload = frame[3:]
     plain = struct.Struct(f'>{len(payload) // 8}d')
     numbers = plain.unpack(payload[:plain.size])
-    named = recipe.named(values)
     for name, function, baseline, than in (
             ('pack', lambda: recipe.pack(values), lambda: plain.pack(*numbers),
              'struct.pack of as many bytes'),
             ('unpack', lambda: recipe.unpack(payload), lambda: plain.unpack(payload[:plain.size]),
              'struct.unpack of as many bytes'),
-            ('values to RobotState', lambda: robot_state(named), lambda: recipe.unpack(payload),
+            ('values to RobotState', lambda: robot_state(values), lambda: recipe.unpack(payload),
              'unpack')):
         yield Figure(benchmark=NAME, name=name, value=1e6 * seconds_each(function, budget),
                      unit='us', baseline=1e6 * seconds_each(baseline, budget), than=than,

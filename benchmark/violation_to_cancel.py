@@ -34,7 +34,7 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.rtde import OUTPUT_TYPES, Recipe
-from ur_cartesian_driver.robot.state_recipe import OPTIONAL, REQUIRED
+from ur_cartesian_driver.robot.state_recipe import NAMES
 
 NAME = 'violated tolerance'
 #: So far the tool is pushed aside, and so far it may be [m].
@@ -43,7 +43,6 @@ PUSH, BOUND = 0.004, 0.002
 ECHOED = 7
 TIMEOUT = 10.0
 #: The robot loop's own.
-NAMES = (*REQUIRED, *OPTIONAL)
 RECIPE = Recipe(NAMES, [OUTPUT_TYPES[name] for name in NAMES])
 FRAME_SIZE = len(RECIPE.pack(RECIPE.zeros()))
 ACTUAL, TARGET = NAMES.index('actual_TCP_pose'), NAMES.index('target_TCP_pose')

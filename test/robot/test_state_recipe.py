@@ -6,7 +6,7 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
-from ur_cartesian_driver.robot.state_recipe import OPTIONAL, REQUIRED, robot_state
+from ur_cartesian_driver.robot.state_recipe import in_order, OPTIONAL, REQUIRED, robot_state
 
 VECTORS = REQUIRED[1:9]
 
@@ -16,7 +16,8 @@ def values(**changes):
     found |= dict.fromkeys(('timestamp', 'speed_scaling', 'target_speed_fraction'), 1.0)
     found |= {name: 7 for name in REQUIRED if name not in found}
     found |= dict.fromkeys(OPTIONAL)
-    return found | changes
+    found |= changes
+    return in_order(tuple(found), tuple(found.values()))
 
 
 def test_unknown_modes_are_the_most_careful_ones():

@@ -5,8 +5,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
 
 from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.protocol.rtde import (
@@ -17,6 +16,7 @@ from ur_cartesian_driver.protocol.rtde import (
     RtdeClient,
     RtdeEvent,
     Value,
+    Values,
 )
 from ur_cartesian_driver.robot.transport import Connection, dial
 
@@ -29,14 +29,14 @@ SILENCE = 1.0
 class RtdeConnection:
     """Used once, from one event loop: open it, wait for its end, close it."""
 
-    def __init__(self, client: RtdeClient, on_values: Callable[[Mapping[str, Any]], None], *,
+    def __init__(self, client: RtdeClient, on_values: Callable[[Sequence[str], Values], None], *,
                  silence: float = SILENCE) -> None:
         """
         Prepare a connection.
 
         :param client: says what is streamed and written.
-        :param on_values: a packet came in, by the names of its fields; also before :meth:`open`
-            returns.
+        :param on_values: a packet came in, with the names of its fields and what is in them; also
+            before :meth:`open` returns.
         :param silence: the longest pause between two packets [s].
         """
         self._client = client
@@ -112,7 +112,7 @@ class RtdeConnection:
             self._answered.set()
         elif isinstance(event, DataReceived):
             self._last_packet = asyncio.get_running_loop().time()
-            self._on_values(dict(zip(self._names, event.values, strict=True)))
+            self._on_values(self._names, event.values)
 
     def _on_closed(self, reason: str) -> None:
         self._closed.set_result(reason)

@@ -11,14 +11,14 @@ as it is.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isclose
 from typing import Any
 
 from ur_cartesian_driver.motion.goal import OutputKind
 from ur_cartesian_driver.motion.signals import AnalogDomain
-from ur_cartesian_driver.protocol.rtde import RtdeClient, Value
+from ur_cartesian_driver.protocol.rtde import RtdeClient, Value, Values
 from ur_cartesian_driver.robot.calls import SetOutput, SetSpeedSlider
 from ur_cartesian_driver.robot.rtde_connection import RtdeConnection
 
@@ -95,8 +95,8 @@ async def write(host: str, port: int, writing: Writing) -> bool:
     """
     done = asyncio.Event()
 
-    def look(values: Mapping[str, Any]) -> None:
-        if writing.done(values):
+    def look(names: Sequence[str], values: Values) -> None:
+        if writing.done(dict(zip(names, values, strict=True))):
             done.set()
 
     connection = RtdeConnection(

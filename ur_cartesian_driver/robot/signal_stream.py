@@ -9,7 +9,7 @@ would cost most of all.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from math import nan
 from typing import Any, NoReturn
 
@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.signals import (
     DigitalChannels,
     Signals,
 )
-from ur_cartesian_driver.protocol.rtde import RtdeClient
+from ur_cartesian_driver.protocol.rtde import RtdeClient, Values
 from ur_cartesian_driver.robot.rtde_connection import RtdeConnection, SILENCE
 from ur_cartesian_driver.robot.transport import Retry
 
@@ -68,8 +68,8 @@ class SignalStream:
                 self._on_warning(f'inputs and outputs are not reported: {reason}')
             await retry.pause()
 
-    def _on_values(self, values: Mapping[str, Any]) -> None:
-        now = signals(values)
+    def _on_values(self, names: Sequence[str], values: Values) -> None:
+        now = signals(dict(zip(names, values, strict=True)))
         if now != self._last:
             self._last = now
             self._on_signals(now)

@@ -8,12 +8,13 @@ Unknown numbers of modes (newer software) become the most careful one that there
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Sequence
+from functools import lru_cache
 from math import isfinite
 from typing import Any
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector6
 from ur_cartesian_driver.motion.state import (
     RobotMode,
     RobotState,
@@ -23,6 +24,7 @@ from ur_cartesian_driver.motion.state import (
     SafetyStatus,
 )
 from ur_cartesian_driver.protocol import registers
+from ur_cartesian_driver.protocol.rtde import Values
 
 POINTS_BEGUN = registers.field(registers.OutputInteger.POINTS_BEGUN)
 
@@ -34,53 +36,85 @@ REQUIRED = (
 #: Old software does not have these.
 OPTIONAL = ('tcp_offset', 'actual_TCP_acceleration', 'target_TCP_acceleration',
             'actual_current_as_torque', POINTS_BEGUN)
+#: The order in which they are asked for.
+NAMES = (*REQUIRED, *OPTIONAL)
 
 _ROBOT_MODES = {mode.value: mode for mode in RobotMode}
 _SAFETY_MODES = {mode.value: mode for mode in SafetyMode}
 _RUNTIME_STATES = {state.value: state for state in RuntimeState}
 
 
-_VECTORS = REQUIRED[1:9]
+#: What has to be finite: vectors, and single numbers.
+_VECTORS = slice(1, 9)
 _NUMBERS = ('timestamp', 'speed_scaling', 'target_speed_fraction')
 
 
-def robot_state(values: Mapping[str, Any]) -> RobotState:
+def in_order(names: Sequence[str], values: Values) -> Values | tuple[Any, ...]:
+    """Return values as :data:`NAMES` has them, None for what the robot does not know."""
+    if names == NAMES:
+        return values
+    found = dict(zip(names, values, strict=True))
+    return tuple(found.get(name) for name in NAMES)
+
+
+def robot_state(values: tuple[Any, ...]) -> RobotState:
     """
-    Return the snapshot of one data package, given by the names above.
+    Return the snapshot of one data package, whose values are in the order of :data:`NAMES`.
 
     :raises RemoteProtocolError: a number is not finite: no comparison with it would ever be true,
         so whoever watches the motion would see nothing.
     """
-    offset = values.get('tcp_offset')
-    if not isfinite(sum(map(sum, (values[name] for name in _VECTORS)))
-                    + sum(values[name] for name in _NUMBERS) + sum(offset or ())):
+    (timestamp, actual_q, actual_qd, target_q, target_qd, actual_pose, actual_twist, target_pose,
+     target_twist, wrench, speed_scaling, speed_fraction, robot_mode, safety_mode, runtime_state,
+     robot_bits, safety_bits, offset, actual_acceleration, target_acceleration, torque,
+     points_begun) = values
+    if not isfinite(sum(map(sum, values[_VECTORS])) + timestamp + speed_scaling + speed_fraction
+                    + sum(offset or ())):
         raise RemoteProtocolError(_not_finite(values))
+    modes = _modes(robot_mode, safety_mode, runtime_state, robot_bits, safety_bits)
     return RobotState(
-        timestamp=values['timestamp'],
-        actual_q=values['actual_q'],
-        actual_qd=values['actual_qd'],
-        target_q=values['target_q'],
-        target_qd=values['target_qd'],
-        actual_tcp_pose=Pose.from_rotation_vector(values['actual_TCP_pose']),
-        actual_tcp_twist=values['actual_TCP_speed'],
-        target_tcp_pose=Pose.from_rotation_vector(values['target_TCP_pose']),
-        target_tcp_twist=values['target_TCP_speed'],
-        actual_tcp_acceleration=values.get('actual_TCP_acceleration'),
-        target_tcp_acceleration=values.get('target_TCP_acceleration'),
-        joint_torque=values.get('actual_current_as_torque'),
-        actual_tcp_wrench=values['actual_TCP_force'],
-        T_flange_tcp=IDENTITY if offset is None else Pose.from_rotation_vector(offset),
-        speed_scaling=values['speed_scaling'],
-        target_speed_fraction=values['target_speed_fraction'],
-        robot_mode=_ROBOT_MODES.get(values['robot_mode'], RobotMode.NO_CONTROLLER),
-        safety_mode=_SAFETY_MODES.get(values['safety_mode'], SafetyMode.UNDEFINED_SAFETY_MODE),
-        runtime_state=_RUNTIME_STATES.get(values['runtime_state'], RuntimeState.STOPPED),
-        robot_status=RobotStatus(values['robot_status_bits'] & 0xF),
-        safety_status=SafetyStatus(values['safety_status_bits'] & 0xFFF),
-        points_begun=values.get(POINTS_BEGUN) or 0)
+        timestamp=timestamp,
+        actual_q=actual_q,
+        actual_qd=actual_qd,
+        target_q=target_q,
+        target_qd=target_qd,
+        actual_tcp_pose=Pose.from_rotation_vector(actual_pose),
+        actual_tcp_twist=actual_twist,
+        target_tcp_pose=Pose.from_rotation_vector(target_pose),
+        target_tcp_twist=target_twist,
+        actual_tcp_acceleration=actual_acceleration,
+        target_tcp_acceleration=target_acceleration,
+        joint_torque=torque,
+        actual_tcp_wrench=wrench,
+        T_flange_tcp=_tcp(offset),
+        speed_scaling=speed_scaling,
+        target_speed_fraction=speed_fraction,
+        robot_mode=modes[0],
+        safety_mode=modes[1],
+        runtime_state=modes[2],
+        robot_status=modes[3],
+        safety_status=modes[4],
+        points_begun=points_begun or 0)
 
 
-def _not_finite(values: Mapping[str, Any]) -> str:
-    names = [name for name in (*_VECTORS, *_NUMBERS, 'tcp_offset') if not isfinite(
-        sum(value) if isinstance(value := values.get(name) or 0.0, tuple) else value)]
+@lru_cache(maxsize=16)
+def _tcp(offset: Vector6 | None) -> Pose:
+    return IDENTITY if offset is None else Pose.from_rotation_vector(offset)
+
+
+@lru_cache(maxsize=64)
+def _modes(robot_mode: int, safety_mode: int, runtime_state: int, robot_bits: int,
+           safety_bits: int) -> tuple[
+               RobotMode, SafetyMode, RuntimeState, RobotStatus, SafetyStatus]:
+    """Return numbers as what they mean; they are the same ones in most packets."""
+    return (_ROBOT_MODES.get(robot_mode, RobotMode.NO_CONTROLLER),
+            _SAFETY_MODES.get(safety_mode, SafetyMode.UNDEFINED_SAFETY_MODE),
+            _RUNTIME_STATES.get(runtime_state, RuntimeState.STOPPED),
+            RobotStatus(robot_bits & 0xF), SafetyStatus(safety_bits & 0xFFF))
+
+
+def _not_finite(values: tuple[Any, ...]) -> str:
+    names = [name for name, value in zip(NAMES, values, strict=True)
+             if name in (*NAMES[_VECTORS], *_NUMBERS, 'tcp_offset') and not isfinite(
+                 sum(value) if isinstance(value, tuple) else value or 0.0)]
     return f"The robot reports numbers that are not finite: {', '.join(names)}."

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.protocol.rtde import RtdeClient
 from ur_cartesian_driver.robot.rtde_connection import RtdeConnection
-from ur_cartesian_driver.robot.state_recipe import OPTIONAL, REQUIRED, robot_state
+from ur_cartesian_driver.robot.state_recipe import in_order, NAMES, OPTIONAL, robot_state
 
 
 class StateStream(RtdeConnection):
@@ -23,6 +23,5 @@ class StateStream(RtdeConnection):
         :param on_state: a packet came in; also before :meth:`open` returns.
         """
         super().__init__(
-            RtdeClient(outputs=(*REQUIRED, *OPTIONAL), optional_outputs=OPTIONAL,
-                       frequency=frequency),
-            lambda values: on_state(robot_state(values)))
+            RtdeClient(outputs=NAMES, optional_outputs=OPTIONAL, frequency=frequency),
+            lambda names, values: on_state(robot_state(in_order(names, values))))
