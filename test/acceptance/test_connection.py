@@ -326,14 +326,22 @@ def test_an_arm_that_a_person_switches_on_waits_for_a_word(make_driver, ur_sim):
     driver.wait_ready(5.0)
 
 
-def test_a_foreign_program_is_not_replaced(make_driver, ur_sim):
+@pytest.mark.parametrize('paused', [False, True])
+def test_a_foreign_program_is_not_replaced(make_driver, ur_sim, paused):
     ur_sim.run_script('def somebody_elses():\n  while True:\n    sync()\n  end\nend\n')
     wait_for(lambda: ur_sim.state().runtime_state.name == 'PLAYING')
+    if paused:
+        ur_sim.pause_program()
+        wait_for(lambda: ur_sim.state().runtime_state.name == 'PAUSED')
+    before = ur_sim.state().runtime_state
     driver = make_driver()
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
     sleep(0.3)
+    driver.resend_robot_program()
+    sleep(0.3)
     assert not driver.status.program_running
-    assert ur_sim.state().runtime_state.name == 'PLAYING'
+    assert ur_sim.state().runtime_state is before
+    assert 'has not called this driver' in driver.status.message
     ur_sim.stop_program()
     sleep(0.3)
     assert ur_sim.state().runtime_state.name == 'STOPPED'

@@ -69,6 +69,24 @@ async def cell(allowed=frozenset()):
         await made.close()
 
 
+def test_the_ports_move_with_our_address():
+    """A computer that is plugged in elsewhere gets another one, and the program is told that."""
+    async def scene():
+        async with cell() as here:
+            await here.connect()
+            before = dict(here.sockets.ports)
+            await here.sockets.open(HOST, frozenset())
+            assert here.sockets.connected
+            assert here.sockets.ports == before
+            await here.sockets.open('127.0.0.2', frozenset())
+            assert await here.next() == 'lost, our address is 127.0.0.2 now'
+            for port in here.sockets.ports.values():
+                _, writer = await asyncio.open_connection('127.0.0.2', port)
+                writer.close()
+
+    asyncio.run(scene())
+
+
 def test_a_program_is_connected_when_it_has_all_sockets():
     async def scene():
         async with cell() as here:

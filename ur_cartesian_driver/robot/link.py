@@ -282,7 +282,7 @@ class RobotLink:
             self._note('the driver sent the robot program')
 
     def _foreign_program_runs(self) -> bool:
-        return (self._robot is not None and self._robot.runtime_state in _RUNS
+        return (self._robot is not None and not has_ended(self._robot)
                 and not self._program.connected and not self._program_is_ours)
 
     def not_ready(self) -> str:
@@ -370,9 +370,9 @@ class RobotLink:
         if self._status.state is ConnectionState.STOPPED \
                 or robot.robot_mode is not RobotMode.RUNNING:
             self._warn(f'the robot program is not started: {self._status.message}')
-        elif robot.robot_status & RobotStatus.PROGRAM_RUNNING:
-            self._warn('the robot program is not started: another program runs on the robot; '
-                       'stop it, then call resend_robot_program')
+        elif robot.robot_status & RobotStatus.PROGRAM_RUNNING or not has_ended(robot):
+            self._warn('the robot program is not started: another program runs on the robot, or '
+                       'is paused; stop it, then call resend_robot_program')
         else:
             self.upload_program()
 

@@ -66,6 +66,8 @@ class ProgramSockets:
         self.longest_gap = 0.0
         #: When the last keepalive was sent to the program that is there, or was last [s].
         self.last_keepalive = -inf
+        #: Where the ports are open.
+        self._host = ''
         self._read_timeout = round(1000.0 * settings.robot_receive_timeout)
         self._results = ResultDecoder()
         self._requests = script_sender.RequestDecoder()
@@ -92,10 +94,15 @@ class ProgramSockets:
         """
         Listen on all ports that are not open yet.
 
-        :param host: our address.
+        :param host: our address; where it is another one than before, all ports move there.
         :param allowed: addresses that may call.
         :raises OSError: a port is taken; the text names the parameter to change.
         """
+        if host != self._host:
+            self.drop(f'our address is {host} now')
+            for port in (*self._program_ports, self._sender):
+                port.close()
+            self._host = host
         for port in (*self._program_ports, self._sender):
             if not port.is_open:
                 await port.open(host, getattr(self._settings, port.name), allowed)
