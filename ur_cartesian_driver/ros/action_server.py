@@ -253,8 +253,7 @@ class GoalRun:
         #: When it is to start [ns]; 0 = at once.
         self.start_time = nanoseconds(handle.request.trajectory.header.stamp)
         self.turn = Turn(f'goal {self.key.hex()[:8]}', self._make_way)
-        self.thread = threading.Thread(
-            target=self._run, name=self.turn.name, daemon=True)
+        self.thread = threading.Thread(target=self._run, name=self.turn.name, daemon=True)
         self._server = server
         self._lock = threading.Lock()
         self._motion: Motion | None = None
@@ -318,14 +317,15 @@ class GoalRun:
             self._check_wanted()
             server.turns.line_up(self.turn)
             goal = replace(goal, age=0.0)
-        return self._moved(self._preempted(goal) if server.preempts else self._waited(goal))
+        return self._moved(
+            self._plan_preempting(goal) if server.preempts else self._plan_if_free(goal))
 
-    def _waited(self, goal: Goal) -> Plan:
+    def _plan_if_free(self, goal: Goal) -> Plan:
         """Return the plan of a goal that runs if no other one does."""
         self._server.seize(self, goal)
         return self._planned(goal)
 
-    def _preempted(self, goal: Goal) -> Plan:
+    def _plan_preempting(self, goal: Goal) -> Plan:
         """
         Return the plan of a goal for which others make way, when they have.
 
