@@ -27,7 +27,6 @@ from ur_cartesian_driver.cli.demo import process
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.protocol.rtde import DataReceived, RtdeClient
 from ur_cartesian_driver.ros.client import GoalClient, load_goal
-from ur_cartesian_driver.sim.config import HOME
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
@@ -100,8 +99,8 @@ class Cell:
         self._stack = stack
         self._environment = {**os.environ, 'PYTHONUNBUFFERED': '1'}
         self.simulator = stack.enter_context(process(
-            'sim', '--rtde-port', '0', '--primary-port', '0', '--dashboard-port', '0', '--joints',
-            ','.join(f'{q:.6f}' for q in HOME), environment=self._environment,
+            'sim', '--model', 'ur5', '--rtde-port', '0', '--primary-port', '0',
+            '--dashboard-port', '0', environment=self._environment,
             stdout=subprocess.PIPE))
         line = self.simulator.stdout.readline()
         self.ports = dict(re.findall(r'(RTDE|primary|dashboard) (\d+)', line))
@@ -113,7 +112,8 @@ class Cell:
 
     def start_node(self):
         parameters = {
-            'headless_mode': 'true', 'rtde_port': self.ports['RTDE'], 'node_timeout': NODE_TIMEOUT,
+            'ur_type': 'ur5', 'headless_mode': 'true', 'node_timeout': NODE_TIMEOUT,
+            'rtde_port': self.ports['RTDE'],
             'primary_port': self.ports['primary'], 'dashboard_port': self.ports['dashboard'],
             'reverse_port': 0, 'script_sender_port': 0, 'trajectory_port': 0,
             'script_command_port': 0}
