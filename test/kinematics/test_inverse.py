@@ -17,6 +17,7 @@ from ur_cartesian_driver.kinematics.inverse import (
     nearest,
     nearest_in,
     solutions,
+    told_apart,
     why_unreachable,
 )
 from ur_cartesian_driver.kinematics.robots import MODELS
@@ -368,6 +369,13 @@ def test_of_two_turns_equally_near_the_one_near_to_before_is_taken():
 def test_the_reason_names_the_distance_and_the_bound(position, reason):
     clause = why_unreachable(UR5E, Pose(position, TOOL_DOWN))
     assert re.search(reason, clause), clause
+
+
+@pytest.mark.parametrize(('value', 'bound', 'texts'), [
+    (0.9, 0.8172, ('0.9000', '0.8172')), (0.817203, 0.8172, ('0.817203', '0.817200')),
+    (0.8172, 0.8172, ('0.817200000', '0.817200000')), (1e300, 0.8172, ('1e+300', '0.8172'))])
+def test_a_value_beyond_its_bound_reads_as_another_number(value, bound, texts):
+    assert told_apart(value, bound) == texts
 
 
 def test_a_reachable_pose_has_no_reason(calibrated_arm):

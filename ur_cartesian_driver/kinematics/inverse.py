@@ -136,8 +136,9 @@ def why_unreachable(arm: Arm, T_base_flange: Pose) -> str:
     shape = shape_of(arm)
     px, py, _ = wrist_centre(shape, T_base_flange)
     if hypot(px, py) < shape.d4:
-        return (f'the centre of the wrist would be {hypot(px, py):.4f} m from the axis of the '
-                f'base, and it cannot come nearer than {shape.d4:.4f} m')
+        value, bound = told_apart(hypot(px, py), shape.d4)
+        return (f'the centre of the wrist would be {value} m from the axis of the base, and it '
+                f'cannot come nearer than {bound} m')
     return _why_no_elbow(shape, T_base_flange)
 
 
@@ -324,6 +325,14 @@ def _turn(angle: float, target: float, low: float, high: float) -> float | None:
 
 # --- Reasons ---------------------------------------------------------------------------------
 
+def told_apart(value: float, bound: float) -> tuple[str, str]:
+    """Return both numbers with as few digits, four at the least, as tell one from the other."""
+    if abs(value) >= 1e4:
+        return f'{value:.4g}', f'{bound:.4f}'
+    digits = next((n for n in range(4, 9) if round(value, n) != round(bound, n)), 9)
+    return f'{value:.{digits}f}', f'{bound:.{digits}f}'
+
+
 def _why_no_elbow(shape: Shape, T_base_flange: Pose) -> str:
     distances = [hypot(wrist.outward, wrist.up)
                  for wrist in wrists(shape, T_base_flange)]
@@ -332,10 +341,12 @@ def _why_no_elbow(shape: Shape, T_base_flange: Pose) -> str:
     longest, shortest = abs(shape.a2 + shape.a3), abs(shape.a2 - shape.a3)
     nearest_to_reach = min(distances, key=lambda r: max(r - longest, shortest - r))
     if nearest_to_reach < 0.5 * (longest + shortest):
-        return (f'wrist 1 would be {nearest_to_reach:.4f} m from the shoulder, and the folded arm '
-                f'comes no nearer than {shortest:.4f} m')
-    return (f'wrist 1 would be {nearest_to_reach:.4f} m from the shoulder, and upper arm and '
-            f'forearm together reach {longest:.4f} m')
+        value, bound = told_apart(nearest_to_reach, shortest)
+        return (f'wrist 1 would be {value} m from the shoulder, and the folded arm comes no '
+                f'nearer than {bound} m')
+    value, bound = told_apart(nearest_to_reach, longest)
+    return (f'wrist 1 would be {value} m from the shoulder, and upper arm and forearm together '
+            f'reach {bound} m')
 
 
 def _why_outside_limits(found: list[Joints], limits: Limits) -> str:
@@ -345,7 +356,8 @@ def _why_outside_limits(found: list[Joints], limits: Limits) -> str:
     if excess <= 0.0:
         return ''
     low, high = limits[joint]
-    return (f'{JOINT_NAMES[joint]} would be at {angle:.4f} rad, and its limits are {low:.4f} to '
+    value, _ = told_apart(angle, low if angle < low else high)
+    return (f'{JOINT_NAMES[joint]} would be at {value} rad, and its limits are {low:.4f} to '
             f'{high:.4f} rad')
 
 

@@ -23,6 +23,7 @@ from ur_cartesian_driver.kinematics.rows import follow, postures
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.planning.corner import Corner
 from ur_cartesian_driver.planning.path import tcp_rows
 from ur_cartesian_driver.planning.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.planning.postures import Reach
@@ -39,6 +40,8 @@ _JUMP = 0.5
 _SAME = 1e-6
 #: Places solved at a time after one at which more had to be put in between; then ever more.
 _FIRST_BLOCK = 64
+#: Places at which is looked how far a joint would go beyond its range.
+_ONWARD = 16
 _GROWTH = 8
 
 
@@ -186,9 +189,17 @@ def _refusal(reach: Reach, piece: Piece, between: _Between, q: Joints
     assert between.stop is not None
     index, fraction = piece.on_segment(between.stop)
     pose = piece.pose(between.stop)
+    where = place(index, fraction)
     if between.jump is not None:
-        return reach.jump(pose, q, between.jump, place(index, fraction)), index
-    return reach.no_solution(pose, place(index, fraction)), index
+        onward = (piece.pose(t) for t in np.linspace(between.stop, piece.end, _ONWARD).tolist())
+        return reach.jump(pose, q, between.jump, where, onward), index
+    refusal = reach.no_solution(pose, where)
+    if not isinstance(piece.curve, Corner) and fraction < 1.0:
+        # There the value is just beyond its bound; at the point it says how far beyond.
+        at_end = reach.no_solution(piece.curve.end, where, 'at the point ')
+        if type(at_end) is type(refusal) and reach.solution(piece.curve.end, q) is None:
+            refusal = at_end
+    return refusal, index
 
 
 def place(index: int, fraction: float) -> str:

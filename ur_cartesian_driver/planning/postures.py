@@ -11,6 +11,7 @@ that is then sent along as ``q_near``.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from math import degrees, dist, hypot, pi
 
 import numpy as np
@@ -21,6 +22,7 @@ from ur_cartesian_driver.kinematics.inverse import (
     nearest,
     nearest_in,
     solutions,
+    told_apart,
     why_unreachable,
 )
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
@@ -98,27 +100,37 @@ class Reach:
             raise self.no_solution(T_base_tcp, place)
         return q
 
-    def no_solution(self, T_base_tcp: Pose, place: str) -> GoalRefused:
-        """Tell why a pose has no solution: out of reach, or outside of the joints' ranges."""
+    def no_solution(self, T_base_tcp: Pose, place: str, there: str = '') -> GoalRefused:
+        """
+        Tell why a pose has no solution: out of reach, or outside of the joints' ranges.
+
+        :param there: where the pose is, if not at the place.
+        """
         T_base_flange = self.flange(T_base_tcp)
-        why = why_unreachable(self.arm, T_base_flange)
+        why = there + why_unreachable(self.arm, T_base_flange)
         if solutions(self.arm, T_base_flange):
             return JointLimitExceeded(
                 f'{place} cannot be reached: {why}; turn the tool in another way.')
         return Unreachable(f'{place} cannot be reached: {why}; check the frame and the TCP, or '
                            'move the point or the robot.')
 
-    def jump(self, T_base_tcp: Pose, q: Joints, q_next: Joints, place: str) -> GoalRefused:
-        """Tell why the configuration cannot be continued: end of a range, or a singularity."""
+    def jump(self, T_base_tcp: Pose, q: Joints, q_next: Joints, place: str,
+             onward: Iterable[Pose] = ()) -> GoalRefused:
+        """
+        Tell why the configuration cannot be continued: end of a range, or a singularity.
+
+        :param onward: where the tool would go from there, near to each other.
+        """
         goes_on = self._continued(T_base_tcp, q)
-        limits = self.arm.model.position_limits
-        for k, (low, high) in enumerate(limits):
-            if max(abs(b - a) for a, b in zip(q, goes_on, strict=True)) <= _CONTINUED and not (
-                    low <= goes_on[k] <= high):
+        for k, (low, high) in enumerate(self.arm.model.position_limits):
+            if goes_on is not None and not low <= goes_on[k] <= high:
+                side = 1.0 if goes_on[k] > high else -1.0
+                far = side * max(side * at for at in self._turns(k, goes_on, onward))
+                value, _ = told_apart(far, high if side > 0.0 else low)
                 return JointLimitExceeded(
-                    f'{place} needs {JOINT_NAMES[k]} at {goes_on[k]:.3f} rad, outside its range '
-                    f'of {low:.3f} to {high:.3f} rad; start with this joint turned back, or go '
-                    'there with a JOINT segment.')
+                    f'{place} takes {JOINT_NAMES[k]} out of its range of {low:.4f} to {high:.4f} '
+                    f'rad, as far as {value} rad; start with this joint turned back, or go there '
+                    'with a JOINT segment.')
         joint = max(range(6), key=lambda k: abs(q_next[k] - q[k]))
         return NearSingularity(
             f'{place} lies behind the {self.nearest_singularity(q)} singularity: '
@@ -143,14 +155,27 @@ class Reach:
             a, b, strict=True) if x != y]
         return ' and '.join(names)
 
-    def _continued(self, T_base_tcp: Pose, q: Joints) -> Joints:
-        """Return the solution nearest to a configuration, the limits of the joints aside."""
+    def _turns(self, k: int, q: Joints, onward: Iterable[Pose]) -> Iterator[float]:
+        """Give the positions of a joint [rad] along a way, as far as it can be followed."""
+        yield q[k]
+        for pose in onward:
+            goes_on = self._continued(pose, q)
+            if goes_on is None:
+                return
+            q = goes_on
+            yield q[k]
+
+    def _continued(self, T_base_tcp: Pose, q: Joints) -> Joints | None:
+        """Return the solution next to a configuration, the limits of the joints aside."""
         def around(found: Joints) -> Joints:
             a, b, c, d, e, f = (x + 2.0 * pi * round((y - x) / (2.0 * pi))
                                 for x, y in zip(found, q, strict=True))
             return (a, b, c, d, e, f)
         every = (around(found) for found in solutions(self.arm, self.flange(T_base_tcp), q))
-        return min(every, key=lambda found: dist(found, q))
+        found = min(every, key=lambda found: dist(found, q), default=None)
+        if found is None or max(abs(b - a) for a, b in zip(q, found, strict=True)) > _CONTINUED:
+            return None
+        return found
 
 
 def named_joints(posture: Posture, tf_prefix: str) -> dict[int, float]:
