@@ -315,6 +315,7 @@ class Driver(RobotServices):
         """
         points = encode_points((segment.primitive for segment in plan.segments),
                                self.config.dialect)
+        order = order_of(plan, self.config.dialect)
         with self._lock:
             if self._motions:
                 raise RobotNotReady('A motion is running; wait for its end or cancel it.')
@@ -322,8 +323,9 @@ class Driver(RobotServices):
                 raise RobotNotReady(reason)
             motion = Motion(self, next(self._numbers), plan, on_progress)
             self._motions[motion.number] = motion
-        self._send(StartMotion(motion=motion.number, points=points,
-                                order=order_of(plan, self.config.dialect)))
+            # Still under the lock: whoever finds the motion may cancel it, and that has to come
+            # behind its start.
+            self._send(StartMotion(motion=motion.number, points=points, order=order))
         return motion
 
     def make_way(self, by: str = 'a newer motion') -> bool:

@@ -177,12 +177,16 @@ class CallDesk:
         refusal = self._command(script_command.SetPayload(mass=call.mass, cog=call.cog))
         if refusal is not None:
             return refusal
-        signals = self._robot.signals
-        if signals is None or isnan(signals.payload):
+        signals, rate = self._robot.signals, self._settings.io_publish_rate
+        if signals is None:
+            return yes('The payload was sent; nothing reports it while inputs and outputs are not '
+                       'reported (io_publish_rate).')
+        if isnan(signals.payload):
             return yes('The payload was sent; the software of the robot does not report it.')
-        if await until(self._robot, lambda _: self._carries(call), SETTING_TIMEOUT):
+        within = SETTING_TIMEOUT + 1.0 / rate
+        if await until(self._robot, lambda _: self._carries(call), within):
             return yes('The payload is set.')
-        return no(f'The robot does not report the new payload within {SETTING_TIMEOUT:g} s.')
+        return no(f'The robot does not report the new payload within {within:g} s.')
 
     def _carries(self, call: SetPayload) -> bool:
         signals = self._robot.signals
