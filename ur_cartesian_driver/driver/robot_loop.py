@@ -97,6 +97,10 @@ REASONED = frozenset({ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP})
 REASON_TIMEOUT = 0.05
 #: How many calls are carried out at a time.
 MOST_CALLS = 32
+#: What is out of date soon is left out while so much waits for an owner that does not read
+#: [bytes]: it may hang for days.
+PASSING = (Alive, LogLine, MotionProgress, SignalsChanged)
+MOST_UNREAD = 1 << 20
 T = TypeVar('T')
 
 
@@ -129,6 +133,8 @@ class RobotLoop:
         self._program_running = False
         self._last_report = inf
         self._longest_gap = 0.0
+        #: The newest inputs and outputs, if the owner did not read when they were to be told.
+        self._untold: SignalsChanged | None = None
         #: The end of a motion, until its reason is there.
         self._unexplained: MotionEnded | None = None
         if configure.loan is not None:
@@ -367,6 +373,8 @@ class RobotLoop:
             self._handle_event(Tick())
             if self._now() - last_sign >= SIGN_OF_LIFE:
                 last_sign = self._now()
+                if self._untold is not None:
+                    self._notify(self._untold)
                 self._notify(Alive(gaps=Gaps(
                     reports=self._longest_gap, keepalives=self._link.keepalive_gap())))
                 self._longest_gap = 0.0
@@ -401,7 +409,13 @@ class RobotLoop:
 
     def _notify(self, notice: Notice) -> None:
         self._share_state()
-        if not self._pipe.is_closing():
+        if self._pipe.is_closing():
+            return
+        left_out = isinstance(notice, PASSING) \
+            and self._pipe.transport.get_write_buffer_size() > MOST_UNREAD
+        if isinstance(notice, SignalsChanged):
+            self._untold = notice if left_out else None
+        if not left_out:
             self._pipe.write(pack(notice))
 
     def _now(self) -> float:

@@ -1,0 +1,41 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The robot loop and an owner that does not read what it is told."""
+
+import asyncio
+import os
+import socket
+
+from ur_cartesian_driver.driver import channel, DriverConfig
+from ur_cartesian_driver.driver.robot_loop import MOST_UNREAD, RobotLoop
+from ur_cartesian_driver.driver.snapshot import create, StateMemory
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.events import Outcome
+
+
+def test_an_owner_that_does_not_read_costs_no_memory_and_misses_no_end():
+    ended = channel.MotionEnded(
+        motion=1, outcome=Outcome(code=ErrorCode.SUCCESSFUL, text='Done.'))
+
+    async def scene():
+        ours, theirs = socket.socketpair()
+        _, writer = await asyncio.open_connection(sock=theirs)
+        descriptor = create()
+        memory = StateMemory(descriptor)
+        loop = RobotLoop(channel.Configure(config=DriverConfig()), memory, writer)
+        line = channel.LogLine(level=20, text='x' * 10_000)
+        for _ in range(1000):
+            loop._notify(line)
+        assert writer.transport.get_write_buffer_size() < MOST_UNREAD + 20_000
+        loop._notify(ended)
+        ours.settimeout(5.0)
+        told = [line]
+        while told[-1] == line:
+            told.append(await asyncio.to_thread(channel.receive, ours))
+        assert told[-1] == ended
+        writer.close()
+        ours.close()
+        memory.close()
+        os.close(descriptor)
+
+    asyncio.run(scene())
