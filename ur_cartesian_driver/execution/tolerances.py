@@ -71,15 +71,18 @@ class Watch:
 
         :param desired: planned pose of the TCP in base.
         """
-        worst, clause = 1.0, None
+        worst, found = 1.0, None
         for quantity, limits in self._watched:
             errors = quantity.error(desired, state, self._turn)
             for axis, error, limit in zip(_AXES, errors, limits, strict=True):
                 if limit > 0.0 and not abs(error) <= worst * limit:
-                    worst = abs(error) / limit
-                    clause = (f'{quantity.name} {axis} is off by {abs(error):.6f} '
-                              f'{quantity.unit}, the tolerance is {limit:.6f} {quantity.unit}')
-        return clause
+                    worst, found = abs(error) / limit, (quantity, axis, abs(error), limit)
+        return None if found is None else _clause(*found)
+
+
+def _clause(quantity: Quantity, axis: str, error: float, limit: float) -> str:
+    return (f'{quantity.name} {axis} is off by {error:.6f} {quantity.unit}, the tolerance is '
+            f'{limit:.6f} {quantity.unit}')
 
 
 def _position(desired: Pose, state: RobotState, turn: Quaternion) -> Vector3:

@@ -133,6 +133,7 @@ class TrajectoryMachine:
         self._pace = Pace(order.reference) if order.knows_pace else None
         self._path_watch = Watch(order.path_tolerance, order.T_base_frame)
         self._goal_watch = Watch(order.goal_tolerance, order.T_base_frame)
+        self._watches_tcp = order.T_tcp_controlled == IDENTITY
         self._max_plan_deviation = max_plan_deviation
         #: Whether the robot program has read START: it has begun a point, or the target moves.
         self._under_way = False
@@ -193,6 +194,8 @@ class TrajectoryMachine:
     def _signal(self, event: Event, now: float) -> tuple[Signal | None, str]:
         """Return what the event means, with a clause for the outcome's text."""
         match event:
+            case StateReceived(state=state):
+                return stop_in(state, self._borne) or self._judge(state, now)
             case TrajectoryEnded(result=TrajectoryResult.CANCELED) if self._has_not_begun():
                 self._deadline = now + EARLY_ANSWER
                 return None, ''
@@ -206,20 +209,18 @@ class TrajectoryMachine:
                 return Signal.PROGRAM_STOPPED, f'the robot program hung up: {reason}'
             case LinkLost(link=link, reason=reason):
                 return Signal.CONNECTION_LOST, f'the {link} connection was lost: {reason}'
-            case StateReceived(state=state):
-                return stop_in(state, self._borne) or self._judge(state, now)
             case Tick():
                 return self._late(now)
         raise TypeError(f'unknown event {event!r}')
 
     def _judge(self, state: RobotState, now: float) -> tuple[Signal | None, str]:
         """Return what a packet of a robot that runs means in the present state."""
-        at_rest = _rests(state)
-        if self.state is State.ARMING and self._is_armed(state):
-            return Signal.ARMED, ''
         if self.state is State.MOVING:
             return (self._plan_deviation(state) or self._wrong_pace(state) or self._stall()
                     or self._path_violation(state))
+        at_rest = _rests(state)
+        if self.state is State.ARMING and self._is_armed(state):
+            return Signal.ARMED, ''
         if self.state is State.SETTLING and at_rest:
             return self._arrival(state, now)
         if self.state is State.HALTING and at_rest:
@@ -307,6 +308,8 @@ class TrajectoryMachine:
 
     def _violation(self, watch: Watch, desired: Pose, state: RobotState) -> str | None:
         """Return what a watch says of the controlled frame; ``desired`` is of the TCP."""
+        if self._watches_tcp:
+            return watch.violation(desired, state)
         T_tcp_controlled = self.order.T_tcp_controlled
         return watch.violation(desired @ T_tcp_controlled, seen_at(state, T_tcp_controlled))
 

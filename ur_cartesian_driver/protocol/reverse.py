@@ -106,11 +106,12 @@ STOPPED_TIMEOUT = 100
 #: Controller cycle of an e-Series robot [ms].
 DEFAULT_STEP_TIME = 2
 
-_STREAMS = frozenset({TrajectoryAction.STREAM_START, TrajectoryAction.STREAM_END})
-REALTIME_MODES = frozenset({
+# Tuples: to compare a few numbers is faster than to hash one.
+_STREAMS = (TrajectoryAction.STREAM_START, TrajectoryAction.STREAM_END)
+REALTIME_MODES = (
     ControlMode.SERVOJ, ControlMode.SPEEDJ, ControlMode.SPEEDL, ControlMode.POSE,
-    ControlMode.TORQUE})
-_NEVER_SENT = frozenset({ControlMode.UNINITIALIZED, ControlMode.TOOL_IN_CONTACT})
+    ControlMode.TORQUE)
+_NEVER_SENT = (ControlMode.UNINITIALIZED, ControlMode.TOOL_IN_CONTACT)
 _VALUE_NAMES = {
     ControlMode.SERVOJ: 'joint position', ControlMode.SPEEDJ: 'joint velocity',
     ControlMode.SPEEDL: 'tool speed', ControlMode.POSE: 'pose', ControlMode.TORQUE: 'torque'}

@@ -402,21 +402,26 @@ class RobotLink:
         self._reported = robot
         self._last_report = asyncio.get_running_loop().time()
         self._tell_state(robot)
-        if before is not None:
-            for change in changes(before, robot):
+        is_news = before is None or _modes(before) != _modes(robot)
+        if is_news:
+            for change in () if before is None else changes(before, robot):
                 self._note(change)
+            self._look_at_program(robot)
+            self._review()
+        self._on_event(StateReceived(state=robot))
+        if not is_news:  # no status follows from it, and a CANCEL had to be sent first
+            self._look_at_program(robot)
+
+    def _on_signals(self, signals: Signals) -> None:
+        self._signals = signals
+        self._tell_signals(signals)
+
+    def _look_at_program(self, robot: RobotState) -> None:
         self._look_for_ghost(robot)
         if has_ended(robot):
             self._program_is_ours = False
         elif self._program.connected:
             self._program_is_ours = True
-        if before is None or _modes(before) != _modes(robot):
-            self._review()
-        self._on_event(StateReceived(state=robot))
-
-    def _on_signals(self, signals: Signals) -> None:
-        self._signals = signals
-        self._tell_signals(signals)
 
     def _look_for_ghost(self, robot: RobotState) -> None:
         """Hang up on a program that has ended without a word."""

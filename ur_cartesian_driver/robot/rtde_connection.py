@@ -106,13 +106,13 @@ class RtdeConnection:
         self._connection.send(self._client.data_to_send())
 
     def _take(self, event: RtdeEvent) -> None:
-        if isinstance(event, Ready):
+        if isinstance(event, DataReceived):
+            self._last_packet = asyncio.get_running_loop().time()
+            self._on_values(self._names, event.values)
+        elif isinstance(event, Ready):
             self._names, self._inputs = event.outputs.names, event.inputs
             self._version = event.controller_version
             self._answered.set()
-        elif isinstance(event, DataReceived):
-            self._last_packet = asyncio.get_running_loop().time()
-            self._on_values(self._names, event.values)
 
     def _on_closed(self, reason: str) -> None:
         self._closed.set_result(reason)
