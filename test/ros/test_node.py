@@ -80,6 +80,16 @@ def test_the_state_of_the_robot_is_published(single_cell):
     assert newest['ur_cartesian_driver/wrench'].header.frame_id == 'tool0_controller'
 
 
+def test_a_value_that_cannot_be_published_does_not_silence_the_topics(single_cell):
+    cell = single_cell
+    newest = subscribe(cell, ['joint_states'])
+    cell.spin_until(lambda: newest)
+    cell.node.driver._signals = 'nonsense'
+    cell.spin_until(lambda: cell.node._publisher._signals._last == 'nonsense')
+    newest.clear()
+    cell.spin_until(lambda: newest)
+
+
 def test_a_protective_stop_is_published(single_cell):
     cell = single_cell
     newest = subscribe(cell, ['ur_cartesian_driver/safety_mode', 'ur_cartesian_driver/status'])

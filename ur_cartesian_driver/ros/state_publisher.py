@@ -54,6 +54,8 @@ LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
 TF = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 #: How often an unchanged status is confirmed [s].
 CONFIRMATION = 1.0
+#: How often a defect is told, at most [s].
+COMPLAINT = 10.0
 
 
 def tf_messages() -> ModuleType | None:
@@ -70,6 +72,7 @@ class StatePublisher:
     def __init__(self, node: Node, driver: Driver, settings: Settings) -> None:
         """Make the publishers; :meth:`start` begins to use them."""
         self._clock = node.get_clock()
+        self._logger = node.get_logger()
         self._driver = driver
         self._period = 1.0 / settings.node.state_publish_rate
         self._closed = threading.Event()
@@ -97,6 +100,11 @@ class StatePublisher:
                 self._publish(monotonic())
             except (InvalidHandle, RCLError):
                 return  # ROS was shut down under the node
+            except Exception as error:
+                # One bad value must not silence all topics for good.
+                self._logger.error(
+                    f'The state of the robot is not published, because of a defect of the driver, '
+                    f'{type(error).__name__}: {error}.', throttle_duration_sec=COMPLAINT)
             due += self._period * max(1.0, (monotonic() - due) // self._period)
 
     def _publish(self, now: float) -> None:
