@@ -9,6 +9,9 @@ import ipaddress
 
 from ur_cartesian_driver.protocol.dialects import Dialect, DIALECTS, NEWEST
 
+#: A robot that reports less often cannot be watched, nor told from one that is lost [Hz].
+LEAST_FREQUENCY = 10.0
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkSettings:
@@ -41,7 +44,7 @@ class LinkSettings:
     auto_power: bool = False
     #: Time between two messages on the reverse socket [s].
     keepalive_period: float = 0.02
-    #: Packets per second from the robot; 0 = as many as it can.
+    #: Packets per second from the robot, at least :data:`LEAST_FREQUENCY`; 0 = as many as it can.
     rtde_frequency: float = 0.0
     #: How often inputs, outputs and tool are reported [Hz]; 0 = never.
     io_publish_rate: float = 25.0
@@ -58,6 +61,10 @@ class LinkSettings:
         for address in self.allowed_peers:
             _require_address('allowed_peers', address)
         self._require_positive('robot_receive_timeout', 'keepalive_period', 'stop_deceleration')
+        if self.rtde_frequency != 0.0 and not self.rtde_frequency >= LEAST_FREQUENCY:
+            raise ValueError(
+                f'rtde_frequency is {self.rtde_frequency:g} Hz, it has to be 0 (as often as the '
+                f'robot can) or at least {LEAST_FREQUENCY:g} Hz.')
         if self.robot_receive_timeout < 2.0 * self.keepalive_period:
             raise ValueError(
                 f'robot_receive_timeout is {self.robot_receive_timeout} s, it has to be at least '

@@ -33,7 +33,7 @@ from ur_cartesian_driver.ros.parameters import declare, overrides, ParameterErro
 from ur_cartesian_driver.ros.services import Services
 from ur_cartesian_driver.ros.state_publisher import StatePublisher
 
-#: How often the driver hears that the executor of the node is alive [s].
+#: How often the driver hears that the executor of the node is alive, at least [s].
 HEARTBEAT_PERIOD = 0.5
 #: How long the other nodes have to make themselves known [s].
 DISCOVERY = 2.0
@@ -90,7 +90,7 @@ class CartesianDriverNode(Node):
         self._publisher.start()
         self._call_services = Services(self, self.driver, lambda: self.action_server.idle)
         self.create_timer(
-            HEARTBEAT_PERIOD, self.driver.heartbeat,
+            min(HEARTBEAT_PERIOD, settings.driver.node_timeout / 4.0), self.driver.heartbeat,
             # Of its own, and on a clock that no simulation stops.
             callback_group=MutuallyExclusiveCallbackGroup(),
             clock=Clock(clock_type=ClockType.STEADY_TIME))

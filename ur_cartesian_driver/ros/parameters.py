@@ -282,8 +282,8 @@ DECLARATIONS: tuple[Declaration, ...] = (
     Declaration('allowed_peers', 'Addresses that may connect to the ports above; empty: '
                 'robot_ip. Empty texts are skipped.'),
     # -- timing
-    Declaration('rtde_frequency', 'How often the robot reports its state [Hz]; 0: as often as it '
-                'can.', 0.0, 500.0),
+    Declaration('rtde_frequency', 'How often the robot reports its state [Hz], at least 10; 0: as '
+                'often as it can.', 0.0, 500.0),
     Declaration('robot_receive_timeout', 'How long the robot program waits for a sign of life '
                 'before it stops the arm [s].', 0.02, 10.0),
     Declaration('keepalive_period', 'How often the robot program gets a sign of life [s].',
