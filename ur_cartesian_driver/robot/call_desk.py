@@ -171,7 +171,9 @@ class CallDesk:
             return refusal
         if await until(self._robot, seen, SETTING_TIMEOUT):
             return yes('The TCP is set.')
-        return no(f'The robot does not report the new TCP within {SETTING_TIMEOUT:g} s.')
+        return no(f'The robot does not report the new TCP within {SETTING_TIMEOUT:g} s: its '
+                  'program may not know that command, or its software not report TCPs; set it on '
+                  'the pendant.')
 
     async def _set_payload(self, call: SetPayload) -> Answer:
         refusal = self._command(script_command.SetPayload(mass=call.mass, cog=call.cog))
@@ -186,7 +188,8 @@ class CallDesk:
         within = SETTING_TIMEOUT + 1.0 / rate
         if await until(self._robot, lambda _: self._carries(call), within):
             return yes('The payload is set.')
-        return no(f'The robot does not report the new payload within {within:g} s.')
+        return no(f'The robot does not report the new payload within {within:g} s: its program '
+                  'may not know that command; set it on the pendant.')
 
     def _carries(self, call: SetPayload) -> bool:
         signals = self._robot.signals
@@ -215,4 +218,5 @@ class CallDesk:
         if await rtde_inputs.write(self._settings.robot_ip, self._settings.rtde_port, writing):
             return yes(success)
         return no('The robot took the value, but does not report it within '
-                  f'{rtde_inputs.EFFECT_TIMEOUT:g} s.')
+                  f'{rtde_inputs.EFFECT_TIMEOUT:g} s; is it in local control, or does something '
+                  'else set the same?')
