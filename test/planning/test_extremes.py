@@ -77,6 +77,17 @@ def test_a_time_that_the_wire_cannot_carry_is_refused_and_not_proposed(make_cell
         sent(cell, goal, singularity_margin_wrist=0.0, on_too_fast=choice)
 
 
+@pytest.mark.parametrize('turn', [0.0, 0.5])
+def test_blends_that_touch_leave_numbers_that_can_be_sent(cell, turn):
+    """Nothing is left of the line between them, so a speed on it means nothing."""
+    points = tuple(cell.point(0.02 * k, turn=(0.0, 0.0, (k % 2) * turn), time=float(k))
+                   for k in (1, 2, 3))
+    made = sent(cell, Goal(waypoints=points, segments=(
+        Segment(blend_radius=0.01), Segment(blend_radius=0.01), Segment())))
+    assert made.segments[1].primitive.duration == pytest.approx(1.0)
+    assert made.segments[1].primitive.acceleration < 10.0
+
+
 def test_a_line_that_turns_so_slowly_that_no_time_carries_it_is_refused(cell):
     goal = Goal(waypoints=(cell.point(0.1, turn=(0.0, 0.0, 0.5)),),
                 segments=(Segment(velocity=1e-5),))

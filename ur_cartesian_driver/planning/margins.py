@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.inverse import told_apart
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
 from ur_cartesian_driver.kinematics.rows import postures
 from ur_cartesian_driver.motion.errors import NearSingularity
@@ -108,14 +109,20 @@ def too_near(pieces: Sequence[Piece], found: Followed, measures: Floats,
             continue
         row, k = min(((int(r), int(c)) for r, c in np.argwhere(near[rows])),
                      key=lambda at: measures[rows[at[0]], at[1]] / bounds[at[1]])
-        value = round(float(measures[rows[row], k]), 6)
         measure, bound = MEASURES[k], float(bounds[k])
+        value = _spoken(float(measures[rows[row], k]), bound)
         where = place(int(segment), float(fractions[rows[row]]))
         return NearSingularity(
-            f'{where} comes within {value:.3g} {measure.unit} of the {measure.name} singularity '
+            f'{where} comes within {value} {measure.unit} of the {measure.name} singularity '
             f'({measure.meaning}), and {measure.option} asks for {bound:g} {measure.unit}; keep '
             'away from it, use a JOINT segment, or lower the parameter.'), int(segment)
     return None
+
+
+def _spoken(value: float, bound: float) -> str:
+    """Return a value below its bound in few digits, and so that it reads as below."""
+    text = f'{round(value, 6):.3g}'  # what is smaller is rounding
+    return text if float(text) < bound else told_apart(value, bound)[0]
 
 
 def _leaving(pieces: Sequence[Piece], found: Followed, rows: NDArray[np.intp], measures: Floats

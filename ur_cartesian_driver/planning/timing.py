@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import hypot, inf, sqrt
+from math import ceil, hypot, inf, sqrt
 
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
@@ -279,7 +279,8 @@ def _turning_line(leg: Leg, angle: float, velocity: float, acceleration: float, 
     profile = timed(angle * leg.share, time * leg.share, *_stands(leg))
     wire_time = time
     if not _takes_time(leg.kind, options):
-        velocity, acceleration, wire_time = profile.cruise, profile.acceleration, 0.0
+        velocity, wire_time = profile.cruise, 0.0
+        _, acceleration = peak_of(angle, time)
     return Timing(velocity=velocity, acceleration=acceleration, wire_time=wire_time, unit='rad',
                   profile=profile, duration=time, reason=f'{reason} and it turns on the way',
                   remark=remark)
@@ -299,9 +300,9 @@ def _by_time(leg: Leg, length: float, unit: str, options: PlanningOptions,
         time, remark = _slowed(leg, length, unit, least, limits, options)
     profile = timed(length * leg.share, time * leg.share, *_stands(leg))
     # The robot ignores speed and acceleration when it has a time; they say what it will need.
-    return Timing(velocity=profile.cruise, acceleration=profile.acceleration, wire_time=time,
-                  unit=unit, profile=profile, duration=time, reason=_TIME_SAYS_SO,
-                  remark=remark)
+    velocity, acceleration = peak_of(length, time)
+    return Timing(velocity=velocity, acceleration=acceleration, wire_time=time, unit=unit,
+                  profile=profile, duration=time, reason=_TIME_SAYS_SO, remark=remark)
 
 
 def _for_time(leg: Leg, measured: tuple[float, str], in_corners: float, options: PlanningOptions,
@@ -355,7 +356,7 @@ def _slowed(leg: Leg, length: float, unit: str, least: float, limits: _Limits,
         f'{speed:.3f} {_speed_unit(unit)} and {acceleration:.3f} {_speed_unit(unit)}^2; '
         f'allowed are {limits.speed:.3f} {_speed_unit(unit)} ({limits.name}) and '
         f'{_bound(leg, limits):.3f} {_speed_unit(unit)}^2',
-        f'give it at least {least:.3f} s, or set on_too_fast to slow')
+        f'give it at least {ceil(1e3 * least) / 1e3:.3f} s, or set on_too_fast to slow')
 
 
 def _least_by_speed(leg: Leg, way: float, speed: float, acceleration: float) -> float:
