@@ -154,6 +154,7 @@ STOPPED = robot(safety_mode=SafetyMode.ROBOT_EMERGENCY_STOP)
     ('play', 'Failed to execute: play', robot(), True, 'load_program'),
     ('pause', 'Failed to execute: pause', robot(), True, 'No program is running'),
     ('load', 'File not found: x', robot(), True, 'folder of programs'),
+    ('get loaded program', 'No program loaded', robot(), None, 'Load one'),
     ('load', 'Error', robot(runtime_state=RuntimeState.PLAYING), True, 'stop it first'),
     ('unlock protective stop', TOO_EARLY + ' until 5s', robot(), None, 'Wait until 5 s'),
 ])

@@ -140,6 +140,8 @@ def _reason(command: str, answer: str, robot: RobotState | None,
         return 'It is in local control: switch it to remote control on the pendant.'
     if answer.startswith(TOO_EARLY):
         return 'Wait until 5 s have passed since the stop, look for its cause, then try again.'
+    if answer.startswith('No program loaded'):
+        return 'Load one with load_program, or on the pendant.'
     if 'File not found' in answer:
         return 'The name counts from the folder of programs on the robot.'
     if robot is None:

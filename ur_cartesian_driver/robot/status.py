@@ -89,7 +89,8 @@ def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_
     :param foreign_program: a program runs on the robot that has not called us.
     """
     if state is ConnectionState.CONNECTING or robot is None:
-        return 'The robot answers; waiting for its report of itself.'
+        return ('The robot answers; waiting for its report of itself on the primary interface '
+                '(primary_port).')
     if state is ConnectionState.STOPPED:
         return _after_a_stop(robot)
     if state is not ConnectionState.CONNECTED:
