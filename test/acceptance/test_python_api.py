@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The driver as a library: what its users' code may do wrong without harm."""
 
+from dataclasses import replace
 import os
 import socket
 import threading
@@ -9,6 +10,7 @@ import threading
 import pytest
 from waiting import wait_for
 
+from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
 
@@ -99,3 +101,18 @@ def test_the_log_names_a_port_that_is_taken(make_driver, caplog):
     with socket.create_server(('127.0.0.1', 0)) as server:
         make_driver(reverse_port=server.getsockname()[1])
         wait_for(lambda: 'set reverse_port to a free port' in caplog.text)
+
+
+NOMINAL = robot_model('ur5e').geometry
+
+
+@pytest.mark.ur_sim(geometry=replace(NOMINAL, d=(NOMINAL.d[0] + 0.02, *NOMINAL.d[1:])))
+@pytest.mark.parametrize(('bound', 'warns'), [(0.01, True), (0.03, False), (0.0, False)])
+def test_a_calibration_far_from_the_model_is_warned_of(make_driver, bound, warns, caplog):
+    driver = make_driver(max_calibration_difference=bound)
+    driver.wait_ready(10.0)
+    wait_for(lambda: driver.arm.calibrated)
+    driver.close()
+    warned = [record for record in caplog.records
+              if 'up to 20.0 mm from where the model ur5e' in record.getMessage()]
+    assert bool(warned) is warns

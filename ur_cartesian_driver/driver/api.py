@@ -41,7 +41,7 @@ from ur_cartesian_driver.driver.services import RobotServices
 from ur_cartesian_driver.execution import Order, same_tcp
 from ur_cartesian_driver.execution.trajectory import STOP_BOUND
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robots import Geometry, robot_model
 from ur_cartesian_driver.motion.errors import (
     code_of,
     DriverError,
@@ -483,13 +483,25 @@ class Driver(RobotServices):
             case Alive(gaps=gaps):
                 self._gaps = gaps
             case GeometryKnown(geometry=geometry):
-                self._arm = Arm(self._arm.model, geometry)
+                self._take_geometry(geometry)
             case TcpLent():
                 self._loan = notice
             case TcpReturned():
                 self._loan = None
             case LogLine(level=level, text=text):
                 LOG.log(level, text)
+
+    def _take_geometry(self, geometry: Geometry) -> None:
+        """Plan with the robot's own kinematics from now on; warn of one that is far off."""
+        model = self._arm.model
+        self._arm = Arm(model, geometry)
+        apart, bound = self._arm.flange_apart(Arm(model)), self.config.max_calibration_difference
+        if 0.0 < bound < apart:
+            LOG.warning(
+                'the calibration of the robot moves the flange by up to %.1f mm from where the '
+                'model %s has it, max_calibration_difference is %.1f mm: check ur_type, and '
+                'whether the arm was repaired and calibrated since', 1e3 * apart, model.name,
+                1e3 * bound)
 
     def _set_status(self, status: DriverStatus) -> None:
         self._status = status

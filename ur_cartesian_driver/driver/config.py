@@ -19,6 +19,8 @@ class DriverConfig(LinkSettings):
     #: How far the controller's own target may be from the plan, corners apart [m], [rad]; 0 = any.
     max_plan_deviation: float = MAX_PLAN_DEVIATION[0]
     max_plan_deviation_angle: float = MAX_PLAN_DEVIATION[1]
+    #: A robot whose calibration moves the flange by more is warned of [m]; 0 = never.
+    max_calibration_difference: float = 0.01
     #: What becomes of a goal when the robot makes a protective or safeguard stop: ``abort``, or
     #: ``continue`` when somebody has unlocked the robot and plays its program.
     after_robot_stop: str = 'abort'
@@ -43,6 +45,7 @@ class DriverConfig(LinkSettings):
             raise ValueError(f'after_robot_stop is {self.after_robot_stop!r}, it has to be '
                              "'abort' or 'continue'.")
         self._require_positive('feedback_rate', 'node_timeout')
-        for name in ('max_plan_deviation', 'max_plan_deviation_angle'):
+        for name in ('max_plan_deviation', 'max_plan_deviation_angle',
+                     'max_calibration_difference'):
             if not getattr(self, name) >= 0.0:
                 raise ValueError(f'{name} is {getattr(self, name)}, it must not be negative.')

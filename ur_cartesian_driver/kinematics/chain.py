@@ -28,6 +28,8 @@ N = TypeVar('N', float, NDArray[np.float64])
 # Controllers report pi/2 as 1.570796327. Tables that differ from the nominal one by such rounding
 # alone (here: less than a nanometre at the flange) are the nominal one.
 _ROUNDING = 1e-9
+# Configurations in which two arms are compared.
+_DRAWN = 500
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +114,17 @@ class Arm:
         rows = np.stack(state, axis=1)
         rows[rows[:, 6] < 0.0, 3:] *= -1.0
         return rows
+
+    def flange_apart(self, other: Arm) -> float:
+        """
+        Return the largest distance of the two flanges at the same joint positions [m].
+
+        Of many drawn configurations, always the same ones. The tables themselves cannot be
+        compared: lengths of a calibrated arm may be off by metres that cancel each other.
+        """
+        q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_DRAWN, 6))
+        apart = self.forward_rows(q)[:, :3] - other.forward_rows(q)[:, :3]
+        return float(np.linalg.norm(apart, axis=1).max())
 
     def jacobian(self, q: Sequence[float], T_flange_tcp: Pose = IDENTITY) -> NDArray[np.float64]:
         """

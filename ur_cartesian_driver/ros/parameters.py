@@ -224,6 +224,9 @@ DECLARATIONS: tuple[Declaration, ...] = (
     Declaration('max_plan_deviation_angle',
                 "How far the controller's own target may be from the plan, corners apart [rad]; "
                 '0: any angle.', 0.0, 3.2),
+    Declaration('max_calibration_difference',
+                'Warn of a robot whose calibration moves the flange farther than this from where '
+                'the nominal model has it [m]; 0: never.', 0.0, 1.0),
     *_tolerances('path', 'on the way'),
     *_tolerances('goal', 'at the end'),
     # -- speeds where the goal says nothing
