@@ -3,14 +3,14 @@
 """Where the controller is on the path, and where the tool should be."""
 
 import itertools
-from math import cos, pi, sin
+from math import cos, inf, pi, sin
 
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution.monitor import LAG_TIME, LAG_WAY, PathTracker
+from ur_cartesian_driver.execution.monitor import LAG_TIME, LAG_WAY, PathTracker, Place
 from ur_cartesian_driver.motion.goal import ZERO6
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
@@ -167,6 +167,33 @@ def test_few_edges_are_searched_as_many_are(seed):
     quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
     tracker = PathTracker(path(*draw.normal(size=(4, 3)), quaternions=list(quaternions)))
     point, lowest, highest = draw.normal(size=7), draw.uniform(0.0, 0.5), draw.uniform(0.5, 1.0)
-    many = tracker._nearest_of_many(tuple(point.tolist()), 0, 3, lowest, highest)
-    few = tracker._nearest(tuple(point.tolist()), 0, 3, lowest, highest)
+    many, far = tracker._nearest_of_many(tuple(point.tolist()), 0, 3, lowest, highest)
+    few, off = tracker._nearest(tuple(point.tolist()), 0, 3, lowest, highest)
     assert (few.row, few.fraction) == (many.row, pytest.approx(many.fraction, abs=1e-12))
+    assert off == pytest.approx(far, abs=1e-12)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_what_is_surely_near_the_plan_is_near_it(seed):
+    draw = np.random.default_rng(seed)
+    quaternions = draw.normal(size=(2, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
+    ends = [(0.4, 0.0, 0.2), (0.5, 0.0, 0.2)]
+    tracker = PathTracker(path(*ends, quaternions=list(quaternions)))
+    place = tracker.pose(Place(0, draw.uniform(0.0, 1.0)))
+    size = 10.0 ** draw.uniform(-6.0, -1.0)
+    target = place @ Pose(tuple(size * draw.normal(size=3)),
+                          quaternion_from_rotation_vector(10.0 * size * draw.normal(size=3)))
+    tracker.update(target, 1.0)
+    way, angle = tracker.deviation(target)
+    for part in (0.5, 0.99):  # neither limit is kept, then one of them is not
+        assert not tracker.is_within(part * way, part * angle)
+        assert not tracker.is_within(inf, part * angle)
+        assert not tracker.is_within(part * way, inf)
+    assert tracker.is_within(2.0 * tracker.miss, 20.0 * tracker.miss)
+
+
+def test_a_target_on_the_plan_is_surely_near_it():
+    tracker = PathTracker(path(*SQUARE))
+    tracker.update(Pose((0.45, 0.0, 0.2001), DOWN), 0.1)
+    assert tracker.is_within(0.00021, inf)

@@ -20,7 +20,7 @@ from __future__ import annotations
 from array import array
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
-from math import inf
+from math import inf, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -109,6 +109,8 @@ class PathTracker:
         self._edges: dict[int, Edge] = {}
         self._end = pose_from_row(path.poses[-1])
         self.place = Place(0, 0.0)
+        #: How far the target was from its place at the last update, in the coordinates of above.
+        self.miss = inf
 
     @property
     def last_row(self) -> int:
@@ -125,9 +127,11 @@ class PathTracker:
         :returns: the new place, never behind the one before.
         """
         first, end = self._window(reach, begun)
+        self.miss = inf
         if end > first:
             lowest = self.place.fraction if first == self.place.row else 0.0
-            self.place = self._nearest(self._coordinates(target, first), first, end, lowest)
+            self.place, self.miss = self._nearest(
+                self._coordinates(target, first), first, end, lowest)
         return self.place
 
     def desired(self, actual: Pose, twist: Vector6) -> Pose:
@@ -142,9 +146,9 @@ class PathTracker:
         end = min(bisect_left(self._arc, here + lag), self.last_row)
         if end <= first:
             return self.pose()
-        place = self._nearest(self._coordinates(actual, first), first, end,
-                              self._fraction(first, here - lag),
-                              self._fraction(end - 1, here + lag))
+        place, _ = self._nearest(self._coordinates(actual, first), first, end,
+                                 self._fraction(first, here - lag),
+                                 self._fraction(end - 1, here + lag))
         return self.pose(place)
 
     def deviation(self, target: Pose) -> tuple[float, float]:
@@ -160,6 +164,16 @@ class PathTracker:
         row, fraction = self.place.row, self.place.fraction
         room = self.path.room[row:row + (2 if fraction > 0.0 else 1)].max(axis=0)
         return max(0.0, way - float(room[0])), max(0.0, angle - float(room[1]))
+
+    def is_within(self, way: float, angle: float) -> bool:
+        """
+        Tell whether the target is surely no farther from its place than that [m], [rad].
+
+        A radian counts as :data:`RADIAN` in :attr:`miss`. Half of it is given away, because the
+        straight line between two quaternions is not quite the turn from one to the other; where
+        they are so far apart that this matters, the line is farther from the target than that.
+        """
+        return self.miss <= 0.5 * min(way, RADIAN * angle)
 
     def finish(self) -> Place:
         """Move on to the end of the path."""
@@ -233,9 +247,11 @@ class PathTracker:
         return x, y, z, scale * a, scale * b, scale * c, scale * d
 
     def _nearest(self, point: Point, first: int, end: int, lowest: float,
-                 highest: float = 1.0) -> Place:
+                 highest: float = 1.0) -> tuple[Place, float]:
         """
-        Return the nearest place on the edges ``first`` to ``end``, the earliest of equals.
+        Return the nearest place on the edges ``first`` to ``end``, and how far it is.
+
+        Of places that are equally near it is the earliest.
 
         :param lowest: where it may be on the first edge at the earliest.
         :param highest: where it may be on the last edge at the latest.
@@ -248,10 +264,11 @@ class PathTracker:
                 point, lowest if row == first else 0.0, highest if row == end - 1 else 1.0)
             if miss < nearest:
                 nearest, best, fraction = miss, row, at
-        return Place(best + 1, 0.0) if fraction >= 1.0 else Place(best, fraction)
+        place = Place(best + 1, 0.0) if fraction >= 1.0 else Place(best, fraction)
+        return place, sqrt(nearest)
 
     def _nearest_of_many(self, point: Point, first: int, end: int, lowest: float,
-                         highest: float) -> Place:
+                         highest: float) -> tuple[Place, float]:
         """Return the same by arrays, whose overhead is nothing beside so many edges."""
         start = self._rows[first:end]
         edge = self._rows[first + 1:end + 1] - start
@@ -263,9 +280,11 @@ class PathTracker:
         fraction[-1] = min(fraction[-1], highest)
         fraction[0] = max(fraction[0], lowest)
         miss = away - fraction[:, None] * edge
-        best = int(np.argmin(np.einsum('ij,ij->i', miss, miss)))
+        squares = np.einsum('ij,ij->i', miss, miss)
+        best = int(np.argmin(squares))
         at = float(fraction[best])
-        return Place(first + best + 1, 0.0) if at >= 1.0 else Place(first + best, at)
+        place = Place(first + best + 1, 0.0) if at >= 1.0 else Place(first + best, at)
+        return place, sqrt(float(squares[best]))
 
 
 def _plain(values: NDArray[np.float64]) -> array[float]:

@@ -135,6 +135,7 @@ class TrajectoryMachine:
         self._goal_watch = Watch(order.goal_tolerance, order.T_base_frame)
         self._watches_tcp = order.T_tcp_controlled == IDENTITY
         self._max_plan_deviation = max_plan_deviation
+        self._surely_allowed = tuple(limit or inf for limit in max_plan_deviation)
         #: Whether the robot program has read START: it has begun a point, or the target moves.
         self._under_way = False
         self._window = Window(order.points)
@@ -246,7 +247,7 @@ class TrajectoryMachine:
 
     def _plan_deviation(self, state: RobotState) -> tuple[Signal, str] | None:
         """Return that the controller does something else than the plan, or None."""
-        if not self._under_way:
+        if not self._under_way or self._tracker.is_within(*self._surely_allowed):
             return None
         for name, unit, value, limit in zip(
                 ('max_plan_deviation', 'max_plan_deviation_angle'), ('m', 'rad'),

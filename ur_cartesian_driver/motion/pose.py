@@ -158,6 +158,8 @@ def angle_between(a: Quaternion, b: Quaternion) -> float:
 
 def slerp(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
     """Return the orientation at a fraction of the shortest rotation from ``a`` to ``b``."""
+    if a == b:
+        return a
     dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
     sign = -1.0 if dot < 0.0 else 1.0  # q and -q are one orientation: take the short way
     angle = acos(min(1.0, abs(dot)))

@@ -144,6 +144,11 @@ class FrameBuffer:
         self._what = what
         self._buffer = bytearray()
 
+    @property
+    def is_empty(self) -> bool:
+        """Tell whether the stream is between two frames."""
+        return not self._buffer
+
     def feed(self, data: bytes) -> list[bytes]:
         """
         Take bytes from the stream (none at all = its end) and return the complete frames.
@@ -154,8 +159,6 @@ class FrameBuffer:
             if self._buffer:
                 raise cut_off(self._what, bytes(self._buffer))
             return []
-        if not self._buffer and self._is_frame(data):
-            return [data]  # as nearly always
         self._buffer += data
         frames = []
         start = 0
@@ -164,12 +167,6 @@ class FrameBuffer:
             start += size
         del self._buffer[:start]
         return frames
-
-    def _is_frame(self, data: bytes) -> bool:
-        """Tell whether these bytes are one whole frame."""
-        smallest, largest = self._bounds
-        return (smallest <= len(data) <= largest
-                and int.from_bytes(data[:self._width], 'big') == len(data))
 
     def _size_at(self, start: int) -> int:
         """Return the size of the frame that starts there; 0 = not known yet."""

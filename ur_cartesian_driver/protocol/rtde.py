@@ -240,6 +240,16 @@ class RtdeClient:
         data, self._to_send = self._to_send, b''
         return data
 
+    def values_in(self, data: bytes) -> Values | None:
+        """
+        Return the values where the bytes are one data package and no more, as nearly always.
+
+        None otherwise: then they are for :meth:`feed`, which is slower.
+        """
+        if self._recipe is None or self.state is not RtdeState.READY or not self._frames.is_empty:
+            return None
+        return self._recipe.unpack_frame(data)
+
     def feed(self, data: bytes) -> list[RtdeEvent]:
         """
         Take bytes from the controller (none at all = its end) and return what happened.

@@ -85,7 +85,8 @@ class Recipe:
     ``pack`` and ``unpack`` go through one precompiled struct, because they run 500 times a second.
     """
 
-    __slots__ = ('_frame', '_lengths', '_pick', '_size', '_struct', 'names', 'recipe_id', 'types')
+    __slots__ = ('_frame', '_head', '_lengths', '_pick', '_size', '_struct', 'names', 'recipe_id',
+                 'types')
 
     def __init__(self, names: Sequence[str], types: Sequence[DataType],
                  recipe_id: int | None = 1) -> None:
@@ -105,6 +106,7 @@ class Recipe:
         self._struct = struct.Struct(f'>{head}{codes}')
         self._frame = struct.Struct(f'>HB{"" if recipe_id is None else "B"}{codes}')
         self._size = self._struct.size
+        self._head = _HEADER.pack(self._frame.size, PackageType.DATA_PACKAGE)
         self._lengths = tuple(data_type.length for data_type in types)
         keys: list[int | slice] = []
         start = 0
@@ -130,6 +132,13 @@ class Recipe:
         if self._pick is None:
             return flat if len(flat) == 1 else (flat,)
         return cast(Values, self._pick(flat))
+
+    def unpack_frame(self, data: bytes) -> Values | None:
+        """Return the values of a whole frame; None where the bytes are anything else."""
+        if (len(data) != self._frame.size or self._pick is None
+                or data[:3] != self._head):
+            return None
+        return cast(Values, self._pick(self._struct.unpack_from(data, _HEADER.size)))
 
     def pack(self, values: Sequence[Value]) -> bytes:
         """

@@ -98,6 +98,10 @@ class RtdeConnection:
 
     def _on_data(self, data: bytes) -> None:
         try:
+            values = self._client.values_in(data)
+            if values is not None:
+                self._take_values(values)
+                return
             for event in self._client.feed(data):
                 self._take(event)
         except ProtocolError as error:
@@ -107,12 +111,15 @@ class RtdeConnection:
 
     def _take(self, event: RtdeEvent) -> None:
         if isinstance(event, DataReceived):
-            self._last_packet = asyncio.get_running_loop().time()
-            self._on_values(self._names, event.values)
+            self._take_values(event.values)
         elif isinstance(event, Ready):
             self._names, self._inputs = event.outputs.names, event.inputs
             self._version = event.controller_version
             self._answered.set()
+
+    def _take_values(self, values: Values) -> None:
+        self._last_packet = asyncio.get_running_loop().time()
+        self._on_values(self._names, values)
 
     def _on_closed(self, reason: str) -> None:
         self._closed.set_result(reason)
