@@ -225,6 +225,20 @@ def test_a_point_out_of_reach_is_named_with_distance_and_bound(cell):
     assert float(found[1]) > float(found[2]) + 0.1
 
 
+@pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.PROCESS, TYPE.CIRCULAR])
+@pytest.mark.parametrize('angle', [pi, -pi, pi - 5e-4])
+def test_half_a_turn_is_refused_because_either_way_is_as_short(cell, kind, angle):
+    via = cell.pose(0.05, 0.02) if kind == TYPE.CIRCULAR else None
+    goal = Goal(waypoints=(cell.point(0.1, turn=(0.0, 0.0, angle)),),
+                segments=(Segment(type=kind, via=via),))
+    text = refusal(InvalidGoal, cell, goal)
+    assert text.startswith('trajectory.points[0].pose.orientation turns the tool by 1')
+    assert 'a point in between' in text
+    way = (Segment(type=kind, via=via, arc_mode=ArcMode.FIXED) if via
+           else Segment(type=TYPE.JOINT))
+    plan(replace(goal, segments=(way,)), cell.state, cell.arm, OPTIONS)
+
+
 def test_a_line_that_leaves_the_reach_half_way_names_the_place(make_cell):
     # Past the base at less than the shoulder's offset: both ends are in reach.
     cell = make_cell((0.0, -1.9, 2.2, -1.9, -pi / 2, 0.0))

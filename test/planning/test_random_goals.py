@@ -103,7 +103,7 @@ frames = st.sampled_from((None, None, None, Pose((0.0, 0.0, 0.1), quaternion_fro
 
 
 @pytest.mark.slow
-@settings(max_examples=250, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(q=st.sampled_from(STARTS), drawn=st.lists(points, max_size=4), timed=st.booleans(),
        plain=st.booleans(), tolerance=tolerances, frame=frames, options=choices)
 def test_any_goal_is_refused_in_words_or_planned_and_can_be_sent(

@@ -71,6 +71,10 @@ REFUSALS = [
     (Goal(waypoints=()), InvalidGoal, 'trajectory.points is empty'),
     (Goal(waypoints=tuple(at(0.01 * i) for i in range(11))), InvalidGoal,
      'trajectory.points has 11 points, more than max_points = 10'),
+    (replace(PLAIN, T_base_frame=Pose((nan, 0.0, 0.0))), InvalidGoal,
+     'the pose of trajectory.header.frame_id contains nan'),
+    (replace(PLAIN, T_flange_controlled=turned(0.0, 0.0, 0.0, 2.0)), InvalidGoal,
+     'the orientation of trajectory.controlled_frame has length 2'),
     (replace(PLAIN, segments=(Segment(), Segment())), InvalidGoal,
      'segments has 2 entries for 3 points'),
     # unknown numbers

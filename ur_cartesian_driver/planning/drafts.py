@@ -11,19 +11,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import degrees
+from math import degrees, pi
 
-from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.corner import Corner
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.path import Line, Path, same
 from ur_cartesian_driver.planning.spoken import spoken_radius
-from ur_cartesian_driver.planning.validate import arc_of, check_blends_fit, segment_of
+from ur_cartesian_driver.planning.validate import (
+    arc_of,
+    check_blends_fit,
+    point_field,
+    segment_of,
+)
 
 _LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
+#: So near to half a turn rounding on the wire, and where the arm really stands, decide in which
+#: direction a line turns the tool [rad].
+_HALF_TURN = 1e-3
 #: Motions on straight lines in joint space.
 IN_JOINTS = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 #: Motions that can only be blended into from some others; all else stops before them.
@@ -111,6 +120,13 @@ class Drafts:
     def straight(self, draft: Draft, start: Pose) -> Path:
         """Return the line or the arc of a segment from a pose."""
         i, segment = draft.index, draft.segment
+        turn = start.angle_to(self._targets[i])
+        follows_arc = (draft.kind == SegmentType.CIRCULAR and segment.arc_mode == ArcMode.FIXED)
+        if turn > pi - _HALF_TURN and not follows_arc:
+            raise InvalidGoal(
+                point_field(i, 'pose.orientation'), f'turns the tool by {degrees(turn):.2f} '
+                'degrees on the way, and either way round is as short: nobody can tell which the '
+                'robot takes', 'add a point in between, or use a JOINT segment')
         if draft.kind != SegmentType.CIRCULAR:
             return Line.between(start, self._targets[i])
         assert segment.via is not None

@@ -108,6 +108,14 @@ def _known_numbers(goal: Goal, options: PlanningOptions) -> None:
         _known(segment_field(i, 'arc_mode'), segment.arc_mode, ArcMode)
 
 
+def _numbers_of_frames(goal: Goal, options: PlanningOptions) -> None:
+    for name, pose in (('trajectory.header.frame_id', goal.T_base_frame),
+                       ('trajectory.controlled_frame', goal.T_flange_controlled)):
+        if pose is not None:
+            _check_finite(f'the pose of {name}', (*pose.position, *pose.quaternion))
+            _check_unit(f'the orientation of {name}', pose.quaternion)
+
+
 def _numbers_of_points(goal: Goal, options: PlanningOptions) -> None:
     for i, point in enumerate(goal.waypoints):
         if not _all_finite(point):
@@ -258,6 +266,7 @@ RULES: tuple[Rule, ...] = (
     _number_of_points,
     _number_of_segments,
     _known_numbers,
+    _numbers_of_frames,
     _numbers_of_points,
     _numbers_of_segments,
     _numbers_of_tolerances,
