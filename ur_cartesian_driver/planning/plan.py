@@ -125,7 +125,8 @@ class _Planner:
             raise RobotNotReady(
                 f'The robot reports its TCP {1e3 * apart:.1f} mm and {angle:.3f} rad away from '
                 f'where the kinematics of a {self.reach.arm.model.name} puts it; check ur_type '
-                'and the TCP.')
+                'and the TCP. Where the software of a robot does not report its TCP (RTDE field '
+                'tcp_offset), it has to be the flange.')
         self._check_approach()
 
     def _check_approach(self) -> None:
