@@ -1,19 +1,21 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How long a violated tolerance takes to CANCEL on the wire, beside a peer that only answers.
+How long a violated tolerance takes to CANCEL on the wire, beside an echo of the same process.
 
-Simulator, relay, robot loop and echo are processes of their own. All packets of the robot's state
-pass through the relay, which notes when each of them leaves for the robot loop, and when CANCEL
-comes back. Every few packets it holds one back and sends it to the echo first: an asyncio loop as
-the robot loop is one, which answers each packet with as many bytes as CANCEL has. So both times
-are taken by one process, of the same packets, while the same other processes run.
+Simulator, relay and robot loop are processes of their own. All packets of the robot's state pass
+through the relay, which notes when each of them leaves for the robot loop, and when CANCEL comes
+back. Every few packets it holds one back and sends it over another connection first, to an echo
+that lives in the robot loop's process, on its event loop (:mod:`robot_loop_with_echo`), and does
+nothing but answer with as many bytes as CANCEL has. So both times are taken between the same two
+processes, of the same packets, with the same pauses between them: what they differ by is what the
+driver does with a packet.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 import os
 import signal
@@ -172,7 +174,8 @@ class RelayWithEcho(Relay):
         """Treat the robot's packets and the echo's answers apart."""
         if way.noted == 'rtde_port':
             self._release()  # the echo is late: the robot loop shall not wait for it
-            self._pass_state_on(source, way)
+            with suppress(OSError):  # it has hung up, which its own way tells
+                self._pass_state_on(source, way)
         elif way.noted == 'echo':
             self._echoed(source)
         else:
@@ -205,7 +208,8 @@ class RelayWithEcho(Relay):
     def _release(self) -> None:
         held, self._held = self._held, None
         if held is not None:
-            held[2].sendall(held[1])
+            with suppress(OSError):
+                held[2].sendall(held[1])
 
 
 def is_pushed(data: bytes) -> bool:

@@ -563,6 +563,27 @@ def test_values_come_back_as_they_were(types_and_values, recipe_id):
     data = recipe.pack(values)
     assert struct.unpack('>H', data[:2]) == (len(data),)
     assert recipe.unpack(data[3:]) == values
+    assert recipe.unpack_frame(data) == (values if len(types) > 1 else None)
+    assert recipe.unpack_frame(data + b'\0') is None
+    assert recipe.unpack_frame(data[:2] + b'M' + data[3:]) is None
+
+
+def test_a_package_that_comes_alone_needs_no_feeding():
+    names = ('timestamp', 'speed_scaling')
+    client, _ = started([STEPS[0], VERSION, OutputsReply(types=('DOUBLE', 'DOUBLE')), STEPS[3]],
+                        names)
+    data = Recipe(names, [DataType.DOUBLE] * 2).pack((1.0, 2.0))
+    assert client.values_in(data) == (1.0, 2.0)
+    assert client.values_in(data + data) is None
+    assert client.feed(data + data[:5]) == [DataReceived((1.0, 2.0))]
+    assert client.values_in(data) is None  # these bytes belong to the package that is not whole
+    assert client.feed(data[5:]) == [DataReceived((1.0, 2.0))]
+    assert client.values_in(data) == (1.0, 2.0)
+
+
+def test_before_the_start_nothing_is_a_package_of_values():
+    client, _ = started(STEPS[:3], ('timestamp',))
+    assert client.values_in(Recipe(['timestamp'], [DataType.DOUBLE]).pack((1.0,))) is None
 
 
 def framed(kind, payload):
