@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+import gc
 from math import degrees, hypot, pi
 import re
 
@@ -237,6 +238,17 @@ def test_half_a_turn_is_refused_because_either_way_is_as_short(cell, kind, angle
     way = (Segment(type=kind, via=via, arc_mode=ArcMode.FIXED) if via
            else Segment(type=TYPE.JOINT))
     plan(replace(goal, segments=(way,)), cell.state, cell.arm, OPTIONS)
+
+
+@pytest.mark.parametrize('enabled', [True, False])
+def test_the_garbage_collector_is_afterwards_as_it_was(cell, enabled):
+    (gc.enable if enabled else gc.disable)()
+    try:
+        plan(Goal(waypoints=(cell.point(0.1),)), cell.state, cell.arm, OPTIONS)
+        refusal(InvalidGoal, cell, Goal(waypoints=()))
+        assert gc.isenabled() is enabled
+    finally:
+        gc.enable()
 
 
 def test_a_line_that_leaves_the_reach_half_way_names_the_place(make_cell):

@@ -10,6 +10,9 @@ the report. The first reason to refuse that is met is raised; nothing has been s
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+import gc
 from itertools import pairwise
 
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -72,6 +75,28 @@ def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> P
     :param arm: the kinematics, the robot's own calibrated one where it is known.
     :raises GoalRefused: the subclass that fits; its text names place, quantity, value and bound.
     """
+    with _no_collections():
+        return _plan(goal, state, arm, options)
+
+
+@contextmanager
+def _no_collections() -> Iterator[None]:
+    """
+    Keep the garbage collector away.
+
+    A plan of ten thousand points is hundreds of thousands of objects, none of which is garbage
+    before it is done, and the collector would walk through them again and again.
+    """
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
     check(goal, options)
     goal = with_default_tolerances(goal, options)
     T_flange_active = state.T_flange_tcp
