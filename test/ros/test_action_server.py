@@ -10,6 +10,7 @@ from rclpy.duration import Duration
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.msg import MotionSegment
+from ur_cartesian_driver.ros import action_server
 
 pytestmark = pytest.mark.slow
 SUCCEEDED, ABORTED, CANCELED = (
@@ -133,6 +134,19 @@ def test_a_goal_for_later_waits_for_its_time(single_cell):
     cell.spin_until(lambda: moving(cell))
     assert monotonic() - begun > 0.9
     assert cell.result(handle)[0] == SUCCEEDED
+
+
+def test_goals_beyond_a_number_are_refused_and_the_others_go_on(cell, monkeypatch):
+    monkeypatch.setattr(action_server, 'MOST_GOALS', 2)
+    cell.wait_ready()
+    waiting = [cell.send(later(cell, 30.0)) for _ in range(2)]
+    status, result = cell.run(cell.goal((0.4, 0.0, 0.01, 0.0)))
+    assert (status, result.error_code) == (ABORTED, ErrorCode.ROBOT_NOT_READY)
+    assert '2 goals' in result.error_string
+    for handle in waiting:
+        cell.await_(handle.cancel_goal_async())
+        assert cell.result(handle)[0] == CANCELED
+    assert cell.run(cell.goal((0.4, 0.0, 0.01, 0.0)))[1].error_code == 0
 
 
 def test_a_goal_for_later_can_be_cancelled_before_it_moves(cell):

@@ -57,6 +57,8 @@ GoalHandle: TypeAlias = Any
 RESULT_TIMEOUT = 60
 #: How requests are queued.
 REQUESTS = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST)
+#: So many goals may be under way, each with a thread and its points in memory.
+MOST_GOALS = 100
 #: How often a waiting goal looks at the node's clock, which may be a simulated one [s].
 CLOCK_PERIOD = 0.05
 #: How long rclpy may need from calling us about a cancel request to noting it [s].
@@ -130,10 +132,17 @@ class CartesianActionServer:
         if not (run.is_for_later or handle.request.validate_only):
             self.turns.line_up(run.turn)  # here, where goals come one after the other
         with self._lock:
-            self._runs[run.key] = run
+            one_too_many = len(self._runs) >= MOST_GOALS
+            if not one_too_many:
+                self._runs[run.key] = run
             if self._closing:
                 run.shut_down()
-        run.thread.start()
+        if one_too_many:
+            self.ended(run, Outcome(code=ErrorCode.ROBOT_NOT_READY, text=(
+                f'{MOST_GOALS} goals are being planned, wait or run; send this one again when '
+                'some of them have ended.')))
+        else:
+            run.thread.start()
 
     def _cancel(self, handle: GoalHandle) -> CancelResponse:
         """Let every goal be cancelled that has not ended."""
