@@ -4,23 +4,28 @@
 How fast each segment goes: from the times of the goal, from its speeds, or from the defaults.
 
 ``movel`` and ``movej`` take a time on the wire. ``movec`` and ``movep`` do not: their speed is
-derived so that the time is met. The robot has one speed for the translation and the turn of the
-tool, in m/s and rad/s, which neither may exceed; so the quantity that *leads* a segment is the
-larger of both numbers (for joint moves the joint that turns farthest).
+derived so that the time is met. All of it is about the quantity that leads a segment, see
+:mod:`~.limits`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import ceil, hypot, inf, sqrt
 
-from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, RobotModel
+from ur_cartesian_driver.kinematics.robots import RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
-from ur_cartesian_driver.motion.goal import ArcMode, SegmentType
-from ur_cartesian_driver.planning.leg import Leg, Pace, Timing
+from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.planning.leg import Leg, Timing
+from ur_cartesian_driver.planning.limits import (
+    is_blended,
+    Limits,
+    limits_of,
+    measure,
+    moves,
+    speed_unit,
+)
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.path import Arc, JointLine, SAME_POSITION
 from ur_cartesian_driver.planning.profile import (
     cruise_for,
     least_time,
@@ -37,21 +42,10 @@ LEAST_SPEED = 1e-5
 #: limits are not published. It only serves to say about how long such a move takes.
 _OPTIMIZED_JOINT_ACCELERATION = 40.0
 _TIME_SAYS_SO = 'its time_from_start says so'
-#: Where the robot stands at the first point already, the way there counts as this.
-_NO_WAY = 1e-9
 #: Motions whose messages have a time.
 _HAVE_TIMES = (SegmentType.LINEAR, SegmentType.JOINT)
 #: Rounds in which speeds and the times in corners are made to agree.
 _ROUNDS = 12
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Limits:
-    """The largest speed of the leading quantity, what sets it, and the largest acceleration."""
-
-    speed: float
-    name: str
-    acceleration: float
 
 
 def schedule(legs: Sequence[Leg], options: PlanningOptions, model: RobotModel) -> list[Timing]:
@@ -61,13 +55,13 @@ def schedule(legs: Sequence[Leg], options: PlanningOptions, model: RobotModel) -
     :raises TooFast: a time needs more speed or acceleration than the limits allow.
     :raises InvalidGoal: a speed is too low for the wire.
     """
-    measures = [measure(leg, model) for leg in legs]
+    measures = [measure(leg) for leg in legs]
     timings = [_first_guess(leg, length, unit, options, model)
                for leg, (length, unit) in zip(legs, measures, strict=True)]
     derived = [k for k, leg in enumerate(legs)
                if leg.time is not None and not _takes_time(leg.kind, options)]
     # The time in a corner depends on the speeds on both of its sides, so go round a few times.
-    for _ in range(_ROUNDS if any(_is_blended(legs[k]) for k in derived) else 1):
+    for _ in range(_ROUNDS if any(is_blended(legs[k]) for k in derived) else 1):
         changed = 0.0
         for k in derived:
             new = _for_time(legs[k], measures[k], _corner_time(legs, timings, k),
@@ -96,7 +90,7 @@ def _check_wire(leg: Leg, timing: Timing, options: PlanningOptions) -> None:
             'raise velocity or acceleration')
     if timing.wire_time > 0.0:
         return
-    unit = _speed_unit(timing.unit)
+    unit = speed_unit(timing.unit)
     for value, name in ((timing.velocity, unit), (timing.acceleration, f'{unit}^2')):
         if value < LEAST_SPEED:
             raise InvalidGoal(
@@ -145,25 +139,6 @@ def _with(timing: Timing, profile: Profile, duration: float = 0.0, corner: float
                   duration=duration, corner=corner, reason=timing.reason, remark=timing.remark)
 
 
-def measure(leg: Leg, model: RobotModel) -> tuple[float, str]:
-    """
-    Return the length of the leading quantity and its unit (m or rad; s for OPTIMIZED moves).
-
-    OPTIMIZED moves are measured by the time that they would take with some joint at its limit
-    everywhere.
-    """
-    path = leg.path
-    if is_optimized(leg.kind):
-        length, unit = leg.pace.whole, 's'
-    elif isinstance(path, JointLine):
-        length, unit = max(path.travel), 'rad'
-    elif path.length >= path.angle or (isinstance(path, Arc) and path.mode == ArcMode.FIXED):
-        length, unit = path.length, 'm'
-    else:
-        length, unit = path.angle, 'rad'
-    return max(length, _NO_WAY), unit
-
-
 def _takes_time(kind: SegmentType, options: PlanningOptions) -> bool:
     """
     Tell whether the wire carries a time for a motion.
@@ -177,10 +152,6 @@ def _takes_time(kind: SegmentType, options: PlanningOptions) -> bool:
 def _own_acceleration(leg: Leg) -> float:
     """Return the acceleration of a timed leg that the goal may choose, 0 = it has none."""
     return 0.0 if leg.kind in _HAVE_TIMES else leg.segment.acceleration
-
-
-def _is_blended(leg: Leg) -> bool:
-    return leg.before is not None or leg.after is not None
 
 
 def _stands(leg: Leg) -> tuple[bool, bool]:
@@ -211,17 +182,17 @@ def _by_speed(leg: Leg, length: float, unit: str, options: PlanningOptions,
     """Return the timing of a leg without a time."""
     wanted, reason = _wanted_speed(leg, unit, options)
     acceleration = leg.segment.acceleration or _default_acceleration(leg, unit, options)
-    limits = _limits(leg, length, options, model)
+    limits = limits_of(leg, length, options, model)
     if not is_optimized(leg.kind):
         acceleration = min(acceleration, limits.acceleration)
-    turns_on_the_way = leg.kind == SegmentType.LINEAR and unit == 'rad' and _moves(leg)
+    turns_on_the_way = leg.kind == SegmentType.LINEAR and unit == 'rad' and moves(leg)
     if turns_on_the_way:
         return _turning_line(leg, length, wanted, acceleration, reason, options)
     velocity = min(wanted, limits.speed)
     remark = ''
     if velocity < wanted:
         remark = (f'point {leg.index}: slowed from {wanted:.3g} to {velocity:.3g} '
-                  f'{_speed_unit(unit)} by {limits.name}')
+                  f'{speed_unit(unit)} by {limits.name}')
     rate = acceleration
     if is_optimized(leg.kind):
         rate *= _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed)
@@ -240,10 +211,10 @@ def _wanted_speed(leg: Leg, unit: str, options: PlanningOptions) -> tuple[float,
     if leg.kind == SegmentType.JOINT:
         return options.joint_velocity, 'that is the default speed'
     twist = leg.waypoint.twist
-    speed = hypot(*twist[:3]) if _moves(leg) else hypot(*twist[3:])
+    speed = hypot(*twist[:3]) if moves(leg) else hypot(*twist[3:])
     if speed > 0.0:
         return speed, 'its twist says so'
-    if not _moves(leg):
+    if not moves(leg):
         return options.angular_velocity, 'that is the default speed'
     if unit == 'rad' and leg.kind != SegmentType.LINEAR:
         # One number for both: as rad/s the turn may have more, but never more than the tool may.
@@ -258,7 +229,7 @@ def _default_acceleration(leg: Leg, unit: str, options: PlanningOptions) -> floa
         return options.optimized_acceleration
     if leg.kind == SegmentType.JOINT:
         return options.joint_acceleration
-    return options.linear_acceleration if _moves(leg) else options.angular_acceleration
+    return options.linear_acceleration if moves(leg) else options.angular_acceleration
 
 
 def _turning_line(leg: Leg, angle: float, velocity: float, acceleration: float, reason: str,
@@ -293,7 +264,7 @@ def _by_time(leg: Leg, length: float, unit: str, options: PlanningOptions,
              model: RobotModel) -> Timing:
     """Return the timing of a leg for which the wire carries the time."""
     assert leg.time is not None
-    limits = _limits(leg, length, options, model)
+    limits = limits_of(leg, length, options, model)
     least = least_time(length, limits.speed, limits.acceleration)
     time, remark = leg.time, ''
     if time < least * (1.0 - 1e-9):
@@ -315,7 +286,7 @@ def _for_time(leg: Leg, measured: tuple[float, str], in_corners: float, options:
     """
     assert leg.time is not None
     length, unit = measured
-    limits = _limits(leg, length, options, model)
+    limits = limits_of(leg, length, options, model)
     way, tail = length * leg.share, _tail(leg, length)
     bound = _bound(leg, limits)
     time, remark = leg.time, ''
@@ -336,7 +307,7 @@ def _for_time(leg: Leg, measured: tuple[float, str], in_corners: float, options:
                   profile=profile, duration=time, reason=_TIME_SAYS_SO, remark=remark)
 
 
-def _slowed(leg: Leg, length: float, unit: str, least: float, limits: _Limits,
+def _slowed(leg: Leg, length: float, unit: str, least: float, limits: Limits,
             options: PlanningOptions) -> tuple[float, str]:
     """Return the time that the limits allow and the remark, or refuse."""
     assert leg.time is not None
@@ -353,9 +324,9 @@ def _slowed(leg: Leg, length: float, unit: str, least: float, limits: _Limits,
     raise TooFast(
         point_field(leg.index, 'time_from_start'),
         f'gives the segment {leg.time:.3f} s for {length:.3f} {unit}, which needs up to '
-        f'{speed:.3f} {_speed_unit(unit)} and {acceleration:.3f} {_speed_unit(unit)}^2; '
-        f'allowed are {limits.speed:.3f} {_speed_unit(unit)} ({limits.name}) and '
-        f'{_bound(leg, limits):.3f} {_speed_unit(unit)}^2',
+        f'{speed:.3f} {speed_unit(unit)} and {acceleration:.3f} {speed_unit(unit)}^2; '
+        f'allowed are {limits.speed:.3f} {speed_unit(unit)} ({limits.name}) and '
+        f'{_bound(leg, limits):.3f} {speed_unit(unit)}^2',
         f'give it at least {ceil(1e3 * least) / 1e3:.3f} s, or set on_too_fast to slow')
 
 
@@ -366,7 +337,7 @@ def _least_by_speed(leg: Leg, way: float, speed: float, acceleration: float) -> 
     return way / peak + 0.5 * ramps * peak / acceleration
 
 
-def _bound(leg: Leg, limits: _Limits) -> float:
+def _bound(leg: Leg, limits: Limits) -> float:
     """Return the largest acceleration that a time may lead to."""
     if own := _own_acceleration(leg):
         return min(own, limits.acceleration)
@@ -393,61 +364,3 @@ def corner_duration(first: Leg, timing: Timing, second: Leg, next_timing: Timing
               + next_timing.profile.enter * second.path.length / next_timing.profile.length
               * second.share)
     return 2.0 * first.after.length / max(speeds, 1e-9)
-
-
-# -- limits ---------------------------------------------------------------------------------------
-
-
-def _limits(leg: Leg, length: float, options: PlanningOptions, model: RobotModel) -> _Limits:
-    """Return what bounds the leading quantity of a leg."""
-    tool = inf
-    if options.max_tool_speed > 0.0 and _moves(leg):
-        tool = options.max_tool_speed / _tool_per_unit(leg, length)
-    speed, name = tool, f'max_tool_speed = {options.max_tool_speed:g} m/s'
-    if leg.kind == SegmentType.JOINT and isinstance(leg.path, JointLine):
-        for k, way in enumerate(leg.path.travel):
-            if way > 0.0 and model.max_joint_speed[k] * length / way < speed:
-                speed = model.max_joint_speed[k] * length / way
-                name = f'the limit of {JOINT_NAMES[k]}, {model.max_joint_speed[k]:.3f} rad/s'
-        speed, name = _in_blends(leg, length, speed, name)
-        return _Limits(speed=speed, name=name, acceleration=options.max_joint_acceleration)
-    if not is_optimized(leg.kind):
-        least = leg.pace.time
-        if least > 0.0 and length / least < speed:
-            speed, name = length / least, _joint_limit(leg.pace)
-    bound = (options.max_linear_acceleration * length / leg.path.length
-             if _moves(leg) else inf)
-    if leg.path.angle > 0.0:
-        bound = min(bound, options.max_angular_acceleration * length / leg.path.angle)
-    return _Limits(speed=speed, name=name, acceleration=bound)
-
-
-def _in_blends(leg: Leg, length: float, speed: float, name: str) -> tuple[float, str]:
-    """Return the bound of a joint move, whose joints may turn faster where it is blended."""
-    least = leg.pace.time
-    if _is_blended(leg) and least > 0.0 and length / least < speed * (1.0 - 1e-9):
-        return length / least, _joint_limit(leg.pace)
-    return speed, name
-
-
-def _joint_limit(pace: Pace) -> str:
-    return (f'the speed limits of the joints, {JOINT_NAMES[pace.joint]} at '
-            f'{100.0 * pace.fraction:.0f} % of the way')
-
-
-def _tool_per_unit(leg: Leg, length: float) -> float:
-    """Return the most metres that the tool goes per unit of the leading quantity."""
-    path = leg.path
-    if is_optimized(leg.kind):  # the tool is fastest where the joints have the least to do
-        length = max(leg.pace.quickest, _NO_WAY)
-    uneven = path.unevenness if isinstance(path, JointLine) else 1.0
-    return path.length * uneven / length
-
-
-def _moves(leg: Leg) -> bool:
-    """Tell whether the tool's position changes; if not the leg only turns it."""
-    return leg.path.length > SAME_POSITION
-
-
-def _speed_unit(unit: str) -> str:
-    return 'of the limits' if unit == 's' else f'{unit}/s'
