@@ -36,6 +36,9 @@ _EXACT = 1e-24
 _MAX_STEPS = 40
 _MAX_FAILURES = 12
 _LONGEST_STEP = 0.5
+#: The least damping, which keeps the normal equations of a singular arm solvable and slows no
+#: other down.
+LEAST_DAMPING = 1e-14
 # A least singular value of the Jacobian below which solutions may meet close by, the sine of
 # theta5 the same, the farthest twin that is looked for [rad], and the step of a derivative [rad].
 _NEARLY_SINGULAR = 0.05
@@ -257,9 +260,9 @@ def _step(q: Joints, frames: Frames, error: list[float], square: float) -> Joint
     """Return q + (J'J + square I)^-1 J' error, the largest change limited."""
     jacobian = jacobian_at(frames, frames.position)
     normal = jacobian.T @ jacobian
-    normal.flat[::7] += square
+    normal.flat[::7] += max(square, LEAST_DAMPING)
     step: list[float] = np.linalg.solve(normal, jacobian.T @ np.array(error)).tolist()
-    scale = min(1.0, _LONGEST_STEP / max(max(step), -min(step)))
+    scale = min(1.0, _LONGEST_STEP / max(max(step), -min(step), 1e-300))
     return _six(angle + scale * change for angle, change in zip(q, step, strict=True))
 
 

@@ -34,7 +34,7 @@ from ur_cartesian_driver.kinematics.closed_form_rows import (
     Targets,
     wrapped,
 )
-from ur_cartesian_driver.kinematics.inverse import DOUBTS, nearest, solutions
+from ur_cartesian_driver.kinematics.inverse import DOUBTS, LEAST_DAMPING, nearest, solutions
 from ur_cartesian_driver.kinematics.shape import shape_of
 from ur_cartesian_driver.motion.pose import pose_from_row
 from ur_cartesian_driver.motion.primitive import Joints
@@ -44,10 +44,8 @@ _BLOCK = 1024
 # Rows that are tried after one at which the branch had to be searched for; then ever more.
 _FIRST_BLOCK = 16
 
-# Newton: the sum of the squares of metres and radians that counts as exact, and the least damping,
-# which keeps the normal equations of a singular arm solvable and slows no other down.
+# Newton: the sum of the squares of metres and radians that counts as exact.
 _EXACT = 1e-21
-_LEAST_DAMPING = 1e-14
 _LONGEST_STEP = 0.5
 # Steps from a solution of the ideal arm: two suffice but next to singularities.
 _STEPS = 3
@@ -310,7 +308,7 @@ def _newton(frames: FramesOf[Floats], errors: Floats, squares: Floats) -> Floats
     jacobian = jacobian_at(frames, frames.position)
     transposed = jacobian.transpose(0, 2, 1)
     normal = transposed @ jacobian
-    normal[:, range(6), range(6)] += np.maximum(squares, _LEAST_DAMPING)[:, None]
+    normal[:, range(6), range(6)] += np.maximum(squares, LEAST_DAMPING)[:, None]
     gradient = transposed @ errors.T[:, :, None]
     change: Floats = np.linalg.solve(normal, gradient)[:, :, 0].astype(np.float64)
     change *= np.minimum(1.0, _LONGEST_STEP / np.maximum(_largest(change), 1e-300))[:, None]
