@@ -82,6 +82,19 @@ def test_a_state_is_told_before_what_follows_from_it(ur_sim):
     asyncio.run(run())
 
 
+def test_a_program_that_was_told_to_end_takes_no_goal_until_it_has(ur_sim):
+    async def run():
+        async with listening(ur_sim) as ear:
+            await ear.ready()
+            ear.link.set_busy(True)
+            ear.link.stop_program('a test')
+            ear.link.set_busy(False)
+            assert ear.link.status.state is ConnectionState.CONNECTED
+            assert 'told to end' in ear.link.not_ready()
+
+    asyncio.run(run())
+
+
 def test_the_log_asks_for_nothing_while_the_program_is_on_its_way(ur_sim):
     async def run():
         async with listening(ur_sim) as ear:

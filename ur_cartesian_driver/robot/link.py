@@ -117,6 +117,8 @@ class RobotLink:
         #: Since when the robot reports that no program runs while one is connected [s].
         self._ghost_since = inf
         self._first_connection = may_upload
+        #: The robot program that is connected was told to end.
+        self._program_is_ending = False
         #: The program that runs on the robot has called us, even if it has hung up since.
         self._program_is_ours = False
         self._chronicle = Chronicle()
@@ -260,6 +262,7 @@ class RobotLink:
         """End the robot program, so that nothing of it can resume."""
         self._warn(f'the robot program is stopped: {reason}')
         self._note('the driver ended the robot program')
+        self._program_is_ending = self._program.connected
         self._primary.send(primary.command(primary.Command.STOP_PROGRAM))
         self._program.send_stop()
 
@@ -458,6 +461,7 @@ class RobotLink:
 
     def _on_program_connected(self) -> None:
         self._note('the robot program has connected')
+        self._program_is_ending = False
         self._tell(program_running=True)
         self._review()
 
@@ -503,7 +507,7 @@ class RobotLink:
     def _program_reads(self) -> bool:
         """Tell whether the robot program would act now on what it is sent."""
         robot = self._robot
-        return (robot is not None and self._program.connected
+        return (robot is not None and self._program.connected and not self._program_is_ending
                 and not is_paused(robot) and not has_ended(robot))
 
     def _change(self, change: Change, **news: object) -> None:
@@ -516,6 +520,7 @@ class RobotLink:
             status = replace(status, message=what_is_needed(
                 status.state, self._robot, program_connected=self._program.connected,
                 headless_mode=self._settings.headless_mode, tcp_owed=self._tcp_owed,
+                program_is_ending=self._program_is_ending,
                 foreign_program=self._foreign_program_runs()))
         if status != self._status:
             before, self._status = self._status, status

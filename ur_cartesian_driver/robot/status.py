@@ -80,12 +80,13 @@ def has_ended(robot: RobotState) -> bool:
 
 def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_connected: bool,
                    headless_mode: bool, tcp_owed: bool = False,
-                   foreign_program: bool = False) -> str:
+                   program_is_ending: bool = False, foreign_program: bool = False) -> str:
     """
     Return the sentence that says what is needed before a goal can run; empty when nothing is.
 
     :param robot: what the robot reported last; None = nothing yet.
     :param tcp_owed: the TCP that a goal had set is still to be put back.
+    :param program_is_ending: our program was told to end, and is still connected.
     :param foreign_program: a program runs on the robot that has not called us.
     """
     if state is ConnectionState.CONNECTING or robot is None:
@@ -101,6 +102,9 @@ def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_
     if program_connected and not has_ended(robot):
         if is_paused(robot):
             return 'The robot program is paused; play it on the pendant.'
+        if program_is_ending:
+            return ('The robot program was told to end, and is still there; if it does not go, '
+                    'stop it on the pendant.')
         return ('The TCP that the last goal had set is still to be put back; should it stay, set '
                 'the right one on the robot.') if tcp_owed else ''
     if foreign_program:
