@@ -209,6 +209,7 @@ class TrajectoryMachine:
             case LinkLost(link='program', reason=reason):
                 return Signal.PROGRAM_STOPPED, f'the robot program hung up: {reason}'
             case LinkLost(link=link, reason=reason):
+                reason = reason.removeprefix(f'{link}: ')
                 return Signal.CONNECTION_LOST, f'the {link} connection was lost: {reason}'
             case Tick():
                 return self._late(now)
@@ -456,8 +457,9 @@ class TrajectoryMachine:
 
     def _sentence(self, code: ErrorCode) -> str:
         if code is ErrorCode.SUCCESSFUL:
-            return (f'All {self.order.points} points were executed in '
-                    f'{self._scaled_time:.3f} s.')
+            points = self.order.points
+            what = 'The point was' if points == 1 else f'All {points} points were'
+            return f'{what} executed in {self._scaled_time:.3f} s.'
         where = f'on the way to point {self._tracker.waypoint()}'
         if not self._started:
             where = 'before anything moved'
