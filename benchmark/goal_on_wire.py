@@ -19,7 +19,7 @@ from ros_client import goal_message, TimedClient
 from wire_tap import marks_until_first_point, wire_tap
 
 from ur_cartesian_driver.driver import channel
-from ur_cartesian_driver.driver.api import order_of
+from ur_cartesian_driver.execution import order_of
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.planning import plan, PlanningOptions

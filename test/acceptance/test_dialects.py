@@ -17,8 +17,8 @@ from saved_program import DIALECTS as NAMES
 from saved_program import saved_program
 from virtual_network import VirtualLoop
 
-from ur_cartesian_driver.driver.api import order_of
 from ur_cartesian_driver.driver.channel import StartMotion
+from ur_cartesian_driver.execution import order_of
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, robot_model

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.execution import Finish, Order, SendPoints, TrajectoryMachine
-from ur_cartesian_driver.execution.trajectory import State, TRANSITIONS
+from ur_cartesian_driver.execution.states import State, TRANSITIONS
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,

@@ -18,9 +18,10 @@ from ur_cartesian_driver.execution import (
     StopProgram,
     TrajectoryMachine,
 )
+from ur_cartesian_driver.execution.observer import STALL_BOUND
 from ur_cartesian_driver.execution.states import Signal, State, STOPS, TRANSITIONS
 from ur_cartesian_driver.execution.tcp_loan import CARRIED_OUT
-from ur_cartesian_driver.execution.trajectory import GATHER, STALL_BOUND, STOP_BOUND, TCP_BOUND
+from ur_cartesian_driver.execution.trajectory import GATHER, STOP_BOUND, TCP_BOUND
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,

@@ -16,7 +16,6 @@ import os
 from virtual_network import HOST, LoopClock, ProgramNetwork, VirtualLoop
 
 from ur_cartesian_driver.driver import snapshot
-from ur_cartesian_driver.driver.api import order_of
 from ur_cartesian_driver.driver.channel import (
     CancelMotion,
     Configure,
@@ -33,6 +32,7 @@ from ur_cartesian_driver.driver.channel import (
 )
 from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.driver.robot_loop import RobotLoop
+from ur_cartesian_driver.execution import order_of
 from ur_cartesian_driver.protocol.reverse import MESSAGE_SIZE, ReverseMessage
 from ur_cartesian_driver.protocol.script_sender import REQUEST
 from ur_cartesian_driver.protocol.trajectory import encode_points

@@ -38,7 +38,7 @@ from ur_cartesian_driver.driver.channel import (
 )
 from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.driver.services import RobotServices
-from ur_cartesian_driver.execution import Order, same_tcp
+from ur_cartesian_driver.execution import order_of, same_tcp
 from ur_cartesian_driver.execution.trajectory import STOP_BOUND
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import Geometry, robot_model
@@ -53,13 +53,11 @@ from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.lever import seen_at
 from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.motion.primitive import OptimoveJ, OptimoveL
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.rest import come_to_rest
 from ur_cartesian_driver.program.render import has_feature
-from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
 from ur_cartesian_driver.protocol.trajectory import encode_points
 from ur_cartesian_driver.robot.calls import Answer, Call
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
@@ -545,20 +543,4 @@ def software_version(text: str) -> tuple[int, int, int]:
     return major, minor, bugfix
 
 
-def order_of(plan: Plan, dialect: Dialect = NEWEST) -> Order:
-    """Return what of a plan the robot loop needs."""
-    goal = plan.goal
-    times = goal.waypoints[-1].time
-    return Order(
-        points=len(plan.segments), reference=plan.reference, duration=plan.duration,
-        due=times if times > 0.0 else None, T_base_frame=goal.T_base_frame,
-        T_flange_active=plan.T_flange_active, T_flange_tcp=plan.T_flange_tcp,
-        T_tcp_controlled=plan.T_tcp_controlled,
-        path_tolerance=goal.path_tolerance, goal_tolerance=goal.goal_tolerance,
-        goal_time_tolerance=goal.goal_time_tolerance,
-        reports_begun=dialect is NEWEST,
-        knows_pace=not any(isinstance(segment.primitive, OptimoveJ | OptimoveL)
-                           for segment in plan.segments))
-
-
-__all__ = ['Driver', 'DriverError', 'Motion', 'order_of']
+__all__ = ['Driver', 'DriverError', 'Motion']

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ur_cartesian_driver.execution.trajectory import MAX_PLAN_DEVIATION
+from ur_cartesian_driver.execution.observer import MAX_PLAN_DEVIATION
 from ur_cartesian_driver.robot.settings import LinkSettings
 
 

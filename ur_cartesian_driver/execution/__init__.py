@@ -12,8 +12,9 @@ from ur_cartesian_driver.execution.commands import (
     SendPoints,
     StopProgram,
 )
+from ur_cartesian_driver.execution.order import Order, order_of
 from ur_cartesian_driver.execution.tcp_loan import same_tcp, TcpLoan
-from ur_cartesian_driver.execution.trajectory import Order, TrajectoryMachine
+from ur_cartesian_driver.execution.trajectory import TrajectoryMachine
 
 __all__ = [
     'Command',
@@ -27,5 +28,6 @@ __all__ = [
     'StopProgram',
     'TcpLoan',
     'TrajectoryMachine',
+    'order_of',
     'same_tcp',
 ]

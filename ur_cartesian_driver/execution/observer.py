@@ -1,0 +1,235 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the packets of the robot show of one goal: how far it is, and whether it is what was planned.
+
+It only looks. What follows from a deviation in the present state, the machine decides
+(:mod:`~.trajectory`).
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+
+from ur_cartesian_driver.execution.monitor import PathTracker, speed
+from ur_cartesian_driver.execution.order import Order
+from ur_cartesian_driver.execution.pace import Pace
+from ur_cartesian_driver.execution.states import Signal
+from ur_cartesian_driver.execution.tolerances import Watch
+from ur_cartesian_driver.motion.events import Progress
+from ur_cartesian_driver.motion.lever import seen_at
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
+from ur_cartesian_driver.motion.state import RobotState, RuntimeState
+
+#: How far the arm may have gone from where the plan begins until it is armed [m], [rad].
+START_POSITION, START_ANGLE = 0.001, 0.01
+#: How long the target may stand still in the middle of a goal that nothing holds [s].
+STALL_BOUND = 2.0
+#: How far the controller's own target may be from the plan [m], [rad].
+MAX_PLAN_DEVIATION = (0.002, 0.02)
+
+
+class Observer:
+    """The newest packet, the place on the path, and what is held against them."""
+
+    def __init__(self, order: Order, max_plan_deviation: tuple[float, float]) -> None:
+        """
+        Prepare for an order.
+
+        :param max_plan_deviation: how far the controller's own target may be from the plan [m],
+            [rad]; 0 = any way, any angle.
+        """
+        self._order = order
+        self._tracker = PathTracker(order.reference)
+        self._pace = Pace(order.reference) if order.knows_pace else None
+        self._path_watch = Watch(order.path_tolerance, order.T_base_frame)
+        self._goal_watch = Watch(order.goal_tolerance, order.T_base_frame)
+        self._watches_tcp = order.T_tcp_controlled == IDENTITY
+        self._max_plan_deviation = max_plan_deviation
+        self._surely_allowed = tuple(limit or inf for limit in max_plan_deviation)
+        #: Whether the robot program has read START: it has begun a point, or the target moves.
+        self._under_way = False
+        #: The count of the goal before, as long as the robot reports it; None afterwards.
+        self._stale_begun: int | None = None
+        #: How long the target has stood still while nothing held it [s].
+        self._stalled_time = 0.0
+        #: The newest packet; None before the first.
+        self.latest: RobotState | None = None
+        #: Time since the start in which the controller's own clock ran [s].
+        self.scaled_time = 0.0
+
+    # ---- what goes on -------------------------------------------------------------------------
+
+    def start(self, state: RobotState) -> None:
+        """Take note that START is sent, and which count of points the robot reports until then."""
+        self._stale_begun = state.points_begun
+
+    def take(self, state: RobotState, *, moving: bool) -> None:
+        """Take a packet; while the goal moves the arm: also time, and place on the path."""
+        before, self.latest = self.latest, state
+        if not moving:
+            return
+        passed = 0.0
+        if before is not None:
+            passed = max(0.0, state.timestamp - before.timestamp)
+            if state.runtime_state is not RuntimeState.PAUSED:
+                self.scaled_time += passed * state.speed_scaling
+        self._follow(before, state, passed)
+        self._stalled_time = self._stalled_time + passed if _stands(before, state) else 0.0
+
+    def finish(self) -> None:
+        """Take note that the robot program has reported the end."""
+        self._tracker.finish()
+
+    def _follow(self, before: RobotState | None, state: RobotState, passed: float) -> None:
+        """Find the place on the path."""
+        begun, fastest = self.begun(state), speed(state.target_tcp_twist)
+        self._under_way = self._under_way or begun > 0 or fastest > 0.0
+        if before is not None:  # it may have braked since
+            fastest = max(fastest, speed(before.target_tcp_twist))
+        self._tracker.update(state.target_tcp_pose, 2.0 * passed * fastest, begun)
+
+    # ---- how far it is ------------------------------------------------------------------------
+
+    def waypoint(self) -> int:
+        """Return the point that the arm is on its way to."""
+        return self._tracker.waypoint()
+
+    def begun(self, state: RobotState) -> int:
+        """
+        Return how many points of this goal the robot has begun; 0 = unknown.
+
+        The register keeps the count of the goal before until the robot program has read START, so
+        it is believed once it changes.
+        """
+        if not self._order.reports_begun or state.points_begun == self._stale_begun:
+            return 0
+        self._stale_begun = None
+        return state.points_begun
+
+    def awaits_count(self) -> bool:
+        """Tell whether the program has not reported a point of this goal since START."""
+        return self._stale_begun is not None
+
+    def progress(self, sent: int, *, at_end: bool) -> Progress:
+        """
+        Return a report about the newest packet.
+
+        :param sent: how many points were sent to the robot.
+        :param at_end: whether the arm should be at the end, and not on its way.
+        """
+        state, order = self.latest, self._order
+        assert state is not None
+        seen = seen_at(state, order.T_tcp_controlled)
+        time = self._tracker.time()
+        buffered_from = min(sent, order.points)
+        last = int(np.searchsorted(order.reference.point, buffered_from - 1, side='right')) - 1
+        desired = self._tracker.pose() if at_end else self._desired(state)
+        return Progress(
+            waypoint=self._tracker.waypoint(),
+            fraction=1.0 if order.duration <= 0.0 else min(1.0, time / order.duration),
+            desired_pose=desired @ order.T_tcp_controlled,
+            desired_twist=seen.target_tcp_twist,
+            desired_acceleration=seen.target_tcp_acceleration,
+            actual_pose=seen.actual_tcp_pose,
+            actual_twist=seen.actual_tcp_twist,
+            actual_acceleration=seen.actual_tcp_acceleration,
+            actual_q=state.actual_q,
+            time=time,
+            time_remaining=max(0.0, order.duration - time),
+            speed_scaling=state.speed_scaling,
+            points_received=order.points,
+            buffered=max(0.0, float(order.reference.time[max(last, 0)]) - time),
+            timestamp=state.timestamp)
+
+    def _desired(self, state: RobotState) -> Pose:
+        """Return where the tool should be on its way: around its progress."""
+        return self._tracker.desired(state.actual_tcp_pose, state.target_tcp_twist)
+
+    # ---- whether it is what was planned -------------------------------------------------------
+
+    def off_start(self, state: RobotState) -> str | None:
+        """Return a clause that says how far the arm is from where the plan begins, or None."""
+        start = pose_from_row(self._order.reference.poses[0])
+        apart, angle = start.distance_to(state.actual_tcp_pose), start.angle_to(
+            state.actual_tcp_pose)
+        if apart <= START_POSITION and angle <= START_ANGLE:
+            return None
+        return (f'the arm is {apart:.4f} m and {angle:.4f} rad away from where the plan begins: '
+                'it moved meanwhile')
+
+    def fault(self, state: RobotState) -> tuple[Signal, str] | None:
+        """Return what is wrong on the way, with a clause for the outcome's text, or None."""
+        return (self._plan_deviation(state) or self._wrong_pace(state) or self._stall()
+                or self._path_violation(state))
+
+    def missed_end(self, state: RobotState) -> str:
+        """Return that the controller's target is not at the end, as a clause, or nothing."""
+        off = [value for value, limit in zip(
+            self._tracker.deviation(state.target_tcp_pose), self._max_plan_deviation, strict=True)
+            if 0.0 < limit < value]
+        return '' if not off else (
+            f'the robot program reports the end {off[0]:.4f} m or rad away from the last point: '
+            'it left out motions that it does not know; set wire_dialect to the version of that '
+            'program')
+
+    def goal_error(self, state: RobotState) -> str | None:
+        """Return a clause that says how far the arm is outside the goal tolerance, or None."""
+        return self._violation(self._goal_watch, self._tracker.pose(), state)
+
+    def _plan_deviation(self, state: RobotState) -> tuple[Signal, str] | None:
+        """Return that the controller does something else than the plan, or None."""
+        if not self._under_way or self._tracker.is_within(*self._surely_allowed):
+            return None
+        for name, unit, value, limit in zip(
+                ('max_plan_deviation', 'max_plan_deviation_angle'), ('m', 'rad'),
+                self._tracker.deviation(state.target_tcp_pose), self._max_plan_deviation,
+                strict=True):
+            if 0.0 < limit < value:
+                return Signal.DEVIATION, (
+                    f'the controller itself left the plan by {value:.6f} {unit}, {name} is '
+                    f'{limit:.6f} {unit}: the arm is on another branch, or something else than '
+                    'this goal moves it')
+        return None
+
+    def _wrong_pace(self, state: RobotState) -> tuple[Signal, str] | None:
+        """Return that a program which tells no progress goes much faster or slower, or None."""
+        if self._pace is None or self._stale_begun is None:
+            return None
+        clause = self._pace.violation(
+            state.target_tcp_twist, self.scaled_time, self._tracker.time())
+        return None if clause is None else (Signal.DEVIATION, clause)
+
+    def _stall(self) -> tuple[Signal, str] | None:
+        """Return that the arm stands for no reason, or None."""
+        if self._stalled_time < STALL_BOUND:
+            return None
+        return Signal.STALLED, (
+            f'the arm has stood still for {STALL_BOUND:g} s, nothing holds it, and the robot '
+            'program has not reported the end: a message to it or from it was lost, so it was '
+            'ended')
+
+    def _path_violation(self, state: RobotState) -> tuple[Signal, str] | None:
+        if not (self._path_watch and self._under_way):
+            return None
+        clause = self._violation(self._path_watch, self._desired(state), state)
+        if clause is None:
+            return None
+        return Signal.VIOLATION, f'on the way to point {self._tracker.waypoint()} {clause}'
+
+    def _violation(self, watch: Watch, desired: Pose, state: RobotState) -> str | None:
+        """Return what a watch says of the controlled frame; ``desired`` is of the TCP."""
+        if self._watches_tcp:
+            return watch.violation(desired, state)
+        T_tcp_controlled = self._order.T_tcp_controlled
+        return watch.violation(desired @ T_tcp_controlled, seen_at(state, T_tcp_controlled))
+
+
+def _stands(before: RobotState | None, state: RobotState) -> bool:
+    """Tell whether the target stands although neither slider nor pause holds it."""
+    return (before is not None and state.target_q == before.target_q
+            and state.target_tcp_pose == before.target_tcp_pose
+            and state.speed_scaling > 0.0 and state.target_speed_fraction > 0.0
+            and state.runtime_state is RuntimeState.PLAYING)
