@@ -8,9 +8,8 @@ then we listen on our own ports, then the primary interface is dialled (it tells
 and errors, and takes the robot program), then the robot program calls us. What was dialled is
 dialled again when it breaks.
 
-Power, brakes and programs are never started again by ourselves: the program is uploaded on the
-first connection only, when the arm is ready and nothing else runs there. Whoever switches the
-robot on later, or stopped it, stands beside it, and says when the program may run.
+Power, brakes and programs are never started again by ourselves, on the first connection only
+(:mod:`~.first_start`).
 
 Events (:mod:`~ur_cartesian_driver.motion.events`) go to one callback, in the order in which they
 happened, on the event loop; a status that follows from an event is told before it, so that nobody
@@ -31,15 +30,16 @@ from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, TrajectoryEnded
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.signals import Signals
-from ur_cartesian_driver.motion.state import RobotMode, RobotState, RobotStatus, RuntimeState
+from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.program import as_program, ProgramSettings, render
-from ur_cartesian_driver.program.secondary import tcp_program
-from ur_cartesian_driver.protocol import primary, script_command
+from ur_cartesian_driver.protocol import primary
 from ur_cartesian_driver.protocol.dialects import NEWEST
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.rtde import ControllerVersion
-from ur_cartesian_driver.protocol.script_command import TcpHold
-from ur_cartesian_driver.robot.chronicle import changes, Chronicle, Pulse, standing
+from ur_cartesian_driver.robot.chronicle import changes
+from ur_cartesian_driver.robot.evidence import Evidence
+from ur_cartesian_driver.robot.first_start import FirstStart
+from ur_cartesian_driver.robot.goal_tcp import GoalTcp
 from ur_cartesian_driver.robot.lifecycle import after, Change, ConnectionState
 from ur_cartesian_driver.robot.primary_client import PrimaryClient, PrimaryListener
 from ur_cartesian_driver.robot.program_sockets import ProgramListener, ProgramSockets
@@ -58,14 +58,6 @@ from ur_cartesian_driver.robot.transport import Retry
 
 #: In these states nobody knows the robot, or it is the wrong one: the reason is the message.
 _OUT_OF_REACH = frozenset({ConnectionState.DISCONNECTED, ConnectionState.REFUSED})
-
-#: Modes of an arm that can be switched on.
-_WITHOUT_MOTION = frozenset({RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE})
-#: How long it may take [s].
-POWER_UP_TIMEOUT = 30.0
-
-#: A program runs, whoever sent it.
-_RUNS = frozenset({RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.RESUMING})
 
 #: How long a robot has to wait for its program before the log says so [s]: a program that is on
 #: its way there needs nobody's help.
@@ -109,24 +101,14 @@ class RobotLink:
         self._version: ControllerVersion | None = None
         self._robot: RobotState | None = None
         self._signals: Signals | None = None
-        self._powering_up = False
         #: The TCP that a goal had set is still to be put back.
         self._tcp_owed = False
-        #: The robot program that is connected is the one that has set it.
-        self._program_remembers = False
         #: Since when the robot reports that no program runs while one is connected [s].
         self._ghost_since = inf
-        self._first_connection = may_upload
         #: The robot program that is connected was told to end.
         self._program_is_ending = False
         #: The program that runs on the robot has called us, even if it has hung up since.
         self._program_is_ours = False
-        self._chronicle = Chronicle()
-        #: The last report of the robot, also when it is gone.
-        self._reported: RobotState | None = None
-        #: When the robot reported last, and the longest pause between keepalives until the last
-        #: time that somebody asked for it [s].
-        self._last_report, self._gap_before = inf, 0.0
         self._explanation: asyncio.TimerHandle | None = None
         self._primary = PrimaryClient(PrimaryListener(
             configuration=self._on_configuration, geometry=self._on_kinematics,
@@ -136,6 +118,12 @@ class RobotLink:
             connected=self._on_program_connected, lost=self._on_program_lost,
             result=lambda result: self._on_event(TrajectoryEnded(result=result)),
             warning=self._warn))
+        self._evidence = Evidence(self._program, settings.robot_receive_timeout)
+        self._goal_tcp = GoalTcp(
+            self._program, self._primary, headless_mode=settings.headless_mode)
+        self._first_start = FirstStart(
+            settings, pending=may_upload, upload=self.upload_program, warn=self._warn,
+            power_up=lambda: self.send_primary(primary.Command.RUN))
 
     # ---- what is known ------------------------------------------------------------------------
 
@@ -171,17 +159,15 @@ class RobotLink:
 
     def keepalive_gap(self) -> float:
         """Return the longest pause between two keepalives since the last call [s]."""
-        self._gap_before, self._program.longest_gap = self._program.longest_gap, 0.0
-        return self._gap_before
+        return self._evidence.keepalive_gap()
 
     def chain(self) -> tuple[str, ...]:
         """Return what led to what has just ended, the first thing first, and how all stands."""
-        now = asyncio.get_running_loop().time()
-        return (*self._chronicle.lines(now), *standing(self._reported, self._pulse(now)))
+        return self._evidence.chain()
 
     def robot_error(self) -> str:
         """Return what the robot itself said lately is wrong; empty when it said nothing."""
-        return self._chronicle.robot_error(asyncio.get_running_loop().time())
+        return self._evidence.robot_error()
 
     def explain(self, text: str) -> None:
         """Take something that has ended, and why, for the last error of the status."""
@@ -200,7 +186,7 @@ class RobotLink:
         """Send a trajectory action to the robot program."""
         self._program.send_control(action, count)
         if action is TrajectoryAction.CANCEL:
-            self._note('the driver sent CANCEL')
+            self._evidence.note('the driver sent CANCEL')
 
     def send_points(self, data: bytes) -> None:
         """Send points to the robot program."""
@@ -224,29 +210,12 @@ class RobotLink:
 
     def lend_tcp(self, T_flange_tcp: Pose) -> None:
         """Have the robot program set the TCP for the time of a goal."""
-        self._program_remembers = True
-        self._send_tcp(T_flange_tcp, TcpHold.LENT)
+        self._goal_tcp.lend(T_flange_tcp)
 
     def return_tcp(self, T_flange_tcp: Pose) -> None:
-        """
-        Have the TCP put back to what it was before a goal.
-
-        The robot program does it where it is there, not paused, and remembers that TCP to the last
-        digit. Else a program of its own does, where we may send one, but never beside a program of
-        somebody else; and where we may not, the robot program by the digits of the wire.
-        """
-        robot = self._robot
-        if robot is None:
-            return
-        listens = self._program.connected and not is_paused(robot)
-        if listens and (self._program_remembers or not self._settings.headless_mode):
-            self._send_tcp(T_flange_tcp, TcpHold.BACK)
-        elif self._settings.headless_mode and (listens or robot.runtime_state not in _RUNS):
-            self._primary.send(primary.upload(tcp_program(T_flange_tcp.rotation_vector())))
-
-    def _send_tcp(self, T_flange_tcp: Pose, hold: TcpHold) -> None:
-        self._program.send_command(script_command.encode(script_command.SetTcpOffset(
-            offset=T_flange_tcp.rotation_vector(), hold=hold)))
+        """Have the TCP put back to what it was before a goal, where the robot is connected."""
+        if self._robot is not None:
+            self._goal_tcp.put_back(T_flange_tcp, self._robot)
 
     def owe_tcp(self, owed: bool) -> None:
         """Say whether the TCP is still to be put back: until it is, no goal is taken."""
@@ -261,7 +230,7 @@ class RobotLink:
     def stop_program(self, reason: str) -> None:
         """End the robot program, so that nothing of it can resume."""
         self._warn(f'the robot program is stopped: {reason}')
-        self._note('the driver ended the robot program')
+        self._evidence.note('the driver ended the robot program')
         self._program_is_ending = self._program.connected
         self._primary.send(primary.command(primary.Command.STOP_PROGRAM))
         self._program.send_stop()
@@ -282,7 +251,7 @@ class RobotLink:
             self._warn('the robot program is not sent: there is no connection to the primary '
                        'interface of the robot')
         else:
-            self._note('the driver sent the robot program')
+            self._evidence.note('the driver sent the robot program')
 
     def _foreign_program_runs(self) -> bool:
         return (self._robot is not None and not has_ended(self._robot)
@@ -360,55 +329,16 @@ class RobotLink:
                 stop_deceleration=s.stop_deceleration))
         self._tell(ports=ports)
 
-    def _start_program_once(self, robot: RobotState) -> None:
-        """Upload the program on the first connection, if nothing speaks against it."""
-        if not self._first_connection or self._status.state not in (
-                ConnectionState.CONNECTED, ConnectionState.STOPPED):
-            return
-        if self._power_up_first(robot):
-            return
-        self._first_connection = False
-        if not self._settings.headless_mode or self._program.connected:
-            return
-        if self._status.state is ConnectionState.STOPPED \
-                or robot.robot_mode is not RobotMode.RUNNING:
-            self._warn(f'the robot program is not started: {self._status.message}')
-        elif robot.robot_status & RobotStatus.PROGRAM_RUNNING or not has_ended(robot):
-            self._warn('the robot program is not started: another program runs on the robot, or '
-                       'is paused; stop it, then call resend_robot_program')
-        else:
-            self.upload_program()
-
-    def _power_up_first(self, robot: RobotState) -> bool:
-        """Switch the arm on, where that is wanted; tell whether the program has to wait for it."""
-        s = self._settings
-        if not (s.auto_power and s.headless_mode) or robot.robot_mode not in _WITHOUT_MOTION \
-                or self._status.state is ConnectionState.STOPPED:
-            return False
-        if not self._powering_up and self.send_primary(primary.Command.RUN):
-            self._powering_up = True
-            self._warn('auto_power: the arm is switched on and its brakes are released')
-            asyncio.get_running_loop().call_later(POWER_UP_TIMEOUT, self._give_up_power)
-        return True
-
-    def _give_up_power(self) -> None:
-        """Start nothing by itself any more, if the arm did not come up."""
-        if self._first_connection:
-            self._first_connection = False
-            self._warn(f'auto_power: the arm is not running after {POWER_UP_TIMEOUT:g} s; '
-                       'is the robot in remote control?')
-
     # ---- what comes in ------------------------------------------------------------------------
 
     def _on_state(self, robot: RobotState) -> None:
         before, self._robot = self._robot, robot
-        self._reported = robot
-        self._last_report = asyncio.get_running_loop().time()
+        self._evidence.take_report(robot)
         self._tell_state(robot)
         is_news = before is None or _modes(before) != _modes(robot)
         if is_news:
             for change in () if before is None else changes(before, robot):
-                self._note(change)
+                self._evidence.note(change)
             self._look_at_program(robot)
             self._review()
         self._on_event(StateReceived(state=robot))
@@ -460,24 +390,24 @@ class RobotLink:
             self._tell(calibration_known=True)
 
     def _on_program_connected(self) -> None:
-        self._note('the robot program has connected')
+        self._evidence.note('the robot program has connected')
         self._program_is_ending = False
         self._tell(program_running=True)
         self._review()
 
     def _on_program_lost(self, reason: str) -> None:
-        self._note(f'{reason}, {self._pulse(asyncio.get_running_loop().time()).sign:.3f} s after '
-                   'the last sign of life that it was sent')
+        self._evidence.note(f'{reason}, {self._evidence.pulse().sign:.3f} s after the last sign '
+                            'of life that it was sent')
         if self._explanation is None:
             self._explanation = asyncio.get_running_loop().call_later(
                 GATHER, self.explain, 'The robot program is gone.')
-        self._program_remembers = False
+        self._goal_tcp.program_lost()
         self._change(Change.PROGRAM_LOST, program_running=False)
         self._on_event(LinkLost(link='program', reason=reason))
 
     def _on_robot_lost(self, reason: str) -> None:
         """Take note that the robot is gone, or never was there."""
-        self._note(reason)
+        self._evidence.note(reason)
         news = stamped(reason, self._status.last_error) if self._robot is None else stamped(
             f"The robot is gone. {'; '.join(self.chain())}.")
         before, self._robot, self._signals = self._robot, None, None
@@ -495,7 +425,7 @@ class RobotLink:
         if robot is None:
             return
         self._change(Change.ROBOT_STOPPED if is_stopped(robot) else Change.ROBOT_FREE)
-        self._start_program_once(robot)
+        self._first_start.review(robot, self._status, program_connected=self._program.connected)
         self._program.deaf = is_paused(robot)
         if not self._program_reads():
             self._change(Change.PROGRAM_PAUSED)
@@ -542,18 +472,9 @@ class RobotLink:
         if self._status.message == message:
             self._on_log(logging.INFO, message)
 
-    def _pulse(self, now: float) -> Pulse:
-        return Pulse(
-            report=now - self._last_report, sign=now - self._program.last_keepalive,
-            longest=max(self._gap_before, self._program.longest_gap),
-            timeout=self._settings.robot_receive_timeout)
-
-    def _note(self, text: str, *, is_robot_error: bool = False) -> None:
-        self._chronicle.add(text, asyncio.get_running_loop().time(), is_robot_error=is_robot_error)
-
     def _robot_error(self, text: str) -> None:
         """Take what the robot says is wrong."""
-        self._note(text, is_robot_error=True)
+        self._evidence.note(text, is_robot_error=True)
         self._error(text)
 
     def _error(self, text: str) -> None:
