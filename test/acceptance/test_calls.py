@@ -16,7 +16,8 @@ from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.motion.state import RobotMode
 from ur_cartesian_driver.program.render import as_program
 from ur_cartesian_driver.protocol.rtde import RtdeClient
-from ur_cartesian_driver.robot.calls import Dashboard, Recover, SetPayload, SetTcp
+from ur_cartesian_driver.robot import call_desk
+from ur_cartesian_driver.robot.calls import Dashboard, Recover, SendProgram, SetPayload, SetTcp
 from ur_cartesian_driver.sim.modes import SafetyEvent
 
 # A slow controller does the same for less.
@@ -172,6 +173,21 @@ def test_recover_goes_no_further_than_it_may(driver, ur_sim):
     assert driver.recover().ok
     assert ur_sim.state().q == q
     assert 'ready for goals' in driver.recover().text
+
+
+@pytest.mark.ur_sim(frequency=125.0, remote_control=False)
+def test_a_program_that_is_sent_in_local_control_is_refused_with_the_reason(
+        make_driver, ur_sim, monkeypatch):
+    driver = make_driver()
+    wait_for(lambda: 'read-only' in driver.status.last_error)
+    with monkeypatch.context() as patch:
+        patch.setattr(call_desk, 'EFFECT_TIMEOUT', 0.3)
+        answer = driver.call(SendProgram()).result(READY)
+    assert not answer.ok
+    assert answer.text.endswith(
+        'The robot is in local control: switch it to remote control, then try again.')
+    ur_sim.call(lambda c: setattr(c, 'remote_control', True))
+    assert driver.call(SendProgram()).result(READY).ok
 
 
 @QUICK

@@ -9,11 +9,13 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.protocol.dashboard import SHAPES
 from ur_cartesian_driver.protocol.rtde import ControllerVersion
 from ur_cartesian_driver.robot import dashboard_client
 from ur_cartesian_driver.robot.dashboard_client import (
     DashboardClient,
     explain,
+    INSTEAD,
     TOO_EARLY,
     why_not_available,
 )
@@ -129,6 +131,9 @@ def version(text):
     ('power on', '5.21.0', ''),
     ('power on', '3.15.0', ''),
     ('power on', '10.11.0', 'PolyScope X has no dashboard server'),
+    ('power on', '10.8.0', 'with software 10.8.0.0; call recover, or do it on the pendant.'),
+    ('robotmode', '10.8.0', '; the topic robot_mode tells it.'),
+    ('load', '10.8.0', '; do it on the pendant.'),
     ('is in remote control', '5.5.0', 'needs software 5.6 or newer'),
     ('is in remote control', '3.15.0', 'has no command'),
     ('restart safety', '3.6.0', 'needs software 3.7 or newer'),
@@ -137,6 +142,10 @@ def test_software_without_a_command_is_explained(command, software, reason):
     why = why_not_available(command, version(software))
     assert bool(why) == bool(reason)
     assert reason in why
+
+
+def test_what_serves_instead_is_said_of_commands_that_exist():
+    assert set(INSTEAD) <= set(SHAPES)
 
 
 def robot(**fields):

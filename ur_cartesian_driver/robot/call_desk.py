@@ -209,8 +209,11 @@ class CallDesk:
         if await until(self._robot, lambda _: self._robot.status.state is ConnectionState.READY,
                        EFFECT_TIMEOUT):
             return yes('The robot program runs.')
+        needed = self._robot.status.message
+        if await self._dashboard.remote_control() is False:
+            needed = 'The robot is in local control: switch it to remote control, then try again.'
         return no(f'The robot program has not called within {EFFECT_TIMEOUT:g} s. '
-                  f'{self._robot.status.message}'.rstrip())
+                  f'{needed}'.rstrip())
 
     # ---- RTDE inputs --------------------------------------------------------------------------
 

@@ -11,7 +11,8 @@ dashboard often only says that it failed.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 
 from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
@@ -31,6 +32,15 @@ from ur_cartesian_driver.robot.transport import Connection, dial
 ANSWER_TIMEOUT = 5.0
 #: The first software without a dashboard.
 POLYSCOPE_X = 10
+#: What serves instead there; a command that is not named is for a person at the pendant.
+INSTEAD: Mapping[str, str] = MappingProxyType({
+    **dict.fromkeys(('power on', 'brake release', 'unlock protective stop'),
+                    'call recover, or do it on the pendant'),
+    'robotmode': 'the topic robot_mode tells it',
+    **dict.fromkeys(('safetymode', 'safetystatus'), 'the topic safety_mode tells it'),
+    **dict.fromkeys(('running', 'programState'), 'the diagnostics tell it'),
+    **dict.fromkeys(('PolyscopeVersion', 'version', 'get robot model'),
+                    'the topic status tells it')})
 
 #: Begins the answer to an unlock that comes too early.
 TOO_EARLY = 'Cannot unlock protective stop'
@@ -111,7 +121,7 @@ def why_not_available(command: str, version: ControllerVersion) -> str:
     """Return why the software of a robot does not have a command; empty when it has it."""
     if version.major >= POLYSCOPE_X:
         return ('PolyScope X has no dashboard server, so this service is not available with '
-                f'software {version}; do it on the pendant.')
+                f'software {version}; {INSTEAD.get(command, "do it on the pendant")}.')
     shape = SHAPES[command]
     if shape.available((version.major, version.minor)):
         return ''

@@ -72,8 +72,8 @@ class RtdeConnection:
             async with asyncio.timeout(ANSWER_TIMEOUT):
                 await self._answered.wait()
         except TimeoutError:
-            raise OSError(f'{host} port {port} does not answer as an RTDE server: is it a '
-                          'robot?') from None
+            raise OSError(f'{host} port {port} does not answer as an RTDE server; it may be no '
+                          'robot') from None
         if self._version is None:
             raise OSError(f'{host} port {port} (RTDE): {self._closed.result()}')
         self._last_packet = asyncio.get_running_loop().time()
