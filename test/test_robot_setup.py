@@ -1,0 +1,166 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The page about real robots knows every state and every sentence that says what is needed.
+
+Both ways: what the tables of the connection and of the way back can say is on the page, and what
+the page quotes is written in the source, as a whole or with values in it.
+"""
+
+import ast
+import asyncio
+import errno
+from itertools import product
+from pathlib import Path
+import re
+import socket
+
+import pytest
+
+from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.msg import DriverStatus
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from ur_cartesian_driver.robot.recovery import next_step, Situation, Step
+from ur_cartesian_driver.robot.status import what_is_needed
+from ur_cartesian_driver.robot.transport import cause, Connection, dial, Listener
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+PAGE = CHECKOUT / 'doc' / 'robot_setup.md'
+PACKAGE = CHECKOUT / 'ur_cartesian_driver'
+pytestmark = pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the documents')
+
+#: Where the sentences come from; the simulator says what a robot says itself.
+SOURCES = [*PACKAGE.glob('robot/*.py'), *PACKAGE.glob('driver/*.py'),
+           PACKAGE / 'protocol' / 'rtde.py', PACKAGE / 'ros' / 'node.py',
+           *PACKAGE.glob('sim/*.py')]
+ROBOT_PROGRAM = PACKAGE / 'program' / 'driver.script'
+
+ROBOTS = [RobotState(timestamp=1.0, actual_q=(0.0,) * 6, robot_mode=mode, safety_mode=safety,
+                     runtime_state=runtime)
+          for mode, safety in ([(mode, SafetyMode.NORMAL) for mode in RobotMode]
+                               + [(RobotMode.RUNNING, safety) for safety in SafetyMode])
+          for runtime in RuntimeState]
+
+
+def table(first_column):
+    """Return the rows of all tables of the page whose first column is called so."""
+    text = PAGE.read_text(encoding='utf-8')
+    found = re.findall(rf'^\| {first_column} \|.*\n\|[ -|]*\n((?:\|.*\n)+)', text, re.MULTILINE)
+    assert found
+    return [[cell.strip() for cell in line.strip('|').split(' | ')]
+            for rows in found for line in rows.splitlines()]
+
+
+def quoted(cell):
+    """Return the sentence of a cell, or none where the cell has other words only."""
+    match = re.match(r'`([^`]+)`', cell)
+    return match[1] if match else ''
+
+
+def sentences():
+    rows = [row[0] for row in table('sentence')] + [
+        row[1] for column in ('state', 'where') for row in table(column)]
+    assert all(map(quoted, rows))
+    return [quoted(row) for row in rows]
+
+
+def pattern(text, placeholder='...'):
+    """Return what fits a text in which a placeholder stands for anything."""
+    return re.compile('.*'.join(map(re.escape, text.split(placeholder))), re.DOTALL)
+
+
+def is_on_page(said):
+    return any(pattern(sentence).fullmatch(said) for sentence in sentences())
+
+
+# ---- states -------------------------------------------------------------------------------------
+
+
+def test_every_state_is_in_the_table_with_its_number():
+    there = {(row[0], row[1]) for row in table('number')}
+    assert there == {(str(state.value), state.name) for state in ConnectionState}
+    assert there == {(str(getattr(DriverStatus, name)), name) for _, name in there}
+
+
+# ---- what the driver says is on the page --------------------------------------------------------
+
+
+def test_all_that_can_be_needed_is_on_the_page():
+    said = {what_is_needed(state, robot, program_connected=connected, headless_mode=headless,
+                           tcp_owed=owed, program_is_ending=ending, foreign_program=foreign)
+            for state, robot, connected, headless, owed, ending, foreign in product(
+                ConnectionState, [None, *ROBOTS], *[(False, True)] * 5)} - {''}
+    assert len(said) > 10
+    assert [text for text in sorted(said) if not is_on_page(text)] == []
+
+
+def test_all_that_a_recovery_leaves_to_a_person_is_on_the_page():
+    steps = [next_step(Situation(connection=state, robot=robot, program_connected=connected,
+                                 headless=headless, remote_control=remote))
+             for state, robot, connected, headless, remote in product(
+                 ConnectionState, ROBOTS, (False, True), (False, True), (None, False))]
+    said = {step.text for step in steps if step.step is Step.PERSON} - {''}
+    assert len(said) > 10
+    assert [text for text in sorted(said) if not is_on_page(text)] == []
+
+
+# ---- what is on the page is what the driver says ------------------------------------------------
+
+
+def texts(tree):
+    """Return the texts of a module, with ``\\0`` for each value in them."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            yield re.sub(r'%\.?\d*[a-z]', '\0', node.value)
+        elif isinstance(node, ast.JoinedStr):
+            yield ''.join(part.value if isinstance(part, ast.Constant) else '\0'
+                          for part in node.values)
+
+
+@pytest.fixture(scope='module')
+def written():
+    """Everything that the sources can say, each text as a pattern with its literal length."""
+    found = {text for path in SOURCES for text in texts(ast.parse(path.read_text()))}
+    # A line in the log of a robot ends in a value.
+    found |= {f'{text}\0' for text in re.findall(r'"([^"\n]+)"', ROBOT_PROGRAM.read_text())}
+    return [(pattern(text, '\0'), len(text.replace('\0', ''))) for text in found
+            if len(text) > 10]
+
+
+async def refusals_of_the_system():
+    """Return what is said of a port that nobody listens on, of one that is taken and of a wire."""
+    said = []
+    with socket.create_server(('127.0.0.1', 0)) as taken:
+        port = taken.getsockname()[1]
+        for host in ('127.0.0.1', '192.0.2.1'):  # RFC 5737: nobody's
+            listener = Listener('reverse_port', on_open=print, on_data=print, on_closed=print,
+                                on_refused=print)
+            with pytest.raises(OSError, match='port') as refused:
+                await listener.open(host, port, frozenset())
+            said.append(str(refused.value))
+    with pytest.raises(OSError, match='port') as refused:
+        await dial(Connection(print, print), '127.0.0.1', port)
+    unreachable = cause(OSError(errno.EHOSTUNREACH, ''))
+    return [*said, str(refused.value), f'127.0.0.1 port {port}: {unreachable}']
+
+
+def can_say(written, said):
+    """Tell whether a text says something, at least half of it in its own words."""
+    return any(length >= 0.5 * len(said.replace('...', '')) and fits.fullmatch(said)
+               for fits, length in written)
+
+
+def test_each_quoted_sentence_is_written_in_the_source(written):
+    on_page = set(sentences())
+    assert len(on_page) > 40
+    heard = asyncio.run(refusals_of_the_system())
+    assert [text for text in heard if not is_on_page(text)] == []
+    # These two consist of two texts each, and are looked for the other way round above.
+    left = {text for text in on_page if 'A program runs on the robot' not in text
+            and not any(pattern(text).fullmatch(one) for one in heard)}
+    assert [text for text in sorted(left) if not can_say(written, text)] == []
+
+
+def test_a_sentence_that_nobody_says_would_be_found(written):
+    assert not can_say(written, 'The robot is tired; let it sleep.')
+    assert not can_say(written, 'The arm is in mode ...; switch it off.')
