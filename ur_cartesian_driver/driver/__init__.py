@@ -11,8 +11,9 @@ Plan, execute and stop Cartesian motions of one robot, from plain Python.
         print(outcome.code.name, outcome.text)
 """
 
-from ur_cartesian_driver.driver.api import Driver, Motion
+from ur_cartesian_driver.driver.api import Driver
 from ur_cartesian_driver.driver.config import DriverConfig
+from ur_cartesian_driver.driver.motion import Motion
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.status import DriverStatus
 

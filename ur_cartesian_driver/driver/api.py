@@ -9,17 +9,15 @@ from concurrent.futures import Future
 import contextlib
 from dataclasses import replace
 import itertools
-import logging
 import threading
 from types import TracebackType
-from typing import TypeVar
 
 from ur_cartesian_driver.driver import channel, host
+from ur_cartesian_driver.driver.callbacks import call_back, LOG
 from ur_cartesian_driver.driver.channel import (
     Alive,
     CallAnswered,
     CallRobot,
-    CancelMotion,
     Configure,
     GeometryKnown,
     Heartbeat,
@@ -37,6 +35,7 @@ from ur_cartesian_driver.driver.channel import (
     TcpReturned,
 )
 from ur_cartesian_driver.driver.config import DriverConfig
+from ur_cartesian_driver.driver.motion import Motion, OnProgress, Run
 from ur_cartesian_driver.driver.services import RobotServices
 from ur_cartesian_driver.execution import order_of, same_tcp
 from ur_cartesian_driver.execution.trajectory import STOP_BOUND
@@ -44,12 +43,11 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import Geometry, robot_model
 from ur_cartesian_driver.motion.errors import (
     code_of,
-    DriverError,
     ErrorCode,
     GoalRefused,
     RobotNotReady,
 )
-from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.lever import seen_at
 from ur_cartesian_driver.motion.plan import Plan
@@ -63,75 +61,13 @@ from ur_cartesian_driver.robot.calls import Answer, Call
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.status import DriverStatus, Gaps, is_paused, is_stopped, stamped
 
-LOG = logging.getLogger('ur_cartesian_driver')
-
-T = TypeVar('T')
-
 #: Pause before a robot loop that died is replaced [s]: what ends it may end the next one too.
 RESTART_PAUSE = 0.5
-
-OnProgress = Callable[[Progress], None]
 
 NO_STATE = 'The robot does not report its state.'
 
 #: How long a cancelled motion may need to its outcome [s], whatever the robot does.
 STOP_PATIENCE = 2.0 * STOP_BOUND + 1.0
-
-
-class Motion:
-    """A running motion; its outcome comes whatever happens to the robot."""
-
-    def __init__(self, driver: Driver, number: int, plan: Plan,
-                 on_progress: OnProgress | None) -> None:
-        """Be made by :meth:`Driver.start`."""
-        self._driver = driver
-        self._future: Future[Outcome] = Future()
-        self._on_progress = on_progress
-        self.number = number
-        self._plan_report = plan.report
-        #: The TCP that the robot has as long as this motion runs.
-        self._loan = None if plan.T_flange_tcp is None else TcpLent(
-            T_flange_before=plan.T_flange_active, T_flange_lent=plan.T_flange_tcp)
-        #: The newest report, None before the first.
-        self.progress: Progress | None = None
-
-    def cancel(self) -> None:
-        """Ask the arm to stop; the outcome follows when it stands. May be called twice."""
-        self._driver._send(CancelMotion(motion=self.number))
-
-    def preempt(self, by: str = 'a newer motion') -> None:
-        """
-        Ask the arm to stop, as :meth:`cancel` does, because another motion is to follow.
-
-        :param by: which one, as part of the outcome's sentence.
-        """
-        self._driver._send(CancelMotion(motion=self.number, preempted_by=by))
-
-    def done(self) -> bool:
-        """Tell whether the outcome is there."""
-        return self._future.done()
-
-    def result(self, timeout: float | None = None) -> Outcome:
-        """
-        Wait for the outcome.
-
-        :raises TimeoutError: it did not come within ``timeout`` [s]; the motion goes on.
-        """
-        return self._future.result(timeout)
-
-    def add_done_callback(self, callback: Callable[[Outcome], None]) -> None:
-        """Call back with the outcome, from the driver's reader thread or at once."""
-        self._future.add_done_callback(lambda future: callback(future.result()))
-
-    def _report(self, progress: Progress) -> None:
-        self.progress = progress
-        if self._on_progress is not None:
-            _call(self._on_progress, progress)
-
-    def _end(self, outcome: Outcome) -> None:
-        if not self._future.done():
-            self._future.set_result(replace(
-                outcome, report=(*self._plan_report, *outcome.report)))
 
 
 class Driver(RobotServices):
@@ -158,7 +94,7 @@ class Driver(RobotServices):
         self._status = DriverStatus()
         self._status_listeners: list[Callable[[DriverStatus], None]] = []
         self._ready = threading.Event()
-        self._motions: dict[int, Motion] = {}
+        self._runs: dict[int, Run] = {}
         #: The TCP that a goal has set and that is not back yet.
         self._loan: TcpLent | None = None
         self._calls: dict[int, Future[Answer]] = {}
@@ -244,7 +180,7 @@ class Driver(RobotServices):
         if state is None:
             return None
         with self._lock:
-            loan = next((motion._loan for motion in self._motions.values()), self._loan)
+            loan = next((run.loan for run in self._runs.values()), self._loan)
         state = come_to_rest(state, self._arm, self.config.stop_deceleration)
         if loan is None or not same_tcp(state.T_flange_tcp, loan.T_flange_lent):
             return state
@@ -299,7 +235,7 @@ class Driver(RobotServices):
             dialect=self.config.dialect,
             # Another program may skip the command, and move the TCP that is there.
             allow_tcp_change=self.options.allow_tcp_change and self.config.dialect.sets_tcp,
-            optimove_known=has_feature('optimove', software_version(status.polyscope_version)),
+            optimove_known=has_feature('optimove', status.software()),
             acceleration_known=state.actual_tcp_acceleration is not None
             and state.target_tcp_acceleration is not None)
         return plan(goal, state, self.arm, options)
@@ -315,12 +251,13 @@ class Driver(RobotServices):
                                self.config.dialect)
         order = order_of(plan, self.config.dialect)
         with self._lock:
-            if self._motions:
+            if self._runs:
                 raise RobotNotReady('A motion is running; wait for its end or cancel it.')
             if reason := self._status.not_ready():
                 raise RobotNotReady(reason)
-            motion = Motion(self, next(self._numbers), plan, on_progress)
-            self._motions[motion.number] = motion
+            run = Run(next(self._numbers), plan, on_progress, self._send)
+            motion = run.motion
+            self._runs[motion.number] = run
             # Still under the lock: whoever finds the motion may cancel it, and that has to come
             # behind its start.
             self._send(StartMotion(motion=motion.number, points=points, order=order))
@@ -335,7 +272,7 @@ class Driver(RobotServices):
             on; or its end did not come.
         """
         with self._lock:
-            motions = list(self._motions.values())
+            motions = [run.motion for run in self._runs.values()]
         if motions:
             self.check_can_make_way()
         for motion in motions:
@@ -388,8 +325,8 @@ class Driver(RobotServices):
 
     def stop(self) -> None:
         """Stop whatever moves."""
-        for motion in list(self._motions.values()):
-            motion.cancel()
+        for run in list(self._runs.values()):
+            run.motion.cancel()
 
     def resend_robot_program(self) -> None:
         """Upload the robot program again; the way on after somebody stopped it."""
@@ -462,13 +399,13 @@ class Driver(RobotServices):
     def _handle(self, notice: Notice | Request) -> None:
         match notice:
             case MotionProgress(motion=number, progress=progress):
-                if number in self._motions:
-                    self._motions[number]._report(progress)
+                if number in self._runs:
+                    self._runs[number].report(progress)
             case MotionEnded(motion=number, outcome=outcome):
                 with self._lock:
-                    motion = self._motions.pop(number, None)
-                if motion is not None:
-                    motion._end(outcome)
+                    run = self._runs.pop(number, None)
+                if run is not None:
+                    run.end(outcome)
             case CallAnswered(number=number, answer=answer):
                 with self._lock:
                     call = self._calls.pop(number, None)
@@ -510,37 +447,18 @@ class Driver(RobotServices):
         else:
             self._ready.clear()
         for listener in list(self._status_listeners):
-            _call(listener, status)
+            call_back(listener, status)
 
     def _abandon(self, text: str) -> None:
         """End all motions and calls of a robot loop that cannot tell their ends any more."""
         self._abandon_calls(text)
         with self._lock:
-            motions, self._motions = self._motions, {}
-        for motion in motions.values():
-            motion._end(Outcome(code=ErrorCode.CONNECTION_LOST, text=text))
+            runs, self._runs = self._runs, {}
+        for run in runs.values():
+            run.end(Outcome(code=ErrorCode.CONNECTION_LOST, text=text))
 
     def _abandon_calls(self, text: str) -> None:
         with self._lock:
             calls, self._calls = self._calls, {}
         for call in calls.values():
             call.set_result(Answer(ok=False, text=text))
-
-
-def _call(callback: Callable[[T], None], argument: T) -> None:
-    """Call somebody else's code; what it raises must not end the thread that serves all."""
-    try:
-        callback(argument)
-    except Exception as error:
-        LOG.exception('a callback of the driver failed with %s: %s; the driver goes on',
-                      type(error).__name__, error)
-
-
-def software_version(text: str) -> tuple[int, int, int]:
-    """Return major, minor and bugfix of ``5.21.0.1``; zeros while it is unknown."""
-    numbers = [int(part) for part in text.split('.') if part.isdigit()][:3]
-    major, minor, bugfix = numbers + [0] * (3 - len(numbers))
-    return major, minor, bugfix
-
-
-__all__ = ['Driver', 'DriverError', 'Motion']

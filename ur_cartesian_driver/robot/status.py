@@ -38,6 +38,12 @@ class DriverStatus:
             return ''
         return self.message or f'The connection is {self.state.name}.'
 
+    def software(self) -> tuple[int, int, int]:
+        """Return major, minor and bugfix of ``5.21.0.1``; zeros while it is unknown."""
+        numbers = [int(part) for part in self.polyscope_version.split('.') if part.isdigit()][:3]
+        major, minor, bugfix = numbers + [0] * (3 - len(numbers))
+        return major, minor, bugfix
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Gaps:

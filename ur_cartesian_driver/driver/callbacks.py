@@ -1,0 +1,22 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Calls of somebody else's code from a thread of the driver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import logging
+from typing import TypeVar
+
+LOG = logging.getLogger('ur_cartesian_driver')
+
+T = TypeVar('T')
+
+
+def call_back(callback: Callable[[T], None], argument: T) -> None:
+    """Call somebody else's code; what it raises must not end the thread that serves all."""
+    try:
+        callback(argument)
+    except Exception as error:
+        LOG.exception('a callback of the driver failed with %s: %s; the driver goes on',
+                      type(error).__name__, error)

@@ -1,0 +1,88 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A running motion from its two sides: what its owner can do, and what the driver says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import replace
+
+from ur_cartesian_driver.driver.callbacks import call_back
+from ur_cartesian_driver.driver.channel import CancelMotion, Request, TcpLent
+from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.plan import Plan
+
+OnProgress = Callable[[Progress], None]
+
+
+class Motion:
+    """A running motion; its outcome comes whatever happens to the robot."""
+
+    def __init__(self, number: int, outcome: Future[Outcome],
+                 send: Callable[[Request], None]) -> None:
+        """Be made by :meth:`~.api.Driver.start`."""
+        self.number = number
+        self._outcome, self._send = outcome, send
+        #: The newest report, None before the first.
+        self.progress: Progress | None = None
+
+    def cancel(self) -> None:
+        """Ask the arm to stop; the outcome follows when it stands. May be called twice."""
+        self._send(CancelMotion(motion=self.number))
+
+    def preempt(self, by: str = 'a newer motion') -> None:
+        """
+        Ask the arm to stop, as :meth:`cancel` does, because another motion is to follow.
+
+        :param by: which one, as part of the outcome's sentence.
+        """
+        self._send(CancelMotion(motion=self.number, preempted_by=by))
+
+    def done(self) -> bool:
+        """Tell whether the outcome is there."""
+        return self._outcome.done()
+
+    def result(self, timeout: float | None = None) -> Outcome:
+        """
+        Wait for the outcome.
+
+        :raises TimeoutError: it did not come within ``timeout`` [s]; the motion goes on.
+        """
+        return self._outcome.result(timeout)
+
+    def add_done_callback(self, callback: Callable[[Outcome], None]) -> None:
+        """Call back with the outcome, from the driver's reader thread or at once."""
+        self._outcome.add_done_callback(lambda future: callback(future.result()))
+
+
+class Run:
+    """The driver's side of a motion: its progress, and its only end."""
+
+    def __init__(self, number: int, plan: Plan, on_progress: OnProgress | None,
+                 send: Callable[[Request], None]) -> None:
+        """
+        Prepare.
+
+        :param send: takes what the owner of the motion asks for.
+        """
+        self._outcome: Future[Outcome] = Future()
+        self._on_progress = on_progress
+        self._plan_report = plan.report
+        #: What the owner holds.
+        self.motion = Motion(number, self._outcome, send)
+        #: The TCP that the robot has as long as this motion runs.
+        self.loan = None if plan.T_flange_tcp is None else TcpLent(
+            T_flange_before=plan.T_flange_active, T_flange_lent=plan.T_flange_tcp)
+
+    def report(self, progress: Progress) -> None:
+        """Take a report of the robot loop."""
+        self.motion.progress = progress
+        if self._on_progress is not None:
+            call_back(self._on_progress, progress)
+
+    def end(self, outcome: Outcome) -> None:
+        """Give the outcome; only the first one counts."""
+        if not self._outcome.done():
+            self._outcome.set_result(replace(
+                outcome, report=(*self._plan_report, *outcome.report)))
