@@ -43,7 +43,7 @@ def main() -> int:
         try:
             options = {'seconds': arguments.seconds} if name in (RTDE_RATE, SOAK) else {}
             if name == SOAK:
-                options['goals'] = arguments.goals
+                options |= {'goals': arguments.goals, 'undisturbed': arguments.undisturbed}
             measured = list(import_module(name).run(arguments.quick, **options))
         except Exception as error:
             # The others can still be measured.
@@ -72,6 +72,8 @@ def _parser() -> argparse.ArgumentParser:
                              'lasts (1800)')
     parser.add_argument('--goals', type=int, default=10_000,
                         help=f'after so many goals {SOAK} ends sooner')
+    parser.add_argument('--undisturbed', action='store_true',
+                        help=f'nothing happens during the goals of {SOAK}: as many as can be')
     parser.add_argument('--json', metavar='FILE', help='write the figures as JSON, - = print them')
     return parser
 

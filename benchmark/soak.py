@@ -71,9 +71,14 @@ class Soak:
     """One run."""
 
     def __init__(self, robot: Child, client: TimedClient, pids: Mapping[str, int],
-                 seed: int = 1) -> None:
-        """Prepare; :meth:`run` does it."""
+                 undisturbed: bool, seed: int = 1) -> None:
+        """
+        Prepare; :meth:`run` does it.
+
+        :param undisturbed: nothing happens during the goals, and they are as short as can be.
+        """
         self._robot, self._client, self._pids = robot, client, pids
+        self._undisturbed = undisturbed
         self._random = random.Random(seed)
         self._home: Pose = robot.call('state').T_base_tcp
         self._recover = client._node.create_client(Trigger, '/ur_cartesian_driver/recover')
@@ -99,8 +104,8 @@ class Soak:
 
     def _goal(self) -> None:
         """Run one goal to its end, and see to it that the next one can run."""
-        (event,) = self._random.choices([name for name, _ in EVENTS],
-                                        [weight for _, weight in EVENTS])
+        (event,) = [''] if self._undisturbed else self._random.choices(
+            [name for name, _ in EVENTS], [weight for _, weight in EVENTS])
         begin = time.monotonic()
         others = []
         try:
@@ -128,15 +133,16 @@ class Soak:
             self._bring_back()
 
     def _message(self) -> FollowCartesianTrajectory.Goal:
-        """Return a goal of a few points near home, 0.1 s apart."""
+        """Return a goal of a few points near home."""
         x, y, z = self._home.position
         points = []
-        for i in range(self._random.randint(1, 3)):
-            offset = [self._random.uniform(-0.006, 0.006) for _ in range(3)]
+        most, way, step = (1, 0.0005, 0.03) if self._undisturbed else (3, 0.006, 0.15)
+        for i in range(self._random.randint(1, most)):
+            offset = [self._random.uniform(-way, way) for _ in range(3)]
             position = (x + offset[0], y + offset[1], z + offset[2])
             points.append(CartesianTrajectoryPoint(
                 pose=_message(Pose(position, self._home.quaternion)),
-                time_from_start=Duration(nanosec=150_000_000 * (i + 1))))
+                time_from_start=Duration(nanosec=round(1e9 * step) * (i + 1))))
         message = FollowCartesianTrajectory.Goal()
         message.trajectory.points = points
         message.validate_only = self._random.random() < 0.05
@@ -159,14 +165,15 @@ class Soak:
         raise TimeoutError(f'the robot does not recover: {answer.message}')
 
 
-def run(quick: bool, seconds: float = 300.0, goals: int = 10_000) -> Iterator[Figure]:
+def run(quick: bool, seconds: float = 300.0, goals: int = 10_000,
+        undisturbed: bool = False) -> Iterator[Figure]:
     """Soak for a time or a number of goals, whichever is reached first."""
     if quick:
         seconds = min(seconds, 20.0)
     with simulator(unlock_delay=0.1) as robot, \
             node(robot, max_tool_speed=1.0) as driver, TimedClient() as client:
         (robot_loop,) = children_of(driver)
-        soak = Soak(robot, client, {'node': driver, 'robot process': robot_loop})
+        soak = Soak(robot, client, {'node': driver, 'robot process': robot_loop}, undisturbed)
         begin = time.monotonic()
         soak.run(seconds, goals)
         duration = time.monotonic() - begin
