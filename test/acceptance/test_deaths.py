@@ -131,10 +131,18 @@ class Cell:
 
     def moving(self, client):
         """Send the goal; return what becomes of it, when the arm moves."""
-        client.wait_ready(10.0)
-        ended = self.pool.submit(self._send, client)
-        self.witness.until(lambda: self.witness.speed > MOVING, 5.0)
-        return ended
+        deadline = monotonic() + 15.0
+        while True:
+            client.wait_ready(10.0)
+            ended = self.pool.submit(self._send, client)
+            self.witness.until(
+                lambda ended=ended: self.witness.speed > MOVING or ended.done(), 5.0)
+            if not ended.done():
+                return ended
+            # Result and status go different ways: READY may be that of the process before.
+            _, outcome, now = ended.result()
+            assert outcome.error_code == ErrorCode.ROBOT_NOT_READY, outcome.error_string
+            assert now < deadline, outcome.error_string
 
     def _send(self, client):
         """Return status, result and when it came."""
