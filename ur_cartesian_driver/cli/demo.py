@@ -102,7 +102,8 @@ def _start(arm: Arm, environment: dict[str, str], stack: ExitStack) -> None:
     names = ['-r', f'__ns:=/{arm.name}'] if arm.name else []
     settings = [word for name, value in parameters.items()
                 for word in ('-p', f'{name}:={value}')]
-    stack.enter_context(process('--ros-args', *names, *settings,
+    # The client says what happens; what the driver has to add then is a warning.
+    stack.enter_context(process('--ros-args', '--log-level', 'warn', *names, *settings,
                                 module='ur_cartesian_driver.ros.node', environment=environment))
 
 
