@@ -6,10 +6,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ur_cartesian_driver.motion.goal import Tolerance
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.goal import ExecutionMode, Tolerance
+from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.primitive import OptimoveJ, OptimoveL
+from ur_cartesian_driver.motion.primitive import OptimoveJ, OptimoveL, Spline, SwitchOutput
 from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
 
 
@@ -17,6 +21,7 @@ from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
 class Order:
     """What of a plan the machine needs; small to send to another process."""
 
+    #: How many records there are on the wire: motions and outputs.
     points: int
     reference: ReferencePath
     #: Expected time at full speed [s].
@@ -37,14 +42,26 @@ class Order:
     reports_begun: bool = True
     #: Whether the plan knows its speeds: not those of OPTIMIZED moves.
     knows_pace: bool = True
+    execution: ExecutionMode = ExecutionMode.PRIMITIVES
+    #: (records,) the waypoint of the goal that each record leads to, or belongs to; empty = each
+    #: record is the motion to the waypoint of its number.
+    waypoint: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    #: (records,) which of them are motions: these the robot program counts; empty = all.
+    is_motion: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
+    #: SERVO: the joints over time.
+    spline: JointSpline | None = None
 
 
 def order_of(plan: Plan, dialect: Dialect = NEWEST) -> Order:
     """Return what of a plan the machine needs, for a robot program of this dialect."""
     goal = plan.goal
     times = goal.waypoints[-1].time
+    waypoints = [segment.waypoint for segment in plan.segments
+                 for _ in range(1 + len(segment.outputs))]
+    pieces = [segment.primitive for segment in plan.segments
+              if isinstance(segment.primitive, Spline)]
     return Order(
-        points=len(plan.segments), reference=plan.reference, duration=plan.duration,
+        points=len(waypoints), reference=plan.reference, duration=plan.duration,
         due=times if times > 0.0 else None, T_base_frame=goal.T_base_frame,
         T_flange_active=plan.T_flange_active, T_flange_tcp=plan.T_flange_tcp,
         T_tcp_controlled=plan.T_tcp_controlled,
@@ -52,4 +69,9 @@ def order_of(plan: Plan, dialect: Dialect = NEWEST) -> Order:
         goal_time_tolerance=goal.goal_time_tolerance,
         reports_begun=dialect is NEWEST,
         knows_pace=not any(isinstance(segment.primitive, OptimoveJ | OptimoveL)
-                           for segment in plan.segments))
+                           for segment in plan.segments),
+        execution=plan.execution, waypoint=np.array(waypoints, dtype=np.int32),
+        is_motion=np.array([not isinstance(instruction, SwitchOutput)
+                            for instruction in plan.instructions]),
+        spline=JointSpline.of(plan.start, pieces)
+        if plan.execution is ExecutionMode.SERVO else None)

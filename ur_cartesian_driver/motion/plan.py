@@ -8,14 +8,15 @@ A plan is made by ``planning`` after every check has passed, and is immutable.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.goal import ExecutionMode, Goal
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.motion.primitive import Joints, Primitive
+from ur_cartesian_driver.motion.primitive import Instruction, Joints, Primitive, SwitchOutput
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,8 +65,11 @@ class PlannedSegment:
     duration: float
     #: Joint positions predicted at its end [rad].
     joints: Joints
-    #: One line for people: what and why.
+    #: One line for people: what and why; empty where the line of another piece of the same
+    #: segment says it (a SPLINE takes several pieces from point to point).
     note: str
+    #: What is switched after it was begun, in this order.
+    outputs: tuple[SwitchOutput, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -84,6 +88,8 @@ class Plan:
     T_flange_tcp: Pose | None = None
     #: Where the controlled frame is behind that TCP: elsewhere only if the TCP must not change.
     T_tcp_controlled: Pose = IDENTITY
+    #: PRIMITIVES, SPLINE or SERVO: how it is carried out.
+    execution: ExecutionMode = ExecutionMode.PRIMITIVES
     #: What was ignored, slowed or changed, and what a reader should know about the whole.
     remarks: tuple[str, ...] = field(default=())
 
@@ -95,4 +101,11 @@ class Plan:
     @property
     def report(self) -> tuple[str, ...]:
         """One line for each segment, then the remarks."""
-        return tuple(segment.note for segment in self.segments) + self.remarks
+        return tuple(segment.note for segment in self.segments if segment.note) + self.remarks
+
+    @property
+    def instructions(self) -> Iterator[Instruction]:
+        """What stands on the wire, in its order."""
+        for segment in self.segments:
+            yield segment.primitive
+            yield from segment.outputs

@@ -13,8 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from ur_cartesian_driver.motion.goal import ArcMode
+from ur_cartesian_driver.motion.goal import ArcMode, OutputKind
 from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.signals import AnalogDomain
 
 Joints: TypeAlias = Vector6
 Target: TypeAlias = Pose | Joints
@@ -119,4 +120,26 @@ class Spline:
     duration: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SwitchOutput:
+    """
+    Not a motion: the robot program switches an output as the tool passes a place.
+
+    It stands behind the motion during or after which that happens, and takes no time of its own.
+    """
+
+    output: OutputKind
+    pin: int
+    #: Digital 0 or 1; analog a fraction of the range.
+    value: float
+    domain: AnalogDomain = AnalogDomain.CURRENT
+    #: Where the tool (TCP, base) is nearest to when it is time; None = where the motion before
+    #: this one has ended, so at once.
+    place: Pose | None = None
+    #: So much later [s].
+    delay: float = 0.0
+
+
 Primitive: TypeAlias = MoveJ | MoveL | MoveP | MoveC | OptimoveJ | OptimoveL | Spline
+#: What stands in a trajectory on the wire.
+Instruction: TypeAlias = Primitive | SwitchOutput
