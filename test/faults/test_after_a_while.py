@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What faults leave behind when they last: queues, dead connections, and who notices."""
 
-from fault_cell import do, GoalInTrouble, let_happen
+from fault_cell import do, let_happen
+from fault_goals import AroundCorners
 import pytest
 import robot_cell
 from robot_cell import run_cell
@@ -28,7 +29,7 @@ def test_a_pause_leaves_no_queue_behind_which_a_goal_would_wait():
         assert 1 <= unread(cell) <= 3, 'one for the read that is under way, and no more'
         await do(cell, 'play')
         await cell.until(cell.is_ready)
-        goal = GoalInTrouble(cell)
+        goal = AroundCorners(cell)
         goal.send()
         await cell.until(lambda: not cell.at_rest(), 0.1)
         await cell.until(lambda: goal.motion.outcome)
@@ -43,7 +44,7 @@ def test_a_stop_is_followed_up_also_when_the_primary_interface_was_dead(fault):
     async def scenario(cell):
         await let_happen(cell, fault)
         await cell.sleep(2.0 * SILENCE + 0.5)
-        goal = GoalInTrouble(cell)
+        goal = AroundCorners(cell)
         await goal.reach('mid-segment')
         cell.robot.protective_stop()
         await cell.until(lambda: goal.motion.outcome, 0.2)
@@ -71,7 +72,7 @@ def test_who_pulls_the_cable_for_a_moment_is_not_taken_for_ready():
 
 def test_an_owner_that_hangs_up_stops_the_arm_and_the_program():
     async def scenario(cell):
-        await GoalInTrouble(cell).reach('mid-segment')
+        await AroundCorners(cell).reach('mid-segment')
         cell.owner.hang_up()
         assert await cell.until(cell.at_rest, 0.5) > 0.0
         await cell.until(lambda: cell.robot.state().runtime_state is RuntimeState.STOPPED, 0.5)
@@ -81,7 +82,7 @@ def test_an_owner_that_hangs_up_stops_the_arm_and_the_program():
 
 def test_sending_the_program_does_not_take_it_away_from_a_goal():
     async def scenario(cell):
-        goal = GoalInTrouble(cell)
+        goal = AroundCorners(cell)
         await goal.reach('mid-segment')
         cell.resend()
         await cell.until(lambda: goal.motion.outcome)
@@ -94,7 +95,7 @@ def test_sending_the_program_does_not_take_it_away_from_a_goal():
 @pytest.mark.parametrize('moment', ['before', 'after'])
 def test_a_cancel_and_a_protective_stop_at_the_same_time_end_in_the_stop(moment):
     async def scenario(cell):
-        goal = GoalInTrouble(cell)
+        goal = AroundCorners(cell)
         await goal.reach('mid-segment')
         if moment == 'before':
             cell.owner.cancel()

@@ -4,7 +4,7 @@
 
 from itertools import pairwise
 
-from fault_cell import ARM, GoalInTrouble, planned
+from fault_goals import ARM, AroundCorners, planned
 import pytest
 from robot_cell import CYCLE, run_cell
 
@@ -62,7 +62,7 @@ def said(cell, first):
 async def preempted(cell, phase):
     first = len(cell.control_messages())
     home = cell.robot.controller.motion.T_base_tcp.position
-    goal = GoalInTrouble(cell)
+    goal = AroundCorners(cell)
     await goal.reach(phase)
     predicted = come_to_rest(cell.memory.read(), ARM, STOP_DECELERATION)
     ways = Ways(cell)

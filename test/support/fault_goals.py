@@ -1,0 +1,150 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The goals to which something goes wrong, and how each is brought to a phase.
+
+Phases are found by looking, at the messages on the wire, at the points that the robot program has
+begun and at where the tool is; never by the time that it should take.
+"""
+
+from functools import lru_cache
+
+from fault_table import BEFORE
+import robot_cell
+from robot_cell import RobotCell
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.goal import Goal, Segment, Tolerance, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
+
+#: Side of the way around two corners, and size of the blends there [m].
+SIDE, BLEND = 0.05, 0.015
+#: What the actual pose may be off, along the path (corners included) and at its end [m]; what the
+#: twist may be off [m/s]; how long the arm may take to settle [s].
+PATH_TOLERANCE, GOAL_TOLERANCE, TWIST_TOLERANCE, SETTLING = 0.004, 0.001, 0.3, 1.4
+
+ARM = Arm(robot_model('ur5e'))
+
+
+def planned(state, offsets, velocity, acceleration, **goal):
+    """Return a plan through points beside where the tool stands, with blends between them."""
+    (x, y, z), turned = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
+    points = tuple(Waypoint(pose=Pose((x + dx, y + dy, z + dz), turned))
+                   for dx, dy, dz in offsets)
+    blends = [BLEND] * (len(points) - 1) + [0.0]
+    segments = tuple(Segment(velocity=velocity, acceleration=acceleration, blend_radius=blend)
+                     for blend in blends)
+    return plan(Goal(waypoints=points, segments=segments, **goal), state, ARM,
+                PlanningOptions(max_tool_speed=1.0))
+
+
+class StartingPoint:
+    """Where the arm stands: the same, whatever is left of the last way home [rad]."""
+
+    def __init__(self, state):
+        self.state = state
+        self._key = tuple(round(q, 4) for q in state.actual_q)
+
+    def __eq__(self, other):
+        return self._key == other._key
+
+    def __hash__(self):
+        return hash(self._key)
+
+
+class GoalInTrouble:
+    """A goal to which something happens; its way of execution is that of a subclass."""
+
+    def __init__(self, cell: RobotCell):
+        self.cell = cell
+        self.start = cell.robot.controller.motion.T_base_tcp.position
+        self.plan = self.plan_from(StartingPoint(cell.memory.read()))
+        self._said_before = len(cell.control_messages())
+        (end,) = cell.loop.open_ends(robot_cell.TRAJECTORY)
+        self._results, self._results_before = end.peer.received, len(end.peer.received)
+        self.motion = None
+
+    def plan_from(self, start: StartingPoint):
+        """Return the plan; made once, as the arm begins at the same place each time."""
+        raise NotImplementedError
+
+    def is_in(self, phase: str) -> bool:
+        """Tell whether the goal is in a phase that is reached by waiting."""
+        raise NotImplementedError
+
+    def send(self):
+        """Send it to the robot loop."""
+        self.motion = self.cell.owner.start(self.plan)
+
+    async def reach(self, phase: str):
+        """Bring it to its phase; before it is sent there is nothing to do."""
+        if phase in BEFORE:
+            return
+        if phase == 'settling':
+            self.cell.robot.inject(f'offset pose z {2.0 * GOAL_TOLERANCE}')
+        self.send()
+        await self.cell.until(lambda: self.is_in(phase), purpose=phase)
+        if phase == 'cancelling':
+            await self.cancel()
+        assert self.motion.outcome is None, self.motion.outcome
+
+    async def cancel(self):
+        """Cancel it, and return when the robot program is about to hear of it."""
+        self.cell.owner.cancel()
+        await self.cell.until(lambda: self.said(TrajectoryAction.CANCEL))
+        assert not self.cell.at_rest()
+
+    def begun(self):
+        """Return how many motions the robot program has begun."""
+        return self.cell.memory.read().points_begun
+
+    def moved(self):
+        """Return how far the tool has come along x and y [m]."""
+        here = self.cell.robot.controller.motion.T_base_tcp.position
+        return here[0] - self.start[0], here[1] - self.start[1]
+
+    def said(self, action):
+        """Tell whether an action of this goal was sent."""
+        return any(message.mode is ControlMode.FORWARD and message.payload[0] == action
+                   for message in self.cell.control_messages(self._said_before))
+
+    def has_result(self):
+        """Tell whether the robot program has reported the end."""
+        return len(self._results) > self._results_before
+
+
+@lru_cache
+def around_corners(start):
+    """Return the plan around three sides of a square."""
+    return planned(
+        start.state, ((0.0, SIDE, 0.0), (SIDE, SIDE, 0.0), (SIDE, 0.0, 0.0)), 0.25, 2.0,
+        path_tolerance=Tolerance(position=(PATH_TOLERANCE,) * 3,
+                                 twist=(TWIST_TOLERANCE,) * 3 + (-1.0,) * 3),
+        goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3), goal_time_tolerance=SETTLING)
+
+
+class AroundCorners(GoalInTrouble):
+    """Three sides of a square, as motions of the robot."""
+
+    def plan_from(self, start):
+        return around_corners(start)
+
+    def is_in(self, phase):
+        x, y = self.moved()
+        match phase:
+            case 'arming':
+                return self.said(TrajectoryAction.START) and self.begun() == 0
+            case 'first point':
+                return self.begun() == 1 and y > 0.2 * SIDE
+            case 'in a blend':
+                return x > 0.1 * BLEND and y < SIDE - 0.1 * BLEND
+            case 'mid-segment' | 'cancelling':
+                return self.begun() == 2 and x > 0.4 * SIDE
+            case 'last point':
+                return self.begun() == 3 and y < 0.5 * SIDE
+            case 'settling':
+                return self.has_result()
+        raise AssertionError(phase)
