@@ -1,0 +1,94 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Joint positions one small step after the other, as a control cycle needs them.
+
+Where the solution before is known, and the next one is near it, neither all branches have to be
+looked at nor many steps of an iteration taken: Newton's method doubles the exact digits with each,
+of a nominal arm as of a calibrated one. A branch is never left, because a solution that is far
+from the one before is none.
+"""
+
+from __future__ import annotations
+
+from math import asin, cos, sin
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.chain import Arm, Frames, jacobian_at
+from ur_cartesian_driver.kinematics.shape import shape_of
+from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion, Vector3
+from ur_cartesian_driver.motion.primitive import Joints
+
+#: An error of metres and radians whose square is below this leaves one of 1e-10 after the next
+#: step, as long as the arm is not singular to the same degree.
+_ONE_STEP_LEFT = 1e-12
+_MOST_STEPS = 8
+#: A joint that would move farther than this is on its way to another solution [rad].
+_FARTHEST = 0.5
+#: Keeps the normal equations of an arm solvable that is singular to the last digit.
+_DAMPING = 1e-14
+
+
+def track(arm: Arm, T_base_flange: Pose, q_before: Joints) -> Joints | None:
+    """
+    Return the joint positions of a pose next to those of one close by [rad].
+
+    :param q_before: of a pose centimetres away at most.
+    :returns: None where the iteration does not get there: out of reach, or nearly singular.
+    """
+    r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_quaternion(
+        T_base_flange.quaternion)
+    axes = ((r11, r21, r31), (r12, r22, r32), (r13, r23, r33))
+    q = q_before
+    for _ in range(_MOST_STEPS):
+        frames = arm.frames(q)
+        error, facing = _error(frames, T_base_flange.position, axes)
+        square = sum([e * e for e in error])
+        if facing <= 0.0:
+            return None
+        q = _stepped(q, frames, error)
+        if max([abs(a - b) for a, b in zip(q, q_before, strict=True)]) > _FARTHEST:
+            return None
+        if square < _ONE_STEP_LEFT:
+            return q
+    return None
+
+
+def singularity_distances(arm: Arm, q: Joints) -> Vector3:
+    """
+    Return how far wrist [rad], elbow [rad] and shoulder [m] are from their singularities.
+
+    All >= 0: the angle of wrist 2 and of the elbow, and how far the centre of the wrist is in
+    front of the plane of the axes 1 and 2.
+    """
+    shape = shape_of(arm)
+    _, t2, t3, t4, t5, _ = (a + b for a, b in zip(q, shape.offsets, strict=True))
+    shoulder = shape.a2 * cos(t2) + shape.a3 * cos(t2 + t3) + shape.d5 * sin(t2 + t3 + t4)
+    return (asin(min(1.0, abs(sin(t5)))), asin(min(1.0, abs(sin(t3)))), abs(shoulder))
+
+
+def _error(frames: Frames, position: Vector3, axes: tuple[Vector3, Vector3, Vector3]
+           ) -> tuple[list[float], float]:
+    """
+    Return what lacks to a pose: translation [m], sine of the turn (base axes), and 1 + 2 cos.
+
+    The last one is positive up to a third of a turn; beyond, the sine misleads.
+    """
+    ex = ey = ez = facing = 0.0
+    for (ax, ay, az), (bx, by, bz) in zip((frames.x, frames.y, frames.z), axes, strict=True):
+        ex += ay * bz - az * by
+        ey += az * bx - ax * bz
+        ez += ax * by - ay * bx
+        facing += ax * bx + ay * by + az * bz
+    (px, py, pz), (x, y, z) = frames.position, position
+    return [x - px, y - py, z - pz, 0.5 * ex, 0.5 * ey, 0.5 * ez], facing
+
+
+def _stepped(q: Joints, frames: Frames, error: list[float]) -> Joints:
+    """Return q + (J'J + tiny I)^-1 J' error."""
+    jacobian = jacobian_at(frames, frames.position)
+    normal = jacobian.T @ jacobian
+    normal.flat[::7] += _DAMPING
+    a, b, c, d, e, f = np.linalg.solve(normal, jacobian.T @ np.array(error)).tolist()
+    return (q[0] + a, q[1] + b, q[2] + c, q[3] + d, q[4] + e, q[5] + f)
