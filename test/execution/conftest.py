@@ -8,7 +8,7 @@ from math import pi
 
 import pytest
 
-from ur_cartesian_driver.execution import Order, TrajectoryMachine
+from ur_cartesian_driver.execution import order_of, TrajectoryMachine
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robots import robot_model
@@ -57,10 +57,7 @@ class Cell:
         :param instead: a plan that the robot runs while the machine believes in the other.
         :returns: the machine, and the commands of each packet.
         """
-        order = Order(points=len(made.segments), reference=made.reference, duration=made.duration,
-                      T_base_frame=made.goal.T_base_frame,
-                      path_tolerance=made.goal.path_tolerance,
-                      goal_tolerance=made.goal.goal_tolerance)
+        order = order_of(made)
         machine = TrajectoryMachine(order, **settings)
         robot = MotionGenerator(self.arm, CYCLE, made.start)
         robot.T_flange_tcp = self.T_flange_tcp

@@ -22,7 +22,7 @@ class SendControl:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SendPoints:
-    """Send the points ``first`` up to, not including, ``end`` on the trajectory socket."""
+    """Send the records ``first`` up to, not including, ``end`` on the trajectory socket."""
 
     first: int
     end: int

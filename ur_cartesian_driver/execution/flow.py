@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""How many points may be on their way to the robot."""
+"""How many records may be on their way to the robot."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 @dataclass(slots=True)
 class Window:
     """
-    Hands out points so that at most ``size`` are sent and not yet begun.
+    Hands out records so that at most ``size`` are sent and not yet begun.
 
     Everything that was sent has to be read and thrown away by the robot program when a goal is
     cancelled (10 points in each step of the controller), so what is in flight is bounded: 500
@@ -23,9 +23,9 @@ class Window:
 
     def release(self, begun: int) -> tuple[int, int]:
         """
-        Return the range of points that may be sent now, ``(first, end)``, and count it as sent.
+        Return the range of records that may be sent now, ``(first, end)``, and count it as sent.
 
-        :param begun: how many points the robot has begun.
+        :param begun: how many records the robot has begun.
         """
         first = self.sent
         self.sent = max(first, min(self.total, begun + self.size))

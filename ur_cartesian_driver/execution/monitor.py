@@ -117,16 +117,18 @@ class PathTracker:
         """The row of the end of the path."""
         return len(self._rows) - 1
 
-    def update(self, target: Pose, reach: float, begun: int = 0) -> Place:
+    def update(self, target: Pose, reach: float,
+               running: tuple[int, int] | None = None) -> Place:
         """
         Move on to the place nearest to the controller's target.
 
         :param target: pose of the TCP in base.
         :param reach: the longest way that the target can have come since the last call [m].
-        :param begun: how many points the robot program has begun; 0 = unknown.
+        :param running: the points to which the motion leads that the robot program has begun
+            last, and the one before it (-1 = there was none); None = unknown.
         :returns: the new place, never behind the one before.
         """
-        first, end = self._window(reach, begun)
+        first, end = self._window(reach, running)
         self.miss = inf
         if end > first:
             lowest = self.place.fraction if first == self.place.row else 0.0
@@ -199,20 +201,20 @@ class PathTracker:
         row = self.place.row + (1 if self.place.fraction > 0.0 else 0)
         return self._points[min(row, self.last_row)]
 
-    def _window(self, reach: float, begun: int) -> tuple[int, int]:
+    def _window(self, reach: float, running: tuple[int, int] | None) -> tuple[int, int]:
         """Return the rows between which the tool may be."""
         points = self._points
-        if begun > 0:
-            # The program runs the motion to point begun - 1, or is in the blend that leads to it:
-            # what comes before was passed, perhaps between two packets.
-            passed = bisect_left(points, begun - 2) - 1
+        if running is not None:
+            # The program runs that motion, or is in the blend that leads to it: what comes before
+            # was passed, perhaps between two packets.
+            passed = bisect_left(points, running[1]) - 1
             if passed > self.place.row:
                 self.place = Place(passed, 0.0)
         first = self.place.row
         end = bisect_left(self._arc, self._way() + reach + SLACK)
         end = min(max(end, first + 1), self.last_row)
-        if begun > 0:
-            end = min(end, bisect_right(points, begun - 1) - 1)
+        if running is not None:
+            end = min(end, bisect_right(points, running[0]) - 1)
         return first, max(end, first)
 
     def _way(self) -> float:

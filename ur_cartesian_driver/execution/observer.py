@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from math import inf
 
-import numpy as np
-
 from ur_cartesian_driver.execution.monitor import PathTracker, speed
 from ur_cartesian_driver.execution.order import Order
 from ur_cartesian_driver.execution.pace import Pace
+from ur_cartesian_driver.execution.records import Records
 from ur_cartesian_driver.execution.states import Signal
 from ur_cartesian_driver.execution.tolerances import Watch
 from ur_cartesian_driver.motion.events import Progress
@@ -34,14 +33,16 @@ MAX_PLAN_DEVIATION = (0.002, 0.02)
 class Observer:
     """The newest packet, the place on the path, and what is held against them."""
 
-    def __init__(self, order: Order, max_plan_deviation: tuple[float, float]) -> None:
+    def __init__(self, order: Order, records: Records,
+                 max_plan_deviation: tuple[float, float]) -> None:
         """
         Prepare for an order.
 
+        :param records: those of the order.
         :param max_plan_deviation: how far the controller's own target may be from the plan [m],
             [rad]; 0 = any way, any angle.
         """
-        self._order = order
+        self._order, self._records = order, records
         self._tracker = PathTracker(order.reference)
         self._pace = Pace(order.reference) if order.knows_pace else None
         self._path_watch = Watch(order.path_tolerance, order.T_base_frame)
@@ -85,11 +86,12 @@ class Observer:
 
     def _follow(self, before: RobotState | None, state: RobotState, passed: float) -> None:
         """Find the place on the path."""
-        begun, fastest = self.begun(state), speed(state.target_tcp_twist)
+        begun, fastest = self._motions_begun(state), speed(state.target_tcp_twist)
         self._under_way = self._under_way or begun > 0 or fastest > 0.0
         if before is not None:  # it may have braked since
             fastest = max(fastest, speed(before.target_tcp_twist))
-        self._tracker.update(state.target_tcp_pose, 2.0 * passed * fastest, begun)
+        self._tracker.update(state.target_tcp_pose, 2.0 * passed * fastest,
+                             self._records.running(begun))
 
     # ---- how far it is ------------------------------------------------------------------------
 
@@ -98,8 +100,13 @@ class Observer:
         return self._tracker.waypoint()
 
     def begun(self, state: RobotState) -> int:
+        """Return how many records of this goal the robot has begun at least."""
+        return max(self._records.begun(self._motions_begun(state)),
+                   self._records.before(self.waypoint()))
+
+    def _motions_begun(self, state: RobotState) -> int:
         """
-        Return how many points of this goal the robot has begun; 0 = unknown.
+        Return how many motions of this goal the robot has begun; 0 = unknown.
 
         The register keeps the count of the goal before until the robot program has read START, so
         it is believed once it changes.
@@ -117,15 +124,13 @@ class Observer:
         """
         Return a report about the newest packet.
 
-        :param sent: how many points were sent to the robot.
+        :param sent: how many records were sent to the robot.
         :param at_end: whether the arm should be at the end, and not on its way.
         """
         state, order = self.latest, self._order
         assert state is not None
         seen = seen_at(state, order.T_tcp_controlled)
         time = self._tracker.time()
-        buffered_from = min(sent, order.points)
-        last = int(np.searchsorted(order.reference.point, buffered_from - 1, side='right')) - 1
         desired = self._tracker.pose() if at_end else self._desired(state)
         return Progress(
             waypoint=self._tracker.waypoint(),
@@ -140,8 +145,8 @@ class Observer:
             time=time,
             time_remaining=max(0.0, order.duration - time),
             speed_scaling=state.speed_scaling,
-            points_received=order.points,
-            buffered=max(0.0, float(order.reference.time[max(last, 0)]) - time),
+            points_received=self._records.points,
+            buffered=max(0.0, self._records.end(sent) - time),
             timestamp=state.timestamp)
 
     def _desired(self, state: RobotState) -> Pose:

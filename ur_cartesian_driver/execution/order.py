@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.goal import ExecutionMode, Tolerance
 from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.plan import Plan, ReferencePath
+from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.primitive import OptimoveJ, OptimoveL, Spline, SwitchOutput
 from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
@@ -48,8 +49,26 @@ class Order:
     waypoint: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
     #: (records,) which of them are motions: these the robot program counts; empty = all.
     is_motion: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
+    #: (records,) when each is planned to end [s]; outputs: as the motion that they belong to.
+    #: Empty = where the reference arrives at their points.
+    ends: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    #: (records,) when the robot program asks for the record behind it [s]: where it ends, or
+    #: where its blend begins. Empty = at ``ends``.
+    asks: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
     #: SERVO: the joints over time.
     spline: JointSpline | None = None
+
+    def __post_init__(self) -> None:
+        """Fill in what is left empty."""
+        def fill(name: str, value: NDArray[Any]) -> None:
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, value)
+
+        fill('waypoint', np.arange(self.points, dtype=np.int32))
+        fill('is_motion', np.ones(self.points, dtype=np.bool_))
+        rows = np.searchsorted(self.reference.point, self.waypoint, side='right') - 1
+        fill('ends', self.reference.time[np.maximum(rows, 0)])
+        fill('asks', self.ends)
 
 
 def order_of(plan: Plan, dialect: Dialect = NEWEST) -> Order:
@@ -58,6 +77,9 @@ def order_of(plan: Plan, dialect: Dialect = NEWEST) -> Order:
     times = goal.waypoints[-1].time
     waypoints = [segment.waypoint for segment in plan.segments
                  for _ in range(1 + len(segment.outputs))]
+    ends = np.cumsum([segment.duration for segment in plan.segments])
+    asks = ends - [_left_at_blend(segment) for segment in plan.segments]
+    records = [1 + len(segment.outputs) for segment in plan.segments]
     pieces = [segment.primitive for segment in plan.segments
               if isinstance(segment.primitive, Spline)]
     return Order(
@@ -73,5 +95,15 @@ def order_of(plan: Plan, dialect: Dialect = NEWEST) -> Order:
         execution=plan.execution, waypoint=np.array(waypoints, dtype=np.int32),
         is_motion=np.array([not isinstance(instruction, SwitchOutput)
                             for instruction in plan.instructions]),
+        ends=np.repeat(ends, records), asks=np.repeat(asks, records),
         spline=JointSpline.of(plan.start, pieces)
         if plan.execution is ExecutionMode.SERVO else None)
+
+
+def _left_at_blend(segment: PlannedSegment) -> float:
+    """Return how long before the end of a motion its blend begins, rather too long [s]."""
+    radius = 0.0 if isinstance(segment.primitive, Spline) else segment.primitive.blend_radius
+    if radius <= 0.0:
+        return 0.0
+    # The tool is slower before than in the blend, but for the one that it comes out of.
+    return segment.duration * min(1.0, radius / max(segment.length, radius))

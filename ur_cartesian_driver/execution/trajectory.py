@@ -27,6 +27,7 @@ from ur_cartesian_driver.execution.commands import (
 from ur_cartesian_driver.execution.flow import Window
 from ur_cartesian_driver.execution.observer import MAX_PLAN_DEVIATION, Observer
 from ur_cartesian_driver.execution.order import Order
+from ur_cartesian_driver.execution.records import Records
 from ur_cartesian_driver.execution.states import (
     HOLDS,
     NO_STOP,
@@ -89,7 +90,8 @@ class TrajectoryMachine:
         #: The TCP that was set for this goal. Where it is not ``returned`` at the end, whoever
         #: carries out the commands has to see to it.
         self.loan: TcpLoan | None = None
-        self._observer = Observer(order, max_plan_deviation)
+        self._records = Records(order)
+        self._observer = Observer(order, self._records, max_plan_deviation)
         self._window = Window(order.points)
         self._feedback_period = feedback_period
         self._next_report = -inf
@@ -328,7 +330,7 @@ class TrajectoryMachine:
 
     def _sentence(self, code: ErrorCode) -> str:
         if code is ErrorCode.SUCCESSFUL:
-            points = self.order.points
+            points = self._records.points
             what = 'The point was' if points == 1 else f'All {points} points were'
             return f'{what} executed in {self._observer.scaled_time:.3f} s.'
         where = f'on the way to point {self._observer.waypoint()}'
@@ -343,7 +345,7 @@ class TrajectoryMachine:
         """Return the points to send and the progress to report after a packet."""
         if self.state is State.ENDED:
             return []
-        commands = self._release(max(self._observer.begun(state), self._observer.waypoint()))
+        commands = self._release(self._observer.begun(state))
         if now >= self._next_report and self._shows_goal():
             self._next_report = now + self._feedback_period
             commands.append(self._progress_report())
