@@ -36,6 +36,7 @@ from ur_cartesian_driver.driver.channel import (
 )
 from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.driver.motion import Motion, OnProgress, Run
+from ur_cartesian_driver.driver.recorder import about
 from ur_cartesian_driver.driver.services import RobotServices
 from ur_cartesian_driver.execution import order_of, same_tcp
 from ur_cartesian_driver.execution.trajectory import STOP_BOUND
@@ -260,7 +261,9 @@ class Driver(RobotServices):
             self._runs[motion.number] = run
             # Still under the lock: whoever finds the motion may cancel it, and that has to come
             # behind its start.
-            self._send(StartMotion(motion=motion.number, points=points, order=order))
+            self._send(StartMotion(
+                motion=motion.number, points=points, order=order,
+                about=about(plan, self.options) if self.config.record_directory else ''))
         return motion
 
     def make_way(self, by: str = 'a newer motion') -> bool:

@@ -60,6 +60,8 @@ class StartMotion:
     motion: int
     order: Order
     points: bytes
+    #: What the recording is to say of the plan, as JSON; empty = nothing.
+    about: str = ''
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -28,6 +28,10 @@ class DriverConfig(LinkSettings):
     feedback_rate: float = 25.0
     #: The arm is stopped when the owner of the driver is silent for that long [s].
     node_timeout: float = 5.0
+    #: Where each motion is recorded, a file each (doc/recordings.md); empty = nowhere.
+    record_directory: str = ''
+    #: What recordings may take together [MB]; the oldest ones are removed.
+    record_max_size: float = 2000.0
     #: ``process`` (robust) or ``thread`` (light: tests and scripts).
     robot_loop: str = 'process'
 
@@ -44,7 +48,7 @@ class DriverConfig(LinkSettings):
         if self.after_robot_stop not in ('abort', 'continue'):
             raise ValueError(f'after_robot_stop is {self.after_robot_stop!r}, it has to be '
                              "'abort' or 'continue'.")
-        self._require_positive('feedback_rate', 'node_timeout')
+        self._require_positive('feedback_rate', 'node_timeout', 'record_max_size')
         for name in ('max_plan_deviation', 'max_plan_deviation_angle',
                      'max_calibration_difference'):
             if not getattr(self, name) >= 0.0:

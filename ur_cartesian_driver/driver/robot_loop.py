@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 import logging
@@ -47,6 +48,7 @@ from ur_cartesian_driver.driver.channel import (
     TcpReturned,
     unpack,
 )
+from ur_cartesian_driver.driver.recorder import head_of, Recorder
 from ur_cartesian_driver.driver.snapshot import StateMemory
 from ur_cartesian_driver.execution import (
     Command,
@@ -73,6 +75,7 @@ from ur_cartesian_driver.motion.events import (
     Tick,
 )
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.protocol.trajectory import POINT_SIZE
 from ur_cartesian_driver.robot.call_desk import CallDesk
@@ -95,6 +98,8 @@ EXPLAINED = frozenset({
 #: so long it is waited for [s].
 REASONED = frozenset({ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP})
 REASON_TIMEOUT = 0.05
+#: How long the end waits until the recording of the last motion is a file [s].
+RECORD_TIMEOUT = 1.0
 #: How many calls are carried out at a time.
 MOST_CALLS = 32
 #: What is out of date soon is left out while so much waits for an owner that does not read
@@ -125,8 +130,11 @@ class RobotLoop:
         self._link = RobotLink(
             config, on_state=self._keep_state, on_event=self._handle_event,
             on_status=self._status_changed, on_geometry=self._geometry_known,
-            on_signals=lambda signals: self._notify(SignalsChanged(signals=signals)),
+            on_signals=self._signals_changed,
             on_log=self._log, may_upload=configure.may_upload)
+        self._recorder = Recorder(
+            config.record_directory, config.record_max_size, partial(
+                _later, asyncio.get_running_loop(), self._log, logging.WARNING))
         self._desk = CallDesk(config, config.dashboard_port, self._link)
         self._calls: set[asyncio.Task[None]] = set()
         self._connection = ConnectionState.DISCONNECTED
@@ -159,6 +167,7 @@ class RobotLoop:
                 self._link.return_tcp(self._loan.T_flange_before)
             self._link.close()
             self._memory.clear()
+            self._recorder.close(RECORD_TIMEOUT)  # the arm must not wait for a disk
 
     async def _serve(self, requests: asyncio.StreamReader) -> None:
         """Handle requests until there are no more."""
@@ -180,6 +189,7 @@ class RobotLoop:
                 await self._start(request)
             case CancelMotion(motion=motion, preempted_by=by):
                 if motion == self._motion:
+                    self._recorder.note('cancel', by and f'preempted by {by}')
                     self._handle_event(PreemptRequested(by=by) if by else CancelRequested())
             case ResendProgram():
                 self._link.upload_program()
@@ -213,6 +223,7 @@ class RobotLoop:
         self._machine = machine
         self._link.set_busy(True)
         assert self._latest is not None  # else the link is not ready
+        self._record(request)
         self._carry_out(machine.start(self._latest))
 
     def _tcp_changed(self, order: Order) -> str:
@@ -222,6 +233,20 @@ class RobotLoop:
             return ''
         return ('The TCP of the robot was changed after the goal had been planned; send the goal '
                 'again.')
+
+    def _record(self, request: StartMotion) -> None:
+        """Begin the recording of a motion, where motions are recorded."""
+        if not self._config.record_directory or self._latest is None:
+            return
+        status = self._link.status
+        self._recorder.start(request.order, head_of(
+            request.order, of_owner=request.about, parameters=self._config, robot={
+                'model': status.robot_model, 'polyscope_version': status.polyscope_version,
+                'serial_number': status.serial_number}), self._latest)
+
+    def _signals_changed(self, signals: Signals) -> None:
+        self._recorder.take_signals(signals)
+        self._notify(SignalsChanged(signals=signals))
 
     # ---- calls --------------------------------------------------------------------------------
 
@@ -256,9 +281,6 @@ class RobotLoop:
     # ---- events of the robot ------------------------------------------------------------------
 
     def _keep_state(self, state: RobotState) -> None:
-        now = self._now()
-        self._longest_gap = max(self._longest_gap, now - self._last_report)
-        self._last_report = now
         self._latest, self._is_shared = state, False
 
     def _share_state(self) -> None:
@@ -271,6 +293,10 @@ class RobotLoop:
         if not self._is_shared and self._latest is not None:
             self._is_shared = True
             self._memory.write(self._latest)
+            self._recorder.take(self._latest)
+            now = self._now()
+            self._longest_gap = max(self._longest_gap, now - self._last_report)
+            self._last_report = now
 
     def _handle_event(self, event: Event) -> None:
         """Feed the machine, and do what it answers."""
@@ -331,6 +357,7 @@ class RobotLoop:
             outcome = replace(outcome, text=text, report=(
                 *outcome.report, *(f'why: {line}' for line in self._link.chain())))
             self._link.explain(text)
+        self._recorder.end(outcome)
         self._notify(replace(ended, outcome=outcome))
 
     def _end_motion(self, text: str) -> None:
@@ -420,6 +447,13 @@ class RobotLoop:
 
     def _now(self) -> float:
         return asyncio.get_running_loop().time()
+
+
+def _later(loop: asyncio.AbstractEventLoop, function: Callable[..., None],
+           *arguments: object) -> None:
+    """Have the loop call a function, from another thread; nothing, if the loop has ended."""
+    with suppress(RuntimeError):
+        loop.call_soon_threadsafe(function, *arguments)
 
 
 async def _apart(size: int, function: Callable[..., T], *arguments: object) -> T:

@@ -266,6 +266,11 @@ DECLARATIONS: tuple[Declaration, ...] = (
     Declaration('diagnostics_rate', 'How often /diagnostics is published [Hz]; 0: never.',
                 0.0, 50.0),
     Declaration('feedback_rate', 'How often a goal sends feedback [Hz].', 0.5, 500.0),
+    # -- what is recorded
+    Declaration('record_directory', 'Directory in which each motion is recorded, a file each, to '
+                'be drawn by `ur-cartesian plot`; empty: nothing is.'),
+    Declaration('record_max_size', 'What the recordings may take together [MB]; the oldest ones '
+                'are removed, and one alone ends at half of it.', 1.0, 1e6),
     # -- network
     Declaration('rtde_port', 'Port of RTDE on the robot.', *_PORT),
     Declaration('primary_port', 'Port of the primary interface on the robot.', *_PORT),

@@ -1,0 +1,257 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Records every motion: a file each, written while it runs.
+
+Between two packets there are 2 ms, and disks take longer than that whenever they like. So a packet
+is put into memory that is there already (a few microseconds), and a thread of its own writes what
+is full. There is a fixed number of such pieces: a disk that is too slow loses rows, which the
+recording says, and neither time of the motion nor memory. A recording that cannot be written ends
+with one sentence, and the motion goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, fields
+from datetime import datetime, UTC
+import json
+from math import nan
+from pathlib import Path
+from queue import Empty, SimpleQueue
+import threading
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.driver import recording_format as disk
+from ur_cartesian_driver.driver.recording_folder import Folder
+from ur_cartesian_driver.execution import Order
+from ur_cartesian_driver.motion.events import Outcome
+from ur_cartesian_driver.motion.plan import Plan, ReferencePath
+from ur_cartesian_driver.motion.signals import Signals
+from ur_cartesian_driver.motion.state import RobotState
+
+#: Rows of a piece of memory, how many there are, and the longest time until one is written [s]:
+#: what a killed process loses.
+PIECE, PIECES, PERIOD = 256, 8, 0.5
+#: So much may wait for the disk; notes and pieces of the plan beyond are left out.
+MOST_WAITING = 1000
+#: Lines of a plan's report that are kept.
+MOST_LINES = 1000
+MEGABYTE = 1_000_000
+
+
+def about(plan: Plan, options: object) -> str:
+    """Return what only the owner of the plan knows of it, as JSON: its report, the options."""
+    lines = plan.report
+    if len(lines) > MOST_LINES:
+        lines = (*lines[:MOST_LINES], f'... and {len(lines) - MOST_LINES} more lines')
+    return json.dumps({'report': lines, 'frame_id': plan.goal.frame_id,
+                       'controlled_frame': plan.goal.controlled_frame,
+                       'planning': _parameters(options)}, default=str)
+
+
+def head_of(order: Order, *, robot: Mapping[str, str], parameters: object,
+            of_owner: str = '') -> dict[str, Any]:
+    """
+    Return the metadata of a motion that begins now.
+
+    :param robot: what is known of the robot.
+    :param parameters: those of the driver, a dataclass.
+    :param of_owner: what :func:`about` has said.
+    """
+    known = json.loads(of_owner) if of_owner else {}
+    planning = known.pop('planning', {})
+    return {
+        'format': disk.FORMAT, 'created': datetime.now(UTC).isoformat(timespec='milliseconds'),
+        'robot': dict(robot), 'execution': order.execution.name,
+        'points': int(order.reference.point[-1]) + 1 if len(order.reference.point) else 0,
+        'duration': order.duration, 'due': order.due,
+        'T_base_frame': order.T_base_frame.row(),
+        'T_flange_tcp': (order.T_flange_tcp or order.T_flange_active).row(),
+        'T_tcp_controlled': order.T_tcp_controlled.row(),
+        'path_tolerance': asdict(order.path_tolerance),
+        'goal_tolerance': asdict(order.goal_tolerance),
+        **known, 'parameters': {**_parameters(parameters), **planning},
+        'outcome': None, 'rows_left_out': 0, 'trouble': ''}
+
+
+class Recorder:
+    """Takes what happens, from one thread; writes it in another."""
+
+    def __init__(self, directory: str, max_size: float, warn: Callable[[str], None]) -> None:
+        """
+        Prepare; nothing happens before :meth:`start`.
+
+        :param directory: where the files go; empty = nothing is recorded.
+        :param max_size: of all of them together [MB]; the oldest ones are removed.
+        :param warn: takes a sentence, on the writer's thread.
+        """
+        self._directory, self._max_size, self._warn = directory, max_size * MEGABYTE, warn
+        self._said = ''
+        self._thread: threading.Thread | None = None
+        self._jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+        #: The motion that runs: its folder, belonging to the writer but for ``left_out``.
+        self._folder: Folder | None = None
+        # Memory for rows: the piece that is being filled, how far, and those that are free.
+        self._piece, self._at = bytearray(), 0
+        self._free: SimpleQueue[bytearray] = SimpleQueue()
+        #: Of the motion: when it began by the controller's clock, the newest packet from then on,
+        #: and when the piece is handed over at the latest [s].
+        self._begin = self._time = self._due = 0.0
+        self._digital, self._analog = -1, (nan, nan)
+        #: The count of the goal before, as long as the robot reports it.
+        self._stale_begun: int | None = None
+        self._begun, self._waypoint = 0, -1
+        self._waypoints: NDArray[np.int32] = np.empty(0, dtype=np.int32)
+
+    # ---- what happens -------------------------------------------------------------------------
+
+    def start(self, order: Order, head: dict[str, Any], state: RobotState) -> None:
+        """
+        Begin the recording of a motion.
+
+        :param head: the metadata, see :func:`head_of`.
+        :param state: the newest packet: time 0 is its time.
+        """
+        if not self._directory:
+            return
+        if self._thread is None:
+            self._begin_writing()
+        self._folder = folder = Folder(
+            Path(self._directory).expanduser(), head, self._max_size, self._say)
+        self._begin, self._time, self._due, self._at = state.timestamp, 0.0, PERIOD, 0
+        self._stale_begun, self._begun, self._waypoint = state.points_begun, 0, -1
+        self._waypoints = np.empty(0, dtype=np.int32)
+        self._do(folder, folder.open)
+        waypoints = order.waypoint[order.is_motion] if len(order.waypoint) else \
+            np.arange(order.points, dtype=np.int32)
+        self.extend(order.reference, waypoints)
+        self.note('start', f"{head['execution']}, {head['points']} points")
+        self.take(state)
+
+    def extend(self, reference: ReferencePath, waypoints: NDArray[np.int32]) -> None:
+        """
+        Take the planned path, or a piece that continues it.
+
+        :param waypoints: the waypoint to which each motion leads that comes with the piece.
+        """
+        if (folder := self._folder) is None:
+            return
+        rows = np.empty(len(reference.time), dtype=disk.PLANNED)
+        rows['time'], rows['pose'] = reference.time, reference.poses
+        rows['point'] = reference.point
+        self._waypoints = np.concatenate((self._waypoints, waypoints))
+        self._do(folder, lambda: folder.write_plan(rows.tobytes(), len(rows)))
+
+    def take(self, state: RobotState, lag: float = nan, buffered: float = nan) -> None:
+        """
+        Take a packet.
+
+        :param lag: of the arm behind what it is sent [s]; NaN = unknown.
+        :param buffered: motion on the robot's side that has not begun [s].
+        """
+        if (folder := self._folder) is None:
+            return
+        if state.points_begun != self._stale_begun and (
+                state.points_begun != self._begun or self._stale_begun is not None):
+            self._take_begun(state.points_begun)
+        self._time = time = state.timestamp - self._begin
+        disk.ROW.pack_into(
+            self._piece, self._at, time,
+            *state.actual_tcp_pose.row(), *state.target_tcp_pose.row(),
+            *state.actual_tcp_twist, *state.target_tcp_twist,
+            *state.actual_q, *state.target_q, *state.actual_qd, *state.target_qd,
+            lag, buffered, state.speed_scaling, state.target_speed_fraction,
+            *self._analog, self._digital, self._begun, self._waypoint,
+            state.robot_mode, state.safety_mode, state.runtime_state)
+        self._at += disk.ROW.size
+        if self._at == len(self._piece) or time >= self._due:
+            self._hand_over(folder)
+
+    def take_signals(self, signals: Signals) -> None:
+        """Take the newest outputs."""
+        out = signals.outputs
+        flags = (*out.standard, *out.configurable, *out.tool)
+        self._digital = sum(1 << i for i, flag in enumerate(flags) if flag)
+        self._analog = (signals.analog_outputs[0].value, signals.analog_outputs[1].value)
+
+    def note(self, kind: str, text: str) -> None:
+        """Take an event that no column shows."""
+        if (folder := self._folder) is not None:
+            event = self._time, kind, text
+            self._do(folder, lambda: folder.write_note(event))
+
+    def end(self, outcome: Outcome) -> None:
+        """End the recording; its file is there soon after."""
+        if (folder := self._folder) is None:
+            return
+        self._hand_over(folder)
+        self.note('end', f'{outcome.code.name}: {outcome.text}')
+        self._folder = None
+        known = {'code': outcome.code.value, 'name': outcome.code.name, 'text': outcome.text,
+                 'report': outcome.report}
+        self._do(folder, lambda: folder.close(known), is_last=True)
+
+    def close(self, timeout: float) -> None:
+        """Wait until everything is written, so long [s]; what is not then stays a folder."""
+        thread, self._thread = self._thread, None
+        if thread is not None:
+            self._jobs.put(None)
+            thread.join(timeout)
+
+    # ---- inside -------------------------------------------------------------------------------
+
+    def _take_begun(self, begun: int) -> None:
+        """Look up where the robot is on its way to."""
+        self._stale_begun, self._begun = None, begun
+        self._waypoint = int(self._waypoints[begun - 1]) if 0 < begun <= len(
+            self._waypoints) else -1
+
+    def _hand_over(self, folder: Folder) -> None:
+        """Have the rows written, and go on in another piece of memory."""
+        piece, used = self._piece, self._at
+        self._at, self._due = 0, self._time + PERIOD
+        try:
+            self._piece = self._free.get_nowait()
+        except Empty:  # all wait for the disk: these rows are lost
+            folder.left_out += used // disk.ROW.size
+            return
+
+        def write() -> None:
+            folder.do(lambda: folder.write_rows(memoryview(piece)[:used]))
+            self._free.put(piece)
+
+        self._jobs.put(write)  # of these there are no more than pieces
+
+    def _do(self, folder: Folder, work: Callable[[], None], is_last: bool = False) -> None:
+        """Have something done by the writer, unless too much waits already."""
+        if is_last or self._jobs.qsize() < MOST_WAITING:
+            self._jobs.put(lambda: folder.do(work))
+
+    def _begin_writing(self) -> None:
+        size = PIECE * disk.ROW.size
+        self._piece = bytearray(size)
+        for _ in range(PIECES - 1):
+            self._free.put(bytearray(size))
+        self._thread = threading.Thread(target=self._write, name='recorder', daemon=True)
+        self._thread.start()
+
+    def _write(self) -> None:
+        """Do what is to be done, until there is nothing more to come."""
+        while (job := self._jobs.get()) is not None:
+            job()
+
+    def _say(self, sentence: str) -> None:
+        """Say what is wrong; once, not with each motion."""
+        if sentence != self._said:
+            self._said = sentence
+            self._warn(sentence)
+
+
+def _parameters(options: object) -> dict[str, Any]:
+    """Return the fields of a dataclass that JSON can hold."""
+    return {f.name: value for f in fields(options)  # type: ignore[arg-type]
+            if isinstance(value := getattr(options, f.name), bool | int | float | str | tuple)}

@@ -1,0 +1,151 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The folder into which a running motion is recorded, and the room that recordings take.
+
+All of it may take as long as the disk likes, so nothing of it is called by the robot loop itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from datetime import datetime
+import fcntl
+import json
+from pathlib import Path
+import re
+from typing import Any
+
+from ur_cartesian_driver.driver import recording_format as disk
+
+#: Names of recordings; other files in the directory are nobody's business.
+_OURS = re.compile(r'\d{8}-\d{6}-\d{3}_[a-z]+_\d+_points(_\d+)?\.(npz|part)')
+
+
+def name_of(head: dict[str, Any]) -> str:
+    """Return the name of a recording, from when and what it is: they sort by time."""
+    begun = datetime.fromisoformat(head['created'])
+    return (f'{begun:%Y%m%d-%H%M%S}-{begun.microsecond // 1000:03d}_'
+            f"{head['execution'].lower()}_{head['points']}_points")
+
+
+class Folder:
+    """One motion on its way to the disk; once something failed it only forgets what it is told."""
+
+    def __init__(self, directory: Path, head: dict[str, Any], max_size: float,
+                 say: Callable[[str], None]) -> None:
+        """
+        Prepare; nothing is written before :meth:`open`.
+
+        :param max_size: of all recordings together [bytes]; a motion may take half of it.
+        :param say: takes a sentence when something is wrong.
+        """
+        self._directory, self._head, self._max_size, self._say = directory, head, max_size, say
+        self._is_broken = False
+        #: How many rows were lost because the disk was too slow.
+        self.left_out = 0
+
+    def open(self) -> None:
+        """Make room, and the files."""
+        self._directory.mkdir(parents=True, exist_ok=True)
+        keep_within(self._directory, self._max_size / 2.0)
+        self._path = _new(self._directory / f'{name_of(self._head)}{disk.PART}')
+        self._rows = disk.GrowingArray(self._path / disk.ROWS, disk.EXECUTED)
+        # Says that we live; it goes with the process, however that ends.
+        fcntl.flock(self._rows.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        self._plan = disk.GrowingArray(self._path / disk.PLAN, disk.PLANNED)
+        self._notes = open(self._path / disk.NOTES, 'xb', buffering=0)  # noqa: SIM115
+        self._write_head()
+
+    def write_rows(self, rows: memoryview) -> None:
+        """Append packets, until there is no room for more."""
+        if self._head['trouble']:
+            return
+        if (self._rows.count + 1) * disk.ROW.size > self._max_size / 2.0:
+            self._head['trouble'] = (
+                f'The recording of this motion ends after {self._rows.count} packets, half of '
+                f'record_max_size = {self._max_size / 1e6:g} MB.')
+            self._say(self._head['trouble'])
+            return
+        self._rows.append(rows, len(rows) // disk.ROW.size)
+
+    def write_plan(self, rows: bytes, count: int) -> None:
+        """Append samples of the planned path."""
+        self._plan.append(rows, count)
+
+    def write_note(self, event: disk.Event) -> None:
+        """Append a note."""
+        time, kind, text = event
+        self._notes.write(json.dumps([time, kind, text[:disk.MOST_TEXT]]).encode() + b'\n')
+
+    def close(self, outcome: dict[str, Any]) -> None:
+        """Make one file out of all this."""
+        self._head.update(outcome=outcome, rows_left_out=self.left_out)
+        self._write_head()
+        self._close_files()
+        disk.finish(self._path)
+
+    def do(self, work: Callable[[], None]) -> None:
+        """Do one of the above, and say so if it fails."""
+        if self._is_broken:
+            return
+        try:
+            work()
+        except (OSError, ValueError) as error:
+            self._is_broken = True
+            self._close_files()
+            reason = error.strerror if isinstance(error, OSError) else error
+            self._say(f'A motion is not recorded, or not to its end: {reason} '
+                      f'({self._directory}); see to record_directory.')
+
+    def _write_head(self) -> None:
+        (self._path / disk.HEAD).write_text(json.dumps(self._head), encoding='utf-8')
+
+    def _close_files(self) -> None:
+        for name in ('_rows', '_plan', '_notes'):
+            if hasattr(self, name):
+                getattr(self, name).close()
+
+
+def _new(path: Path) -> Path:
+    """Make a folder; one of that name may be there, of another arm for example."""
+    for number in range(1, 100):
+        found = path if number == 1 else path.with_stem(f'{path.stem}_{number}')
+        if found.with_suffix('.npz').exists():
+            continue
+        with suppress(FileExistsError):
+            found.mkdir()
+            return found
+    raise FileExistsError(f'there are many recordings of the name {path.stem} already')
+
+
+# ---- what is there already ------------------------------------------------------------------
+
+
+def keep_within(directory: Path, room: float) -> None:
+    """
+    Finish what a process that was killed has left, then remove the oldest recordings.
+
+    :param room: what they may take together [bytes].
+    """
+    ours = sorted(path for path in directory.iterdir() if _OURS.fullmatch(path.name))
+    for path in ours:
+        if path.suffix == disk.PART and not _is_written(path):
+            with suppress(OSError, ValueError):
+                disk.finish(path)
+    ours = [path for path in sorted(directory.glob('*.npz')) if _OURS.fullmatch(path.name)]
+    sizes = [path.stat().st_size for path in ours]
+    while ours and sum(sizes) > room:
+        ours.pop(0).unlink(missing_ok=True)
+        sizes.pop(0)
+
+
+def _is_written(folder: Path) -> bool:
+    """Tell whether somebody is writing it, or nobody can tell."""
+    try:
+        with open(folder / disk.ROWS, 'rb') as rows:
+            fcntl.flock(rows, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    return False

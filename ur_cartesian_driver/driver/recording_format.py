@@ -1,0 +1,242 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How an execution lies on disk: what a row of it holds, and the files.
+
+While a motion runs there is a folder ``NAME.part``, whose files are complete at every moment: rows
+in ``.npy`` files that grow, notes in JSON lines. So what is there when the process is killed can
+be read by anybody. When the motion has ended the folder becomes one file ``NAME.npz``, with an
+array for each column. Neither needs more memory than a part of it, however long the motion was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+import json
+from os import replace as replace_file
+from pathlib import Path
+import shutil
+import struct
+from typing import Any, BinaryIO, TypeAlias
+import zipfile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
+
+#: Of the members of a file; counts up when one of them changes its meaning.
+FORMAT = 1
+
+#: One packet of the robot: names, shapes and order of the columns. Units and frames:
+#: doc/recordings.md.
+EXECUTED = np.dtype([
+    ('time', '<f8'),
+    ('actual_pose', '<f8', 7), ('target_pose', '<f8', 7),
+    ('actual_twist', '<f8', 6), ('target_twist', '<f8', 6),
+    ('actual_q', '<f8', 6), ('target_q', '<f8', 6),
+    ('actual_qd', '<f8', 6), ('target_qd', '<f8', 6),
+    ('lag', '<f8'), ('buffered', '<f8'), ('speed_scaling', '<f8'), ('slider', '<f8'),
+    ('analog_output', '<f8', 2),
+    ('digital_output', '<i4'), ('points_begun', '<i4'), ('waypoint', '<i4'),
+    ('robot_mode', '<i4'), ('safety_mode', '<i4'), ('runtime_state', '<i4')])
+#: The same for :mod:`struct`, which fills a row faster than numpy does.
+ROW = struct.Struct('<57d6i')
+#: One sample of the planned path.
+PLANNED = np.dtype([('time', '<f8'), ('pose', '<f8', 7), ('point', '<i4')])
+
+#: Files of a folder, and the end of its name.
+PART = '.part'
+HEAD, ROWS, PLAN, NOTES = 'metadata.json', 'executed.npy', 'planned.npy', 'events.jsonl'
+#: So many rows are looked at together.
+CHUNK = 8192
+#: So many events are kept. A path of a million points begins a million of them; the column
+#: ``waypoint`` has them all.
+MOST_EVENTS = 10_000
+#: Longest text of an event; whole sentences are in the metadata.
+MOST_TEXT = 120
+
+#: Time since the start [s], what kind of event, and a few words.
+Event: TypeAlias = tuple[float, str, str]
+
+#: The digital outputs by bit.
+OUTPUT_NAMES = (*(f'standard digital output {i}' for i in range(8)),
+                *(f'configurable digital output {i}' for i in range(8)),
+                *(f'tool digital output {i}' for i in range(2)))
+
+
+class GrowingArray:
+    """A ``.npy`` file to which rows are appended; it can be loaded at every moment."""
+
+    def __init__(self, path: Path, dtype: np.dtype[Any]) -> None:
+        """
+        Make the file, with no rows.
+
+        :raises OSError: it cannot be written, or exists.
+        """
+        self._dtype = dtype
+        self.count = 0
+        # Unbuffered: what could not be written must not be tried again when it is closed.
+        self.file = open(path, 'xb', buffering=0)  # noqa: SIM115
+        self._write(_npy_header(dtype, (0,)))
+
+    def append(self, rows: bytes | memoryview, count: int) -> None:
+        """
+        Append rows.
+
+        They count only when all of them are there: a write that fails leaves what was before.
+
+        :raises OSError: the disk is full, for example.
+        """
+        start = len(_npy_header(self._dtype, (self.count,)))
+        self.file.seek(start + self.count * self._dtype.itemsize)
+        self._write(rows)
+        self.file.seek(0)
+        self._write(_npy_header(self._dtype, (self.count + count,)))
+        self.count += count
+
+    def close(self) -> None:
+        """Close the file."""
+        self.file.close()
+
+    def _write(self, data: bytes | memoryview) -> None:
+        view = memoryview(data).cast('B')
+        while len(view):
+            view = view[self.file.write(view):]
+
+
+def _npy_header(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
+    """Return the head of a ``.npy`` file (version 1.0), as long for every number of rows."""
+    sizes = ''.join(f'{size:>12},' for size in shape)
+    descr = dtype.descr if dtype.names else dtype.str
+    text = f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': ({sizes}), }}"
+    fill = -(10 + len(text) + 1) % 64
+    body = text.encode('latin1') + b' ' * fill + b'\n'
+    return b'\x93NUMPY\x01\x00' + struct.pack('<H', len(body)) + body
+
+
+# ---- events ---------------------------------------------------------------------------------
+
+
+def events_of(rows: NDArray[np.void]) -> list[Event]:
+    """
+    Return what changed from packet to packet: points begun, outputs, slider, program, modes.
+
+    :param rows: of the type :data:`EXECUTED`, may be a file in memory.
+    """
+    found: list[Event] = []
+    for first in range(0, len(rows), CHUNK):
+        part = rows[max(0, first - 1):first + CHUNK]
+        found += sorted(_changes(part), key=lambda event: event[0])
+        if len(found) > MOST_EVENTS:
+            last = found[MOST_EVENTS - 1][0]
+            return [*found[:MOST_EVENTS - 1],
+                    (last, 'more', 'more events follow, which the columns show')]
+    return found
+
+
+def _changes(part: NDArray[np.void]) -> Iterator[Event]:
+    for name, says in _SAYINGS.items():
+        values = part[name]
+        for i in np.flatnonzero(values[1:] != values[:-1]) + 1:
+            for kind, text in says(values[i - 1].item(), values[i].item()):
+                yield float(part['time'][i]), kind, text
+    analog = part['analog_output']
+    for i, channel in np.argwhere(analog[1:] != analog[:-1]):
+        if not np.isnan(analog[i, channel]):
+            yield (float(part['time'][i + 1]), 'output',
+                   f'standard analog output {channel}: {analog[i + 1, channel]:.4g}')
+
+
+def _outputs(before: int, now: int) -> Iterator[tuple[str, str]]:
+    if before < 0 or now < 0:  # nobody knew
+        return
+    for bit, name in enumerate(OUTPUT_NAMES):
+        if (before ^ now) >> bit & 1:
+            yield 'output', f"{name}: {'on' if now >> bit & 1 else 'off'}"
+
+
+def _waypoint(_: int, now: int) -> Iterator[tuple[str, str]]:
+    if now >= 0:
+        yield 'point', f'on the way to point {now}'
+
+
+_SAYINGS: Mapping[str, Any] = {
+    'waypoint': _waypoint,
+    'digital_output': _outputs,
+    'slider': lambda _, now: [('slider', f'speed slider at {100.0 * now:.0f} %')],
+    'runtime_state': lambda _, now: [('program', f'robot program {RuntimeState(now).name}')],
+    'robot_mode': lambda _, now: [('robot', f'robot mode {RobotMode(now).name}')],
+    'safety_mode': lambda _, now: [('safety', f'safety mode {SafetyMode(now).name}')],
+}
+
+
+# ---- from the folder to the file ------------------------------------------------------------
+
+
+def read_notes(folder: Path) -> list[Event]:
+    """Return the notes of a folder; a last line that was not finished does not count."""
+    notes = []
+    for line in (folder / NOTES).read_text(encoding='utf-8').split('\n')[:-1]:
+        time, kind, text = json.loads(line)
+        notes.append((float(time), str(kind), str(text)))
+    return notes
+
+
+def all_events(notes: Iterable[Event], rows: NDArray[np.void]) -> list[Event]:
+    """Return notes and changes in the order of time."""
+    return sorted([*notes, *events_of(rows)], key=lambda event: event[0])
+
+
+def event_arrays(events: list[Event]) -> dict[str, NDArray[Any]]:
+    """Return events as the members of a file."""
+    return {
+        'event_time': np.array([time for time, _, _ in events], dtype='<f8'),
+        'event_kind': np.array([kind for _, kind, _ in events], dtype='<U16'),
+        'event_text': np.array([text for _, _, text in events], dtype=f'<U{MOST_TEXT}')}
+
+
+def finish(folder: Path) -> Path:
+    """
+    Make one file out of a folder, and remove the folder.
+
+    :returns: the file.
+    :raises OSError: it cannot be written; the folder stays as it was.
+    """
+    file = folder.with_suffix('.npz')
+    unfinished = folder / file.name
+    rows, plan = (np.load(folder / name, mmap_mode='r') for name in (ROWS, PLAN))
+    try:
+        with zipfile.ZipFile(unfinished, 'w', zipfile.ZIP_STORED) as archive:
+            head = (folder / HEAD).read_text(encoding='utf-8')
+            members = {'metadata': np.array(head), **event_arrays(
+                all_events(read_notes(folder), rows))}
+            for name, values in members.items():
+                _write_member(archive, name, values.dtype, values.shape, [values])
+            for prefix, table in (('', rows), ('planned_', plan)):
+                for name in table.dtype.names or ():
+                    _write_column(archive, prefix + name, table, name)
+    except OSError:
+        unfinished.unlink(missing_ok=True)
+        raise
+    replace_file(unfinished, file)
+    shutil.rmtree(folder, ignore_errors=True)
+    return file
+
+
+def _write_column(archive: zipfile.ZipFile, member: str, table: NDArray[np.void],
+                  name: str) -> None:
+    """Write a column of a table, a part after the other."""
+    dtype = table.dtype[name]
+    _write_member(archive, member, dtype.base, (len(table), *dtype.shape), (
+        np.ascontiguousarray(table[name][first:first + CHUNK])
+        for first in range(0, len(table), CHUNK)))
+
+
+def _write_member(archive: zipfile.ZipFile, name: str, dtype: np.dtype[Any],
+                  shape: tuple[int, ...], parts: Iterable[NDArray[Any]]) -> None:
+    with archive.open(f'{name}.npy', 'w', force_zip64=True) as raw:
+        file: BinaryIO = raw  # type: ignore[assignment]
+        file.write(_npy_header(dtype, shape))
+        for part in parts:
+            file.write(part.tobytes())
