@@ -11,6 +11,7 @@ from random import Random
 
 import pytest
 from robot_cell import REVERSE, RTDE, run_cell
+from virtual_network import hand_over
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
@@ -75,7 +76,7 @@ class Tapped(asyncio.Protocol):
 
     def data_received(self, data):
         self.notes.append((self._loop.time(), data))
-        self._reader.data_received(data)
+        hand_over(self._reader, data)
 
     def eof_received(self):
         return self._reader.eof_received()

@@ -205,9 +205,22 @@ class _End(asyncio.Transport):
             data = self._inbox.popleft()
             if data:
                 self.received += data
-                self.protocol.data_received(data)
+                hand_over(self.protocol, data)
             elif not self.protocol.eof_received():
                 self.close()
+
+
+def hand_over(protocol, data):
+    """Give a protocol what has arrived, in the way in which it takes it."""
+    if not isinstance(protocol, asyncio.BufferedProtocol):
+        protocol.data_received(data)
+        return
+    while data:
+        buffer = protocol.get_buffer(len(data))
+        size = min(len(buffer), len(data))
+        buffer[:size] = data[:size]
+        protocol.buffer_updated(size)
+        data = data[size:]
 
 
 class _ProgramSocket(asyncio.Protocol):

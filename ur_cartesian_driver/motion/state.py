@@ -89,7 +89,9 @@ class SafetyStatus(IntFlag):
     THREE_POSITION_ENABLING_STOP = 1 << 11
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+# Never changed, but not frozen: a frozen one takes four times as long to make, and one is made for
+# each packet, between its arrival and what has to be done about it.
+@dataclass(slots=True, kw_only=True)
 class RobotState:
     """
     One RTDE packet: joints in rad and rad/s, poses of the TCP in the robot's base.

@@ -333,17 +333,19 @@ class RobotLink:
 
     def _on_state(self, robot: RobotState) -> None:
         before, self._robot = self._robot, robot
-        self._evidence.take_report(robot)
         self._tell_state(robot)
-        is_news = before is None or _modes(before) != _modes(robot)
-        if is_news:
-            for change in () if before is None else changes(before, robot):
-                self._evidence.note(change)
+        if before is not None and _modes(before) == _modes(robot):
+            # No status follows from it, and what the event leads to, a CANCEL maybe, goes first.
+            self._on_event(StateReceived(state=robot))
+            self._evidence.take_report(robot)
             self._look_at_program(robot)
-            self._review()
+            return
+        self._evidence.take_report(robot)
+        for change in () if before is None else changes(before, robot):
+            self._evidence.note(change)
+        self._look_at_program(robot)
+        self._review()
         self._on_event(StateReceived(state=robot))
-        if not is_news:  # no status follows from it, and a CANCEL had to be sent first
-            self._look_at_program(robot)
 
     def _on_signals(self, signals: Signals) -> None:
         self._signals = signals

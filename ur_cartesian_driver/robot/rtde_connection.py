@@ -118,8 +118,8 @@ class RtdeConnection:
             self._answered.set()
 
     def _take_values(self, values: Values) -> None:
+        self._on_values(self._names, values)  # first, because a CANCEL may follow from it
         self._last_packet = asyncio.get_running_loop().time()
-        self._on_values(self._names, values)
 
     def _on_closed(self, reason: str) -> None:
         self._closed.set_result(reason)
