@@ -96,6 +96,17 @@ class PlanningOptions:
     optimized_velocity: float = 0.3
     optimized_acceleration: float = 0.3
 
+    #: Live targets: how fast the tool follows [m/s], [m/s^2], [rad/s], [rad/s^2], the fastest
+    #: joint meanwhile [rad/s] ...
+    servo_target_linear_velocity: float = 0.25
+    servo_target_linear_acceleration: float = 1.0
+    servo_target_angular_velocity: float = 1.0
+    servo_target_angular_acceleration: float = 4.0
+    servo_target_joint_velocity: float = 1.5
+    #: ... how old a target may be, and how long after the last one the session ends [s].
+    servo_target_max_age: float = 0.2
+    servo_target_timeout: float = 2.0
+
     #: Largest accelerations that a time may lead to [m/s^2], [rad/s^2], [rad/s^2].
     max_linear_acceleration: float = 10.0
     max_angular_acceleration: float = 40.0
@@ -111,7 +122,8 @@ class PlanningOptions:
                 raise ValueError(f'{name} is {value}; it must be finite and not negative')
         for name in ('linear_velocity', 'linear_acceleration', 'angular_velocity',
                      'angular_acceleration', 'joint_velocity', 'joint_acceleration',
-                     'optimized_velocity', 'optimized_acceleration'):
+                     'optimized_velocity', 'optimized_acceleration',
+                     *(field for field in self.__slots__ if field.startswith('servo_target_'))):
             if getattr(self, name) == 0.0:
                 raise ValueError(f'{name} is 0; it must be positive')
         for name in ('optimized_velocity', 'optimized_acceleration'):

@@ -53,6 +53,8 @@ class NodeSettings:
     diagnostics_rate: float = 1.0
     static_frames: tuple[str, ...] = ()
     tf_max_age: float = 1.0
+    servo_target_enabled: bool = False
+    servo_state_rate: float = 25.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -256,6 +258,24 @@ DECLARATIONS: tuple[Declaration, ...] = (
                 'Largest acceleration of a joint that a time may lead to [rad/s^2].',
                 0.1, 1000.0),
     Declaration('max_segment_time', 'Longest duration of one segment [s].', 0.1, 2147.483647),
+    # -- live targets
+    Declaration('servo_target_enabled',
+                'Follow the poses on ~/servo_target; false: nobody listens there.'),
+    Declaration('servo_target_max_age',
+                'How old a live target may be, by its stamp or else since it came [s]; then the '
+                'arm stops smoothly until a newer one comes.', 0.01, 10.0),
+    Declaration('servo_target_timeout',
+                'How long after the last live target the session ends [s].', 0.1, 3600.0),
+    Declaration('servo_target_linear_velocity', 'Largest speed of the tool when it follows live '
+                'targets [m/s]; not above max_tool_speed.', 1e-4, 10.0),
+    Declaration('servo_target_linear_acceleration', 'Acceleration of the tool when it follows '
+                'live targets [m/s^2].', 1e-3, 100.0),
+    Declaration('servo_target_angular_velocity', 'Largest speed at which the tool turns when it '
+                'follows live targets [rad/s].', 1e-3, 20.0),
+    Declaration('servo_target_angular_acceleration', 'Angular acceleration of the tool when it '
+                'follows live targets [rad/s^2].', 1e-2, 400.0),
+    Declaration('servo_target_joint_velocity', 'Largest speed of a joint when the tool follows '
+                'live targets [rad/s].', 1e-3, 10.0),
     # -- what is published
     Declaration('state_publish_rate',
                 'How often joint states, TCP pose, wrench, speed scaling and tf are published '
@@ -265,6 +285,8 @@ DECLARATIONS: tuple[Declaration, ...] = (
                 'never.', 0.0, 125.0),
     Declaration('diagnostics_rate', 'How often /diagnostics is published [Hz]; 0: never.',
                 0.0, 50.0),
+    Declaration('servo_state_rate', 'How often ~/servo_state is published at most [Hz]; 0: never.',
+                0.0, 500.0),
     Declaration('feedback_rate', 'How often a goal sends feedback [Hz].', 0.5, 500.0),
     # -- what is recorded
     Declaration('record_directory', 'Directory in which each motion is recorded, a file each, to '

@@ -1,0 +1,134 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Targets that come late, twice, in the wrong order, or no more."""
+
+from dataclasses import replace
+
+import pytest
+
+from ur_cartesian_driver.execution.live_targets import LiveSettings, LiveTargets
+from ur_cartesian_driver.execution.target_follower import TargetFollower
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+
+ARM = Arm(robot_model('ur5e'))
+HOME = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
+DT = 0.008
+SETTINGS = LiveSettings(max_age=0.2, timeout=1.0)
+
+
+class Session:
+    """A session and the clock of its owner."""
+
+    def __init__(self):
+        self.follower = TargetFollower(ARM, IDENTITY, HOME, SETTINGS.limits)
+        self.now = 100.0
+        self.live = LiveTargets(self.follower, SETTINGS, self.now)
+        self.home = self.follower.T_base_tcp
+
+    def beside(self, y):
+        x, y0, z = self.home.position
+        return Pose((x, y0 + y, z), self.home.quaternion)
+
+    def take(self, y, age=0.0):
+        self.live.take(self.beside(y), age, self.now)
+
+    def run(self, seconds):
+        for _ in range(round(seconds / DT)):
+            self.now += DT
+            self.live.look(self.now)
+            self.live.next(DT)
+
+    @property
+    def y(self):
+        return self.follower.T_base_tcp.position[1] - self.home.position[1]
+
+
+@pytest.fixture
+def session():
+    return Session()
+
+
+def test_a_stale_target_stops_the_arm_and_a_fresh_one_continues(session):
+    session.take(0.3)
+    session.run(0.2)
+    assert session.follower.linear[1] > 0.15
+    session.run(0.3)
+    assert session.follower.at_rest
+    assert 0.01 < session.y < 0.15
+    assert not session.live.done
+    for _ in range(20):
+        session.take(0.3)
+        session.run(0.1)
+    assert session.y == pytest.approx(0.3, abs=1e-9)
+    assert session.live.pauses == 1
+    assert 'stopped once' in ' '.join(session.live.report)
+
+
+def test_the_age_counts_from_the_stamp(session):
+    session.take(0.3, age=0.15)
+    session.run(0.064)
+    assert session.follower.target is None, 'it was 0.15 s old when it came'
+    session.take(0.1, age=0.25)
+    assert session.follower.target is None
+    assert session.live.left_out == 1
+
+
+def test_the_newest_stamp_wins_whatever_comes_last(session):
+    session.take(0.02, age=0.01)
+    session.take(0.3, age=0.1)
+    session.take(0.3, age=0.01)
+    assert session.follower.target == session.beside(0.02)
+    assert (session.live.taken, session.live.left_out) == (1, 2)
+
+
+def test_an_arm_that_has_arrived_is_not_stopped_by_the_age(session):
+    session.take(0.002)
+    session.run(0.5)
+    assert session.y == pytest.approx(0.002, abs=1e-9)
+    assert session.live.pauses == 0
+
+
+def test_the_session_ends_when_no_target_came_for_long(session):
+    session.take(0.01)
+    session.run(0.9)
+    assert not session.live.done
+    session.run(0.2)
+    assert session.live.done
+
+
+def test_it_does_not_end_before_the_arm_rests(session):
+    session.run(0.9)
+    session.take(0.3)
+    session.live.look(session.now + 2.0)
+    session.live.next(DT)
+    session.run(0.1)
+    for _ in range(100):
+        if session.live.done:
+            assert session.follower.at_rest
+        session.run(DT)
+        session.live.look(session.now + 2.0)
+    assert session.live.done
+
+
+def test_what_stops_it_is_reported_once_in_words(session):
+    for i in range(30):
+        x, y, z = session.home.position
+        session.live.take(Pose((x - 0.45 - 1e-3 * (i % 3), y, z), session.home.quaternion), 0.0,
+                          session.now)
+        session.run(0.1)
+    assert session.live.blocked
+    why = [line for line in session.live.report if line.startswith('the arm was stopped: ')]
+    assert len(why) in (1, 2), 'reach, singularity'
+
+
+def test_no_time_gives_no_step(session):
+    session.take(0.3)
+    assert session.live.next(0.0) == HOME
+
+
+@pytest.mark.parametrize('field', ['max_age', 'timeout'])
+def test_times_are_positive(field):
+    with pytest.raises(ValueError, match=field):
+        replace(SETTINGS, **{field: 0.0})
