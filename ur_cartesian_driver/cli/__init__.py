@@ -17,7 +17,7 @@ import re
 import signal
 import sys
 
-from ur_cartesian_driver.cli import commands, plans
+from ur_cartesian_driver.cli import commands, plans, plot
 from ur_cartesian_driver.kinematics.robots import MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.sim.fault_text import parse_fault
@@ -52,6 +52,7 @@ def parser() -> argparse.ArgumentParser:
     _add_send(sub)
     _add_validate(sub)
     _add_where(sub)
+    _add_plot(sub)
     return top
 
 
@@ -165,6 +166,16 @@ def _add_where(sub: Commands[argparse.ArgumentParser]) -> None:
                  'print where the robot stands, as a point to paste into a goal')
     where.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
     where.add_argument('--rtde-port', type=int, default=30004, help='its RTDE port')
+
+
+def _add_plot(sub: Commands[argparse.ArgumentParser]) -> None:
+    draw = _add(sub, 'plot', plot.plot,
+                'draw a recorded motion: path, deviation, speed, lag, outputs and events')
+    draw.add_argument('file', help='a recording, or a directory of recordings: its newest one')
+    draw.add_argument('-o', '--output', metavar='PICTURE',
+                      help='left out: beside the recording, as .png; the suffix is the format')
+    draw.add_argument('--csv', metavar='TABLE',
+                      help='write all packets as comma-separated values; without -o no picture')
 
 
 def _fault(text: str) -> Fault:
