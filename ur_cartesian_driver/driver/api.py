@@ -15,12 +15,14 @@ from types import TracebackType
 from ur_cartesian_driver.driver import channel, host
 from ur_cartesian_driver.driver.callbacks import call_back, LOG
 from ur_cartesian_driver.driver.channel import (
+    AimMotion,
     Alive,
     CallAnswered,
     CallRobot,
     Configure,
     GeometryKnown,
     Heartbeat,
+    LiveOrder,
     LogLine,
     MotionEnded,
     MotionProgress,
@@ -35,10 +37,17 @@ from ur_cartesian_driver.driver.channel import (
     TcpReturned,
 )
 from ur_cartesian_driver.driver.config import DriverConfig
+from ur_cartesian_driver.driver.live import (
+    check_target,
+    live_order,
+    LiveSession,
+    standing_order,
+    standing_plan,
+)
 from ur_cartesian_driver.driver.motion import Motion, OnProgress, Run
 from ur_cartesian_driver.driver.recorder import about
 from ur_cartesian_driver.driver.services import RobotServices
-from ur_cartesian_driver.execution import order_of, same_tcp
+from ur_cartesian_driver.execution import Order, order_of, same_tcp
 from ur_cartesian_driver.execution.trajectory import STOP_BOUND
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import Geometry, robot_model
@@ -52,11 +61,13 @@ from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.lever import seen_at
 from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.rest import come_to_rest
 from ur_cartesian_driver.program.render import has_feature
+from ur_cartesian_driver.protocol.dialects import NEWEST
 from ur_cartesian_driver.protocol.trajectory import encode_points
 from ur_cartesian_driver.robot.calls import Answer, Call
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
@@ -100,6 +111,7 @@ class Driver(RobotServices):
         self._loan: TcpLent | None = None
         self._calls: dict[int, Future[Answer]] = {}
         self._signals: Signals | None = None
+        self._live: LiveSession | None = None
         self._gaps = Gaps()
         self._numbers = itertools.count(1)
         # Guards the pipe (several threads send), the running motions and opening and closing.
@@ -250,7 +262,11 @@ class Driver(RobotServices):
         """
         points = encode_points((segment.primitive for segment in plan.segments),
                                self.config.dialect)
-        order = order_of(plan, self.config.dialect)
+        return self._launch(plan, points, order_of(plan, self.config.dialect), on_progress)
+
+    def _launch(self, plan: Plan, points: bytes, order: Order, on_progress: OnProgress | None,
+                live: LiveOrder | None = None) -> Motion:
+        """Have the robot loop begin a motion, if nothing else moves."""
         with self._lock:
             if self._runs:
                 raise RobotNotReady('A motion is running; wait for its end or cancel it.')
@@ -262,9 +278,54 @@ class Driver(RobotServices):
             # Still under the lock: whoever finds the motion may cancel it, and that has to come
             # behind its start.
             self._send(StartMotion(
-                motion=motion.number, points=points, order=order,
+                motion=motion.number, points=points, order=order, live=live,
                 about=about(plan, self.options) if self.config.record_directory else ''))
         return motion
+
+    def follow_targets(self, T_base_tcp: Pose, *, age: float = 0.0) -> LiveSession:
+        """
+        Go to a target, and to others that are told while the arm moves; return at once.
+
+        The tool goes straight, with bounded speed and acceleration (``servo_target_*`` of the
+        options), to the newest target that is not too old.
+
+        :param T_base_tcp: where the active TCP is to be, in the robot's base.
+        :param age: how long ago that was true [s].
+        :raises InvalidGoal: the target is malformed, or too far away.
+        :raises RobotNotReady: the robot cannot take a motion now, or one is running.
+        """
+        state = self.state
+        if state is None:
+            raise RobotNotReady(self._status.message or NO_STATE)
+        check_target(T_base_tcp, state, self.options)
+        if self.config.dialect is not NEWEST:
+            raise RobotNotReady(
+                f'Only our own robot program follows live targets; wire_dialect is '
+                f'{self.config.wire_dialect}.')
+        plan = standing_plan(state)
+        motion = self._launch(plan, b'', standing_order(plan), None,
+                              live_order(self.arm, self.options))
+        self._live = LiveSession(motion, self._aim)
+        self._live.aim(T_base_tcp, age=age)
+        return self._live
+
+    def servo_to(self, T_base_tcp: Pose, *, age: float = 0.0) -> Motion:
+        """
+        Go to a target: the next one of the session that runs, or the first of a new one.
+
+        :returns: the session, as a motion; it ends ``servo_target_timeout`` after the last target.
+        :raises GoalRefused: as of :meth:`follow_targets`.
+        """
+        if self._live is None or self._live.motion.done():
+            return self.follow_targets(T_base_tcp, age=age).motion
+        self._live.aim(T_base_tcp, age=age)
+        return self._live.motion
+
+    def _aim(self, number: int, T_base_tcp: Pose, age: float) -> None:
+        state = self.state
+        if state is not None and number in self._runs:
+            check_target(T_base_tcp, state, self.options)
+            self._send(AimMotion(motion=number, T_base_tcp=T_base_tcp, age=age))
 
     def make_way(self, by: str = 'a newer motion') -> bool:
         """

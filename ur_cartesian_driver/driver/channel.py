@@ -18,6 +18,7 @@ from typing import TypeAlias
 
 from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.execution import Order
+from ur_cartesian_driver.execution.live_targets import LiveSettings
 from ur_cartesian_driver.kinematics.robots import Geometry
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.pose import Pose
@@ -53,6 +54,15 @@ class Configure:
     loan: TcpLent | None = None
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveOrder:
+    """What it takes to follow live targets, beside the order of a motion that stands."""
+
+    settings: LiveSettings
+    #: Of the arm, as the owner knows it.
+    geometry: Geometry
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StartMotion:
     """Run these points (84 bytes each)."""
@@ -62,6 +72,18 @@ class StartMotion:
     points: bytes
     #: What the recording is to say of the plan, as JSON; empty = nothing.
     about: str = ''
+    #: A session of live targets; None = a goal.
+    live: LiveOrder | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AimMotion:
+    """A session of live targets has another target."""
+
+    motion: int
+    T_base_tcp: Pose
+    #: How old it is [s].
+    age: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,7 +179,8 @@ class LogLine:
 
 
 Request: TypeAlias = (
-    Configure | StartMotion | CancelMotion | ResendProgram | CallRobot | Heartbeat | Shutdown)
+    Configure | StartMotion | AimMotion | CancelMotion | ResendProgram | CallRobot | Heartbeat
+    | Shutdown)
 Notice: TypeAlias = (
     Alive | StatusChanged | SignalsChanged | GeometryKnown | MotionProgress | MotionEnded
     | CallAnswered | TcpLent | TcpReturned | LogLine)
