@@ -2,12 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whatever happens to a goal, in whatever order, it ends once, with a code and a sentence."""
 
+from dataclasses import replace
+
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution import Finish, Order, SendPoints, TrajectoryMachine
+from ur_cartesian_driver.execution import (
+    AnswerExtension,
+    Extension,
+    Finish,
+    Order,
+    SendControl,
+    SendPoints,
+    StreamMachine,
+    TrajectoryMachine,
+)
 from ur_cartesian_driver.execution.states import State, TRANSITIONS
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
@@ -23,6 +34,7 @@ from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyStatus
+from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 
 POINTS = 3
 NOZZLE = Pose((0.0, 0.0, 0.1), (0.0, 0.0, 0.0, 1.0))
@@ -38,6 +50,11 @@ def machine(T_flange_tcp):
             time=np.arange(POINTS + 1.0)),
         path_tolerance=Tolerance(position=(0.01,) * 3),
         goal_tolerance=Tolerance(position=(0.001,) * 3)))
+
+
+def stream(T_flange_tcp, deviation):
+    order = replace(machine(T_flange_tcp).order, open_end=True, ending=1)
+    return StreamMachine(order, max_plan_deviation=(deviation, deviation))
 
 
 def robot(part=0.0, off=0.0, speed=0.0, begun=0, T_flange_tcp=IDENTITY, **changes):
@@ -97,6 +114,67 @@ def test_a_goal_ends_once_whatever_happens(events, lends):
             for index in range(command.first, command.end)]
     assert sent == list(range(len(sent))), 'each point once, in order'
     assert len(sent) <= POINTS
+
+
+def extension(number, behind, begin, count, last):
+    """Points that go on along the line from a place on it; all but the last one are firm."""
+    x = 0.1 * (begin + np.arange(count))
+    poses = np.stack([x, *np.tile([[0.0], [0.2], [0.0], [0.0], [0.0], [1.0]], count)], axis=1)
+    point, time = np.arange(begin, begin + count) - 1, np.arange(begin, begin + count, dtype=float)
+    return Extension(number=number, behind=behind, order=None if not count else Order(
+        points=count, duration=float(begin + count), open_end=not last, ending=0 if last else 1,
+        reference=ReferencePath(poses=poses, point=point.astype(np.int32), time=time),
+        waypoint=point.astype(np.int32)))
+
+
+EXTENSIONS = st.builds(extension, number=st.integers(1, 9), behind=st.integers(0, 8),
+                       begin=st.integers(1, 8), count=st.integers(0, 4), last=st.booleans())
+
+
+@pytest.mark.slow
+@given(events=st.lists(st.tuples(st.one_of(EVENTS, PACKETS.map(
+    lambda state: StateReceived(state=state)), EXTENSIONS), st.floats(0.001, 2.0)), max_size=25),
+    lends=st.booleans(), deviation=st.sampled_from([0.0, 0.002]))
+@settings(max_examples=150, deadline=None)
+def test_an_open_goal_ends_once_whatever_happens(events, lends, deviation):
+    goal, now = stream(NOZZLE if lends else None, deviation), 0.0
+    commands = goal.start(robot())
+    for event, later in events:
+        now += later
+        commands += goal.step(timed(event, now), now)
+    commands += goal.step(LinkLost(link='RTDE', reason='the end of the test'), now)
+    for _ in range(round(BOUND / 0.02)):
+        now += 0.02
+        commands += goal.step(Tick(), now)
+    (end,) = [command for command in commands if isinstance(command, Finish)]
+    assert end.outcome.text.endswith('.')
+    assert goal.state is State.ENDED
+    asked = [event for event, _ in events if isinstance(event, Extension)]
+    answers = [command for command in commands if isinstance(command, AnswerExtension)]
+    ended = next(i for i, c in enumerate(commands) if isinstance(c, Finish))
+    assert len(answers) == len(asked), 'who appends is answered, also behind the end'
+    assert all(answer.refusal for answer in answers if commands.index(answer) > ended)
+    sent = [index for command in commands if isinstance(command, SendPoints)
+            for index in range(command.first, command.end)]
+    assert sent == list(range(len(sent))), 'each record once, in order'
+    counts_fit(commands)
+
+
+def counts_fit(commands):
+    """Each stream is told how many records it has, and no record comes behind that."""
+    sent = None
+    for command in commands:
+        match command:
+            case SendControl(action=TrajectoryAction.STREAM_START):
+                sent = 0
+            case SendPoints(first=first, end=end):
+                assert sent is not None, 'points without a stream'
+                sent += end - first
+            case SendControl(action=TrajectoryAction.STREAM_END, count=count):
+                assert count == sent > 0
+                sent = None
+            case SendControl(action=TrajectoryAction.CANCEL, count=count):
+                assert sent is None or count == sent
 
 
 @pytest.mark.parametrize('state', [state for state in State if state is not State.ENDED])

@@ -20,6 +20,7 @@ from ur_cartesian_driver.execution import (
 )
 from ur_cartesian_driver.execution.observer import STALL_BOUND
 from ur_cartesian_driver.execution.states import Signal, State, STOPS, TRANSITIONS
+from ur_cartesian_driver.execution.stream import StreamMachine
 from ur_cartesian_driver.execution.tcp_loan import CARRIED_OUT
 from ur_cartesian_driver.execution.trajectory import GATHER, STOP_BOUND, TCP_BOUND
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -96,6 +97,14 @@ def brought_to(state):
     if state is State.RESTORING:
         machine = armed()
         machine.step(TrajectoryEnded(result=TrajectoryResult.FAILURE), 1.0)
+        assert machine.state is state
+        return machine
+    if state in (State.CLOSING, State.WAITING):
+        machine = StreamMachine(order(open_end=True, ending=1), max_plan_deviation=(0.0, 0.0))
+        machine.start(robot().state)
+        machine.step(robot(), 0.0)
+        if state is State.WAITING:
+            machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 1.0)
         assert machine.state is state
         return machine
     machine = started()
@@ -366,10 +375,13 @@ def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
            State.HALTING: {Signal.AT_REST, Signal.LATE},
            State.ARMING: {Signal.ARMED, Signal.LATE},
            State.RESTORING: {Signal.RESTORED, Signal.LATE},
-           State.MOVING: {Signal.VIOLATION, Signal.DEVIATION, Signal.STALLED},
+           State.MOVING: {Signal.VIOLATION, Signal.DEVIATION, Signal.STALLED, Signal.STARVING},
+           State.CLOSING: {Signal.VIOLATION, Signal.DEVIATION, Signal.STALLED},
+           State.WAITING: {Signal.EXTENDED, Signal.LAST, Signal.DEVIATION, Signal.LATE},
            State.ENDING: {Signal.LATE}}
     judged = {Signal.ARMED, Signal.RESTORED, Signal.SETTLED, Signal.AT_REST, Signal.LATE,
-              Signal.UNANSWERED, Signal.VIOLATION, Signal.DEVIATION, Signal.STALLED}
+              Signal.UNANSWERED, Signal.VIOLATION, Signal.DEVIATION, Signal.STALLED,
+              Signal.STARVING, Signal.EXTENDED, Signal.LAST}
     possible = state is not State.ENDED and (
         signal not in judged or signal in own.get(state, set()))
     assert (signal in TRANSITIONS[state]) == possible

@@ -3,6 +3,7 @@
 """What to do next: pure state machines, fed with events and the time, answering with commands."""
 
 from ur_cartesian_driver.execution.commands import (
+    AnswerExtension,
     Command,
     Finish,
     LendTcp,
@@ -12,12 +13,15 @@ from ur_cartesian_driver.execution.commands import (
     SendPoints,
     StopProgram,
 )
-from ur_cartesian_driver.execution.order import Order, order_of
+from ur_cartesian_driver.execution.order import Extension, Order, order_of
+from ur_cartesian_driver.execution.stream import StreamMachine, StreamSettings
 from ur_cartesian_driver.execution.tcp_loan import same_tcp, TcpLoan
 from ur_cartesian_driver.execution.trajectory import TrajectoryMachine
 
 __all__ = [
+    'AnswerExtension',
     'Command',
+    'Extension',
     'Finish',
     'LendTcp',
     'Order',
@@ -26,6 +30,8 @@ __all__ = [
     'SendControl',
     'SendPoints',
     'StopProgram',
+    'StreamMachine',
+    'StreamSettings',
     'TcpLoan',
     'TrajectoryMachine',
     'order_of',

@@ -57,6 +57,17 @@ class Report:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class AnswerExtension:
+    """Tell whether points are taken; either they all are, or the goal is as it was."""
+
+    number: int
+    #: Why not; empty = they are.
+    refusal: str = ''
+    #: Plan them from where the arm is going to rest, and they are taken: the goal has been closed.
+    from_rest: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Finish:
     """The goal has ended."""
 
@@ -64,4 +75,5 @@ class Finish:
 
 
 Command: TypeAlias = (
-    SendControl | SendPoints | LendTcp | ReturnTcp | StopProgram | Report | Finish)
+    SendControl | SendPoints | LendTcp | ReturnTcp | StopProgram | Report | AnswerExtension
+    | Finish)

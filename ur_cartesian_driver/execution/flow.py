@@ -20,6 +20,8 @@ class Window:
     total: int
     size: int = 500
     sent: int = 0
+    #: How many the robot has begun, as far as is known.
+    begun: int = 0
 
     def release(self, begun: int) -> tuple[int, int]:
         """

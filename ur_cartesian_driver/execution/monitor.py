@@ -37,6 +37,10 @@ SLACK = 0.005
 #: the target [s], and this far [m]. Position controllers of arms lag by some cycles.
 LAG_TIME = 0.02
 LAG_WAY = 0.0005
+#: Times nearer to each other than this are one [s]; the wire counts in microseconds.
+SAME_TIME = 5e-7
+#: How long ago a place may be that the tool still lags behind at [s].
+MEMORY = 1.0
 #: Up to so many edges are looked at one by one.
 FEW = 8
 #: So many edges are kept in plain floats.
@@ -99,6 +103,13 @@ class PathTracker:
 
         :param path: the plan's reference; it is not changed.
         """
+        self._load(path)
+        self.place = Place(0, 0.0)
+        #: How far the target was from its place at the last update, in the coordinates of above.
+        self.miss = inf
+
+    def _load(self, path: ReferencePath) -> None:
+        """Prepare the arrays that are searched."""
         self.path = path
         self._rows = np.array(path.poses)
         self._rows[:, 3:] *= 2.0 * RADIAN * _continuous_signs(path.poses[:, 3:])[:, None]
@@ -108,9 +119,6 @@ class PathTracker:
         self._is_roomy = bool(path.room.any())
         self._edges: dict[int, Edge] = {}
         self._end = pose_from_row(path.poses[-1])
-        self.place = Place(0, 0.0)
-        #: How far the target was from its place at the last update, in the coordinates of above.
-        self.miss = inf
 
     @property
     def last_row(self) -> int:
@@ -177,10 +185,25 @@ class PathTracker:
         """
         return self.miss <= 0.5 * min(way, RADIAN * angle)
 
-    def finish(self) -> Place:
-        """Move on to the end of the path."""
-        self.place = Place(self.last_row, 0.0)
+    def finish(self, time: float = inf) -> Place:
+        """Move on to the end of the path, or to where it is at a time [s]."""
+        self.place = Place(max(bisect_right(self._time, time + SAME_TIME) - 1, 0), 0.0)
         return self.place
+
+    def extend(self, path: ReferencePath, since: float) -> None:
+        """
+        Let a path follow from a time on [s], and forget what lies far behind.
+
+        The time is that of a place at which both paths are the same, and which is still ahead.
+        """
+        old, row = self.path, self.place.row
+        first = max(0, min(bisect_left(self._time, self._time[row] - MEMORY), row))
+        end = max(bisect_right(self._time, since + SAME_TIME), row + 1)
+        new = bisect_right(path.time, since + SAME_TIME)
+        self._load(ReferencePath(**{
+            name: np.concatenate([getattr(old, name)[first:end], getattr(path, name)[new:]])
+            for name in ('poses', 'point', 'time', 'room')}))
+        self.place = Place(row - first, self.place.fraction if row + 1 < end else 0.0)
 
     def pose(self, place: Place | None = None) -> Pose:
         """Return the planned pose at a place, the present one if none is given."""

@@ -54,6 +54,8 @@ class Observer:
         self._under_way = False
         #: The count of the goal before, as long as the robot reports it; None afterwards.
         self._stale_begun: int | None = None
+        #: How many motions of the goal the robot had begun in trajectories before this one.
+        self._motions_before = 0
         #: How long the target has stood still while nothing held it [s].
         self._stalled_time = 0.0
         #: The newest packet; None before the first.
@@ -80,20 +82,39 @@ class Observer:
         self._follow(before, state, passed)
         self._stalled_time = self._stalled_time + passed if _stands(before, state) else 0.0
 
-    def finish(self) -> None:
-        """Take note that the robot program has reported the end."""
-        self._tracker.finish()
+    def finish(self, time: float = inf) -> None:
+        """Take note that the robot program has reported the end, or the rest at a time [s]."""
+        self._tracker.finish(time)
+
+    def extend(self, order: Order, behind: int) -> None:
+        """Take note of what comes behind so many records."""
+        self._tracker.extend(order.reference, self._records.end(behind))
+        self._records.extend(order, behind)
+        self._order = order
+        if self.latest is not None:
+            self._records.forget(self.begun(self.latest) - 2)
+
+    def resume(self, state: RobotState, sent: int) -> None:
+        """Take note that the motion goes on from rest, behind so many records."""
+        self.start(state)
+        self._motions_before = self._records.motions_before(sent)
+        self._stalled_time = 0.0
+        self.scaled_time = self._tracker.time()  # waiting is nobody's delay
 
     def _follow(self, before: RobotState | None, state: RobotState, passed: float) -> None:
         """Find the place on the path."""
         begun, fastest = self._motions_begun(state), speed(state.target_tcp_twist)
-        self._under_way = self._under_way or begun > 0 or fastest > 0.0
+        self._under_way = self._under_way or begun > self._motions_before or fastest > 0.0
         if before is not None:  # it may have braked since
             fastest = max(fastest, speed(before.target_tcp_twist))
         self._tracker.update(state.target_tcp_pose, 2.0 * passed * fastest,
                              self._records.running(begun))
 
     # ---- how far it is ------------------------------------------------------------------------
+
+    def time(self) -> float:
+        """Return the planned time of the place where the arm is [s]."""
+        return self._tracker.time()
 
     def waypoint(self) -> int:
         """Return the point that the arm is on its way to."""
@@ -112,20 +133,21 @@ class Observer:
         it is believed once it changes.
         """
         if not self._order.reports_begun or state.points_begun == self._stale_begun:
-            return 0
+            return self._motions_before
         self._stale_begun = None
-        return state.points_begun
+        return self._motions_before + state.points_begun
 
     def awaits_count(self) -> bool:
         """Tell whether the program has not reported a point of this goal since START."""
         return self._stale_begun is not None
 
-    def progress(self, sent: int, *, at_end: bool) -> Progress:
+    def progress(self, sent: int, *, at_end: bool, waits: bool = False) -> Progress:
         """
         Return a report about the newest packet.
 
         :param sent: how many records were sent to the robot.
         :param at_end: whether the arm should be at the end, and not on its way.
+        :param waits: whether it rests until more points come.
         """
         state, order = self.latest, self._order
         assert state is not None
@@ -147,7 +169,7 @@ class Observer:
             speed_scaling=state.speed_scaling,
             points_received=self._records.points,
             buffered=max(0.0, self._records.end(sent) - time),
-            timestamp=state.timestamp)
+            timestamp=state.timestamp, waits=waits)
 
     def _desired(self, state: RobotState) -> Pose:
         """Return where the tool should be on its way: around its progress."""
@@ -157,9 +179,14 @@ class Observer:
 
     def off_start(self, state: RobotState) -> str | None:
         """Return a clause that says how far the arm is from where the plan begins, or None."""
-        start = pose_from_row(self._order.reference.poses[0])
-        apart, angle = start.distance_to(state.actual_tcp_pose), start.angle_to(
-            state.actual_tcp_pose)
+        return self._off(pose_from_row(self._order.reference.poses[0]), state.actual_tcp_pose)
+
+    def off_place(self, state: RobotState) -> str | None:
+        """Return a clause that says how far the arm is from where it waits, or None."""
+        return self._off(self._tracker.pose(), state.target_tcp_pose)
+
+    def _off(self, start: Pose, pose: Pose) -> str | None:
+        apart, angle = start.distance_to(pose), start.angle_to(pose)
         if apart <= START_POSITION and angle <= START_ANGLE:
             return None
         return (f'the arm is {apart:.4f} m and {angle:.4f} rad away from where the plan begins: '

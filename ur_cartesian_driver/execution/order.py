@@ -55,6 +55,10 @@ class Order:
     #: (records,) when the robot program asks for the record behind it [s]: where it ends, or
     #: where its blend begins. Empty = at ``ends``.
     asks: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    #: Whether more may come behind it (keep_open).
+    open_end: bool = False
+    #: Of an open one: how many records at its end take the arm to rest where nothing else comes.
+    ending: int = 0
     #: SERVO: the joints over time.
     spline: JointSpline | None = None
 
@@ -71,27 +75,47 @@ class Order:
         fill('asks', self.ends)
 
 
-def order_of(plan: Plan, dialect: Dialect = NEWEST) -> Order:
-    """Return what of a plan the machine needs, for a robot program of this dialect."""
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Extension:
+    """What comes behind the records that a goal with an open end has."""
+
+    #: By which its answer is known.
+    number: int
+    #: How many records stay in front of it; the ending that was planned there is given up.
+    behind: int
+    #: Times count from the start of the goal, rows of the reference from behind those that stay.
+    #: None = nothing comes any more, and the goal ends where it is known to end.
+    order: Order | None
+
+
+def order_of(plan: Plan, dialect: Dialect = NEWEST, *, since: float = 0.0,
+             ending: int = 0) -> Order:
+    """
+    Return what of a plan the machine needs, for a robot program of this dialect.
+
+    :param since: when its first segment begins [s]; not 0 for what continues a goal.
+    :param ending: see :class:`Order`.
+    """
     goal = plan.goal
     times = goal.waypoints[-1].time
     waypoints = [segment.waypoint for segment in plan.segments
                  for _ in range(1 + len(segment.outputs))]
-    ends = np.cumsum([segment.duration for segment in plan.segments])
+    ends = since + np.cumsum([segment.duration for segment in plan.segments])
     asks = ends - [_left_at_blend(segment) for segment in plan.segments]
     records = [1 + len(segment.outputs) for segment in plan.segments]
     pieces = [segment.primitive for segment in plan.segments
               if isinstance(segment.primitive, Spline)]
     return Order(
-        points=len(waypoints), reference=plan.reference, duration=plan.duration,
+        points=len(waypoints), reference=plan.reference, duration=since + plan.duration,
         due=times if times > 0.0 else None, T_base_frame=goal.T_base_frame,
         T_flange_active=plan.T_flange_active, T_flange_tcp=plan.T_flange_tcp,
         T_tcp_controlled=plan.T_tcp_controlled,
         path_tolerance=goal.path_tolerance, goal_tolerance=goal.goal_tolerance,
         goal_time_tolerance=goal.goal_time_tolerance,
         reports_begun=dialect is NEWEST,
-        knows_pace=not any(isinstance(segment.primitive, OptimoveJ | OptimoveL)
-                           for segment in plan.segments),
+        open_end=goal.keep_open, ending=ending,
+        knows_pace=not (goal.keep_open or any(isinstance(segment.primitive, OptimoveJ | OptimoveL)
+                                              for segment in plan.segments)),
         execution=plan.execution, waypoint=np.array(waypoints, dtype=np.int32),
         is_motion=np.array([not isinstance(instruction, SwitchOutput)
                             for instruction in plan.instructions]),

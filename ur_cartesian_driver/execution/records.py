@@ -25,11 +25,18 @@ class Records:
         self._ends = array('d', order.ends.tobytes())
         self._asks = array('d', order.asks.tobytes())
         #: The numbers of those that are motions.
-        self._motions = array('q', order.is_motion.nonzero()[0].astype('int64').tobytes())
+        self._motions = _motions(order, 0)
+        #: How many records, and motions, are forgotten.
+        self._first = self._first_motion = 0
 
     @property
     def total(self) -> int:
-        """How many there are."""
+        """How many there are, and were."""
+        return self._first + len(self._waypoints)
+
+    @property
+    def kept(self) -> int:
+        """How many are in memory."""
         return len(self._waypoints)
 
     @property
@@ -39,9 +46,9 @@ class Records:
 
     def begun(self, motions: int) -> int:
         """Return how many records are begun when so many motions are."""
-        if motions <= 0:
-            return 0
-        return self._motions[min(motions, len(self._motions)) - 1] + 1
+        if motions <= self._first_motion:
+            return self._first
+        return self._motions[self._index(motions)] + 1
 
     def running(self, motions: int) -> tuple[int, int] | None:
         """
@@ -49,16 +56,60 @@ class Records:
 
         :param motions: how many are begun; None is returned for 0.
         """
-        if motions <= 0:
+        if motions <= self._first_motion:
             return None
-        last = min(motions, len(self._motions)) - 1
-        return (self._waypoints[self._motions[last]],
-                self._waypoints[self._motions[max(last - 1, 0)]] if last else -1)
+        last = self._index(motions)
+        return (self._waypoints[self._motions[last] - self._first],
+                self._waypoints[self._motions[last - 1] - self._first] if last else -1)
 
     def before(self, waypoint: int) -> int:
         """Return how many records stand before those of a point."""
-        return bisect_left(self._waypoints, waypoint)
+        return self._first + bisect_left(self._waypoints, waypoint)
+
+    def motions_before(self, record: int) -> int:
+        """Return how many motions stand before a record."""
+        return self._first_motion + bisect_left(self._motions, record)
 
     def end(self, records: int) -> float:
         """Return when the last one of so many is planned to end [s]."""
-        return self._ends[records - 1] if records > 0 else 0.0
+        return self._ends[records - 1 - self._first] if records > 0 else 0.0
+
+    def asked(self, records: int) -> float:
+        """Return when the robot program asks for the one behind so many [s]."""
+        return self._asks[records - 1 - self._first] if records > 0 else 0.0
+
+    def until(self, time: float) -> int:
+        """Return how many it takes for the last one to end at a time [s] or later."""
+        return min(self.total, self._first + bisect_left(self._ends, time) + 1)
+
+    # ---- goals that go on ---------------------------------------------------------------------
+
+    def extend(self, order: Order, behind: int) -> None:
+        """Put those of an order behind the first so many, in the place of what is there."""
+        kept = behind - self._first
+        for values, new in ((self._waypoints, order.waypoint), (self._ends, order.ends),
+                            (self._asks, order.asks)):
+            del values[kept:]
+            values.frombytes(new.tobytes())
+        del self._motions[bisect_left(self._motions, behind):]
+        self._motions.extend(_motions(order, behind))
+
+    def forget(self, records: int) -> None:
+        """Forget the first so many; nobody asks for them any more."""
+        gone = records - self._first
+        if gone <= 0:
+            return
+        motions = bisect_left(self._motions, records)
+        for values in (self._waypoints, self._ends, self._asks):
+            del values[:gone]
+        del self._motions[:motions]
+        self._first += gone
+        self._first_motion += motions
+
+    def _index(self, motions: int) -> int:
+        return min(motions - self._first_motion, len(self._motions)) - 1
+
+
+def _motions(order: Order, first: int) -> array[int]:
+    """Return the numbers of an order's motions, its records numbered from ``first``."""
+    return array('q', (order.is_motion.nonzero()[0] + first).astype('int64').tobytes())

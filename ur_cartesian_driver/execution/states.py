@@ -13,6 +13,12 @@ means in the present state: the next state and how the goal ends, if it does.
   the arm by itself (safety, connection) ends the goal at once, because nothing that we could send
   would be read; a reason of ours to stop (cancel, preemption, tolerance)
   leads to STOPPING.
+* **CLOSING**: of a goal that can be continued (keep_open) no more points came in time. What takes
+  the arm to rest at the last known point, or behind it, is on the wire, and the number of its
+  records. Points that come now wait for the SUCCESS of the program: they go on from rest.
+* **WAITING**: the arm is at rest there, and the program has no trajectory. EXTENDED starts the
+  next one; LAST, the word that no points will come, leads to SETTLING. Without either the goal
+  ends after ``keep_open_timeout`` (LATE), as CANCELLED: it was given up, and nothing failed.
 * **SETTLING**: the program says that the last point is reached. The arm has to be inside the goal
   tolerance and at rest, within the goal's time tolerance. Where the controller's own target is
   elsewhere, the program left something out (DEVIATION).
@@ -33,9 +39,9 @@ Everything has a bound: an answer that does not come in STOPPING or HALTING ends
 arm stands, and the goal ends as it was to end (UNANSWERED); an arm that still moves is a failure
 (LATE). A TCP that is not set in time ends the goal before it began; one that is not back in time,
 or not at the end because the robot stopped, is the business of whoever carries out the commands
-(the ``loan`` of the machine). MOVING has none, because a speed slider at zero is not an error; but
-an arm that stands for ``STALL_BOUND`` while nothing holds it waits for something that will not
-come: a command or a result was lost (STALLED). RTDE packets that stop coming are a lost
+(the ``loan`` of the machine). MOVING and CLOSING have none, because a speed slider at zero is no
+error; but an arm that stands for ``STALL_BOUND`` while nothing holds it waits for something that
+will not come: a command or a result was lost (STALLED). RTDE packets that stop coming are a lost
 connection.
 """
 
@@ -56,6 +62,8 @@ class State(Enum):
 
     ARMING = auto()
     MOVING = auto()
+    CLOSING = auto()
+    WAITING = auto()
     SETTLING = auto()
     STOPPING = auto()
     HALTING = auto()
@@ -79,6 +87,9 @@ class Signal(Enum):
     EMERGENCY_STOP = auto()
     PROGRAM_STOPPED = auto()
     CONNECTION_LOST = auto()
+    STARVING = auto()
+    EXTENDED = auto()
+    LAST = auto()
     ARMED = auto()
     SETTLED = auto()
     RESTORED = auto()
@@ -86,6 +97,9 @@ class Signal(Enum):
     LATE = auto()
     UNANSWERED = auto()
 
+
+#: In these the robot program runs points of the goal.
+UNDER_WAY = frozenset({State.MOVING, State.CLOSING})
 
 #: What stops the arm in every state but ENDED, and the code that the goal ends with where none is
 #: decided yet.
@@ -129,8 +143,20 @@ def _stays(state: State, *signals: Signal) -> dict[Signal, Step]:
 #: What people ask for; the first of them says how the goal ends.
 _WISHES = (Signal.CANCEL, Signal.PREEMPT)
 
-#: What each signal means in each state. ARMED, SETTLED, RESTORED, AT_REST, LATE and UNANSWERED are
-#: about the state they are given for, so they are not possible in the others.
+#: What a trajectory that runs is stopped by, or ends by itself with.
+_RUNS: Mapping[Signal, Step] = MappingProxyType({
+    **_STOPS,
+    Signal.CANCELED: _judged(ErrorCode.EXECUTION_FAILED),
+    Signal.FAILURE: _judged(ErrorCode.EXECUTION_FAILED),
+    Signal.CANCEL: Step(State.STOPPING, ErrorCode.CANCELLED),
+    Signal.PREEMPT: Step(State.STOPPING, ErrorCode.PREEMPTED),
+    Signal.VIOLATION: Step(State.STOPPING, ErrorCode.PATH_TOLERANCE_VIOLATED),
+    Signal.DEVIATION: Step(State.STOPPING, ErrorCode.EXECUTION_FAILED),
+    Signal.STALLED: _ends(ErrorCode.EXECUTION_FAILED),
+})
+
+#: What each signal means in each state. STARVING, EXTENDED, LAST, ARMED, SETTLED, RESTORED,
+#: AT_REST, LATE and UNANSWERED are about the state they are given for: not possible in the others.
 TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
     State.ARMING: {
         **_STOPS,
@@ -142,15 +168,23 @@ TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
         Signal.LATE: _judged(ErrorCode.ROBOT_NOT_READY),
     },
     State.MOVING: {
-        **_STOPS,
+        **_RUNS,
         Signal.SUCCESS: Step(State.SETTLING),
-        Signal.CANCELED: _judged(ErrorCode.EXECUTION_FAILED),
-        Signal.FAILURE: _judged(ErrorCode.EXECUTION_FAILED),
-        Signal.CANCEL: Step(State.STOPPING, ErrorCode.CANCELLED),
-        Signal.PREEMPT: Step(State.STOPPING, ErrorCode.PREEMPTED),
-        Signal.VIOLATION: Step(State.STOPPING, ErrorCode.PATH_TOLERANCE_VIOLATED),
-        Signal.DEVIATION: Step(State.STOPPING, ErrorCode.EXECUTION_FAILED),
-        Signal.STALLED: _ends(ErrorCode.EXECUTION_FAILED),
+        Signal.STARVING: Step(State.CLOSING),
+    },
+    State.CLOSING: {
+        **_RUNS,
+        Signal.SUCCESS: Step(State.WAITING),
+    },
+    State.WAITING: {
+        **_STOPS,
+        **_stays(State.WAITING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
+        Signal.EXTENDED: Step(State.MOVING),
+        Signal.LAST: Step(State.SETTLING),
+        Signal.CANCEL: _judged(ErrorCode.CANCELLED),
+        Signal.PREEMPT: _judged(ErrorCode.PREEMPTED),
+        Signal.DEVIATION: _judged(ErrorCode.EXECUTION_FAILED),
+        Signal.LATE: _judged(ErrorCode.CANCELLED),
     },
     State.SETTLING: {
         **_STOPS,

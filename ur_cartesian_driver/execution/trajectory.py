@@ -10,9 +10,8 @@ goal is seen in :mod:`~.observer`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from math import inf
-from types import MappingProxyType
 
 from ur_cartesian_driver.execution.commands import (
     Command,
@@ -37,6 +36,7 @@ from ur_cartesian_driver.execution.states import (
     State,
     stop_in,
     TRANSITIONS,
+    UNDER_WAY,
 )
 from ur_cartesian_driver.execution.tcp_loan import REST_SPEED, same_tcp, TcpLoan
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -130,7 +130,7 @@ class TrajectoryMachine:
         if isinstance(event, StateReceived):
             if self.loan is not None:
                 self.loan.observe(event.state, now)
-            self._observer.take(event.state, moving=self.state is State.MOVING)
+            self._observer.take(event.state, moving=self.state in UNDER_WAY)
         signal, text = self._signal(event, now)
         commands = [] if signal is None else self._apply(signal, text, now)
         brakes = signal is not None and self.state is State.STOPPING
@@ -166,7 +166,7 @@ class TrajectoryMachine:
 
     def _judge(self, state: RobotState, now: float) -> tuple[Signal | None, str]:
         """Return what a packet of a robot that runs means in the present state."""
-        if self.state is State.MOVING:
+        if self.state in UNDER_WAY:
             return self._observer.fault(state) or (None, '')
         at_rest = _rests(state)
         if self.state is State.ARMING and self._is_armed(state):
@@ -200,12 +200,12 @@ class TrajectoryMachine:
         A CANCELED that comes then most likely answers a goal whose end nobody waited for, because
         RTDE was lost; it names no goal. It counts only if nothing begins after it.
         """
-        return self.state is State.MOVING and self._observer.awaits_count()
+        return self.state in UNDER_WAY and self._observer.awaits_count()
 
     def _late(self, now: float) -> tuple[Signal | None, str]:
         if now < self._deadline:
             return None, ''
-        if self.state is State.MOVING:
+        if self.state in UNDER_WAY:
             self._deadline = inf
             return RESULTS[TrajectoryResult.CANCELED] if self._has_not_begun() else (None, '')
         if self.state is State.ARMING:
@@ -247,7 +247,19 @@ class TrajectoryMachine:
             self._code, self._text = step.code, text
         if step.state is before:
             return []
-        return _ENTER[step.state](self, signal, now)
+        return self._entered(step.state)(signal, now)
+
+    def _entered(self, state: State) -> Callable[[Signal, float], list[Command]]:
+        """Return what is done when a state is entered."""
+        return {
+            State.MOVING: self._enter_moving,
+            State.SETTLING: self._enter_settling,
+            State.STOPPING: self._enter_stopping,
+            State.HALTING: self._enter_halting,
+            State.RESTORING: self._enter_restoring,
+            State.ENDING: self._enter_ending,
+            State.ENDED: self._enter_ended,
+        }[state]
 
     def _enter_moving(self, signal: Signal, now: float) -> list[Command]:
         assert self._observer.latest is not None
@@ -274,7 +286,11 @@ class TrajectoryMachine:
 
     def _enter_stopping(self, signal: Signal, now: float) -> list[Command]:
         self._deadline = now + STOP_BOUND
-        return [SendControl(action=TrajectoryAction.CANCEL, count=self._window.sent)]
+        return [SendControl(action=TrajectoryAction.CANCEL, count=self._sent())]
+
+    def _sent(self) -> int:
+        """Return how many records were sent since START."""
+        return self._window.sent
 
     def _enter_halting(self, signal: Signal, now: float) -> list[Command]:
         self._deadline = now + STOP_BOUND
@@ -306,7 +322,11 @@ class TrajectoryMachine:
     def _finish(self) -> list[Command]:
         code = self._code if self._code is not None else ErrorCode.EXECUTION_FAILED
         return [*self._last_report(), Finish(outcome=Outcome(
-            code=code, text=self._sentence(code), report=self._about_tcp()))]
+            code=code, text=self._sentence(code), report=self._report()))]
+
+    def _report(self) -> tuple[str, ...]:
+        """Return what is to be said beyond the sentence."""
+        return self._about_tcp()
 
     def _last_report(self) -> list[Report]:
         return [self._progress_report()] if self._shows_goal() else []
@@ -333,13 +353,15 @@ class TrajectoryMachine:
             points = self._records.points
             what = 'The point was' if points == 1 else f'All {points} points were'
             return f'{what} executed in {self._observer.scaled_time:.3f} s.'
-        where = f'on the way to point {self._observer.waypoint()}'
-        if not self._started:
-            where = 'before anything moved'
-        if code is ErrorCode.GOAL_TOLERANCE_VIOLATED:
-            where = 'at the last point'
+        where = 'at the last point' if code is ErrorCode.GOAL_TOLERANCE_VIOLATED else self._where()
         text = self._text if where in self._text else f'{self._text} ({where})'
         return text[:1].upper() + text[1:] + '.'
+
+    def _where(self) -> str:
+        """Return where the goal ended, as a clause."""
+        if not self._started:
+            return 'before anything moved'
+        return f'on the way to point {self._observer.waypoint()}'
 
     def _inform(self, state: RobotState, now: float) -> list[Command]:
         """Return the points to send and the progress to report after a packet."""
@@ -367,15 +389,3 @@ class TrajectoryMachine:
 
 def _rests(state: RobotState) -> bool:
     return max(map(abs, state.actual_qd)) < REST_SPEED
-
-
-_ENTER: Mapping[State, Callable[[TrajectoryMachine, Signal, float], list[Command]]] = (
-    MappingProxyType({
-        State.MOVING: TrajectoryMachine._enter_moving,
-        State.SETTLING: TrajectoryMachine._enter_settling,
-        State.STOPPING: TrajectoryMachine._enter_stopping,
-        State.HALTING: TrajectoryMachine._enter_halting,
-        State.RESTORING: TrajectoryMachine._enter_restoring,
-        State.ENDING: TrajectoryMachine._enter_ending,
-        State.ENDED: TrajectoryMachine._enter_ended,
-    }))

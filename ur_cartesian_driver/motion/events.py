@@ -98,6 +98,8 @@ class Progress:
     buffered: float = 0.0
     #: The controller's clock [s].
     timestamp: float = 0.0
+    #: Whether the arm rests and the goal waits for more points (keep_open).
+    waits: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
