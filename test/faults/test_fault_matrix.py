@@ -3,6 +3,8 @@
 """Every fault in every phase of a goal: the matrix of doc/faults.md, in virtual time."""
 
 from fault_cell import scenario
+from fault_goals import AroundCorners, GOALS
+from fault_modes import MODES
 from fault_table import CONTINUED, HEADLESS, LOCAL, PHASES
 import pytest
 from robot_cell import run_cell
@@ -12,18 +14,25 @@ from ur_cartesian_driver.sim import faults
 pytestmark = pytest.mark.slow
 
 
+CONTINUE = {'after_robot_stop': 'continue'}
+CASES = [
+    pytest.param(kind, phases, row, settings, id=prefix + where + row.fault)
+    for kind, prefix, phases, tables in [
+        (AroundCorners, '', PHASES, (HEADLESS, LOCAL, CONTINUED)),
+        *((GOALS[mode.name], f'{mode.name}: ', mode.phases,
+           (mode.headless, mode.local, mode.continued)) for mode in MODES)]
+    for rows, where, settings in zip(
+        tables, ('', 'in local control: ', 'continued: '), ({}, {'headless': False}, CONTINUE),
+        strict=True)
+    for row in rows]
+
+
 @pytest.mark.exhaustive
-@pytest.mark.parametrize(
-    ('row', 'settings'),
-    [pytest.param(row, {}, id=row.fault) for row in HEADLESS]
-    + [pytest.param(row, {'headless': False}, id=f'in local control: {row.fault}')
-       for row in LOCAL]
-    + [pytest.param(row, {'after_robot_stop': 'continue'}, id=f'continued: {row.fault}')
-       for row in CONTINUED])
-def test_a_goal_ends_as_the_table_says_and_the_next_one_works(row, settings):
+@pytest.mark.parametrize(('kind', 'phases', 'row', 'settings'), CASES)
+def test_a_goal_ends_as_the_table_says_and_the_next_one_works(kind, phases, row, settings):
     async def all_phases(cell):
-        for phase in PHASES:
-            await scenario(cell, row.at(phase), phase)
+        for phase in row.phases or phases:
+            await scenario(cell, row.at(phase), phase, kind)
 
     run_cell(all_phases, **settings)
 

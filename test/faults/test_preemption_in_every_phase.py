@@ -2,9 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A motion makes way for the next one in every phase: messages, brakes, place of rest."""
 
-from itertools import pairwise
-
 from fault_goals import ARM, AroundCorners, planned
+from fault_ways import Ways
 import pytest
 from robot_cell import CYCLE, run_cell
 
@@ -30,27 +29,6 @@ PHASES = {
     'settling': ([START, START], ErrorCode.PREEMPTED),
     'cancelling': ([START, CANCEL, START], ErrorCode.CANCELLED),
 }
-
-
-class Ways:
-    """The joints in every cycle."""
-
-    def __init__(self, cell):
-        self.cell, self.rows = cell, []
-
-    async def until(self, condition, bound):
-        end = self.cell.loop.time() + bound
-        while not condition():
-            assert self.cell.loop.time() < end
-            self.rows.append(self.cell.q)
-            await self.cell.sleep(CYCLE)
-
-    def fastest_and_strongest(self):
-        speeds = [[(b - a) / CYCLE for a, b in zip(*pair, strict=True)]
-                  for pair in pairwise(self.rows)]
-        changes = [abs(b - a) / CYCLE for pair in pairwise(speeds)
-                   for a, b in zip(*pair, strict=True)]
-        return max(abs(v) for row in speeds for v in row), max(changes)
 
 
 def said(cell, first):

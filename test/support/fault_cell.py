@@ -6,10 +6,14 @@ from fault_goals import AroundCorners, planned
 from fault_table import BEFORE, Row
 import robot_cell
 from robot_cell import CYCLE, RobotCell
+from virtual_network import HOST
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.protocol.registers import SERVO_INPUTS
+from ur_cartesian_driver.protocol.rtde import RtdeClient
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from ur_cartesian_driver.robot.rtde_connection import RtdeConnection
 from ur_cartesian_driver.sim.modes import OPERATIONAL
 
 #: How long the arm is watched after somebody has unlocked or played, and a goal that waits [s].
@@ -34,6 +38,14 @@ async def let_happen(cell: RobotCell, cause: str):
     elif cause == 'freeze all':
         for port in set(cell.loop.servers) - {robot_cell.OWNER_PORT}:
             cell.loop.freeze(port)
+    elif what == 'set-points':
+        end = setpoint_connection(cell)
+        if kind == 'cut':
+            end.abort()
+        else:
+            end.frozen = end.peer.frozen = True
+    elif cause == 'take the inputs':
+        cell.guests.append(await take_inputs())
     elif kind == 'freeze':
         cell.loop.freeze(PORTS[what])
     elif kind == 'cut':
@@ -42,9 +54,26 @@ async def let_happen(cell: RobotCell, cause: str):
         cell.robot.inject(cause)
 
 
+def setpoint_connection(cell: RobotCell):
+    """Return the connection on which the driver writes set-points, the end that dialled."""
+    (end,) = (end for end in cell.loop.open_ends(robot_cell.RTDE)
+              if SERVO_INPUTS[0].encode() in end.peer.received)
+    return end
+
+
+async def take_inputs():
+    """Be another client that wants to write the inputs which set-points need."""
+    guest = RtdeConnection(RtdeClient(outputs=('timestamp',), inputs=SERVO_INPUTS),
+                           lambda *_: None)
+    await guest.open(HOST, robot_cell.RTDE)
+    return guest
+
+
 async def let_pass(cell: RobotCell):
     """End the faults that last."""
     cell.robot.clear_faults()
+    while cell.guests:
+        cell.guests.pop().close()
     cell.owner.silent = False
     await cell.sleep(2.0 * CYCLE)
 
@@ -137,6 +166,7 @@ async def scenario(cell: RobotCell, row: Row, phase: str, kind=AroundCorners):
         assert travel <= row.travel, f'{here}: a joint has moved by {travel} rad'
     await cell.until(cell.is_ready, row.back, here)
     await go_home(cell, home, here)
+    goal.judge(row, phase)
     return goal.motion.ended_at - begin
 
 

@@ -8,14 +8,24 @@ begun and at where the tool is; never by the time that it should take.
 """
 
 from functools import lru_cache
+from math import atan2, cos, pi, sin
 
 from fault_table import BEFORE
 import robot_cell
-from robot_cell import RobotCell
+from robot_cell import CYCLE, RobotCell
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
-from ur_cartesian_driver.motion.goal import Goal, Segment, Tolerance, Waypoint
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.goal import (
+    ExecutionMode,
+    Goal,
+    IOCommand,
+    OutputKind,
+    Segment,
+    Tolerance,
+    Waypoint,
+)
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
@@ -97,6 +107,9 @@ class GoalInTrouble:
         await self.cell.until(lambda: self.said(TrajectoryAction.CANCEL))
         assert not self.cell.at_rest()
 
+    def judge(self, row, phase):
+        """Look, when everything is over, at what this way of execution has to leave behind."""
+
     def begun(self):
         """Return how many motions the robot program has begun."""
         return self.cell.memory.read().points_begun
@@ -111,19 +124,30 @@ class GoalInTrouble:
         return any(message.mode is ControlMode.FORWARD and message.payload[0] == action
                    for message in self.cell.control_messages(self._said_before))
 
+    def wanted(self, mode):
+        """Tell whether a control mode was asked for by this goal."""
+        return any(message.mode is mode
+                   for message in self.cell.control_messages(self._said_before))
+
     def has_result(self):
         """Tell whether the robot program has reported the end."""
         return len(self._results) > self._results_before
 
 
-@lru_cache
-def around_corners(start):
-    """Return the plan around three sides of a square."""
+def around_square(state, **goal):
+    """Return a plan around three sides of a square."""
     return planned(
-        start.state, ((0.0, SIDE, 0.0), (SIDE, SIDE, 0.0), (SIDE, 0.0, 0.0)), 0.25, 2.0,
+        state, ((0.0, SIDE, 0.0), (SIDE, SIDE, 0.0), (SIDE, 0.0, 0.0)), 0.25, 2.0,
         path_tolerance=Tolerance(position=(PATH_TOLERANCE,) * 3,
                                  twist=(TWIST_TOLERANCE,) * 3 + (-1.0,) * 3),
-        goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3), goal_time_tolerance=SETTLING)
+        goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3), goal_time_tolerance=SETTLING,
+        **goal)
+
+
+@lru_cache
+def around_corners(start):
+    """Return the plan of the goals without anything special."""
+    return around_square(start.state)
 
 
 class AroundCorners(GoalInTrouble):
@@ -148,3 +172,134 @@ class AroundCorners(GoalInTrouble):
             case 'settling':
                 return self.has_result()
         raise AssertionError(phase)
+
+
+#: Radius of a half circle [m], the time that it takes [s], and when its points are passed.
+RADIUS, HALF_CIRCLE = 0.04, 1.0
+PASSED = (0.3, 0.5, 0.7, 1.0)
+
+
+def on_half_circle(time):
+    """
+    Return place, velocity and acceleration (x, y) beside the start: from rest to rest.
+
+    The angle grows as pi (10 s^3 - 15 s^4 + 6 s^5), s being the part of the time that is over.
+    """
+    s = time / HALF_CIRCLE
+    angle = pi * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    rate = pi * 30.0 * s**2 * (1.0 - s) ** 2 / HALF_CIRCLE
+    change = pi * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s) / HALF_CIRCLE**2
+    along, inwards = (cos(angle), sin(angle)), (-sin(angle), cos(angle))
+    place = (RADIUS * sin(angle), RADIUS * (1.0 - cos(angle)))
+    velocity = tuple(RADIUS * rate * u for u in along)
+    acceleration = tuple(RADIUS * (change * u + rate**2 * n)
+                         for u, n in zip(along, inwards, strict=True))
+    return place, velocity, acceleration
+
+
+def half_circle_goal(state, execution):
+    """Return the half circle as a goal whose points have twist and acceleration."""
+    (x, y, z), turned = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
+    waypoints = []
+    for time in PASSED:
+        (dx, dy), (vx, vy), (ax, ay) = on_half_circle(time * HALF_CIRCLE)
+        waypoints.append(Waypoint(
+            time=time * HALF_CIRCLE, pose=Pose((x + dx, y + dy, z), turned),
+            twist=(vx, vy, 0.0, 0.0, 0.0, 0.0), acceleration=(ax, ay, 0.0, 0.0, 0.0, 0.0)))
+    return Goal(waypoints=tuple(waypoints), execution=execution,
+                path_tolerance=Tolerance(position=(PATH_TOLERANCE,) * 3),
+                goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3),
+                goal_time_tolerance=SETTLING)
+
+
+@lru_cache
+def half_circle(start, execution):
+    """Return the plan of a half circle."""
+    return plan(half_circle_goal(start.state, execution), start.state, ARM,
+                PlanningOptions(max_tool_speed=1.0))
+
+
+class AlongSpline(GoalInTrouble):
+    """A half circle, as splines that the robot program interpolates."""
+
+    execution = ExecutionMode.SPLINE
+
+    def plan_from(self, start):
+        return half_circle(start, self.execution)
+
+    def is_in(self, phase):
+        x, y = self.moved()
+        way = atan2(x, RADIUS - y) / pi
+        match phase:
+            case 'between points' | 'cancelling':
+                return 0.55 < way < 0.8
+            case 'slowing down':
+                return way > 0.985
+        raise AssertionError(phase)
+
+
+class Servoed(AlongSpline):
+    """The same half circle, as set-points through RTDE that the robot program buffers."""
+
+    execution = ExecutionMode.SERVO
+
+    def is_in(self, phase):
+        if phase == 'entering':
+            return self.wanted(ControlMode.BUFFERED_SERVO) and self.cell.at_rest()
+        return super().is_in(phase)
+
+    async def cancel(self):
+        self.cell.owner.cancel()
+        await self.cell.sleep(2.0 * CYCLE)
+        assert not self.cell.at_rest()
+
+
+#: The output that is switched at the second corner, and the one after the end [s].
+AT_CORNER, AFTER_END, DELAY = 2, 3, 0.4
+
+
+@lru_cache
+def around_corners_with_outputs(start, values):
+    """Return the plan around three sides of a square, with two outputs that are switched."""
+    commands = tuple(
+        IOCommand(waypoint=waypoint, offset=offset, output=OutputKind.STANDARD_DIGITAL, pin=pin,
+                  value=float(value))
+        for waypoint, offset, pin, value in zip(
+            (1, 2), (0.0, DELAY), (AT_CORNER, AFTER_END), values, strict=True))
+    return around_square(start.state, io_commands=commands)
+
+
+class WithOutputs(AroundCorners):
+    """Three sides of a square, and outputs that wait to be switched."""
+
+    def __init__(self, cell):
+        self._before = self._outputs(cell)
+        super().__init__(cell)
+
+    def plan_from(self, start):
+        return around_corners_with_outputs(start, tuple(not value for value in self._before))
+
+    def is_in(self, phase):
+        match phase:
+            case 'before the place' | 'cancelling':
+                return super().is_in('mid-segment')
+            case 'before the time':
+                return self.begun() == 3 and self.moved()[1] < 1e-4 and self.cell.at_rest()
+        raise AssertionError(phase)
+
+    def judge(self, row, phase):
+        """See that all is switched in the end, or nothing that was still waiting."""
+        done = row.code is ErrorCode.SUCCESSFUL
+        switched = done or phase == 'before the time', done
+        assert self._outputs(self.cell) == [
+            before != is_switched for before, is_switched in zip(
+                self._before, switched, strict=True)], (row.fault, phase)
+
+    @staticmethod
+    def _outputs(cell):
+        outputs = cell.robot.controller.signals.digital_out.standard
+        return [outputs[AT_CORNER], outputs[AFTER_END]]
+
+
+#: The goals of the ways of execution.
+GOALS = {}

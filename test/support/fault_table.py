@@ -56,6 +56,8 @@ class Row:
     back: float = 1.5
     #: Joint travel from the stand after the fault to the end of the steps [rad].
     travel: float = 0.0
+    #: The only phases in which it is looked at; empty = all.
+    phases: tuple[str, ...] = ()
     #: What is different in some phases: name -> value.
     differs: dict[str, dict[str, object]] = field(default_factory=dict)
 

@@ -128,6 +128,8 @@ class RobotCell:
         self.owner = Owner()
         self.robot = self.robot_task = self.loop_task = self.memory = self._pipe = None
         self.config = None
+        #: Connections of other clients.
+        self.guests = []
 
     # ---- life ---------------------------------------------------------------------------------
 

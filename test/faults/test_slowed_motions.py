@@ -1,0 +1,69 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What slider and pause do to the way of the tool: they take time, and change nothing else.
+
+Slowed, held and let go again the tool stays on its path, no joint is thrown, and a cancel while it
+is slowed brakes as any other.
+"""
+
+from fault_goals import AroundCorners, GOALS
+from fault_ways import Ways
+import pytest
+from robot_cell import run_cell
+
+from ur_cartesian_driver.motion.errors import ErrorCode
+
+pytestmark = pytest.mark.slow
+
+KINDS = {'PRIMITIVES': AroundCorners, **GOALS}
+#: What is done in the middle of a goal, and how long it lasts [s].
+DONE = {
+    'slower and faster': [('slider 0.3', 0.1), ('slider 1', 0.2)],
+    'to zero and up again': [('slider 0', 0.3), ('slider 1', 0.2)],
+    'full at once, from a crawl': [('slider 0.02', 0.3), ('slider 1', 0.2)],
+    'pause and play': [('pause', 0.3), ('play', 0.2)],
+}
+#: By way of execution: how far the tool may be off its path [m], and which accelerations a joint
+#: may see [rad/s^2]. A program that pauses as the arm comes to a corner does not begin the blend.
+BOUNDS = {'PRIMITIVES': (0.005, 12.0), 'SPLINE': (0.0002, 12.0)}
+MIDDLE = {'PRIMITIVES': 'mid-segment', 'SPLINE': 'between points'}
+
+
+@pytest.mark.parametrize('what', DONE)
+@pytest.mark.parametrize('kind', KINDS)
+def test_a_tool_that_is_slowed_stays_on_its_path(kind, what):
+    async def scenario(cell):
+        goal, ways = KINDS[kind](cell), Ways(cell)
+        goal.send()
+        await ways.until(lambda: goal.is_in(MIDDLE[kind]), 2.0)
+        for fault, seconds in DONE[what]:
+            cell.robot.inject(fault)
+            over = cell.loop.time() + seconds
+            await ways.until(lambda over=over: cell.loop.time() >= over, 1.0)
+        await ways.until(lambda: goal.motion.outcome, 3.0)
+        assert goal.motion.outcome.succeeded, goal.motion.outcome
+        off, (_, strongest) = ways.farthest_off(goal.plan), ways.fastest_and_strongest()
+        farthest, most = BOUNDS[kind]
+        assert off < farthest
+        assert strongest < most
+
+    run_cell(scenario)
+
+
+@pytest.mark.parametrize('slider', ['1', '0.5'])
+@pytest.mark.parametrize('kind', KINDS)
+def test_a_cancel_brakes_and_is_no_protective_stop(kind, slider):
+    async def scenario(cell):
+        goal, ways = KINDS[kind](cell), Ways(cell)
+        cell.robot.inject(f'slider {slider}')
+        goal.send()
+        await ways.until(lambda: goal.is_in(MIDDLE[kind]), 3.0)
+        cell.owner.cancel()
+        await ways.until(lambda: goal.motion.outcome, 0.4)
+        assert goal.motion.outcome.code is ErrorCode.CANCELLED
+        assert cell.at_rest()
+        assert cell.is_ready()
+        assert ways.fastest_and_strongest()[1] < BOUNDS[kind][1]
+
+    run_cell(scenario)

@@ -1,0 +1,113 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The fault matrix of the other ways of execution: their phases, and the faults that may differ.
+
+Each fault is a row of :mod:`fault_table`, with what this way of execution changes about it. What
+cannot differ, because it is decided before a way of execution matters (idle, planning), or
+happens to interfaces that none of them uses, is not run again.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from fault_table import CONTINUED, HEADLESS, LOCAL, Row
+
+from ur_cartesian_driver.motion.errors import ErrorCode
+
+E = ErrorCode
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mode:
+    """A way of execution under faults."""
+
+    #: What goals of it are called in tests and in the page.
+    name: str
+    #: What the page says of it.
+    about: str
+    phases: dict[str, str]
+    headless: tuple[Row, ...]
+    local: tuple[Row, ...]
+    continued: tuple[Row, ...]
+    #: What of the goal takes as long as without the fault [s], where that does not disturb it.
+    undisturbed: float
+
+
+#: Faults that meet what every way of execution has of its own: program, points, packets, stops.
+FAULTS = (
+    'protective stop', 'emergency stop', 'somebody stops the program',
+    "another client's program replaces ours", 'somebody pauses the program',
+    'the speed slider is moved to 0', 'the controller crashes', 'the network cable is cut',
+    'protective stop that the driver does not see', 'RTDE is cut', 'RTDE is 0.1 s late',
+    "the program's sockets are cut", "the program's answers are lost",
+    'the reverse socket is half-open', 'the trajectory socket is half-open',
+    'the pose is measured 6 mm off', 'the node is silent')
+#: Where set-points come through RTDE, what else happens to that.
+FAULTS_OF_RTDE = (
+    'safeguard stop', 'somebody switches the arm off',
+    'all connections are cut for 0.1 s, RTDE first',
+    'all connections are cut for 0.1 s, the program first', 'RTDE is half-open',
+    'RTDE is silent for 1.5 s', 'RTDE carries less than it should', 'garbage on RTDE',
+    'the reverse socket is cut', 'the trajectory socket is cut')
+#: Where the program stands on the pendant.
+ON_THE_PENDANT = (
+    'protective stop', 'emergency stop', 'protective stop that the driver does not see',
+    'somebody pauses the program', 'the network cable is cut')
+
+
+def chosen(rows: Iterable[Row], names: Iterable[str], phases: Iterable[str], undisturbed: float,
+           changes: dict[str, dict[str, dict[str, object]]]) -> tuple[Row, ...]:
+    """
+    Return rows of a table for the phases of a way of execution.
+
+    :param names: which faults, in this order.
+    :param undisturbed: what replaces the time of a goal that takes no notice [s].
+    :param changes: fault -> phase, or '' for all of them -> what is different.
+    """
+    by_name = {row.fault: row for row in rows}
+    return tuple(_adapted(by_name[name], tuple(phases), undisturbed, changes.get(name, {}))
+                 for name in names)
+
+
+def _adapted(row: Row, phases: tuple[str, ...], undisturbed: float,
+             changes: dict[str, dict[str, object]]) -> Row:
+    """Return a row whose differences are those of other phases, and the changes."""
+    differs = {phase: row.differs.get(phase, {}) | changes.get(phase, {}) for phase in phases
+               if phase in row.differs or phase in changes}
+    usual = replace(row, **changes.get('', {}), differs={})
+    return _long_enough(replace(usual, differs={
+        phase: _times(replace(usual, **differing), undisturbed, differing)
+        for phase, differing in differs.items()}), undisturbed)
+
+
+def _long_enough(row: Row, undisturbed: float) -> Row:
+    return replace(row, **_times(row, undisturbed, {}))
+
+
+def _times(row: Row, undisturbed: float, differing: dict[str, object]) -> dict[str, object]:
+    """Return differences with the time of a goal that is not disturbed."""
+    if row.code is not E.SUCCESSFUL or row.waits:
+        return differing
+    return differing | {'bound': undisturbed, 'rest': undisturbed}
+
+
+def _mode(name: str, about: str, phases: dict[str, str], undisturbed: float,
+          changes: dict[str, dict[str, dict[str, object]]], *, faults: Iterable[str] = FAULTS,
+          more: tuple[Row, ...] = ()) -> Mode:
+    return Mode(
+        name=name, about=about, phases=phases, undisturbed=undisturbed,
+        headless=chosen(HEADLESS, faults, phases, undisturbed, changes) + more,
+        local=chosen(LOCAL, ON_THE_PENDANT, phases, undisturbed, changes),
+        continued=chosen(CONTINUED, ('protective stop',), phases, undisturbed, changes))
+
+
+SPLINE = _mode(
+    'SPLINE', 'A half circle through four points, all but the last with twist and acceleration.',
+    {'between points': 'on the way from the second point to the third',
+     'slowing down': 'on the way to the last point, a tenth of a second before it',
+     'cancelling': 'CANCEL is on the wire, the arm still moves'},
+    1.6, {'the reverse socket is half-open': {'slowing down': {'code': E.SUCCESSFUL}},
+          'the node is silent': {'slowing down': {'code': E.SUCCESSFUL}}})
+
+MODES: tuple[Mode, ...] = ()

@@ -1,0 +1,45 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The joints in every cycle, and what a way of the arm is judged by."""
+
+from itertools import pairwise
+
+from fault_goals import ARM
+import numpy as np
+from robot_cell import CYCLE
+
+from ur_cartesian_driver.motion.pose import pose_from_row
+
+
+class Ways:
+    """The joints in every cycle."""
+
+    def __init__(self, cell):
+        self.cell, self.rows = cell, []
+
+    async def until(self, condition, bound):
+        """Watch until a condition holds, which it has to within a bound [s]."""
+        end = self.cell.loop.time() + bound
+        while not condition():
+            assert self.cell.loop.time() < end, self.cell.owner.log
+            self.rows.append(self.cell.q)
+            await self.cell.sleep(CYCLE)
+
+    def fastest_and_strongest(self):
+        """Return the largest speed and acceleration of a joint [rad/s], [rad/s^2]."""
+        speeds = [[(b - a) / CYCLE for a, b in zip(*pair, strict=True)]
+                  for pair in pairwise(self.rows)]
+        changes = [abs(b - a) / CYCLE for pair in pairwise(speeds)
+                   for a, b in zip(*pair, strict=True)]
+        return max(abs(v) for row in speeds for v in row), max(changes)
+
+    def farthest_off(self, plan):
+        """Return how far the tool was off a planned path of one orientation [m]."""
+        flange = ARM.forward_rows(np.array(self.rows))
+        tool = np.array([(pose_from_row(row) @ plan.T_flange_active).position for row in flange])
+        begin, end = plan.reference.poses[:-1, :3], plan.reference.poses[1:, :3]
+        way = end - begin
+        square = np.maximum((way**2).sum(axis=1), 1e-18)
+        at = np.clip(((tool[:, None] - begin) * way).sum(axis=2) / square, 0.0, 1.0)
+        off = tool[:, None] - begin - at[..., None] * way
+        return float(np.sqrt((off**2).sum(axis=2).min(axis=1)).max())
