@@ -99,6 +99,19 @@ def test_the_arm_is_seized_only_when_it_is_free(turns):
     assert turns.seize(second.turn)
 
 
+def test_what_has_the_arm_for_now_makes_way_for_every_goal(turns):
+    (early,) = lined_up(turns, 'goal 1')
+    session = RunningGoal(turns, 'a session')
+    assert turns.seize_for_now(session.turn)
+    assert not turns.seize_for_now(Turn('another session', lambda: None))
+    turns.claim(early.turn)
+    assert (session.turn.successor, session.calls) == ('goal 1', 1)
+    assert early.turn.predecessor == 'a session'
+    assert not turns.seize_for_now(session.turn), 'as long as the goal has the arm'
+    turns.leave(early.turn)
+    assert turns.seize_for_now(session.turn)
+
+
 @pytest.mark.parametrize('seed', range(5))
 def test_one_goal_at_a_time_has_the_arm_and_the_newest_the_last(turns, seed):
     random, goals, moved = Random(seed), [], []

@@ -45,7 +45,7 @@ from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.planning.validate import check
 from ur_cartesian_driver.ros.convert import goal_from_message, nanoseconds, placed
 from ur_cartesian_driver.ros.deferring_server import DeferringActionServer
-from ur_cartesian_driver.ros.frames import Stand
+from ur_cartesian_driver.ros.frames import Frames, Stand
 from ur_cartesian_driver.ros.parameters import Settings
 from ur_cartesian_driver.ros.reports import feedback_message, FeedbackFrame, result_message
 from ur_cartesian_driver.ros.transforms import listen
@@ -98,6 +98,11 @@ class CartesianActionServer:
             result_service_qos_profile=REQUESTS,
             cancel_service_qos_profile=REQUESTS,
         )
+
+    @property
+    def frames(self) -> Frames:
+        """The frames in which goals are given; also those of tf2."""
+        return self._frames
 
     @property
     def idle(self) -> bool:

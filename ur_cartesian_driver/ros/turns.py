@@ -71,6 +71,19 @@ class Turns:
             self._owner = turn
             return True
 
+    def seize_for_now(self, turn: Turn) -> bool:
+        """
+        Take the arm if it is free, and make way for whatever goal claims it; tell whether it was.
+
+        In line it stands before all others: each of them is newer.
+        """
+        with self._condition:
+            if self._owner is not None:
+                return False
+            self._owner = turn
+            self._line.insert(0, turn)
+            return True
+
     def claim(self, turn: Turn) -> None:
         """
         Have all older goals make way, and wait for the arm.
