@@ -31,7 +31,8 @@ from ur_cartesian_driver.motion.goal import (
 )
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import check, PlanningOptions
-from ur_cartesian_driver.planning.validate import RULES
+from ur_cartesian_driver.planning.validate import RULES, way_of_execution
+from ur_cartesian_driver.protocol.dialects import DIALECTS
 
 OPTIONS = PlanningOptions(max_points=10)
 TYPE = SegmentType
@@ -43,6 +44,7 @@ def at(x, y=0.0, z=0.0, time=0.0, **fields):
 
 PLAIN = Goal(waypoints=(at(0.1), at(0.2), at(0.3)))
 TIMED = Goal(waypoints=(at(0.1, time=1.0), at(0.2, time=2.0), at(0.3, time=3.0)))
+SPLINE = replace(TIMED, execution=ExecutionMode.SPLINE)
 
 
 def with_point(goal, index, **fields):
@@ -122,17 +124,37 @@ REFUSALS = [
     (replace(PLAIN, age=1.5), OldHeaderTimestamp, 'header.stamp lies 1.500 s in the past'),
     (replace(PLAIN, age=-61.0), InvalidGoal, 'trajectory.header.stamp lies 61.0 s in the future'),
     # not there yet
-    (replace(TIMED, execution=ExecutionMode.SPLINE), NotAvailable, 'execution is SPLINE'),
-    (replace(TIMED, execution=ExecutionMode.SERVO), NotAvailable, 'execution is SERVO'),
     (replace(PLAIN, keep_open=True), NotAvailable, 'keep_open is set'),
     (replace(PLAIN, io_commands=(IOCommand(
         waypoint=0, offset=0.0, output=OutputKind.TOOL_DIGITAL, pin=0, value=1.0),)),
      NotAvailable, 'io_commands is not empty'),
     (replace(PLAIN, controlled_frame='nozzle'), InvalidGoal,
      "trajectory.controlled_frame is 'nozzle'"),
-    (with_point(TIMED, 1, twist=ONE), NotAvailable, 'trajectory.points[1].twist is not zero'),
-    (with_point(TIMED, 0, acceleration=ONE), NotAvailable,
-     'trajectory.points[0].acceleration is not zero'),
+    # splines
+    (replace(PLAIN, execution=ExecutionMode.SPLINE), InvalidGoal,
+     'execution is SPLINE, and the goal has no times'),
+    (replace(PLAIN, execution=ExecutionMode.SERVO), InvalidGoal,
+     'execution is SERVO, and the goal has no times'),
+    (with_point(with_point(TIMED, 0, twist=ONE), 2, twist=ONE), InvalidGoal,
+     'trajectory.points[2].twist is not zero, but the motion ends there'),
+    (with_point(SPLINE, 2, acceleration=ONE), InvalidGoal,
+     'trajectory.points[2].acceleration is not zero, but the motion ends there'),
+    (with_point(SPLINE, 0, time=0.0, twist=ONE), InvalidGoal,
+     'trajectory.points[0].twist is not zero, but the robot stands there'),
+    (with_segment(SPLINE, 1, type=TYPE.JOINT), InvalidGoal, 'segments[1].type is JOINT, but the '
+     'execution is SPLINE'),
+    (with_segment(SPLINE, 1, **ARC), InvalidGoal, 'segments[1].type is CIRCULAR, but'),
+    (with_segment(SPLINE, 1, blend_radius=0.01), InvalidGoal,
+     'segments[1].blend_radius is 0.01, but the execution is SPLINE'),
+    (with_segment(SPLINE, 1, velocity=0.1), InvalidGoal, 'segments[1].velocity is 0.1 in a goal'),
+    (with_point(SPLINE, 1, time=1.0005), InvalidGoal,
+     'points[1].time_from_start gives the segment 0.0005 s'),
+    (with_point(SPLINE, 1, twist=(inf, *ONE[1:])), InvalidGoal,
+     'trajectory.points[1].twist contains inf'),
+    (with_point(SPLINE, 1, jerk=SIX_NAN), InvalidGoal, 'trajectory.points[1].jerk contains nan'),
+    (with_point(TIMED, 2, twist=SIX_NAN), InvalidGoal, 'trajectory.points[2].twist contains nan'),
+    (with_point(replace(TIMED, execution=ExecutionMode.PRIMITIVES), 1, acceleration=SIX_NAN),
+     InvalidGoal, 'trajectory.points[1].acceleration contains nan'),
     # times
     (with_point(TIMED, 2, time=2.0), InvalidGoal, 'trajectory.points[2].time_from_start is 2 s'),
     (with_point(TIMED, 1, time=0.5), InvalidGoal, 'trajectory.points[1].time_from_start is 0.5 s'),
@@ -214,6 +236,12 @@ ACCEPTED = {
     'primitives ignore a twist': replace(
         with_point(TIMED, 1, twist=ONE), execution=ExecutionMode.PRIMITIVES),
     'twist at the last point': with_point(TIMED, 2, twist=ONE),
+    'a twist at an inner point means a spline': with_point(TIMED, 1, twist=ONE),
+    'a spline with NaN': with_point(with_point(
+        with_point(TIMED, 0, twist=SIX_NAN), 1, acceleration=SIX_NAN), 2, twist=SIX_NAN),
+    'a spline that waits': with_point(SPLINE, 1, pose=SPLINE.waypoints[0].pose),
+    'a spline with lines': with_segment(SPLINE, 1, type=TYPE.LINEAR, acceleration=1.0),
+    'servo': replace(TIMED, execution=ExecutionMode.SERVO),
     'twist as a speed': with_point(PLAIN, 1, twist=ONE),
     'arc': with_segment(PLAIN, 1, **ARC),
     'unset via': with_segment(PLAIN, 1, via=Pose()),
@@ -232,6 +260,24 @@ ACCEPTED = {
 @pytest.mark.parametrize('goal', ACCEPTED.values(), ids=ACCEPTED)
 def test_a_right_goal_passes(goal):
     check(goal, OPTIONS)
+
+
+@pytest.mark.parametrize(('mode', 'options', 'text'), [
+    (ExecutionMode.SPLINE, PlanningOptions(calibration_known=False), 'SPLINE.*calibration'),
+    (ExecutionMode.SPLINE, PlanningOptions(dialect=DIALECTS['2.0']), 'SPLINE.*milliseconds'),
+    (ExecutionMode.SERVO, PlanningOptions(dialect=DIALECTS['2.12']), 'SERVO.*dialect 2.12')])
+def test_a_spline_needs_a_robot_that_takes_joints_exactly(mode, options, text):
+    goal = replace(TIMED, execution=mode)
+    check(goal, PlanningOptions())
+    with pytest.raises(NotAvailable, match=f'^execution is {text}'):
+        check(goal, options)
+
+
+def test_auto_is_a_spline_only_with_times_and_a_twist_or_acceleration_at_an_inner_point():
+    for goal in (TIMED, with_point(TIMED, 2, twist=ONE), with_point(PLAIN, 1, twist=ONE)):
+        assert way_of_execution(goal) is ExecutionMode.PRIMITIVES
+    for field in ('twist', 'acceleration'):
+        assert way_of_execution(with_point(TIMED, 1, **{field: ONE})) is ExecutionMode.SPLINE
 
 
 @pytest.mark.parametrize('kind', [SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT])
@@ -309,7 +355,8 @@ def test_nonsense_of_any_kind_ends_in_a_refusal_or_passes_but_never_in_another_e
 @pytest.mark.parametrize(('field', 'value'), [
     ('linear_velocity', 0.0), ('optimized_velocity', 1.5), ('max_tool_speed', -1.0),
     ('max_segment_time', 2148.0), ('on_too_fast', 'ignore'), ('on_posture_change', 'maybe'),
-    ('max_points', 0), ('stamp_tolerance', nan)])
+    ('max_points', 0), ('stamp_tolerance', nan), ('spline_tolerance', 0.0),
+    ('closing_deceleration', 0.0)])
 def test_options_out_of_their_range_are_named(field, value):
     with pytest.raises(ValueError, match=field):
         PlanningOptions(**{field: value})

@@ -37,6 +37,7 @@ from ur_cartesian_driver.planning.pose_rows import (
     multiply_rows,
     normalized_rows,
 )
+from ur_cartesian_driver.planning.tool_spline import ToolCurve
 
 # Chords that measure the length of a corner without a formula.
 _CHORDS = 16
@@ -248,7 +249,7 @@ def _crossing_rows(all_corners: Sequence[Corner], which: NDArray[np.intp], s: Fl
     return rows
 
 
-def path_rows(paths: Sequence[Path], which: NDArray[np.intp], u: Floats) -> Floats:
+def path_rows(paths: Sequence[Path | ToolCurve], which: NDArray[np.intp], u: Floats) -> Floats:
     """
     Return poses (n, 7) of many paths.
 

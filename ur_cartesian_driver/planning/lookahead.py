@@ -102,13 +102,15 @@ def in_joints(reach: Reach, pieces: Sequence[Piece]) -> Followed:
     return Followed(piece, t, tcp_rows(reach.arm, reach.T_flange_tcp, q), q)
 
 
-def followed(reach: Reach, pieces: Sequence[Piece], q_start: Joints) -> Followed:
+def followed(reach: Reach, pieces: Sequence[Piece], q_start: Joints,
+             places: Places | None = None) -> Followed:
     """
     Return the places on pieces in the tool's space, one piece after the other, with the joints.
 
     :param q_start: the configuration at the beginning of the first piece [rad].
+    :param places: those on the pieces; None = evenly along each of them.
     """
-    places = places_on(pieces)
+    places = places_on(pieces) if places is None else places
     found, q = _Rows(), q_start
     row, block = 0, len(places.t)
     while row < len(places.t):

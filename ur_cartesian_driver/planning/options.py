@@ -11,6 +11,9 @@ from typing import Literal, TypeAlias
 from ur_cartesian_driver.planning.workspace import parse_planes
 from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
 
+#: Finer than this the wire does not carry joint positions [m].
+LEAST_SPLINE_TOLERANCE = 1e-6
+
 Choice: TypeAlias = Literal['refuse', 'slow']
 PostureChoice: TypeAlias = Literal['refuse', 'movej']
 CollisionChoice: TypeAlias = Literal['off', 'warn', 'refuse', 'auto']
@@ -111,6 +114,11 @@ class PlanningOptions:
     max_linear_acceleration: float = 10.0
     max_angular_acceleration: float = 40.0
     max_joint_acceleration: float = 40.0
+    #: SPLINE and SERVO: how far the tool may be beside the curve through the points [m]; how far
+    #: turned is as much at 0.1 m.
+    spline_tolerance: float = 0.00005
+    #: How hard the fastest joint brakes where an open goal ends without a last point [rad/s^2].
+    closing_deceleration: float = 4.0
     #: The longest time that the wire carries, (2^31 - 1) us.
     max_segment_time: float = 2147.483647
 
@@ -137,6 +145,9 @@ class PlanningOptions:
         if self.self_collision not in ('off', 'warn', 'refuse', 'auto'):
             raise ValueError(f"self_collision is {self.self_collision!r}; it must be 'off', "
                              "'warn', 'refuse' or 'auto'")
+        if self.spline_tolerance < LEAST_SPLINE_TOLERANCE:
+            raise ValueError(f'spline_tolerance is {self.spline_tolerance}; it must be at least '
+                             f'{LEAST_SPLINE_TOLERANCE:g} m')
         if self.max_segment_time > NEWEST.max_duration:
             raise ValueError(f'max_segment_time is {self.max_segment_time}; at most '
                              f'{NEWEST.max_duration} s can be sent')

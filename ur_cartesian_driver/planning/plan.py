@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 import gc
 from itertools import pairwise
 
@@ -38,7 +39,7 @@ from ur_cartesian_driver.motion.primitive import (
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.clearance import Clearance
 from ur_cartesian_driver.planning.clearance import remarks as clearance_remarks
-from ur_cartesian_driver.planning.controlled import carried, tools
+from ur_cartesian_driver.planning.controlled import Carried, carried, tools
 from ur_cartesian_driver.planning.leg import Leg, Timing
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.path import Arc
@@ -51,14 +52,17 @@ from ur_cartesian_driver.planning.postures import (
 from ur_cartesian_driver.planning.reference import reference_path
 from ur_cartesian_driver.planning.report import ignored, note, smallest
 from ur_cartesian_driver.planning.route import Route, SAME_SOLUTION
+from ur_cartesian_driver.planning.spline_plan import plan_pieces, SplineState, stretched
 from ur_cartesian_driver.planning.spoken import poses_only, spoken
 from ur_cartesian_driver.planning.timing import schedule
 from ur_cartesian_driver.planning.tolerances import with_default_tolerances
 from ur_cartesian_driver.planning.validate import (
     check,
+    is_spline,
     is_timed,
     point_field,
     segment_field,
+    way_of_execution,
 )
 
 #: How far the reported TCP may be from where the kinematics puts it [m], [rad]. Calibration moves
@@ -103,6 +107,8 @@ def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> 
     about = carried(goal, state, options)
     goal, state = about.goal, about.state
     planner = _Planner(goal, state, arm, options)
+    if is_spline(goal):
+        return _spline_plan(planner, about, T_flange_active)
     legs = planner.legs()
     samples = planner.route.survey.samples()
     said = list(dict.fromkeys(
@@ -121,6 +127,25 @@ def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> 
                 T_tcp_controlled=about.T_tcp_controlled)
 
 
+def _spline_plan(planner: _Planner, about: Carried, T_flange_active: Pose) -> Plan:
+    """Return the plan of a goal whose points are joined by a spline."""
+    goal, state, options = planner.goal, planner.state, planner.options
+    begin = planner.begin()
+    if begin == len(goal.waypoints):
+        raise InvalidGoal('trajectory.points', 'has only the point at which the robot stands, at '
+                          'time 0', 'give at least one point with a time')
+    part = goal if not begin else replace(
+        goal, waypoints=goal.waypoints[begin:], segments=goal.segments[begin:])
+    found = plan_pieces(
+        SplineState(q=state.actual_q), part, planner.reach.arm, state.T_flange_tcp, options,
+        first=begin, tools=tools(goal, T_flange_active))
+    return Plan(
+        goal=stretched(goal, found.stretch), segments=found.segments, start=state.actual_q,
+        reference=found.reference, remarks=(*about.remarks, *planner.remarks, *found.remarks),
+        T_flange_active=T_flange_active, T_flange_tcp=about.T_flange_tcp,
+        T_tcp_controlled=about.T_tcp_controlled, execution=way_of_execution(goal))
+
+
 class _Planner:
     """The data that the stages share; made for one goal and thrown away."""
 
@@ -132,7 +157,7 @@ class _Planner:
         self.why: dict[int, list[str]] = {}
         self.targets = [goal.T_base_frame @ point.pose for point in goal.waypoints]
         self.timed = is_timed(goal)
-        if self.timed and options.dialect.is_coarse:
+        if self.timed and options.dialect.is_coarse and not is_spline(goal):
             self.remarks.append(f'all points: times are kept by speeds, because robot programs '
                                 f'of wire dialect {options.dialect.name} count in milliseconds')
         self.route = Route(goal, self.targets, self.reach, options, self.remarks, self.why)
@@ -197,9 +222,13 @@ class _Planner:
                 raise InvalidPosture(f'{point_field(0, "posture")} is not the one in which the '
                                      f'robot stands: {clause}; give the first point a time.')
 
+    def begin(self) -> int:
+        """Return the number of the first point to which there is a motion."""
+        return 1 if self._stands_at_first() else 0
+
     def legs(self) -> list[Leg]:
         """Return the way of every segment and the configuration it arrives in."""
-        begin = 1 if self._stands_at_first() else 0
+        begin = self.begin()
         stops = [0.0, *(point.time for point in self.goal.waypoints)][begin:]
         times = [after - before if self.timed else None for before, after in pairwise(stops)]
         legs = self.route.legs(begin, self.state.actual_tcp_pose, self.state.actual_q, times)

@@ -40,7 +40,7 @@ def reference_path(start: Pose, legs: Sequence[Leg], timings: Sequence[Timing]) 
     room = np.array([section.curve.room if isinstance(section.curve, Corner) else (0.0, 0.0)
                      for section in sections])[of]
     poses = np.concatenate([[start.row()], _poses(sections, is_corner, of, at)])
-    _keep_hemisphere(poses)
+    keep_hemisphere(poses)
     return ReferencePath(
         poses=poses, point=np.concatenate([[legs[0].index], points]).astype(np.int32),
         time=np.maximum.accumulate(np.concatenate([[0.0], _times(sections, of, at)])),
@@ -117,7 +117,7 @@ def _places(leg: Leg, timing: Timing) -> list[float]:
     return [*sorted(places), end]
 
 
-def _keep_hemisphere(poses: Floats) -> None:
+def keep_hemisphere(poses: Floats) -> None:
     """Turn signs of quaternions (q and -q are one orientation) so that rows do not jump."""
     dots = np.einsum('ij,ij->i', poses[1:, 3:], poses[:-1, 3:])
     signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0))

@@ -45,17 +45,17 @@ def ignored(goal: Goal) -> list[str]:
     timed = is_timed(goal)
     points = list(enumerate(goal.waypoints))
     if timed:
-        _say(remarks, [i for i, p in points if any(p.twist)],
+        say(remarks, [i for i, p in points if any(p.twist)],
              'twist is ignored: UR motion commands stop or blend at a point')
     else:
-        _say(remarks, [i for i, p in points if any(p.twist) and not _takes_twist(goal, i)],
+        say(remarks, [i for i, p in points if any(p.twist) and not _takes_twist(goal, i)],
              'twist is ignored: the segment has a velocity of its own, or no speed of the tool')
-    _say(remarks, [i for i, p in points if any(p.acceleration)],
+    say(remarks, [i for i, p in points if any(p.acceleration)],
          'acceleration is ignored: UR motion commands cannot meet it')
-    _say(remarks, [i for i, p in points if any(p.jerk)],
+    say(remarks, [i for i, p in points if any(p.jerk)],
          'jerk is ignored: no robot motion takes it')
     if timed:
-        _say(remarks, [i for i, s in enumerate(goal.segments) if s.acceleration > 0.0 and s.type
+        say(remarks, [i for i, s in enumerate(goal.segments) if s.acceleration > 0.0 and s.type
                        in (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)],
              'the acceleration of the segment is ignored: its time counts')
     if goal.segments and goal.segments[-1].blend_radius > 0.0:
@@ -70,7 +70,8 @@ def _takes_twist(goal: Goal, index: int) -> bool:
             and not is_optimized(segment.type))
 
 
-def _say(remarks: list[str], points: list[int], what: str) -> None:
+def say(remarks: list[str], points: list[int], what: str) -> None:
+    """Add the remark about some points, none if there are no such points."""
     if not points:
         return
     listed = ', '.join(str(i) for i in points[:_LISTED])

@@ -22,6 +22,7 @@ from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.corner import Corner, corner_rows, crossing, path_rows
 from ur_cartesian_driver.planning.path import JointLine, Path
 from ur_cartesian_driver.planning.pose_rows import Floats
+from ur_cartesian_driver.planning.tool_spline import ToolCurve
 
 Ints = NDArray[np.int32]
 
@@ -61,7 +62,7 @@ class Piece:
 
     #: Index of the waypoint at the end of the path; of a corner the one that it rounds.
     index: int
-    curve: Path | Corner
+    curve: Path | Corner | ToolCurve
     #: From where to where: the path's ``u``, the corner's ``s``.
     begin: float
     end: float

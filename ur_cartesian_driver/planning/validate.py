@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from enum import IntEnum
-from math import hypot, isfinite, pi, sqrt
+from math import hypot, isfinite, isnan, pi, sqrt
 from typing import TypeAlias, TypeVar
 
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
@@ -37,6 +37,7 @@ from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Quaternion
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.path import Arc, same
 from ur_cartesian_driver.planning.tolerances import tolerances_of, with_default_tolerances
+from ur_cartesian_driver.protocol.dialects import NEWEST
 
 #: How far a quaternion's length may be off 1.
 QUATERNION_TOLERANCE = 1e-3
@@ -44,6 +45,8 @@ QUATERNION_TOLERANCE = 1e-3
 LARGEST_JOINT_VALUE = 8.0 * pi
 #: How far ahead a stamp may lie [s].
 LARGEST_DELAY = 60.0
+#: The shortest way of a spline from point to point [s].
+LEAST_SPLINE_TIME = 0.001
 
 Rule: TypeAlias = Callable[[Goal, PlanningOptions], None]
 _Enum = TypeVar('_Enum', bound=IntEnum)
@@ -75,6 +78,21 @@ def segment_field(index: int, field: str) -> str:
 def segment_of(goal: Goal, index: int) -> Segment:
     """Return the segment that ends at a point, the plain one where the goal has none."""
     return goal.segments[index] if goal.segments else PLAIN
+
+
+def way_of_execution(goal: Goal) -> ExecutionMode:
+    """Return how a goal is carried out: AUTO means SPLINE where only that does what it asks."""
+    if goal.execution != ExecutionMode.AUTO:
+        return ExecutionMode(goal.execution)
+    inner = goal.waypoints if goal.keep_open else goal.waypoints[:-1]
+    if is_timed(goal) and any(any(point.twist) or any(point.acceleration) for point in inner):
+        return ExecutionMode.SPLINE
+    return ExecutionMode.PRIMITIVES
+
+
+def is_spline(goal: Goal) -> bool:
+    """Tell whether the goal's points are joined by a spline, with times."""
+    return way_of_execution(goal) in (ExecutionMode.SPLINE, ExecutionMode.SERVO)
 
 
 def is_timed(goal: Goal) -> bool:
@@ -117,9 +135,11 @@ def _numbers_of_frames(goal: Goal, options: PlanningOptions) -> None:
 
 
 def _numbers_of_points(goal: Goal, options: PlanningOptions) -> None:
+    chooses: bool | None = None
     for i, point in enumerate(goal.waypoints):
         if not _all_finite(point):
-            _name_the_infinite(i, point)
+            chooses = is_spline(goal) if chooses is None else chooses
+            _name_the_infinite(i, point, chooses)
         _check_unit(point_field(i, 'pose.orientation'), point.pose.quaternion)
 
 
@@ -172,10 +192,6 @@ def _stamp(goal: Goal, options: PlanningOptions) -> None:
 
 
 def _available(goal: Goal, options: PlanningOptions) -> None:
-    if goal.execution in (ExecutionMode.SPLINE, ExecutionMode.SERVO):
-        raise NotAvailable(
-            'execution', f'is {ExecutionMode(goal.execution).name}, which this version does not '
-            'do', 'set it to PRIMITIVES')
     if goal.keep_open:
         raise NotAvailable('keep_open', 'is set, but points cannot be appended in this version',
                            'send all points at once')
@@ -205,16 +221,70 @@ def _times(goal: Goal, options: PlanningOptions) -> None:
         before = point.time
 
 
-def _twist_needs_spline(goal: Goal, options: PlanningOptions) -> None:
-    if goal.execution != ExecutionMode.AUTO or not is_timed(goal):
+def _spline(goal: Goal, options: PlanningOptions) -> None:
+    if not is_spline(goal):
         return
-    for i, point in enumerate(goal.waypoints[:-1]):
-        for field, values in (('twist', point.twist), ('acceleration', point.acceleration)):
-            if any(values):
-                raise NotAvailable(
-                    point_field(i, field), 'is not zero in a goal with times; only splines can '
-                    'meet it, and this version does not do them',
-                    'set execution to PRIMITIVES to have it ignored, or set it to 0')
+    name = way_of_execution(goal).name
+    if not is_timed(goal):
+        raise InvalidGoal('execution', f'is {name}, and the goal has no times',
+                          'give every point a time_from_start, or set execution to PRIMITIVES')
+    _spline_can_be_sent(goal, name, options)
+    before = 0.0
+    for i, point in enumerate(goal.waypoints):
+        if 0.0 < point.time < before + LEAST_SPLINE_TIME:
+            raise InvalidGoal(
+                point_field(i, 'time_from_start'), f'gives the segment {point.time - before:g} s; '
+                f'pieces of splines take at least {LEAST_SPLINE_TIME:g} s', 'leave points out')
+        before = point.time
+    for i, segment in enumerate(goal.segments):
+        if segment is not PLAIN:
+            _spline_segment(i, segment, name)
+    if goal.waypoints[0].time == 0.0:
+        _check_rests(goal, 0, 'the robot stands there when the motion begins')
+    if not goal.keep_open:
+        _check_rests(goal, len(goal.waypoints) - 1, 'the motion ends there')
+
+
+def _spline_can_be_sent(goal: Goal, name: str, options: PlanningOptions) -> None:
+    remedy = 'set execution to PRIMITIVES'
+    if not options.calibration_known:
+        raise NotAvailable(
+            'execution', f'is {name}, for which joint positions are sent, and the calibration of '
+            'the robot, from which they follow, is not known', remedy)
+    if goal.execution == ExecutionMode.SERVO:
+        if options.dialect is not NEWEST:
+            raise NotAvailable(
+                'execution', f'is {name}, which robot programs of wire dialect '
+                f'{options.dialect.name} do not know', remedy)
+        if goal.io_commands:
+            raise NotAvailable('io_commands', f'is not empty, and {name} switches no outputs',
+                               'set execution to SPLINE or PRIMITIVES')
+    elif options.dialect.is_coarse:
+        raise NotAvailable(
+            'execution', f'is {name}, and robot programs of wire dialect {options.dialect.name} '
+            'count in milliseconds, too coarse for splines', remedy)
+
+
+def _spline_segment(index: int, segment: Segment, name: str) -> None:
+    kind = SegmentType(segment.type)
+    if kind not in (SegmentType.AUTO, SegmentType.LINEAR):
+        raise InvalidGoal(
+            segment_field(index, 'type'), f'is {kind.name}, but the execution is {name}, in which '
+            'a spline joins the points', 'set it to AUTO, or set execution to PRIMITIVES, which '
+            'ignores twists and accelerations at points')
+    if segment.blend_radius > 0.0:
+        raise InvalidGoal(
+            segment_field(index, 'blend_radius'), f'is {segment.blend_radius:g}, but the '
+            f'execution is {name}: the spline goes through the point', 'set it to 0, or set '
+            'execution to PRIMITIVES, which ignores twists and accelerations at points')
+
+
+def _check_rests(goal: Goal, index: int, why: str) -> None:
+    point = goal.waypoints[index]
+    for field, values in (('twist', point.twist), ('acceleration', point.acceleration)):
+        if any(value != 0.0 and not isnan(value) for value in values):
+            raise InvalidGoal(point_field(index, field), f'is not zero, but {why}',
+                              'set it to 0')
 
 
 def _segment_rules(goal: Goal, options: PlanningOptions) -> None:
@@ -240,6 +310,8 @@ def _postures(goal: Goal, options: PlanningOptions) -> None:
 
 
 def _blends(goal: Goal, options: PlanningOptions) -> None:
+    if is_spline(goal):
+        return
     last = len(goal.waypoints) - 1
     for i in range(1, len(goal.segments)):
         check_blends_fit(goal, i, goal.waypoints[i - 1].pose.distance_to(goal.waypoints[i].pose),
@@ -248,6 +320,8 @@ def _blends(goal: Goal, options: PlanningOptions) -> None:
 
 
 def _ways(goal: Goal, options: PlanningOptions) -> None:
+    if is_spline(goal):
+        return  # it can wait at a point
     for i in range(1, len(goal.waypoints)):
         start, end = goal.waypoints[i - 1], goal.waypoints[i]
         segment = segment_of(goal, i)
@@ -274,7 +348,7 @@ RULES: tuple[Rule, ...] = (
     _stamp,
     _available,
     _times,
-    _twist_needs_spline,
+    _spline,
     _segment_rules,
     _postures,
     _blends,
@@ -382,12 +456,19 @@ def _all_finite(point: Waypoint) -> bool:
                     + sum(point.acceleration) + sum(point.jerk))
 
 
-def _name_the_infinite(index: int, point: Waypoint) -> None:
+def _name_the_infinite(index: int, point: Waypoint, chooses: bool) -> None:
+    """
+    Refuse the number that is not finite.
+
+    :param chooses: whether NaN in twist and acceleration lets the driver choose.
+    """
     _check_finite(point_field(index, 'time_from_start'), (point.time,))
     _check_finite(point_field(index, 'pose.position'), point.pose.position)
     _check_finite(point_field(index, 'pose.orientation'), point.pose.quaternion)
     for field in ('twist', 'acceleration', 'jerk'):
-        _check_finite(point_field(index, field), getattr(point, field))
+        values = getattr(point, field)
+        _check_finite(point_field(index, field), (
+            0.0 if chooses and field != 'jerk' and isnan(value) else value for value in values))
 
 
 def _check_finite(field: str, values: Iterable[float]) -> None:

@@ -258,6 +258,11 @@ DECLARATIONS: tuple[Declaration, ...] = (
                 'Largest acceleration of a joint that a time may lead to [rad/s^2].',
                 0.1, 1000.0),
     Declaration('max_segment_time', 'Longest duration of one segment [s].', 0.1, 2147.483647),
+    # -- splines
+    Declaration('spline_tolerance', 'How far the tool may be beside the curve through the points '
+                'of SPLINE and SERVO goals [m]; how far turned is as much at 0.1 m.', 1e-6, 0.01),
+    Declaration('closing_deceleration', 'How hard the fastest joint brakes where an open goal '
+                'ends without a last point [rad/s^2].', 0.1, 100.0),
     # -- live targets
     Declaration('servo_target_enabled',
                 'Follow the poses on ~/servo_target; false: nobody listens there.'),

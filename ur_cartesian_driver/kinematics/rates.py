@@ -1,0 +1,84 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Velocities and accelerations of tool and joints, in rows: one from the other.
+
+With the twist V and the joint velocities q', V = J q' and V' = J q'' + J' q'. The last term is the
+acceleration that the tool has while all joints turn evenly; it is added up along the arm.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.chain import Arm, FramesOf, jacobian_at
+from ur_cartesian_driver.motion.pose import Pose
+
+Floats = NDArray[np.float64]
+
+# Far below the least singular value of an arm that may move.
+_LEAST = 1e-12
+
+
+class _Motion(NamedTuple):
+    """Of rows of joint positions: frames, Jacobians (n, 6, 6), and the TCP (3, n) [m]."""
+
+    frames: FramesOf[Floats]
+    jacobian: Floats
+    tcp: Floats
+
+
+def joint_rates(arm: Arm, T_flange_tcp: Pose, q: Floats, twist: Floats, acceleration: Floats
+                ) -> tuple[Floats, Floats]:
+    """
+    Return joint velocities [rad/s] and accelerations [rad/s^2] (n, 6) that move the TCP so.
+
+    :param q: (n, 6) [rad]; beside a singularity the joints get as fast as it takes.
+    :param twist: (n, 6) of the TCP in base axes [m/s], [rad/s].
+    :param acceleration: (n, 6) [m/s^2], [rad/s^2].
+    """
+    at = _motion(arm, T_flange_tcp, q)
+    # An arm that leaves a singularity at rest shall not be divided by zero.
+    inverse = np.linalg.inv(at.jacobian + _LEAST * np.eye(6))
+    qd: Floats = (inverse @ twist[:, :, None])[:, :, 0]
+    rest = acceleration - _even(at, qd)
+    return qd, (inverse @ rest[:, :, None])[:, :, 0]
+
+
+def tool_rates(arm: Arm, T_flange_tcp: Pose, q: Floats, qd: Floats, qdd: Floats
+               ) -> tuple[Floats, Floats]:
+    """Return twist and acceleration (n, 6) of the TCP in base axes; as :func:`joint_rates`."""
+    at = _motion(arm, T_flange_tcp, q)
+    twist: Floats = (at.jacobian @ qd[:, :, None])[:, :, 0]
+    return twist, (at.jacobian @ qdd[:, :, None])[:, :, 0] + _even(at, qd)
+
+
+def _motion(arm: Arm, T_flange_tcp: Pose, q: Floats) -> _Motion:
+    frames = arm.frames_rows(q)
+    x, y, z = T_flange_tcp.position
+    tcp = (np.array(frames.position) + x * np.array(frames.x) + y * np.array(frames.y)
+           + z * np.array(frames.z))
+    jacobian = jacobian_at(frames, (tcp[0], tcp[1], tcp[2]))
+    return _Motion(frames, jacobian, tcp)
+
+
+def _even(at: _Motion, qd: Floats) -> Floats:
+    """
+    Return J' q' (n, 6): the acceleration of the TCP while the joint velocities stay.
+
+    From link to link: an axis that is carried by w turns the velocity about it, w x (z q'), and a
+    point r farther out is accelerated by e x r + w x (w x r).
+    """
+    origins = [np.array(origin).T for origin in at.frames.origins]
+    axes = [np.array(axis).T for axis in at.frames.axes]
+    w, e, a = np.zeros((3, len(qd), 3))
+    for k in range(6):
+        spin = axes[k] * qd[:, k:k + 1]
+        e = e + np.cross(w, spin)
+        w = w + spin
+        r = (origins[k + 1] if k < 5 else at.tcp.T) - origins[k]
+        a = a + np.cross(e, r) + np.cross(w, np.cross(w, r))
+    return np.concatenate([a, e], axis=1)

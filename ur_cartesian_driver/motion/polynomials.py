@@ -1,0 +1,66 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Polynomials between two states, in rows: of the tool, of its turn, and of the joints.
+
+Coefficients are (n, 6 powers, k quantities), those of the time since the piece began.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+class Rates(NamedTuple):
+    """A quantity and its first and second derivative by time, each (n, k)."""
+
+    x: Floats
+    v: Floats
+    a: Floats
+
+
+def cubic_rows(duration: Floats, start: Rates, end: Rates) -> Floats:
+    """
+    Return the cubics (n, 6, k) with these positions and velocities at their ends.
+
+    :param duration: (n,) [s].
+    """
+    T = duration[:, None]
+    d = end.x - start.x
+    zero = np.zeros_like(d)
+    return np.stack([
+        start.x, start.v, 3.0 * d / T**2 - (2.0 * start.v + end.v) / T,
+        -2.0 * d / T**3 + (start.v + end.v) / T**2, zero, zero], axis=1)
+
+
+def quintic_rows(duration: Floats, start: Rates, end: Rates) -> Floats:
+    """Return the quintics (n, 6, k) that have all three at both ends."""
+    T = duration[:, None]
+    d, v, w, a, b = end.x - start.x, start.v, end.v, start.a, end.a
+    return np.stack([
+        start.x, v, 0.5 * a,
+        (20.0 * d - (8.0 * w + 12.0 * v) * T - (3.0 * a - b) * T**2) / (2.0 * T**3),
+        (-30.0 * d + (14.0 * w + 16.0 * v) * T + (3.0 * a - 2.0 * b) * T**2) / (2.0 * T**4),
+        (12.0 * d - 6.0 * (w + v) * T - (a - b) * T**2) / (2.0 * T**5)], axis=1)
+
+
+def evaluated(coefficients: Floats, t: Floats) -> Rates:
+    """
+    Return the values of polynomials, one for each row.
+
+    :param coefficients: (m, 6, k).
+    :param t: (m,) the time since the piece began [s].
+    """
+    t = t[:, None]
+    x = coefficients[:, 5]
+    v, a = np.zeros_like(x), np.zeros_like(x)
+    for power in range(4, -1, -1):  # Horner, with both derivatives
+        a = a * t + 2.0 * v
+        v = v * t + x
+        x = x * t + coefficients[:, power]
+    return Rates(x, v, a)

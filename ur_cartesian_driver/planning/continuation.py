@@ -1,0 +1,334 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Goals that go on (keep_open): part by part, each from where the one before leads.
+
+The last motion of a part is planned to end at rest, because nobody knows what comes, and may be
+given up: the driver keeps it back as the *ending* of the goal. When points come in time, it is
+planned again together with them, so that a blend or a spline goes through its end. Otherwise it
+was sent, the arm rests behind it, and the next part begins there.
+
+A straight motion is planned again with the two before it as context: its corner depends on them.
+A spline needs none, for its state at a point is position, velocity and acceleration; its ending
+is a piece that brakes behind the last point (:func:`~.spline_plan.closing`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+import re
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal
+from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, IOCommand, Segment, Waypoint
+from ur_cartesian_driver.motion.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.planning.controlled import carried, tools
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.path import tcp_rows
+from ur_cartesian_driver.planning.plan import plan as plan_goal
+from ur_cartesian_driver.planning.reference import keep_hemisphere
+from ur_cartesian_driver.planning.spline_plan import closing, end_state, plan_pieces, SplineState
+from ur_cartesian_driver.planning.validate import check
+
+#: So many of the last points are planned again with the next ones: the one that is kept back, and
+#: one whose corner leads into its motion.
+CONTEXT = 2
+#: How much later than at once a spline may begin again from rest [s]: the first that is possible.
+LEADS = (0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+#: Rows of the reference along a closing piece.
+_CLOSING_ROWS = 16
+#: What counts points in a sentence of the planner.
+_NUMBER = re.compile(r'\b(point |points\[|segments\[)(\d+)')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Addition:
+    """What a client appends."""
+
+    waypoints: tuple[Waypoint, ...] = ()
+    #: Empty, or one for each waypoint.
+    segments: tuple[Segment, ...] = ()
+    #: Their waypoints are numbered from the start of the goal.
+    io_commands: tuple[IOCommand, ...] = ()
+    #: Whether nothing comes behind it.
+    last: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Known:
+    """A point that may have to be planned again, and where the arm was before it."""
+
+    waypoint: Waypoint
+    segment: Segment
+    q_before: Joints
+    time_before: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OpenGoal:
+    """What has to be remembered of a goal so that it can go on; as much, however long it is."""
+
+    #: Without its points.
+    goal: Goal
+    T_flange_active: Pose
+    T_flange_tcp: Pose | None
+    points: int
+    #: On the wire, and how many of them are not given up.
+    records: int
+    firm: int
+    #: When the firm ones end and when all of them do, in the time of the motion [s].
+    time: float
+    rest_time: float
+    #: What the client's times lack to those of the motion, and the last of the client's [s].
+    shift: float
+    told: float
+    #: Where the arm rests in the end [rad].
+    q_rest: Joints
+    tail: tuple[Known, ...] = ()
+    #: Of a spline: behind its last point.
+    state: SplineState | None = None
+    #: Outputs that may not have been switched yet, and when that is due [s].
+    outputs: tuple[tuple[float, IOCommand], ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Part:
+    """A part of an open goal that has passed all checks."""
+
+    #: Its segments, the ending among them, and its reference in the time of the whole motion.
+    plan: Plan
+    #: How many records stay in front of it, and when they end [s].
+    behind: int
+    since: float
+    #: How many of its records are the ending.
+    ending: int
+    #: When it ends, where the goal says times [s].
+    due: float | None
+    #: What the client is told.
+    text: str
+    #: For the next part.
+    then: OpenGoal
+
+
+def opened(plan: Plan, arm: Arm, options: PlanningOptions) -> Part:
+    """Return the first part of a goal: its plan, and how it ends for now."""
+    goal = plan.goal
+    base = OpenGoal(
+        goal=replace(goal, waypoints=(), segments=(), io_commands=(), age=None,
+                     execution=plan.execution),
+        T_flange_active=plan.T_flange_active, T_flange_tcp=plan.T_flange_tcp,
+        points=0, records=0, firm=0, time=0.0, rest_time=0.0, shift=0.0, told=0.0,
+        q_rest=plan.start)
+    addition = Addition(waypoints=goal.waypoints, segments=goal.segments,
+                        io_commands=goal.io_commands)
+    if plan.execution is ExecutionMode.SPLINE:
+        return _spline_part(base, addition, plan, end_state(plan), 0.0, arm, options)
+    return _moves_part(base, addition, plan, 0.0, 0)
+
+
+def following(open_goal: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptions, *,
+              from_rest: bool) -> Part:
+    """
+    Return the part of a goal that goes on with an addition.
+
+    :param from_rest: whether the ending was sent, so that the arm stands, or is about to.
+    :raises GoalRefused: with the reason; points are numbered from the start of the goal.
+    """
+    _check_size(open_goal, addition, options)
+    options = replace(options, max_approach_distance=0.0,
+                      max_points=options.max_points + CONTEXT)
+    if open_goal.goal.execution is ExecutionMode.SPLINE:
+        return _spline_on(open_goal, addition, arm, options, from_rest)
+    return _moves_on(open_goal, addition, arm, options, from_rest)
+
+
+def _check_size(open_goal: OpenGoal, addition: Addition, options: PlanningOptions) -> None:
+    count, first = len(addition.waypoints), open_goal.points
+    if not count:
+        raise InvalidGoal('points', 'is empty', 'give at least one point, or set last')
+    if count > options.max_points:
+        raise InvalidGoal('points', f'has {count} points, more than max_points = '
+                          f'{options.max_points}', 'append them in several requests')
+    if addition.segments and len(addition.segments) != count:
+        raise InvalidGoal('segments', f'has {len(addition.segments)} entries for {count} points',
+                          'give none, or exactly one for each point')
+    for i, command in enumerate(addition.io_commands):
+        if not first <= command.waypoint < first + count:
+            raise InvalidGoal(
+                f'io_commands[{i}].point_index', f'is {command.waypoint}, and the points of this '
+                f'request are {first} to {first + count - 1}', 'name one of these')
+
+
+# ---- motions of the robot -----------------------------------------------------------------------
+
+
+def _moves_on(on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptions,
+              from_rest: bool) -> Part:
+    tail = () if from_rest else on.tail
+    since = on.rest_time if from_rest else on.time
+    q_start, told = (tail[0].q_before, tail[0].time_before) if tail else (on.q_rest, on.told)
+    waypoints = (*(known.waypoint for known in tail), *addition.waypoints)
+    segments = addition.segments or (Segment(),) * len(addition.waypoints)
+    first = on.points - len(tail)
+    timed = any(point.time != 0.0 for point in waypoints)
+    if timed:
+        waypoints = tuple(replace(point, time=point.time - told) for point in waypoints)
+    pending = max(len(tail) - 1, 0)
+    goal = replace(
+        on.goal, waypoints=waypoints, segments=(*(k.segment for k in tail), *segments),
+        io_commands=_outputs_due(on, addition, first, pending, since, from_rest),
+        keep_open=not addition.last)
+    try:
+        made = plan_goal(goal, _standing(on, q_start, arm), arm, options)
+    except GoalRefused as refusal:
+        raise _renumbered(refusal, first) from None
+    return _moves_part(on, addition, _moved(made, first, on.points - 1 if tail else on.points,
+                                            since), since, on.records if from_rest else on.firm)
+
+
+def _outputs_due(on: OpenGoal, addition: Addition, first: int, pending: int, since: float,
+                 from_rest: bool) -> tuple[IOCommand, ...]:
+    """Return the commands of a part; those before it that are still due count from its start."""
+    new = [replace(command, waypoint=command.waypoint - first)
+           for command in addition.io_commands]
+    if from_rest:
+        return tuple(new)
+    old = []
+    for due, command in on.outputs:
+        if command.waypoint == on.points - 1:
+            old.append(replace(command, waypoint=command.waypoint - first))
+        elif due > since and pending:
+            old.append(replace(command, waypoint=pending - 1, offset=due - since))
+    return (*old, *new)
+
+
+def _moved(made: Plan, first: int, waypoint: int, since: float) -> Plan:
+    """Return a plan without what leads to points before a waypoint, numbers and times shifted."""
+    left_out = [s for s in made.segments if s.waypoint + first < waypoint]
+    begin = sum(segment.duration for segment in left_out)
+    path = made.reference
+    time = path.time + (since - begin)
+    row = max(int(np.searchsorted(time, since + 5e-7, side='right')) - 1, 0)
+    return replace(
+        made, segments=tuple(replace(s, waypoint=s.waypoint + first, note=_shifted(s.note, first))
+                             for s in made.segments[len(left_out):]),
+        reference=ReferencePath(poses=path.poses[row:].copy(), time=time[row:].copy(),
+                                point=(path.point[row:] + first).astype(np.int32),
+                                room=path.room[row:].copy()))
+
+
+def _moves_part(on: OpenGoal, addition: Addition, made: Plan, since: float, behind: int) -> Part:
+    """Return a part whose last motion is its ending."""
+    *before, last = made.segments
+    count, ending = _records(made.segments), _records((last,))
+    time = since + sum(segment.duration for segment in before)
+    end = time + last.duration
+    segments = addition.segments or (Segment(),) * len(addition.waypoints)
+    points = on.points + len(addition.waypoints)
+    known = list(on.tail) + [
+        Known(waypoint=waypoint, segment=segment, q_before=on.q_rest, time_before=on.told)
+        for waypoint, segment in zip(addition.waypoints, segments, strict=True)]
+    arrived = {segment.waypoint: segment.joints for segment in made.segments}
+    tail = [_seen(known, k - len(known), arrived, points) for k in range(
+        max(0, len(known) - CONTEXT), len(known))]
+    told = addition.waypoints[-1].time
+    timed = any(known.waypoint.time != 0.0 for known in tail)
+    then = replace(
+        on, points=points, records=behind + count, firm=behind + count - ending, time=time,
+        rest_time=end, told=told, q_rest=last.joints, tail=tuple(tail),
+        outputs=_still_due(on, addition, made, since, time))
+    return Part(plan=replace(made, goal=replace(made.goal, keep_open=not addition.last)),
+                behind=behind, since=since, ending=0 if addition.last else ending,
+                due=end if timed else None, text=_text(on, then, addition), then=then)
+
+
+def _seen(known: Sequence[Known], k: int, arrived: dict[int, Joints], points: int) -> Known:
+    """Return a point (counted from the end) with where the arm was before it, if that is new."""
+    here = known[k]
+    q = arrived.get(points + k - 1)
+    if q is None:
+        return here
+    return replace(here, q_before=q, time_before=known[k - 1].waypoint.time)
+
+
+def _still_due(on: OpenGoal, addition: Addition, made: Plan, since: float, firm_time: float
+               ) -> tuple[tuple[float, IOCommand], ...]:
+    """Return the commands that the next part has to look at again."""
+    ends, now = {}, since
+    for segment in made.segments:
+        now += segment.duration
+        ends[segment.waypoint] = now
+    last = on.points + len(addition.waypoints) - 1
+    commands = [*on.outputs, *((ends.get(c.waypoint, since) + c.offset, c)
+                               for c in addition.io_commands)]
+    return tuple((due, command) for due, command in commands
+                 if due > firm_time or command.waypoint == last)
+
+
+# ---- splines ------------------------------------------------------------------------------------
+
+
+def _spline_on(on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptions,
+               from_rest: bool) -> Part:
+    """Return the part behind the end of a spline; from rest as soon as the limits allow."""
+    assert on.state is not None
+    if not from_rest:
+        return _spline_behind(on, addition, on.state, on.shift, arm, options)
+    start = SplineState(time=on.rest_time, q=on.q_rest)
+    refusals = []
+    for lead in LEADS:
+        try:
+            return _spline_behind(on, addition, start, on.rest_time + lead - on.told, arm,
+                                  options)
+        except GoalRefused as refusal:
+            refusals.append(refusal)
+    raise refusals[-1]
+
+
+def _spline_behind(on: OpenGoal, addition: Addition, start: SplineState, shift: float, arm: Arm,
+                   options: PlanningOptions) -> Part:
+    goal = replace(on.goal, waypoints=addition.waypoints, segments=addition.segments,
+                   io_commands=tuple(replace(command, waypoint=command.waypoint - on.points)
+                                     for command in addition.io_commands),
+                   keep_open=not addition.last)
+    standing = _standing(on, start.q, arm)
+    try:
+        check(goal, options)
+        about = carried(goal, standing, options).goal
+        later = replace(about, waypoints=tuple(
+            replace(point, time=point.time + shift) for point in about.waypoints))
+    except GoalRefused as refusal:
+        raise _renumbered(refusal, on.points) from None
+    found = plan_pieces(start, later, arm, on.T_flange_tcp or on.T_flange_active, options,
+                        first=on.points, tools=tools(goal, on.T_flange_active))
+    made = Plan(goal=later, segments=found.segments, reference=found.reference, start=start.q,
+                T_flange_active=on.T_flange_active, T_flange_tcp=on.T_flange_tcp,
+                execution=ExecutionMode.SPLINE, remarks=found.remarks)
+    return _spline_part(replace(on, shift=shift), addition, made, found.end, start.time, arm,
+                        options)
+
+
+def _spline_part(on: OpenGoal, addition: Addition, made: Plan, end: SplineState, since: float,
+                 arm: Arm, options: PlanningOptions) -> Part:
+    """Return a part whose ending is a piece to rest, where its last point moves."""
+    behind = on.records if since == on.rest_time and not on.state_moves_at(since) else on.firm
+    firm = behind + _records(made.segments)
+    point = on.points + len(addition.waypoints) - 1
+    rest_time, q_rest, ending = end.time, end.q, 0
+    if end.moves and not addition.last:
+        made = _closed(made, end, point, arm, options)
+        rest_time, q_rest = end.time + made.segments[-1].duration, made.segments[-1].joints
+        ending = 1
+    then = replace(
+        on, points=point + 1, records=firm + ending, firm=firm, time=end.time,
+        rest_time=rest_time, told=addition.waypoints[-1].time, q_rest=q_rest, state=end)
+    return Part(plan=replace(made, goal=replace(made.goal, keep_open=not addition.last)),
+                behind=behind, since=since, ending=ending, due=rest_time,
+                text=_text(on, then, addition), then=then)

@@ -1,0 +1,88 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Turns as rotation vectors, with their exact velocities, in rows.
+
+An orientation near to R0 is exp(r) R0 with the rotation vector r (n, 3) [rad] in base axes. While
+r changes the body turns with w = J r', where J is the left Jacobian of the rotation group,
+
+    J = I + b [r]x + c [r]x^2,    b = (1 - cos |r|) / |r|^2,    c = (|r| - sin |r|) / |r|^3
+
+(J. Sola, J. Deray, D. Atchuthan, A micro Lie theory for state estimation in robotics, 2018). So a
+twist that is asked for at a point is met exactly. b and c are power series of |r|^2, which have no
+singular place and need no cases.
+"""
+
+from __future__ import annotations
+
+from math import factorial
+
+import numpy as np
+
+from ur_cartesian_driver.motion.polynomials import Rates
+from ur_cartesian_driver.planning.pose_rows import Floats
+
+# Terms of the series: exact to rounding for turns up to two full turns.
+_TERMS = 26
+_B = np.array([(-1.0) ** k / factorial(2 * k + 2) for k in range(_TERMS)])
+_C = np.array([(-1.0) ** k / factorial(2 * k + 3) for k in range(_TERMS)])
+_LEAST = 1e-150
+
+
+def exp_rows(r: Floats) -> Floats:
+    """Return the unit quaternions (n, 4) of rotation vectors (n, 3) [rad]."""
+    half = 0.5 * np.linalg.norm(r, axis=1)[:, None]
+    return np.concatenate([0.5 * np.sinc(half / np.pi) * r, np.cos(half)], axis=1)
+
+
+def log_rows(quaternions: Floats) -> Floats:
+    """Return the rotation vectors (n, 3) of unit quaternions (n, 4), their angles in [0, pi]."""
+    upper = np.where(quaternions[:, 3:] < 0.0, -1.0, 1.0) * quaternions
+    length = np.linalg.norm(upper[:, :3], axis=1)
+    scale = np.where(length < 1e-9, 2.0,
+                     2.0 * np.arctan2(length, upper[:, 3]) / np.maximum(length, _LEAST))
+    vectors: Floats = scale[:, None] * upper[:, :3]
+    return vectors
+
+
+def angular(turn: Rates) -> tuple[Floats, Floats]:
+    """Return angular velocity [rad/s] and acceleration [rad/s^2] (n, 3) of a turn, base axes."""
+    r, v, a = turn
+    b, b_s, c, c_s = _series(r)
+    s = 2.0 * np.einsum('ij,ij->i', r, v)[:, None]  # the derivative of |r|^2
+    rv, ra = np.cross(r, v), np.cross(r, a)
+    rrv = np.cross(r, rv)
+    w = v + b * rv + c * rrv
+    e = (a + b * ra + c * (np.cross(r, ra) + np.cross(v, rv))
+         + s * (b_s * rv + c_s * rrv))
+    return w, e
+
+
+def turn_of(r: Floats, w: Floats, e: Floats) -> Rates:
+    """Return the turn with a rotation vector r, |r| < 2 pi, and these :func:`angular` rates."""
+    b, _, c, _ = _series(r)
+    K = _cross_matrices(r)
+    J = np.eye(3) + b[:, :, None] * K + c[:, :, None] * (K @ K)
+    inverse = np.linalg.inv(J)
+    v: Floats = (inverse @ w[:, :, None])[:, :, 0]
+    _, bias = angular(Rates(r, v, np.zeros_like(v)))
+    return Rates(r, v, (inverse @ (e - bias)[:, :, None])[:, :, 0])
+
+
+def _series(r: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return b, its derivative by |r|^2, c and its derivative, each (n, 1)."""
+    s = np.einsum('ij,ij->i', r, r)[:, None]
+    b, b_s, c, c_s = np.zeros((4, *s.shape))
+    # No more terms than the largest turn needs.
+    terms = _TERMS if s.max(initial=0.0) > 4.0 else 14
+    for k in range(terms - 1, -1, -1):
+        b_s, b = b_s * s + b, b * s + _B[k]
+        c_s, c = c_s * s + c, c * s + _C[k]
+    return b, b_s, c, c_s
+
+
+def _cross_matrices(r: Floats) -> Floats:
+    """Return the matrices [r]x (n, 3, 3)."""
+    x, y, z = r.T
+    zero = np.zeros_like(x)
+    return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)

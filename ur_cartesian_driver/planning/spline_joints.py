@@ -1,0 +1,156 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The joint polynomials along which the tool keeps to a tool spline.
+
+A piece has the joint positions, velocities and accelerations of the tool spline at its ends; in
+between the tool is off it. How far is measured by the forward kinematics, and where it is more
+than allowed the piece is halved, until all are within.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.rates import joint_rates
+from ur_cartesian_driver.kinematics.rows import nearest_rows
+from ur_cartesian_driver.motion.errors import TooFast
+from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluated, quintic_rows, Rates
+from ur_cartesian_driver.planning.path import tcp_rows
+from ur_cartesian_driver.planning.pose_rows import angle_rows, compose_rows, Floats
+from ur_cartesian_driver.planning.postures import Reach
+from ur_cartesian_driver.planning.spline_way import SplineWay
+from ur_cartesian_driver.planning.validate import point_field
+
+#: Times of pieces are whole microseconds, as on the wire, so that sums of them do not drift.
+TICK = 1e-6
+#: Pieces are not halved below this [s]: one step of the fastest controllers.
+_LEAST = 0.002
+#: Places inside a piece at which the tool is compared, at least and at most.
+_COMPARED = 7, 23
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class JointTrack:
+    """The joints over time, in n pieces."""
+
+    #: (n + 1,) [s], whole ticks.
+    times: Floats
+    #: (n + 1, 6)
+    q: Floats
+    qd: Floats
+    qdd: Floats
+    #: (n,) the piece of the tool spline that each is a part of.
+    piece: NDArray[np.intp]
+    quintic: bool
+    #: How far the tool is off the tool spline at the most [m], [rad].
+    distance: float
+    angle: float
+
+
+def joint_track(reach: Reach, way: SplineWay, start: Rates, quintic: bool, tolerance: float,
+                angle_tolerance: float) -> JointTrack:
+    """
+    Return the pieces for a way.
+
+    :param start: the joints at its start (1, 6).
+    :param tolerance: how far the tool may be off [m], and ``angle_tolerance`` how far turned.
+    :raises TooFast: pieces as short as a step of the controller are not enough.
+    """
+    return _Refining(reach, way, start, quintic).within(tolerance, angle_tolerance)
+
+
+class _Refining:
+    """The pieces so far: ends in order of time, and which of them are not compared yet."""
+
+    def __init__(self, reach: Reach, way: SplineWay, start: Rates, quintic: bool) -> None:
+        self.reach, self.way, self.quintic = reach, way, quintic
+        self._places = way.times
+        spline = way.spline
+        n = len(spline.positions)
+        #: Ends by the piece of the tool spline they lie on, and the exact time there.
+        self.piece = np.arange(n)
+        self.times = np.concatenate([spline.times[:1], _whole(spline.times[1:])])
+        joints = self._joints(self.piece, np.diff(spline.times), self.times[1:])
+        self.joints = Rates(*(np.concatenate([a, b]) for a, b in zip(start, joints, strict=True)))
+        self.fresh = np.ones(n, dtype=np.bool_)
+        self.off = np.zeros((n, 2))
+
+    def within(self, tolerance: float, angle_tolerance: float) -> JointTrack:
+        bounds = np.array([tolerance, angle_tolerance])
+        while True:
+            rows = np.flatnonzero(self.fresh)
+            self.off[rows] = self._compared(rows)
+            self.fresh[rows] = False
+            bad = rows[(self.off[rows] > bounds).any(axis=1)]
+            if not len(bad):
+                break
+            self._halve(bad)
+        distance, angle = self.off.max(axis=0).tolist()
+        return JointTrack(
+            times=self.times, q=self.joints.x, qd=self.joints.v, qdd=self.joints.a,
+            piece=self.piece, quintic=self.quintic, distance=distance, angle=angle)
+
+    def _joints(self, piece: NDArray[np.intp], t: Floats, times: Floats) -> Rates:
+        """Return the joints at times ``t`` since pieces of the tool spline began."""
+        tool = self.way.spline.rows(piece, t)
+        near = self.way.q[np.clip(np.searchsorted(self._places, times), 0,
+                                  len(self._places) - 1)]
+        q = nearest_rows(self.reach.arm, compose_rows(tool.poses, self.reach.T_tcp_flange), near)
+        qd, qdd = joint_rates(
+            self.reach.arm, self.reach.T_flange_tcp, q, tool.twists, tool.accelerations)
+        return Rates(q, qd, qdd)
+
+    def _coefficients(self, rows: NDArray[np.intp]) -> Floats:
+        between = quintic_rows if self.quintic else cubic_rows
+        start, end = (Rates(*(x[rows + k] for x in self.joints)) for k in (0, 1))
+        return between(np.diff(self.times)[rows], start, end)
+
+    def _compared(self, rows: NDArray[np.intp]) -> Floats:
+        """Return how far the tool is off on pieces (n, 2) [m], [rad]."""
+        begin, end = self.times[rows], self.times[rows + 1]
+        places = np.searchsorted(self._places, end) - np.searchsorted(self._places, begin)
+        count = int(np.clip(places.max(), *_COMPARED))
+        t = (end - begin)[:, None] * (np.arange(1, count + 1) / (count + 1))
+        coefficients = np.repeat(self._coefficients(rows), count, axis=0)
+        q = evaluated(coefficients, t.ravel()).x
+        tool = tcp_rows(self.reach.arm, self.reach.T_flange_tcp, q)
+        spline, piece = self.way.spline, np.repeat(self.piece[rows], count)
+        asked = spline.rows(piece, (begin[:, None] + t).ravel() - spline.times[piece]).poses
+        distance = np.linalg.norm(tool[:, :3] - asked[:, :3], axis=1)
+        off = np.stack([distance, angle_rows(asked[:, 3:], tool[:, 3:])], axis=1)
+        most: Floats = off.reshape(len(rows), count, 2).max(axis=1)
+        return most
+
+    def _halve(self, rows: NDArray[np.intp]) -> None:
+        begin, end = self.times[rows], self.times[rows + 1]
+        middle = _whole(0.5 * (begin + end))
+        short = np.flatnonzero(end - begin < 2.0 * _LEAST)
+        if len(short):
+            self._refuse(int(rows[short[0]]))
+        piece = self.piece[rows]
+        joints = self._joints(piece, middle - self.way.spline.times[piece], middle)
+        self.joints = Rates(*(np.insert(x, rows + 1, y, axis=0)
+                              for x, y in zip(self.joints, joints, strict=True)))
+        self.times = np.insert(self.times, rows + 1, middle)
+        self.piece = np.insert(self.piece, rows, piece)
+        self.off = np.insert(self.off, rows, 0.0, axis=0)
+        self.fresh[rows] = True
+        self.fresh = np.insert(self.fresh, rows, True)
+
+    def _refuse(self, row: int) -> None:
+        distance, angle = self.off[row].tolist()
+        raise TooFast(
+            point_field(self.way.first + int(self.piece[row])),
+            f'cannot be approached along the spline: {self.times[row]:.3f} s from the start the '
+            f'joints change so fast that the tool would be {1e3 * distance:.3f} mm and '
+            f'{angle:.4f} rad off it in one step of the controller', 'give it more time, or keep '
+            'away from the singularity there')
+
+
+def _whole(times: Floats) -> Floats:
+    rounded: Floats = np.round(times / TICK) * TICK
+    return rounded

@@ -1,0 +1,150 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the tool is to do at the points of a SPLINE or SERVO goal, NaN replaced by a choice.
+
+A point whose twist is 0 is a stop. What is NaN is chosen: velocities so that a parabola through
+the point and its neighbours has them, accelerations as the mean of what the cubics before and
+after the point have there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.pose import Pose, pose_rows
+from ur_cartesian_driver.planning.pose_rows import (
+    conjugate_rows,
+    Floats,
+    multiply_rows,
+    normalized_rows,
+)
+from ur_cartesian_driver.planning.report import say
+from ur_cartesian_driver.planning.rotation_rows import log_rows, turn_of
+from ur_cartesian_driver.planning.tool_spline import ToolPoints
+
+# Shorter ways are none, and a point beside one is not passed through [m], [rad].
+_NO_WAY = 1e-9
+
+
+def tool_points(goal: Goal, start: ToolPoints) -> ToolPoints:
+    """
+    Return the points of a checked goal in base, behind the start.
+
+    :param goal: its waypoints are those behind the start.
+    :param start: the tool at the start in base, one row.
+    """
+    given = _given(goal.waypoints)
+    T_frame_base = goal.T_base_frame.inverse()
+    start = _seen_from(start, T_frame_base)
+    points = ToolPoints(
+        times=np.concatenate([start.times, given.times]),
+        poses=np.concatenate([start.poses, given.poses]),
+        twists=np.concatenate([start.twists, given.twists]),
+        accelerations=np.concatenate([start.accelerations, given.accelerations]),
+        quintic=bool(np.any(given.accelerations)))
+    return _seen_from(_chosen(points, ends_moving=goal.keep_open), goal.T_base_frame)
+
+
+def remarks(goal: Goal, first: int) -> list[str]:
+    """Return what the report says of twists and accelerations; points count from ``first``."""
+    points = list(enumerate(goal.waypoints, first))
+    inner = points if goal.keep_open else points[:-1]
+    said: list[str] = []
+    stops = [i for i, point in inner if not any(point.twist)]
+    say(said, stops, 'the arm stops there, because the twist is 0 (NaN lets the driver choose)')
+    for field in ('twist', 'acceleration'):
+        say(said, [i for i, point in points if np.isnan(sum(getattr(point, field)))],
+            f'{field} is NaN, so it is chosen by the points around' + (
+                '' if goal.keep_open else '; at the last one it is 0'))
+    say(said, [i for i, point in points if any(point.jerk)],
+        'jerk is ignored: no robot motion takes it')
+    say(said, [i for i, segment in enumerate(goal.segments, first) if segment.acceleration > 0.0],
+        'the acceleration of the segment is ignored: its time counts')
+    return said
+
+
+def _given(waypoints: Sequence[Waypoint]) -> ToolPoints:
+    poses = pose_rows(point.pose for point in waypoints)
+    poses[:, 3:] = normalized_rows(poses[:, 3:])
+    return ToolPoints(
+        times=np.array([point.time for point in waypoints]), poses=poses,
+        twists=np.array([point.twist for point in waypoints]),
+        accelerations=np.array([point.acceleration for point in waypoints]), quintic=False)
+
+
+def _seen_from(points: ToolPoints, T_new_old: Pose) -> ToolPoints:
+    """Return the same points in the axes of another frame at rest."""
+    R = T_new_old.matrix()[:3, :3]
+
+    def turned(vectors: Floats) -> Floats:
+        return np.concatenate([vectors[:, :3] @ R.T, vectors[:, 3:] @ R.T], axis=1)
+    positions = points.poses[:, :3] @ R.T + T_new_old.position
+    orientations = normalized_rows(
+        multiply_rows(np.array([T_new_old.quaternion]), points.poses[:, 3:]))
+    return ToolPoints(
+        times=points.times, quintic=points.quintic, twists=turned(points.twists),
+        accelerations=turned(points.accelerations),
+        poses=np.concatenate([positions, orientations], axis=1))
+
+
+def _chosen(points: ToolPoints, *, ends_moving: bool) -> ToolPoints:
+    """Return the points without NaN."""
+    twists, accelerations = points.twists, points.accelerations
+    if np.isnan(twists).any():
+        twists = np.where(np.isnan(twists), _twists(points, ends_moving), twists)
+    if np.isnan(accelerations).any():
+        accelerations = np.where(
+            np.isnan(accelerations), _accelerations(points, twists), accelerations)
+    return ToolPoints(times=points.times, poses=points.poses, twists=twists,
+                      accelerations=accelerations, quintic=points.quintic)
+
+
+def _twists(points: ToolPoints, ends_moving: bool) -> Floats:
+    """
+    Return velocities by the neighbours, those of parabolas; 0 at the start.
+
+    The angular ones by the rotation vectors from the point to its neighbours: in these coordinates
+    the angular velocity at the point is their derivative.
+    """
+    h = np.diff(points.times)[:, None]
+    way = np.concatenate([np.diff(points.poses[:, :3], axis=0),
+                          _turns(points.poses[1:, 3:], points.poses[:-1, 3:])], axis=1)
+    mean = way / h
+    twists = np.zeros_like(points.twists)
+    twists[1:-1] = (h[1:] * mean[:-1] + h[:-1] * mean[1:]) / (h[1:] + h[:-1])
+    if ends_moving:
+        twists[-1] = mean[-1]
+    for part in (slice(0, 3), slice(3, 6)):
+        stands = np.linalg.norm(way[:, part], axis=1) < _NO_WAY
+        beside = np.concatenate([[False], stands]) | np.concatenate([stands, [False]])
+        twists[beside, part] = 0.0
+    return twists
+
+
+def _accelerations(points: ToolPoints, twists: Floats) -> Floats:
+    """Return the means of what cubics before and after each point have there; 0 at both ends."""
+    h = np.diff(points.times)[:, None]
+    inner = slice(1, -1)
+    poses, zero = points.poses, np.zeros((len(points.times) - 2, 3))
+    # All seen from the inner point: positions, and rotation vectors from its orientation.
+    there = []
+    for around in (slice(None, -2), slice(2, None)):
+        turn = turn_of(_turns(poses[around, 3:], poses[inner, 3:]), twists[around, 3:], zero)
+        there.append((
+            np.concatenate([poses[around, :3] - poses[inner, :3], turn.x], axis=1),
+            np.concatenate([twists[around, :3], turn.v], axis=1)))
+    (x_before, v_before), (x_after, v_after) = there
+    v, before, after = twists[inner], h[:-1], h[1:]
+    accelerations = np.zeros_like(points.accelerations)
+    accelerations[inner] = 0.5 * (
+        6.0 * x_before / before**2 + (2.0 * v_before + 4.0 * v) / before
+        + 6.0 * x_after / after**2 - (4.0 * v + 2.0 * v_after) / after)
+    return accelerations
+
+
+def _turns(after: Floats, before: Floats) -> Floats:
+    return log_rows(multiply_rows(after, conjugate_rows(before)))

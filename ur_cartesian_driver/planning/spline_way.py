@@ -1,0 +1,194 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The arm along a tool spline: places as on all ways, but with times, and why it cannot go there.
+
+Places are evenly spaced in time on each piece, so near to each other that the tool moves 2 mm and
+turns a degree at the most where it is fastest, and that the chords between them stay within some
+micrometres of the curve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.errors import (
+    GoalRefused,
+    InvalidPosture,
+    JointLimitExceeded,
+    NearSingularity,
+)
+from ur_cartesian_driver.motion.goal import Waypoint
+from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.planning.lookahead import Followed, followed
+from ur_cartesian_driver.planning.margins import measured, Nearest, nearest_of, too_near
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.path import ARC_CHORD_ERROR
+from ur_cartesian_driver.planning.pose_rows import angle_rows, Floats
+from ur_cartesian_driver.planning.postures import missed, named_joints, Reach
+from ur_cartesian_driver.planning.samples import (
+    LEAST_PLACES,
+    Piece,
+    Places,
+    STEP_ANGLE,
+    STEP_LENGTH,
+)
+from ur_cartesian_driver.planning.tool_spline import ToolCurve, ToolSpline
+from ur_cartesian_driver.planning.validate import point_field
+
+# Where a piece is looked at for how fast it gets, and what it may be faster in between.
+_LOOKS = 9
+_FASTER = 1.05
+#: The most places on a piece: nobody goes 20 m at once, or turns the tool 27 times.
+_MOST_PLACES = 10_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SplineWay:
+    """A spline that the arm can follow, and the places at which it was looked at."""
+
+    spline: ToolSpline
+    #: The number of the point at the end of the first piece.
+    first: int
+    #: (m,) the piece of each place and the share of the piece's time; where it begins is row 0.
+    piece: NDArray[np.intp]
+    u: Floats
+    #: (m, 7) the TCP in base, (m, 6) [rad].
+    poses: Floats
+    q: Floats
+    #: (m,) the way and the turn of the tool since the start [m], [rad].
+    length: Floats
+    angle: Floats
+    #: By point.
+    nearest: dict[int, Nearest]
+
+    @property
+    def times(self) -> Floats:
+        """(m,) when the tool is at each place [s]."""
+        begin = self.spline.times[self.piece]
+        times: Floats = begin + self.u * (self.spline.times[self.piece + 1] - begin)
+        return times
+
+    @property
+    def points(self) -> NDArray[np.int32]:
+        """(m,) the number of the point to which each place leads."""
+        return (self.first + self.piece).astype(np.int32)
+
+    def stretched(self, factor: float) -> SplineWay:
+        """Return the same way in so many times the time."""
+        return replace(self, spline=self.spline.stretched(factor))
+
+
+def way_along(reach: Reach, spline: ToolSpline, waypoints: Sequence[Waypoint], q_start: Joints,
+              options: PlanningOptions, first: int) -> SplineWay:
+    """
+    Return the arm's way along a spline.
+
+    :param waypoints: those at the ends of its pieces, of which the first one has the number
+        ``first``.
+    :param q_start: the configuration at its begin [rad].
+    :raises GoalRefused: the arm cannot go there.
+    """
+    places = _places(spline)
+    pieces = _pieces(spline, places, first)
+    found = followed(reach, pieces, q_start, places)
+    segments = first + found.piece.astype(np.int32)
+    measures = measured(reach.arm, found.q)
+    _check(reach, pieces, found, measures, waypoints, options)
+    start = spline.rows(np.zeros(1, dtype=np.intp), np.zeros(1)).poses
+    poses = np.concatenate([start, found.poses])
+    return SplineWay(
+        spline=spline, first=first, poses=poses, q=np.concatenate([[q_start], found.q]),
+        piece=np.concatenate([[0], found.piece]), u=np.concatenate([[0.0], found.t]),
+        length=_sum(np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)),
+        angle=_sum(angle_rows(poses[:-1, 3:], poses[1:, 3:])),
+        nearest=nearest_of(reach.arm, found.q, measures, segments, found.t))
+
+
+def _check(reach: Reach, pieces: Sequence[Piece], found: Followed, measures: Floats,
+           waypoints: Sequence[Waypoint], options: PlanningOptions) -> None:
+    """Raise the first reason why the arm cannot go along."""
+    first = pieces[0].index
+    segments = first + found.piece.astype(np.int32)
+    refusal, index = found.refusal, found.refused_segment
+    near = too_near(pieces, found, measures, segments, found.t, options)
+    # The end of a range behind a singularity is where the joints swing to beside it.
+    if near is not None and (refusal is None or near[1] < index or (
+            near[1] == index and isinstance(refusal, JointLimitExceeded))):
+        refusal, index = near
+    for k, point in enumerate(waypoints):
+        if refusal is not None and first + k >= index:
+            break
+        if point.posture:
+            row = int(np.searchsorted(found.piece, k, side='right')) - 1
+            _check_posture(reach, pieces[k], point, found.q[row], options)
+    if refusal is not None:
+        raise _said(refusal)
+
+
+def _said(refusal: GoalRefused) -> GoalRefused:
+    """Return a refusal whose advice is good for splines, which have no JOINT segments."""
+    if isinstance(refusal, NearSingularity | JointLimitExceeded):
+        text = str(refusal).replace('use a JOINT segment', 'use PRIMITIVES with a JOINT segment')
+        return type(refusal)(text)
+    return refusal
+
+
+def _check_posture(reach: Reach, piece: Piece, point: Waypoint, q: Floats,
+                   options: PlanningOptions) -> None:
+    named = named_joints(point.posture, options.tf_prefix)
+    a, b, c, d, e, f = q.tolist()
+    arrives = (a, b, c, d, e, f)
+    chosen = reach.chosen(piece.pose(1.0), named, arrives, point_field(piece.index, 'pose'))
+    if clause := missed(arrives, chosen, named):
+        flips = reach.flips(arrives, chosen)
+        raise InvalidPosture(
+            f'{point_field(piece.index, "posture")} cannot be reached along the spline: {clause}'
+            f'{f", which takes {flips}" if flips else ""}; start in that configuration, or use '
+            'PRIMITIVES with a JOINT segment.')
+
+
+def _places(spline: ToolSpline) -> Places:
+    n = len(spline.positions)
+    h = np.diff(spline.times)
+    looks = np.repeat(np.arange(n), _LOOKS)
+    t = np.tile(np.linspace(0.0, 1.0, _LOOKS), n) * h[looks]
+    rows = spline.rows(looks, t)
+
+    def largest(vectors: Floats) -> Floats:
+        most: Floats = np.linalg.norm(vectors, axis=1).reshape(n, _LOOKS).max(axis=1)
+        return most
+    steps = _FASTER * np.max([
+        h * largest(rows.twists[:, :3]) / STEP_LENGTH,
+        h * largest(rows.twists[:, 3:]) / STEP_ANGLE,
+        h * np.sqrt(largest(rows.accelerations[:, :3]) / (8.0 * ARC_CHORD_ERROR))], axis=0)
+    count = np.clip(np.ceil(steps), np.minimum(LEAST_PLACES, np.ceil(1.25 * steps) + 1.0),
+                    _MOST_PLACES).astype(np.intp)
+    piece = np.repeat(np.arange(n), count)
+    number = np.arange(1, len(piece) + 1) - np.repeat(np.cumsum(count) - count, count)
+    u = number / count[piece]
+    return Places(piece, u, spline.rows(piece, u * h[piece]).poses)
+
+
+def _pieces(spline: ToolSpline, places: Places, first: int) -> list[Piece]:
+    """Return the pieces, with lengths by chords that begin at their first place."""
+    n = len(spline.positions)
+    starts = spline.rows(np.arange(n), np.zeros(n)).poses
+    begins = np.searchsorted(places.piece, np.arange(n))
+    before = np.concatenate([places.poses[:1], places.poses[:-1]])
+    before[begins] = starts
+    lengths = np.bincount(places.piece, np.linalg.norm(
+        places.poses[:, :3] - before[:, :3], axis=1))
+    angles = np.bincount(places.piece, angle_rows(before[:, 3:], places.poses[:, 3:]))
+    counts = np.bincount(places.piece)
+    return [Piece(first + k, ToolCurve(spline, k, length, angle), 0.0, 1.0, count)
+            for k, (length, angle, count) in enumerate(zip(
+                lengths.tolist(), angles.tolist(), counts.tolist(), strict=True))]
+
+
+def _sum(steps: Floats) -> Floats:
+    return np.concatenate([[0.0], np.cumsum(steps)])

@@ -1,0 +1,136 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The tool over time: the curve that a SPLINE or SERVO goal means.
+
+From point to point the position is a polynomial, and so is the rotation vector from the
+orientation at the begin of the piece (:mod:`~.rotation_rows`): cubic where twists are given,
+quintic where accelerations are given too. Both are met exactly at the points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluated, quintic_rows, Rates
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.planning.pose_rows import (
+    conjugate_rows,
+    Floats,
+    multiply_rows,
+    normalized_rows,
+)
+from ur_cartesian_driver.planning.rotation_rows import angular, exp_rows, log_rows, turn_of
+
+Ints = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ToolPoints:
+    """What the tool is to do at n + 1 times, the first of them the start; in one frame."""
+
+    #: (n + 1,) [s], increasing.
+    times: Floats
+    #: (n + 1, 7)
+    poses: Floats
+    #: (n + 1, 6) [m/s], [rad/s] along the axes of the frame.
+    twists: Floats
+    #: (n + 1, 6) [m/s^2], [rad/s^2]
+    accelerations: Floats
+    #: Whether the accelerations count.
+    quintic: bool
+
+
+class ToolRows(NamedTuple):
+    """The tool at m times."""
+
+    #: (m, 7), (m, 6), (m, 6)
+    poses: Floats
+    twists: Floats
+    accelerations: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ToolSpline:
+    """n pieces, in the robot's base."""
+
+    #: (n + 1,) [s]
+    times: Floats
+    #: (n, 6 powers, 3) [m / s^power]
+    positions: Floats
+    #: (n, 6 powers, 3) [rad / s^power] from ``orientations`` (n, 4)
+    turns: Floats
+    orientations: Floats
+
+    @classmethod
+    def through(cls, points: ToolPoints) -> ToolSpline:
+        """Return the curve through points in base."""
+        begin, end = slice(None, -1), slice(1, None)
+        x, v, a = points.poses[:, :3], points.twists, points.accelerations
+        orientations = points.poses[:, 3:]
+        turn = log_rows(multiply_rows(orientations[end], conjugate_rows(orientations[begin])))
+        zero = np.zeros_like(turn)
+        between = quintic_rows if points.quintic else cubic_rows
+        durations = np.diff(points.times)
+        return cls(
+            times=points.times, orientations=orientations[begin],
+            positions=between(durations, Rates(x[begin], v[begin, :3], a[begin, :3]),
+                              Rates(x[end], v[end, :3], a[end, :3])),
+            # At the begin the vector is 0, and there its derivatives are the angular ones.
+            turns=between(durations, Rates(zero, v[begin, 3:], a[begin, 3:]),
+                          turn_of(turn, v[end, 3:], a[end, 3:])))
+
+    def rows(self, piece: Ints, t: Floats) -> ToolRows:
+        """
+        Return the tool on pieces (m,).
+
+        :param t: (m,) time since the piece began [s].
+        """
+        x, turn = evaluated(self.positions[piece], t), evaluated(self.turns[piece], t)
+        w, e = angular(turn)
+        turned = multiply_rows(exp_rows(turn.x), self.orientations[piece])
+        return ToolRows(np.concatenate([x.x, normalized_rows(turned)], axis=1),
+                        np.concatenate([x.v, w], axis=1), np.concatenate([x.a, e], axis=1))
+
+    def at(self, times: Floats) -> ToolRows:
+        """Return the tool at times (m,) [s]; where two pieces meet on the second one."""
+        piece = np.clip(np.searchsorted(self.times, times, side='right') - 1,
+                        0, len(self.positions) - 1)
+        return self.rows(piece, times - self.times[piece])
+
+    def stretched(self, factor: float) -> ToolSpline:
+        """Return the same way in so many times the time."""
+        powers = factor ** -np.arange(6.0)[:, None]
+        return ToolSpline(
+            times=self.times[0] + factor * (self.times - self.times[0]),
+            positions=self.positions * powers, turns=self.turns * powers,
+            orientations=self.orientations)
+
+
+@dataclass(frozen=True, slots=True)
+class ToolCurve:
+    """One piece as a path over ``u``, its share of time, for the look ahead."""
+
+    spline: ToolSpline
+    piece: int
+    #: Length [m] and turn [rad].
+    length: float
+    angle: float
+
+    def rows(self, u: Floats) -> Floats:
+        """Return the poses (n, 7) at many ``u`` (n,)."""
+        begin, end = self.spline.times[self.piece:self.piece + 2]
+        return self.spline.rows(np.full(len(u), self.piece), u * (end - begin)).poses
+
+    def pose(self, u: float) -> Pose:
+        """Return the pose at ``u``."""
+        return pose_from_row(self.rows(np.array([u]))[0])
+
+    @property
+    def end(self) -> Pose:
+        """The pose at its end."""
+        return self.pose(1.0)
