@@ -130,7 +130,7 @@ class PlanningOptions:
                 raise ValueError(f'{name} is {value}; it must be finite and not negative')
         for name in ('linear_velocity', 'linear_acceleration', 'angular_velocity',
                      'angular_acceleration', 'joint_velocity', 'joint_acceleration',
-                     'optimized_velocity', 'optimized_acceleration',
+                     'optimized_velocity', 'optimized_acceleration', 'closing_deceleration',
                      *(field for field in self.__slots__ if field.startswith('servo_target_'))):
             if getattr(self, name) == 0.0:
                 raise ValueError(f'{name} is 0; it must be positive')
