@@ -52,21 +52,29 @@ class LiveSession:
         self._send(self.motion.number, T_base_tcp, age)
 
 
+def check_pose(pose: Pose) -> None:
+    """
+    Refuse what is no pose.
+
+    :raises InvalidGoal: a number is not finite, or the quaternion is not of length 1.
+    """
+    for name, values in (('position', pose.position), ('orientation', pose.quaternion)):
+        if not all(map(isfinite, values)):
+            raise InvalidGoal(f'The {name} of the target', f'is {values}, which is not finite')
+    square = sum(v * v for v in pose.quaternion)
+    if abs(square - 1.0) > UNIT_TOLERANCE:
+        raise InvalidGoal(
+            'The orientation of the target', f'has length {sqrt(square):.6g}; a unit quaternion '
+            'is needed', 'divide it by its length')
+
+
 def check_target(T_base_tcp: Pose, state: RobotState, options: PlanningOptions) -> None:
     """
     Refuse a target that cannot be meant.
 
     :raises InvalidGoal: it is malformed, or farther than ``max_approach_distance`` from the tool.
     """
-    for name, values in (('position', T_base_tcp.position),
-                         ('orientation', T_base_tcp.quaternion)):
-        if not all(map(isfinite, values)):
-            raise InvalidGoal(f'The {name} of the target', f'is {values}, which is not finite')
-    square = sum(v * v for v in T_base_tcp.quaternion)
-    if abs(square - 1.0) > UNIT_TOLERANCE:
-        raise InvalidGoal(
-            'The orientation of the target', f'has length {sqrt(square):.6g}; a unit quaternion '
-            'is needed', 'divide it by its length')
+    check_pose(T_base_tcp)
     far, most = T_base_tcp.distance_to(state.actual_tcp_pose), options.max_approach_distance
     if 0.0 < most < far:
         raise InvalidGoal(

@@ -24,7 +24,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from ur_cartesian_driver.driver import Driver
-from ur_cartesian_driver.driver.live import LiveSession
+from ur_cartesian_driver.driver.live import check_pose, LiveSession
 from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.pose import Pose
@@ -57,9 +57,11 @@ def target_from_message(message: Message, frames: Frames, *, stand: Stand | None
 
     :param now: time of the node's clock [ns].
     :param max_age: how old, or how far in the future, a stamp may be [s].
-    :raises InvalidGoal: the frame is unknown, or the stamp is not of now.
+    :raises InvalidGoal: the pose is malformed, its frame unknown, or the stamp is not of now.
     :raises RobotNotReady: the frame moves with the arm, and nobody knows where that stands.
     """
+    pose = pose_of(message)
+    check_pose(pose)
     stamp = nanoseconds(message.header.stamp)
     age = (now - stamp) / 1_000_000_000 if stamp else 0.0
     if abs(age) > max_age:
@@ -68,7 +70,7 @@ def target_from_message(message: Message, frames: Frames, *, stand: Stand | None
             f'servo_target_max_age is {max_age:g} s',
             'compare the clocks of both computers, or leave the stamp 0: then the age counts '
             'from the receipt')
-    return frames.T_base_frame(message.header.frame_id, stand) @ pose_of(message), max(0.0, age)
+    return frames.T_base_frame(message.header.frame_id, stand) @ pose, max(0.0, age)
 
 
 class ServoTargets:
