@@ -13,7 +13,7 @@ from ur_cartesian_driver.program.render import FEATURES, has_feature
 from ur_cartesian_driver.protocol.registers import POINTS_BEGUN
 from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
 from ur_cartesian_driver.protocol.script_command import ScriptCommand, TcpHold
-from ur_cartesian_driver.protocol.trajectory import MotionType
+from ur_cartesian_driver.protocol.trajectory import MotionType, SplineKind
 from ur_cartesian_driver.urscript import parse
 
 SETTINGS = {'host': '192.168.56.1', 'reverse_port': 50001, 'trajectory_port': 50003,
@@ -38,7 +38,7 @@ def test_addresses_are_those_of_the_settings():
 
 @pytest.mark.parametrize(('prefix', 'members'), [
     ('MODE', ControlMode), ('TRAJECTORY', TrajectoryAction), ('MOTION', MotionType),
-    ('RESULT', TrajectoryResult), ('COMMAND', ScriptCommand),
+    ('SPLINE', SplineKind), ('RESULT', TrajectoryResult), ('COMMAND', ScriptCommand),
     ('TCP', TcpHold)])
 def test_every_wire_constant_comes_from_its_enum(prefix, members):
     lines = text().splitlines()
@@ -57,7 +57,7 @@ def test_there_are_no_numbers_of_the_protocol_in_the_statements():
     numbers = {number for line in statements
                for number in re.findall(r'(?<![\w.])\d+(?:\.\d+)?(?![\w.])',
                                         re.sub(r'"[^"]*"', '', line))}
-    assert numbers <= {*map(str, range(13)), '0.2', '1000'}
+    assert numbers <= {*map(str, range(13)), '15', '0.2', '1000'}
 
 
 @pytest.mark.parametrize(('feature', 'version', 'known'), [

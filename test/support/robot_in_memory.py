@@ -37,6 +37,8 @@ class Run:
 
     #: What the controller said when it stopped; empty if the trajectory was run to its end.
     trouble: str
+    #: What the robot program said at the end, if it came to that.
+    result: TrajectoryResult | None
     #: Where the arm stands then [rad], and where the controller says that its TCP is.
     q: tuple
     pose: Pose
@@ -50,7 +52,12 @@ class Run:
 class RobotInMemory:
     """One robot, on which trajectories are run one after the other from anywhere."""
 
-    def __init__(self, model, frequency=None, geometry=None):
+    def __init__(self, model, frequency=None, geometry=None, edit=as_program):
+        """
+        Start it.
+
+        :param edit: makes a program of the text that the driver sends.
+        """
         self.model, self.geometry = model, geometry
         config = SimulatorConfig(model=model, frequency=frequency, geometry=geometry,
                                  unlock_delay=0.0)
@@ -61,7 +68,7 @@ class RobotInMemory:
         program = render(ProgramSettings(
             host='driver', reverse_port=REVERSE, trajectory_port=TRAJECTORY,
             script_command_port=COMMAND, version=config.version[:3]))
-        refusal = self.controller.programs.load('driver', as_program(program))
+        refusal = self.controller.programs.load('driver', edit(program))
         assert refusal == '', refusal
 
     @cached_property
@@ -78,10 +85,17 @@ class RobotInMemory:
         return RobotState(timestamp=0.0, actual_q=q, target_q=q, T_flange_tcp=T_flange_tcp,
                           actual_tcp_pose=motion.T_base_tcp, target_tcp_pose=motion.T_base_tcp)
 
-    def run(self, primitives):
-        """Send the primitives as the driver does, and wait for the end of the motion."""
-        self._socket(TRAJECTORY).feed(encode_points(primitives))
-        self._command(trajectory(TrajectoryAction.START, len(primitives), read_timeout=0))
+    def run(self, primitives, *, data=None, announced=None, on_cycle=lambda controller: None):
+        """
+        Send the primitives as the driver does, and wait for the end of the motion.
+
+        :param data: sent instead of their bytes; ``announced``: instead of their number.
+        :param on_cycle: called after each cycle.
+        """
+        self._socket(TRAJECTORY).feed(encode_points(primitives) if data is None else data)
+        self._command(trajectory(
+            TrajectoryAction.START, len(primitives) if announced is None else announced,
+            read_timeout=0))
         results, motion = ResultDecoder(), self.controller.motion
         joints, poses = [], []
         self.controller.announcements.log.clear()
@@ -90,6 +104,7 @@ class RobotInMemory:
             self.controller.step()
             joints.append(motion.q)
             poses.append(motion.T_base_tcp)
+            on_cycle(self.controller)
             said = self._socket(TRAJECTORY).take()
             ended = results.feed(said) if said else []
             if ended or motion.fault is not None or not self.controller.programs.running:
@@ -99,8 +114,13 @@ class RobotInMemory:
                if not line.startswith(HARMLESS)]
         failed = ended != [TrajectoryResult.SUCCESS] or log
         return Run(trouble='; '.join(log) or str(ended) if failed else '', q=motion.q,
-                   pose=motion.T_base_tcp, joints=np.array(joints), poses=poses,
+                   result=ended[0] if ended else None, pose=motion.T_base_tcp,
+                   joints=np.array(joints), poses=poses,
                    duration=self.controller.time - begun)
+
+    def feed(self, primitives):
+        """Let more points come."""
+        self._socket(TRAJECTORY).feed(encode_points(primitives))
 
     # -- between trajectories --------------------------------------------------------------------
 

@@ -34,6 +34,25 @@ FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     'target_payload': ((5, 10, 0), (10, 0, 0)),
 }
 
+#: How the program follows splines.
+SPLINE_LAW: dict[str, float] = {
+    #: How fast the leading axis changes its speed from step to step, and brakes where a point
+    #: is late [rad/s^2]; the client library's number for speedj.
+    'ACCELERATION': 40.0,
+    #: What part of a distance from the polynomial one step takes away.
+    'CORRECTION': 0.2,
+    #: How hard the last piece may end in motion [rad/s^2], and the greatest mean speed of a
+    #: joint [rad/s]; the client library's numbers, as the next one.
+    'BRAKING': 15.0,
+    'MAX_SPEED': 20.0,
+    #: A first point without time may lie so far from where the arm is [rad].
+    'AT_START': 0.01,
+    #: Slower than this is at rest [rad/s].
+    'REST': 0.0001,
+    #: Less than this [s] or [rad] comes from rounding.
+    'ROUNDING': 1e-10,
+}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProgramSettings:
@@ -119,6 +138,9 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield from _enum('MODE', reverse.ControlMode)
     yield from _enum('TRAJECTORY', reverse.TrajectoryAction)
     yield from _enum('MOTION', trajectory.MotionType)
+    yield from _enum('SPLINE', trajectory.SplineKind)
+    for name, value in SPLINE_LAW.items():
+        yield f'SPLINE_{name} = {value:.10f}'
     yield from _enum('RESULT', TrajectoryResult)
     yield from _enum('COMMAND', script_command.ScriptCommand)
     yield from _enum('TCP', script_command.TcpHold)
