@@ -17,6 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.goal import ZERO6
+from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluated, quintic_rows, Rates
 from ur_cartesian_driver.motion.pose import Vector6
 from ur_cartesian_driver.motion.primitive import Joints, Spline
 
@@ -40,15 +42,17 @@ class JointSpline:
 
         :param velocities: those at the start [rad/s]; None = at rest. So ``accelerations``.
         """
-        q, qd, qdd = (np.array(v if v is not None else np.zeros(6))
-                      for v in (start, velocities, accelerations))
-        times, rows = [0.0], []
-        for piece in pieces:
-            rows.append(_piece(q, qd, qdd, piece))
-            times.append(times[-1] + piece.duration)
-            q, qd = np.array(piece.target), np.array(piece.velocities)
-            qdd = np.zeros(6) if piece.accelerations is None else np.array(piece.accelerations)
-        return cls(times=np.array(times), coefficients=np.array(rows).reshape(-1, 6, 6))
+        pieces = tuple(pieces)
+        ends = [(start, velocities or ZERO6, accelerations or ZERO6), *(
+            (piece.target, piece.velocities, piece.accelerations or ZERO6) for piece in pieces)]
+        x, v, a = np.array(ends).transpose(1, 0, 2)
+        before, after = (Rates(x[k], v[k], a[k]) for k in (slice(None, -1), slice(1, None)))
+        durations = np.array([piece.duration for piece in pieces])
+        is_cubic = np.array([piece.accelerations is None for piece in pieces], dtype=np.bool_)
+        coefficients = np.where(
+            is_cubic[:, None, None], cubic_rows(durations, before, after),
+            quintic_rows(durations, before, after))
+        return cls(times=np.concatenate([[0.0], np.cumsum(durations)]), coefficients=coefficients)
 
     @property
     def duration(self) -> float:
@@ -65,34 +69,10 @@ class JointSpline:
         inside = np.clip(times, self.times[0], self.times[-1])
         k = np.clip(np.searchsorted(self.times, inside, side='right') - 1,
                     0, len(self.coefficients) - 1)
-        t = (inside - self.times[k])[:, None]
-        c = self.coefficients[k]
-        q = c[:, 5]
-        qd = np.zeros_like(q)
-        qdd = np.zeros_like(q)
-        for power in range(4, -1, -1):  # Horner, with both derivatives
-            qdd = qdd * t + 2.0 * qd
-            qd = qd * t + q
-            q = q * t + c[:, power]
+        q, qd, qdd = evaluated(self.coefficients[k], inside - self.times[k])
         outside = ((times < self.times[0]) | (times > self.times[-1]))[:, None]
         return q, np.where(outside, 0.0, qd), np.where(outside, 0.0, qdd)
 
     def piece(self, time: float) -> int:
         """Return the index of the piece that runs at a time."""
         return min(max(bisect_right(self.times, time) - 1, 0), len(self.coefficients) - 1)
-
-
-def _piece(q: Floats, qd: Floats, qdd: Floats, piece: Spline) -> Floats:
-    """Return the coefficients (6 powers, 6 joints) of one piece from a state to its end."""
-    T = piece.duration
-    d, vd = np.array(piece.target) - q, np.array(piece.velocities)
-    if piece.accelerations is None:
-        a = np.stack([q, qd, 3.0 * d / T**2 - (2.0 * qd + vd) / T,
-                      -2.0 * d / T**3 + (qd + vd) / T**2])
-        return np.concatenate([a, np.zeros((2, 6))])
-    e = np.array(piece.accelerations)
-    return np.stack([
-        q, qd, 0.5 * qdd,
-        (20.0 * d - (8.0 * vd + 12.0 * qd) * T - (3.0 * qdd - e) * T**2) / (2.0 * T**3),
-        (-30.0 * d + (14.0 * vd + 16.0 * qd) * T + (3.0 * qdd - 2.0 * e) * T**2) / (2.0 * T**4),
-        (12.0 * d - 6.0 * (vd + qd) * T - (qdd - e) * T**2) / (2.0 * T**5)])
