@@ -10,7 +10,16 @@ from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.program import as_program, ProgramSettings, render
 from ur_cartesian_driver.program.render import FEATURES, has_feature
-from ur_cartesian_driver.protocol.registers import POINTS_BEGUN
+from ur_cartesian_driver.protocol.registers import (
+    ExternalError,
+    InputDouble,
+    InputInteger,
+    OutputDouble,
+    OutputInteger,
+    POINTS_BEGUN,
+    ServoMode,
+    SyncState,
+)
 from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
 from ur_cartesian_driver.protocol.script_command import ScriptCommand, TcpHold
 from ur_cartesian_driver.protocol.trajectory import MotionType, SplineKind
@@ -90,3 +99,22 @@ def test_an_uploaded_program_is_one_indented_definition():
     assert lines[0] == 'def ur_cartesian_driver():'
     assert lines[-1] == 'end'
     assert all(not line or line.startswith('\t') for line in lines[1:-1])
+
+
+def test_an_include_stands_in_its_place_and_takes_its_settings():
+    lines = text(servoj_gain=300.0, servo_buffer_depth=3, allow_teach=True).splitlines()
+    assert lines.count('thread servo_control():') == 1
+    assert not [line for line in lines if line.startswith('#!')]
+    for line in ('SERVOJ_GAIN = 300.0', 'SERVO_DEPTH = 3', 'SERVO_ONES = [1, 1, 1]',
+                 'SERVO_ALLOW_TEACH = True'):
+        assert line in lines
+
+
+@pytest.mark.parametrize(('prefix', 'members'), [
+    ('SERVO_IN', InputInteger), ('SERVO_IN', InputDouble), ('SERVO_OUT', OutputInteger),
+    ('SERVO_OUT', OutputDouble), ('SERVO_MODE', ServoMode), ('SERVO_SYNC', SyncState),
+    ('SERVO_ERROR', ExternalError)])
+def test_registers_of_the_servo_come_from_their_enums(prefix, members):
+    lines = text().splitlines()
+    for member in members:
+        assert f'{prefix}_{member.name} = {member.value}' in lines

@@ -9,6 +9,8 @@ program that start with ``#!`` are instructions for this module:
 
 ``#! constants``
     the constants stand here.
+``#! include NAME``
+    the file ``NAME.script`` stands here.
 ``#! if FEATURE`` ... ``#! end``
     kept only where the controller's software has the feature, because a controller refuses a
     program that names a function which it does not know.
@@ -27,6 +29,13 @@ from ur_cartesian_driver.protocol import registers, reverse, script_command, tra
 from ur_cartesian_driver.protocol.framing import FIXED_POINT
 
 PROGRAM_NAME = 'ur_cartesian_driver'
+
+#: A set-point of the buffered servo is repeated until each joint is as near to it [rad], as in the
+#: manufacturer's guide, but not more often than this.
+SERVO_NEAR = 0.2
+SERVO_MOST_REPEATS = 500
+#: A set-point that comes longer after the one before stands for one step, as in the guide.
+SERVO_MOST_STEPS = 50
 
 #: The first software of the CB3/e-Series line and of PolyScope X that has a feature.
 FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
@@ -69,6 +78,14 @@ class ProgramSettings:
     stop_deceleration: float = 4.0
     #: How long the program waits for the next trajectory point [s].
     point_timeout: float = 0.5
+    #: How stiff ``servoj`` holds a set-point (100 to 2000), and how far it looks ahead [s] (0.03
+    #: to 0.2).
+    servoj_gain: float = 2000.0
+    servoj_lookahead_time: float = 0.03
+    #: How many set-points the buffered servo can hold.
+    servo_buffer_depth: int = 250
+    #: Whether the buffered servo may let people push the arm.
+    allow_teach: bool = False
 
     def __post_init__(self) -> None:
         """Refuse a host that would not survive inside a quoted string."""
@@ -84,8 +101,7 @@ def render(settings: ProgramSettings) -> str:
 
     :raises LocalProtocolError: an instruction in the program is unknown (a defect of ours).
     """
-    text = files('ur_cartesian_driver.program').joinpath('driver.script').read_text('ascii')
-    return '\n'.join(_lines(text, settings)) + '\n'
+    return '\n'.join(_lines('driver', settings)) + '\n'
 
 
 def as_program(text: str) -> str:
@@ -100,19 +116,22 @@ def has_feature(feature: str, version: tuple[int, int, int]) -> bool:
     return version >= (polyscope_x if version[0] >= 10 else classic)
 
 
-def _lines(text: str, settings: ProgramSettings) -> Iterator[str]:
-    """Yield the program's lines, instructions carried out."""
+def _lines(name: str, settings: ProgramSettings) -> Iterator[str]:
+    """Yield the lines of a part of the program, instructions carried out."""
     keep = True
+    text = files('ur_cartesian_driver.program').joinpath(f'{name}.script').read_text('ascii')
     for line in text.splitlines():
         match line.split():
             case ['#!', 'constants']:
                 yield from constants(settings)
+            case ['#!', 'include', part]:
+                yield from _lines(part, settings)
             case ['#!', 'if', feature] if feature in FEATURES:
                 keep = has_feature(feature, settings.version)
             case ['#!', 'end']:
                 keep = True
             case ['#!', *rest]:
-                raise LocalProtocolError(f'driver.script: unknown instruction {rest}')
+                raise LocalProtocolError(f'{name}.script: unknown instruction {rest}')
             case _ if keep:
                 yield line
 
@@ -135,6 +154,7 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'STREAM_LENGTH = {2**31 - 1}'
     yield f'TCP_RESOLUTION = {2.0 / FIXED_POINT:.6f}'
     yield f'REGISTER_POINTS_BEGUN = {int(registers.POINTS_BEGUN)}'
+    yield from _servo_constants(settings)
     yield from _enum('MODE', reverse.ControlMode)
     yield from _enum('TRAJECTORY', reverse.TrajectoryAction)
     yield from _enum('MOTION', trajectory.MotionType)
@@ -146,6 +166,26 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield from _enum('TCP', script_command.TcpHold)
     # Where a field of a point stands in the list that the robot reads, its length first.
     yield from _enum('POINT', trajectory.PointField, offset=1)
+
+
+def _servo_constants(settings: ProgramSettings) -> Iterator[str]:
+    """Yield those of the buffered servo."""
+    yield f'SERVOJ_GAIN = {settings.servoj_gain}'
+    yield f'SERVOJ_LOOKAHEAD_TIME = {settings.servoj_lookahead_time}'
+    yield f'SERVO_ALLOW_TEACH = {settings.allow_teach}'
+    yield f'SERVO_DEPTH = {settings.servo_buffer_depth}'
+    # A list as long as the buffer: old controllers have no other way to make one.
+    yield f'SERVO_ONES = [{", ".join("1" * settings.servo_buffer_depth)}]'
+    yield f'SERVO_MOST_STEPS = {SERVO_MOST_STEPS}'
+    yield f'SERVO_MOST_REPEATS = {SERVO_MOST_REPEATS}'
+    yield f'SERVO_NEAR = {[SERVO_NEAR] * 6}'
+    yield from _enum('SERVO_IN', registers.InputInteger)
+    yield from _enum('SERVO_IN', registers.InputDouble)
+    yield from _enum('SERVO_OUT', registers.OutputInteger)
+    yield from _enum('SERVO_OUT', registers.OutputDouble)
+    yield from _enum('SERVO_MODE', registers.ServoMode)
+    yield from _enum('SERVO_SYNC', registers.SyncState)
+    yield from _enum('SERVO_ERROR', registers.ExternalError)
 
 
 def _enum(prefix: str, members: type[IntEnum], offset: int = 0) -> Iterator[str]:

@@ -21,7 +21,15 @@ from the program   int         24         actual mode
 from the program   int         25         the last sequence number that was read
 from the program   int         26         points of the running trajectory that were begun
 from the program   double      24         lag: motion time in the buffer [s]
+from the program   int         27         set-points that were carried out
+from the program   int         28         how often one was repeated, the arm not being near it
+from the program   int         29         sequence numbers that were never read
+from the program   int         30         set-points in the buffer
+from the program   int         31         set-points that found the buffer full
 =================  ==========  =========  ====================================================
+
+From int 27 on the numbers are ours; a program after the guide does not write them. All counts
+begin with 0 when the program enters the control mode ``BUFFERED_SERVO``.
 """
 
 from __future__ import annotations
@@ -53,6 +61,11 @@ class OutputInteger(IntEnum):
     LAST_SEQUENCE_ID = 25
     #: How many points of the running trajectory the program has begun; 0 = none.
     POINTS_BEGUN = 26
+    SETPOINTS_DONE = 27
+    REPEATS = 28
+    SKIPPED = 29
+    BUFFER_SIZE = 30
+    OVERFLOWS = 31
 
 
 class OutputDouble(IntEnum):
@@ -112,7 +125,10 @@ SERVO_INPUTS = (
     field(InputInteger.EXTERNAL_ERROR), field(InputInteger.EXTERNAL_SYNC_STATE),
     *six_fields(InputDouble.DESIRED_JOINT_POSITIONS),
     *six_fields(InputDouble.MAX_JOINT_DIVERGENCE_THRESHOLDS), field(InputDouble.STATE_TIME))
-#: What the buffered servo reports, to be added to an output recipe.
+#: What the buffered servo reports, in this order: first what the guide's program does, too.
 SERVO_OUTPUTS = (
     field(OutputInteger.ACTUAL_MODE), field(OutputInteger.LAST_SEQUENCE_ID),
-    field(OutputDouble.LAG_TIME))
+    field(OutputDouble.LAG_TIME),
+    *(field(register) for register in (
+        OutputInteger.SETPOINTS_DONE, OutputInteger.REPEATS, OutputInteger.SKIPPED,
+        OutputInteger.BUFFER_SIZE, OutputInteger.OVERFLOWS)))

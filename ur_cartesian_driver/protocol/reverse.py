@@ -31,6 +31,7 @@ The sender must
   STREAM_START;
 * end or cancel a stream before the next START, which would else swallow the new points.
 
+``BUFFERED_SERVO`` is a mode of our own robot program, whose words 1 to 6 have no meaning either.
 The streams came with URCL 2.14 (see :mod:`~ur_cartesian_driver.protocol.dialects`). All else here
 has had its place and scale since URCL 2.0.
 """
@@ -76,6 +77,9 @@ class ControlMode(IntEnum):
     #: Used inside the robot program; never sent.
     TOOL_IN_CONTACT = 7
     TORQUE = 8
+    #: Ours alone: set-points come through RTDE registers (:mod:`~.registers`), are buffered and
+    #: fed to ``servoj``; the messages here are the leash, as in the other modes.
+    BUFFERED_SERVO = 100
 
 
 class TrajectoryAction(IntEnum):
@@ -193,7 +197,7 @@ def read_timeout_for(mode: ControlMode, requested: int, step_time: int = DEFAULT
 
     * Real-time modes: at least one step, at most 200 ms. They cannot wait for ever, because the
       arm would go on moving.
-    * IDLE, FORWARD, FREEDRIVE: 0 = for ever, else at least one step.
+    * IDLE, FORWARD, FREEDRIVE, BUFFERED_SERVO: 0 = for ever, else at least one step.
     * STOPPED: always 100 ms.
 
     :param step_time: controller cycle [ms].
@@ -256,6 +260,13 @@ def setpoint(mode: ControlMode, values: Sequence[float], read_timeout: int = 20,
 def keepalive(read_timeout: int = 1000, step_time: int = DEFAULT_STEP_TIME) -> ReverseMessage:
     """Return the message that says: stand still, and wait for the next one."""
     mode = ControlMode.IDLE
+    return ReverseMessage(read_timeout=read_timeout_for(mode, read_timeout, step_time), mode=mode)
+
+
+def buffered_servo(read_timeout: int = 200,
+                   step_time: int = DEFAULT_STEP_TIME) -> ReverseMessage:
+    """Return the message that enters the buffered servo, or keeps it alive."""
+    mode = ControlMode.BUFFERED_SERVO
     return ReverseMessage(read_timeout=read_timeout_for(mode, read_timeout, step_time), mode=mode)
 
 
