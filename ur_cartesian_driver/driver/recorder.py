@@ -196,8 +196,12 @@ class Recorder:
         self._do(folder, lambda: folder.close(known), is_last=True)
 
     def close(self, timeout: float) -> None:
-        """Wait until everything is written, so long [s]; what is not then stays a folder."""
+        """Wait until everything is written, so long [s]; what has not ended stays a folder."""
         thread, self._thread = self._thread, None
+        if (folder := self._folder) is not None:
+            self._hand_over(folder)
+            self._folder = None
+            self._do(folder, folder.leave, is_last=True)
         if thread is not None:
             self._jobs.put(None)
             thread.join(timeout)

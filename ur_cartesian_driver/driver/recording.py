@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, fields
 import json
 from pathlib import Path
 from typing import Any, TypeAlias
+import zipfile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,6 +156,8 @@ class Recording:
 
 
 def _from_file(path: Path, most_rows: int) -> Recording:
+    if path.is_file() and not zipfile.is_zipfile(path):
+        raise ValueError(f'{path} is no recording: it is no file of NumPy arrays (.npz)')
     try:
         with np.load(path) as file:
             head, times, kinds, texts = (file[name] for name in (
@@ -162,8 +165,8 @@ def _from_file(path: Path, most_rows: int) -> Recording:
             step = _step(len(file['time']), most_rows)
             columns = {name: file[name] if name.startswith('planned_') else file[name][::step]
                        for name in _COLUMNS}
-    except (KeyError, ValueError) as error:
-        raise ValueError(f'{path} is no recording: {error}') from None
+    except KeyError as error:
+        raise ValueError(f'{path} is no recording: {error.args[0]}') from None
     events = [(float(time), str(kind), str(text))
               for time, kind, text in zip(times, kinds, texts, strict=True)]
     return Recording(metadata=json.loads(head.item()), events=events, **columns)

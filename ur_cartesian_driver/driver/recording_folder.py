@@ -86,6 +86,10 @@ class Folder:
         self._close_files()
         disk.finish(self._path)
 
+    def leave(self) -> None:
+        """Leave it as it is."""
+        self._close_files()
+
     def do(self, work: Callable[[], None]) -> None:
         """Do one of the above, and say so if it fails."""
         if self._is_broken:

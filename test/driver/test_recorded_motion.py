@@ -1,0 +1,138 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Whole goals against the simulated controller, and whether their recordings say what happened."""
+
+import asyncio
+
+import numpy as np
+import pytest
+from robot_cell import CYCLE, run_cell
+
+from ur_cartesian_driver.driver.recording import Recording
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.goal import Goal, Segment, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.sim.faults import Action, Event, Slider, Travelled
+
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+
+
+def corner(cell):
+    """A goal of two lines with a blend between them, from where the arm stands."""
+    home = cell.memory.read().actual_tcp_pose
+    places = ((0.0, 0.05, 0.0), (0.04, 0.05, 0.0))
+    return Goal(waypoints=tuple(
+        Waypoint(pose=Pose(tuple(a + b for a, b in zip(home.position, place, strict=True)),
+                           home.quaternion)) for place in places),
+        segments=(Segment(blend_radius=0.01), Segment()))
+
+
+async def executed(cell, goal, act=None):
+    """Run a goal; return its plan, its outcome, and what the shared memory showed meanwhile."""
+    made = plan(goal, cell.memory.read(), Arm(robot_model('ur5e')), PlanningOptions())
+    seen = {}
+
+    async def watch():
+        while True:
+            state = cell.memory.read()
+            seen[state.timestamp] = state
+            await asyncio.sleep(0.5 * CYCLE)
+
+    watching = asyncio.create_task(watch())
+    motion = cell.owner.start(made)
+    if act is not None:
+        await act(motion)
+    await cell.until(lambda: motion.outcome is not None, 20.0)
+    watching.cancel()
+    return made, motion.outcome, seen
+
+
+def recorded(directory):
+    """Return the recordings; the robot loop has ended, and with it the writing."""
+    return [Recording.load(file) for file in sorted(directory.glob('*.npz'))]
+
+
+def kinds(recording):
+    return [kind for _, kind, _ in recording.events]
+
+
+def test_a_recording_equals_what_happened(tmp_path):
+    """Packet by packet, with a slider that moves and an output that somebody switches."""
+    async def scenario(cell):
+        cell.robot.inject(Slider(fraction=0.5, when=Travelled(0.02)))
+
+        async def switch(motion):
+            await cell.until(lambda: len(motion.progress) > 3)
+            cell.robot.controller.signals.digital_out.standard[3] = True
+
+        return await executed(cell, corner(cell), switch)
+
+    made, outcome, seen = run_cell(scenario, record_directory=str(tmp_path))
+    (found,) = recorded(tmp_path)
+    begin = min(seen)
+    steps = np.rint((np.array(sorted(seen)) - begin) / CYCLE).astype(int)
+    states = dict(zip(steps, (seen[time] for time in sorted(seen)), strict=True))
+    rows = np.rint(found.time / CYCLE).astype(int)
+    assert len(rows) + found.metadata['rows_left_out'] == rows[-1] + 1
+    assert set(states) - set(rows) <= {rows[-1] + 1}
+    for i in set(states) & set(rows):
+        assert tuple(found.actual_q[i]) == states[i].actual_q
+        assert tuple(found.target_pose[i]) == states[i].target_tcp_pose.row()
+        assert tuple(found.actual_twist[i]) == states[i].actual_tcp_twist
+        assert found.speed_scaling[i] == states[i].speed_scaling
+    np.testing.assert_array_equal(found.planned_pose, made.reference.poses)
+    np.testing.assert_array_equal(found.planned_time, made.reference.time)
+    assert found.metadata['outcome']['text'] == outcome.text
+    assert found.metadata['robot']['model'] == 'ur5e'
+    assert [text for _, _, text in found.events] == [
+        'PRIMITIVES, 2 points', 'on the way to point 0', 'standard digital output 3: on',
+        'speed slider at 50 %', 'on the way to point 1', f'SUCCESSFUL: {outcome.text}']
+    off = found.deviation()
+    assert off.position.max() < 1e-3
+    assert off.planned_time[-1] == pytest.approx(made.duration, abs=1e-6)
+
+
+def test_each_motion_is_a_file_that_says_how_it_ended(tmp_path):
+    async def scenario(cell):
+        async def cancel(motion):
+            await cell.until(lambda: len(motion.progress) > 5)
+            cell.owner.cancel()
+
+        async def stop(motion):
+            await cell.until(lambda: len(motion.progress) > 5)
+            cell.robot.inject(Event(action=Action.PROTECTIVE_STOP))
+
+        ends = []
+        for act in (cancel, stop):
+            _, outcome, _ = await executed(cell, corner(cell), act)
+            ends.append(outcome)
+        return ends
+
+    ends = run_cell(scenario, record_directory=str(tmp_path))
+    cancelled, stopped = recorded(tmp_path)
+    assert [found.metadata['outcome']['text'] for found in (cancelled, stopped)] == [
+        end.text for end in ends]
+    assert cancelled.metadata['outcome']['name'] == ErrorCode.CANCELLED.name
+    assert stopped.metadata['outcome']['report'] == list(ends[1].report)
+    assert 'cancel' in kinds(cancelled)
+    assert ('safety', 'safety mode PROTECTIVE_STOP') in [e[1:] for e in stopped.events]
+    # The arm was braking when it was cancelled, and stood when that had ended.
+    assert cancelled.tool_speed.max() > 0.05
+    assert cancelled.tool_speed[-1] < 1e-3
+
+
+def test_a_goal_does_not_care_for_a_directory_that_cannot_be_written(tmp_path):
+    blocked = tmp_path / 'file'
+    blocked.write_text('no directory')
+
+    async def scenario(cell):
+        _, outcome, _ = await executed(cell, corner(cell))
+        await cell.sleep(0.1)
+        return outcome, list(cell.owner.log)
+
+    outcome, log = run_cell(scenario, record_directory=str(blocked))
+    assert outcome.succeeded
+    assert ['record_directory' in line for line in log].count(True) == 1

@@ -1,0 +1,300 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What is on the disk after a motion, after half of one, and where there is no room for it."""
+
+import contextlib
+import json
+import os
+import pickle
+import resource
+import signal
+import subprocess
+import sys
+import tracemalloc
+
+from made_up_recording import (
+    DONE,
+    HEAD,
+    keep_pace,
+    only_file,
+    ORDER,
+    outputs,
+    packet,
+    path,
+    PERIOD,
+    record,
+    Said,
+    START,
+)
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.driver import recording_format
+from ur_cartesian_driver.driver.recorder import PIECE, PIECES, Recorder
+from ur_cartesian_driver.driver.recording import Recording
+from ur_cartesian_driver.driver.recording_folder import keep_within, name_of
+from ur_cartesian_driver.motion.state import RuntimeState, SafetyMode
+
+# ---- what is in a file --------------------------------------------------------------------------
+
+
+def test_a_recording_holds_every_packet_as_it_came(tmp_path):
+    packets = [packet(i) for i in range(1000)]
+    assert record(tmp_path, packets) == []
+    found = Recording.load(only_file(tmp_path))
+    np.testing.assert_array_equal(found.time, [p.timestamp - START for p in packets])
+    for name, values in {
+            'actual_q': [p.actual_q for p in packets],
+            'target_q': [p.target_q for p in packets],
+            'actual_pose': [p.actual_tcp_pose.row() for p in packets],
+            'target_pose': [p.target_tcp_pose.row() for p in packets],
+            'actual_twist': [p.actual_tcp_twist for p in packets],
+            'speed_scaling': [1.0] * 1000, 'safety_mode': [SafetyMode.NORMAL] * 1000}.items():
+        np.testing.assert_array_equal(getattr(found, name), values, err_msg=name)
+    assert np.isnan(found.lag).all()
+
+
+def test_numpy_alone_opens_a_recording_without_pickle(tmp_path):
+    record(tmp_path, [packet(i) for i in range(10)])
+    with np.load(only_file(tmp_path), allow_pickle=False) as file:
+        shapes = {name: file[name].shape for name in file.files}
+        head = json.loads(file['metadata'].item())
+    assert shapes['actual_pose'] == (10, 7)
+    assert shapes['planned_pose'] == (4, 7)
+    assert head['outcome'] == {'code': 0, 'name': 'SUCCESSFUL', 'text': 'Done.',
+                               'report': ['a line']}
+    assert head['report'] == ['point 0: there']
+    assert head['parameters']['x'] == 1
+    assert head['parameters']['ur_type'] == 'ur5e'
+
+
+def test_the_deviation_is_what_the_arm_was_beside_its_plan(tmp_path):
+    record(tmp_path, [packet(i) for i in range(0, 2000, 20)])
+    off = Recording.load(only_file(tmp_path)).deviation()
+    np.testing.assert_allclose(off.position, 0.001, atol=1e-12)
+    np.testing.assert_allclose(off.target_position, 0.0, atol=1e-12)
+    np.testing.assert_allclose(off.planned_time, np.arange(0, 2000, 20) * PERIOD, atol=1e-9)
+    assert set(off.waypoint) == {0, 1}
+
+
+def test_events_are_what_changed_and_what_was_noted_in_the_order_of_time(tmp_path):
+    def between(recorder, i):
+        if i == 10:
+            recorder.take_signals(outputs(1 << 0))
+        elif i == 30:
+            recorder.take_signals(outputs(1 << 0 | 1 << 9 | 1 << 17))
+        elif i == 300:
+            recorder.note('cancel', '')
+
+    def state(i):
+        begun = 7 if i < 5 else 1 if i < 100 else 2  # 7: of the goal before
+        return packet(i, begun, target_speed_fraction=0.5 if i >= 200 else 1.0, runtime_state=(
+            RuntimeState.PAUSED if 250 <= i < 280 else RuntimeState.PLAYING))
+
+    record(tmp_path, map(state, range(400)), between=between)
+    found = Recording.load(only_file(tmp_path))
+    assert [(round(time / PERIOD), kind, text) for time, kind, text in found.events] == [
+        (0, 'start', 'PRIMITIVES, 2 points'),
+        (5, 'point', 'on the way to point 0'),
+        (31, 'output', 'configurable digital output 1: on'),
+        (31, 'output', 'tool digital output 1: on'),
+        (100, 'point', 'on the way to point 1'),
+        (200, 'slider', 'speed slider at 50 %'),
+        (250, 'program', 'robot program PAUSED'),
+        (280, 'program', 'robot program PLAYING'),
+        (300, 'cancel', ''),
+        (399, 'end', 'SUCCESSFUL: Done.')]
+    assert list(found.points_begun[[4, 5, 399]]) == [0, 1, 2]
+
+
+def test_a_path_that_is_continued_is_recorded_to_its_end(tmp_path):
+    def between(recorder, i):
+        if i == 50:
+            recorder.extend(path(0.4, 0.6, 2), np.array([2], dtype=np.int32))
+
+    record(tmp_path, [packet(i, i // 40) for i in range(160)], between=between)
+    found = Recording.load(only_file(tmp_path))
+    assert list(found.planned_point) == [0, 0, 1, 1, 2, 2]
+    assert list(found.waypoint[[0, 40, 80, 120]]) == [-1, 0, 1, 2]
+    assert found.points.shape == (3, 7)
+
+
+def test_files_are_named_after_time_and_motion_and_never_overwritten(tmp_path):
+    for _ in range(2):
+        record(tmp_path, [packet(0)])
+    name = name_of(HEAD)
+    assert name.endswith('_primitives_2_points')
+    assert {file.name for file in tmp_path.iterdir()} == {f'{name}.npz', f'{name}_2.npz'}
+
+
+def test_nothing_is_recorded_without_a_directory(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert record('', [packet(0), packet(1)]) == []
+    assert list(tmp_path.iterdir()) == []
+
+
+# ---- where there is no room, or no end ----------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_an_endless_motion_takes_no_memory(tmp_path):
+    count, packets = 15_000, [packet(i) for i in range(100)]
+    recorder = Recorder(str(tmp_path), 100.0, Said())
+    recorder.start(ORDER, dict(HEAD), packet(0))
+    tracemalloc.start()
+    try:
+        for i in range(1, count):
+            keep_pace(recorder)
+            recorder.take(packets[i % len(packets)])
+        recorder.end(DONE)
+        recorder.close(30.0)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    file = only_file(tmp_path)
+    size = count * recording_format.ROW.size
+    assert file.stat().st_size > size
+    assert peak < 0.3 * size
+
+
+def test_a_disk_that_is_too_slow_costs_rows_and_not_memory(tmp_path):
+    """Nobody writes while the packets come: what there is no memory for is counted."""
+    recorder = Recorder(str(tmp_path), 100.0, Said())
+    recorder.start(ORDER, dict(HEAD), packet(0))
+    held = [recorder._free.get() for _ in range(PIECES - 1)]
+    count = 3 * PIECE
+    for i in range(1, count):
+        recorder.take(packet(i))
+    for piece in held:
+        recorder._free.put(piece)
+    recorder.end(DONE)
+    recorder.close(10.0)
+    found = Recording.load(only_file(tmp_path))
+    assert len(found.time) + found.metadata['rows_left_out'] == count
+    assert found.metadata['rows_left_out'] > PIECE
+
+
+@contextlib.contextmanager
+def a_disk_of(size):
+    """Let no file of this process become larger [bytes]."""
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def test_a_full_disk_ends_the_recording_with_one_sentence_and_keeps_what_was_written(tmp_path):
+    with a_disk_of(200_000):
+        said = record(tmp_path, [packet(i) for i in range(1000)])
+    (sentence,) = said
+    assert 'File too large' in sentence
+    assert 'record_directory' in sentence
+    found = Recording.load(only_file(tmp_path))
+    assert 200 < len(found.time) < 420
+    np.testing.assert_array_equal(found.time, [i * PERIOD + START - START for i in range(
+        len(found.time))])
+    assert found.metadata['outcome'] is None
+
+
+def test_a_directory_that_cannot_be_written_is_said_once_not_with_each_motion(tmp_path):
+    blocked = tmp_path / 'file'
+    blocked.write_text('no directory')
+    said = Said()
+    recorder = Recorder(str(blocked / 'below'), 100.0, said)
+    for _ in range(3):
+        recorder.start(ORDER, dict(HEAD), packet(0))
+        for i in range(3 * PIECE * PIECES):
+            recorder.take(packet(i))
+        recorder.end(DONE)
+    recorder.close(10.0)
+    assert len(said) == 1
+    assert 'Not a directory' in said[0]
+
+
+def test_a_motion_that_takes_more_than_half_of_the_room_is_recorded_as_far_as_that(tmp_path):
+    said = record(tmp_path, [packet(i) for i in range(1500)], max_size=0.5)
+    assert ['half of record_max_size = 0.5 MB' in text for text in said] == [True]
+    found = Recording.load(only_file(tmp_path))
+    assert found.metadata['trouble'] == said[0]
+    assert found.metadata['outcome']['name'] == 'SUCCESSFUL'
+    assert 400 < len(found.time) < 800
+
+
+def test_the_oldest_recordings_make_room_and_other_files_stay(tmp_path):
+    names = [f'2026010{day}-120000-000_spline_5_points' for day in (1, 2, 3)]
+    for name in [*names, 'kept for the report']:
+        (tmp_path / f'{name}.npz').write_bytes(bytes(1000))
+    keep_within(tmp_path, 2500.0)
+    assert {file.stem for file in tmp_path.iterdir()} == {*names[1:], 'kept for the report'}
+
+
+# ---- killed in the middle -----------------------------------------------------------------------
+
+KILLED = """
+import os, pickle, signal, sys, time
+from ur_cartesian_driver.driver.recorder import PIECES, Recorder
+directory, scene = sys.argv[1:]
+with open(scene, 'rb') as file:
+    order, head, packets = pickle.load(file)
+recorder = Recorder(directory, 100.0, print)
+recorder.start(order, head, packets[0])
+recorder.note('cancel', '')
+for packet in packets[1:]:
+    recorder.take(packet)
+while recorder._free.qsize() < PIECES - 1:
+    time.sleep(0.001)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.slow
+def test_what_a_killed_process_has_written_can_be_read_and_becomes_a_file_later(tmp_path):
+    scene, tmp_path = tmp_path / 'scene', tmp_path / 'recordings'
+    scene.write_bytes(pickle.dumps((ORDER, HEAD, [
+        packet(i, runtime_state=RuntimeState.PLAYING) for i in range(1000)])))
+    ended = subprocess.run(
+        [sys.executable, '-c', KILLED, str(tmp_path), str(scene)], check=False)
+    assert ended.returncode == -signal.SIGKILL
+    folder = only_file(tmp_path)
+    assert folder.suffix == '.part'
+    cut = Recording.load(folder)
+    assert 700 < len(cut.time) < 1000
+    np.testing.assert_array_equal(cut.actual_q[:, 0], 0.1 * np.arange(len(cut.time)))
+    assert [kind for _, kind, _ in cut.events] == ['start', 'cancel']
+    assert cut.metadata['outcome'] is None
+    # With the half of a row that the end has left.
+    with open(folder / 'executed.npy', 'ab') as rows:
+        rows.write(b'half a row')
+    assert len(np.load(folder / 'executed.npy')) == len(cut.time)
+    record(tmp_path, [packet(0)])
+    mended = Recording.load(folder.with_suffix('.npz'))
+    np.testing.assert_array_equal(mended.actual_pose, cut.actual_pose)
+    assert mended.events == cut.events
+
+
+def test_a_motion_that_runs_can_be_looked_at_and_is_not_taken_for_a_dead_one(tmp_path):
+    recorder = Recorder(str(tmp_path), 100.0, Said())
+    recorder.start(ORDER, dict(HEAD), packet(0))
+    for i in range(1, PIECE):
+        recorder.take(packet(i))
+    while recorder._free.qsize() < PIECES - 1:
+        os.sched_yield()
+    assert 200 < len(Recording.load(only_file(tmp_path)).time) <= PIECE
+    keep_within(tmp_path, 1e6)
+    assert only_file(tmp_path).suffix == '.part'
+    recorder.end(DONE)
+    recorder.close(10.0)
+    assert len(Recording.load(only_file(tmp_path)).time) == PIECE
+
+
+@pytest.mark.parametrize('data', [b'', b'no zip', b'PK\x03\x04 no zip either'])
+def test_what_is_no_recording_is_refused(tmp_path, data):
+    file = tmp_path / 'other.npz'
+    file.write_bytes(data)
+    with pytest.raises(ValueError, match='no recording'):
+        Recording.load(file)
+    np.savez(file, other=np.zeros(3))
+    with pytest.raises(ValueError, match='metadata'):
+        Recording.load(file)
