@@ -9,7 +9,9 @@ times are those expected at full speed.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from math import ceil, degrees
 
 import numpy as np
@@ -18,9 +20,11 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
+from ur_cartesian_driver.motion.goal import ExecutionMode
+from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.motion.primitive import Joints, MoveJ, OptimoveJ
+from ur_cartesian_driver.motion.primitive import Joints, MoveJ, OptimoveJ, Spline
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -56,7 +60,10 @@ def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
     share[time >= end] = 1.0
     poses = [_between(reference, int(k), float(f)) for k, f in zip(row, share, strict=True)]
     tcp = T_flange_tcp if plan.T_flange_tcp is None else plan.T_flange_tcp
-    joints = _joints(plan, arm, tcp.inverse(), poses, row + share)
+    if plan.execution in (ExecutionMode.SPLINE, ExecutionMode.SERVO):
+        joints = _spline(plan).rows(time)[0]
+    else:
+        joints = _joints(plan, arm, tcp.inverse(), poses, row + share)
     return Preview(time=time, poses=np.array([pose.row() for pose in poses]), joints=joints)
 
 
@@ -64,7 +71,7 @@ def table(plan: Plan) -> str:
     """Return the plan as lines of text: one for each segment, and the sum."""
     length = sum(segment.length for segment in plan.segments)
     lines = [f'{"point":>5}  {"command":<10} {"length":>9} {"turn":>8} {"time":>9} {"blend":>7}']
-    lines += [_line(segment) for segment in plan.segments]
+    lines += [_line(segments) for segments in _to_points(plan)]
     lines.append(f'{"sum":>5}  {"":<10} {length:7.3f} m {"":>8} {plan.duration:7.3f} s')
     return '\n'.join(lines)
 
@@ -73,19 +80,33 @@ def postures(plan: Plan) -> str:
     """Return the joint positions [rad] in which the arm is predicted to arrive, line by line."""
     names = [name.removesuffix('_joint') for name in JOINT_NAMES]
     lines = [f'{"point":>5}  ' + ' '.join(f'{name:>13}' for name in names) + ' [rad]']
+    ends = (segments[-1] for segments in _to_points(plan))
     for point, joints in [('start', plan.start),
-                          *((str(segment.waypoint), segment.joints) for segment in plan.segments)]:
+                          *((str(segment.waypoint), segment.joints) for segment in ends)]:
         # + 0.0: no -0.0000
         lines.append(f'{point:>5}  ' + ' '.join(f'{round(q, 4) + 0.0:13.4f}' for q in joints))
     return '\n'.join(lines)
 
 
-def _line(segment: PlannedSegment) -> str:
-    primitive = segment.primitive
+def _to_points(plan: Plan) -> list[list[PlannedSegment]]:
+    """Return what leads to each point, several pieces where it is a spline."""
+    return [list(segments) for _, segments in groupby(
+        plan.segments, key=lambda segment: segment.waypoint)]
+
+
+def _line(segments: Sequence[PlannedSegment]) -> str:
+    primitive, pieces = segments[-1].primitive, len(segments)
+    name = type(primitive).__name__ + (f' x {pieces}' if pieces > 1 else '')
     blend = 1e3 * getattr(primitive, 'blend_radius', 0.0)
-    return (f'{segment.waypoint:>5}  {type(primitive).__name__:<10} {segment.length:7.3f} m '
-            f'{degrees(segment.angle):6.1f}\N{DEGREE SIGN} {segment.duration:7.3f} s '
-            f'{blend:4.0f} mm')
+    length, angle, duration = (sum(getattr(segment, quantity) for segment in segments)
+                               for quantity in ('length', 'angle', 'duration'))
+    return (f'{segments[0].waypoint:>5}  {name:<10} {length:7.3f} m {degrees(angle):6.1f}'
+            f'\N{DEGREE SIGN} {duration:7.3f} s {blend:4.0f} mm')
+
+
+def _spline(plan: Plan) -> JointSpline:
+    pieces = (segment.primitive for segment in plan.segments)
+    return JointSpline.of(plan.start, (piece for piece in pieces if isinstance(piece, Spline)))
 
 
 def _between(reference: ReferencePath, row: int, share: float) -> Pose:

@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 from math import pi
 
+import numpy as np
 import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
-from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP
+from ur_cartesian_driver.motion.goal import ExecutionMode
+from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, Spline
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import check, plan, PlanningOptions
 from ur_cartesian_driver.resources import share_path
@@ -39,14 +41,15 @@ def kinds(name):
 
 
 def test_there_are_examples():
-    assert set(NAMES) >= {'square', 'seam', 'postures', 'relative', 'tilt', 'tolerances'}
+    assert set(NAMES) >= {'square', 'seam', 'postures', 'relative', 'tilt', 'tolerances', 'circle',
+                          'figure_eight', 'seam_timed'}
 
 
 @pytest.mark.parametrize('name', NAMES)
 def test_an_example_passes_all_checks_with_the_default_parameters(name):
     check(goal_of(name), PlanningOptions())
     result = planned(name)
-    assert len(result.report) >= len(result.segments)
+    assert len(result.report) >= len({segment.waypoint for segment in result.segments})
     assert any('slowed' in line for line in result.report) == (name == 'stretch')
 
 
@@ -67,6 +70,30 @@ def test_the_square_is_20_cm_in_10_s_and_plain():
 def test_the_seam_shows_every_kind_of_motion():
     assert kinds('seam') == [MoveJ, MoveL, MoveL, MoveP, MoveC, MoveP, MoveL, MoveL, MoveJ]
     assert 14.0 < planned('seam').duration < 20.0
+
+
+@pytest.mark.parametrize('name', ['circle', 'figure_eight', 'seam_timed'])
+def test_goals_with_twists_are_splines_that_are_at_their_points_in_time(name):
+    result = planned(name)
+    assert result.execution is ExecutionMode.SPLINE
+    assert set(kinds(name)) == {Spline}
+    path = result.reference
+    for index, point in enumerate(result.goal.waypoints):
+        row = int(np.flatnonzero(path.point == index)[-1])
+        assert path.time[row] == pytest.approx(point.time)
+        assert path.poses[row, :3] == pytest.approx(point.pose.position, abs=1e-9)
+
+
+def test_the_circle_is_round_and_even_between_its_points():
+    path = planned('circle').reference
+    around = path.poses[(path.point > 0) & (path.point < 13), :3] - (-0.4919, -0.1333, 0.4879)
+    assert np.linalg.norm(around, axis=1) == pytest.approx(0.08, abs=6e-6)
+    assert np.abs(around[:, 2]).max() < 1e-9
+
+
+def test_the_timed_seam_stops_only_above_it_behind_it_and_at_home():
+    assert [line for line in planned('seam_timed').report if 'stops' in line][-1] == (
+        'points 0, 6: the arm stops there, because the twist is 0 (NaN lets the driver choose)')
 
 
 def test_the_posture_of_the_seam_is_the_one_of_its_pose():

@@ -11,6 +11,7 @@ after the point have there.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isnan
 
 import numpy as np
 
@@ -57,9 +58,8 @@ def remarks(goal: Goal, first: int) -> list[str]:
     stops = [i for i, point in inner if not any(point.twist)]
     say(said, stops, 'the arm stops there, because the twist is 0 (NaN lets the driver choose)')
     for field in ('twist', 'acceleration'):
-        say(said, [i for i, point in points if np.isnan(sum(getattr(point, field)))],
-            f'{field} is NaN, so it is chosen by the points around' + (
-                '' if goal.keep_open else '; at the last one it is 0'))
+        say(said, [i for i, point in inner if isnan(sum(getattr(point, field)))],
+            f'{field} is NaN, so it is chosen, to fit the points around')
     say(said, [i for i, point in points if any(point.jerk)],
         'jerk is ignored: no robot motion takes it')
     say(said, [i for i, segment in enumerate(goal.segments, first) if segment.acceleration > 0.0],
