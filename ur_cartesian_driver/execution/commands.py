@@ -9,6 +9,7 @@ from typing import TypeAlias
 
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.servo import ServoReport
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 
 
@@ -68,6 +69,35 @@ class AnswerExtension:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class OpenServo:
+    """Take the RTDE inputs of the buffered servo, and report what the robot says of it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnterServo:
+    """Have the robot program listen to these inputs."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WriteServo:
+    """Write the inputs of the buffered servo, in the order of ``registers.SERVO_INPUTS``."""
+
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeaveServo:
+    """Have the robot program brake and listen no more, and give the inputs back."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportServo:
+    """Tell how the streaming of set-points is going."""
+
+    report: ServoReport
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Finish:
     """The goal has ended."""
 
@@ -76,4 +106,4 @@ class Finish:
 
 Command: TypeAlias = (
     SendControl | SendPoints | LendTcp | ReturnTcp | StopProgram | Report | AnswerExtension
-    | Finish)
+    | OpenServo | EnterServo | WriteServo | LeaveServo | ReportServo | Finish)

@@ -6,11 +6,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from math import nan
 from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import ZERO6
 from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.servo import ServoFeedback
 from ur_cartesian_driver.motion.state import RobotState
 
 
@@ -64,8 +66,16 @@ class Tick:
     """Time passed; sent at least every 20 ms so that bounds hold when nothing else happens."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoReceived:
+    """The robot reported how it gets on with streamed set-points."""
+
+    feedback: ServoFeedback
+
+
 Event: TypeAlias = (
-    StateReceived | TrajectoryEnded | CancelRequested | PreemptRequested | LinkLost | Tick)
+    StateReceived | ServoReceived | TrajectoryEnded | CancelRequested | PreemptRequested | LinkLost
+    | Tick)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,6 +106,8 @@ class Progress:
     points_received: int = 0
     #: Motion time of the points on the robot's side that are not begun yet [s].
     buffered: float = 0.0
+    #: SERVO: how far the arm is behind the newest set-point, as nominal time [s].
+    lag: float = nan
     #: The controller's clock [s].
     timestamp: float = 0.0
     #: Whether the arm rests and the goal waits for more points (keep_open).

@@ -66,7 +66,7 @@ def feedback_message(progress: Progress, frame: FeedbackFrame,
     message.time_remaining = duration_message(progress.time_remaining)
     message.points_received = progress.points_received
     message.buffered = duration_message(progress.buffered)
-    message.lag = nan
+    message.lag = progress.lag
     return message
 
 

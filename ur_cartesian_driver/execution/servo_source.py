@@ -1,0 +1,74 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Where the set-points of the buffered servo come from."""
+
+from __future__ import annotations
+
+from typing import cast, Protocol
+
+import numpy as np
+
+from ur_cartesian_driver.motion.joint_spline import JointSpline
+from ur_cartesian_driver.motion.pose import Vector6
+
+#: So many set-points of a spline are computed at a time: a row of an array costs a fiftieth of
+#: what it costs alone.
+BATCH = 128
+_SAME = 1e-12
+
+
+class Setpoints(Protocol):
+    """Joint positions, one after the other; the streaming decides how fast time passes."""
+
+    def next(self, dt: float) -> Vector6:
+        """
+        Return the joint positions [rad] so much later [s], in nominal time; 0 = hold.
+
+        :param dt: since the last call.
+        """
+
+    @property
+    def done(self) -> bool:
+        """Whether the last positions were the end, where the arm is to arrive."""
+
+
+class SplineSetpoints:
+    """A joint spline, from its beginning to its end."""
+
+    def __init__(self, spline: JointSpline) -> None:
+        """Begin at the start of the curve."""
+        self._spline = spline
+        self._time = float(spline.times[0])
+        self._end = float(spline.times[-1])
+        self._row = 0
+        self._step = 0.0
+        self._rows: list[Vector6] = []
+        self._now = self._at(self._time)
+
+    @property
+    def done(self) -> bool:
+        """Whether the end of the curve is reached."""
+        return self._time >= self._end - _SAME
+
+    def next(self, dt: float) -> Vector6:
+        """Return the joint positions so much later."""
+        if dt <= 0.0:
+            return self._now
+        if abs(dt - self._step) > _SAME or self._row >= len(self._rows):
+            self._look_ahead(dt)
+        self._time = min(self._time + dt, self._end)
+        self._now = self._rows[self._row]
+        self._row += 1
+        return self._now
+
+    def _look_ahead(self, dt: float) -> None:
+        """Compute what comes next, if the steps stay as they are."""
+        count = BATCH if abs(dt - self._step) <= _SAME else 1
+        self._step, self._row = dt, 0
+        times = self._time + dt * np.arange(1, count + 1, dtype=np.float64)
+        q, _, _ = self._spline.rows(times.astype(np.float64))
+        self._rows = [cast(Vector6, tuple(row)) for row in q.tolist()]
+
+    def _at(self, time: float) -> Vector6:
+        q, _, _ = self._spline.at(time)
+        return cast(Vector6, tuple(q.tolist()))

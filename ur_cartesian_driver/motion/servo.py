@@ -1,0 +1,74 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the robot says of streamed set-points, and what the driver tells of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from math import nan
+
+from ur_cartesian_driver.motion.pose import Vector6
+
+UNKNOWN6: Vector6 = (nan,) * 6
+
+
+class ServoActivity(IntEnum):
+    """What the streaming is doing; the numbers of ``ServoState``."""
+
+    IDLE = 0
+    FILLING = 1
+    SERVOING = 2
+    HOLDING = 3
+    DRAINING = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoFeedback:
+    """
+    One RTDE packet of the registers of the buffered servo.
+
+    The counts are those of our own robot program; a program after the manufacturer's guide leaves
+    them at 0.
+    """
+
+    #: The controller's clock [s].
+    timestamp: float
+    #: What the controller runs at, 0 to 1, also while its program is paused.
+    speed_scaling: float
+    #: Whether the robot program runs, and is not paused.
+    playing: bool
+    mode: int
+    last_sequence: int
+    #: Motion time in the buffer [s].
+    lag: float
+    setpoints_done: int = 0
+    repeats: int = 0
+    skipped: int = 0
+    buffer_size: int = 0
+    overflows: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoReport:
+    """How the streaming of set-points is going: what ``ServoState`` tells."""
+
+    #: The controller's clock [s].
+    timestamp: float
+    activity: ServoActivity
+    setpoints_sent: int
+    setpoints_done: int
+    buffer_size: int
+    buffer_capacity: int
+    #: Nominal duration of what waits in the robot's buffer [s].
+    buffered: float
+    #: How far the arm is behind the newest set-point, as nominal time [s].
+    lag: float
+    speed_scaling: float
+    #: Target - actual [rad].
+    joint_error: Vector6 = UNKNOWN6
+    underruns: int = 0
+    overruns: int = 0
+    repeats: int = 0
+    #: Sequence numbers that the robot never saw: what was written was written over.
+    skipped: int = 0
