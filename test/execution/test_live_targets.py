@@ -24,7 +24,8 @@ class Session:
     def __init__(self):
         self.follower = TargetFollower(ARM, IDENTITY, HOME, SETTINGS.limits)
         self.now = 100.0
-        self.live = LiveTargets(self.follower, SETTINGS, self.now)
+        self.live = LiveTargets(self.follower, SETTINGS)
+        self.live.look(self.now)
         self.home = self.follower.T_base_tcp
 
     def beside(self, y):

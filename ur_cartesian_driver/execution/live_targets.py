@@ -43,12 +43,8 @@ class LiveSettings:
 class LiveTargets:
     """The source of the set-points of a session."""
 
-    def __init__(self, follower: TargetFollower, settings: LiveSettings, now: float) -> None:
-        """
-        Begin with no target.
-
-        :param now: time of a steady clock [s], of which all later ones are too.
-        """
+    def __init__(self, follower: TargetFollower, settings: LiveSettings) -> None:
+        """Begin with no target."""
         self.follower = follower
         #: How many targets were followed, and how many came in after a newer one or too old.
         self.taken = self.left_out = 0
@@ -56,7 +52,7 @@ class LiveTargets:
         self.pauses = 0
         self._settings = settings
         self._stamp = -inf
-        self._last_came = now
+        self._last_came = inf
         self._is_over = False
         # The first wording of each reason.
         self._reasons: dict[str, str] = {}
@@ -84,6 +80,7 @@ class LiveTargets:
             # An arm that rests where it was to be is not stopped by that.
             self.pauses += not follower.arrived
             follower.release()
+        self._last_came = min(self._last_came, now)
         self._is_over = now - self._last_came > self._settings.timeout
 
     def next(self, dt: float) -> Joints:
