@@ -20,6 +20,7 @@ CHECKOUT = Path(__file__).resolve().parents[1]
 PAGE = CHECKOUT / 'doc' / 'faults.md'
 
 if TYPE_CHECKING:
+    from fault_modes import Mode
     from fault_table import Row
 
 HEAD = """# What goes wrong, and what becomes of the goal
@@ -62,30 +63,54 @@ Then a protective or safeguard stop holds the goal as a pause does. Everything e
 
 """
 
+MODES_HEAD = """# The other ways of execution
+
+All above is about goals that are executed as PRIMITIVES. The following goals go through the same
+faults while they move, wait or end. What happens before a goal is on its way, and to interfaces
+that no goal uses, does not depend on its execution and stands above.
+
+"""
+
 TITLES = ('fault', 'the goal ends', 'result within', 'arm stands within', 'then the driver is',
           'what to do')
 
 
 def page() -> str:
     """Return the text of doc/faults.md."""
+    from fault_modes import MODES
     from fault_table import CONTINUED, HEADLESS, LOCAL, PHASES
 
     travel = max(row.at(phase).travel for row in LOCAL for phase in PHASES)
     return ''.join((
         HEAD, '## Phases\n\n', _table(('phase', 'when'), PHASES.items()), '\n',
-        HEADLESS_HEAD, _table(TITLES, map(_cells, HEADLESS)), '\n',
-        LOCAL_HEAD.format(travel=travel),
-        _table(TITLES, map(_cells, LOCAL)), '\n',
-        CONTINUED_HEAD, _table(TITLES, map(_cells, CONTINUED))))
+        HEADLESS_HEAD, _faults(HEADLESS, PHASES), '\n',
+        LOCAL_HEAD.format(travel=travel), _faults(LOCAL, PHASES), '\n',
+        CONTINUED_HEAD, _faults(CONTINUED, PHASES), '\n', MODES_HEAD,
+        '\n'.join(map(_mode, MODES))))
 
 
-def _cells(row: Row) -> Sequence[str]:
-    return (row.fault, _by_phase(row, lambda at: ('goes on, ' if at.waits else '') + at.code.name),
-            _by_phase(row, lambda at: f'{at.bound:g} s' if _disturbs(at) else 'as without'),
-            _by_phase(row, lambda at: (
-                f'{at.rest:g} s' if _disturbs(at) or at.waits else 'as without')),
-            _by_phase(row, lambda at: at.then.name),
-            _by_phase(row, lambda at: ', '.join(_needed(at.steps)) or 'nothing'))
+def _mode(mode: Mode) -> str:
+    """Return the section of a way of execution."""
+    return ''.join((
+        f'## {mode.name}\n\n{mode.about}\n\n', _table(('phase', 'when'), mode.phases.items()),
+        '\n', _faults(mode.headless, mode.phases), '\nIn local control:\n\n',
+        _faults(mode.local, mode.phases), '\nWith `after_robot_stop: continue`:\n\n',
+        _faults(mode.continued, mode.phases)))
+
+
+def _faults(rows: Iterable[Row], phases: Iterable[str]) -> str:
+    return _table(TITLES, (_cells(row, row.phases or tuple(phases)) for row in rows))
+
+
+def _cells(row: Row, phases: Sequence[str]) -> Sequence[str]:
+    def tell(what: Callable[[Row], str]) -> str:
+        return _by_phase(row, phases, what)
+
+    return (row.fault, tell(lambda at: ('goes on, ' if at.waits else '') + at.code.name),
+            tell(lambda at: f'{at.bound:g} s' if _disturbs(at) else 'as without'),
+            tell(lambda at: f'{at.rest:g} s' if _disturbs(at) or at.waits else 'as without'),
+            tell(lambda at: at.then.name),
+            tell(lambda at: ', '.join(_needed(at.steps)) or 'nothing'))
 
 
 def _disturbs(row: Row) -> bool:
@@ -97,15 +122,15 @@ def _needed(steps: Sequence[str]) -> list[str]:
     return [step for i, step in enumerate(steps) if tuple(steps[i:i + 2]) != ('play', 'resend')]
 
 
-def _by_phase(row: Row, tell: Callable[[Row], str]) -> str:
+def _by_phase(row: Row, phases: Sequence[str], tell: Callable[[Row], str]) -> str:
     """Return what is told of a row, and the phases in which something else is."""
-    from fault_table import PHASES
-
     usual = tell(row)
     phases_of: dict[str, list[str]] = {}
-    for phase in PHASES:
+    for phase in phases:
         phases_of.setdefault(tell(row.at(phase)), []).append(phase)
-    phases_of.pop(usual, None)
+    if usual not in phases_of:  # what would be usual is in no phase
+        usual = next(iter(phases_of))
+    phases_of.pop(usual)
     return '<br>'.join([usual, *(f'{", ".join(phases)}: {text}'
                                  for text, phases in phases_of.items())])
 

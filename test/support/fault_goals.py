@@ -255,7 +255,7 @@ class Servoed(AlongSpline):
 
 
 #: The output that is switched at the second corner, and the one after the end [s].
-AT_CORNER, AFTER_END, DELAY = 2, 3, 0.4
+AT_CORNER, AFTER_END, DELAY = 2, 3, 0.6
 
 
 @lru_cache
@@ -302,4 +302,4 @@ class WithOutputs(AroundCorners):
 
 
 #: The goals of the ways of execution.
-GOALS = {}
+GOALS = {'SPLINE': AlongSpline}

@@ -110,4 +110,42 @@ SPLINE = _mode(
     1.6, {'the reverse socket is half-open': {'slowing down': {'code': E.SUCCESSFUL}},
           'the node is silent': {'slowing down': {'code': E.SUCCESSFUL}}})
 
-MODES: tuple[Mode, ...] = ()
+#: What is a matter of the set-points' own connection.
+SETPOINTS = (
+    Row(fault='the connection of the set-points is cut', cause=('cut set-points',),
+        code=E.CONNECTION_LOST),
+    Row(fault='the connection of the set-points is half-open', cause=('freeze set-points',),
+        code=E.CONNECTION_LOST),
+    Row(fault='another client has taken the inputs that set-points need', phases=('idle',),
+        cause=('take the inputs',), code=E.ROBOT_NOT_READY, steps=('wait until it is over',)))
+
+SERVO = _mode(
+    'SERVO', 'The same half circle as set-points, which the robot program buffers.',
+    {'entering': 'the robot program is told to take set-points, nothing has moved',
+     'between points': 'on the way from the second point to the third',
+     'slowing down': 'on the way to the last point, a tenth of a second before it',
+     'cancelling': 'the driver has left the mode of set-points, the arm still moves'},
+    1.8, {'the reverse socket is half-open': {'slowing down': {'code': E.SUCCESSFUL}},
+          'the node is silent': {'slowing down': {'code': E.SUCCESSFUL}}},
+    faults=(*FAULTS[:-3], *FAULTS[-2:], *FAULTS_OF_RTDE), more=SETPOINTS)
+
+OUTPUTS = _mode(
+    'Outputs', 'PRIMITIVES around two corners; one output is switched in the second corner, '
+    'another one 0.6 s after the end. What still waits when a goal does not succeed is not '
+    'switched any more.',
+    {'before the place': 'on the way to the corner',
+     'before the time': 'the arm stands at the last point, the last output is not yet switched',
+     'cancelling': 'CANCEL is on the wire, the arm still moves'},
+    2.0, {'the speed slider is moved to 0': {
+        'before the time': {'waits': False, 'steps': ('move the slider up',)}}})
+
+OPEN = _mode(
+    'Open goals', 'A goal that is continued while it runs (`keep_open`); the last points are '
+    'appended when the fault is there.',
+    {'moving': 'on the way, more points are expected',
+     'closing': 'none came in time, the arm is being brought to rest behind the last one',
+     'waiting': 'the arm is at rest, and waits for more points',
+     'cancelling': 'CANCEL is on the wire, the arm still moves'},
+    2.5, {})
+
+MODES = (SPLINE,)
