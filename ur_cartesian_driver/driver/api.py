@@ -25,6 +25,7 @@ from ur_cartesian_driver.driver.channel import (
     LiveOrder,
     LogLine,
     MotionEnded,
+    MotionExtended,
     MotionProgress,
     Notice,
     Request,
@@ -37,6 +38,7 @@ from ur_cartesian_driver.driver.channel import (
     TcpReturned,
 )
 from ur_cartesian_driver.driver.config import DriverConfig
+from ur_cartesian_driver.driver.continuing import Continuing, encoded
 from ur_cartesian_driver.driver.live import (
     check_target,
     live_order,
@@ -47,7 +49,7 @@ from ur_cartesian_driver.driver.live import (
 from ur_cartesian_driver.driver.motion import Motion, OnProgress, Run
 from ur_cartesian_driver.driver.recorder import about
 from ur_cartesian_driver.driver.services import RobotServices
-from ur_cartesian_driver.execution import Order, order_of, same_tcp
+from ur_cartesian_driver.execution import AnswerExtension, Order, order_of, same_tcp
 from ur_cartesian_driver.execution.trajectory import STOP_BOUND
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import Geometry, robot_model
@@ -62,9 +64,11 @@ from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.lever import seen_at
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.servo import ServoReport
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.continuation import opened, Part
 from ur_cartesian_driver.planning.rest import come_to_rest
 from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.protocol.dialects import NEWEST
@@ -112,6 +116,7 @@ class Driver(RobotServices):
         self._calls: dict[int, Future[Answer]] = {}
         self._signals: Signals | None = None
         self._live: LiveSession | None = None
+        self._servo_listeners: list[Callable[[ServoReport], None]] = []
         self._gaps = Gaps()
         self._numbers = itertools.count(1)
         # Guards the pipe (several threads send), the running motions and opening and closing.
@@ -220,6 +225,10 @@ class Driver(RobotServices):
         self._status_listeners.append(callback)
         callback(self._status)
 
+    def add_servo_listener(self, callback: Callable[[ServoReport], None]) -> None:
+        """Call back with what the robot loop tells of set-points that are streamed."""
+        self._servo_listeners.append(callback)
+
     def wait_ready(self, timeout: float) -> None:
         """
         Wait until a goal can run.
@@ -242,8 +251,12 @@ class Driver(RobotServices):
         state = self.rest_state
         if state is None:
             raise RobotNotReady(self._status.message or NO_STATE)
+        return plan(goal, state, self.arm, self._options(state))
+
+    def _options(self, state: RobotState) -> PlanningOptions:
+        """Return the options for the robot that is connected."""
         status = self._status
-        options = replace(
+        return replace(
             self.options, calibration_known=status.calibration_known,
             dialect=self.config.dialect,
             # Another program may skip the command, and move the TCP that is there.
@@ -251,7 +264,6 @@ class Driver(RobotServices):
             optimove_known=has_feature('optimove', status.software()),
             acceleration_known=state.actual_tcp_acceleration is not None
             and state.target_tcp_acceleration is not None)
-        return plan(goal, state, self.arm, options)
 
     def start(self, plan: Plan, on_progress: OnProgress | None = None) -> Motion:
         """
@@ -260,12 +272,19 @@ class Driver(RobotServices):
         :raises RobotNotReady: the robot program is not connected, or a motion is running.
         :raises LocalProtocolError: a value of the plan does not fit into a message.
         """
+        if plan.goal.keep_open:
+            state = self.state
+            if state is None:
+                raise RobotNotReady(self._status.message or NO_STATE)
+            part = opened(plan, self.arm, self._options(state))
+            points, order = encoded(part, self.config.dialect)
+            return self._launch(plan, points, order, on_progress, part=part)
         points = encode_points((segment.primitive for segment in plan.segments),
                                self.config.dialect)
         return self._launch(plan, points, order_of(plan, self.config.dialect), on_progress)
 
     def _launch(self, plan: Plan, points: bytes, order: Order, on_progress: OnProgress | None,
-                live: LiveOrder | None = None) -> Motion:
+                live: LiveOrder | None = None, part: Part | None = None) -> Motion:
         """Have the robot loop begin a motion, if nothing else moves."""
         with self._lock:
             if self._runs:
@@ -274,6 +293,8 @@ class Driver(RobotServices):
                 raise RobotNotReady(reason)
             run = Run(next(self._numbers), plan, on_progress, self._send)
             motion = run.motion
+            if part is not None:
+                motion.continuing = self._continuing(motion, part)
             self._runs[motion.number] = run
             # Still under the lock: whoever finds the motion may cancel it, and that has to come
             # behind its start.
@@ -281,6 +302,17 @@ class Driver(RobotServices):
                 motion=motion.number, points=points, order=order, live=live,
                 about=about(plan, self.options) if self.config.record_directory else ''))
         return motion
+
+    def _continuing(self, motion: Motion, part: Part) -> Continuing:
+        """Return the owner's side of a goal with an open end."""
+        def arm_and_options() -> tuple[Arm, PlanningOptions]:
+            state = self.state
+            if state is None:
+                raise RobotNotReady(self._status.message or NO_STATE)
+            return self.arm, self._options(state)
+
+        return Continuing(motion.number, part, dialect=self.config.dialect, send=self._send,
+                          arm_and_options=arm_and_options, progress=lambda: motion.progress)
 
     def follow_targets(self, T_base_tcp: Pose, *, age: float = 0.0) -> LiveSession:
         """
@@ -465,6 +497,8 @@ class Driver(RobotServices):
             case MotionProgress(motion=number, progress=progress):
                 if number in self._runs:
                     self._runs[number].report(progress)
+            case MotionExtended(motion=number, answer=answer):
+                self._tell_extended(number, answer)
             case MotionEnded(motion=number, outcome=outcome):
                 with self._lock:
                     run = self._runs.pop(number, None)
@@ -489,6 +523,11 @@ class Driver(RobotServices):
                 self._loan = None
             case LogLine(level=level, text=text):
                 LOG.log(level, text)
+
+    def _tell_extended(self, number: int, answer: AnswerExtension) -> None:
+        run = self._runs.get(number)
+        if run is not None and run.motion.continuing is not None:
+            run.motion.continuing.answer(answer)
 
     def _take_geometry(self, geometry: Geometry) -> None:
         """Plan with the robot's own kinematics from now on; warn of one that is far off."""

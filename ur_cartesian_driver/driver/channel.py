@@ -17,7 +17,7 @@ import struct
 from typing import TypeAlias
 
 from ur_cartesian_driver.driver.config import DriverConfig
-from ur_cartesian_driver.execution import Order
+from ur_cartesian_driver.execution import AnswerExtension, Extension, Order
 from ur_cartesian_driver.execution.live_targets import LiveSettings
 from ur_cartesian_driver.kinematics.robots import Geometry
 from ur_cartesian_driver.motion.events import Outcome, Progress
@@ -86,6 +86,15 @@ class AimMotion:
     age: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ExtendMotion:
+    """Let records follow (84 bytes each) in a motion with an open end; answered in any case."""
+
+    motion: int
+    extension: Extension
+    points: bytes
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CancelMotion:
     """Stop the motion, if it is the one that runs."""
@@ -141,6 +150,14 @@ class MotionProgress:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MotionExtended:
+    """Whether a motion has taken what was to follow."""
+
+    motion: int
+    answer: AnswerExtension
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MotionEnded:
     """How a motion ended."""
 
@@ -179,11 +196,11 @@ class LogLine:
 
 
 Request: TypeAlias = (
-    Configure | StartMotion | AimMotion | CancelMotion | ResendProgram | CallRobot | Heartbeat
-    | Shutdown)
+    Configure | StartMotion | ExtendMotion | AimMotion | CancelMotion | ResendProgram | CallRobot
+    | Heartbeat | Shutdown)
 Notice: TypeAlias = (
-    Alive | StatusChanged | SignalsChanged | GeometryKnown | MotionProgress | MotionEnded
-    | CallAnswered | TcpLent | TcpReturned | LogLine)
+    Alive | StatusChanged | SignalsChanged | GeometryKnown | MotionProgress | MotionExtended
+    | MotionEnded | CallAnswered | TcpLent | TcpReturned | LogLine)
 
 
 def pack(message: Request | Notice) -> bytes:

@@ -24,6 +24,12 @@ class DriverConfig(LinkSettings):
     #: What becomes of a goal when the robot makes a protective or safeguard stop: ``abort``, or
     #: ``continue`` when somebody has unlocked the robot and plays its program.
     after_robot_stop: str = 'abort'
+    #: Of goals with keep_open: planned time of the motion that the robot is given ahead [s]; ...
+    stream_horizon: float = 1.0
+    #: ... how long before it runs out the motion is brought to rest if nothing else comes [s]; ...
+    stream_margin: float = 0.2
+    #: ... and how long the goal then waits for more points until it ends [s]; 0 = without end.
+    keep_open_timeout: float = 30.0
     #: Progress reports per second.
     feedback_rate: float = 25.0
     #: The arm is stopped when the owner of the driver is silent for that long [s].
@@ -48,7 +54,13 @@ class DriverConfig(LinkSettings):
         if self.after_robot_stop not in ('abort', 'continue'):
             raise ValueError(f'after_robot_stop is {self.after_robot_stop!r}, it has to be '
                              "'abort' or 'continue'.")
-        self._require_positive('feedback_rate', 'node_timeout', 'record_max_size')
+        self._require_positive('feedback_rate', 'node_timeout', 'stream_margin', 'record_max_size')
+        if not self.stream_horizon >= 2.0 * self.stream_margin:
+            raise ValueError(f'stream_horizon is {self.stream_horizon}, it has to be at least '
+                             f'twice stream_margin = {self.stream_margin}.')
+        if not self.keep_open_timeout >= 0.0:
+            raise ValueError(
+                f'keep_open_timeout is {self.keep_open_timeout}, it must not be negative.')
         for name in ('max_plan_deviation', 'max_plan_deviation_angle',
                      'max_calibration_difference'):
             if not getattr(self, name) >= 0.0:

@@ -4,14 +4,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
 
 from ur_cartesian_driver.driver.callbacks import call_back
 from ur_cartesian_driver.driver.channel import CancelMotion, Request, TcpLent
+from ur_cartesian_driver.driver.continuing import Appended, Continuing
+from ur_cartesian_driver.motion.errors import RobotNotReady
 from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.goal import IOCommand, Segment, Waypoint
 from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.planning.continuation import Addition
 
 OnProgress = Callable[[Progress], None]
 
@@ -24,6 +28,8 @@ class Motion:
         """Be made by :meth:`~.api.Driver.start`."""
         self.number = number
         self._outcome, self._send = outcome, send
+        #: How it is continued; None = it is as long as it is. Set by the driver.
+        self.continuing: Continuing | None = None
         #: The newest report, None before the first.
         self.progress: Progress | None = None
 
@@ -38,6 +44,25 @@ class Motion:
         :param by: which one, as part of the outcome's sentence.
         """
         self._send(CancelMotion(motion=self.number, preempted_by=by))
+
+    def append(self, waypoints: Sequence[Waypoint], segments: Sequence[Segment] = (),
+               io_commands: Sequence[IOCommand] = (), *, last: bool = False) -> Appended:
+        """
+        Let points follow while the goal runs; it was started with ``keep_open``.
+
+        They are checked and planned here, so this takes a while; do not call it from callbacks.
+
+        :param waypoints: with times from the start of the goal, in its frame.
+        :param segments: none, or one for each point.
+        :param io_commands: their waypoints are numbered from the start of the goal.
+        :param last: nothing follows; without points: the goal ends where it is known to end.
+        :raises GoalRefused: nothing was taken, and the goal is as it was; the text says why.
+        """
+        if self.continuing is None:
+            raise RobotNotReady('The goal was sent without keep_open: nothing can be appended.')
+        return self.continuing.append(Addition(
+            waypoints=tuple(waypoints), segments=tuple(segments),
+            io_commands=tuple(io_commands), last=last))
 
     def done(self) -> bool:
         """Tell whether the outcome is there."""
@@ -83,6 +108,8 @@ class Run:
 
     def end(self, outcome: Outcome) -> None:
         """Give the outcome; only the first one counts."""
+        if self.motion.continuing is not None:
+            self.motion.continuing.end()
         if not self._outcome.done():
             self._outcome.set_result(replace(
                 outcome, report=(*self._plan_report, *outcome.report)))

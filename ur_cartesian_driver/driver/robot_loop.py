@@ -30,11 +30,13 @@ from ur_cartesian_driver.driver.channel import (
     CallRobot,
     CancelMotion,
     Configure,
+    ExtendMotion,
     GeometryKnown,
     Heartbeat,
     LENGTH,
     LogLine,
     MotionEnded,
+    MotionExtended,
     MotionProgress,
     Notice,
     pack,
@@ -48,9 +50,12 @@ from ur_cartesian_driver.driver.channel import (
     TcpReturned,
     unpack,
 )
+from ur_cartesian_driver.driver.machines import machine_of
 from ur_cartesian_driver.driver.recorder import head_of, Recorder
+from ur_cartesian_driver.driver.records_to_send import RecordsToSend
 from ur_cartesian_driver.driver.snapshot import StateMemory
 from ur_cartesian_driver.execution import (
+    AnswerExtension,
     Command,
     Finish,
     LendTcp,
@@ -61,6 +66,7 @@ from ur_cartesian_driver.execution import (
     SendControl,
     SendPoints,
     StopProgram,
+    StreamMachine,
     TcpLoan,
     TrajectoryMachine,
 )
@@ -77,7 +83,6 @@ from ur_cartesian_driver.motion.events import (
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.protocol.trajectory import POINT_SIZE
 from ur_cartesian_driver.robot.call_desk import CallDesk
 from ur_cartesian_driver.robot.calls import Answer, Dashboard
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
@@ -123,7 +128,9 @@ class RobotLoop:
         self._latest: RobotState | None = None
         #: Whether it is in the shared memory.
         self._is_shared = True
-        self._points = memoryview(b'')
+        self._points = RecordsToSend()
+        #: What is offered to the machine at this moment.
+        self._offered: ExtendMotion | None = None
         #: The TCP that an ended goal had set, until it is back.
         self._loan: TcpLoan | None = None
         self._last_heartbeat = 0.0
@@ -187,6 +194,8 @@ class RobotLoop:
         match request:
             case StartMotion():
                 await self._start(request)
+            case ExtendMotion():
+                self._extend(request)
             case CancelMotion(motion=motion, preempted_by=by):
                 if motion == self._motion:
                     self._recorder.note('cancel', by and f'preempted by {by}')
@@ -203,11 +212,7 @@ class RobotLoop:
 
     async def _start(self, request: StartMotion) -> None:
         """Start a motion, or refuse it with the reason."""
-        machine = await _apart(len(request.points), partial(
-            TrajectoryMachine, request.order, feedback_period=1.0 / self._config.feedback_rate,
-            max_plan_deviation=(self._config.max_plan_deviation,
-                                self._config.max_plan_deviation_angle),
-            continues=self._config.after_robot_stop == 'continue'))
+        machine = await _apart(len(request.points), machine_of, request, self._config)
         reason = self._link.not_ready()
         if self._machine is not None or self._unexplained is not None:
             reason = 'Another motion is running; wait for its end or cancel it.'
@@ -219,12 +224,29 @@ class RobotLoop:
             self._notify(MotionEnded(motion=request.motion, outcome=Outcome(
                 code=ErrorCode.ROBOT_NOT_READY, text=reason)))
             return
-        self._motion, self._points = request.motion, memoryview(request.points)
+        self._motion, self._points = request.motion, RecordsToSend(request.points)
         self._machine = machine
         self._link.set_busy(True)
         assert self._latest is not None  # else the link is not ready
         self._record(request)
         self._carry_out(machine.start(self._latest))
+
+    def _extend(self, request: ExtendMotion) -> None:
+        """Offer points to the motion that runs, if it is theirs."""
+        if request.motion == self._motion and isinstance(self._machine, StreamMachine):
+            self._offered = request
+            self._carry_out(self._machine.step(request.extension, self._now()))
+        else:
+            self._notify(MotionExtended(motion=request.motion, answer=AnswerExtension(
+                number=request.extension.number, refusal='The goal has ended.')))
+
+    def _answer_extension(self, answer: AnswerExtension) -> None:
+        """Keep the points that the machine has taken, and tell their owner."""
+        offered, self._offered = self._offered, None
+        assert offered is not None
+        if not answer.refusal and offered.points:
+            self._points.put(offered.extension.behind, offered.points)
+        self._notify(MotionExtended(motion=self._motion, answer=answer))
 
     def _tcp_changed(self, order: Order) -> str:
         """Return that the plan was made for another TCP than the robot has; empty if not."""
@@ -312,8 +334,7 @@ class RobotLoop:
                 case SendControl(action=action, count=count):
                     self._link.send_control(action, count)
                 case SendPoints(first=first, end=end):
-                    points = self._points[first * POINT_SIZE:end * POINT_SIZE]
-                    self._link.send_points(bytes(points))
+                    self._link.send_points(self._points.take(first, end))
                 case LendTcp(T_flange_tcp=T_flange_tcp):
                     self._lend(T_flange_tcp)
                 case ReturnTcp(T_flange_tcp=T_flange_tcp):
@@ -322,13 +343,15 @@ class RobotLoop:
                     self._link.stop_program(reason)
                 case Report(progress=progress):
                     self._notify(MotionProgress(motion=self._motion, progress=progress))
+                case AnswerExtension():
+                    self._answer_extension(command)
                 case Finish(outcome=outcome):
                     self._finish(outcome)
 
     def _finish(self, outcome: Outcome) -> None:
         machine, motion = self._machine, self._motion
         self._motion, self._machine = 0, None
-        self._points = memoryview(b'')
+        self._points = RecordsToSend()
         if machine is not None and machine.loan is not None:
             if machine.loan.returned:
                 self._notify(TcpReturned())

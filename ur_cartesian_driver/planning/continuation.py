@@ -129,7 +129,7 @@ def opened(plan: Plan, arm: Arm, options: PlanningOptions) -> Part:
     addition = Addition(waypoints=goal.waypoints, segments=goal.segments,
                         io_commands=goal.io_commands)
     if plan.execution is ExecutionMode.SPLINE:
-        return _spline_part(base, addition, plan, end_state(plan), 0.0, arm, options)
+        return _spline_part(base, addition, plan, end_state(plan), 0, 0.0, arm, options)
     return _moves_part(base, addition, plan, 0.0, 0)
 
 
@@ -171,8 +171,9 @@ def _check_size(open_goal: OpenGoal, addition: Addition, options: PlanningOption
 
 def _moves_on(on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptions,
               from_rest: bool) -> Part:
-    tail = () if from_rest else on.tail
-    since = on.rest_time if from_rest else on.time
+    if from_rest:
+        on = replace(on, tail=(), outputs=())
+    tail, since = on.tail, on.rest_time if from_rest else on.time
     q_start, told = (tail[0].q_before, tail[0].time_before) if tail else (on.q_rest, on.told)
     waypoints = (*(known.waypoint for known in tail), *addition.waypoints)
     segments = addition.segments or (Segment(),) * len(addition.waypoints)
@@ -183,7 +184,7 @@ def _moves_on(on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptio
     pending = max(len(tail) - 1, 0)
     goal = replace(
         on.goal, waypoints=waypoints, segments=(*(k.segment for k in tail), *segments),
-        io_commands=_outputs_due(on, addition, first, pending, since, from_rest),
+        io_commands=_outputs_due(on, addition, first, pending, since),
         keep_open=not addition.last)
     try:
         made = plan_goal(goal, _standing(on, q_start, arm), arm, options)
@@ -193,13 +194,11 @@ def _moves_on(on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptio
                                             since), since, on.records if from_rest else on.firm)
 
 
-def _outputs_due(on: OpenGoal, addition: Addition, first: int, pending: int, since: float,
-                 from_rest: bool) -> tuple[IOCommand, ...]:
+def _outputs_due(on: OpenGoal, addition: Addition, first: int, pending: int, since: float
+                 ) -> tuple[IOCommand, ...]:
     """Return the commands of a part; those before it that are still due count from its start."""
     new = [replace(command, waypoint=command.waypoint - first)
            for command in addition.io_commands]
-    if from_rest:
-        return tuple(new)
     old = []
     for due, command in on.outputs:
         if command.waypoint == on.points - 1:
@@ -246,7 +245,7 @@ def _moves_part(on: OpenGoal, addition: Addition, made: Plan, since: float, behi
         outputs=_still_due(on, addition, made, since, time))
     return Part(plan=replace(made, goal=replace(made.goal, keep_open=not addition.last)),
                 behind=behind, since=since, ending=0 if addition.last else ending,
-                due=end if timed else None, text=_text(on, then, addition), then=then)
+                due=end if timed else None, text=_text(on, addition), then=then)
 
 
 def _seen(known: Sequence[Known], k: int, arrived: dict[int, Joints], points: int) -> Known:
@@ -266,8 +265,10 @@ def _still_due(on: OpenGoal, addition: Addition, made: Plan, since: float, firm_
         now += segment.duration
         ends[segment.waypoint] = now
     last = on.points + len(addition.waypoints) - 1
-    commands = [*on.outputs, *((ends.get(c.waypoint, since) + c.offset, c)
-                               for c in addition.io_commands)]
+    commands = [
+        *((ends[c.waypoint] + c.offset if c.waypoint in ends else due, c)
+          for due, c in on.outputs),
+        *((ends.get(c.waypoint, since) + c.offset, c) for c in addition.io_commands)]
     return tuple((due, command) for due, command in commands
                  if due > firm_time or command.waypoint == last)
 
@@ -280,20 +281,20 @@ def _spline_on(on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOpti
     """Return the part behind the end of a spline; from rest as soon as the limits allow."""
     assert on.state is not None
     if not from_rest:
-        return _spline_behind(on, addition, on.state, on.shift, arm, options)
+        return _spline_behind(on, addition, on.state, on.firm, on.shift, arm, options)
     start = SplineState(time=on.rest_time, q=on.q_rest)
     refusals = []
     for lead in LEADS:
         try:
-            return _spline_behind(on, addition, start, on.rest_time + lead - on.told, arm,
-                                  options)
+            return _spline_behind(on, addition, start, on.records,
+                                  on.rest_time + lead - on.told, arm, options)
         except GoalRefused as refusal:
             refusals.append(refusal)
     raise refusals[-1]
 
 
-def _spline_behind(on: OpenGoal, addition: Addition, start: SplineState, shift: float, arm: Arm,
-                   options: PlanningOptions) -> Part:
+def _spline_behind(on: OpenGoal, addition: Addition, start: SplineState, behind: int,
+                   shift: float, arm: Arm, options: PlanningOptions) -> Part:
     goal = replace(on.goal, waypoints=addition.waypoints, segments=addition.segments,
                    io_commands=tuple(replace(command, waypoint=command.waypoint - on.points)
                                      for command in addition.io_commands),
@@ -311,19 +312,18 @@ def _spline_behind(on: OpenGoal, addition: Addition, start: SplineState, shift: 
     made = Plan(goal=later, segments=found.segments, reference=found.reference, start=start.q,
                 T_flange_active=on.T_flange_active, T_flange_tcp=on.T_flange_tcp,
                 execution=ExecutionMode.SPLINE, remarks=found.remarks)
-    return _spline_part(replace(on, shift=shift), addition, made, found.end, start.time, arm,
-                        options)
+    return _spline_part(replace(on, shift=shift), addition, made, found.end, behind, start.time,
+                        arm, options)
 
 
-def _spline_part(on: OpenGoal, addition: Addition, made: Plan, end: SplineState, since: float,
-                 arm: Arm, options: PlanningOptions) -> Part:
+def _spline_part(on: OpenGoal, addition: Addition, made: Plan, end: SplineState, behind: int,
+                 since: float, arm: Arm, options: PlanningOptions) -> Part:
     """Return a part whose ending is a piece to rest, where its last point moves."""
-    behind = on.records if since == on.rest_time and not on.state_moves_at(since) else on.firm
     firm = behind + _records(made.segments)
     point = on.points + len(addition.waypoints) - 1
     rest_time, q_rest, ending = end.time, end.q, 0
     if end.moves and not addition.last:
-        made = _closed(made, end, point, arm, options)
+        made = _closed(made, end, point, arm, on, options)
         rest_time, q_rest = end.time + made.segments[-1].duration, made.segments[-1].joints
         ending = 1
     then = replace(
@@ -331,4 +331,54 @@ def _spline_part(on: OpenGoal, addition: Addition, made: Plan, end: SplineState,
         rest_time=rest_time, told=addition.waypoints[-1].time, q_rest=q_rest, state=end)
     return Part(plan=replace(made, goal=replace(made.goal, keep_open=not addition.last)),
                 behind=behind, since=since, ending=ending, due=rest_time,
-                text=_text(on, then, addition), then=then)
+                text=_text(on, addition), then=then)
+
+
+def _closed(made: Plan, end: SplineState, point: int, arm: Arm, on: OpenGoal,
+            options: PlanningOptions) -> Plan:
+    """Return a plan with the piece that brings it to rest."""
+    piece = closing(end, arm, options.closing_deceleration)
+    times = np.linspace(0.0, piece.duration, _CLOSING_ROWS + 1)[1:]
+    q, _, _ = JointSpline.of(end.q, [piece], velocities=end.qd,
+                             accelerations=end.qdd).rows(times)
+    path = made.reference
+    poses = np.concatenate([path.poses, tcp_rows(arm, on.T_flange_tcp or on.T_flange_active, q)])
+    keep_hemisphere(poses)
+    return replace(made, segments=(*made.segments, PlannedSegment(
+        primitive=piece, waypoint=point, length=0.0, angle=0.0, duration=piece.duration,
+        joints=piece.target if isinstance(piece.target, tuple) else end.q, note='')),
+        reference=ReferencePath(
+            poses=poses, time=np.concatenate([path.time, end.time + times]),
+            point=np.concatenate([path.point, np.full(len(times), point, dtype=np.int32)])))
+
+
+# ---- both ---------------------------------------------------------------------------------------
+
+
+def _standing(on: OpenGoal, q: Joints, arm: Arm) -> RobotState:
+    """Return the state of a robot that rests somewhere on the way."""
+    pose = arm.forward(q) @ on.T_flange_active
+    return RobotState(timestamp=0.0, actual_q=q, target_q=q, actual_tcp_pose=pose,
+                      target_tcp_pose=pose, T_flange_tcp=on.T_flange_active)
+
+
+def _records(segments: Sequence[PlannedSegment]) -> int:
+    return sum(1 + len(segment.outputs) for segment in segments)
+
+
+def _renumbered(refusal: GoalRefused, first: int) -> GoalRefused:
+    """Return a refusal whose points are numbered from the start of the goal."""
+    error = type(refusal).__new__(type(refusal))
+    Exception.__init__(error, _shifted(str(refusal), first))
+    return error
+
+
+def _shifted(text: str, first: int) -> str:
+    return _NUMBER.sub(lambda found: f'{found[1]}{int(found[2]) + first}', text)
+
+
+def _text(on: OpenGoal, addition: Addition) -> str:
+    count = len(addition.waypoints)
+    points = 'point' if count == 1 else 'points'
+    end = ', these are the last' if addition.last else ''
+    return f'{count} {points} appended, the goal has {on.points + count}{end}.'

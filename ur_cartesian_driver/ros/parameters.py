@@ -292,6 +292,12 @@ DECLARATIONS: tuple[Declaration, ...] = (
                 0.0, 50.0),
     Declaration('servo_state_rate', 'How often ~/servo_state is published at most [Hz]; 0: never.',
                 0.0, 500.0),
+    Declaration('stream_horizon', 'Goals with keep_open: planned time of the motion that the '
+                'robot is given ahead [s]; at least twice stream_margin.', 0.1, 60.0),
+    Declaration('stream_margin', 'Goals with keep_open: how long before the robot runs out of '
+                'points it is brought to rest, if no more come [s].', 0.02, 10.0),
+    Declaration('keep_open_timeout', 'Goals with keep_open: how long one waits at rest for more '
+                'points until it ends [s]; 0: without end.', 0.0, 86400.0),
     Declaration('feedback_rate', 'How often a goal sends feedback [Hz].', 0.5, 500.0),
     # -- what is recorded
     Declaration('record_directory', 'Directory in which each motion is recorded, a file each, to '

@@ -1,0 +1,175 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A goal that is continued while it runs, from the side of its owner.
+
+Points are planned here, in the thread that appends them, and offered to the robot loop. That takes
+all of them or none: it alone knows whether the motion has been closed in the meantime. If it has,
+they are planned again, from rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+import itertools
+import threading
+
+from ur_cartesian_driver.driver.channel import ExtendMotion
+from ur_cartesian_driver.execution import AnswerExtension, Extension, Order, order_of
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.events import Progress
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning.continuation import Addition, following, OpenGoal, Part
+from ur_cartesian_driver.protocol.dialects import Dialect
+from ur_cartesian_driver.protocol.trajectory import encode_points
+
+#: How long the robot loop may take to an answer [s]; it stops the arm when it hangs for so long.
+ANSWER_TIMEOUT = 5.0
+#: So many times as many points as one message may hold can be ahead of the arm.
+MESSAGES_AHEAD = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Appended:
+    """Points that a goal has taken."""
+
+    #: How many it has now.
+    points: int
+    #: What becomes of them.
+    text: str
+
+
+def encoded(part: Part, dialect: Dialect) -> tuple[bytes, Order]:
+    """Return the records of a part, and what the machine needs of it."""
+    plan = part.plan
+    order = order_of(plan, dialect, since=part.since, ending=part.ending)
+    return (encode_points((segment.primitive for segment in plan.segments), dialect),
+            replace(order, due=part.due))
+
+
+class Continuing:
+    """What the driver knows of a goal with an open end; thread-safe."""
+
+    def __init__(self, motion: int, opened: Part, *, dialect: Dialect,
+                 arm_and_options: Callable[[], tuple[Arm, PlanningOptions]],
+                 send: Callable[[ExtendMotion], None],
+                 progress: Callable[[], Progress | None]) -> None:
+        """
+        Prepare.
+
+        :param arm_and_options: for planning, as they are then.
+        :param progress: the newest report of the motion.
+        """
+        self._motion, self._dialect = motion, dialect
+        self._arm_and_options, self._send, self._progress = arm_and_options, send, progress
+        self._goal: OpenGoal = opened.then
+        self._is_open = True
+        # One request after the other: each begins where the one before ends.
+        self._turn = threading.Lock()
+        # Guards what follows.
+        self._lock = threading.Lock()
+        self._asked: dict[int, Future[AnswerExtension]] = {}
+        self._ended = ''
+        self._numbers = itertools.count(1)
+
+    @property
+    def points(self) -> int:
+        """How many the goal has."""
+        return self._goal.points
+
+    def append(self, addition: Addition) -> Appended:
+        """
+        Plan points and have them taken, all or none; it takes as long as the planning.
+
+        :raises GoalRefused: they are not taken, and the goal is as it was.
+        """
+        with self._turn:
+            if not self._is_open:
+                raise RobotNotReady('The last points of the goal were said to be the last.')
+            appended = self._append(addition) if addition.waypoints else self._close(addition)
+            self._is_open = not addition.last
+            return appended
+
+    def _close(self, addition: Addition) -> Appended:
+        if not addition.last:
+            raise InvalidGoal('points', 'is empty', 'give at least one point, or set last')
+        answer = self._offer(None, b'', 0)
+        if answer.refusal:
+            raise RobotNotReady(answer.refusal)
+        return Appended(points=self.points, text=(
+            f'The goal ends with the {self.points} points that it has.'))
+
+    def _append(self, addition: Addition) -> Appended:
+        arm, options = self._arm_and_options()
+        self._check_ahead(len(addition.waypoints), options)
+        before = self._goal
+        for from_rest in (False, True) if not self._waits() else (True,):
+            part = following(before, addition, arm, options, from_rest=from_rest)
+            points, order = encoded(part, self._dialect)
+            answer = self._offer(order, points, part.behind)
+            if not answer.refusal:
+                self._goal = part.then
+                return Appended(points=part.then.points, text=part.text + (
+                    _from_rest(part.then.shift - before.shift) if from_rest else ''))
+            if not answer.from_rest:
+                break
+        raise RobotNotReady(answer.refusal)
+
+    def _waits(self) -> bool:
+        """Tell whether the arm surely rests behind all points that the goal has."""
+        progress = self._progress()
+        return (progress is not None and progress.waits
+                and progress.points_received == self.points)
+
+    def _check_ahead(self, count: int, options: PlanningOptions) -> None:
+        progress = self._progress()
+        ahead = self.points - (progress.waypoint if progress is not None else 0)
+        most = MESSAGES_AHEAD * options.max_points
+        if ahead + count > most:
+            raise InvalidGoal(
+                'points', f'would make {ahead + count} points that the arm has not reached, more '
+                f'than {most} = {MESSAGES_AHEAD} max_points', 'append them when it has come '
+                'further (feedback: point_index)')
+
+    def _offer(self, order: Order | None, points: bytes, behind: int) -> AnswerExtension:
+        with self._lock:
+            number = next(self._numbers)
+            if self._ended:
+                return AnswerExtension(number=number, refusal=self._ended)
+            future = self._asked[number] = Future()
+        self._send(ExtendMotion(motion=self._motion, points=points, extension=Extension(
+            number=number, behind=behind, order=order)))
+        try:
+            return future.result(ANSWER_TIMEOUT)
+        except TimeoutError:
+            return AnswerExtension(number=number, refusal='The robot loop does not answer.')
+        finally:
+            with self._lock:
+                self._asked.pop(number, None)
+
+    # ---- told by the driver -------------------------------------------------------------------
+
+    def answer(self, answer: AnswerExtension) -> None:
+        """Take the answer of the robot loop."""
+        with self._lock:
+            future = self._asked.get(answer.number)
+        if future is not None:
+            future.set_result(answer)
+
+    def end(self) -> None:
+        """Take note that the motion has ended; who waits for an answer gets that one."""
+        with self._lock:
+            self._ended = 'The goal has ended.'
+            asked, self._asked = self._asked, {}
+        for number, future in asked.items():
+            if not future.done():
+                future.set_result(AnswerExtension(number=number, refusal=self._ended))
+
+
+def _from_rest(later: float) -> str:
+    """Return what is said where the motion had been closed."""
+    clause = f', {later:.3f} s later than their times say' if later > 0.0 else ''
+    return f' The motion had come to rest before them, and goes on from there{clause}.'
