@@ -21,7 +21,7 @@ import signal
 import subprocess
 import sys
 import time
-from typing import Any
+from typing import Any, TypeAlias
 
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
@@ -89,18 +89,28 @@ def child(target: Callable[..., None], *arguments: Any) -> Iterator[Child]:
 # ---- simulated robot --------------------------------------------------------------------------
 
 
+#: Calls that a simulated robot answers beside the usual ones.
+Calls: TypeAlias = Callable[[SimulatedRobot], Mapping[str, Callable[..., Any]]]
+
+
+def no_calls(_: SimulatedRobot) -> Mapping[str, Callable[..., Any]]:
+    """Return none."""
+    return {}
+
+
 @contextmanager
-def simulator(**settings: Any) -> Iterator[Child]:
+def simulator(calls: Calls = no_calls, **settings: Any) -> Iterator[Child]:
     """
     Run a simulated robot; calls: ``ports``, ``state``, ``inject``, ``begin``, ...
 
+    :param calls: a function of a module, which adds others.
     :param settings: fields of its configuration.
     """
-    with child(_simulate, settings) as robot:
+    with child(_simulate, calls, settings) as robot:
         yield robot
 
 
-def _simulate(connection: Connection, settings: dict[str, Any]) -> None:
+def _simulate(connection: Connection, calls: Calls, settings: dict[str, Any]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
     any_port: dict[str, Any] = {
         field.name: 0 for field in fields(SimulatorConfig) if field.name.endswith('_port')}
@@ -114,6 +124,7 @@ def _simulate(connection: Connection, settings: dict[str, Any]) -> None:
             'inject': robot.inject,
             'begin': beginnings.clear,
             'cycles': lambda: list(beginnings),
+            **calls(robot),
         })
 
 

@@ -5,14 +5,18 @@ The driver's robot loop with an echo in it, for :mod:`violation_to_cancel`.
 
 It is run in the place of ``ur_cartesian_driver.driver``, with the same arguments, and does the
 same. On the same event loop, in the same thread, it answers one more connection, of the same class
-as the driver's own, on which whatever comes is answered with as many bytes as CANCEL has: what the
-interpreter, asyncio and the system take from a packet to an answer, in this very process, if
-nothing is done in between.
+as the driver's own, in two ways by turns:
+
+* with as many zeros as CANCEL has bytes: what the interpreter, asyncio and the system take from a
+  packet to an answer, in this very process, if nothing is done in between;
+* with a CANCEL that is encoded, after the packet was read into a ``RobotState``: what any answer
+  takes that depends on what is in the packet, whatever is decided.
 """
 
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 import socket
 import sys
@@ -20,23 +24,51 @@ import sys
 from processes import HOST
 
 from ur_cartesian_driver.driver.robot_loop import serve
-from ur_cartesian_driver.protocol.reverse import MESSAGE_SIZE
+from ur_cartesian_driver.protocol.reverse import MESSAGE_SIZE, trajectory, TrajectoryAction
+from ur_cartesian_driver.protocol.rtde import OUTPUT_TYPES, Recipe
+from ur_cartesian_driver.robot.state_recipe import NAMES, robot_state
 from ur_cartesian_driver.robot.transport import Connection, dial
 
 #: The variable of the environment that names the port to dial.
 PORT = 'BENCHMARK_ECHO_PORT'
 
 
-async def _serve(pipe: socket.socket, descriptor: int) -> None:
-    def answer(_: bytes) -> None:
-        echo.send(bytes(MESSAGE_SIZE))
+RECIPE = Recipe(NAMES, [OUTPUT_TYPES[name] for name in NAMES])
+ZEROS = bytes(MESSAGE_SIZE)
 
-    echo = Connection(answer, lambda _: None)
-    await dial(echo, HOST, int(os.environ[PORT]))
+
+class Echo:
+    """Answers packets of the robot's state."""
+
+    def __init__(self) -> None:
+        """Prepare; :meth:`open` connects."""
+        self._connection = Connection(self._answer, lambda _: None)
+        self._reads = False
+
+    async def open(self) -> None:
+        """Connect to who sends the packets."""
+        await dial(self._connection, HOST, int(os.environ[PORT]))
+
+    def _answer(self, data: bytes) -> None:
+        self._reads = not self._reads
+        self._connection.send(_read(data) if self._reads else ZEROS)
+
+
+def _read(data: bytes) -> bytes:
+    """Return a CANCEL, for a robot that reports anything."""
+    values = RECIPE.unpack_frame(data)
+    assert values is not None
+    robot_state(values)
+    return trajectory(TrajectoryAction.CANCEL, 1).encode()
+
+
+async def _serve(pipe: socket.socket, descriptor: int) -> None:
+    await Echo().open()
     await serve(pipe, descriptor)
 
 
 if __name__ == '__main__':
+    gc.freeze()
     _pipe, _descriptor = (int(argument) for argument in sys.argv[1:])
     with socket.socket(fileno=_pipe) as _connection:
         asyncio.run(_serve(_connection, _descriptor))

@@ -1,33 +1,43 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How long a violated tolerance takes to CANCEL on the wire, beside an echo of the same process.
+How long a violated tolerance takes to CANCEL, beside an echo of the same process.
 
 Simulator, relay and robot loop are processes of their own. All packets of the robot's state pass
-through the relay, which notes when each of them leaves for the robot loop, and when CANCEL comes
-back. Every few packets it holds one back and sends it over another connection first, to an echo
-that lives in the robot loop's process, on its event loop (:mod:`robot_loop_with_echo`), and does
-nothing but answer with as many bytes as CANCEL has. So both times are taken between the same two
-processes, of the same packets, with the same pauses between them: what they differ by is what the
-driver does with a packet.
+through the relay, which notes when the first one with a violation in it leaves for the robot loop,
+and when CANCEL comes back. In two of three trials it holds that packet back and sends it over
+another connection first, to an echo that lives in the robot loop's process, on its event loop
+(:mod:`robot_loop_with_echo`), and answers with as many bytes as CANCEL has: by turns at once, and
+after it has read the packet. So all times are taken between the same two processes, of the same
+packets, at the same moment of a motion: what they differ by is what the driver does with a packet,
+or decides.
+
+That is the driver's part. A violation begins on the other side, in the cycle of the controller in
+which the arm is out of its tolerance, and nobody can answer it before that cycle is computed and
+its packet made. So the simulator notes how long that took, for each cycle, and both times are also
+given from the beginning of the cycle: what the robot waits for an answer. The way from simulator
+to relay counts in neither; it is not there where a robot sends to the driver itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 import os
 import signal
 import socket
+import struct
 import threading
 import time
+from typing import Any
 
 from figures import Figure, percentile
 import paths
-from processes import answer_calls, Child, child, HOST, simulator
+from processes import answer_calls, Child, child, HOST, PERIOD, simulator
 import robot_loop_with_echo
-from wire_tap import Mark, Relay, TAP_HOST, Way
+from wire_tap import Relay, TAP_HOST, Way
 
 from ur_cartesian_driver.driver import Driver, DriverConfig, host
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -37,39 +47,73 @@ from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.rtde import OUTPUT_TYPES, Recipe
 from ur_cartesian_driver.robot.state_recipe import NAMES
+from ur_cartesian_driver.sim import SimulatedRobot
+from ur_cartesian_driver.sim.rtde_session import RtdeSession
 
 NAME = 'violated tolerance'
 #: So far the tool is pushed aside, and so far it may be [m].
 PUSH, BOUND = 0.004, 0.002
-#: One in so many packets goes to the echo first.
-ECHOED = 7
+#: So many violations of each kind.
+TRIALS = 100
 TIMEOUT = 10.0
 #: The robot loop's own.
 RECIPE = Recipe(NAMES, [OUTPUT_TYPES[name] for name in NAMES])
 FRAME_SIZE = len(RECIPE.pack(RECIPE.zeros()))
+TIMESTAMP = struct.Struct('>d')
 ACTUAL, TARGET = NAMES.index('actual_TCP_pose'), NAMES.index('target_TCP_pose')
+
+
+@dataclass(frozen=True, slots=True)
+class Reaction:
+    """An answer to a packet with a violation in it."""
+
+    #: The controller's clock in the cycle of the packet [s].
+    cycle: float
+    #: From the packet to the answer, both at the relay [ms].
+    taken: float
+    #: Whether the packet was read for it.
+    reads: bool = True
 
 
 def run(quick: bool) -> Iterator[Figure]:
     """Push the arm off its path again and again."""
-    with simulator() as robot, _relay(robot) as (relay, settings), _echo(relay), Driver(
-                DriverConfig(robot_ip=HOST, ur_type=paths.MODEL, headless_mode=True, **settings),
+    cancels: list[Reaction] = []
+    echoes: list[Reaction] = []
+    with simulator(_note_packets) as robot, _relay(robot) as (relay, settings), _echo(relay), \
+            Driver(DriverConfig(
+                robot_ip=HOST, ur_type=paths.MODEL, headless_mode=True, **settings),
                 PlanningOptions(max_tool_speed=1.0)) as driver:
         driver.wait_ready(TIMEOUT)
         home = driver.state.actual_tcp_pose
         _violate(driver, robot, home, 0)  # nothing is measured cold
-        relay.call('marks')
-        relay.call('echoes')
-        times = []
-        for trial in range(1, 10 if quick else 151):
+        for trial in range(1, 1 + 3 * (3 if quick else TRIALS)):
+            kind = cancels if trial % 3 == 0 else echoes
+            relay.call('marks')
+            relay.call('await_push', kind is echoes)
             _violate(driver, robot, home, trial)
-            times.append(_reaction(relay.call('marks')))
-        echoes = [1e-6 * taken for taken in relay.call('echoes')]
-    for text, percent in (('p50', 50.0), ('p90', 90.0), ('p99', 99.0), ('longest', 100.0)):
-        yield Figure(benchmark=NAME, name=f'packet -> CANCEL on the wire, {text}',
-                     value=percentile(times, percent), unit='ms',
-                     baseline=percentile(echoes, percent), than='echo of the same packets',
-                     note=f'{len(times)} violations, {len(echoes)} echoes')
+            kind.append(relay.call('echoed') if kind is echoes else _cancelled(relay))
+        making = robot.call('making')
+    for than, reads in (('echo', False), ('echo that reads the packet', True)):
+        yield from _compare(than, cancels, [e for e in echoes if e.reads == reads], making)
+
+
+def _compare(than: str, cancels: Sequence[Reaction], echoes: Sequence[Reaction],
+             making: Mapping[float, float]) -> Iterator[Figure]:
+    """Yield the times of both, first without, then with the making of the packet."""
+    note = f'{len(cancels)} violations, {len(echoes)} echoes'
+    for name, begun in (('packet -> CANCEL on the wire', lambda _: 0.0),
+                        ('cycle -> CANCEL at the robot', making.__getitem__)):
+        ours, theirs = ([begun(r.cycle) + r.taken for r in which] for which in (cancels, echoes))
+        for text, percent in (('p50', 50.0), ('p90', 90.0), ('p99', 99.0), ('longest', 100.0)):
+            yield Figure(benchmark=NAME, name=f'{name}, {text}', value=percentile(ours, percent),
+                         unit='ms', baseline=percentile(theirs, percent), than=than, note=note)
+    yield Figure(benchmark=NAME, name='CANCEL is there before the next cycle',
+                 value=_in_time(ours), unit='%', baseline=_in_time(theirs), than=than, note=note)
+
+
+def _in_time(times: Sequence[float]) -> float:
+    """Return how many times are shorter than a cycle [%]."""
+    return 100.0 * sum(1e-3 * time < PERIOD for time in times) / len(times)
 
 
 def _violate(driver: Driver, robot: Child, home: Pose, trial: int) -> None:
@@ -89,12 +133,38 @@ def _violate(driver: Driver, robot: Child, home: Pose, trial: int) -> None:
     time.sleep(0.05)
 
 
-def _reaction(marks: Sequence[Mark]) -> float:
-    """Return the time from the first packet with the push in it to CANCEL [ms]."""
-    pushed = next(m.time for m in marks if m.port == 'rtde_port')
-    cancel = next(m.time for m in marks if m.is_trajectory_action
+def _cancelled(relay: Child) -> Reaction:
+    """Return how the first packet with the push in it was answered by CANCEL."""
+    cycle, pushed = relay.call('pushed')
+    cancel = next(m.time for m in relay.call('marks') if m.is_trajectory_action
                   and m.action == TrajectoryAction.CANCEL)
-    return 1e-6 * (cancel - pushed)
+    return Reaction(cycle, 1e-6 * (cancel - pushed))
+
+
+# ---- the simulator's process ------------------------------------------------------------------
+
+
+def _note_packets(robot: SimulatedRobot) -> Mapping[str, Callable[[], object]]:
+    """Have the time noted that each packet took from the beginning of its cycle (``making``)."""
+    making: dict[float, float] = {}
+    began = 0
+    step, packages = robot.controller.step, RtdeSession.packages
+
+    def noted_step() -> None:
+        nonlocal began
+        began = time.monotonic_ns()
+        step()
+
+    def noted_packages(session: RtdeSession) -> Iterator[bytes]:
+        for package in packages(session):
+            if len(package) == FRAME_SIZE:  # the other client reads inputs and outputs
+                making[robot.controller.time] = 1e-6 * (time.monotonic_ns() - began)
+            yield package
+
+    patched: Any = robot.controller
+    patched.step = noted_step
+    RtdeSession.packages = noted_packages  # type: ignore[method-assign]  # what is measured
+    return {'making': lambda: making}
 
 
 # ---- the relay's process ----------------------------------------------------------------------
@@ -102,7 +172,7 @@ def _reaction(marks: Sequence[Mark]) -> float:
 
 @contextmanager
 def _relay(robot: Child) -> Iterator[tuple[Child, dict[str, object]]]:
-    """Run the relay; yield it (calls: ``marks``, ``echoes``) and what the driver is told."""
+    """Run the relay; yield it (calls: ``marks``, ``await_push``, ...) and the parameters."""
     ports = robot.call('ports')
     with child(_run_relay, ports.rtde) as relay:
         yield relay, {
@@ -116,7 +186,8 @@ def _run_relay(connection: Connection, rtde_port: int) -> None:
     threading.Thread(target=relay.run, daemon=True).start()
     answer_calls(connection, {
         'ports': lambda: relay.ports, 'echo_port': lambda: relay.echo_port,
-        'marks': relay.take, 'echoes': relay.take_echoes})
+        'marks': relay.take, 'await_push': relay.await_push,
+        'pushed': lambda: relay.pushed, 'echoed': lambda: relay.echoed})
 
 
 @contextmanager
@@ -131,7 +202,7 @@ def _echo(relay: Child) -> Iterator[None]:
 
 
 class RelayWithEcho(Relay):
-    """Passes on the robot's packets too, and tries some of them on the echo first."""
+    """Passes on the robot's packets too, and tries a violation on the echo first."""
 
     def __init__(self, rtde_port: int) -> None:
         """
@@ -145,21 +216,17 @@ class RelayWithEcho(Relay):
         self._echo_listener = socket.create_server((HOST, 0))
         self.echo_port = self._echo_listener.getsockname()[1]
         self._echo: socket.socket | None = None
-        self._echoes: list[int] = []
-        self._marks_of_pushes: list[Mark] = []
-        #: What waits for the echo: since when, and where it goes then.
-        self._held: tuple[int, bytes, socket.socket] | None = None
-        self._packets = 0
+        #: Cycle [s] and time [ns] of the first packet with a push; None = not come yet.
+        self.pushed: tuple[float, int] | None = None
+        #: How the echo answered it.
+        self.echoed: Reaction | None = None
+        self._asks_echo = False
+        #: What waits for the echo, and where it goes then.
+        self._held: tuple[bytes, socket.socket] | None = None
 
-    def take(self) -> list[Mark]:
-        """Return the marks since the last call, those of packets with a push in them first."""
-        pushes, self._marks_of_pushes = self._marks_of_pushes, []
-        return pushes + super().take()
-
-    def take_echoes(self) -> list[int]:
-        """Return how long the echo took each time since the last call [ns]."""
-        echoes, self._echoes = self._echoes, []
-        return echoes
+    def await_push(self, asks_echo: bool) -> None:
+        """Wait for a packet with a push; it may be for the echo first."""
+        self._asks_echo, self.echoed, self.pushed = asks_echo, None, None
 
     def ways(self, name: str) -> tuple[int, str, str]:
         """Let the robot be called for who calls its port; the echo has called before."""
@@ -186,30 +253,34 @@ class RelayWithEcho(Relay):
             super().pass_on(source, way)  # the handshake, or the end
             return
         data = source.recv(FRAME_SIZE)
-        pushed = is_pushed(data)
-        self._packets += 1
-        now = time.monotonic_ns()
-        if pushed:
-            way.target.sendall(data)
-            self._marks_of_pushes.append(Mark(now, 'rtde_port', len(data)))
-        elif self._packets % ECHOED == 0 and self._echo is not None:
-            self._held = now, data, way.target
+        is_awaited = self.pushed is None and is_pushed(data)
+        if is_awaited:
+            self.pushed = cycle_of(data), time.monotonic_ns()
+        if is_awaited and self._asks_echo and self._echo is not None:
+            self._held = data, way.target
             self._echo.sendall(data)
         else:
             way.target.sendall(data)
 
     def _echoed(self, echo: socket.socket) -> None:
-        echo.recv(65536)
+        answer = echo.recv(65536)
         now = time.monotonic_ns()
-        if self._held is not None:
-            self._echoes.append(now - self._held[0])
-            self._release()
+        if self.pushed is not None:
+            cycle, since = self.pushed
+            self.echoed = Reaction(cycle, 1e-6 * (now - since), any(answer))
+        self._release()
 
     def _release(self) -> None:
         held, self._held = self._held, None
         if held is not None:
             with suppress(OSError):
-                held[2].sendall(held[1])
+                held[1].sendall(held[0])
+
+
+def cycle_of(data: bytes) -> float:
+    """Return the controller's clock in the cycle of a packet [s]."""
+    (timestamp,) = TIMESTAMP.unpack_from(data, 4)  # behind size, type and recipe
+    return float(timestamp)
 
 
 def is_pushed(data: bytes) -> bool:

@@ -11,6 +11,7 @@ program stops the arm; when the owner dies the pipe ends and it stops the arm it
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 import socket
 import subprocess
@@ -117,6 +118,7 @@ def _environment() -> dict[str, str]:
 
 def main() -> None:
     """Run the loop in this process; the arguments are the two descriptors."""
+    gc.freeze()  # what the imports made stays: the collector would look at it in mid-motion
     pipe, descriptor = (int(argument) for argument in sys.argv[1:])
     with socket.socket(fileno=pipe) as connection:
         asyncio.run(serve(connection, descriptor))
