@@ -36,7 +36,7 @@ demo-two: $(stamp)  ## The same with two arms at once, each with a goal of its o
 	$(bin)/ur-cartesian demo --arms 2
 
 test: lint  ## Lint, then all tests (PYTEST_ARGS='-k name' chooses)
-	$(bin)/pytest $(PYTEST_ARGS)
+	$(bin)/pytest --no-skips $(PYTEST_ARGS)
 
 lint: $(stamp)  ## ruff, mypy, the rules for imports, spelling
 	$(bin)/ruff check

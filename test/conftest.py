@@ -3,7 +3,33 @@
 """What holds for all tests."""
 
 from hypothesis import settings
+import pytest
 
 # A machine that does something else for a moment is no defect.
 settings.register_profile('any machine', deadline=None)
 settings.load_profile('any machine')
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        '--no-skips', action='store_true',
+        help='count what is skipped as failed: `make test` runs where all is installed')
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item):
+    return _without_skip((yield), item.config)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector):
+    return _without_skip((yield), collector.config)
+
+
+def _without_skip(report, config):
+    """Turn a skip into a failure where none is expected; what is known to fail is no skip."""
+    if report.skipped and not hasattr(report, 'wasxfail') and config.getoption('--no-skips'):
+        _, _, reason = report.longrepr
+        report.outcome = 'failed'
+        report.longrepr = f'{reason}: but --no-skips says that nothing may be skipped here.'
+    return report
