@@ -124,7 +124,8 @@ REFUSALS = [
     (replace(PLAIN, age=1.5), OldHeaderTimestamp, 'header.stamp lies 1.500 s in the past'),
     (replace(PLAIN, age=-61.0), InvalidGoal, 'trajectory.header.stamp lies 61.0 s in the future'),
     # not there yet
-    (replace(PLAIN, keep_open=True), NotAvailable, 'keep_open is set'),
+    (replace(TIMED, keep_open=True, execution=ExecutionMode.SERVO), NotAvailable,
+     'keep_open is set, but the points of a SERVO goal have to be known'),
     (replace(PLAIN, io_commands=(IOCommand(
         waypoint=0, offset=0.0, output=OutputKind.TOOL_DIGITAL, pin=0, value=1.0),)),
      NotAvailable, 'io_commands is not empty'),

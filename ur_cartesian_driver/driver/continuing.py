@@ -10,11 +10,12 @@ they are planned again, from rest.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 import itertools
 import threading
+from typing import TypeAlias
 
 from ur_cartesian_driver.driver.channel import ExtendMotion
 from ur_cartesian_driver.execution import AnswerExtension, Extension, Order, order_of
@@ -40,6 +41,9 @@ class Appended:
     points: int
     #: What becomes of them.
     text: str
+
+
+Offers: TypeAlias = Generator[ExtendMotion, AnswerExtension, Appended]
 
 
 def encoded(part: Part, dialect: Dialect) -> tuple[bytes, Order]:
@@ -87,29 +91,47 @@ class Continuing:
         :raises GoalRefused: they are not taken, and the goal is as it was.
         """
         with self._turn:
-            if not self._is_open:
-                raise RobotNotReady('The last points of the goal were said to be the last.')
-            appended = self._append(addition) if addition.waypoints else self._close(addition)
-            self._is_open = not addition.last
-            return appended
+            offers = self.offers(addition)
+            try:
+                offer = next(offers)
+                while True:
+                    offer = offers.send(self._answered(offer))
+            except StopIteration as end:
+                appended: Appended = end.value
+                return appended
 
-    def _close(self, addition: Addition) -> Appended:
+    def offers(self, addition: Addition) -> Offers:
+        """
+        Return what is offered to the robot loop, one by one, for an addition.
+
+        Each offer is to be sent, and its answer to be sent in here.
+
+        :raises GoalRefused: as of :meth:`append`.
+        """
+        if not self._is_open:
+            raise RobotNotReady('The last points of the goal were said to be the last.')
+        appended = yield from (self._append(addition) if addition.waypoints
+                               else self._close(addition))
+        self._is_open = not addition.last
+        return appended
+
+    def _close(self, addition: Addition) -> Offers:
         if not addition.last:
             raise InvalidGoal('points', 'is empty', 'give at least one point, or set last')
-        answer = self._offer(None, b'', 0)
+        answer = yield self._offer(None, b'', 0)
         if answer.refusal:
             raise RobotNotReady(answer.refusal)
         return Appended(points=self.points, text=(
             f'The goal ends with the {self.points} points that it has.'))
 
-    def _append(self, addition: Addition) -> Appended:
+    def _append(self, addition: Addition) -> Offers:
         arm, options = self._arm_and_options()
         self._check_ahead(len(addition.waypoints), options)
         before = self._goal
         for from_rest in (False, True) if not self._waits() else (True,):
             part = following(before, addition, arm, options, from_rest=from_rest)
             points, order = encoded(part, self._dialect)
-            answer = self._offer(order, points, part.behind)
+            answer = yield self._offer(order, points, part.behind)
             if not answer.refusal:
                 self._goal = part.then
                 return Appended(points=part.then.points, text=part.text + (
@@ -134,14 +156,18 @@ class Continuing:
                 f'than {most} = {MESSAGES_AHEAD} max_points', 'append them when it has come '
                 'further (feedback: point_index)')
 
-    def _offer(self, order: Order | None, points: bytes, behind: int) -> AnswerExtension:
+    def _offer(self, order: Order | None, points: bytes, behind: int) -> ExtendMotion:
+        return ExtendMotion(motion=self._motion, points=points, extension=Extension(
+            number=next(self._numbers), behind=behind, order=order))
+
+    def _answered(self, offer: ExtendMotion) -> AnswerExtension:
+        """Send an offer and wait for its answer."""
+        number = offer.extension.number
         with self._lock:
-            number = next(self._numbers)
             if self._ended:
                 return AnswerExtension(number=number, refusal=self._ended)
             future = self._asked[number] = Future()
-        self._send(ExtendMotion(motion=self._motion, points=points, extension=Extension(
-            number=number, behind=behind, order=order)))
+        self._send(offer)
         try:
             return future.result(ANSWER_TIMEOUT)
         except TimeoutError:

@@ -192,9 +192,14 @@ def _stamp(goal: Goal, options: PlanningOptions) -> None:
 
 
 def _available(goal: Goal, options: PlanningOptions) -> None:
-    if goal.keep_open:
-        raise NotAvailable('keep_open', 'is set, but points cannot be appended in this version',
-                           'send all points at once')
+    if goal.keep_open and not options.dialect.streams:
+        raise NotAvailable(
+            'keep_open', 'is set, but a robot program of wire dialect '
+            f'{options.dialect.name} has to know at the start how many points there are',
+            'send all points at once, or use a robot program of wire dialect 2.14')
+    if goal.keep_open and goal.execution == ExecutionMode.SERVO:
+        raise NotAvailable('keep_open', 'is set, but the points of a SERVO goal have to be known '
+                           'at its start', 'set execution to SPLINE or PRIMITIVES')
     if goal.io_commands:
         raise NotAvailable('io_commands', 'is not empty, but outputs cannot be switched on the '
                            'way in this version', 'leave it empty')
