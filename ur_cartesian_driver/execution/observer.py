@@ -120,6 +120,10 @@ class Observer:
         """Return the point that the arm is on its way to."""
         return self._tracker.waypoint()
 
+    def buffered(self, sent: int) -> float:
+        """Return how much planned time of what was sent the arm has before it [s]."""
+        return max(0.0, self._records.end(sent) - self._tracker.time())
+
     def begun(self, state: RobotState) -> int:
         """Return how many records of this goal the robot has begun at least."""
         return max(self._records.begun(self._motions_begun(state)),
@@ -168,7 +172,7 @@ class Observer:
             time_remaining=max(0.0, order.duration - time),
             speed_scaling=state.speed_scaling,
             points_received=self._records.points,
-            buffered=max(0.0, self._records.end(sent) - time),
+            buffered=self.buffered(sent),
             timestamp=state.timestamp, waits=waits)
 
     def _desired(self, state: RobotState) -> Pose:
@@ -192,10 +196,14 @@ class Observer:
         return (f'the arm is {apart:.4f} m and {angle:.4f} rad away from where the plan begins: '
                 'it moved meanwhile')
 
-    def fault(self, state: RobotState) -> tuple[Signal, str] | None:
-        """Return what is wrong on the way, with a clause for the outcome's text, or None."""
-        return (self._plan_deviation(state) or self._wrong_pace(state) or self._stall()
-                or self._path_violation(state))
+    def fault(self, state: RobotState, *, may_stand: bool = False) -> tuple[Signal, str] | None:
+        """
+        Return what is wrong on the way, with a clause for the outcome's text, or None.
+
+        :param may_stand: an arm that stands waits for nothing that was lost.
+        """
+        return (self._plan_deviation(state) or self._wrong_pace(state)
+                or (None if may_stand else self._stall()) or self._path_violation(state))
 
     def missed_end(self, state: RobotState) -> str:
         """Return that the controller's target is not at the end, as a clause, or nothing."""

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 #: The fastest that the clock runs to fill the buffer again.
 FASTEST = 1.5
 #: How fast a lag that is not the wanted one is corrected [s].
-CORRECTION_TIME = 0.1
+CORRECTION_TIME = 0.05
 #: How fast the rate changes [1/s].
 SLEW = 50.0
 #: A set-point stands for so many steps at most: more than one where the clock has to catch up.

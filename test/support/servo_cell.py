@@ -1,0 +1,85 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The guide's sample program on a simulated controller, driven by our servo side over RTDE only.
+
+Controller and driver take turns cycle by cycle through the bytes of RTDE, with a delay that a
+test may vary; so it needs no real time and is always the same.
+"""
+
+from collections import deque
+from pathlib import Path
+
+from ur_cartesian_driver.execution.servo_stream import ServoSettings
+from ur_cartesian_driver.motion.servo import ServoFeedback
+from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.protocol import registers
+from ur_cartesian_driver.protocol.rtde import DataReceived, Ready, RtdeClient
+from ur_cartesian_driver.sim import SimulatorConfig
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.rtde_session import RtdeSession
+from ur_cartesian_driver.sim.uploads import Uploads
+
+GUIDE = Path(__file__).parents[1] / 'acceptance' / 'programs' / 'servoj_guide.script'
+CYCLE = 0.002
+SETTINGS = ServoSettings(step=CYCLE)
+OUTPUTS = ('timestamp', 'speed_scaling', 'runtime_state', 'actual_q', 'actual_qd',
+           *registers.SERVO_OUTPUTS)
+
+
+class GuideCell:
+    """A UR5e that runs the sample of the guide, or another program, and one client of RTDE."""
+
+    def __init__(self, program=GUIDE):
+        self.controller = Controller(SimulatorConfig())
+        self._session = RtdeSession(self.controller, set())
+        self._client = RtdeClient(OUTPUTS, registers.SERVO_INPUTS)
+        data, ready = self._client.start(), []
+        while not ready:
+            ready = [event for event in self._client.feed(self._session.feed(data))
+                     if isinstance(event, Ready)]
+            data = self._client.data_to_send()
+        self._inputs = ready[0].inputs[0]
+        self._inbox, self._outbox = deque(), deque()
+        #: Per cycle: the packet as the client gets it.
+        self.history = []
+        text, = Uploads().feed(program.read_bytes())
+        self.controller.programs.submit(text.text)
+
+    @property
+    def q(self):
+        return self.controller.motion.q
+
+    @property
+    def log(self):
+        return list(self.controller.announcements.log)
+
+    def cycle(self, take, *, delay=0):
+        """
+        Let a cycle pass: the robot's, then its packets, then what ``take(feedback)`` writes.
+
+        :param delay: packets stay on the wire for so many cycles more than the one before did.
+        """
+        self.controller.step()
+        for event in self._client.feed(b''.join(self._session.packages())):
+            if isinstance(event, DataReceived):
+                self._inbox.append(feedback_of(event.values))
+        while len(self._inbox) > delay:
+            feedback = self._inbox.popleft()
+            row = take(feedback)
+            self.history.append((feedback, self.q))
+            if row is not None:
+                self._session.feed(self._inputs.pack(list(row)))
+
+    @property
+    def time(self):
+        return self.controller.time
+
+
+def feedback_of(values):
+    """Return a packet of :data:`OUTPUTS` as what it means."""
+    timestamp, scaling, state, _, _, mode, sequence, lag, done, repeats, skipped, size, over = values
+    return ServoFeedback(
+        timestamp=timestamp, speed_scaling=scaling, playing=state == RuntimeState.PLAYING,
+        mode=mode, last_sequence=sequence, lag=lag, setpoints_done=done, repeats=repeats,
+        skipped=skipped, buffer_size=size, overflows=over)
