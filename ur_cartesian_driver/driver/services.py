@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from concurrent.futures import Future
 
 from ur_cartesian_driver.motion.goal import OutputKind
@@ -23,7 +24,7 @@ from ur_cartesian_driver.robot.calls import (
 )
 
 
-class RobotServices:
+class RobotServices(ABC):
     """
     Each method waits for its answer, which comes within 40 s, that of a recovery within 120 s.
 
@@ -31,9 +32,9 @@ class RobotServices:
     :class:`~ur_cartesian_driver.motion.errors.LocalProtocolError`.
     """
 
+    @abstractmethod
     def call(self, call: Call) -> Future[Answer]:
         """Ask the robot for something and return at once; the answer comes in any case."""
-        raise NotImplementedError
 
     def dashboard(self, command: str, argument: str = '') -> Answer:
         """Give a command to the dashboard: ``power on``, ``load`` with the name of a file ..."""

@@ -97,8 +97,9 @@ class _Between:
 def in_joints(reach: Reach, pieces: Sequence[Piece]) -> Followed:
     """Return the places on pieces in joint space."""
     piece, t = along(pieces)
-    q = np.concatenate([p.curve.joint_rows(t[piece == k])  # type: ignore[union-attr]
-                        for k, p in enumerate(pieces)])
+    q = np.concatenate([
+        p.curve.joint_rows(t[piece == k])  # type: ignore[union-attr]  # no other comes here
+        for k, p in enumerate(pieces)])
     return Followed(piece, t, tcp_rows(reach.arm, reach.T_flange_tcp, q), q)
 
 

@@ -152,6 +152,7 @@ class Recipe:
             for value, length in zip(values, self._lengths, strict=True):
                 if length == 1:
                     flat.append(value)
+                # A number has no length: that is one of the errors below.
                 elif len(value) == length:  # type: ignore[arg-type]
                     flat.extend(value)  # type: ignore[arg-type]
                 else:

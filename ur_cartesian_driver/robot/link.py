@@ -447,6 +447,7 @@ class RobotLink:
         self._tell(state=after(self._status.state, change), **news)
 
     def _tell(self, **news: object) -> None:
+        # Who calls names fields; mypy cannot follow names.
         status = replace(self._status, **news)  # type: ignore[arg-type]
         if status.state not in _OUT_OF_REACH:
             status = replace(status, message=what_is_needed(

@@ -87,7 +87,7 @@ class CartesianActionServer:
         self._lock = threading.Lock()
         self._runs: dict[bytes, GoalRun] = {}
         self._closing = False
-        self._server: Any = DeferringActionServer(  # type: ignore[no-untyped-call]
+        self._server: Any = DeferringActionServer(  # type: ignore[no-untyped-call]  # rclpy's
             node, FollowCartesianTrajectory, '~/follow_cartesian_trajectory', self._begin,
             # Of its own: goals and cancel requests are served while other callbacks run.
             callback_group=MutuallyExclusiveCallbackGroup(),

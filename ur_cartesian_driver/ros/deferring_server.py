@@ -35,7 +35,7 @@ class DeferringActionServer(ActionServer):
         enabled = gc.isenabled()
         gc.disable()
         try:
-            return super().take_data()  # type: ignore[no-untyped-call]
+            return super().take_data()  # type: ignore[no-untyped-call]  # rclpy's
         finally:
             if enabled:
                 gc.enable()
@@ -53,9 +53,10 @@ class DeferringActionServer(ActionServer):
 
     def _hand_over(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:
         if not self._destroyed:
-            super().notify_execute(goal_handle, callback)  # type: ignore[no-untyped-call]
+            super().notify_execute(  # type: ignore[no-untyped-call]  # rclpy's
+                goal_handle, callback)
 
     def destroy(self) -> None:
         """Send no more results."""
         self._destroyed = True
-        super().destroy()  # type: ignore[no-untyped-call]
+        super().destroy()  # type: ignore[no-untyped-call]  # rclpy's

@@ -78,7 +78,7 @@ class CartesianDriverNode(Node):
 
     def _start(self) -> None:
         settings = declare(self)
-        logger = self.get_logger()  # type: ignore[no-untyped-call]
+        logger = self.get_logger()  # type: ignore[no-untyped-call]  # rclpy's
         self._parts.append(_LogBridge(logger))
         self.driver = Driver(settings.driver, settings.planning, auto_heartbeat=False)
         self._parts.append(self.driver)
@@ -102,7 +102,7 @@ class CartesianDriverNode(Node):
         self._twin_timer.cancel()
         mine = self.get_name(), self.get_namespace()
         if self.get_node_names_and_namespaces().count(mine) > 1:
-            self.get_logger().error(  # type: ignore[no-untyped-call]
+            self.get_logger().error(  # type: ignore[no-untyped-call]  # rclpy's
                 f'Another node is called {self.get_fully_qualified_name()}: goals and calls may '
                 'reach the wrong robot. Give each driver a namespace, a tf_prefix and ports of '
                 'its own.')
@@ -112,7 +112,7 @@ class CartesianDriverNode(Node):
         parts, self._parts = self._parts, []
         for part in reversed(parts):
             part.close()
-        super().destroy_node()  # type: ignore[no-untyped-call]
+        super().destroy_node()  # type: ignore[no-untyped-call]  # rclpy's
 
 
 class _LogBridge(logging.Handler):

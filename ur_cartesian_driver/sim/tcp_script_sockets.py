@@ -144,6 +144,7 @@ class TcpScriptSockets:
             connection.resolving = self._lookup(address, port)
             return
         try:
+            # A Python without IPv6 gives other addresses, which connecting refuses.
             connection.connect(resolved)  # type: ignore[arg-type]
         except (OSError, OverflowError):
             connection.close()
@@ -151,6 +152,7 @@ class TcpScriptSockets:
     def _lookup(self, address: str, port: int) -> Future[_Resolved]:
         if self._resolver is None:
             self._resolver = ThreadPoolExecutor(1, thread_name_prefix='ur-sim-resolver')
+        # The same as above.
         return self._resolver.submit(
             socket.getaddrinfo, address, port, type=socket.SOCK_STREAM)  # type: ignore[arg-type]
 

@@ -62,6 +62,7 @@ def _refusing(name: str, function: Any) -> Any:
     def refuse(*arguments: Any, **named: Any) -> None:
         raise RuntimeException(f'{name} takes time, which a secondary program does not have.')
     # The signature stays that of the function; what counts as a generator must not.
-    refuse.__signature__ = inspect.signature(function)  # type: ignore[attr-defined]
+    refuse.__signature__ = inspect.signature(  # type: ignore[attr-defined]  # all have it
+        function)
     del refuse.__wrapped__
     return refuse
