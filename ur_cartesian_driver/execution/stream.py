@@ -34,6 +34,7 @@ from ur_cartesian_driver.execution.commands import (
 from ur_cartesian_driver.execution.observer import MAX_PLAN_DEVIATION
 from ur_cartesian_driver.execution.order import Extension, Order
 from ur_cartesian_driver.execution.states import Signal, State
+from ur_cartesian_driver.execution.tcp_loan import REST_SPEED
 from ur_cartesian_driver.execution.trajectory import TrajectoryMachine
 from ur_cartesian_driver.motion.events import Event
 from ur_cartesian_driver.motion.state import RobotState
@@ -118,11 +119,22 @@ class StreamMachine(TrajectoryMachine):
         """Return what points, or the word that none will come, lead to in the present state."""
         if self.state is State.MOVING:
             return self._release(0)
+        signal = self._continuation()  # else they are sent when it is their turn
+        return [] if signal is None else self._apply(signal, '', now)
+
+    def _continuation(self) -> Signal | None:
+        """
+        Return how a goal that waits goes on, or None.
+
+        Packets may be late: where the arm goes on from is judged by one that shows it at rest.
+        """
         if self.state is not State.WAITING:
-            return []  # they are sent when it is their turn
-        if self._records.total > self._window.sent:
-            return self._apply(Signal.EXTENDED, '', now)
-        return [] if self._is_open else self._apply(Signal.LAST, '', now)
+            return None
+        if self._records.total == self._window.sent:
+            return None if self._is_open else Signal.LAST
+        state = self._observer.latest
+        is_seen = state is not None and max(map(abs, state.actual_qd)) < REST_SPEED
+        return Signal.EXTENDED if is_seen else None
 
     # ---- points that go -----------------------------------------------------------------------
 
@@ -161,7 +173,7 @@ class StreamMachine(TrajectoryMachine):
         signal, text = super()._judge(state, now)
         if signal is None and self.state is State.MOVING and self._starves():
             return Signal.STARVING, ''
-        return signal, text
+        return (signal, text) if signal is not None else (self._continuation(), '')
 
     def _starves(self) -> bool:
         """Tell whether the program is soon going to ask for a point that nobody has given."""
