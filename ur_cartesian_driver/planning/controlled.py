@@ -20,7 +20,13 @@ from ur_cartesian_driver.motion.lever import acceleration_at, seen_at, twist_at
 from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose, rotate
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.validate import is_timed, point_field, segment_field, segment_of
+from ur_cartesian_driver.planning.validate import (
+    is_spline,
+    is_timed,
+    point_field,
+    segment_field,
+    segment_of,
+)
 
 #: How far the tool may turn on a straight or circular segment that counts as one without a turn
 #: [rad]: a frame r away from the TCP leaves its line by r angle^2 / 8, 5 um at 0.4 m.
@@ -103,8 +109,8 @@ def _check_turns(goal: Goal, T_base_start: Pose) -> None:
         before = point.pose
         if segment.type in _JOINT_TYPES or (i == 0 and stands):
             continue
-        remedy = ('keep the orientation, use JOINT for that segment, or set allow_tcp_change to '
-                  'true')
+        joint = '' if is_spline(goal) else 'use JOINT for that segment, '
+        remedy = f'keep the orientation, {joint}or set allow_tcp_change to true'
         if angle > KEPT_ANGLE:
             raise InvalidGoal(
                 point_field(i, 'pose.orientation'), f'turns {_name(goal)} by {degrees(angle):.2f} '
