@@ -24,6 +24,7 @@ from made_up_recording import (
     PERIOD,
     record,
     Said,
+    SPEED,
     START,
 )
 import numpy as np
@@ -91,11 +92,12 @@ def test_events_are_what_changed_and_what_was_noted_in_the_order_of_time(tmp_pat
         return packet(i, begun, target_speed_fraction=0.5 if i >= 200 else 1.0, runtime_state=(
             RuntimeState.PAUSED if 250 <= i < 280 else RuntimeState.PLAYING))
 
-    record(tmp_path, map(state, range(400)), between=between)
+    record(tmp_path, map(state, range(400)), between=between,
+           where=lambda i: (int(i >= 100), 1.0 - 0.001 * i))
     found = Recording.load(only_file(tmp_path))
     assert [(round(time / PERIOD), kind, text) for time, kind, text in found.events] == [
         (0, 'start', 'PRIMITIVES, 2 points'),
-        (5, 'point', 'on the way to point 0'),
+        (1, 'point', 'on the way to point 0'),
         (31, 'output', 'configurable digital output 1: on'),
         (31, 'output', 'tool digital output 1: on'),
         (100, 'point', 'on the way to point 1'),
@@ -105,17 +107,20 @@ def test_events_are_what_changed_and_what_was_noted_in_the_order_of_time(tmp_pat
         (300, 'cancel', ''),
         (399, 'end', 'SUCCESSFUL: Done.')]
     assert list(found.points_begun[[4, 5, 399]]) == [0, 1, 2]
+    np.testing.assert_allclose(found.buffered[1:], 1.0 - 0.001 * np.arange(1, 400))
 
 
-def test_a_path_that_is_continued_is_recorded_to_its_end(tmp_path):
+def test_what_a_path_is_continued_by_takes_the_place_of_its_ending(tmp_path):
     def between(recorder, i):
-        if i == 50:
-            recorder.extend(path(0.4, 0.6, 2), np.array([2], dtype=np.int32))
+        if i == 50:  # from 0.3 m on, the arm does not stop at 0.4 m
+            recorder.extend(path(0.3, 0.6, 1), 0.4 / SPEED)
+        elif i == 60:
+            recorder.extend(path(0.5, 0.7, 2), 0.5 / SPEED)
 
-    record(tmp_path, [packet(i, i // 40) for i in range(160)], between=between)
+    record(tmp_path, [packet(i) for i in range(160)], between=between)
     found = Recording.load(only_file(tmp_path))
-    assert list(found.planned_point) == [0, 0, 1, 1, 2, 2]
-    assert list(found.waypoint[[0, 40, 80, 120]]) == [-1, 0, 1, 2]
+    np.testing.assert_allclose(found.planned_pose[:, 0], [0.0, 0.2, 0.2, 0.4, 0.7])
+    assert list(found.planned_point) == [0, 0, 1, 1, 2]
     assert found.points.shape == (3, 7)
 
 

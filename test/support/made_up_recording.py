@@ -74,7 +74,8 @@ def keep_pace(recorder):
         os.sched_yield()
 
 
-def record(directory, packets, *, outcome=DONE, max_size=100.0, between=lambda recorder, i: None):
+def record(directory, packets, *, outcome=DONE, max_size=100.0,
+           between=lambda recorder, i: None, where=lambda i: (0, 0.0)):
     """Record packets, and what is done between them; return the warnings."""
     said = Said()
     recorder = Recorder(str(directory), max_size, said)
@@ -83,7 +84,7 @@ def record(directory, packets, *, outcome=DONE, max_size=100.0, between=lambda r
             recorder.start(ORDER, dict(HEAD), state)
         else:
             keep_pace(recorder)
-            recorder.take(state)
+            recorder.take(state, *where(i))
         between(recorder, i)
     if outcome is not None:
         recorder.end(outcome)

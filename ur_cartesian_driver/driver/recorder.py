@@ -16,14 +16,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields
 from datetime import datetime, UTC
 import json
-from math import nan
+from math import inf, nan
 from pathlib import Path
 from queue import Empty, SimpleQueue
 import threading
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ur_cartesian_driver.driver import recording_format as disk
 from ur_cartesian_driver.driver.recording_folder import Folder
@@ -104,8 +103,6 @@ class Recorder:
         self._digital, self._analog = -1, (nan, nan)
         #: The count of the goal before, as long as the robot reports it.
         self._stale_begun: int | None = None
-        self._begun, self._waypoint = 0, -1
-        self._waypoints: NDArray[np.int32] = np.empty(0, dtype=np.int32)
 
     # ---- what happens -------------------------------------------------------------------------
 
@@ -123,41 +120,41 @@ class Recorder:
         self._folder = folder = Folder(
             Path(self._directory).expanduser(), head, self._max_size, self._say)
         self._begin, self._time, self._due, self._at = state.timestamp, 0.0, PERIOD, 0
-        self._stale_begun, self._begun, self._waypoint = state.points_begun, 0, -1
-        self._waypoints = np.empty(0, dtype=np.int32)
+        self._stale_begun = state.points_begun
         self._do(folder, folder.open)
-        waypoints = order.waypoint[order.is_motion] if len(order.waypoint) else \
-            np.arange(order.points, dtype=np.int32)
-        self.extend(order.reference, waypoints)
+        self.extend(order.reference, -inf)
         self.note('start', f"{head['execution']}, {head['points']} points")
         self.take(state)
 
-    def extend(self, reference: ReferencePath, waypoints: NDArray[np.int32]) -> None:
+    def extend(self, reference: ReferencePath, since: float) -> None:
         """
-        Take the planned path, or a piece that continues it.
+        Take the planned path, or a piece that takes the place of its end.
 
-        :param waypoints: the waypoint to which each motion leads that comes with the piece.
+        :param since: from when on [s].
         """
         if (folder := self._folder) is None:
             return
         rows = np.empty(len(reference.time), dtype=disk.PLANNED)
         rows['time'], rows['pose'] = reference.time, reference.poses
         rows['point'] = reference.point
-        self._waypoints = np.concatenate((self._waypoints, waypoints))
-        self._do(folder, lambda: folder.write_plan(rows.tobytes(), len(rows)))
+        self._do(folder, lambda: folder.write_plan(rows, since))
 
-    def take(self, state: RobotState, lag: float = nan, buffered: float = nan) -> None:
+    def take(self, state: RobotState, waypoint: int = -1, buffered: float = nan,
+             lag: float = nan) -> None:
         """
         Take a packet.
 
+        :param waypoint: the goal's point that the arm is on its way to.
+        :param buffered: motion that it has before it [s].
         :param lag: of the arm behind what it is sent [s]; NaN = unknown.
-        :param buffered: motion on the robot's side that has not begun [s].
         """
         if (folder := self._folder) is None:
             return
-        if state.points_begun != self._stale_begun and (
-                state.points_begun != self._begun or self._stale_begun is not None):
-            self._take_begun(state.points_begun)
+        begun = state.points_begun
+        if begun == self._stale_begun:
+            begun = 0
+        else:
+            self._stale_begun = None
         self._time = time = state.timestamp - self._begin
         disk.ROW.pack_into(
             self._piece, self._at, time,
@@ -165,7 +162,7 @@ class Recorder:
             *state.actual_tcp_twist, *state.target_tcp_twist,
             *state.actual_q, *state.target_q, *state.actual_qd, *state.target_qd,
             lag, buffered, state.speed_scaling, state.target_speed_fraction,
-            *self._analog, self._digital, self._begun, self._waypoint,
+            *self._analog, self._digital, begun, waypoint,
             state.robot_mode, state.safety_mode, state.runtime_state)
         self._at += disk.ROW.size
         if self._at == len(self._piece) or time >= self._due:
@@ -207,12 +204,6 @@ class Recorder:
             thread.join(timeout)
 
     # ---- inside -------------------------------------------------------------------------------
-
-    def _take_begun(self, begun: int) -> None:
-        """Look up where the robot is on its way to."""
-        self._stale_begun, self._begun = None, begun
-        self._waypoint = int(self._waypoints[begun - 1]) if 0 < begun <= len(
-            self._waypoints) else -1
 
     def _hand_over(self, folder: Folder) -> None:
         """Have the rows written, and go on in another piece of memory."""

@@ -17,10 +17,16 @@ from pathlib import Path
 import re
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ur_cartesian_driver.driver import recording_format as disk
 
 #: Names of recordings; other files in the directory are nobody's business.
 _OURS = re.compile(r'\d{8}-\d{6}-\d{3}_[a-z]+_\d+_points(_\d+)?\.(npz|part)')
+
+#: Times nearer to each other than this are one [s].
+SAME_TIME = 5e-7
 
 
 def name_of(head: dict[str, Any]) -> str:
@@ -43,6 +49,8 @@ class Folder:
         """
         self._directory, self._head, self._max_size, self._say = directory, head, max_size, say
         self._is_broken = False
+        #: When the samples of the plan that came last are due.
+        self._last_times: NDArray[np.float64] = np.empty(0)
         #: How many rows were lost because the disk was too slow.
         self.left_out = 0
 
@@ -70,9 +78,17 @@ class Folder:
             return
         self._rows.append(rows, len(rows) // disk.ROW.size)
 
-    def write_plan(self, rows: bytes, count: int) -> None:
-        """Append samples of the planned path."""
-        self._plan.append(rows, count)
+    def write_plan(self, rows: NDArray[np.void], since: float) -> None:
+        """
+        Append samples of the planned path, in the place of those after a time [s].
+
+        These are among the samples that came last: a goal with an open end gives up its ending.
+        """
+        kept = int(np.searchsorted(self._last_times, since + SAME_TIME, side='right'))
+        rows = rows[np.searchsorted(rows['time'], since + SAME_TIME, side='right'):]
+        self._plan.count -= len(self._last_times) - kept
+        self._plan.append(rows.tobytes(), len(rows))
+        self._last_times = rows['time']
 
     def write_note(self, event: disk.Event) -> None:
         """Append a note."""

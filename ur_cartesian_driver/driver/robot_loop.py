@@ -246,6 +246,10 @@ class RobotLoop:
         assert offered is not None
         if not answer.refusal and offered.points:
             self._points.put(offered.extension.behind, offered.points)
+            if offered.extension.order is not None and self._machine is not None:
+                self._recorder.extend(
+                    offered.extension.order.reference,
+                    self._machine.time_behind(offered.extension.behind))
         self._notify(MotionExtended(motion=self._motion, answer=answer))
 
     def _tcp_changed(self, order: Order) -> str:
@@ -315,7 +319,8 @@ class RobotLoop:
         if not self._is_shared and self._latest is not None:
             self._is_shared = True
             self._memory.write(self._latest)
-            self._recorder.take(self._latest)
+            if self._machine is not None:
+                self._recorder.take(self._latest, *self._machine.where())
             now = self._now()
             self._longest_gap = max(self._longest_gap, now - self._last_report)
             self._last_report = now

@@ -117,6 +117,14 @@ class TrajectoryMachine:
         self.loan = TcpLoan(self.order.T_flange_active, lent)
         return [LendTcp(T_flange_tcp=lent)]
 
+    def where(self) -> tuple[int, float]:
+        """Return the point that the arm is on its way to, and what motion it has yet [s]."""
+        return self._observer.waypoint(), self._observer.buffered(self._window.sent)
+
+    def time_behind(self, records: int) -> float:
+        """Return when the first so many records are planned to end [s]."""
+        return self._records.end(records)
+
     def step(self, event: Event, now: float) -> list[Command]:
         """
         Return what to do after an event.
