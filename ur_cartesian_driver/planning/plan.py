@@ -131,9 +131,6 @@ def _spline_plan(planner: _Planner, about: Carried, T_flange_active: Pose) -> Pl
     """Return the plan of a goal whose points are joined by a spline."""
     goal, state, options = planner.goal, planner.state, planner.options
     begin = planner.begin()
-    if begin == len(goal.waypoints):
-        raise InvalidGoal('trajectory.points', 'has only the point at which the robot stands, at '
-                          'time 0', 'give at least one point with a time')
     part = goal if not begin else replace(
         goal, waypoints=goal.waypoints[begin:], segments=goal.segments[begin:])
     found = plan_pieces(

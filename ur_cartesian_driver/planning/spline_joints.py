@@ -29,6 +29,8 @@ from ur_cartesian_driver.planning.validate import point_field
 TICK = 1e-6
 #: Pieces are not halved below this [s]: one step of the fastest controllers.
 _LEAST = 0.002
+# Digits of joint rates that are more than rounding.
+_DIGITS = 12
 #: Places inside a piece at which the tool is compared, at least and at most.
 _COMPARED = 7, 23
 
@@ -102,7 +104,8 @@ class _Refining:
         q = nearest_rows(self.reach.arm, compose_rows(tool.poses, self.reach.T_tcp_flange), near)
         qd, qdd = joint_rates(
             self.reach.arm, self.reach.T_flange_tcp, q, tool.twists, tool.accelerations)
-        return Rates(q, qd, qdd)
+        # At rest is exactly at rest.
+        return Rates(q, np.round(qd, _DIGITS) + 0.0, np.round(qdd, _DIGITS) + 0.0)
 
     def _coefficients(self, rows: NDArray[np.intp]) -> Floats:
         between = quintic_rows if self.quintic else cubic_rows
