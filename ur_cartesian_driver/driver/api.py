@@ -41,10 +41,8 @@ from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.driver.continuing import Continuing, encoded
 from ur_cartesian_driver.driver.live import (
     check_target,
-    live_order,
-    LiveSession,
+    LiveMotions,
     standing_order,
-    standing_plan,
 )
 from ur_cartesian_driver.driver.motion import Motion, OnProgress, Run
 from ur_cartesian_driver.driver.recorder import about
@@ -71,7 +69,6 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.continuation import opened, Part
 from ur_cartesian_driver.planning.rest import come_to_rest
 from ur_cartesian_driver.program.render import has_feature
-from ur_cartesian_driver.protocol.dialects import NEWEST
 from ur_cartesian_driver.protocol.trajectory import encode_points
 from ur_cartesian_driver.robot.calls import Answer, Call
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
@@ -86,7 +83,7 @@ NO_STATE = 'The robot does not report its state.'
 STOP_PATIENCE = 2.0 * STOP_BOUND + 1.0
 
 
-class Driver(RobotServices):
+class Driver(RobotServices, LiveMotions):
     """
     One robot. Thread-safe; open it, or use it as a context manager.
 
@@ -115,7 +112,6 @@ class Driver(RobotServices):
         self._loan: TcpLent | None = None
         self._calls: dict[int, Future[Answer]] = {}
         self._signals: Signals | None = None
-        self._live: LiveSession | None = None
         self._servo_listeners: list[Callable[[ServoReport], None]] = []
         self._gaps = Gaps()
         self._numbers = itertools.count(1)
@@ -284,7 +280,8 @@ class Driver(RobotServices):
         return self._launch(plan, points, order_of(plan, self.config.dialect), on_progress)
 
     def _launch(self, plan: Plan, points: bytes, order: Order, on_progress: OnProgress | None,
-                live: LiveOrder | None = None, part: Part | None = None) -> Motion:
+                live: LiveOrder | None = None, teach: bool = False,
+                part: Part | None = None) -> Motion:
         """Have the robot loop begin a motion, if nothing else moves."""
         with self._lock:
             if self._runs:
@@ -299,7 +296,7 @@ class Driver(RobotServices):
             # Still under the lock: whoever finds the motion may cancel it, and that has to come
             # behind its start.
             self._send(StartMotion(
-                motion=motion.number, points=points, order=order, live=live,
+                motion=motion.number, points=points, order=order, live=live, teach=teach,
                 about=about(plan, self.options) if self.config.record_directory else ''))
         return motion
 
@@ -314,44 +311,9 @@ class Driver(RobotServices):
         return Continuing(motion.number, part, dialect=self.config.dialect, send=self._send,
                           arm_and_options=arm_and_options, progress=lambda: motion.progress)
 
-    def follow_targets(self, T_base_tcp: Pose, *, age: float = 0.0) -> LiveSession:
-        """
-        Go to a target, and to others that are told while the arm moves; return at once.
-
-        The tool goes straight, with bounded speed and acceleration (``servo_target_*`` of the
-        options), to the newest target that is not too old.
-
-        :param T_base_tcp: where the active TCP is to be, in the robot's base.
-        :param age: how long ago that was true [s].
-        :raises InvalidGoal: the target is malformed, or too far away.
-        :raises RobotNotReady: the robot cannot take a motion now, or one is running.
-        """
-        state = self.state
-        if state is None:
-            raise RobotNotReady(self._status.message or NO_STATE)
-        check_target(T_base_tcp, state, self.options)
-        if self.config.dialect is not NEWEST:
-            raise RobotNotReady(
-                f'Only our own robot program follows live targets; wire_dialect is '
-                f'{self.config.wire_dialect}.')
-        plan = standing_plan(state)
-        motion = self._launch(plan, b'', standing_order(plan), None,
-                              live_order(self.arm, self.options))
-        self._live = LiveSession(motion, self._aim)
-        self._live.aim(T_base_tcp, age=age)
-        return self._live
-
-    def servo_to(self, T_base_tcp: Pose, *, age: float = 0.0) -> Motion:
-        """
-        Go to a target: the next one of the session that runs, or the first of a new one.
-
-        :returns: the session, as a motion; it ends ``servo_target_timeout`` after the last target.
-        :raises GoalRefused: as of :meth:`follow_targets`.
-        """
-        if self._live is None or self._live.motion.done():
-            return self.follow_targets(T_base_tcp, age=age).motion
-        self._live.aim(T_base_tcp, age=age)
-        return self._live.motion
+    def _launch_standing(self, plan: Plan, on_progress: OnProgress | None, *,
+                         live: LiveOrder | None = None, teach: bool = False) -> Motion:
+        return self._launch(plan, b'', standing_order(plan), on_progress, live=live, teach=teach)
 
     def _aim(self, number: int, T_base_tcp: Pose, age: float) -> None:
         state = self.state
@@ -383,12 +345,14 @@ class Driver(RobotServices):
         """
         See that a motion that runs can be stopped for another one.
 
-        :raises RobotNotReady: the robot program is held: it would read neither the stop nor the
-            next motion.
+        :raises RobotNotReady: a person guides the arm; or the robot program is held: it would
+            read neither the stop nor the next motion.
         """
         state = self.state
         if state is None:
             raise RobotNotReady(self._status.message or NO_STATE)
+        if self.is_guided:
+            raise RobotNotReady('Somebody guides the arm by hand; end that first.')
         if is_paused(state) or is_stopped(state):
             raise RobotNotReady(
                 'A motion is running, and the robot program is held by a pause or a stop, so that '

@@ -22,6 +22,8 @@ from ur_cartesian_driver.execution.live_targets import LiveSettings
 from ur_cartesian_driver.kinematics.robots import Geometry
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.servo import ServoReport
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.robot.calls import Answer, Call
 from ur_cartesian_driver.robot.status import DriverStatus, Gaps
@@ -61,6 +63,8 @@ class LiveOrder:
     settings: LiveSettings
     #: Of the arm, as the owner knows it.
     geometry: Geometry
+    #: Where the arm stands [rad].
+    start: Joints
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -74,6 +78,8 @@ class StartMotion:
     about: str = ''
     #: A session of live targets; None = a goal.
     live: LiveOrder | None = None
+    #: Whether the arm is to be guided by hand; else it is a goal, or a session.
+    teach: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,6 +161,14 @@ class MotionExtended:
 
     motion: int
     answer: AnswerExtension
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoChanged:
+    """How the streaming of a motion's set-points is going."""
+
+    motion: int
+    report: ServoReport
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,32 +1,36 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Sessions of live targets, from the side of their owner.
+Sessions of live targets, from the side of their owner; and the arm in the hands of a person.
 
-A session is a motion like that of a goal: there is one at a time, it is cancelled in the same way,
-and has one outcome. Only where it goes is told while it runs.
+Both are motions like that of a goal: there is one at a time, it is cancelled in the same way, and
+has one outcome. Only where it goes is told while it runs.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from math import isfinite, sqrt
 
 import numpy as np
 
 from ur_cartesian_driver.driver.channel import LiveOrder
-from ur_cartesian_driver.driver.motion import Motion
+from ur_cartesian_driver.driver.config import DriverConfig
+from ur_cartesian_driver.driver.motion import Motion, OnProgress
 from ur_cartesian_driver.execution import Order
 from ur_cartesian_driver.execution.live_targets import LiveSettings
 from ur_cartesian_driver.execution.target_follower import FollowLimits, KeepOut
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
 from ur_cartesian_driver.motion.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
+from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.workspace import parse_planes
+from ur_cartesian_driver.protocol.dialects import NEWEST
 
 #: How far the square of a quaternion's length may be from 1.
 UNIT_TOLERANCE = 1e-3
@@ -50,6 +54,102 @@ class LiveSession:
         :raises InvalidGoal: the target is malformed, or too far away; the one before stays.
         """
         self._send(self.motion.number, T_base_tcp, age)
+
+
+class LiveMotions(ABC):
+    """Motions that are led while they run, as methods of a driver."""
+
+    config: DriverConfig
+    options: PlanningOptions
+    _live: LiveSession | None = None
+    _guided: Motion | None = None
+
+    @property
+    @abstractmethod
+    def arm(self) -> Arm:
+        """The arm's kinematics."""
+
+    @property
+    @abstractmethod
+    def state(self) -> RobotState | None:
+        """The newest robot state."""
+
+    @abstractmethod
+    def _launch_standing(self, plan: Plan, on_progress: OnProgress | None, *,
+                         live: LiveOrder | None = None, teach: bool = False) -> Motion:
+        """Begin a motion that goes nowhere by itself."""
+
+    @abstractmethod
+    def _aim(self, number: int, T_base_tcp: Pose, age: float) -> None:
+        """Check a target, and send it to a session."""
+
+    def follow_targets(self, T_base_tcp: Pose, *, age: float = 0.0) -> LiveSession:
+        """
+        Go to a target, and to others that are told while the arm moves; return at once.
+
+        The tool goes straight, with bounded speed and acceleration (``servo_target_*`` of the
+        options), to the newest target that is not too old.
+
+        :param T_base_tcp: where the active TCP is to be, in the robot's base.
+        :param age: how long ago that was true [s].
+        :raises InvalidGoal: the target is malformed, or too far away.
+        :raises RobotNotReady: the robot cannot take a motion now, or one is running.
+        """
+        state = self._state_for('follow live targets')
+        check_target(T_base_tcp, state, self.options)
+        motion = self._launch_standing(
+            standing_plan(state), None, live=live_order(self.arm, state.target_q, self.options))
+        self._live = LiveSession(motion, self._aim)
+        self._live.aim(T_base_tcp, age=age)
+        return self._live
+
+    def servo_to(self, T_base_tcp: Pose, *, age: float = 0.0) -> Motion:
+        """
+        Go to a target: the next one of the session that runs, or the first of a new one.
+
+        :returns: the session, as a motion; it ends ``servo_target_timeout`` after the last target.
+        :raises GoalRefused: as of :meth:`follow_targets`.
+        """
+        if self._live is None or self._live.motion.done():
+            return self.follow_targets(T_base_tcp, age=age).motion
+        self._live.aim(T_base_tcp, age=age)
+        return self._live.motion
+
+    def teach(self, on_guided: Callable[[], None] = lambda: None) -> Motion:
+        """
+        Let a person guide the arm by hand, until the motion that is returned is cancelled.
+
+        Only where ``allow_teach`` of the configuration was set when the robot program began.
+
+        :param on_guided: called, now and then, from when the arm can be guided.
+        :raises RobotNotReady: it is not allowed, or something else has the arm.
+        """
+        state = self._state_for('let the arm be guided')
+        if not self.config.allow_teach:
+            raise RobotNotReady('Nobody may guide the arm: allow_teach is false; set it to true, '
+                                'and start the driver again.')
+        self._guided = self._launch_standing(
+            standing_plan(state), lambda _: on_guided(), teach=True)
+        return self._guided
+
+    @property
+    def is_guided(self) -> bool:
+        """Tell whether a person guides the arm."""
+        return self._guided is not None and not self._guided.done()
+
+    def _state_for(self, what: str) -> RobotState:
+        """
+        Return the newest state.
+
+        :raises RobotNotReady: there is none, or the robot program cannot do this.
+        """
+        if self.config.dialect is not NEWEST:
+            raise RobotNotReady(f'Only the robot program of this driver can {what}; wire_dialect '
+                                f'says that another one, {self.config.wire_dialect}, runs.')
+        state = self.state
+        if state is None:
+            raise RobotNotReady('The robot does not report its state.')
+        return state
 
 
 def check_pose(pose: Pose) -> None:
@@ -82,8 +182,12 @@ def check_target(T_base_tcp: Pose, state: RobotState, options: PlanningOptions) 
             f'{most:g} m', 'approach it by a goal, or raise the parameter')
 
 
-def live_order(arm: Arm, options: PlanningOptions) -> LiveOrder:
-    """Return how targets are followed by the parameters."""
+def live_order(arm: Arm, start: Joints, options: PlanningOptions) -> LiveOrder:
+    """
+    Return how targets are followed by the parameters.
+
+    :param start: where the arm stands [rad].
+    """
     fastest = options.servo_target_linear_velocity
     if options.max_tool_speed > 0.0:
         fastest = min(fastest, options.max_tool_speed)
@@ -105,7 +209,7 @@ def live_order(arm: Arm, options: PlanningOptions) -> LiveOrder:
     return LiveOrder(
         settings=LiveSettings(limits=limits, max_age=options.servo_target_max_age,
                               timeout=options.servo_target_timeout),
-        geometry=arm.geometry)
+        geometry=arm.geometry, start=start)
 
 
 def standing_plan(state: RobotState) -> Plan:

@@ -98,6 +98,13 @@ class ReportServo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Remark:
+    """Write a sentence into the log: something a person may want to look at."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Finish:
     """The goal has ended."""
 
@@ -106,4 +113,4 @@ class Finish:
 
 Command: TypeAlias = (
     SendControl | SendPoints | LendTcp | ReturnTcp | StopProgram | Report | AnswerExtension
-    | OpenServo | EnterServo | WriteServo | LeaveServo | ReportServo | Finish)
+    | OpenServo | EnterServo | WriteServo | LeaveServo | ReportServo | Remark | Finish)

@@ -130,6 +130,12 @@ class TargetFollower:
         #: Whether the target is another one than that which the arm was stopped for.
         self._is_new = False
 
+    def stand_at(self, q: Joints) -> None:
+        """Begin again at rest at other joint positions [rad], towards the same target."""
+        self.q = self._q_stop = q
+        self.T_base_tcp = self._arm.forward(q) @ self._T_tcp_flange.inverse()
+        self.linear = self.angular = ZERO
+
     @property
     def target(self) -> Pose | None:
         """Where the tool is to go; None: it is to stop, or stands."""
