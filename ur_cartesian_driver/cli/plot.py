@@ -129,7 +129,8 @@ def _draw_path(figure: Any, recording: Recording) -> None:
     """Draw the path in space, and in the plane in which it is largest."""
     planned, actual = recording.planned_pose[:, :3], recording.actual_pose[:, :3]
     space, flat = figure.add_subplot(2, 1, 1, projection='3d'), figure.add_subplot(2, 1, 2)
-    extent = np.ptp(np.vstack((planned, actual)), axis=0)
+    low, high = (side(np.vstack((planned, actual)), axis=0) for side in (np.min, np.max))
+    extent = high - low
     a, b = sorted(np.argsort(extent)[1:].tolist())
     for axes, columns in ((space, [0, 1, 2]), (flat, [a, b])):
         axes.plot(*planned[:, columns].T, color=_PLANNED, linewidth=4.0, alpha=0.6,
@@ -143,11 +144,12 @@ def _draw_path(figure: Any, recording: Recording) -> None:
         for number, point in enumerate(recording.points):
             flat.annotate(str(number), point[[a, b]], xytext=(4, 4), textcoords='offset points')
     space.set(xlabel='x [m]', ylabel='y [m]', zlabel='z [m]')
-    space.tick_params(labelsize=7.0)
+    space.tick_params(labelsize=7.0, pad=0.0)
+    space.yaxis.labelpad = space.zaxis.labelpad = 8.0
     space.locator_params(nbins=4)
     span = np.maximum(extent, 0.25 * max(extent.max(), 1e-3))
     for axis, name in enumerate(_AXES):
-        middle = 0.5 * (planned[:, axis].min() + planned[:, axis].max())
+        middle = 0.5 * (low[axis] + high[axis])
         getattr(space, f'set_{name}lim')(middle - 0.6 * span[axis], middle + 0.6 * span[axis])
     space.set_box_aspect(span, zoom=0.85)
     flat.set(xlabel=f'{_AXES[a]} [m]', ylabel=f'{_AXES[b]} [m]')
@@ -174,7 +176,7 @@ def _draw_time(figure: Any, recording: Recording) -> None:
              label="controller's target")
     off.plot(time, 1e3 * deviation.position, color=_ACTUAL, linewidth=0.9, label='tool')
     off.set_ylabel('distance from\nthe plan [mm]')
-    off.set_ylim(bottom=0.0, top=max(off.get_ylim()[1], 0.1))
+    off.set_ylim(0.0, 1.15 * max(0.05, 1e3 * np.nan_to_num(deviation.position).max()))
     off.legend(loc='upper right', ncols=2)
     speed.plot(time, np.linalg.norm(recording.target_twist[:, :3], axis=1), color=_TARGET,
                linewidth=2.4, alpha=0.5, label="controller's target")

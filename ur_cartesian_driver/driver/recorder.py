@@ -104,6 +104,11 @@ class Recorder:
         #: The count of the goal before, as long as the robot reports it.
         self._stale_begun: int | None = None
 
+    @property
+    def is_recording(self) -> bool:
+        """Tell whether a motion is being recorded."""
+        return self._folder is not None
+
     # ---- what happens -------------------------------------------------------------------------
 
     def start(self, order: Order, head: dict[str, Any], state: RobotState) -> None:

@@ -131,10 +131,19 @@ class Recording:
 
         The target is followed along the path, only ever forwards; the measured pose is compared
         with the place nearest to it around there. So a path that crosses itself is followed in
-        the right order, and a robot that is slowed down is not off it.
+        the right order, and a robot that is slowed down is not off it. Where there was no plan,
+        as for live targets, the numbers are NaN.
         """
-        tracker = PathTracker(self.reference)
-        rows = np.zeros((len(self.time), 6))
+        rows = np.full((len(self.time), 6), np.nan)
+        if len(self.planned_time) > 1:
+            self._compare(PathTracker(self.reference), rows)
+        position, angle, target_position, target_angle, time, waypoint = rows.T
+        return Deviation(position=position, angle=angle, target_position=target_position,
+                         target_angle=target_angle, planned_time=time,
+                         waypoint=np.where(np.isnan(waypoint), -1.0, waypoint).astype(np.int32))
+
+    def _compare(self, tracker: PathTracker, rows: Floats) -> None:
+        """Fill in the columns of a deviation."""
         passed, fastest_before = 0.0, 0.0
         for i in range(len(rows)):
             twist = tuple(self.target_twist[i].tolist())
@@ -149,10 +158,6 @@ class Recording:
             rows[i] = (desired.distance_to(actual), desired.angle_to(actual),
                        reached.distance_to(target), reached.angle_to(target),
                        tracker.time(), tracker.waypoint())
-        position, angle, target_position, target_angle, time, waypoint = rows.T
-        return Deviation(position=position, angle=angle, target_position=target_position,
-                         target_angle=target_angle, planned_time=time,
-                         waypoint=waypoint.astype(np.int32))
 
 
 def _from_file(path: Path, most_rows: int) -> Recording:

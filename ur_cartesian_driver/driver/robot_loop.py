@@ -319,7 +319,7 @@ class RobotLoop:
         if not self._is_shared and self._latest is not None:
             self._is_shared = True
             self._memory.write(self._latest)
-            if self._machine is not None:
+            if self._recorder.is_recording and self._machine is not None:
                 self._recorder.take(self._latest, *self._machine.where())
             now = self._now()
             self._longest_gap = max(self._longest_gap, now - self._last_report)
