@@ -5,18 +5,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import product
 
 from figures import Figure, seconds
+import numpy as np
 import paths
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.goal import ExecutionMode, Goal
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 #: Of the corners that are blended [m]; two of them fit between points that are 5 mm apart.
 RADIUS = 0.002
+#: From timed point to point, and to the first one [s].
+PERIOD = 0.1
+LEAD = 3.0
 
 
 def run(quick: bool) -> Iterator[Figure]:
@@ -35,3 +41,27 @@ def run(quick: bool) -> Iterator[Figure]:
                          note=f'{1e3 * taken[0] / points:.0f} us a point, no collisions')
             yield Figure(benchmark='planning', name=f'{name}, collisions', value=taken[1],
                          unit='ms', baseline=taken[0], than='without')
+        for arm in arms:
+            yield _spline(points, arm, arms[arm])
+
+
+def _spline(points: int, name: str, arm: Arm) -> Figure:
+    """Plan the same points with times and twists, from Cartesian curve to joint pieces."""
+    goal, state = _timed(paths.goal(points)), paths.at_home(arm)
+    options = PlanningOptions(self_collision='off')
+    taken = 1e3 * seconds(partial(plan, goal, state, arm, options),
+                          repeat=3 if points == 1_000 else 1)
+    pieces = len(plan(goal, state, arm, options).segments)
+    return Figure(benchmark='planning', name=f'{points:,} timed points with twists, {name}',
+                  value=taken, unit='ms',
+                  note=f'{1e3 * taken / points:.0f} us a point, {pieces:,} spline pieces')
+
+
+def _timed(goal: Goal) -> Goal:
+    """Return a goal that passes its points every 0.1 s, at the speed of their neighbours."""
+    places = np.array([point.pose.position for point in goal.waypoints])
+    speeds = np.zeros((len(places), 6))
+    speeds[1:-1, :3] = (places[2:] - places[:-2]) / (2.0 * PERIOD)
+    return replace(goal, execution=ExecutionMode.SPLINE, waypoints=tuple(
+        replace(point, time=LEAD + PERIOD * k, twist=tuple(speed))
+        for k, (point, speed) in enumerate(zip(goal.waypoints, speeds.tolist(), strict=True))))

@@ -48,9 +48,9 @@ class Excess:
         """Return the refusal of the goal."""
         return TooFast(
             point_field(self.point, 'time_from_start'),
-            f'gives too little time: {100.0 * self.fraction:.0f} % of it before the point '
-            f'{self.what} needs {self.needed:.3f} {self.unit}, and allowed are '
-            f'{self.allowed:.3f} {self.unit} ({self.name})',
+            f'gives too little time: after {100.0 * self.fraction:.0f} % of it {self.what} needs '
+            f'{self.needed:.3f} {self.unit}, and allowed are {self.allowed:.3f} {self.unit} '
+            f'({self.name})',
             f'give all points {ceil(1e3 * self.factor) / 1e3:.3f} times the time (and twists and '
             'accelerations to match), or set on_too_fast to slow')
 
