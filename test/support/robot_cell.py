@@ -19,10 +19,12 @@ from ur_cartesian_driver.driver import snapshot
 from ur_cartesian_driver.driver.channel import (
     CancelMotion,
     Configure,
+    ExtendMotion,
     Heartbeat,
     LENGTH,
     LogLine,
     MotionEnded,
+    MotionExtended,
     MotionProgress,
     pack,
     ResendProgram,
@@ -66,6 +68,8 @@ class Owner:
         self.status = DriverStatus()
         self.statuses = []
         self.motions = {}
+        #: To points that were appended.
+        self.answers = []
         self.log = []
         self.silent = False
         self._writer = None
@@ -92,11 +96,16 @@ class Owner:
         self._writer.write(pack(request))
 
     def start(self, plan):
+        return self.run(encode_points(plan.instructions), order_of(plan))
+
+    def run(self, points, order):
         number = len(self.motions) + 1
         motion = self.motions[number] = Motion()
-        self.send(StartMotion(motion=number, order=order_of(plan), points=encode_points(
-            segment.primitive for segment in plan.segments)))
+        self.send(StartMotion(motion=number, order=order, points=points))
         return motion
+
+    def extend(self, points, extension):
+        self.send(ExtendMotion(motion=len(self.motions), points=points, extension=extension))
 
     def cancel(self):
         self.send(CancelMotion(motion=len(self.motions)))
@@ -111,6 +120,8 @@ class Owner:
                 self.statuses.append(status)
             case MotionProgress(motion=number, progress=progress):
                 self.motions[number].progress.append(progress)
+            case MotionExtended(answer=answer):
+                self.answers.append(answer)
             case MotionEnded(motion=number, outcome=outcome):
                 motion = self.motions[number]
                 assert motion.outcome is None, 'a goal ends once'

@@ -1,0 +1,100 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Goals with an open end in a cell in virtual time, and producers of their points."""
+
+from math import cos, pi, sin
+
+from ur_cartesian_driver.driver.continuing import Continuing, encoded
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.goal import Segment, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.continuation import Addition, opened
+from ur_cartesian_driver.protocol.dialects import NEWEST
+
+BLEND = Segment(blend_radius=0.01, velocity=0.2, acceleration=1.0)
+
+
+def moved(pose, *offset):
+    """A pose moved along base axes [m]."""
+    return Pose(tuple(a + b for a, b in zip(pose.position, offset, strict=True)), pose.quaternion)
+
+
+def corners(home, first, count):
+    """Points on the corners of a square of 40 mm beside the tool, round and round."""
+    return [Waypoint(pose=moved(home, 0.04 * (k // 2 % 2), 0.04 * ((k + 1) // 2 % 2), 0.0))
+            for k in range(first, first + count)]
+
+
+def circle(home, first, count, *, step=0.1, radius=0.05, round_in=4.0):
+    """Points with times and twists on a circle that begins at the tool, at rest and faster."""
+    rate = 2.0 * pi / round_in
+    points = []
+    for k in range(first, first + count):
+        # The first round begins with a ramp of a second, along which the angle grows as t^2.
+        t = step * k
+        angle, speed = (0.5 * rate * t * t, rate * t) if t < 1.0 else (rate * (t - 0.5), rate)
+        points.append(Waypoint(
+            time=t, pose=moved(home, radius * sin(angle), radius * (1.0 - cos(angle)), 0.0),
+            twist=(radius * speed * cos(angle), radius * speed * sin(angle), 0.0, 0.0, 0.0, 0.0)))
+    return points
+
+
+class OpenMotion:
+    """A goal with an open end on its way, and who appends to it."""
+
+    def __init__(self, cell, goal, **options):
+        self._cell, self._owner = cell, cell.owner
+        self._arm = Arm(robot_model(cell.robot.config.model))
+        self._options = PlanningOptions(**{'max_tool_speed': 1.0, 'max_points': 5000} | options)
+        part = opened(plan(goal, cell.memory.read(), self._arm, self._options), self._arm,
+                      self._options)
+        self.continuing = Continuing(
+            len(self._owner.motions) + 1, part, dialect=NEWEST, send=self._owner.send,
+            progress=self._newest, arm_and_options=lambda: (self._arm, self._options))
+        points, order = encoded(part, NEWEST)
+        self.motion = self._owner.run(points, order)
+
+    def _newest(self):
+        return self.motion.progress[-1] if self.motion.progress else None
+
+    @property
+    def points(self):
+        return self.continuing.points
+
+    @property
+    def outcome(self):
+        return self.motion.outcome
+
+    @property
+    def progress(self):
+        return self.motion.progress[-1]
+
+    @property
+    def ahead(self):
+        """How many points the arm has not come to."""
+        return self.points - (self.progress.waypoint if self.motion.progress else 0)
+
+    async def append(self, waypoints=(), segments=(), io_commands=(), *, last=False):
+        """Append as the Python API does, but wait as a coroutine."""
+        offers = self.continuing.offers(Addition(
+            waypoints=tuple(waypoints), segments=tuple(segments),
+            io_commands=tuple(io_commands), last=last))
+        try:
+            offer = next(offers)
+            while True:
+                self._owner.send(offer)
+                await self._cell.until(lambda: self._owner.answers)
+                offer = offers.send(self._owner.answers.pop())
+        except StopIteration as end:
+            return end.value
+
+    async def until(self, condition, bound=30.0):
+        """Wait for a condition, or the end of the goal; return whether it has come."""
+        await self._cell.until(lambda: condition() or self.outcome, bound)
+        return self.outcome is None
+
+    async def ended(self, bound=60.0):
+        await self._cell.until(lambda: self.outcome is not None, bound)
+        return self.outcome
