@@ -201,6 +201,10 @@ class ServoMachine(TrajectoryMachine):
 
     def _release(self, begun: int) -> list[Command]:
         return []
+    def where(self) -> tuple[int, float, float]:
+        """Return where the arm is, as any machine does."""
+        return self._observer.waypoint(), self.stream.buffered, self.stream.lag
+
 
     def _inform(self, state: RobotState, now: float) -> list[Command]:
         commands = super()._inform(state, now)

@@ -11,7 +11,7 @@ goal is seen in :mod:`~.observer`.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf
+from math import inf, nan
 
 from ur_cartesian_driver.execution.commands import (
     Command,
@@ -117,9 +117,13 @@ class TrajectoryMachine:
         self.loan = TcpLoan(self.order.T_flange_active, lent)
         return [LendTcp(T_flange_tcp=lent)]
 
-    def where(self) -> tuple[int, float]:
-        """Return the point that the arm is on its way to, and what motion it has yet [s]."""
-        return self._observer.waypoint(), self._observer.buffered(self._window.sent)
+    def where(self) -> tuple[int, float, float]:
+        """
+        Return the point that the arm is on its way to, and two times [s].
+
+        What motion the robot has yet, and how far the arm is behind; NaN = nobody knows.
+        """
+        return self._observer.waypoint(), self._observer.buffered(self._window.sent), nan
 
     def time_behind(self, records: int) -> float:
         """Return when the first so many records are planned to end [s]."""
