@@ -8,6 +8,7 @@ is slowed brakes as any other.
 """
 
 from fault_goals import AroundCorners, GOALS
+from fault_modes import MODES
 from fault_ways import Ways
 import pytest
 from robot_cell import run_cell
@@ -16,7 +17,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 
 pytestmark = pytest.mark.slow
 
-KINDS = {'PRIMITIVES': AroundCorners, **GOALS}
+KINDS = {'PRIMITIVES': AroundCorners, **{mode.name: GOALS[mode.name] for mode in MODES}}
 #: What is done in the middle of a goal, and how long it lasts [s].
 DONE = {
     'slower and faster': [('slider 0.3', 0.1), ('slider 1', 0.2)],
@@ -26,11 +27,12 @@ DONE = {
 }
 #: By way of execution: how far the tool may be off its path [m], and which accelerations a joint
 #: may see [rad/s^2]. A program that pauses as the arm comes to a corner does not begin the blend.
-BOUNDS = {'PRIMITIVES': (0.005, 12.0), 'SPLINE': (0.0002, 12.0)}
+BOUNDS = {'PRIMITIVES': (0.005, 12.0), 'SPLINE': (0.0002, 12.0),
+          'Open goals': (0.0002, 12.0)}
 #: A paused program calls no speedj any more, and the simulated controller then brakes as hard as
 #: the last one was allowed to.
-PAUSED = {'SPLINE': 40.0}
-MIDDLE = {'PRIMITIVES': 'mid-segment', 'SPLINE': 'between points'}
+PAUSED = {'SPLINE': 40.0, 'Open goals': 40.0}
+MIDDLE = {'PRIMITIVES': 'mid-segment', 'SPLINE': 'between points', 'Open goals': 'moving'}
 
 
 @pytest.mark.parametrize('what', DONE)
@@ -40,13 +42,14 @@ def test_a_tool_that_is_slowed_stays_on_its_path(kind, what):
         goal, ways = KINDS[kind](cell), Ways(cell)
         goal.send()
         await ways.until(lambda: goal.is_in(MIDDLE[kind]), 2.0)
+        goal.follow_up(MIDDLE[kind])
         for fault, seconds in DONE[what]:
             cell.robot.inject(fault)
             over = cell.loop.time() + seconds
             await ways.until(lambda over=over: cell.loop.time() >= over, 1.0)
         await ways.until(lambda: goal.motion.outcome, 3.0)
         assert goal.motion.outcome.succeeded, goal.motion.outcome
-        off, (_, strongest) = ways.farthest_off(goal.plan), ways.fastest_and_strongest()
+        off, (_, strongest) = ways.farthest_off(goal), ways.fastest_and_strongest()
         farthest, most = BOUNDS[kind]
         assert off < farthest
         assert strongest < (PAUSED.get(kind, most) if what == 'pause and play' else most)

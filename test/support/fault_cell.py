@@ -148,6 +148,8 @@ async def scenario(cell: RobotCell, row: Row, phase: str, kind=AroundCorners):
     if phase in BEFORE:
         await cell.sleep(0.1 if phase == 'idle' else CYCLE)
         goal.send()
+    if not cell.owner.silent:
+        goal.follow_up(phase)
     if row.waits:
         await wait_on(cell, goal, row, here)
     elif phase == 'settling' and row.code is ErrorCode.SUCCESSFUL:

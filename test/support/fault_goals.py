@@ -7,6 +7,7 @@ Phases are found by looking, at the messages on the wire, at the points that the
 begun and at where the tool is; never by the time that it should take.
 """
 
+from dataclasses import replace
 from functools import lru_cache
 from math import atan2, cos, pi, sin
 
@@ -14,6 +15,8 @@ from fault_table import BEFORE
 import robot_cell
 from robot_cell import CYCLE, RobotCell
 
+from ur_cartesian_driver.driver.continuing import encoded
+from ur_cartesian_driver.execution import Extension
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -28,6 +31,8 @@ from ur_cartesian_driver.motion.goal import (
 )
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.continuation import Addition, following, opened
+from ur_cartesian_driver.protocol.dialects import NEWEST
 from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
 
 #: Side of the way around two corners, and size of the blends there [m].
@@ -37,6 +42,7 @@ SIDE, BLEND = 0.05, 0.015
 PATH_TOLERANCE, GOAL_TOLERANCE, TWIST_TOLERANCE, SETTLING = 0.004, 0.001, 0.3, 1.4
 
 ARM = Arm(robot_model('ur5e'))
+OPTIONS = PlanningOptions(max_tool_speed=1.0)
 
 
 def planned(state, offsets, velocity, acceleration, **goal):
@@ -48,7 +54,7 @@ def planned(state, offsets, velocity, acceleration, **goal):
     segments = tuple(Segment(velocity=velocity, acceleration=acceleration, blend_radius=blend)
                      for blend in blends)
     return plan(Goal(waypoints=points, segments=segments, **goal), state, ARM,
-                PlanningOptions(max_tool_speed=1.0))
+                OPTIONS)
 
 
 class StartingPoint:
@@ -106,6 +112,13 @@ class GoalInTrouble:
         self.cell.owner.cancel()
         await self.cell.until(lambda: self.said(TrajectoryAction.CANCEL))
         assert not self.cell.at_rest()
+
+    def paths(self):
+        """Return the planned paths, one behind the other."""
+        return [self.plan.reference]
+
+    def follow_up(self, phase):
+        """Send what belongs to the goal and is still missing when the fault is there."""
 
     def judge(self, row, phase):
         """Look, when everything is over, at what this way of execution has to leave behind."""
@@ -216,7 +229,7 @@ def half_circle_goal(state, execution):
 def half_circle(start, execution):
     """Return the plan of a half circle."""
     return plan(half_circle_goal(start.state, execution), start.state, ARM,
-                PlanningOptions(max_tool_speed=1.0))
+                OPTIONS)
 
 
 class AlongSpline(GoalInTrouble):
@@ -227,14 +240,17 @@ class AlongSpline(GoalInTrouble):
     def plan_from(self, start):
         return half_circle(start, self.execution)
 
-    def is_in(self, phase):
+    def way(self):
+        """Return which part of the half circle the tool has gone."""
         x, y = self.moved()
-        way = atan2(x, RADIUS - y) / pi
+        return atan2(x, RADIUS - y) / pi
+
+    def is_in(self, phase):
         match phase:
             case 'between points' | 'cancelling':
-                return 0.55 < way < 0.8
+                return 0.55 < self.way() < 0.8
             case 'slowing down':
-                return way > 0.985
+                return self.way() > 0.985
         raise AssertionError(phase)
 
 
@@ -287,6 +303,13 @@ class WithOutputs(AroundCorners):
                 return self.begun() == 3 and self.moved()[1] < 1e-4 and self.cell.at_rest()
         raise AssertionError(phase)
 
+    def paths(self):
+        """Return the planned paths, one behind the other."""
+        return [self.plan.reference]
+
+    def follow_up(self, phase):
+        """Send what belongs to the goal and is still missing when the fault is there."""
+
     def judge(self, row, phase):
         """See that all is switched in the end, or nothing that was still waiting."""
         done = row.code is ErrorCode.SUCCESSFUL
@@ -301,5 +324,52 @@ class WithOutputs(AroundCorners):
         return [outputs[AT_CORNER], outputs[AFTER_END]]
 
 
+@lru_cache
+def open_half_circle(start):
+    """Return the first three points of a half circle, and the last one as what is appended."""
+    whole = half_circle_goal(start.state, ExecutionMode.SPLINE)
+    goal = replace(whole, waypoints=whole.waypoints[:-1], keep_open=True)
+    part = opened(plan(goal, start.state, ARM, OPTIONS), ARM, OPTIONS)
+    return part, Addition(waypoints=whole.waypoints[-1:], last=True)
+
+
+@lru_cache
+def rest_of_half_circle(start, *, from_rest):
+    """Return the last point of a half circle, planned behind what was sent before."""
+    part, addition = open_half_circle(start)
+    return following(part.then, addition, ARM, OPTIONS, from_rest=from_rest)
+
+
+class Continued(AlongSpline):
+    """The half circle as an open goal, whose last point is appended when the fault is there."""
+
+    def plan_from(self, start):
+        self._beginning = start
+        return open_half_circle(start)[0].plan
+
+    def send(self):
+        part, _ = open_half_circle(self._beginning)
+        self.motion = self.cell.owner.run(*encoded(part, NEWEST))
+
+    def is_in(self, phase):
+        match phase:
+            case 'moving' | 'cancelling':
+                return 0.1 < self.way() < 0.4
+            case 'closing':
+                return self.said(TrajectoryAction.STREAM_END) and self.way() > 0.7
+            case 'waiting':
+                return self.motion.progress and self.motion.progress[-1].waits
+        return super().is_in(phase)
+
+    def paths(self):
+        rest = rest_of_half_circle(self._beginning, from_rest=False)
+        return [self.plan.reference, rest.plan.reference]
+
+    def follow_up(self, phase):
+        part = rest_of_half_circle(self._beginning, from_rest=phase in ('closing', 'waiting'))
+        points, order = encoded(part, NEWEST)
+        self.cell.owner.extend(points, Extension(number=1, behind=part.behind, order=order))
+
+
 #: The goals of the ways of execution.
-GOALS = {'SPLINE': AlongSpline}
+GOALS = {'SPLINE': AlongSpline, 'SERVO': Servoed, 'Open goals': Continued}

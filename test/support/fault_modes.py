@@ -146,6 +146,8 @@ OPEN = _mode(
      'closing': 'none came in time, the arm is being brought to rest behind the last one',
      'waiting': 'the arm is at rest, and waits for more points',
      'cancelling': 'CANCEL is on the wire, the arm still moves'},
-    2.5, {})
+    2.5, {}, faults=tuple(name for name in FAULTS if name not in (
+        'emergency stop', "another client's program replaces ours", 'the controller crashes',
+        "the program's sockets are cut")))
 
-MODES = (SPLINE,)
+MODES = (SPLINE, OPEN)
