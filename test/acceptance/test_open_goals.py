@@ -6,12 +6,13 @@ import asyncio
 from dataclasses import replace
 
 import numpy as np
-from open_goals import BLEND, circle, corners, OpenMotion
+from open_goals import BLEND, circle, corners, moved, OpenMotion
 import pytest
 from robot_cell import CYCLE, run_cell
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.errors import ErrorCode, GoalRefused
 from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, ZERO6
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
@@ -113,3 +114,88 @@ def test_a_producer_that_is_late_by_less_than_the_margin_is_not_noticed(kind):
         assert motion.outcome.report == ()
         assert len(speeds) == len(known)
         assert (speeds == known).all()
+
+
+async def closed(cell, kind, count=6, **changes):
+    """Run an open goal whose producer stops until it rests; return it, home, and its speeds."""
+    home, speeds = cell.memory.read().actual_tcp_pose, Speeds(cell)
+    motion = OpenMotion(cell, goal(kind, home, count, **changes))
+    assert await motion.until(lambda: motion.motion.progress and motion.progress.waits)
+    return motion, home, speeds.stop()
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_a_producer_that_stops_is_closed_gracefully_and_may_go_on(kind):
+    async def scenario(cell):
+        motion, home, speeds = await closed(cell, kind)
+        step = np.abs(np.diff(speeds, axis=0)).max() / CYCLE
+        assert step < 5.0, 'decelerated, not stopped the hard way [rad/s^2]'
+        assert motion.progress.time_remaining == motion.progress.buffered == 0.0
+        assert motion.progress.points_received == 6
+        assert cell.at_rest()
+        points, segments = KINDS[kind][1](home, 7, 5, False)
+        said = await motion.append(points, segments)
+        assert 'had come to rest before them' in said.text
+        assert ('later than their times say' in said.text) == (kind == 'spline')
+        assert await motion.until(lambda: not motion.progress.waits)
+        points, segments = KINDS[kind][1](home, 12, 5, True)
+        said = await motion.append(points, segments, last=True)
+        assert said.text == '5 points appended, the goal has 16, these are the last.'
+        end = await motion.ended()
+        assert end.succeeded, end.text
+        assert end.text.startswith('All 16 points were')
+        (line,) = end.report
+        assert line.startswith('the motion was brought to rest once, the last time behind point 5')
+        assert not any('stop' in text for text in cell.owner.log)
+
+    run_cell(scenario)
+
+
+def test_the_word_that_nothing_follows_ends_a_goal_where_it_is_known_to_end():
+    async def scenario(cell):
+        home = cell.memory.read().actual_tcp_pose
+        moving = OpenMotion(cell, goal('spline', home, 6))
+        said = await moving.append(last=True)
+        assert said.text == 'The goal ends with the 6 points that it has.'
+        with pytest.raises(GoalRefused, match=r'were said to be the last\.$'):
+            await moving.append(circle(home, 7, 1))
+        assert (await moving.ended()).succeeded
+        waiting, *_ = await closed(cell, 'lines')
+        await waiting.append(last=True)
+        assert (await waiting.ended()).succeeded
+
+    run_cell(scenario)
+
+
+def test_nobody_waits_for_ever():
+    async def scenario(cell):
+        motion, *_ = await closed(cell, 'lines')
+        end = await motion.ended()
+        assert end.code is ErrorCode.CANCELLED
+        assert end.text == (
+            'No more points, and no word that there are none, came within keep_open_timeout = '
+            '0.5 s (at rest behind point 5, waiting for more).')
+        await cell.until(cell.is_ready)
+        with pytest.raises(GoalRefused, match=r'^The goal has ended\.$'):
+            await motion.append(corners(motion.home, 7, 1), (BLEND,))
+
+    run_cell(scenario, keep_open_timeout=0.5)
+
+
+def test_points_that_are_refused_leave_the_goal_as_it_was():
+    async def scenario(cell):
+        home = cell.memory.read().actual_tcp_pose
+        motion = OpenMotion(cell, goal('lines', home, 5))
+        far = replace(corners(home, 6, 1)[0], pose=moved(home, 2.0, 0.0, 0.0))
+        for wrong, text in (
+                (([*corners(home, 6, 1), far], (BLEND,) * 2), r'points\[6\]'),
+                ((corners(home, 6, 2), (BLEND,)), 'segments has 1 entries for 2 points'),
+                (((), ()), r'^points is empty; give at least one point, or set last\.$')):
+            with pytest.raises(GoalRefused, match=text):
+                await motion.append(*wrong)
+        await motion.append(corners(home, 6, 5), (BLEND,) * 5, last=True)
+        end = await motion.ended()
+        assert end.text.startswith('All 10 points were')
+        assert end.report == (), 'it was never closed'
+
+    run_cell(scenario)

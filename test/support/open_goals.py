@@ -50,6 +50,7 @@ class OpenMotion:
         self._options = PlanningOptions(**{'max_tool_speed': 1.0, 'max_points': 5000} | options)
         part = opened(plan(goal, cell.memory.read(), self._arm, self._options), self._arm,
                       self._options)
+        self.home = cell.memory.read().actual_tcp_pose
         self.continuing = Continuing(
             len(self._owner.motions) + 1, part, dialect=NEWEST, send=self._owner.send,
             progress=self._newest, arm_and_options=lambda: (self._arm, self._options))
