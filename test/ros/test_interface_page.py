@@ -45,3 +45,11 @@ def test_all_services_are_on_the_page(single_cell):
     node = single_cell.node
     assert written('Services') == there(node.get_service_names_and_types_by_node(
         node.get_name(), node.get_namespace()))
+
+
+@pytest.mark.parametrize('enabled', [False, True])
+def test_nobody_listens_to_targets_unasked(sim, make_cell, enabled):
+    node = make_cell(sim, servo_target_enabled=enabled).node
+    assert (written('Topics that it listens to') if enabled else {}) == {
+        name: kind for name, kind in there(node.get_subscriber_names_and_types_by_node(
+            node.get_name(), node.get_namespace())).items() if not name.startswith('/tf')}

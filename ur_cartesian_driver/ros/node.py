@@ -31,6 +31,7 @@ from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.ros.action_server import CartesianActionServer
 from ur_cartesian_driver.ros.parameters import declare, overrides, ParameterError, Value
 from ur_cartesian_driver.ros.services import Services
+from ur_cartesian_driver.ros.servo_topics import ServoStates, ServoTargets, TeachService
 from ur_cartesian_driver.ros.state_publisher import StatePublisher
 
 #: How often the driver hears that the executor of the node is alive, at least [s].
@@ -87,8 +88,17 @@ class CartesianDriverNode(Node):
         self._parts.append(self._publisher)
         self.action_server = CartesianActionServer(self, self.driver, settings)
         self._parts.append(self.action_server)
+        turns = self.action_server.turns
+        if settings.node.servo_state_rate > 0.0:
+            self._servo_states = ServoStates(self, self.driver, settings.node.servo_state_rate)
+        if settings.node.servo_target_enabled:
+            self.servo_targets = ServoTargets(
+                self, self.driver, turns, self.action_server.frames)
+            self._parts.append(self.servo_targets)
+        self._teach_service = TeachService(self, self.driver, turns)
+        self._parts.append(self._teach_service)
         self._publisher.start()
-        self._call_services = Services(self, self.driver, lambda: self.action_server.idle)
+        self._call_services = Services(self, self.driver, self._is_idle)
         self.create_timer(
             min(HEARTBEAT_PERIOD, settings.driver.node_timeout / 4.0), self.driver.heartbeat,
             # Of its own, and on a clock that no simulation stops.
@@ -96,6 +106,10 @@ class CartesianDriverNode(Node):
             clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._twin_timer = self.create_timer(
             DISCOVERY, self._look_for_a_twin, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def _is_idle(self) -> bool:
+        """Tell whether nobody counts on the TCP and the payload that are set."""
+        return self.action_server.idle and not self.action_server.turns.is_taken()
 
     def _look_for_a_twin(self) -> None:
         """Say once that there is another driver of the same name: each would answer for both."""

@@ -130,7 +130,7 @@ class Services:
         group = MutuallyExclusiveCallbackGroup()
         kinds = {name: (Trigger, lambda _, call=call: call) for name, call in TRIGGERS.items()}
         self._services = [
-            _PromisedService(node, kind, f'~/{name}', _Asker(driver, is_idle, call_of), group)
+            PromisedService(node, kind, f'~/{name}', _Asker(driver, is_idle, call_of), group)
             for name, (kind, call_of) in {**kinds, **OTHERS}.items()]
 
 
@@ -146,15 +146,15 @@ class _Asker:
         try:
             call = self._call_of(request)
         except DriverError as error:
-            return _kept(str(error))
+            return kept(str(error))
         # A goal that is only planned so far counts on what it found.
         if isinstance(call, SetTcp | SetPayload) and not self._is_idle():
-            return _kept('A goal is being planned or carried out, and this would change what it '
-                         'counts on; wait for its end or cancel it, then try again.')
+            return kept('A goal is being planned or carried out, and this would change what it '
+                        'counts on; wait for its end or cancel it, then try again.')
         return self._driver.call(call)
 
 
-class _PromisedService:
+class PromisedService:
     """A service whose responses are sent when they are there, from whatever thread."""
 
     def __init__(self, node: Node, kind: Any, name: str,
@@ -179,8 +179,8 @@ class _PromisedService:
             self._send_now(response, header)
 
 
-def _kept(reason: str) -> Future[Answer]:
-    """Return a promise that is kept already: by a refusal."""
+def kept(text: str, *, ok: bool = False) -> Future[Answer]:
+    """Return a promise that is kept already: mostly by a refusal."""
     future: Future[Answer] = Future()
-    future.set_result(Answer(ok=False, text=reason))
+    future.set_result(Answer(ok=ok, text=text))
     return future

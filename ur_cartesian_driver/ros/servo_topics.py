@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-``~/servo_target``: poses that the tool follows as they come.
+The arm that is led while it moves: ``~/servo_target``, ``~/servo_state``, ``~/teach_mode``.
 
-The executor only puts a message down; a thread of its own looks at the newest one, because a frame
-of tf2 may have to be waited for, and whoever sends faster than that is not to hold up the node.
-What cannot be followed is ignored, with a warning that says why; the target before counts until it
-is too old.
+Of a target the executor only puts the message down; a thread of its own looks at the newest one,
+because a frame of tf2 may have to be waited for, and whoever sends faster than that is not to hold
+up the node. What cannot be followed is ignored, with a warning that says why; the target before
+counts until it is too old.
 
 A session lines up for the arm as a goal does, but before all of them: any goal takes its place.
 """
@@ -14,22 +14,34 @@ A session lines up for the arm as a goal does, but before all of them: any goal 
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future, InvalidStateError
 import contextlib
+from math import inf
 import threading
+from time import monotonic
 from typing import Any, TypeAlias
 
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped
+from rclpy.action.server import RCLError
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_srvs.srv import SetBool
 
-from ur_cartesian_driver.driver import Driver
+from ur_cartesian_driver.driver import Driver, Motion
 from ur_cartesian_driver.driver.live import check_pose, LiveSession
 from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.servo import ServoActivity, ServoReport
+from ur_cartesian_driver.msg import ServoState
+from ur_cartesian_driver.robot.calls import Answer
 from ur_cartesian_driver.ros.convert import nanoseconds
 from ur_cartesian_driver.ros.frames import Frames, Stand
+from ur_cartesian_driver.ros.reports import duration_message
+from ur_cartesian_driver.ros.services import kept, PromisedService
 from ur_cartesian_driver.ros.turns import Turn, Turns
 
 #: Generated message classes carry no types.
@@ -37,6 +49,8 @@ Message: TypeAlias = Any
 
 #: The newest one counts, and one that was lost is not sent again.
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+#: As the other topics that tell the state.
+STATES = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 #: How often the same kind of trouble is told, at most [s].
 COMPLAINT = 2.0
 #: How long the end of a session is waited for when the node is destroyed [s].
@@ -71,6 +85,117 @@ def target_from_message(message: Message, frames: Frames, *, stand: Stand | None
             'compare the clocks of both computers, or leave the stamp 0: then the age counts '
             'from the receipt')
     return frames.T_base_frame(message.header.frame_id, stand) @ pose, max(0.0, age)
+
+
+def servo_state_message(report: ServoReport, stamp: Time) -> ServoState:
+    """Return how the streaming of set-points is going."""
+    message = ServoState(
+        state=int(report.activity), setpoints_sent=report.setpoints_sent,
+        setpoints_done=report.setpoints_done, buffer_size=report.buffer_size,
+        buffer_capacity=report.buffer_capacity, buffered=duration_message(report.buffered),
+        lag=report.lag, speed_scaling=report.speed_scaling, joint_error=report.joint_error,
+        underruns=report.underruns, overruns=report.overruns, repeats=report.repeats)
+    message.header.stamp = stamp
+    return message
+
+
+class ServoStates:
+    """Publishes what the robot loop tells of set-points, as often as it is asked for."""
+
+    def __init__(self, node: Node, driver: Driver, rate: float) -> None:
+        """
+        Begin to publish.
+
+        :param rate: at most so often [Hz], more than 0.
+        """
+        self._clock, self._period, self._due = node.get_clock(), 1.0 / rate, -inf
+        self._topic = node.create_publisher(ServoState, '~/servo_state', STATES)
+        driver.add_servo_listener(self._publish)
+
+    def _publish(self, report: ServoReport) -> None:
+        """Publish, in the thread of the driver; the end of a stream in any case."""
+        now = monotonic()
+        if now < self._due and report.activity is not ServoActivity.IDLE:
+            return
+        self._due = max(self._due + self._period, now)
+        # The node, or all of ROS, may have ended meanwhile.
+        with contextlib.suppress(InvalidHandle, RCLError):
+            self._topic.publish(servo_state_message(report, self._clock.now().to_msg()))
+
+
+class TeachService:
+    """``~/teach_mode``: lets a person guide the arm by hand, and ends that."""
+
+    def __init__(self, node: Node, driver: Driver, turns: Turns) -> None:
+        """Begin to serve."""
+        self._driver, self._turns = driver, turns
+        self._motion: Motion | None = None
+        self._lock = threading.Lock()
+        self._service = PromisedService(
+            node, SetBool, '~/teach_mode', self.ask, MutuallyExclusiveCallbackGroup())
+
+    @property
+    def idle(self) -> bool:
+        """Tell whether nobody guides the arm."""
+        return self._motion is None
+
+    def close(self) -> None:
+        """Hold the arm again, and wait until it is; the service goes with the node."""
+        motion = self._motion
+        if motion is not None:
+            motion.cancel()
+            with contextlib.suppress(TimeoutError):
+                motion.result(PATIENCE)
+
+    def ask(self, request: Message) -> Future[Answer]:
+        """Begin or end it; the answer comes when the robot has done that, or cannot."""
+        with self._lock:
+            motion = self._motion
+            if request.data:
+                return kept('The arm can be guided by hand already.', ok=True) \
+                    if motion is not None else self._begin()
+        if motion is None:
+            return kept('Nobody guides the arm.', ok=True)
+        answer = _Promise()
+        motion.add_done_callback(lambda outcome: answer.keep(
+            outcome.code is ErrorCode.CANCELLED,
+            'The arm is held by the robot again.'
+            if outcome.code is ErrorCode.CANCELLED else outcome.text))
+        motion.cancel()
+        return answer.future
+
+    def _begin(self) -> Future[Answer]:
+        turn = Turn('a person who guides the arm', lambda: None)
+        if not self._turns.seize(turn):
+            return kept('A goal or a session of live targets has the arm; wait for its end or '
+                        'cancel it, then try again.')
+        answer = _Promise()
+        try:
+            motion = self._driver.teach(
+                lambda: answer.keep(True, 'The arm can be guided by hand.'))
+        except DriverError as error:
+            self._turns.leave(turn)
+            return kept(str(error))
+        self._motion = motion
+
+        def ended(outcome: Outcome) -> None:
+            self._motion = None
+            self._turns.leave(turn)
+            answer.keep(False, outcome.text)
+
+        motion.add_done_callback(ended)
+        return answer.future
+
+
+class _Promise:
+    """An answer of which the first wording counts."""
+
+    def __init__(self) -> None:
+        self.future: Future[Answer] = Future()
+
+    def keep(self, ok: bool, text: str) -> None:
+        with contextlib.suppress(InvalidStateError):
+            self.future.set_result(Answer(ok=ok, text=text))
 
 
 class ServoTargets:
