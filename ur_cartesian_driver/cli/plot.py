@@ -200,7 +200,7 @@ def _draw_scaling(axes: Any, recording: Recording) -> None:
               label='speed scaling')
     axes.set_ylabel('speed\n[%]')
     axes.set_ylim(0.0, 108.0)
-    if recording.metadata['keep_open'] or np.isfinite(recording.lag).any():
+    if recording.metadata.get('keep_open') or np.isfinite(recording.lag).any():
         other = axes.twinx()
         other.plot(time, 1e3 * recording.lag, color=_ACTUAL, linewidth=0.9, label='lag')
         other.plot(time, 1e3 * recording.buffered, color=_TARGET, linewidth=0.9, label='buffered')
