@@ -98,7 +98,7 @@ def test_a_changed_result_changes_the_outcome(served, ur_sim):
 
 
 @pytest.mark.parametrize(('line', 'replacement', 'expected'), [
-    ('begin_point()', 'no_such_function()', 'compile_error_name_not_found:no_such_function:'),
+    ('begin_motion()', 'no_such_function()', 'compile_error_name_not_found:no_such_function:'),
     ('local kind = point[POINT_TYPE]', 'local kind = = 3', 'syntax_error_on_line:'),
 ])
 def test_a_broken_program_is_refused_with_line_and_column(

@@ -14,7 +14,7 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.goal import ArcMode, ZERO6
+from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, ZERO6
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import (
     MoveC,
@@ -24,7 +24,9 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveJ,
     OptimoveL,
     Spline,
+    SwitchOutput,
 )
+from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.protocol.trajectory import (
     decode_fields,
     decode_point,
@@ -190,6 +192,9 @@ FIELD_ERRORS = [
      'velocities[1] is 3000.0'),
     (Spline(target=ZERO6, velocities=ZERO6, accelerations=(float('nan'),) * 6, duration=1.0),
      'accelerations[0] is nan'),
+    (SwitchOutput(output=OutputKind.STANDARD_DIGITAL, pin=0, value=1.0, delay=-0.1),
+     'delay is -0.1'),
+    (SwitchOutput(output=OutputKind.STANDARD_ANALOG, pin=0, value=float('nan')), 'value is nan'),
 ]
 
 
@@ -225,6 +230,19 @@ def test_the_fields_have_the_places_that_the_robot_program_reads():
     assert (arc[PointField.ARC_MODE], arc[PointField.SECOND]) == (1_000_000, 8_000_000)
 
 
+def test_the_fields_of_an_output_have_the_places_that_the_robot_program_reads():
+    words = struct.unpack('>21i', encode_point(SwitchOutput(
+        output=OutputKind.STANDARD_ANALOG, pin=1, value=0.25, domain=AnalogDomain.VOLTAGE,
+        place=Pose((7.0, 0.0, 0.0)), heading=(0.0, 0.6, 0.8, 0.0, 0.0, 0.0), comes_round=True,
+        delay=4.0)))
+    places = {PointField.TARGET: 7.0, PointField.SECOND + 1: 0.6, PointField.OUTPUT_KIND: 3.0,
+              PointField.OUTPUT_PIN: 1.0, PointField.OUTPUT_VALUE: 0.25,
+              PointField.OUTPUT_DOMAIN: 1.0, PointField.HAS_PLACE: 1.0,
+              PointField.COMES_ROUND: 1.0, PointField.DURATION: 4.0}
+    assert {place: words[place] / 1e6 for place in places} == places
+    assert words[PointField.TYPE] == MotionType.SWITCH_OUTPUT == 200
+
+
 def words_with(**changes):
     words = [0] * POINT_FIELDS
     for index, value in changes.items():
@@ -235,6 +253,7 @@ def words_with(**changes):
 @pytest.mark.parametrize('data', [
     b'', bytes(POINT_SIZE - 1), bytes(POINT_SIZE + 1), words_with(w20=14), words_with(w20=255),
     words_with(w20=-1), words_with(w20=51), words_with(w20=51, w19=3),
+    words_with(w20=200, w12=4_000_000),
     words_with(w20=3, w14=2_000_000), words_with(w20=3, w14=500_000)])
 def test_a_point_without_sense_is_refused_with_its_bytes(data):
     with pytest.raises(RemoteProtocolError) as error:
@@ -267,7 +286,10 @@ PRIMITIVES = st.one_of(
     st.builds(MoveC, target=POSES | JOINTS, via=POSES | JOINTS, **SPEEDS,
               mode=st.sampled_from(ArcMode)),
     st.builds(Spline, target=JOINTS, velocities=JOINTS, accelerations=st.none() | JOINTS,
-              duration=DURATION))
+              duration=DURATION),
+    st.builds(SwitchOutput, output=st.sampled_from(OutputKind), pin=st.integers(0, 7),
+              value=FRACTION, domain=st.sampled_from(AnalogDomain), place=st.none() | POSES,
+              heading=vector(1.0), comes_round=st.booleans(), delay=DURATION))
 
 
 @given(PRIMITIVES)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector3, Vector6
+from ur_cartesian_driver.motion.signals import AnalogDomain
 
 ZERO6: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
@@ -111,7 +112,10 @@ class IOCommand:
     offset: float
     output: OutputKind
     pin: int
+    #: Digital 0 or 1; analog a fraction of the range.
     value: float
+    #: What an analog output carries.
+    domain: AnalogDomain = AnalogDomain.CURRENT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

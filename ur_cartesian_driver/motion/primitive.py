@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from ur_cartesian_driver.motion.goal import ArcMode, OutputKind
+from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, ZERO6
 from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.motion.signals import AnalogDomain
 
@@ -133,10 +133,15 @@ class SwitchOutput:
     #: Digital 0 or 1; analog a fraction of the range.
     value: float
     domain: AnalogDomain = AnalogDomain.CURRENT
-    #: Where the tool (TCP, base) is nearest to when it is time; None = where the motion before
-    #: this one has ended, so at once.
+    #: Where the tool (TCP, base) is when it is time; None = where the motion before this one has
+    #: ended, so at once.
     place: Pose | None = None
-    #: So much later [s].
+    #: The direction of the motion there, linear or angular, of length 1 and in the axes of the
+    #: place. It is time when the tool gets to its side of the plane through the place.
+    heading: Vector6 = ZERO6
+    #: Whether the tool is on that side when the record is read, and comes round once more.
+    comes_round: bool = False
+    #: After the end of the last motion: so much later than that [s].
     delay: float = 0.0
 
 

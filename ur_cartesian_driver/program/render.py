@@ -25,6 +25,7 @@ from importlib.resources import files
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
+from ur_cartesian_driver.motion.goal import OutputKind
 from ur_cartesian_driver.protocol import registers, reverse, script_command, trajectory
 from ur_cartesian_driver.protocol.framing import FIXED_POINT
 
@@ -61,6 +62,15 @@ SPLINE_LAW: dict[str, float] = {
     #: Less than this [s] or [rad] comes from rounding.
     'ROUNDING': 1e-10,
 }
+
+#: An output takes effect at the end of a cycle: so many cycles ahead is the nearest to its place.
+OUTPUT_LEAD = 1.5
+#: The words of an output that wait with it, and where in them the program looks.
+OUTPUT_WORDS = 18
+OUTPUT_COLUMNS = {
+    trajectory.PointField.OUTPUT_KIND: 'KIND', trajectory.PointField.OUTPUT_PIN: 'PIN',
+    trajectory.PointField.OUTPUT_VALUE: 'VALUE', trajectory.PointField.OUTPUT_DOMAIN: 'DOMAIN',
+    trajectory.PointField.COMES_ROUND: 'COMES_ROUND'}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,6 +174,15 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield from _enum('RESULT', TrajectoryResult)
     yield from _enum('COMMAND', script_command.ScriptCommand)
     yield from _enum('TCP', script_command.TcpHold)
+    yield f'OUTPUTS_WAITING = {trajectory.MOST_OUTPUTS}'
+    yield f'OUTPUT_WORDS = {OUTPUT_WORDS}'
+    yield f'OUTPUT_ONES = {[1] * trajectory.MOST_OUTPUTS}'
+    yield f'OUTPUT_ROW = {[0.0] * OUTPUT_WORDS}'
+    yield f'OUTPUT_LEAD = {OUTPUT_LEAD}'
+    yield from _enum('OUTPUT', OutputKind)
+    # Where a field stands in the row of an output that waits.
+    for field, name in OUTPUT_COLUMNS.items():
+        yield f'OUTPUT_{name} = {field.value}'
     # Where a field of a point stands in the list that the robot reads, its length first.
     yield from _enum('POINT', trajectory.PointField, offset=1)
 

@@ -13,8 +13,10 @@ dialect  library        time scale  motion types      words 6 - 17 of moves  str
 2.0      2.0 - 2.9      1000        0 - 3, 51         v x 6, a x 6           no
 2.10     2.10, 2.11     1,000,000   0 - 5, 51         v x 6, a x 6           no
 2.12     2.12, 2.13     1,000,000   0 - 13, 51        q_near, v, a, flag     no
-2.14     since 2.14     1,000,000   0 - 13, 51        q_near, v, a, flag     yes
+2.14     since 2.14     1,000,000   0 - 13, 51, 200   q_near, v, a, flag     yes
 =======  =============  ==========  ================  =====================  =======
+
+Type 200, which switches an output, is ours alone: a program of the library skips it in silence.
 
 "Moves" are all types but MOVEC* and SPLINE, whose words never changed. Blend radii have the time
 scale too. With a scale of 1000 times are whole milliseconds and radii whole millimetres (the
@@ -39,6 +41,7 @@ _ARCS_AND_LINES = frozenset(range(4))
 _OPTIMOVES = frozenset((4, 5))
 _OTHER_TARGETS = frozenset(range(6, 14))
 _SPLINE = frozenset((51,))
+_OUTPUTS = frozenset((200,))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,7 +93,7 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType({dialect.name: dialect for di
             motion_types=_ARCS_AND_LINES | _OPTIMOVES | _OTHER_TARGETS | _SPLINE,
             q_near=True, streams=False, sets_tcp=False),
     Dialect(name='2.14', time_scale=FIXED_POINT,
-            motion_types=_ARCS_AND_LINES | _OPTIMOVES | _OTHER_TARGETS | _SPLINE,
+            motion_types=_ARCS_AND_LINES | _OPTIMOVES | _OTHER_TARGETS | _SPLINE | _OUTPUTS,
             q_near=True, streams=True, sets_tcp=True),
 )})
 #: The one that the robot program of this package speaks.

@@ -24,6 +24,18 @@ index    meaning                                                                
 20       motion type                                                            1
 =======  =====================================================================  =====
 
+SWITCH_OUTPUT is no motion and not of the library: our own robot program alone knows it. It is
+read when the motion before it returns, at its stop or where its blend begins, and takes no time:
+
+=======  =====================================================================  =====
+0 - 5    the place, x y z rx ry rz [m, rad]; zeros where there is none          S
+6 - 11   the heading there, linear and angular, in the axes of the place        S
+12 - 15  kind of output, pin, value, domain of an analog one                    S
+16, 17   1 = there is a place; 1 = the tool comes round to it                   S
+18       delay after the end of the last motion [s]                             T
+20       motion type                                                            1
+=======  =====================================================================  =====
+
 The sender must
 
 * announce the points on the reverse interface first (``TrajectoryAction.START`` with their number,
@@ -49,9 +61,10 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.motion.goal import ArcMode, ZERO6
+from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, ZERO6
 from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.motion.primitive import (
+    Instruction,
     MoveC,
     MoveJ,
     MoveL,
@@ -60,8 +73,10 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveL,
     Primitive,
     Spline,
+    SwitchOutput,
     Target,
 )
+from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
 from ur_cartesian_driver.protocol.framing import (
     checked_size,
@@ -109,6 +124,8 @@ class MotionType(IntEnum):
     OPTIMOVEL_JOINT = 13
     #: cubic or quintic joint spline, interpolated by the robot program
     SPLINE = 51
+    #: no motion: an output is switched at a place; of our own robot program alone
+    SWITCH_OUTPUT = 200
 
 
 class SplineKind(IntEnum):
@@ -127,11 +144,19 @@ class PointField(IntEnum):
     ACCELERATION = 13
     HAS_Q_NEAR = 14
     ARC_MODE = 14
+    OUTPUT_KIND = 12
+    OUTPUT_PIN = 13
+    OUTPUT_VALUE = 14
+    OUTPUT_DOMAIN = 15
+    HAS_PLACE = 16
+    COMES_ROUND = 17
     DURATION = 18
     BLEND = 19
     TYPE = 20
 
 
+#: How many outputs may wait for their places at one time.
+MOST_OUTPUTS = 64
 POINT_FIELDS = 21
 POINT_SIZE = 4 * POINT_FIELDS
 
@@ -154,6 +179,10 @@ _REPEATED_FIELD_NAMES = (
 _SPLINE_FIELD_NAMES = (
     *_TARGET_NAMES, *(f'velocities[{i}]' for i in range(6)),
     *(f'accelerations[{i}]' for i in range(6)), 'duration', 'kind', 'motion type')
+_OUTPUT_FIELD_NAMES = (
+    *(f'place[{i}]' for i in range(6)), *(f'heading[{i}]' for i in range(6)),
+    'output', 'pin', 'value', 'domain', 'has_place', 'comes_round', 'delay', 'word 19',
+    'motion type')
 
 #: Class -> motion type with joint positions, with a pose as target.
 _TYPES: dict[type[Primitive], tuple[MotionType, MotionType]] = {
@@ -177,12 +206,14 @@ _SPEEDS_ONCE = (PointField.VELOCITY, PointField.ACCELERATION)
 _SPEEDS_REPEATED = (PointField.SECOND, PointField.VELOCITY)
 
 
-def motion_type(primitive: Primitive) -> MotionType:
+def motion_type(primitive: Instruction) -> MotionType:
     """
     Return the wire's number for a primitive: its class and the kind of its target (and via).
 
-    :raises LocalProtocolError: it is no primitive.
+    :raises LocalProtocolError: it is no primitive, nor an output.
     """
+    if isinstance(primitive, SwitchOutput):
+        return MotionType.SWITCH_OUTPUT
     if isinstance(primitive, MoveC):
         return _ARC_TYPES[isinstance(primitive.target, Pose), isinstance(primitive.via, Pose)]
     if isinstance(primitive, Spline):
@@ -193,7 +224,7 @@ def motion_type(primitive: Primitive) -> MotionType:
         raise LocalProtocolError(f'{primitive!r} is not a motion primitive.') from None
 
 
-def to_fields(primitive: Primitive, dialect: Dialect = NEWEST) -> Fields:
+def to_fields(primitive: Instruction, dialect: Dialect = NEWEST) -> Fields:
     """
     Return the 21 numbers of a primitive in SI units, see the table above.
 
@@ -203,6 +234,11 @@ def to_fields(primitive: Primitive, dialect: Dialect = NEWEST) -> Fields:
     kind = motion_type(primitive)
     if kind not in dialect.motion_types:
         raise _unknown_in(dialect, f'{kind.name} (motion type {kind})')
+    if isinstance(primitive, SwitchOutput):
+        place = primitive.place
+        return (*(_numbers(place) if place else ZERO6), *primitive.heading, primitive.output,
+                primitive.pin, primitive.value, primitive.domain, place is not None,
+                primitive.comes_round, primitive.delay, 0, kind)
     if isinstance(primitive, Spline):
         spline = SplineKind.CUBIC if primitive.accelerations is None else SplineKind.QUINTIC
         return (*primitive.target, *primitive.velocities, *(primitive.accelerations or ZERO6),
@@ -229,11 +265,11 @@ def _unknown_in(dialect: Dialect, what: str) -> LocalProtocolError:
     return LocalProtocolError(f'{what} does not exist in wire dialect {dialect.name}.')
 
 
-def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST) -> Primitive:
+def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST) -> Instruction:
     """
-    Return the primitive of the 21 numbers.
+    Return the primitive, or the output, of the 21 numbers.
 
-    :raises RemoteProtocolError: motion type, spline kind or arc mode is unknown.
+    :raises RemoteProtocolError: motion type, spline kind, arc mode or output is unknown.
     """
     kind = _known(MotionType, fields[20], 'motion type (word 20)')
     if kind not in dialect.motion_types:
@@ -244,6 +280,13 @@ def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST) -> Primitive
         spline = _known(SplineKind, fields[19], 'spline kind (word 19)')
         third = _vector(fields[12:18]) if spline is SplineKind.QUINTIC else None
         return Spline(target=target, velocities=second, accelerations=third, duration=fields[18])
+    if kind is MotionType.SWITCH_OUTPUT:
+        return SwitchOutput(
+            output=_known(OutputKind, fields[12], 'kind of output (word 12)'),
+            pin=int(fields[13]), value=fields[14],
+            domain=_known(AnalogDomain, fields[15], 'domain (word 15)'),
+            place=Pose.from_rotation_vector(target) if fields[16] else None, heading=second,
+            comes_round=bool(fields[17]), delay=fields[18])
     velocity, acceleration, flag = fields[12:15]
     if kind in _ARCS:
         target_is_pose, via_is_pose = _ARCS[kind]
@@ -273,7 +316,9 @@ def check_fields(fields: Fields, dialect: Dialect = NEWEST) -> None:
     duration, blend, kind = fields[18], fields[19], fields[20]
     if duration and (duration > dialect.max_duration or 0.0 < duration < dialect.least_duration):
         raise _bad_duration(duration, dialect)
-    if kind == MotionType.SPLINE:
+    if kind == MotionType.SWITCH_OUTPUT and not 0.0 <= duration <= dialect.max_duration:
+        raise LocalProtocolError(f'delay is {duration!r} s, but it must not be negative.')
+    if kind in (MotionType.SPLINE, MotionType.SWITCH_OUTPUT):
         return
     v_at, a_at = _SPEEDS_ONCE if dialect.q_near or kind in _ARCS else _SPEEDS_REPEATED
     velocity, acceleration = fields[v_at], fields[a_at]
@@ -327,7 +372,7 @@ def decode_fields(data: bytes, dialect: Dialect = NEWEST) -> Fields:
             words[20])
 
 
-def encode_point(primitive: Primitive, dialect: Dialect = NEWEST) -> bytes:
+def encode_point(primitive: Instruction, dialect: Dialect = NEWEST) -> bytes:
     """
     Return the 84 bytes of a primitive.
 
@@ -336,9 +381,9 @@ def encode_point(primitive: Primitive, dialect: Dialect = NEWEST) -> bytes:
     return encode_fields(to_fields(primitive, dialect), dialect)
 
 
-def decode_point(data: bytes, dialect: Dialect = NEWEST) -> Primitive:
+def decode_point(data: bytes, dialect: Dialect = NEWEST) -> Instruction:
     """
-    Return the primitive of 84 bytes.
+    Return the primitive, or the output, of 84 bytes.
 
     :raises RemoteProtocolError: it has another size, or a type, kind or mode that is unknown.
     """
@@ -352,9 +397,9 @@ def decode_point(data: bytes, dialect: Dialect = NEWEST) -> Primitive:
 _CHUNK = 4096
 
 
-def encode_points(primitives: Iterable[Primitive], dialect: Dialect = NEWEST) -> bytes:
+def encode_points(primitives: Iterable[Instruction], dialect: Dialect = NEWEST) -> bytes:
     """
-    Return the bytes of many primitives, the same as :func:`encode_point` one by one but faster.
+    Return the bytes of many of them, the same as :func:`encode_point` one by one but faster.
 
     :raises LocalProtocolError: names the point (from 0), the field and the bound.
     """
@@ -367,7 +412,7 @@ def encode_points(primitives: Iterable[Primitive], dialect: Dialect = NEWEST) ->
     return b''.join(chunks)
 
 
-def _encode_chunk(primitives: list[Primitive], first: int, dialect: Dialect) -> bytes:
+def _encode_chunk(primitives: list[Instruction], first: int, dialect: Dialect) -> bytes:
     rows = []
     for index, primitive in enumerate(primitives, first):
         try:
@@ -404,6 +449,8 @@ def _names(kind: float, dialect: Dialect) -> Sequence[str]:
     """Return what the 21 numbers of a motion type are called in errors."""
     if kind == MotionType.SPLINE:
         return _SPLINE_FIELD_NAMES
+    if kind == MotionType.SWITCH_OUTPUT:
+        return _OUTPUT_FIELD_NAMES
     return _FIELD_NAMES if dialect.q_near or kind in _ARCS else _REPEATED_FIELD_NAMES
 
 
