@@ -22,7 +22,7 @@ from ur_cartesian_driver.sim.uploads import Uploads
 
 GUIDE = Path(__file__).parents[1] / 'acceptance' / 'programs' / 'servoj_guide.script'
 CYCLE = 0.002
-SETTINGS = ServoSettings(step=CYCLE)
+SETTINGS = ServoSettings()
 OUTPUTS = ('timestamp', 'speed_scaling', 'runtime_state', 'actual_q', 'actual_qd',
            *registers.SERVO_OUTPUTS)
 

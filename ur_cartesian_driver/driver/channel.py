@@ -61,7 +61,8 @@ class LiveOrder:
     """What it takes to follow live targets, beside the order of a motion that stands."""
 
     settings: LiveSettings
-    #: Of the arm, as the owner knows it.
+    #: The arm, as the owner knows it.
+    ur_type: str
     geometry: Geometry
     #: Where the arm stands [rad].
     start: Joints
@@ -213,8 +214,8 @@ Request: TypeAlias = (
     Configure | StartMotion | ExtendMotion | AimMotion | CancelMotion | ResendProgram | CallRobot
     | Heartbeat | Shutdown)
 Notice: TypeAlias = (
-    Alive | StatusChanged | SignalsChanged | GeometryKnown | MotionProgress | MotionExtended
-    | MotionEnded | CallAnswered | TcpLent | TcpReturned | LogLine)
+    Alive | StatusChanged | SignalsChanged | GeometryKnown | MotionProgress | ServoChanged
+    | MotionExtended | MotionEnded | CallAnswered | TcpLent | TcpReturned | LogLine)
 
 
 def pack(message: Request | Notice) -> bytes:

@@ -30,6 +30,10 @@ class DriverConfig(LinkSettings):
     stream_margin: float = 0.2
     #: ... and how long the goal then waits for more points until it ends [s]; 0 = without end.
     keep_open_timeout: float = 30.0
+    #: SERVO: motion time that is under way to the arm, so how long nothing may come through [s].
+    servo_target_lag: float = 0.04
+    #: SERVO: the robot program stops the arm when a joint is farther from its set-point [rad].
+    servo_max_divergence: float = 0.3
     #: Progress reports per second.
     feedback_rate: float = 25.0
     #: The arm is stopped when the owner of the driver is silent for that long [s].
@@ -58,6 +62,8 @@ class DriverConfig(LinkSettings):
         if not self.stream_horizon >= 2.0 * self.stream_margin:
             raise ValueError(f'stream_horizon is {self.stream_horizon}, it has to be at least '
                              f'twice stream_margin = {self.stream_margin}.')
+        self._require_within('servo_target_lag', 0.008, 0.2)
+        self._require_within('servo_max_divergence', 0.01, 3.0)
         if not self.keep_open_timeout >= 0.0:
             raise ValueError(
                 f'keep_open_timeout is {self.keep_open_timeout}, it must not be negative.')

@@ -42,6 +42,7 @@ from ur_cartesian_driver.driver.channel import (
     pack,
     Request,
     ResendProgram,
+    ServoChanged,
     Shutdown,
     SignalsChanged,
     StartMotion,
@@ -57,26 +58,34 @@ from ur_cartesian_driver.driver.snapshot import StateMemory
 from ur_cartesian_driver.execution import (
     AnswerExtension,
     Command,
+    EnterServo,
     Finish,
+    LeaveServo,
     LendTcp,
+    OpenServo,
     Order,
     Report,
+    ReportServo,
     ReturnTcp,
     same_tcp,
     SendControl,
     SendPoints,
+    SERVO_LINK,
     StopProgram,
     StreamMachine,
     TcpLoan,
     TrajectoryMachine,
+    WriteServo,
 )
 from ur_cartesian_driver.kinematics.robots import Geometry
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
     Event,
+    LinkLost,
     Outcome,
     PreemptRequested,
+    ServoReceived,
     StateReceived,
     Tick,
 )
@@ -87,6 +96,7 @@ from ur_cartesian_driver.robot.call_desk import CallDesk
 from ur_cartesian_driver.robot.calls import Answer, Dashboard
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import RobotLink
+from ur_cartesian_driver.robot.servo_connection import ServoConnection
 from ur_cartesian_driver.robot.status import DriverStatus, Gaps
 
 #: How often time alone is looked at [s].
@@ -109,7 +119,7 @@ RECORD_TIMEOUT = 1.0
 MOST_CALLS = 32
 #: What is out of date soon is left out while so much waits for an owner that does not read
 #: [bytes]: it may hang for days.
-PASSING = (Alive, LogLine, MotionProgress, SignalsChanged)
+PASSING = (Alive, LogLine, MotionProgress, ServoChanged, SignalsChanged)
 MOST_UNREAD = 1 << 20
 T = TypeVar('T')
 
@@ -129,6 +139,8 @@ class RobotLoop:
         #: Whether it is in the shared memory.
         self._is_shared = True
         self._points = RecordsToSend()
+        #: The inputs of a motion that is streamed as set-points.
+        self._servo: ServoConnection | None = None
         #: What is offered to the machine at this moment.
         self._offered: ExtendMotion | None = None
         #: The TCP that an ended goal had set, until it is back.
@@ -348,12 +360,39 @@ class RobotLoop:
                     self._link.stop_program(reason)
                 case Report(progress=progress):
                     self._notify(MotionProgress(motion=self._motion, progress=progress))
+                case WriteServo(values=values):
+                    if self._servo is not None:
+                        self._servo.write_row(values)
+                case OpenServo():
+                    self._open_servo()
+                case EnterServo():
+                    self._link.send_servo(True)
+                case LeaveServo():
+                    self._leave_servo()
+                case ReportServo(report=report):
+                    self._notify(ServoChanged(motion=self._motion, report=report))
                 case AnswerExtension():
                     self._answer_extension(command)
                 case Finish(outcome=outcome):
                     self._finish(outcome)
 
+    def _open_servo(self) -> None:
+        """Take the inputs of the servo for the motion that runs."""
+        self._servo = ServoConnection(
+            lambda feedback: self._handle_event(ServoReceived(feedback=feedback)))
+        self._spawn(self._servo.run(
+            self._config.robot_ip, self._config.rtde_port,
+            lambda reason: self._handle_event(LinkLost(link=SERVO_LINK, reason=reason))))
+
+    def _leave_servo(self) -> None:
+        """Have the robot program listen to the inputs no more, and give them back."""
+        if self._servo is not None:
+            self._link.send_servo(False)
+            self._servo.close()
+            self._servo = None
+
     def _finish(self, outcome: Outcome) -> None:
+        self._leave_servo()
         machine, motion = self._machine, self._motion
         self._motion, self._machine = 0, None
         self._points = RecordsToSend()

@@ -5,35 +5,52 @@
 from ur_cartesian_driver.execution.commands import (
     AnswerExtension,
     Command,
+    EnterServo,
     Finish,
+    LeaveServo,
     LendTcp,
+    OpenServo,
     Report,
+    ReportServo,
     ReturnTcp,
     SendControl,
     SendPoints,
     StopProgram,
+    WriteServo,
 )
 from ur_cartesian_driver.execution.order import Extension, Order, order_of
+from ur_cartesian_driver.execution.servo import SERVO_LINK, ServoMachine
+from ur_cartesian_driver.execution.servo_source import Setpoints
+from ur_cartesian_driver.execution.servo_stream import ServoSettings
 from ur_cartesian_driver.execution.stream import StreamMachine, StreamSettings
 from ur_cartesian_driver.execution.tcp_loan import same_tcp, TcpLoan
 from ur_cartesian_driver.execution.trajectory import TrajectoryMachine
 
 __all__ = [
+    'SERVO_LINK',
     'AnswerExtension',
     'Command',
+    'EnterServo',
     'Extension',
     'Finish',
+    'LeaveServo',
     'LendTcp',
+    'OpenServo',
     'Order',
     'Report',
+    'ReportServo',
     'ReturnTcp',
     'SendControl',
     'SendPoints',
+    'ServoMachine',
+    'ServoSettings',
+    'Setpoints',
     'StopProgram',
     'StreamMachine',
     'StreamSettings',
     'TcpLoan',
     'TrajectoryMachine',
+    'WriteServo',
     'order_of',
     'same_tcp',
 ]

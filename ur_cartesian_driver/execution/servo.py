@@ -45,6 +45,7 @@ from ur_cartesian_driver.motion.events import (
     Event,
     LinkLost,
     ServoReceived,
+    StateReceived,
     TrajectoryEnded,
 )
 from ur_cartesian_driver.motion.pose import Vector6
@@ -71,8 +72,8 @@ class ServoMachine(TrajectoryMachine):
         :param source: where the set-points come from; None = the spline of the order.
         :raises ValueError: there is neither a source nor a spline.
         """
-        # Nothing counts points here, and the time of the set-points is not that of the packets.
-        super().__init__(replace(order, knows_pace=False, reports_begun=False),
+        # How far it is, the set-points tell; how fast they go, nobody else does.
+        super().__init__(replace(order, knows_pace=False, reports_begun=order.spline is not None),
                          feedback_period=feedback_period,
                          max_plan_deviation=max_plan_deviation, continues=continues)
         if source is None:
@@ -108,7 +109,16 @@ class ServoMachine(TrajectoryMachine):
         commands: list[Command] = []
         if isinstance(event, ServoReceived):
             commands = self._stream_on(event.feedback, now)
+        elif isinstance(event, StateReceived):
+            event = StateReceived(state=replace(event.state, points_begun=self._begun()))
         return commands + super().step(event, now)
+
+    def _begun(self) -> int:
+        """Return how many pieces of the spline the arm was led into; 0 = none, or unknown."""
+        spline = self.order.spline
+        if spline is None or self.stream.motion_time <= 0.0:
+            return 0
+        return spline.piece(self.stream.motion_time) + 1
 
     def _stream_on(self, feedback: ServoFeedback, now: float) -> list[Command]:
         """Answer a packet of the servo's registers with a write."""
@@ -120,7 +130,9 @@ class ServoMachine(TrajectoryMachine):
             self._is_timed = True
             self._put_off()
         commands: list[Command] = [] if row is None else [WriteServo(values=row)]
-        return [*commands, EnterServo()] if opening else commands
+        if opening and self.stream.phase is Phase.ENTERING:
+            commands.append(EnterServo())
+        return commands
 
     def _put_off(self) -> None:
         """Let the time of the goal begin with its motion: not with the filling of the buffer."""
@@ -180,7 +192,7 @@ class ServoMachine(TrajectoryMachine):
     def _begin(self, state: RobotState) -> list[Command]:
         self._deadline = inf
         self._started = True
-        self._observer.start(state)
+        self._observer.start(replace(state, points_begun=0))
         self.stream.begin()
         return []  # the next packet is answered with the first set-point
 
@@ -199,12 +211,12 @@ class ServoMachine(TrajectoryMachine):
         row = self.stream.stop()
         return [] if row is None else [WriteServo(values=row)]
 
-    def _release(self, begun: int) -> list[Command]:
-        return []
     def where(self) -> tuple[int, float, float]:
         """Return where the arm is, as any machine does."""
         return self._observer.waypoint(), self.stream.buffered, self.stream.lag
 
+    def _release(self, begun: int) -> list[Command]:
+        return []
 
     def _inform(self, state: RobotState, now: float) -> list[Command]:
         commands = super()._inform(state, now)

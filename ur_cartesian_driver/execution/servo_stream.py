@@ -7,8 +7,8 @@ Each packet of the robot is answered by one write with a new sequence number, so
 knows that somebody is there; most of them carry a set-point. The phases, and what leads from one
 to another (:data:`TRANSITIONS`):
 
-* **OPENING**: the inputs are asked for. The first packet shows the sequence number that the robot
-  has read last, perhaps from an earlier client; ours begin behind it.
+* **OPENING**: the inputs are asked for. The first packets show the control step of the robot, and
+  the sequence number that it has read last, perhaps from an earlier client; ours begin behind it.
 * **ENTERING**: the divergence thresholds are written, with the mode IDLE, and the robot program is
   told to listen (a program after the guide does so always). It has answered when it has read one
   of our sequence numbers.
@@ -34,7 +34,8 @@ from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import auto, Enum
-from math import inf
+from itertools import pairwise
+from math import ceil, inf
 from types import MappingProxyType
 
 from ur_cartesian_driver.execution.servo_clock import ServoClock
@@ -54,6 +55,10 @@ RESTART = 2.0
 LAST_SEQUENCE = 2**30
 #: A clock that jumps by more, or backwards, has not run [s].
 LONGEST_GAP = 1.0
+#: Control steps of the robots that there are [s].
+SHORTEST_STEP, LONGEST_STEP = 0.002, 0.008
+#: So many packets show how long the robot's control step is.
+FIRST_PACKETS = 4
 
 
 class Phase(Enum):
@@ -118,8 +123,6 @@ class ServoSettings:
     :raises ValueError: the values cannot work together.
     """
 
-    #: Control step of the robot [s].
-    step: float = 0.002
     #: Motion time that is to be under way to the arm [s]: so long may nothing come through.
     target_lag: float = 0.04
     #: Motion time that may be under way [s].
@@ -135,11 +138,15 @@ class ServoSettings:
 
     def __post_init__(self) -> None:
         """Refuse what lets the buffer overflow."""
-        if not self.step <= self.target_lag <= self.most_lag <= self.buffer_depth * self.step:
+        if not LONGEST_STEP <= self.target_lag <= self.most_lag:
             raise ValueError(
-                f'servo_target_lag of {self.target_lag:g} s has to be at least one control step '
-                f'of {self.step:g} s and at most {self.most_lag:g} s, and that fit into '
-                f'servo_buffer_depth of {self.buffer_depth} set-points.')
+                f'servo_target_lag is {self.target_lag:g} s, it has to be within '
+                f'{LONGEST_STEP:g} and {self.most_lag:g} s.')
+        if self.target_lag > SHORTEST_STEP * self.buffer_depth:
+            raise ValueError(
+                f'servo_buffer_depth is {self.buffer_depth}, but servo_target_lag of '
+                f'{self.target_lag:g} s needs room for '
+                f'{ceil(self.target_lag / SHORTEST_STEP)} set-points.')
 
 
 class ServoStream:
@@ -150,8 +157,8 @@ class ServoStream:
         self.phase = Phase.OPENING
         self._source = source
         self._settings = settings
-        self._clock = ServoClock(step=settings.step, target=settings.target_lag,
-                                 most=settings.most_lag, closed=settings.closed_loop)
+        self._clock = self._clock_of(SHORTEST_STEP)
+        self._times: list[float] = []
         self._latest: ServoFeedback | None = None
         self._sequence = 0
         #: The first number of ours, of those that want SERVO, and of those that want IDLE again.
@@ -162,10 +169,21 @@ class ServoStream:
         #: Set-points that the robot has not read yet: sequence number and state time.
         self._unread: deque[tuple[int, float]] = deque()
         self._read_time = 0.0
+        #: How far the source was asked [s]; of what is under way: state time, time of the source.
+        self._asked = 0.0
+        self._behind: deque[tuple[float, float]] = deque()
+        #: The time of the source that the arm was led to last [s].
+        self.motion_time = 0.0
         #: How fast the motion runs in the time of the set-points, 0 to 1.
         self._pace = 1.0
         self._last_write = -inf
         self._sent = self._underruns = 0
+
+    def _clock_of(self, step: float) -> ServoClock:
+        settings = self._settings
+        return ServoClock(
+            step=step, target=settings.target_lag, closed=settings.closed_loop,
+            most=min(settings.most_lag, settings.buffer_depth * step))
 
     # ---- what is known ------------------------------------------------------------------------
 
@@ -227,29 +245,44 @@ class ServoStream:
         :param now: time of a steady clock [s].
         """
         before, self._latest = self._latest, feedback
-        if self.phase is Phase.OPENING:
-            self._open(feedback)
+        if self.phase is Phase.OPENING and not self._open(feedback):
+            return None
         self._note_read(feedback)
+        self._note_done()
         self._look(feedback)
         if before is not None:
             self._pass(feedback.timestamp - before.timestamp, feedback)
-        if self.phase is Phase.LEFT or now < self._last_write + LEAST_PAUSE * self._settings.step:
+        if self.phase is Phase.LEFT or now < self._last_write + LEAST_PAUSE * self._clock.step:
             return None
         self._last_write = now
         self._advance()
         return self._row()
 
-    def _open(self, feedback: ServoFeedback) -> None:
+    def _open(self, feedback: ServoFeedback) -> bool:
+        """Learn from the first packets; return whether they were enough."""
+        self._times.append(feedback.timestamp)
+        if len(self._times) < FIRST_PACKETS:
+            return False
+        step = min(b - a for a, b in pairwise(self._times))
+        if step > 0.0:
+            self._clock = self._clock_of(1.0 / round(1.0 / step))
         last = feedback.last_sequence
         self._sequence = last if 0 <= last < LAST_SEQUENCE else 0
         self._first = self._sequence + 1
         self._change(Change.OPENED)
+        return True
 
     def _note_read(self, feedback: ServoFeedback) -> None:
         """Forget what the robot has read."""
         if feedback.last_sequence <= self._sequence:  # else it is not about ours
             while self._unread and self._unread[0][0] <= feedback.last_sequence:
                 self._read_time = self._unread.popleft()[1]
+
+    def _note_done(self) -> None:
+        """Find how far the arm was led."""
+        done = self._state_time - self.under_way + 0.5 * self._clock.step
+        while self._behind and self._behind[0][0] <= done:
+            self.motion_time = self._behind.popleft()[1]
 
     def _look(self, feedback: ServoFeedback) -> None:
         """Find what the packet changes."""
@@ -262,11 +295,11 @@ class ServoStream:
                 and self.under_way >= self._enough:
             self._change(Change.FILLED)
         elif phase is Phase.SERVOING and feedback.lag <= 0.0 and feedback.playing \
-                and self.under_way <= 0.5 * self._settings.step:
+                and self.under_way <= 0.5 * self._clock.step:
             self._underruns += 1
             self._pace = 0.0
             self._change(Change.EMPTY)
-        elif phase is Phase.DRAINING and self.under_way <= 0.5 * self._settings.step:
+        elif phase is Phase.DRAINING and self.under_way <= 0.5 * self._clock.step:
             self._change(Change.DONE)
 
     def _is_left(self, feedback: ServoFeedback) -> bool:
@@ -291,15 +324,18 @@ class ServoStream:
         if self.phase in (Phase.FILLING, Phase.SERVOING, Phase.HOLDING):
             steps = self._clock.take(self.under_way)
             if steps:
-                self._send(steps * self._settings.step)
+                self._sent += steps
+                self._send(steps * self._clock.step)
                 self._unread.append((self._sequence, self._state_time))
 
     def _send(self, time: float) -> None:
         """Make the next set-point."""
         moves = self.phase is Phase.SERVOING
-        self._joints = self._source.next(self._pace * time if moves else 0.0)
+        passed = self._pace * time if moves else 0.0
+        self._joints = self._source.next(passed)
+        self._asked += passed
         self._state_time += time
-        self._sent += 1
+        self._behind.append((self._state_time, self._asked))
         if moves and self._source.done:
             self._change(Change.AT_END)
 

@@ -192,6 +192,11 @@ class RobotLink:
         """Send points to the robot program."""
         self._program.send_points(data)
 
+    def send_servo(self, on: bool) -> None:
+        """Have the robot program enter the buffered servo, or leave it and brake."""
+        self._program.send_servo(on)
+        self._evidence.note('the driver entered the servo' if on else 'the driver left the servo')
+
     def send_command(self, data: bytes) -> bool:
         """Send a single command to the robot program; False = it is not there."""
         return self._program.send_command(data)
@@ -326,7 +331,9 @@ class RobotLink:
                 trajectory_port=ports['trajectory_port'],
                 script_command_port=ports['script_command_port'],
                 version=(version.major, version.minor, version.bugfix),
-                stop_deceleration=s.stop_deceleration))
+                stop_deceleration=s.stop_deceleration,
+                servoj_gain=s.servoj_gain, servoj_lookahead_time=s.servoj_lookahead_time,
+                servo_buffer_depth=s.servo_buffer_depth, allow_teach=s.allow_teach))
         self._tell(ports=ports)
 
     # ---- what comes in ------------------------------------------------------------------------

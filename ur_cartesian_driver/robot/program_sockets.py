@@ -55,6 +55,8 @@ class ProgramSockets:
         self.text = ''
         #: A goal runs: its keepalives are another message.
         self.busy = False
+        #: It goes through the buffered servo, whose keepalives are yet another one.
+        self.servo = False
         #: The program is paused and reads nothing: it is not sent more than it can read at once,
         #: because a START must not stand behind the keepalives of an hour.
         self.deaf = False
@@ -156,8 +158,16 @@ class ProgramSockets:
             due = max(due + self._settings.keepalive_period, loop.time())
             await asyncio.sleep(due - loop.time())
 
+    def send_servo(self, on: bool) -> None:
+        """Have the program enter the buffered servo, or leave it and stand."""
+        self.servo = on
+        self._send(reverse.buffered_servo(self._read_timeout) if on
+                   else reverse.keepalive(self._read_timeout))
+
     def _send_keepalive(self) -> None:
-        if self.busy:
+        if self.servo:
+            self.send_servo(True)
+        elif self.busy:
             self.send_control(TrajectoryAction.NOOP, 0)
         else:
             self._send(reverse.keepalive(self._read_timeout))

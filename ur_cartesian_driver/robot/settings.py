@@ -50,6 +50,13 @@ class LinkSettings:
     io_publish_rate: float = 25.0
     #: Deceleration of the leading axis for every stop [rad/s^2].
     stop_deceleration: float = 4.0
+    #: SERVO: how stiff ``servoj`` holds a set-point (100 to 2000), how far it looks ahead [s]
+    #: (0.03 to 0.2), and how many set-points the buffer of the robot program holds.
+    servoj_gain: float = 2000.0
+    servoj_lookahead_time: float = 0.03
+    servo_buffer_depth: int = 250
+    #: Whether people may push the arm in the teach mode of the servo.
+    allow_teach: bool = False
 
     def __post_init__(self) -> None:
         """
@@ -58,6 +65,9 @@ class LinkSettings:
         :raises ValueError: names the field, its value and the bound.
         """
         self._check_dialect()
+        self._require_within('servoj_gain', 100.0, 2000.0)
+        self._require_within('servoj_lookahead_time', 0.03, 0.2)
+        self._require_within('servo_buffer_depth', 20, 1000)
         for address in self.allowed_peers:
             _require_address('allowed_peers', address)
         self._require_positive('robot_receive_timeout', 'keepalive_period', 'stop_deceleration')
@@ -86,6 +96,11 @@ class LinkSettings:
                 f"headless_mode sends our own robot program, which understands '{NEWEST.name}'; "
                 'leave wire_dialect out, or set headless_mode to false and start the program that '
                 'is saved on the robot.')
+
+    def _require_within(self, name: str, low: float, high: float) -> None:
+        value = getattr(self, name)
+        if not low <= value <= high:
+            raise ValueError(f'{name} is {value:g}, it has to be within {low:g} and {high:g}.')
 
     def _require_positive(self, *names: str) -> None:
         for name in names:

@@ -292,6 +292,17 @@ DECLARATIONS: tuple[Declaration, ...] = (
                 0.0, 50.0),
     Declaration('servo_state_rate', 'How often ~/servo_state is published at most [Hz]; 0: never.',
                 0.0, 500.0),
+    Declaration('servoj_gain', 'SERVO: how stiff servoj holds a set-point.', 100.0, 2000.0),
+    Declaration('servoj_lookahead_time', 'SERVO: how far servoj looks ahead, and so lags behind '
+                '[s].', 0.03, 0.2),
+    Declaration('servo_target_lag', 'SERVO: motion time that is under way to the arm, so how long '
+                'nothing may come through [s].', 0.008, 0.2),
+    Declaration('servo_buffer_depth', 'SERVO: set-points that the buffer of the robot program '
+                'holds; servo_target_lag has to fit in at 500 Hz.', 20, 1000),
+    Declaration('servo_max_divergence', 'SERVO: the robot program stops the arm when a joint is '
+                'farther from its set-point [rad].', 0.01, 3.0),
+    Declaration('allow_teach', 'Whether people may push the arm in the teach mode of the servo; '
+                'the robot program is made for it.'),
     Declaration('stream_horizon', 'Goals with keep_open: planned time of the motion that the '
                 'robot is given ahead [s]; at least twice stream_margin.', 0.1, 60.0),
     Declaration('stream_margin', 'Goals with keep_open: how long before the robot runs out of '
