@@ -170,7 +170,6 @@ class TrajectoryMachine:
             case LinkLost(link='program', reason=reason):
                 return Signal.PROGRAM_STOPPED, f'the robot program hung up: {reason}'
             case LinkLost(link=link, reason=reason):
-                reason = reason.removeprefix(f'{link}: ')
                 return Signal.CONNECTION_LOST, f'the {link} connection was lost: {reason}'
             case Tick():
                 return self._late(now)

@@ -285,10 +285,11 @@ class RobotLink:
         while True:
             try:
                 reason = await self._session()
+                told = f'RTDE: {reason}'
                 retry.reset()
             except (OSError, DriverError) as error:
-                reason = str(error)
-            self._on_robot_lost(reason)
+                reason = told = str(error)
+            self._on_robot_lost(reason, told)
             await retry.pause()
 
     async def _session(self) -> str:
@@ -414,15 +415,15 @@ class RobotLink:
         self._change(Change.PROGRAM_LOST, program_running=False)
         self._on_event(LinkLost(link='program', reason=reason))
 
-    def _on_robot_lost(self, reason: str) -> None:
-        """Take note that the robot is gone, or never was there."""
-        self._evidence.note(reason)
-        news = stamped(reason, self._status.last_error) if self._robot is None else stamped(
+    def _on_robot_lost(self, reason: str, told: str) -> None:
+        """Take note that the robot is gone, or never was there; people are told by whom."""
+        self._evidence.note(told)
+        news = stamped(told, self._status.last_error) if self._robot is None else stamped(
             f"The robot is gone. {'; '.join(self.chain())}.")
         before, self._robot, self._signals = self._robot, None, None
         self._program.deaf = False  # nobody knows; too many messages are better than none
         self._change(Change.ROBOT_LOST, calibration_known=False, last_error=news,
-                     message=f"No connection to the robot: {reason.rstrip('.')}.")
+                     message=f"No connection to the robot: {told.rstrip('.')}.")
         if before is not None:
             self._on_event(LinkLost(link='RTDE', reason=reason))
 

@@ -84,13 +84,13 @@ class RtdeConnection:
         self._connection.send(self._inputs[0].pack_named(values))
 
     async def ended(self) -> str:
-        """Wait until the connection breaks or the robot falls silent, and return why it ended."""
+        """Wait until the connection breaks or the robot falls silent; return why, as a clause."""
         loop = asyncio.get_running_loop()
         while loop.time() - self._last_packet < self._silence:
             await asyncio.wait({self._closed}, timeout=self._silence / 10.0)
             if self._closed.done():
-                return f'RTDE: {self._closed.result()}'
-        return f'RTDE: the robot sent nothing for {self._silence:g} s'
+                return self._closed.result()
+        return f'the robot sent nothing for {self._silence:g} s'
 
     def close(self) -> None:
         """Hang up."""
