@@ -240,7 +240,6 @@ class RelayWithEcho(Relay):
     def pass_on(self, source: socket.socket, way: Way) -> None:
         """Treat the robot's packets and the echo's answers apart."""
         if way.noted == 'rtde_port':
-            self._release()  # the echo is late: the robot loop shall not wait for it
             with suppress(OSError):  # it has hung up, which its own way tells
                 self._pass_state_on(source, way)
         elif way.noted == 'echo':
@@ -249,10 +248,14 @@ class RelayWithEcho(Relay):
             super().pass_on(source, way)
 
     def _pass_state_on(self, source: socket.socket, way: Way) -> None:
-        if len(source.recv(65536, socket.MSG_PEEK)) != FRAME_SIZE:
+        packets, rest = divmod(len(source.recv(65536, socket.MSG_PEEK)), FRAME_SIZE)
+        if rest or not packets:
             super().pass_on(source, way)  # the handshake, or the end
-            return
-        data = source.recv(FRAME_SIZE)
+        for _ in range(0 if rest else packets):  # several where we were kept from looking
+            self._release()  # the echo is late: the robot loop shall not wait for it
+            self._pass_packet_on(source.recv(FRAME_SIZE), way)
+
+    def _pass_packet_on(self, data: bytes, way: Way) -> None:
         is_awaited = self.pushed is None and is_pushed(data)
         if is_awaited:
             self.pushed = cycle_of(data), time.monotonic_ns()
