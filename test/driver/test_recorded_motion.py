@@ -3,8 +3,10 @@
 """Whole goals against the simulated controller, and whether their recordings say what happened."""
 
 import asyncio
+from dataclasses import replace
 
 import numpy as np
+from open_goals import circle, OpenMotion
 import pytest
 from robot_cell import CYCLE, run_cell
 
@@ -12,7 +14,7 @@ from ur_cartesian_driver.driver.recording import Recording
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import Goal, Segment, Waypoint
+from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Segment, Waypoint, ZERO6
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.faults import Action, Event, Slider, Travelled
@@ -136,3 +138,29 @@ def test_a_goal_does_not_care_for_a_directory_that_cannot_be_written(tmp_path):
     outcome, log = run_cell(scenario, record_directory=str(blocked))
     assert outcome.succeeded
     assert ['record_directory' in line for line in log].count(True) == 1
+
+
+@pytest.mark.parametrize('late', [False, True], ids=['in time', 'late'])
+def test_the_recording_of_an_open_goal_has_the_path_that_was_gone(tmp_path, late):
+    """The ending that each part was planned with is in the plan only where the arm went it."""
+    async def scenario(cell):
+        home = cell.memory.read().actual_tcp_pose
+        motion = OpenMotion(cell, Goal(
+            waypoints=tuple(circle(home, 1, 4)), execution=ExecutionMode.SPLINE, keep_open=True))
+        await motion.until(lambda: motion.motion.progress and (
+            motion.progress.waits if late else motion.progress.time_remaining < 0.6))
+        points = circle(home, 5, 4)
+        points[-1] = replace(points[-1], time=points[-1].time + 0.1, twist=ZERO6)
+        await motion.append(points, last=True)
+        return await motion.ended()
+
+    outcome = run_cell(scenario, record_directory=str(tmp_path))
+    assert outcome.succeeded, outcome.text
+    (found,) = recorded(tmp_path)
+    off = found.deviation()
+    assert off.target_position.max() < 3e-4
+    assert off.waypoint[-1] == found.planned_point[-1] == 7
+    assert np.all(np.diff(found.planned_time) >= 0.0)
+    assert len(found.points) == 8
+    assert ('rest' in ' '.join(outcome.report)) == late
+    assert np.nanmax(found.buffered) < 1.5
