@@ -30,6 +30,7 @@ from ur_cartesian_driver.driver.channel import (
     Notice,
     Request,
     ResendProgram,
+    ServoChanged,
     Shutdown,
     SignalsChanged,
     StartMotion,
@@ -473,6 +474,9 @@ class Driver(RobotServices, LiveMotions):
                     call = self._calls.pop(number, None)
                 if call is not None:
                     call.set_result(answer)
+            case ServoChanged(report=report):
+                for listener in list(self._servo_listeners):
+                    call_back(listener, report)
             case StatusChanged(status=status):
                 self._set_status(status)
             case SignalsChanged(signals=signals):

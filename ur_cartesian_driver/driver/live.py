@@ -209,7 +209,7 @@ def live_order(arm: Arm, start: Joints, options: PlanningOptions) -> LiveOrder:
     return LiveOrder(
         settings=LiveSettings(limits=limits, max_age=options.servo_target_max_age,
                               timeout=options.servo_target_timeout),
-        geometry=arm.geometry, start=start)
+        ur_type=arm.model.name, geometry=arm.geometry, start=start)
 
 
 def standing_plan(state: RobotState) -> Plan:

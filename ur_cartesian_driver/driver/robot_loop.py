@@ -25,6 +25,7 @@ import socket
 from typing import TypeVar
 
 from ur_cartesian_driver.driver.channel import (
+    AimMotion,
     Alive,
     CallAnswered,
     CallRobot,
@@ -64,6 +65,7 @@ from ur_cartesian_driver.execution import (
     LendTcp,
     OpenServo,
     Order,
+    Remark,
     Report,
     ReportServo,
     ReturnTcp,
@@ -77,6 +79,7 @@ from ur_cartesian_driver.execution import (
     TrajectoryMachine,
     WriteServo,
 )
+from ur_cartesian_driver.execution.live_machine import LiveMachine
 from ur_cartesian_driver.kinematics.robots import Geometry
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
@@ -208,6 +211,9 @@ class RobotLoop:
                 await self._start(request)
             case ExtendMotion():
                 self._extend(request)
+            case AimMotion(motion=motion, T_base_tcp=T_base_tcp, age=age):
+                if motion == self._motion and isinstance(self._machine, LiveMachine):
+                    self._machine.aim(T_base_tcp, age, self._now())
             case CancelMotion(motion=motion, preempted_by=by):
                 if motion == self._motion:
                     self._recorder.note('cancel', by and f'preempted by {by}')
@@ -224,7 +230,9 @@ class RobotLoop:
 
     async def _start(self, request: StartMotion) -> None:
         """Start a motion, or refuse it with the reason."""
-        machine = await _apart(len(request.points), machine_of, request, self._config)
+        # The kinematics of a calibrated arm take longer to prepare than a keepalive waits.
+        size = len(request.points) if request.live is None else LARGE
+        machine = await _apart(size, machine_of, request, self._config)
         reason = self._link.not_ready()
         if self._machine is not None or self._unexplained is not None:
             reason = 'Another motion is running; wait for its end or cancel it.'
@@ -371,6 +379,8 @@ class RobotLoop:
                     self._leave_servo()
                 case ReportServo(report=report):
                     self._notify(ServoChanged(motion=self._motion, report=report))
+                case Remark(text=text):
+                    self._log(logging.WARNING, text)
                 case AnswerExtension():
                     self._answer_extension(command)
                 case Finish(outcome=outcome):

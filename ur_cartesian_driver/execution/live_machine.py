@@ -22,6 +22,7 @@ from ur_cartesian_driver.execution.target_follower import TargetFollower
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Event
+from ur_cartesian_driver.motion.goal import ZERO6
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.servo import ServoFeedback
@@ -84,32 +85,24 @@ class LiveMachine(ServoMachine):
         return 'following live targets' if self._started else 'before anything moved'
 
 
-class _Stand:
-    """Set-points of an arm that is guided: there are none."""
+class _NoSetpoints:
+    """What an arm that is guided by hand gets; in the mode TEACH nobody reads it."""
 
     done = False
 
-    def __init__(self, q: Joints) -> None:
-        self._q = q
-
     def next(self, dt: float) -> Joints:
-        """Return where the arm stood."""
-        return self._q
+        """Return something."""
+        return ZERO6
 
 
 class TeachMachine(ServoMachine):
-    """
-    The robot program lets the arm be guided by hand, until it is told to end that.
+    """The robot program lets the arm be guided by hand, until it is told to end that."""
 
-    :param start: where the arm stands [rad].
-    """
-
-    def __init__(self, order: Order, start: Joints, *, settings: ServoSettings, **more: Any
-                 ) -> None:
+    def __init__(self, order: Order, *, settings: ServoSettings, **more: Any) -> None:
         """Take an order to stand; nothing happens before :meth:`start`."""
-        super().__init__(order, settings=settings, source=_Stand(start),
+        super().__init__(order, settings=settings, source=_NoSetpoints(),
                          **more | {'max_plan_deviation': ANY_WAY})
-        self.stream: TeachStream = TeachStream(_Stand(start), settings)
+        self.stream: TeachStream = TeachStream(settings)
 
     def _progress_of_stream(self) -> tuple[Signal | None, str]:
         if self.stream.trouble:
@@ -130,9 +123,9 @@ class TeachMachine(ServoMachine):
 class TeachStream(ServoStream):
     """The registers of an arm that is guided: the mode TEACH in the place of set-points."""
 
-    def __init__(self, source: _Stand, settings: ServoSettings) -> None:
+    def __init__(self, settings: ServoSettings) -> None:
         """Wait for the first packet."""
-        super().__init__(source, settings)
+        super().__init__(_NoSetpoints(), settings)
         self._begun = False
         self._asked_at = 0.0
         #: Whether the robot program has let the arm go.
