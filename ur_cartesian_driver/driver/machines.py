@@ -41,6 +41,12 @@ def machine_of(request: StartMotion, config: DriverConfig) -> TrajectoryMachine:
     return TrajectoryMachine(request.order, **settings)
 
 
+def is_slow(request: StartMotion) -> bool:
+    """Tell whether a machine takes long to make: the kinematics of a calibrated arm do."""
+    live = request.live
+    return live is not None and live.geometry != robot_model(live.ur_type).geometry
+
+
 def _servo_machine(request: StartMotion, **settings: Any) -> ServoMachine:
     live = request.live
     if live is not None:

@@ -52,7 +52,7 @@ from ur_cartesian_driver.driver.channel import (
     TcpReturned,
     unpack,
 )
-from ur_cartesian_driver.driver.machines import machine_of
+from ur_cartesian_driver.driver.machines import is_slow, machine_of
 from ur_cartesian_driver.driver.recorder import head_of, Recorder
 from ur_cartesian_driver.driver.records_to_send import RecordsToSend
 from ur_cartesian_driver.driver.snapshot import StateMemory
@@ -230,9 +230,8 @@ class RobotLoop:
 
     async def _start(self, request: StartMotion) -> None:
         """Start a motion, or refuse it with the reason."""
-        # The kinematics of a calibrated arm take longer to prepare than a keepalive waits.
-        size = len(request.points) if request.live is None else LARGE
-        machine = await _apart(size, machine_of, request, self._config)
+        machine = await _apart(LARGE if is_slow(request) else len(request.points),
+                               machine_of, request, self._config)
         reason = self._link.not_ready()
         if self._machine is not None or self._unexplained is not None:
             reason = 'Another motion is running; wait for its end or cancel it.'
