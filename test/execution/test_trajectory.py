@@ -20,7 +20,7 @@ from ur_cartesian_driver.execution import (
 )
 from ur_cartesian_driver.execution.observer import STALL_BOUND
 from ur_cartesian_driver.execution.states import Signal, State, STOPS, TRANSITIONS
-from ur_cartesian_driver.execution.stream import StreamMachine
+from ur_cartesian_driver.execution.stream import PATIENCE, StreamMachine
 from ur_cartesian_driver.execution.tcp_loan import CARRIED_OUT
 from ur_cartesian_driver.execution.trajectory import GATHER, STOP_BOUND, TCP_BOUND
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -102,7 +102,7 @@ def brought_to(state):
     if state in (State.CLOSING, State.WAITING):
         machine = StreamMachine(order(open_end=True, ending=1), max_plan_deviation=(0.0, 0.0))
         machine.start(robot().state)
-        machine.step(robot(), 0.0)
+        machine.step(robot(timestamp=PATIENCE), PATIENCE)
         if state is State.WAITING:
             machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 1.0)
         assert machine.state is state

@@ -40,6 +40,10 @@ from ur_cartesian_driver.motion.events import Event
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 
+#: How long a motion that is only its ending so far waits for more before it begins [s]: the robot
+#: program waits half a second for its first point.
+PATIENCE = 0.25
+
 #: In these a goal takes more points.
 _TAKES = frozenset({State.ARMING, State.MOVING, State.CLOSING, State.WAITING})
 
@@ -74,6 +78,8 @@ class StreamMachine(TrajectoryMachine):
         self._firm = order.points - order.ending
         #: How many were sent before this stream, and whether its number was told.
         self._stream_from = 0
+        #: When it was begun, by the robot's clock [s].
+        self._stream_since = 0.0
         self._is_counted = False
         #: How often the motion was closed, and where the last time.
         self._closed = self._closed_at = 0
@@ -141,7 +147,7 @@ class StreamMachine(TrajectoryMachine):
     def _begin(self, state: RobotState) -> list[Command]:
         self._deadline = inf
         self._started, self._is_counted, self._rests = True, False, False
-        self._stream_from = self._window.sent
+        self._stream_from, self._stream_since = self._window.sent, state.timestamp
         self._observer.resume(state, self._window.sent)
         return [SendControl(action=TrajectoryAction.STREAM_START), *self._release(0)]
 
@@ -178,8 +184,15 @@ class StreamMachine(TrajectoryMachine):
     def _starves(self) -> bool:
         """Tell whether the program is soon going to ask for a point that nobody has given."""
         sent = self._window.sent
-        left = self._records.asked(sent) - self._observer.time()
-        return self._is_open and sent == self._firm and left <= self._settings.margin
+        if not self._is_open or sent != self._firm:
+            return False
+        if sent == self._stream_from:
+            return self._robot_time() - self._stream_since >= PATIENCE
+        return self._records.asked(sent) - self._observer.time() <= self._settings.margin
+
+    def _robot_time(self) -> float:
+        state = self._observer.latest
+        return 0.0 if state is None else state.timestamp
 
     def _late(self, now: float) -> tuple[Signal | None, str]:
         if self.state is State.WAITING and now >= self._deadline:

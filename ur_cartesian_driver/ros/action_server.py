@@ -110,6 +110,11 @@ class CartesianActionServer:
         with self._lock:
             return not self._runs
 
+    def run_of(self, key: bytes) -> GoalRun | None:
+        """Return the run of a goal that has not ended, by the bytes of its id."""
+        with self._lock:
+            return self._runs.get(key)
+
     def stop(self) -> None:
         """Stop the arm, end all goals and take no new ones; returns at once."""
         with self._lock:
@@ -271,6 +276,10 @@ class GoalRun:
         self._server = server
         self._lock = threading.Lock()
         self._motion: Motion | None = None
+        #: Set when the motion has begun, or never will.
+        self._begun = threading.Event()
+        #: The last request for more points that was granted, and its response.
+        self.answered: tuple[object, Any] | None = None
         self._given_up = threading.Event()
         self._cancel_requested = False
 
@@ -278,6 +287,17 @@ class GoalRun:
     def is_for_later(self) -> bool:
         """Tell whether its time is still to come when it is received."""
         return self.start_time > self.received
+
+    def motion(self, timeout: float) -> Motion | None:
+        """Return its motion, waiting for its begin; None: there is none [s]."""
+        self._begun.wait(timeout)
+        return self._motion
+
+    @property
+    def points(self) -> int:
+        """How many points it has, where it may have more."""
+        motion = self._motion
+        return motion.continuing.points if motion is not None and motion.continuing else 0
 
     def cancel(self) -> None:
         """Stop, because the client wants it."""
@@ -315,6 +335,8 @@ class GoalRun:
                 text=f'The driver has a defect, {type(error).__name__}: {error}; its log says '
                      'more.'))
             raise
+        finally:
+            self._begun.set()
         if outcome.code is ErrorCode.CANCELLED and self._cancel_requested:
             self._wait_until_cancel_is_noted()
         self._server.ended(self, outcome)
@@ -386,6 +408,7 @@ class GoalRun:
         with self._lock:
             self._motion = motion
             given_up = self._given_up.is_set()
+        self._begun.set()
         if given_up:
             motion.cancel()
         elif self.turn.successor:

@@ -30,6 +30,7 @@ from ur_cartesian_driver.motion.goal import (
     ZERO6,
 )
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector3, Vector6
+from ur_cartesian_driver.planning.continuation import Addition
 from ur_cartesian_driver.ros.frames import Frames, Stand
 
 #: Generated message classes carry no types.
@@ -68,6 +69,22 @@ def goal_from_message(message: Message, frames: Frames, *, now: int,
             for i, command in enumerate(message.io_commands)),
         keep_open=message.keep_open,
     ), trajectory, frames, now=now, stand=stand)
+
+
+def addition_from_message(message: Message) -> Addition:
+    """
+    Return what an ``AppendPoints.Request`` appends.
+
+    :raises InvalidGoal: an enumeration has no such value; the text names the field.
+    """
+    return Addition(
+        waypoints=tuple(map(_waypoint, message.points)),
+        segments=tuple(
+            _segment(segment, f'segments[{i}]') for i, segment in enumerate(message.segments)),
+        io_commands=tuple(
+            _io_command(command, f'io_commands[{i}]')
+            for i, command in enumerate(message.io_commands)),
+        last=message.last)
 
 
 def placed(goal: Goal, trajectory: Message, frames: Frames, *, now: int,

@@ -29,6 +29,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.ros.action_server import CartesianActionServer
+from ur_cartesian_driver.ros.append_points import AppendService
 from ur_cartesian_driver.ros.parameters import declare, overrides, ParameterError, Value
 from ur_cartesian_driver.ros.services import Services
 from ur_cartesian_driver.ros.servo_topics import ServoStates, ServoTargets, TeachService
@@ -88,6 +89,8 @@ class CartesianDriverNode(Node):
         self._parts.append(self._publisher)
         self.action_server = CartesianActionServer(self, self.driver, settings)
         self._parts.append(self.action_server)
+        self._append_service = AppendService(self, self.action_server)
+        self._parts.append(self._append_service)
         turns = self.action_server.turns
         if settings.node.servo_state_rate > 0.0:
             self._servo_states = ServoStates(self, self.driver, settings.node.servo_state_rate)

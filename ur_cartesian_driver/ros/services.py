@@ -173,10 +173,14 @@ class PromisedService:
         promise.add_done_callback(lambda kept: self._send(kept.result(), header))
 
     def _send(self, answer: Answer, header: Any) -> None:
-        response = self._kind.Response(success=answer.ok, message=answer.text)
+        response = self._response(answer)
         # The node, or all of ROS, may have ended meanwhile.
         with contextlib.suppress(InvalidHandle, RCLError):
             self._send_now(response, header)
+
+    def _response(self, answer: Any) -> Any:
+        """Return the response of what was promised."""
+        return self._kind.Response(success=answer.ok, message=answer.text)
 
 
 def kept(text: str, *, ok: bool = False) -> Future[Answer]:

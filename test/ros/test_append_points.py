@@ -1,0 +1,64 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Points that are appended to a running goal by the service of the node."""
+
+import pytest
+from unique_identifier_msgs.msg import UUID
+
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.srv import AppendPoints
+
+pytestmark = pytest.mark.slow
+
+
+class Producer:
+    """Appends to the goals of a cell."""
+
+    def __init__(self, cell):
+        self.cell = cell
+        self._client = cell.client_node.create_client(
+            AppendPoints, '/ur_cartesian_driver/append_points')
+        cell.spin_until(self._client.service_is_ready)
+
+    def __call__(self, handle, first_index, *steps, goal_id=None, **fields):
+        points = self.cell.goal(*steps).trajectory.points
+        return self.cell.await_(self._client.call_async(AppendPoints.Request(
+            goal_id=goal_id or handle.goal_id, first_index=first_index, points=points,
+            **fields)))
+
+
+def test_a_goal_is_continued_once_for_each_request_and_ends_with_the_last(single_cell):
+    cell = single_cell
+    append = Producer(cell)
+    handle = cell.send(cell.goal((1.0, 0.03, 0.0, 0.0), keep_open=True))
+    said = append(handle, 1, (2.0, 0.03, 0.03, 0.0), (3.0, 0.0, 0.03, 0.0))
+    assert said.accepted, said.message
+    assert (said.points_received, said.message) == (3, '2 points appended, the goal has 3.')
+    again = append(handle, 1, (2.0, 0.03, 0.03, 0.0), (3.0, 0.0, 0.03, 0.0))
+    assert again == said, 'it came twice and was taken once'
+    for index, step, text in (
+            (5, (4.0, 0.0, 0.0, 0.0), 'first_index is 5, but the goal has 3 points; append'),
+            (2, (4.0, 0.0, 0.0, 0.0), 'first_index is 2, but the goal has 3 points; go on with'),
+            (3, (4.0, 3.0, 0.0, 0.0), 'points[3]')):
+        refused = append(handle, index, step)
+        assert (refused.accepted, refused.points_received) == (False, 3), refused.message
+        assert text in refused.message
+    stranger = append(handle, 0, (0.5, 0.0, 0.0, 0.0), goal_id=UUID(uuid=[1] * 16))
+    assert 'There is no goal with this goal_id' in stranger.message
+    assert append(handle, 3, (4.0, 0.0, 0.0, 0.0), last=True).accepted
+    _, result = cell.result(handle)
+    assert result.error_code == ErrorCode.SUCCESSFUL, result.error_string
+    assert result.error_string.startswith('All 4 points were')
+    assert max(feedback.points_received for feedback in cell.feedback) == 4
+    late = append(handle, 4, (3.0, 0.0, 0.0, 0.0))
+    assert 'it has ended, or was never sent' in late.message
+
+
+def test_nothing_is_appended_to_a_goal_that_is_as_long_as_it_is(single_cell):
+    append = Producer(single_cell)
+    handle = single_cell.send(single_cell.goal((1.0, 0.02, 0.0, 0.0)))
+    said = append(handle, 1, (2.0, 0.0, 0.0, 0.0))
+    assert said.message == 'The goal was sent without keep_open: nothing can be appended.'
+    assert not said.accepted
+    _, result = single_cell.result(handle)
+    assert result.error_code == ErrorCode.SUCCESSFUL

@@ -1,0 +1,104 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The service that appends points to a goal that is being carried out (keep_open).
+
+Points are planned in a thread of their own, one request after the other, so neither the executor
+nor the feedback waits for them; the response is sent when they are taken, or refused.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+
+from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNotReady
+from ur_cartesian_driver.ros.action_server import CartesianActionServer, GoalRun
+from ur_cartesian_driver.ros.convert import addition_from_message
+from ur_cartesian_driver.ros.services import PromisedService
+from ur_cartesian_driver.srv import AppendPoints
+
+#: How long a goal may take from its acceptance to its motion while points wait for it [s].
+BEGIN_PATIENCE = 10.0
+
+CLOSING = 'The driver node is shutting down.'
+
+
+class AppendService:
+    """Serves ``~/append_points``."""
+
+    def __init__(self, node: Node, server: CartesianActionServer) -> None:
+        """Begin to serve."""
+        self._server = server
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix='append points')
+        self._service = _Service(node, AppendPoints, '~/append_points', self._ask,
+                                 MutuallyExclusiveCallbackGroup())
+
+    def close(self) -> None:
+        """Take nothing any more; what is being planned comes to its end."""
+        self._thread.shutdown(cancel_futures=True)
+
+    def _ask(self, request: Any) -> Future[Any]:
+        promise: Future[Any] = Future()
+        try:
+            planned = self._thread.submit(self._append, request)
+        except RuntimeError:  # the thread takes no more work
+            promise.set_result(_refused(CLOSING))
+            return promise
+        planned.add_done_callback(lambda done: promise.set_result(
+            _refused(CLOSING) if done.cancelled() else done.result()))
+        return promise
+
+    def _append(self, request: Any) -> Any:
+        """Return the response to a request."""
+        run = self._server.run_of(bytes(request.goal_id.uuid))
+        if run is None:
+            return _refused('There is no goal with this goal_id that is being carried out: it '
+                            'has ended, or was never sent.')
+        try:
+            return self._appended(run, request)
+        except DriverError as error:
+            return _refused(str(error), run.points)
+        except Exception as error:
+            return _refused(f'The driver has a defect, {type(error).__name__}: {error}.',
+                            run.points)
+
+    def _appended(self, run: GoalRun, request: Any) -> Any:
+        """
+        Return the response to a request to a goal.
+
+        :raises GoalRefused: nothing was taken.
+        """
+        motion = run.motion(BEGIN_PATIENCE)
+        if motion is None or motion.continuing is None:
+            raise RobotNotReady(
+                'The goal does not move yet; append its points when it does.' if motion is None
+                else 'The goal was sent without keep_open: nothing can be appended.')
+        asked = (request.first_index, len(request.points), request.last)
+        if run.answered is not None and run.answered[0] == asked:
+            return run.answered[1]  # it came twice
+        points = motion.continuing.points
+        if request.first_index != points:
+            raise InvalidGoal(
+                'first_index', f'is {request.first_index}, but the goal has {points} points',
+                f'append point {points} first' if request.first_index > points
+                else f'go on with point {points}')
+        appended = motion.continuing.append(addition_from_message(request))
+        response = AppendPoints.Response(
+            accepted=True, message=appended.text, points_received=appended.points)
+        run.answered = (asked, response)
+        return response
+
+
+class _Service(PromisedService):
+    """Promises responses."""
+
+    def _response(self, answer: Any) -> Any:
+        return answer
+
+
+def _refused(text: str, points: int = 0) -> Any:
+    return AppendPoints.Response(accepted=False, message=text, points_received=points)
