@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ur_cartesian_driver.execution.commands import Command, Remark, Report
+from ur_cartesian_driver.execution.commands import Command, Remark
 from ur_cartesian_driver.execution.live_targets import LiveSettings, LiveTargets
 from ur_cartesian_driver.execution.order import Order
 from ur_cartesian_driver.execution.servo import ServoMachine
@@ -109,12 +109,9 @@ class TeachMachine(ServoMachine):
             return Signal.FAILURE, self.stream.trouble
         return super()._progress_of_stream()
 
-    def _inform(self, state: RobotState, now: float) -> list[Command]:
+    def _shows_goal(self) -> bool:
         """Report once the arm is let go, and not before: that is how its owner knows."""
-        commands = super()._inform(state, now)
-        if self.stream.is_guided:
-            return commands
-        return [command for command in commands if not isinstance(command, Report)]
+        return self.stream.is_guided and super()._shows_goal()
 
     def _where(self) -> str:
         return 'while the arm was guided' if self._started else 'before the arm was let go'
