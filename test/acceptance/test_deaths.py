@@ -18,10 +18,11 @@ import signal
 import socket
 import subprocess
 import threading
-from time import monotonic, sleep
+from time import monotonic
 
 from action_msgs.msg import GoalStatus
 import pytest
+from waiting import wait_for
 
 from ur_cartesian_driver.cli.demo import process
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -81,10 +82,7 @@ class Witness:
         self.speed = speed
 
     def until(self, condition, bound):
-        deadline = monotonic() + bound
-        while not condition():
-            assert monotonic() < deadline, f'waited {bound} s in vain; speed {self.speed} rad/s'
-            sleep(0.005)
+        wait_for(condition, bound, lambda: f'speed {self.speed} rad/s')
 
     def close(self):
         self._closing.set()

@@ -432,13 +432,3 @@ def test_timed_goals_keep_their_sum_or_are_too_fast(cell, spots, gap):
     assert made.duration == pytest.approx(gap * len(spots), rel=1e-6)
     slow = plan(goal, cell.state, cell.arm, PlanningOptions(on_too_fast='slow'))
     assert slow.duration == pytest.approx(made.duration)
-
-
-@pytest.mark.slow
-def test_a_thousand_points_take_well_below_a_second(cell):
-    from time import perf_counter
-    points = tuple(cell.point(0.1 * np.cos(0.05 * i) - 0.1, 0.1 * np.sin(0.05 * i), 1e-4 * i)
-                   for i in range(1, 1001))
-    begin = perf_counter()
-    plan(Goal(waypoints=points), cell.state, cell.arm, OPTIONS)
-    assert perf_counter() - begin < 1.0

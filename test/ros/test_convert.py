@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 from dataclasses import replace
 from math import inf, isnan, nan
-from time import perf_counter
 
 from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import Point, Quaternion, Twist, Vector3
@@ -258,14 +257,6 @@ def test_malformed_messages_end_with_the_code_and_the_field(spoil, code, sentenc
     with pytest.raises(GoalRefused, match=sentence) as refusal:
         check(converted(message), PlanningOptions())
     assert code_of(refusal.value) is code
-
-
-@pytest.mark.slow
-def test_twenty_thousand_points_take_less_than_a_second():
-    message = goal(*(point() for _ in range(20_000)))
-    start = perf_counter()
-    assert len(converted(message).waypoints) == 20_000
-    assert perf_counter() - start < 1.0
 
 
 def test_nan_is_not_lost_on_the_way():

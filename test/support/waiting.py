@@ -5,9 +5,9 @@
 from time import monotonic, sleep
 
 
-def wait_for(condition, timeout=5.0):
+def wait_for(condition, timeout=5.0, how_it_stands=lambda: ''):
     """Return when the condition holds, fail when it does not within the timeout [s]."""
     end = monotonic() + timeout
     while not condition():
-        assert monotonic() < end, 'waited in vain'
+        assert monotonic() < end, f'waited {timeout:g} s in vain; {how_it_stands()}'
         sleep(0.005)
