@@ -11,7 +11,7 @@ for the date in their titles, which is left out::
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, replace
 from pathlib import Path
 import sys
@@ -27,53 +27,91 @@ COLOURS = 64
 
 @dataclass(frozen=True, kw_only=True)
 class Picture:
-    """A goal, what happens to it, and what the picture is called."""
+    """What happens, in a cell in virtual time, and what the picture of it is called."""
 
-    goal: str
     title: str
-    #: As on the command line of ``ur-cartesian sim``.
-    faults: Sequence[str] = ()
-    #: Instead of the goal's own.
-    execution: str = ''
+    happens: Callable[[Any], Coroutine[None, None, Any]]
+
+
+def a_goal(name: str, *faults: str,
+           execution: str = '') -> Callable[[Any], Coroutine[None, None, Any]]:
+    """
+    Return the execution of an example.
+
+    :param faults: as on the command line of ``ur-cartesian sim``.
+    :param execution: in the place of that of the file.
+    """
+    async def happens(cell: Any) -> Any:
+        from ur_cartesian_driver.cli.commands import goal_file
+        from ur_cartesian_driver.kinematics.chain import Arm
+        from ur_cartesian_driver.kinematics.robots import robot_model
+        from ur_cartesian_driver.motion.goal import ExecutionMode
+        from ur_cartesian_driver.planning import plan, PlanningOptions
+        from ur_cartesian_driver.ros.client import load_goal
+        from ur_cartesian_driver.ros.convert import goal_from_message
+        from ur_cartesian_driver.ros.frames import Frames, Stand
+        from ur_cartesian_driver.sim.fault_text import parse_fault
+
+        state = cell.memory.read()
+        goal = goal_from_message(load_goal(goal_file(name)), Frames(), now=0,
+                                 stand=Stand.of(state))
+        cell.robot.inject(*map(parse_fault, faults))
+        if execution:
+            goal = replace(goal, execution=ExecutionMode[execution])
+        motion = cell.owner.start(plan(
+            goal, state, Arm(robot_model(cell.robot.config.model)), PlanningOptions()))
+        await cell.until(lambda: motion.outcome is not None, 120.0)
+        return motion.outcome
+
+    return happens
+
+
+async def a_late_producer(cell: Any) -> Any:
+    """Go round and round on points that come when half a second is left, but for once."""
+    from open_goals import circle, OpenMotion
+
+    from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, ZERO6
+
+    home = cell.memory.read().actual_tcp_pose
+    motion = OpenMotion(cell, Goal(waypoints=tuple(circle(home, 1, 10)), keep_open=True,
+                                   execution=ExecutionMode.SPLINE))
+    while motion.points < 80:
+        late = motion.points == 40
+        await motion.until(lambda late=late: motion.motion.progress and (
+            motion.progress.waits if late else motion.progress.time_remaining < 0.5))
+        if late:
+            await cell.sleep(0.6)
+        points = circle(home, motion.points + 1, 10)
+        last = motion.points == 70
+        if last:
+            points[-1] = replace(points[-1], time=points[-1].time + 0.1, twist=ZERO6)
+        await motion.append(points, last=last)
+    return await motion.ended()
 
 
 PICTURES = {
     'primitives': Picture(
-        goal='seam', faults=('slider 0.5 at 0.6 m', 'slider 1 at 0.7 m'),
-        title='Lines, an arc and blends (PRIMITIVES); the speed slider at 50 % for a while'),
+        title='Lines, an arc and blends (PRIMITIVES); the speed slider at 50 % for a while',
+        happens=a_goal('seam', 'slider 0.5 at 0.6 m', 'slider 1 at 0.7 m')),
     'spline': Picture(
-        goal='figure_eight',
-        title='A figure eight with times and twists (SPLINE): no stop, no corner'),
+        title='A figure eight with times and twists (SPLINE): no stop, no corner',
+        happens=a_goal('figure_eight')),
+    'servo': Picture(
+        title='The same by set-points (SERVO); the speed slider at 50 % for a while',
+        happens=a_goal('figure_eight', 'slider 0.5 at 0.3 m', 'slider 1 at 0.5 m',
+                       execution='SERVO')),
+    'open': Picture(
+        title='Points that come while the arm goes (keep_open); once they come too late',
+        happens=a_late_producer),
 }
 
 
 def record(picture: Picture, directory: Path) -> Path:
-    """Run the goal of a picture and return its recording."""
+    """Let it happen and return the recording."""
     from robot_cell import run_cell
 
-    from ur_cartesian_driver.cli.commands import goal_file
-    from ur_cartesian_driver.kinematics.chain import Arm
-    from ur_cartesian_driver.kinematics.robots import robot_model
-    from ur_cartesian_driver.motion.goal import ExecutionMode
-    from ur_cartesian_driver.planning import plan, PlanningOptions
-    from ur_cartesian_driver.ros.client import load_goal
-    from ur_cartesian_driver.ros.convert import goal_from_message
-    from ur_cartesian_driver.ros.frames import Frames, Stand
-    from ur_cartesian_driver.sim.fault_text import parse_fault
-
-    async def scenario(cell: Any) -> None:
-        state = cell.memory.read()
-        goal = goal_from_message(load_goal(goal_file(picture.goal)), Frames(), now=0,
-                                 stand=Stand.of(state))
-        if picture.execution:
-            goal = replace(goal, execution=ExecutionMode[picture.execution])
-        cell.robot.inject(*map(parse_fault, picture.faults))
-        motion = cell.owner.start(plan(
-            goal, state, Arm(robot_model(cell.robot.config.model)), PlanningOptions()))
-        await cell.until(lambda: motion.outcome is not None, 120.0)
-        assert motion.outcome.succeeded, motion.outcome
-
-    run_cell(scenario, record_directory=str(directory))
+    outcome = run_cell(picture.happens, record_directory=str(directory))
+    assert outcome.succeeded, outcome
     (file,) = directory.glob('*.npz')
     return file
 

@@ -200,9 +200,11 @@ def _draw_scaling(axes: Any, recording: Recording) -> None:
               label='speed scaling')
     axes.set_ylabel('speed\n[%]')
     axes.set_ylim(0.0, 108.0)
-    if recording.metadata.get('keep_open') or np.isfinite(recording.lag).any():
+    lags = bool(np.isfinite(recording.lag).any())
+    if lags or recording.metadata.get('keep_open'):
         other = axes.twinx()
-        other.plot(time, 1e3 * recording.lag, color=_ACTUAL, linewidth=0.9, label='lag')
+        if lags:
+            other.plot(time, 1e3 * recording.lag, color=_ACTUAL, linewidth=0.9, label='lag')
         other.plot(time, 1e3 * recording.buffered, color=_TARGET, linewidth=0.9, label='buffered')
         other.set_ylabel('[ms]')
         other.set_ylim(bottom=0.0)
