@@ -126,9 +126,9 @@ REFUSALS = [
     # not there yet
     (replace(TIMED, keep_open=True, execution=ExecutionMode.SERVO), NotAvailable,
      'keep_open is set, but the points of a SERVO goal have to be known'),
-    (replace(PLAIN, io_commands=(IOCommand(
+    (replace(TIMED, execution=ExecutionMode.SERVO, io_commands=(IOCommand(
         waypoint=0, offset=0.0, output=OutputKind.TOOL_DIGITAL, pin=0, value=1.0),)),
-     NotAvailable, 'io_commands is not empty'),
+     NotAvailable, 'io_commands is not empty, and SERVO switches no outputs'),
     (replace(PLAIN, controlled_frame='nozzle'), InvalidGoal,
      "trajectory.controlled_frame is 'nozzle'"),
     # splines

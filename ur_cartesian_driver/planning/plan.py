@@ -42,6 +42,7 @@ from ur_cartesian_driver.planning.clearance import remarks as clearance_remarks
 from ur_cartesian_driver.planning.controlled import Carried, carried, tools
 from ur_cartesian_driver.planning.leg import Leg, Timing
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.outputs import with_outputs
 from ur_cartesian_driver.planning.path import Arc
 from ur_cartesian_driver.planning.postures import (
     full,
@@ -117,14 +118,15 @@ def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> 
             Clearance(arm, T_flange_tcp, options).check(samples.q, state.actual_q),
             samples.segment, samples.fraction)))
     timings = schedule(legs, options, arm.model)
-    segments = tuple(planner.segment(leg, timing)
-                     for leg, timing in zip(legs, timings, strict=True))
+    reference = reference_path(state.actual_tcp_pose, legs, timings)
+    segments = with_outputs(
+        [planner.segment(leg, timing) for leg, timing in zip(legs, timings, strict=True)],
+        reference, goal.io_commands, corners=[timing.corner for timing in timings])
     remarks = [*about.remarks, *planner.remarks, *ignored(goal),
                *(timing.remark for timing in timings if timing.remark), *said, smallest(legs)]
     return Plan(goal=goal, segments=segments, start=state.actual_q, remarks=tuple(remarks),
-                reference=reference_path(state.actual_tcp_pose, legs, timings),
-                T_flange_active=T_flange_active, T_flange_tcp=about.T_flange_tcp,
-                T_tcp_controlled=about.T_tcp_controlled)
+                reference=reference, T_flange_active=T_flange_active,
+                T_flange_tcp=about.T_flange_tcp, T_tcp_controlled=about.T_tcp_controlled)
 
 
 def _spline_plan(planner: _Planner, about: Carried, T_flange_active: Pose) -> Plan:
@@ -137,7 +139,8 @@ def _spline_plan(planner: _Planner, about: Carried, T_flange_active: Pose) -> Pl
         SplineState(q=state.actual_q), part, planner.reach.arm, state.T_flange_tcp, options,
         first=begin, tools=tools(goal, T_flange_active))
     return Plan(
-        goal=stretched(goal, found.stretch), segments=found.segments, start=state.actual_q,
+        goal=stretched(goal, found.stretch), start=state.actual_q,
+        segments=with_outputs(found.segments, found.reference, goal.io_commands),
         reference=found.reference, remarks=(*about.remarks, *planner.remarks, *found.remarks),
         T_flange_active=T_flange_active, T_flange_tcp=about.T_flange_tcp,
         T_tcp_controlled=about.T_tcp_controlled, execution=way_of_execution(goal))

@@ -35,6 +35,7 @@ from ur_cartesian_driver.motion.goal import (
 )
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Quaternion
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.outputs import check_outputs
 from ur_cartesian_driver.planning.path import Arc, same
 from ur_cartesian_driver.planning.tolerances import tolerances_of, with_default_tolerances
 from ur_cartesian_driver.protocol.dialects import NEWEST
@@ -200,9 +201,7 @@ def _available(goal: Goal, options: PlanningOptions) -> None:
     if goal.keep_open and goal.execution == ExecutionMode.SERVO:
         raise NotAvailable('keep_open', 'is set, but the points of a SERVO goal have to be known '
                            'at its start', 'set execution to SPLINE or PRIMITIVES')
-    if goal.io_commands:
-        raise NotAvailable('io_commands', 'is not empty, but outputs cannot be switched on the '
-                           'way in this version', 'leave it empty')
+    check_outputs(goal, options)
     known = ('', options.tf_prefix + 'tool0_controller')
     if goal.T_flange_controlled is None and goal.controlled_frame not in known:
         raise InvalidGoal(
