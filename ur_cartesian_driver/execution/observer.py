@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from math import inf
 
+import numpy as np
+
 from ur_cartesian_driver.execution.monitor import PathTracker, speed
 from ur_cartesian_driver.execution.order import Order
 from ur_cartesian_driver.execution.pace import Pace
@@ -19,6 +21,7 @@ from ur_cartesian_driver.execution.states import Signal
 from ur_cartesian_driver.execution.tolerances import Watch
 from ur_cartesian_driver.motion.events import Progress
 from ur_cartesian_driver.motion.lever import seen_at
+from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
 from ur_cartesian_driver.motion.state import RobotState, RuntimeState
 
@@ -26,6 +29,8 @@ from ur_cartesian_driver.motion.state import RobotState, RuntimeState
 START_POSITION, START_ANGLE = 0.001, 0.01
 #: How long the target may stand still in the middle of a goal that nothing holds [s].
 STALL_BOUND = 2.0
+#: Rows of a path that differ by less are one place, at which the plan waits [m], [rad].
+SAME_PLACE = 1e-9
 #: How far the controller's own target may be from the plan [m], [rad].
 MAX_PLAN_DEVIATION = (0.002, 0.02)
 
@@ -58,6 +63,8 @@ class Observer:
         self._motions_before = 0
         #: How long the target has stood still while nothing held it [s].
         self._stalled_time = 0.0
+        #: The same of the controller's own time, and how much of that the plan itself may stand.
+        self._stalled_scaled, self._patience = 0.0, _patience(order.reference)
         #: The newest packet; None before the first.
         self.latest: RobotState | None = None
         #: Time since the start in which the controller's own clock ran [s].
@@ -80,7 +87,11 @@ class Observer:
             if state.runtime_state is not RuntimeState.PAUSED:
                 self.scaled_time += passed * state.speed_scaling
         self._follow(before, state, passed)
-        self._stalled_time = self._stalled_time + passed if _stands(before, state) else 0.0
+        if _stands(before, state):
+            self._stalled_time += passed
+            self._stalled_scaled += passed * state.speed_scaling
+        else:
+            self._stalled_time = self._stalled_scaled = 0.0
 
     def finish(self, time: float = inf) -> None:
         """Take note that the robot program has reported the end, or the rest at a time [s]."""
@@ -91,6 +102,7 @@ class Observer:
         self._tracker.extend(order.reference, self._records.end(behind))
         self._records.extend(order, behind)
         self._order = order
+        self._patience = max(self._patience, _patience(order.reference))
         if self.latest is not None:
             self._records.forget(self.begun(self.latest) - 2)
 
@@ -98,7 +110,7 @@ class Observer:
         """Take note that the motion goes on from rest, behind so many records."""
         self.start(state)
         self._motions_before = self._records.motions_before(sent)
-        self._stalled_time = 0.0
+        self._stalled_time = self._stalled_scaled = 0.0
         self.scaled_time = self._tracker.time()  # waiting is nobody's delay
 
     def _follow(self, before: RobotState | None, state: RobotState, passed: float) -> None:
@@ -244,12 +256,12 @@ class Observer:
 
     def _stall(self) -> tuple[Signal, str] | None:
         """Return that the arm stands for no reason, or None."""
-        if self._stalled_time < STALL_BOUND:
+        if self._stalled_time < STALL_BOUND or self._stalled_scaled < self._patience:
             return None
         return Signal.STALLED, (
-            f'the arm has stood still for {STALL_BOUND:g} s, nothing holds it, and the robot '
-            'program has not reported the end: a message to it or from it was lost, so it was '
-            'ended')
+            f'the arm has stood still for {self._stalled_time:.3g} s, nothing holds it, and the '
+            'robot program has not reported the end: a message to it or from it was lost, so it '
+            'was ended')
 
     def _path_violation(self, state: RobotState) -> tuple[Signal, str] | None:
         if not (self._path_watch and self._under_way):
@@ -273,3 +285,10 @@ def _stands(before: RobotState | None, state: RobotState) -> bool:
             and state.target_tcp_pose == before.target_tcp_pose
             and state.speed_scaling > 0.0 and state.target_speed_fraction > 0.0
             and state.runtime_state is RuntimeState.PLAYING)
+
+
+def _patience(path: ReferencePath) -> float:
+    """Return for how long the arm may stand on a path, of the controller's time [s]."""
+    waits = np.diff(path.time)[(np.abs(np.diff(path.poses, axis=0)) < SAME_PLACE).all(axis=1)]
+    longest = float(waits.max(initial=0.0))
+    return longest + STALL_BOUND if longest > 0.0 else 0.0

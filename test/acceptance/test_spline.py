@@ -1,0 +1,145 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+SPLINE, from the goal to the simulated arm: every point in time, with its twist, on the curve.
+
+What is looked at are the targets that the controller reports, packet by packet, in virtual time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import robot_cell
+from robot_cell import run_cell
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
+from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.spline_plan import SplineState
+from ur_cartesian_driver.planning.spline_points import tool_points
+from ur_cartesian_driver.planning.tool_spline import ToolSpline
+from ur_cartesian_driver.resources import share_path
+from ur_cartesian_driver.ros.client import load_goal
+from ur_cartesian_driver.ros.convert import goal_from_message
+from ur_cartesian_driver.ros.frames import Frames, Stand
+
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+
+ARM = Arm(robot_model('ur5e'))
+FOLDER = share_path() / 'config' / 'examples'
+
+
+@dataclass
+class Run:
+    """A goal that was carried out, and the targets of all packets."""
+
+    made: Plan
+    outcome: object
+    #: (n,) since the arm began to move [s]; (n, 3), (n, 6).
+    times: np.ndarray
+    places: np.ndarray
+    twists: np.ndarray
+
+    @property
+    def stands(self):
+        """When the arm is at rest again [s]."""
+        return self.times[np.flatnonzero(np.abs(self.twists).max(axis=1) > 1e-9)[-1]]
+
+    def curve(self):
+        goal, begin = self.made.goal, SplineState(q=self.made.start)
+        return ToolSpline.through(tool_points(goal, begin.tool(ARM, self.made.T_flange_active)))
+
+    def passing(self, time):
+        """Return when the tool is nearest to where the curve is at a time, and its twist then."""
+        place = self.curve().at(np.array([time])).poses[0, :3]
+        fine = np.arange(time - 0.06, time + 0.06, 1e-4)
+        way = np.stack([np.interp(fine, self.times, x) for x in self.places.T], axis=1)
+        at = fine[np.argmin(np.linalg.norm(way - place, axis=1))]
+        return at, np.array([np.interp(at, self.times, v) for v in self.twists.T])
+
+
+def carried_out(goal_from):
+    """Run a goal that is made from where the arm stands."""
+    async def scenario(cell):
+        stand = cell.memory.read()
+        made = plan(replace(goal_from(stand), execution=ExecutionMode.SPLINE), stand, ARM,
+                    PlanningOptions())
+        packets = []
+
+        def looked():
+            state = cell.memory.read()
+            if not packets or state.timestamp > packets[-1].timestamp:
+                packets.append(state)
+            return motion.outcome is not None
+        motion = cell.owner.start(made)
+        await cell.until(looked, 60.0)
+        return run_of(made, motion.outcome, packets)
+    return run_cell(scenario)
+
+
+def run_of(made, outcome, packets):
+    begin = next(before.timestamp for before, after in pairwise(packets) if any(after.target_qd))
+    return Run(made, outcome, np.array([state.timestamp - begin for state in packets]),
+               np.array([state.target_tcp_pose.position for state in packets]),
+               np.array([state.target_tcp_twist for state in packets]))
+
+
+def times_as_long(goal, factor):
+    """Return a goal that goes the same way in so many times the time."""
+    return replace(goal, waypoints=tuple(replace(
+        point, time=factor * point.time, twist=tuple(v / factor for v in point.twist),
+        acceleration=tuple(a / factor ** 2 for a in point.acceleration))
+        for point in goal.waypoints))
+
+
+def example(name, stand):
+    return goal_from_message(load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0,
+                             stand=Stand.of(stand))
+
+
+@pytest.mark.parametrize(('name', 'factor'), [
+    ('circle', 0.45),
+    *(pytest.param(name, 1.0, marks=pytest.mark.exhaustive)
+      for name in ('circle', 'figure_eight', 'seam_timed'))])
+def test_every_point_is_passed_in_time_with_its_twist_and_the_tool_keeps_to_the_curve(
+        name, factor, monkeypatch):
+    monkeypatch.setattr(robot_cell, 'CYCLE', 0.002)  # of an e-Series
+    run = carried_out(lambda stand: times_as_long(example(name, stand), factor))
+    assert run.outcome.code is ErrorCode.SUCCESSFUL, run.outcome.text
+    curve = run.curve()
+    points = run.made.goal.waypoints
+    passed = [point for point in points if any(point.twist)]
+    for point in passed:
+        asked = curve.at(np.array([point.time])).twists[0]
+        at, twist = run.passing(point.time)
+        assert abs(at - point.time) <= 2.0 * robot_cell.CYCLE, point
+        for part in (slice(0, 3), slice(3, 6)):
+            bound = 0.01 * np.linalg.norm(asked[part]) + 1e-5
+            assert np.linalg.norm(twist[part] - asked[part]) < bound, point
+    assert run.stands == pytest.approx(points[-1].time, abs=2.0 * robot_cell.CYCLE)
+    # From where the curve is around that time.
+    around = [np.linalg.norm(run.places - curve.at(run.times + lag).poses[:, :3], axis=1)
+              for lag in np.linspace(-0.006, 0.006, 25)]
+    assert np.min(around, axis=0)[run.times < run.stands].max() < 2e-4
+    between = (run.times > passed[0].time) & (run.times < passed[-1].time)
+    assert np.linalg.norm(run.twists[between, :3], axis=1).min() > 0.02
+
+
+def test_an_arm_that_waits_at_a_point_for_long_is_not_stuck():
+    def goal(stand):
+        x, y, z = stand.actual_tcp_pose.position
+        there = replace(stand.actual_tcp_pose, position=(x, y + 0.02, z))
+        return Goal(waypoints=tuple(Waypoint(time=time, pose=pose) for time, pose in (
+            (0.5, there), (4.0, there), (4.5, stand.actual_tcp_pose))))
+    run = carried_out(goal)
+    assert run.outcome.code is ErrorCode.SUCCESSFUL, run.outcome.text
+    waits = (run.times > 0.55) & (run.times < 3.95)
+    assert np.abs(run.twists[waits]).max() < 1e-4
+    assert run.stands == pytest.approx(4.5, abs=2.0 * robot_cell.CYCLE)
