@@ -18,6 +18,7 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.goal import ArcMode, ExecutionMode, OutputKind, SegmentType
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.msg import (
     CartesianPosture,
     CartesianTrajectoryPoint,
@@ -83,7 +84,8 @@ def test_every_other_field_of_a_goal_arrives():
     message = goal(point(), execution=1, keep_open=True,
                    goal_time_tolerance=Duration(sec=-1, nanosec=500_000_000),
                    io_commands=[IOCommand(point_index=0, output=2, pin=1, value=1.0,
-                                          offset=Duration(nanosec=1))])
+                                          offset=Duration(nanosec=1)),
+                                IOCommand(output=3, analog_domain=1)])
     message.path_tolerance.position_error.x = 0.1
     message.goal_tolerance.orientation_error.z = -1.0
     message.goal_tolerance.twist_error.angular.y = 0.2
@@ -94,9 +96,10 @@ def test_every_other_field_of_a_goal_arrives():
     assert result.path_tolerance.position == (0.1, 0.0, 0.0)
     assert result.goal_tolerance.orientation == (0.0, 0.0, -1.0)
     assert result.goal_tolerance.twist == (0.0, 0.0, 0.0, 0.0, 0.2, 0.0)
-    command, = result.io_commands
+    command, analog = result.io_commands
     assert (command.output, command.pin, command.value) == (OutputKind.TOOL_DIGITAL, 1, 1.0)
     assert command.offset == 1e-9
+    assert analog.domain is AnalogDomain.VOLTAGE
 
 
 def test_a_plain_goal_passes_the_checks_of_planning():

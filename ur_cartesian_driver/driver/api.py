@@ -276,8 +276,7 @@ class Driver(RobotServices, LiveMotions):
             part = opened(plan, self.arm, self._options(state))
             points, order = encoded(part, self.config.dialect)
             return self._launch(plan, points, order, on_progress, part=part)
-        points = encode_points((segment.primitive for segment in plan.segments),
-                               self.config.dialect)
+        points = encode_points(plan.instructions, self.config.dialect)
         return self._launch(plan, points, order_of(plan, self.config.dialect), on_progress)
 
     def _launch(self, plan: Plan, points: bytes, order: Order, on_progress: OnProgress | None,

@@ -50,7 +50,7 @@ def encoded(part: Part, dialect: Dialect) -> tuple[bytes, Order]:
     """Return the records of a part, and what the machine needs of it."""
     plan = part.plan
     order = order_of(plan, dialect, since=part.since, ending=part.ending)
-    return (encode_points((segment.primitive for segment in plan.segments), dialect),
+    return (encode_points(plan.instructions, dialect),
             replace(order, due=part.due))
 
 

@@ -107,7 +107,8 @@ def order_of(plan: Plan, dialect: Dialect = NEWEST, *, since: float = 0.0,
               if isinstance(segment.primitive, Spline)]
     return Order(
         points=len(waypoints), reference=plan.reference, duration=since + plan.duration,
-        due=times if times > 0.0 else None, T_base_frame=goal.T_base_frame,
+        due=times + _waits_for_outputs(plan) if times > 0.0 else None,
+        T_base_frame=goal.T_base_frame,
         T_flange_active=plan.T_flange_active, T_flange_tcp=plan.T_flange_tcp,
         T_tcp_controlled=plan.T_tcp_controlled,
         path_tolerance=goal.path_tolerance, goal_tolerance=goal.goal_tolerance,
@@ -122,6 +123,11 @@ def order_of(plan: Plan, dialect: Dialect = NEWEST, *, since: float = 0.0,
         ends=np.repeat(ends, records), asks=np.repeat(asks, records),
         spline=JointSpline.of(plan.start, pieces)
         if plan.execution is ExecutionMode.SERVO else None)
+
+
+def _waits_for_outputs(plan: Plan) -> float:
+    """Return how long after the end of the motion the last output is switched [s]."""
+    return max((output.delay for output in plan.segments[-1].outputs), default=0.0)
 
 
 def _left_at_blend(segment: PlannedSegment) -> float:

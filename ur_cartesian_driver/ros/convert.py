@@ -30,6 +30,7 @@ from ur_cartesian_driver.motion.goal import (
     ZERO6,
 )
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector3, Vector6
+from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.planning.continuation import Addition
 from ur_cartesian_driver.ros.frames import Frames, Stand
 
@@ -38,7 +39,6 @@ Message: TypeAlias = Any
 _Enum = TypeVar('_Enum', bound=IntEnum)
 
 _NO_POSTURE = Posture()
-_ANALOG_DOMAINS = 2
 
 
 def goal_from_message(message: Message, frames: Frames, *, now: int,
@@ -178,15 +178,13 @@ def _segment(segment: Message, field: str) -> Segment:
 
 
 def _io_command(command: Message, field: str) -> IOCommand:
-    if command.analog_domain >= _ANALOG_DOMAINS:
-        raise InvalidGoal(f'{field}.analog_domain', f'is {command.analog_domain}',
-                          'it is CURRENT (0) or VOLTAGE (1)')
     return IOCommand(
         waypoint=command.point_index,
         offset=seconds(command.offset),
         output=_member(OutputKind, command.output, f'{field}.output'),
         pin=command.pin,
         value=command.value,
+        domain=_member(AnalogDomain, command.analog_domain, f'{field}.analog_domain'),
     )
 
 
