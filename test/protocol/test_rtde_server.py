@@ -1,0 +1,134 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The RTDE server: what a controller does with the packages of any client."""
+
+from contextlib import suppress
+import math
+import struct
+
+from hypothesis import given
+import pytest
+from random_frames import RANDOM_FRAMES
+
+from ur_cartesian_driver.motion.errors import RemoteProtocolError
+from ur_cartesian_driver.protocol.rtde import (
+    ControllerVersion,
+    Data,
+    decode_reply,
+    RequestProtocolVersion,
+    RtdeFrameBuffer,
+    SetupInputs,
+    SetupOutputs,
+)
+from ur_cartesian_driver.protocol.rtde_server import RtdeServer
+
+VERSION = ControllerVersion(major=5, minor=21, bugfix=0)
+
+
+def server(**options):
+    return RtdeServer(VERSION, set(), **options)
+
+
+def test_a_client_may_have_several_output_recipes_with_frequencies_of_their_own():
+    controller = server()
+    controller.feed(SetupOutputs(names=('timestamp',), frequency=10.0).encode()
+                    + SetupOutputs(names=('nonsense',), frequency=10.0).encode()
+                    + SetupOutputs(names=('actual_q',), frequency=9999.0).encode()
+                    + SetupOutputs(names=('robot_mode',), frequency=math.nan).encode())
+    assert [(o.recipe.recipe_id, o.recipe.names, o.frequency) for o in controller.outputs] == [
+        (1, ('timestamp',), 10.0), (2, ('actual_q',), 500.0), (3, ('robot_mode',), 500.0)]
+    replies = [decode_reply(f) for f in RtdeFrameBuffer().feed(controller.data_to_send())]
+    assert [reply.recipe_id for reply in replies] == [1, 0, 2, 3]
+    assert replies[1].types == ('NOT_FOUND',)
+
+
+def test_in_version_1_there_is_one_output_recipe_without_id():
+    controller = server()
+    controller.feed(RequestProtocolVersion(version=1).encode()
+                    + SetupOutputs(names=('timestamp',)).encode()
+                    + SetupOutputs(names=('actual_q',)).encode())
+    (output,) = controller.outputs
+    assert len(output.recipe.pack(((0.0,) * 6,))) == 3 + 48
+    assert controller.data_to_send().endswith(b'OVECTOR6D')
+
+
+def test_a_client_with_one_recipe_may_give_it_any_id():
+    controller = server()
+    controller.feed(SetupInputs(names=('input_int_register_24',)).encode())
+    for number in (0, 1, 200):
+        (event,) = controller.feed(Data(payload=bytes([number]) + b'\0\0\0\x05').encode())
+        assert event.values == (5,)
+
+
+def test_with_several_recipes_the_id_counts():
+    controller = server()
+    for number in (24, 25):
+        controller.feed(SetupInputs(names=(f'input_int_register_{number}',)).encode())
+    (event,) = controller.feed(Data(payload=b'\2\0\0\0\x05').encode())
+    assert event.recipe.names == ('input_int_register_25',)
+    with pytest.raises(RemoteProtocolError, match='recipe 3'):
+        controller.feed(Data(payload=b'\3\0\0\0\x05').encode())
+
+
+def test_start_and_pause():
+    controller = server()
+    for kind, streaming in ((b'S', True), (b'P', False), (b'S', True)):
+        controller.feed(b'\0\3' + kind)
+        assert controller.data_to_send() == b'\0\4' + kind + b'\1'
+        assert controller.streaming is streaming
+
+
+def test_an_unknown_protocol_version_is_refused_and_nothing_changes():
+    controller = server()
+    controller.feed(RequestProtocolVersion(version=3).encode())
+    assert controller.data_to_send() == b'\0\4V\0'
+    assert controller.protocol_version == 2
+
+
+def test_inputs_before_their_recipe_are_an_error():
+    with pytest.raises(RemoteProtocolError, match='before'):
+        server().feed(Data(payload=bytes(5)).encode())
+
+
+def test_the_number_of_recipes_is_bounded():
+    controller = server()
+    request = SetupOutputs(names=('timestamp',), frequency=1.0).encode()
+    controller.feed(request * 255)
+    with pytest.raises(RemoteProtocolError, match='255'):
+        controller.feed(request)
+
+
+def test_a_client_may_write_an_input_through_several_recipes_but_two_clients_may_not():
+    taken = set()
+    one, two = RtdeServer(VERSION, taken), RtdeServer(VERSION, taken)
+    both = ('input_int_register_1', 'input_int_register_2')
+    for names in (both[:1], both):
+        one.feed(SetupInputs(names=names).encode())
+    two.feed(SetupInputs(names=both).encode())
+    replies = [decode_reply(f) for f in RtdeFrameBuffer().feed(
+        one.data_to_send() + two.data_to_send())]
+    assert [(reply.recipe_id, reply.types) for reply in replies] == [
+        (1, ('INT32',)), (2, ('INT32', 'INT32')), (0, ('IN_USE', 'IN_USE'))]
+    (event,) = one.feed(struct.pack('>HBBii', 12, ord('U'), 2, 5, 6))
+    assert event.recipe.named(event.values) == dict(zip(both, (5, 6), strict=True))
+    one.close()
+    assert not taken
+
+
+def test_a_list_of_names_may_end_with_a_comma_as_some_clients_write_it():
+    controller = server()
+    for kind, head, names in ((b'O', struct.pack('>d', 125.0), b'timestamp,actual_q,'),
+                              (b'I', b'', b'input_int_register_1,')):
+        controller.feed(struct.pack('>H', 3 + len(head + names)) + kind + head + names)
+    replies = [decode_reply(f) for f in RtdeFrameBuffer().feed(controller.data_to_send())]
+    assert [reply.types for reply in replies] == [('DOUBLE', 'VECTOR6D'), ('INT32',)]
+
+
+@given(RANDOM_FRAMES)
+def test_random_bytes_from_a_client_raise_nothing_but_a_remote_error(chunks):
+    controller = server()
+    controller.feed(SetupInputs(names=('input_int_register_24',)).encode())
+    with suppress(RemoteProtocolError):
+        for chunk in chunks:
+            controller.feed(chunk or b'\0')
+            assert len(controller.data_to_send()) < 10_000
