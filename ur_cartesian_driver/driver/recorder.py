@@ -20,6 +20,7 @@ from math import inf, nan
 from pathlib import Path
 from queue import Empty, SimpleQueue
 import threading
+from time import sleep
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,9 @@ from ur_cartesian_driver.motion.state import RobotState
 PIECE, PIECES, PERIOD = 256, 8, 0.5
 #: So much may wait for the disk; notes and pieces of the plan beyond are left out.
 MOST_WAITING = 1000
+#: How long whoever makes a file pauses behind each small part of it [s]: a thread that wants the
+#: interpreter from one that never pauses waits 5 ms and more for it.
+BREATH = 0.0002
 #: Lines of a plan's report that are kept.
 MOST_LINES = 1000
 MEGABYTE = 1_000_000
@@ -90,8 +94,10 @@ class Recorder:
         """
         self._directory, self._max_size, self._warn = directory, max_size * MEGABYTE, warn
         self._said = ''
-        self._thread: threading.Thread | None = None
-        self._jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+        #: Who writes while a motion runs, and who makes a file of it afterwards, slowly.
+        self._writer: _Worker | None = None
+        self._finisher: _Worker | None = None
+        self._is_in_hurry = False
         #: The motion that runs: its folder, belonging to the writer but for ``left_out``.
         self._folder: Folder | None = None
         # Memory for rows: the piece that is being filled, how far, and those that are free.
@@ -120,7 +126,7 @@ class Recorder:
         """
         if not self._directory:
             return
-        if self._thread is None:
+        if self._writer is None:
             self._begin_writing()
         self._folder = folder = Folder(
             Path(self._directory).expanduser(), head, self._max_size, self._say)
@@ -196,17 +202,21 @@ class Recorder:
         known = {'code': outcome.code.value, 'name': outcome.code.name, 'text': outcome.text,
                  'report': outcome.report}
         self._do(folder, lambda: folder.close(known), is_last=True)
+        if (writer := self._writer) is not None and (finisher := self._finisher) is not None:
+            writer.do(lambda: finisher.do(
+                lambda: folder.do(lambda: folder.finish(self._breathe))))
 
     def close(self, timeout: float) -> None:
         """Wait until everything is written, so long [s]; what has not ended stays a folder."""
-        thread, self._thread = self._thread, None
         if (folder := self._folder) is not None:
             self._hand_over(folder)
             self._folder = None
             self._do(folder, folder.leave, is_last=True)
-        if thread is not None:
-            self._jobs.put(None)
-            thread.join(timeout)
+        self._is_in_hurry = True
+        if self._writer is not None and self._finisher is not None:
+            self._writer.end(timeout)
+            self._finisher.end(timeout)
+        self._writer = self._finisher = None
 
     # ---- inside -------------------------------------------------------------------------------
 
@@ -224,31 +234,55 @@ class Recorder:
             folder.do(lambda: folder.write_rows(memoryview(piece)[:used]))
             self._free.put(piece)
 
-        self._jobs.put(write)  # of these there are no more than pieces
+        if self._writer is not None:
+            self._writer.do(write)  # of these there are no more than pieces
 
     def _do(self, folder: Folder, work: Callable[[], None], is_last: bool = False) -> None:
         """Have something done by the writer, unless too much waits already."""
-        if is_last or self._jobs.qsize() < MOST_WAITING:
-            self._jobs.put(lambda: folder.do(work))
+        writer = self._writer
+        if writer is not None and (is_last or writer.jobs.qsize() < MOST_WAITING):
+            writer.do(lambda: folder.do(work))
 
     def _begin_writing(self) -> None:
         size = PIECE * disk.ROW.size
         self._piece = bytearray(size)
         for _ in range(PIECES - 1):
             self._free.put(bytearray(size))
-        self._thread = threading.Thread(target=self._write, name='recorder', daemon=True)
-        self._thread.start()
+        self._is_in_hurry = False
+        self._writer, self._finisher = _Worker('recorder'), _Worker('recorder, finishing')
 
-    def _write(self) -> None:
-        """Do what is to be done, until there is nothing more to come."""
-        while (job := self._jobs.get()) is not None:
-            job()
+    def _breathe(self) -> None:
+        """Let the robot loop have the interpreter at once, should it want it."""
+        if not self._is_in_hurry:
+            sleep(BREATH)
 
     def _say(self, sentence: str) -> None:
         """Say what is wrong; once, not with each motion."""
         if sentence != self._said:
             self._said = sentence
             self._warn(sentence)
+
+
+class _Worker:
+    """A thread that does one thing after the other; it does not keep the process alive."""
+
+    def __init__(self, name: str) -> None:
+        self.jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._work, name=name, daemon=True)
+        self._thread.start()
+
+    def do(self, job: Callable[[], None]) -> None:
+        """Have something done."""
+        self.jobs.put(job)
+
+    def end(self, timeout: float) -> None:
+        """Wait until all is done, so long [s]."""
+        self.jobs.put(None)
+        self._thread.join(timeout)
+
+    def _work(self) -> None:
+        while (job := self.jobs.get()) is not None:
+            job()
 
 
 def _parameters(options: object) -> dict[str, Any]:

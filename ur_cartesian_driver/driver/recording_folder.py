@@ -55,9 +55,8 @@ class Folder:
         self.left_out = 0
 
     def open(self) -> None:
-        """Make room, and the files."""
+        """Make the files."""
         self._directory.mkdir(parents=True, exist_ok=True)
-        keep_within(self._directory, self._max_size / 2.0)
         self._path = _new(self._directory / f'{name_of(self._head)}{disk.PART}')
         self._rows = disk.GrowingArray(self._path / disk.ROWS, disk.EXECUTED)
         # Says that we live; it goes with the process, however that ends.
@@ -96,11 +95,19 @@ class Folder:
         self._notes.write(json.dumps([time, kind, text[:disk.MOST_TEXT]]).encode() + b'\n')
 
     def close(self, outcome: dict[str, Any]) -> None:
-        """Make one file out of all this."""
+        """Write what is only known at the end."""
         self._head.update(outcome=outcome, rows_left_out=self.left_out)
         self._write_head()
-        self._close_files()
-        disk.finish(self._path)
+
+    def finish(self, breathe: Callable[[], None]) -> None:
+        """
+        Make one file out of all this, and room for the next.
+
+        :param breathe: called often, to let others work.
+        """
+        disk.finish(self._path, breathe)
+        self._close_files()  # not before: till then it is ours
+        keep_within(self._directory, self._max_size, breathe)
 
     def leave(self) -> None:
         """Leave it as it is."""
@@ -143,17 +150,19 @@ def _new(path: Path) -> Path:
 # ---- what is there already ------------------------------------------------------------------
 
 
-def keep_within(directory: Path, room: float) -> None:
+def keep_within(directory: Path, room: float,
+                breathe: Callable[[], None] = lambda: None) -> None:
     """
     Finish what a process that was killed has left, then remove the oldest recordings.
 
     :param room: what they may take together [bytes].
+    :param breathe: called often, to let others work.
     """
     ours = sorted(path for path in directory.iterdir() if _OURS.fullmatch(path.name))
     for path in ours:
         if path.suffix == disk.PART and not _is_written(path):
             with suppress(OSError, ValueError):
-                disk.finish(path)
+                disk.finish(path, breathe)
     ours = [path for path in sorted(directory.glob('*.npz')) if _OURS.fullmatch(path.name)]
     sizes = [path.stat().st_size for path in ours]
     while ours and sum(sizes) > room:

@@ -11,7 +11,7 @@ array for each column. Neither needs more memory than a part of it, however long
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 import json
 from os import replace as replace_file
 from pathlib import Path
@@ -48,8 +48,8 @@ PLANNED = np.dtype([('time', '<f8'), ('pose', '<f8', 7), ('point', '<i4')])
 #: Files of a folder, and the end of its name.
 PART = '.part'
 HEAD, ROWS, PLAN, NOTES = 'metadata.json', 'executed.npy', 'planned.npy', 'events.jsonl'
-#: So many rows are looked at together.
-CHUNK = 8192
+#: So many rows are looked at together: for as long nobody else has the interpreter, 0.1 ms.
+CHUNK = 512
 #: So many events are kept. A path of a million points begins a million of them; the column
 #: ``waypoint`` has them all.
 MOST_EVENTS = 10_000
@@ -118,16 +118,19 @@ def _npy_header(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
 # ---- events ---------------------------------------------------------------------------------
 
 
-def events_of(rows: NDArray[np.void]) -> list[Event]:
+def events_of(rows: NDArray[np.void],
+              breathe: Callable[[], None] = lambda: None) -> list[Event]:
     """
     Return what changed from packet to packet: points begun, outputs, slider, program, modes.
 
     :param rows: of the type :data:`EXECUTED`, may be a file in memory.
+    :param breathe: called often, to let others work.
     """
     found: list[Event] = []
     for first in range(0, len(rows), CHUNK):
         part = rows[max(0, first - 1):first + CHUNK]
         found += sorted(_changes(part), key=lambda event: event[0])
+        breathe()
         if len(found) > MOST_EVENTS:
             last = found[MOST_EVENTS - 1][0]
             return [*found[:MOST_EVENTS - 1],
@@ -183,9 +186,10 @@ def read_notes(folder: Path) -> list[Event]:
     return notes
 
 
-def all_events(notes: Iterable[Event], rows: NDArray[np.void]) -> list[Event]:
+def all_events(notes: Iterable[Event], rows: NDArray[np.void],
+               breathe: Callable[[], None] = lambda: None) -> list[Event]:
     """Return notes and changes in the order of time."""
-    return sorted([*notes, *events_of(rows)], key=lambda event: event[0])
+    return sorted([*notes, *events_of(rows, breathe)], key=lambda event: event[0])
 
 
 def event_arrays(events: list[Event]) -> dict[str, NDArray[Any]]:
@@ -196,26 +200,28 @@ def event_arrays(events: list[Event]) -> dict[str, NDArray[Any]]:
         'event_text': np.array([text for _, _, text in events], dtype=f'<U{MOST_TEXT}')}
 
 
-def finish(folder: Path) -> Path:
+def finish(folder: Path, breathe: Callable[[], None] = lambda: None) -> Path:
     """
     Make one file out of a folder, and remove the folder.
 
+    :param breathe: called often, to let others work.
     :returns: the file.
     :raises OSError: it cannot be written; the folder stays as it was.
     """
     file = folder.with_suffix('.npz')
     unfinished = folder / file.name
-    rows, plan = (np.load(folder / name, mmap_mode='r') for name in (ROWS, PLAN))
+    # Plain arrays: those of a file make an object of their own for each look at a part of them.
+    rows, plan = (np.asarray(np.load(folder / name, mmap_mode='r')) for name in (ROWS, PLAN))
     try:
         with zipfile.ZipFile(unfinished, 'w', zipfile.ZIP_STORED) as archive:
             head = (folder / HEAD).read_text(encoding='utf-8')
             members = {'metadata': np.array(head), **event_arrays(
-                all_events(read_notes(folder), rows))}
+                all_events(read_notes(folder), rows, breathe))}
             for name, values in members.items():
                 _write_member(archive, name, values.dtype, values.shape, [values])
             for prefix, table in (('', rows), ('planned_', plan)):
                 for name in table.dtype.names or ():
-                    _write_column(archive, prefix + name, table, name)
+                    _write_column(archive, prefix + name, table[name], breathe)
     except OSError:
         unfinished.unlink(missing_ok=True)
         raise
@@ -224,13 +230,15 @@ def finish(folder: Path) -> Path:
     return file
 
 
-def _write_column(archive: zipfile.ZipFile, member: str, table: NDArray[np.void],
-                  name: str) -> None:
+def _write_column(archive: zipfile.ZipFile, name: str, column: NDArray[Any],
+                  breathe: Callable[[], None]) -> None:
     """Write a column of a table, a part after the other."""
-    dtype = table.dtype[name]
-    _write_member(archive, member, dtype.base, (len(table), *dtype.shape), (
-        np.ascontiguousarray(table[name][first:first + CHUNK])
-        for first in range(0, len(table), CHUNK)))
+    def parts() -> Iterator[NDArray[Any]]:
+        for first in range(0, len(column), CHUNK):
+            yield column[first:first + CHUNK]
+            breathe()
+
+    _write_member(archive, name, column.dtype, column.shape, parts())
 
 
 def _write_member(archive: zipfile.ZipFile, name: str, dtype: np.dtype[Any],
