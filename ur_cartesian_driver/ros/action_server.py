@@ -217,8 +217,11 @@ class CartesianActionServer:
         if self.turns.seize(run.turn):
             return
         check(goal, self._settings.planning)
-        raise RobotNotReady('Another goal is running and on_new_goal is reject; wait for its end '
-                            'or cancel it, then send this goal again.')
+        holder = self.turns.holder
+        other = 'Another goal is' if not holder or holder.startswith('goal ') \
+            else f'{holder.capitalize()} is'
+        raise RobotNotReady(f'{other} running and on_new_goal is reject; wait for its end or '
+                            'cancel it, then send this goal again.')
 
     def claim(self, run: GoalRun) -> None:
         """

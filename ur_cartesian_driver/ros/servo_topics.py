@@ -268,7 +268,8 @@ class ServoTargets:
             try:
                 self._follow(message, received)
             except DriverError as error:
-                self._logger.warning(f'A message on ~/servo_target is ignored: {error}',
+                reason = str(error).removeprefix('trajectory.')  # as of a goal, which it is not
+                self._logger.warning(f'A message on ~/servo_target is ignored: {reason}',
                                      throttle_duration_sec=COMPLAINT)
                 self._forget_future(received)
             except Exception as error:  # the next one may be better

@@ -53,6 +53,12 @@ class Turns:
         """How often the arm was given back: after each it may stand somewhere else."""
         return self._changes
 
+    @property
+    def holder(self) -> str:
+        """Who has the arm; empty: nobody."""
+        owner = self._owner
+        return '' if owner is None else owner.name
+
     def is_taken(self) -> bool:
         """Tell whether a goal has the arm."""
         return self._owner is not None
