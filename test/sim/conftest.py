@@ -1,14 +1,16 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A controller under the virtual clock: cycles pass only when a test asks for them."""
+"""A controller whose cycles pass only when a test asks for them; a robot on real ports."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import pytest
+from robot_ports import FREE
 
 from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.sim import SimulatedRobot
 from ur_cartesian_driver.sim.config import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
 
@@ -60,3 +62,10 @@ def bench() -> Bench:
 @pytest.fixture
 def make_bench() -> type[Bench]:
     return Bench
+
+
+@pytest.fixture
+def robot():
+    """Run a robot on free ports, 20 times as fast as time."""
+    with SimulatedRobot(SimulatorConfig(**FREE, rate=20.0)) as robot:
+        yield robot

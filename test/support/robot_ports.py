@@ -1,0 +1,83 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Clients of the ports of a simulated robot: real sockets on the loopback interface."""
+
+from __future__ import annotations
+
+import socket
+import struct
+
+from ur_cartesian_driver.protocol.primary import PrimaryDecoder
+
+FREE = {'rtde_port': 0, 'primary_port': 0, 'dashboard_port': 0}
+HOST = '127.0.0.1'
+
+
+class Wire:
+    """A client's socket that reads exactly what is asked for."""
+
+    def __init__(self, port: int) -> None:
+        self.socket = socket.create_connection((HOST, port), timeout=5.0)
+
+    def __enter__(self) -> Wire:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.socket.close()
+
+    def send(self, data: bytes) -> None:
+        self.socket.sendall(data)
+
+    def exactly(self, size: int) -> bytes:
+        data = b''
+        while len(data) < size:
+            data += self._more(size - len(data))
+        return data
+
+    def line(self) -> str:
+        data = b''
+        while not data.endswith(b'\n'):
+            data += self._more(1)
+        return data.decode().rstrip('\n')
+
+    def ask(self, line: str) -> str:
+        self.send(line.encode() + b'\n')
+        return self.line()
+
+    def rtde(self) -> tuple[int, bytes]:
+        size, kind = struct.unpack('>HB', head := self.exactly(3))
+        return kind, head + self.exactly(size - 3)
+
+    def _more(self, size: int) -> bytes:
+        data = self.socket.recv(size)
+        assert data, 'the robot has closed the connection'
+        return data
+
+
+class Primary(Wire):
+    """A client of the primary interface; collects frames until one fits."""
+
+    def __init__(self, port: int) -> None:
+        super().__init__(port)
+        self._decoder = PrimaryDecoder()
+        self._waiting: list[object] = []
+
+    def next(self) -> object:
+        while not self._waiting:
+            self._waiting += self._decoder.feed(self._more(65536))
+        return self._waiting.pop(0)
+
+    def await_(self, kind: type, **fields: object) -> object:
+        while True:
+            frame = self.next()
+            if isinstance(frame, kind) and all(
+                    getattr(frame, name) == value for name, value in fields.items()):
+                return frame
+
+
+def setup_inputs(*names: str) -> bytes:
+    payload = ','.join(names).encode()
+    return struct.pack('>HB', 3 + len(payload), ord('I')) + payload
+
+
+PAUSE = struct.pack('>HB', 3, ord('P'))
