@@ -4,11 +4,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from time import process_time
+
 import pytest
 
 from ur_cartesian_driver.kinematics.inverse import nearest
-from ur_cartesian_driver.motion.errors import InvalidGoal, InvalidJoints, TooFast, Unreachable
-from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.errors import (
+    GoalRefused,
+    InvalidGoal,
+    InvalidJoints,
+    TooFast,
+    Unreachable,
+)
+from ur_cartesian_driver.motion.goal import (
+    ExecutionMode,
+    Goal,
+    Posture,
+    Segment,
+    SegmentType,
+    Waypoint,
+)
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.trajectory import encode_points
@@ -111,3 +127,49 @@ def test_a_line_is_no_faster_than_the_joints(cell):
     with pytest.raises(InvalidGoal, match='limits of the joints'):
         sent(cell, turn)
     assert sent(cell, turn, on_too_fast='slow').duration > 0.9
+
+
+@pytest.mark.filterwarnings('error')
+@pytest.mark.parametrize('value', [1e-300, 1e-9, 10.0, 99.0, 1e6, 1e300])
+@pytest.mark.parametrize('field', ['linear', 'angular', 'acceleration', 'time', 'position'])
+def test_absurd_numbers_in_a_spline_are_refused_at_once_or_can_be_sent(cell, field, value):
+    point = cell.point(0.02, time=1.0, twist=(0.01, 0.0, 0.0, 0.0, 0.0, 0.0))
+    time = 1.0
+    match field:
+        case 'linear':
+            point = replace(point, twist=(value, 0.0, 0.0, 0.0, 0.0, 0.0))
+        case 'angular':
+            point = replace(point, twist=(0.0, 0.0, 0.0, value, 0.0, 0.0))
+        case 'acceleration':
+            point = replace(point, acceleration=(value, 0.0, 0.0, value, 0.0, 0.0))
+        case 'time':
+            time = min(value, 2147.0)
+            point = replace(point, time=time)
+        case _:
+            point = replace(point, pose=Pose((value, 0.0, 0.0), point.pose.quaternion))
+    goal = Goal(waypoints=(point, cell.point(time=time + 1.0)), execution=ExecutionMode.SPLINE)
+    begin = process_time()
+    for options in ({}, {'on_too_fast': 'slow', 'max_tool_speed': 0.0,
+                         'max_approach_distance': 0.0}):
+        try:
+            sent(cell, goal, self_collision='off', **options)
+        except GoalRefused:
+            assert value > 1e-8 or field in ('time', 'position')
+    assert process_time() - begin < 3.0
+
+
+def test_a_spline_that_turns_the_tool_more_than_once_around_names_its_point(cell):
+    spin = (0.0, 0.0, 0.0, 0.0, 0.0, 50.0)
+    goal = Goal(waypoints=(cell.point(time=1.0, twist=spin), cell.point(time=2.0)))
+    with pytest.raises(InvalidGoal, match=r'points\[0\] .* a turn by up to 7\.\d+ rad in betw'):
+        sent(cell, goal)
+
+
+def test_a_spline_of_kilometres_is_refused_before_it_is_looked_at(cell):
+    wide = tuple(cell.point(0.01, time=1.0 + k, twist=(40.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+                 for k in range(2000))
+    goal = Goal(waypoints=(*wide, cell.point(time=2001.0)))
+    begin = process_time()
+    with pytest.raises(InvalidGoal, match=r'a detour of|would have to be looked at in'):
+        sent(cell, goal)
+    assert process_time() - begin < 3.0

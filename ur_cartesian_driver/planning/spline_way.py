@@ -12,19 +12,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.errors import (
     GoalRefused,
+    InvalidGoal,
     InvalidPosture,
     JointLimitExceeded,
     NearSingularity,
 )
 from ur_cartesian_driver.motion.goal import Waypoint
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.lookahead import Followed, followed
+from ur_cartesian_driver.planning.lookahead import farthest_way, Followed, followed
 from ur_cartesian_driver.planning.margins import measured, Nearest, nearest_of, too_near
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.path import ARC_CHORD_ERROR
@@ -43,8 +45,10 @@ from ur_cartesian_driver.planning.validate import point_field
 # Where a piece is looked at for how fast it gets, and what it may be faster in between.
 _LOOKS = 9
 _FASTER = 1.05
-#: The most places on a piece: nobody goes 20 m at once, or turns the tool 27 times.
-_MOST_PLACES = 10_000
+#: The farthest turn from the begin of a piece [rad]: rotation vectors do not mean more.
+_FARTHEST_TURN = 2.0 * pi
+#: The most places of a goal; each takes a quarter of a kilobyte while it is looked at.
+MOST_PLACES = 2_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -93,7 +97,9 @@ def way_along(reach: Reach, spline: ToolSpline, waypoints: Sequence[Waypoint], q
     :param q_start: the configuration at its begin [rad].
     :raises GoalRefused: the arm cannot go there.
     """
-    places = _places(spline)
+    looks = _looked_at(spline)
+    _check_sizes(reach, spline, looks, first)
+    places = _places(spline, looks, first)
     pieces = _pieces(spline, places, first)
     found = followed(reach, pieces, q_start, places)
     segments = first + found.piece.astype(np.int32)
@@ -152,12 +158,36 @@ def _check_posture(reach: Reach, piece: Piece, point: Waypoint, q: Floats,
             'PRIMITIVES with a JOINT segment.')
 
 
-def _places(spline: ToolSpline) -> Places:
+def _looked_at(spline: ToolSpline) -> tuple[NDArray[np.intp], Floats]:
+    """Return some places on all pieces: piece and time since it began."""
     n = len(spline.positions)
-    h = np.diff(spline.times)
-    looks = np.repeat(np.arange(n), _LOOKS)
-    t = np.tile(np.linspace(0.0, 1.0, _LOOKS), n) * h[looks]
-    rows = spline.rows(looks, t)
+    piece = np.repeat(np.arange(n), _LOOKS)
+    return piece, np.tile(np.linspace(0.0, 1.0, _LOOKS), n) * np.diff(spline.times)[piece]
+
+
+def _check_sizes(reach: Reach, spline: ToolSpline, looks: tuple[NDArray[np.intp], Floats],
+                 first: int) -> None:
+    """Refuse pieces on which twists and accelerations carry the tool away for nothing."""
+    n = len(spline.positions)
+    x, turn = spline.vectors(*looks)
+    x = x.reshape(n, _LOOKS, 3)
+    detour = (np.linalg.norm(np.diff(x, axis=1), axis=2).sum(axis=1)
+              - np.linalg.norm(x[:, -1] - x[:, 0], axis=1))
+    angle = np.linalg.norm(turn, axis=1).reshape(n, _LOOKS).max(axis=1)
+    for sizes, most, what, unit in (
+            (detour, farthest_way(reach), 'a detour of', 'm'),
+            (angle, _FARTHEST_TURN, 'a turn by up to', 'rad')):
+        k = int(np.argmax(sizes > most))
+        if sizes[k] > most:
+            raise InvalidGoal(
+                point_field(first + k), f'and the point before it ask for {what} {sizes[k]:.3g} '
+                f'{unit} in between, by their twists and accelerations; more than {most:.3g} '
+                f'{unit} make no sense', 'check units, directions, and the time in between')
+
+
+def _places(spline: ToolSpline, looks: tuple[NDArray[np.intp], Floats], first: int) -> Places:
+    n, h = len(spline.positions), np.diff(spline.times)
+    rows = spline.rows(*looks)
 
     def largest(vectors: Floats) -> Floats:
         most: Floats = np.linalg.norm(vectors, axis=1).reshape(n, _LOOKS).max(axis=1)
@@ -166,8 +196,14 @@ def _places(spline: ToolSpline) -> Places:
         h * largest(rows.twists[:, :3]) / STEP_LENGTH,
         h * largest(rows.twists[:, 3:]) / STEP_ANGLE,
         h * np.sqrt(largest(rows.accelerations[:, :3]) / (8.0 * ARC_CHORD_ERROR))], axis=0)
-    count = np.clip(np.ceil(steps), np.minimum(LEAST_PLACES, np.ceil(1.25 * steps) + 1.0),
-                    _MOST_PLACES).astype(np.intp)
+    count = np.maximum(np.ceil(steps), np.minimum(LEAST_PLACES, np.ceil(1.25 * steps) + 1.0))
+    if count.sum() > MOST_PLACES:
+        k = int(np.argmax(count))
+        raise InvalidGoal(
+            'trajectory.points', f'ask for a way so long, or so fast (most of all to points'
+            f'[{first + k}]), that it would have to be looked at in {count.sum():.3g} places, '
+            f'more than {MOST_PLACES:,}', 'check twists and accelerations, or split the goal')
+    count = count.astype(np.intp)
     piece = np.repeat(np.arange(n), count)
     number = np.arange(1, len(piece) + 1) - np.repeat(np.cumsum(count) - count, count)
     u = number / count[piece]

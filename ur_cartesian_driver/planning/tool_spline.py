@@ -96,6 +96,10 @@ class ToolSpline:
         return ToolRows(np.concatenate([x.x, normalized_rows(turned)], axis=1),
                         np.concatenate([x.v, w], axis=1), np.concatenate([x.a, e], axis=1))
 
+    def vectors(self, piece: Ints, t: Floats) -> tuple[Floats, Floats]:
+        """Return positions [m] and rotation vectors since the piece began [rad] (m, 3)."""
+        return (evaluated(self.positions[piece], t).x, evaluated(self.turns[piece], t).x)
+
     def at(self, times: Floats) -> ToolRows:
         """Return the tool at times (m,) [s]; where two pieces meet on the second one."""
         piece = np.clip(np.searchsorted(self.times, times, side='right') - 1,

@@ -48,6 +48,10 @@ LARGEST_JOINT_VALUE = 8.0 * pi
 LARGEST_DELAY = 60.0
 #: The shortest way of a spline from point to point [s].
 LEAST_SPLINE_TIME = 0.001
+#: What points of splines may ask for before it is absurd [m], [m/s, rad/s], [m/s^2, rad/s^2].
+FARTHEST_POINT = 1000.0
+LARGEST_TWIST = 100.0
+LARGEST_ACCELERATION = 10_000.0
 
 Rule: TypeAlias = Callable[[Goal, PlanningOptions], None]
 _Enum = TypeVar('_Enum', bound=IntEnum)
@@ -240,6 +244,13 @@ def _spline(goal: Goal, options: PlanningOptions) -> None:
                 point_field(i, 'time_from_start'), f'gives the segment {point.time - before:g} s; '
                 f'pieces of splines take at least {LEAST_SPLINE_TIME:g} s', 'leave points out')
         before = point.time
+        for field, values, most in (('pose.position', point.pose.position, FARTHEST_POINT),
+                                    ('twist', point.twist, LARGEST_TWIST),
+                                    ('acceleration', point.acceleration, LARGEST_ACCELERATION)):
+            if any(abs(value) > most for value in values):
+                raise InvalidGoal(point_field(i, field), f'contains a number beyond {most:g}, far '
+                                  'more than any of these robots can do', 'check the units: '
+                                  'metres, radians, seconds')
     for i, segment in enumerate(goal.segments):
         if segment is not PLAIN:
             _spline_segment(i, segment, name)
