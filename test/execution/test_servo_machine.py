@@ -172,7 +172,9 @@ def test_a_program_that_leaves_by_itself_ends_the_goal():
         cell.cycle()
     cell.row = (0, *cell.row[1:])
     cell.event(ServoReceived(feedback=registers(0, cell.row[1], timestamp=cell.now)))
-    assert cell.outcome.code is ErrorCode.EXECUTION_FAILED
+    assert cell.goal.state is State.ENDING
+    cell.until(State.ENDED)
+    assert cell.outcome.code is ErrorCode.PROGRAM_STOPPED
     assert 'left the servo by itself' in cell.outcome.text
 
 

@@ -163,8 +163,9 @@ class ServoMachine(TrajectoryMachine):
         if self.state is State.STOPPING:
             return Signal.CANCELED, ''
         if self.state in (State.MOVING, State.SETTLING):
-            return Signal.FAILURE, ('the robot program left the servo by itself; its log on the '
-                                    'pendant says why')
+            # It does so where it is about to end, for a reason that we may hear of in a moment.
+            return Signal.PROGRAM_STOPPED, ('the robot program left the servo by itself; its log '
+                                            'on the pendant says why')
         return None, ''
 
     def _judge(self, state: RobotState, now: float) -> tuple[Signal | None, str]:
