@@ -18,6 +18,8 @@ from ur_cartesian_driver.sim.modes import OPERATIONAL
 
 #: How long the arm is watched after somebody has unlocked or played, and a goal that waits [s].
 WATCHED = 0.2
+#: How long an arm that is inside all tolerances may still creep [s].
+STANDING = 0.05
 #: How long the next goal may take [s].
 NEXT_BOUND = 2.0
 
@@ -36,14 +38,16 @@ async def let_happen(cell: RobotCell, cause: str):
     elif cause == 'silent owner':
         cell.owner.silent = True
     elif cause == 'freeze all':
+        cell.guests += [end.peer for end in setpoint_connections(cell)]
         for port in set(cell.loop.servers) - {robot_cell.OWNER_PORT}:
             cell.loop.freeze(port)
     elif what == 'set-points':
-        end = setpoint_connection(cell)
+        (end,) = setpoint_connections(cell)
         if kind == 'cut':
-            end.abort()
+            end.peer.abort()
         else:
             end.frozen = end.peer.frozen = True
+            cell.guests.append(end.peer)
     elif cause == 'take the inputs':
         cell.guests.append(await take_inputs())
     elif kind == 'freeze':
@@ -54,11 +58,10 @@ async def let_happen(cell: RobotCell, cause: str):
         cell.robot.inject(cause)
 
 
-def setpoint_connection(cell: RobotCell):
-    """Return the connection on which the driver writes set-points, the end that dialled."""
-    (end,) = (end for end in cell.loop.open_ends(robot_cell.RTDE)
-              if SERVO_INPUTS[0].encode() in end.peer.received)
-    return end
+def setpoint_connections(cell: RobotCell):
+    """Return the connections on which set-points are written, the ends that dialled."""
+    return [end for end in cell.loop.open_ends(robot_cell.RTDE)
+            if SERVO_INPUTS[0].encode() in end.peer.received]
 
 
 async def take_inputs():
@@ -70,7 +73,7 @@ async def take_inputs():
 
 
 async def let_pass(cell: RobotCell):
-    """End the faults that last."""
+    """End the faults that last; also the robot finds out about dead connections that bind it."""
     cell.robot.clear_faults()
     while cell.guests:
         cell.guests.pop().close()
@@ -110,6 +113,8 @@ async def do(cell: RobotCell, step: str):
             cell.robot.set_speed_slider(1.0)
         case 'start the controller':
             await cell.reboot_robot()
+            await cell.until(lambda: cell.status.state is ConnectionState.CONNECTED, 5.0)
+        case 'wait for the robot':
             await cell.until(lambda: cell.status.state is ConnectionState.CONNECTED, 5.0)
         case 'wait until it is over':
             await let_pass(cell)
@@ -158,7 +163,7 @@ async def scenario(cell: RobotCell, row: Row, phase: str, kind=AroundCorners):
     outcome = goal.motion.outcome
     assert outcome.code is row.code, f'{here}: {outcome}'
     assert outcome.text, here
-    await cell.until(cell.at_rest, max(0.0, begin + row.rest - cell.loop.time()), here)
+    await cell.until(cell.at_rest, max(STANDING, begin + row.rest - cell.loop.time()), here)
     if not row.waits:
         await cell.until(lambda: cell.status.state is row.then, row.then_within, here)
         assert cell.is_ready() or cell.status.message, here

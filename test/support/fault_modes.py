@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 from fault_table import CONTINUED, HEADLESS, LOCAL, Row
 
 from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
-E = ErrorCode
+E, S = ErrorCode, ConnectionState
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +49,7 @@ FAULTS_OF_RTDE = (
     'safeguard stop', 'somebody switches the arm off',
     'all connections are cut for 0.1 s, RTDE first',
     'all connections are cut for 0.1 s, the program first', 'RTDE is half-open',
-    'RTDE is silent for 1.5 s', 'RTDE carries less than it should', 'garbage on RTDE',
+    'RTDE is silent for 1.5 s', 'garbage on RTDE',
     'the reverse socket is cut', 'the trajectory socket is cut')
 #: Where the program stands on the pendant.
 ON_THE_PENDANT = (
@@ -94,11 +95,18 @@ def _times(row: Row, undisturbed: float, differing: dict[str, object]) -> dict[s
 
 def _mode(name: str, about: str, phases: dict[str, str], undisturbed: float,
           changes: dict[str, dict[str, dict[str, object]]], *, faults: Iterable[str] = FAULTS,
-          more: tuple[Row, ...] = ()) -> Mode:
+          more: tuple[Row, ...] = (),
+          changes_there: dict[str, dict[str, dict[str, object]]] | None = None) -> Mode:
+    """
+    Return a way of execution.
+
+    :param changes_there: those of the rows of the pendant, where they are others.
+    """
     return Mode(
         name=name, about=about, phases=phases, undisturbed=undisturbed,
         headless=chosen(HEADLESS, faults, phases, undisturbed, changes) + more,
-        local=chosen(LOCAL, ON_THE_PENDANT, phases, undisturbed, changes),
+        local=chosen(LOCAL, ON_THE_PENDANT, phases, undisturbed,
+                     changes if changes_there is None else changes_there),
         continued=chosen(CONTINUED, ('protective stop',), phases, undisturbed, changes))
 
 
@@ -113,11 +121,26 @@ SPLINE = _mode(
 #: What is a matter of the set-points' own connection.
 SETPOINTS = (
     Row(fault='the connection of the set-points is cut', cause=('cut set-points',),
-        code=E.CONNECTION_LOST),
+        code=E.CONNECTION_LOST, differs={'entering': {'code': E.ROBOT_NOT_READY}}),
     Row(fault='the connection of the set-points is half-open', cause=('freeze set-points',),
-        code=E.CONNECTION_LOST),
+        code=E.PROGRAM_STOPPED, bound=0.7, rest=0.7, then=S.CONNECTED,
+        steps=('wait until it is over', 'resend'),
+        differs={'cancelling': {'code': E.CANCELLED, 'then': S.READY,
+                                'steps': ('wait until it is over',)}}),
+    Row(fault='RTDE is 0.05 s late', cause=('delay rtde 0.05 s',), code=E.SUCCESSFUL, bound=4.0,
+        rest=4.0, steps=('wait until it is over',),
+        differs={'cancelling': {'code': E.CANCELLED, 'bound': 0.7, 'rest': 0.7}}),
     Row(fault='another client has taken the inputs that set-points need', phases=('idle',),
         cause=('take the inputs',), code=E.ROBOT_NOT_READY, steps=('wait until it is over',)))
+
+#: Nothing has moved yet, and the goal ends because the robot does not answer.
+_NOT_ENTERED = {'entering': {'code': E.ROBOT_NOT_READY}}
+#: The program has read that it is to leave, and the arm stands: it is over.
+_LEFT_PAUSED = {'cancelling': {'bound': 0.7, 'steps': ('play',)}}
+#: Set-points stay away, so the robot program brakes and ends; then the driver finds that the
+#: robot is silent.
+_DEAF = {'': {'code': E.PROGRAM_STOPPED, 'bound': 0.7, 'rest': 0.7, 'then': S.DISCONNECTED,
+              'then_within': 1.5, 'steps': ('wait for the robot', 'resend'), 'back': 3.0}}
 
 SERVO = _mode(
     'SERVO', 'The same half circle as set-points, which the robot program buffers.',
@@ -125,9 +148,26 @@ SERVO = _mode(
      'between points': 'on the way from the second point to the third',
      'slowing down': 'on the way to the last point, a tenth of a second before it',
      'cancelling': 'the driver has left the mode of set-points, the arm still moves'},
-    1.8, {'the reverse socket is half-open': {'slowing down': {'code': E.SUCCESSFUL}},
-          'the node is silent': {'slowing down': {'code': E.SUCCESSFUL}}},
-    faults=(*FAULTS[:-3], *FAULTS[-2:], *FAULTS_OF_RTDE), more=SETPOINTS)
+    1.8, {
+        'somebody pauses the program': _LEFT_PAUSED,
+        'the network cable is cut': _NOT_ENTERED | {
+            '': {'steps': ('wait until it is over', 'resend')}},
+        'protective stop that the driver does not see': _NOT_ENTERED,
+        'RTDE is cut': _NOT_ENTERED,
+        'RTDE is half-open': _DEAF,
+        'RTDE is silent for 1.5 s': _DEAF,
+        'garbage on RTDE': _DEAF,
+        "the program's answers are lost": {
+            '': {'code': E.SUCCESSFUL, 'then': S.READY, 'steps': ('wait until it is over',)}},
+        'the reverse socket is half-open': {'slowing down': {'code': E.SUCCESSFUL}},
+        'the node is silent': {'slowing down': {'code': E.SUCCESSFUL}}},
+    faults=(*(name for name in FAULTS if name not in (
+        'the trajectory socket is half-open', 'RTDE is 0.1 s late')), *FAULTS_OF_RTDE),
+    more=SETPOINTS, changes_there={
+        'somebody pauses the program': _LEFT_PAUSED,
+        'the network cable is cut': _NOT_ENTERED | {
+            '': {'steps': ('wait until it is over', 'play')}},
+        'protective stop that the driver does not see': _NOT_ENTERED})
 
 OUTPUTS = _mode(
     'Outputs', 'PRIMITIVES around two corners; one output is switched in the second corner, '
@@ -150,4 +190,4 @@ OPEN = _mode(
         'emergency stop', "another client's program replaces ours", 'the controller crashes',
         "the program's sockets are cut")))
 
-MODES = (SPLINE, OPEN)
+MODES = (SPLINE, SERVO, OPEN)
