@@ -100,6 +100,9 @@ PICTURES = {
         title='The same by set-points (SERVO); the speed slider at 50 % for a while',
         happens=a_goal('figure_eight', 'slider 0.5 at 0.3 m', 'slider 1 at 0.5 m',
                        execution='SERVO')),
+    'outputs': Picture(
+        title='A bead of glue: a valve that opens and closes on the way (io_commands)',
+        happens=a_goal('glue')),
     'open': Picture(
         title='Points that come while the arm goes (keep_open); once they come too late',
         happens=a_late_producer),
@@ -110,7 +113,7 @@ def record(picture: Picture, directory: Path) -> Path:
     """Let it happen and return the recording."""
     from robot_cell import run_cell
 
-    outcome = run_cell(picture.happens, record_directory=str(directory))
+    outcome = run_cell(picture.happens, record_directory=str(directory), io_publish_rate=125.0)
     assert outcome.succeeded, outcome
     (file,) = directory.glob('*.npz')
     return file

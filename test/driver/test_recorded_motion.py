@@ -14,7 +14,15 @@ from ur_cartesian_driver.driver.recording import Recording
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Segment, Waypoint, ZERO6
+from ur_cartesian_driver.motion.goal import (
+    ExecutionMode,
+    Goal,
+    IOCommand,
+    OutputKind,
+    Segment,
+    Waypoint,
+    ZERO6,
+)
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.faults import Action, Event, Slider, Travelled
@@ -164,3 +172,37 @@ def test_the_recording_of_an_open_goal_has_the_path_that_was_gone(tmp_path, late
     assert len(found.points) == 8
     assert ('rest' in ' '.join(outcome.report)) == late
     assert np.nanmax(found.buffered) < 1.5
+
+
+def test_the_recording_of_a_stream_of_set_points_has_its_lag(tmp_path):
+    async def scenario(cell):
+        home = cell.memory.read().actual_tcp_pose
+        points = circle(home, 1, 10)
+        points[-1] = replace(points[-1], twist=ZERO6)
+        return await executed(cell, Goal(
+            waypoints=tuple(points), execution=ExecutionMode.SERVO))
+
+    _, outcome, _ = run_cell(scenario, record_directory=str(tmp_path))
+    assert outcome.succeeded, outcome.text
+    (found,) = recorded(tmp_path)
+    under_way = (found.waypoint >= 1) & (found.waypoint < 9)
+    assert np.isfinite(found.lag[1:]).all()
+    assert found.lag[under_way].min() > 0.0
+    assert found.lag[under_way].max() < 0.2
+    assert found.buffered[under_way].max() < 0.2
+    assert found.deviation().target_position.max() < 1e-3
+
+
+def test_an_output_that_the_goal_switches_is_recorded_where_it_switched(tmp_path):
+    async def scenario(cell):
+        goal = replace(corner(cell), io_commands=(IOCommand(
+            waypoint=0, offset=0.0, output=OutputKind.STANDARD_DIGITAL, pin=5, value=1.0),))
+        return await executed(cell, goal)
+
+    _, outcome, _ = run_cell(scenario, record_directory=str(tmp_path), io_publish_rate=125.0)
+    assert outcome.succeeded, outcome.text
+    (found,) = recorded(tmp_path)
+    ((time, text),) = [(time, text) for time, kind, text in found.events if kind == 'output']
+    assert text == 'standard digital output 5: on'
+    place = found.actual_pose[np.searchsorted(found.time, time), :3]
+    assert np.linalg.norm(place - found.points[0, :3]) < 0.004  # within 3 cycles

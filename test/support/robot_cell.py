@@ -151,8 +151,8 @@ class RobotCell:
             power_on_time=0.05, brake_release_time=0.05, secondary_port=30002,
             realtime_port=30003, interpreter_port=30020))
         self.config = DriverConfig(
-            headless_mode=self.headless, node_timeout=NODE_TIMEOUT, io_publish_rate=5.0,
-            **self._settings)
+            **{'headless_mode': self.headless, 'node_timeout': NODE_TIMEOUT,
+               'io_publish_rate': 5.0} | self._settings)
         await asyncio.start_server(self.owner.serve, HOST, OWNER_PORT)
         reader, self._pipe = await asyncio.open_connection(HOST, OWNER_PORT)
         descriptor = snapshot.create()
