@@ -127,7 +127,9 @@ class TargetFollower:
         self._bounds = _Bounds(arm, T_flange_tcp, limits)
         # The joints of the place where the tool would rest, from the last cycle.
         self._q_stop = q
-        #: Whether the target is another one than that which the arm was stopped for.
+        #: Length of the last cycle [s].
+        self._dt = 0.0
+        # Whether the target is another one than that which the arm was stopped for.
         self._is_new = False
 
     def stand_at(self, q: Joints) -> None:
@@ -170,16 +172,18 @@ class TargetFollower:
         :param dt: nominal time to it [s].
         """
         self.slowed = 1.0
+        # The speed of the cycle before was chosen for its length, and cannot be undone in less.
+        change, self._dt = max(dt, self._dt), dt
         if self.blocked and self._is_new and self.at_rest:
             self._is_new = False
             if self._is_open():
                 self.blocked = ''
-        linear, angular = self._wanted(dt)
+        linear, angular = self._wanted(dt, change)
         if self._target is not None and not self.blocked:
             self.blocked = self._why_not(linear, angular, dt)
             if self.blocked:
                 self._is_new = False
-                linear, angular = self._braked(dt)
+                linear, angular = self._braked(change)
         if linear == ZERO and angular == ZERO:
             self.linear = self.angular = ZERO
         else:
@@ -188,20 +192,26 @@ class TargetFollower:
 
     # ---- speeds -------------------------------------------------------------------------------
 
-    def _wanted(self, dt: float) -> tuple[Vector3, Vector3]:
-        """Return the speeds of the next cycle towards the target, or towards rest."""
-        if self._target is None or self.blocked:
-            return self._braked(dt)
-        limits, (linear, angular) = self.limits, _way(self.T_base_tcp, self._target)
-        return (_towards(linear, self.linear, limits.linear_velocity,
-                         limits.linear_acceleration, dt),
-                _towards(angular, self.angular, limits.angular_velocity,
-                         limits.angular_acceleration, dt))
+    def _wanted(self, dt: float, change: float) -> tuple[Vector3, Vector3]:
+        """
+        Return the speeds of the next cycle towards the target, or towards rest.
 
-    def _braked(self, dt: float) -> tuple[Vector3, Vector3]:
+        :param change: for so long they may change [s].
+        """
+        if self._target is None or self.blocked:
+            return self._braked(change)
+        limits, (linear, angular) = self.limits, _way(self.T_base_tcp, self._target)
+        return (_changed(self.linear, _towards(
+                    linear, limits.linear_velocity, limits.linear_acceleration, dt),
+                    limits.linear_acceleration * change),
+                _changed(self.angular, _towards(
+                    angular, limits.angular_velocity, limits.angular_acceleration, dt),
+                    limits.angular_acceleration * change))
+
+    def _braked(self, change: float) -> tuple[Vector3, Vector3]:
         limits = self.limits
-        return (_changed(self.linear, ZERO, limits.linear_acceleration * dt),
-                _changed(self.angular, ZERO, limits.angular_acceleration * dt))
+        return (_changed(self.linear, ZERO, limits.linear_acceleration * change),
+                _changed(self.angular, ZERO, limits.angular_acceleration * change))
 
     # ---- places -------------------------------------------------------------------------------
 
@@ -358,9 +368,9 @@ def _way(here: Pose, there: Pose) -> tuple[Vector3, Vector3]:
         multiply(there.quaternion, conjugate(here.quaternion))))
 
 
-def _towards(way: Vector3, speed: Vector3, most: float, acceleration: float, dt: float) -> Vector3:
+def _towards(way: Vector3, most: float, acceleration: float, dt: float) -> Vector3:
     """
-    Return the speed of the next cycle on a way that is to end at rest.
+    Return the speed that is wanted in the next cycle on a way that is to end at rest.
 
     The speed v of which the cycle of length dt and braking by b dt in each one after it cover the
     distance d is v = sqrt((b dt / 2)^2 + 2 b d) - b dt / 2: after each such cycle the formula
@@ -368,11 +378,11 @@ def _towards(way: Vector3, speed: Vector3, most: float, acceleration: float, dt:
     """
     distance = hypot(*way)
     if distance < _THERE:
-        return _changed(speed, ZERO, acceleration * dt)
+        return ZERO
     half = 0.5 * _RESERVE * acceleration * dt
     fast = min(most, sqrt(half * half + 2.0 * _RESERVE * acceleration * distance) - half,
                distance / dt)
-    return _changed(speed, _scaled(way, fast / distance), acceleration * dt)
+    return _scaled(way, fast / distance)
 
 
 def _changed(speed: Vector3, wanted: Vector3, most: float) -> Vector3:

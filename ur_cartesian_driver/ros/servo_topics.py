@@ -32,7 +32,7 @@ from std_srvs.srv import SetBool
 
 from ur_cartesian_driver.driver import Driver, Motion
 from ur_cartesian_driver.driver.live import check_pose, LiveSession
-from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, InvalidGoal
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.servo import ServoActivity, ServoReport
@@ -298,11 +298,14 @@ class ServoTargets:
         """
         Begin a session, if nothing else has the arm.
 
-        :raises GoalRefused: something has, the robot is not ready, or the target cannot be meant.
+        :raises GoalRefused: the robot is not ready, or the target cannot be meant.
         """
         turn = Turn(SESSION, lambda: self._make_way_for(turn.successor))
         if not self._turns.seize_for_now(turn):
-            raise RobotNotReady('A goal has the arm; live targets are followed when it has ended.')
+            self._logger.info(
+                f'Live targets are ignored as long as {self._turns.holder} has the arm.',
+                throttle_duration_sec=COMPLAINT)
+            return
         try:
             session = self._driver.follow_targets(T_base_tcp, age=age)
         except BaseException:

@@ -1,0 +1,80 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""How parameters become bounds of live targets, and the way to the robot loop."""
+
+from dataclasses import replace
+
+import pytest
+
+from ur_cartesian_driver.driver.channel import AimMotion, LENGTH, pack, StartMotion, unpack
+from ur_cartesian_driver.driver.config import DriverConfig
+from ur_cartesian_driver.driver.live import live_order, standing_order, standing_plan
+from ur_cartesian_driver.driver.machines import is_slow, machine_of
+from ur_cartesian_driver.execution.live_machine import LiveMachine, TeachMachine
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.pose import IDENTITY
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.sim.config import HOME
+
+UR5E = robot_model('ur5e')
+ARM = Arm(UR5E)
+HERE = ARM.forward(HOME)
+STATE = RobotState(timestamp=0.0, actual_q=HOME, target_q=HOME, actual_tcp_pose=HERE,
+                   target_tcp_pose=HERE)
+
+
+def limits(**options):
+    return live_order(ARM, HOME, PlanningOptions(**options)).settings.limits
+
+
+@pytest.mark.parametrize(('most', 'expected'), [(0.1, 0.1), (0.0, 0.25), (1.0, 0.25)])
+def test_the_tool_is_never_faster_than_max_tool_speed(most, expected):
+    assert limits(max_tool_speed=most).linear_velocity == expected
+
+
+def test_joints_are_as_fast_as_both_bounds_allow():
+    assert limits(servo_target_joint_velocity=1.0).joint_velocity == (1.0,) * 6
+    assert limits(servo_target_joint_velocity=9.0).joint_velocity == UR5E.max_joint_speed
+
+
+def test_margins_and_planes_are_those_of_goals():
+    found = limits(singularity_margin_elbow=0.2, tool_radius=0.03,
+                   workspace_planes=('table 0 0 0.1 0 0 2 0.02',))
+    assert found.singularity_margins == (0.05, 0.2, 0.02)
+    assert found.tool_radius == 0.03
+    (table,) = found.planes
+    assert (table.name, table.normal, table.margin) == ('table', (0.0, 0.0, 1.0), 0.02)
+
+
+def sent(message):
+    """Return a message as the robot loop gets it."""
+    return unpack(pack(message)[LENGTH.size:])
+
+
+def start(arm=ARM, **fields):
+    return sent(StartMotion(motion=7, points=b'', order=standing_order(standing_plan(STATE)),
+                            live=live_order(arm, HOME, PlanningOptions()), **fields))
+
+
+def test_a_session_and_its_targets_come_through_the_pipe():
+    machine = machine_of(start(), DriverConfig())
+    assert isinstance(machine, LiveMachine)
+    aim = sent(AimMotion(motion=7, T_base_tcp=HERE, age=0.05))
+    machine.aim(aim.T_base_tcp, aim.age, 10.0)
+    assert machine.live.taken == 1
+    assert isinstance(machine_of(replace(start(), live=None, teach=True), DriverConfig()),
+                      TeachMachine)
+
+
+def test_only_a_calibrated_arm_takes_long():
+    other = Arm(UR5E, replace(UR5E.geometry, a=(0.0, -0.4252, -0.3925, 0.0, 0.0, 0.0)))
+    assert is_slow(start(other))
+    assert not is_slow(start())
+    assert not is_slow(replace(start(), live=None))
+
+
+def test_a_plan_that_stands_has_nothing_on_the_wire():
+    plan = standing_plan(STATE)
+    assert (plan.segments, plan.report, plan.T_flange_active) == ((), (), IDENTITY)
