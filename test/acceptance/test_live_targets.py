@@ -17,7 +17,7 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.sim.builtins.motion import HandGuided
 
-pytestmark = pytest.mark.acceptance
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 ARM = Arm(robot_model('ur5e'))
 #: How often somebody tells a target [s].

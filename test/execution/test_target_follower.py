@@ -106,6 +106,7 @@ OFFSETS = st.tuples(*[st.floats(-0.08, 0.08)] * 3)
 TURNS = st.tuples(*[st.floats(-0.5, 0.5)] * 3)
 
 
+@pytest.mark.slow
 @settings(max_examples=6, deadline=None, derandomize=True)
 @given(jumps=st.lists(st.tuples(OFFSETS, TURNS, st.floats(0.02, 0.3)), min_size=1, max_size=4))
 def test_wherever_targets_jump_it_stays_within_bounds_and_arrives_at_the_last(jumps):
@@ -200,6 +201,7 @@ STOPS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('what', STOPS)
 def test_it_stops_smoothly_before(what):
     limits, q, target_of, words = STOPS[what]
