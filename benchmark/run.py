@@ -22,8 +22,8 @@ import time
 
 from figures import as_json, Figure, machine, table
 
-#: Those that are told how long to measure; the soak is no part of a usual run.
-RTDE_RATE, SOAK = 'rtde_rate', 'soak'
+#: Those that are told how much to measure; soak and open goal are no part of a usual run.
+RTDE_RATE, SOAK, OPEN_GOAL = 'rtde_rate', 'soak', 'open_goal'
 #: In the order of the table: what is measured with many processes first.
 MODULES = ('goal_on_wire', 'violation_to_cancel', 'keepalive', 'points', 'load', RTDE_RATE,
            'planning', 'kinematics', 'kinematics_rows', 'codecs_rtde', 'urscript_frames')
@@ -44,6 +44,8 @@ def main() -> int:
             options = {'seconds': arguments.seconds} if name in (RTDE_RATE, SOAK) else {}
             if name == SOAK:
                 options |= {'goals': arguments.goals, 'undisturbed': arguments.undisturbed}
+            if name == OPEN_GOAL:
+                options = {'points': arguments.points}
             measured = list(import_module(name).run(arguments.quick, **options))
         except Exception as error:
             # The others can still be measured.
@@ -62,9 +64,9 @@ def main() -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description='Measure the driver and the simulated robot.')
-    parser.add_argument('--only', action='append', choices=(*MODULES, SOAK), metavar='NAME',
-                        help='only this one (may be repeated): '
-                             f'{", ".join((*MODULES, SOAK))}')
+    parser.add_argument('--only', action='append', choices=(*MODULES, SOAK, OPEN_GOAL),
+                        metavar='NAME', help='only this one (may be repeated): '
+                        f'{", ".join((*MODULES, SOAK, OPEN_GOAL))}')
     parser.add_argument('--quick', action='store_true',
                         help='smaller goals, shorter times: to see that it runs')
     parser.add_argument('--seconds', type=float, default=30.0,
@@ -72,6 +74,8 @@ def _parser() -> argparse.ArgumentParser:
                              'lasts (1800)')
     parser.add_argument('--goals', type=int, default=10_000,
                         help=f'after so many goals {SOAK} ends sooner')
+    parser.add_argument('--points', type=int, default=50_000,
+                        help=f'how many points {OPEN_GOAL} has (1000000 for the record)')
     parser.add_argument('--undisturbed', action='store_true',
                         help=f'nothing happens during the goals of {SOAK}: as many as can be')
     parser.add_argument('--json', metavar='FILE', help='write the figures as JSON, - = print them')

@@ -4,16 +4,24 @@
 
 import asyncio
 from dataclasses import replace
+import gc
+import sys
 
 import numpy as np
-from open_goals import BLEND, circle, corners, moved, OpenMotion
+from open_goals import BLEND, circle, corners, forget, kept, moved, OpenMotion
 import pytest
 from robot_cell import CYCLE, run_cell
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode, GoalRefused
-from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, ZERO6
+from ur_cartesian_driver.motion.goal import (
+    ExecutionMode,
+    Goal,
+    IOCommand,
+    OutputKind,
+    ZERO6,
+)
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
@@ -107,10 +115,10 @@ def test_a_producer_that_is_late_by_less_than_the_margin_is_not_noticed(kind):
 
     The late one appends when the motion is going to be closed within its own reaction time.
     """
-    total = 15
+    total = 9
     known = run_cell(lambda cell: at_once(cell, kind, total))
     for lead in HORIZON, MARGIN + KINDS[kind][2] + REACTION:
-        motion, speeds = run_cell(lambda cell, lead=lead: produced(cell, kind, total, 5, lead))
+        motion, speeds = run_cell(lambda cell, lead=lead: produced(cell, kind, total, 3, lead))
         assert motion.outcome.report == ()
         assert len(speeds) == len(known)
         assert (speeds == known).all()
@@ -199,3 +207,87 @@ def test_points_that_are_refused_leave_the_goal_as_it_was():
         assert end.report == (), 'it was never closed'
 
     run_cell(scenario)
+
+
+#: Points and offsets [s]: inside a part, at its last point and after it, far into the next part,
+#: at the first point of one, and behind the end.
+SWITCHES = [(3, 0.0), (4, 0.0), (4, 0.03), (4, 0.25), (5, 0.0), (9, 0.0), (14, 0.1)]
+
+
+def switches(first, count):
+    return tuple(
+        IOCommand(waypoint=point, offset=offset, output=OutputKind.STANDARD_DIGITAL, pin=k,
+                  value=1.0) for k, (point, offset) in enumerate(SWITCHES)
+        if first <= point < first + count)
+
+
+async def outputs_at(cell, kind, chunk):
+    """Run 15 points, known at once or in parts; return when each output came on in the motion."""
+    home, times, begin = cell.memory.read().actual_tcp_pose, {}, []
+
+    async def look():
+        while True:
+            if not begin and any(cell.robot.controller.qd):
+                begin.append(cell.robot.controller.time)
+            for k in range(len(SWITCHES)):
+                if cell.robot.state().digital_outputs >> k & 1:
+                    times.setdefault(k, cell.robot.controller.time - begin[0])
+            await asyncio.sleep(0.5 * CYCLE)
+
+    watch = asyncio.ensure_future(look())
+    if chunk == 15:
+        motion = cell.owner.start(plan(
+            goal(kind, home, 15, keep_open=False, io_commands=switches(0, 15)),
+            cell.memory.read(), ARM, PlanningOptions(max_tool_speed=1.0)))
+        await cell.until(lambda: motion.outcome, 60.0)
+    else:
+        motion = OpenMotion(cell, goal(kind, home, chunk, io_commands=switches(0, chunk)))
+        while motion.points < 15:
+            assert await motion.until(lambda: motion.motion.progress
+                                      and motion.progress.time_remaining < HORIZON)
+            last = motion.points + chunk == 15
+            points, segments = KINDS[kind][1](home, motion.points + 1, chunk, last)
+            await motion.append(points, segments, switches(motion.points, chunk), last=last)
+        await motion.ended()
+    assert motion.outcome.succeeded, motion.outcome.text
+    watch.cancel()
+    return times
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_outputs_are_switched_as_if_all_points_had_been_known(kind):
+    known = run_cell(lambda cell: outputs_at(cell, kind, 15))
+    assert sorted(known) == list(range(len(SWITCHES)))
+    assert run_cell(lambda cell: outputs_at(cell, kind, 5)) == known
+
+
+def test_memory_stays_the_same_however_long_a_goal_goes_on():
+    """A thousand pieces of a spline, a cycle each: no starvation, and nothing that grows."""
+    async def scenario(cell):
+        home, sizes, blocks = cell.memory.read().actual_tcp_pose, [], []
+
+        def part(first):
+            return circle(home, first, 125, step=CYCLE)
+
+        motion = OpenMotion(cell, Goal(waypoints=tuple(part(1)), keep_open=True,
+                                       execution=ExecutionMode.SPLINE), self_collision='off')
+        while motion.points < 1000:
+            assert await motion.until(
+                lambda: motion.motion.progress
+                and motion.progress.points_received == motion.points
+                and motion.progress.time_remaining < HORIZON), motion.outcome.text
+            await motion.append(part(motion.points + 1))
+            forget(cell)
+            del motion.motion.progress[:-1]
+            sizes.append(kept(cell))
+            gc.collect()
+            blocks.append(sys.getallocatedblocks())
+        await motion.append(last=True)
+        end = await motion.ended()
+        assert end.succeeded, end.text
+        assert end.report == (), 'it was never closed'
+        for name, bound in (('records', 500), ('rows', 1000), ('unsent', 400)):
+            assert max(size[name] for size in sizes) < bound, name
+        assert max(blocks[3:]) - min(blocks[2:3]) < 500, 'of hundreds of thousands'
+
+    run_cell(scenario, feedback_rate=10.0)

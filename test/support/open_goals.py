@@ -99,3 +99,18 @@ class OpenMotion:
     async def ended(self, bound=60.0):
         await self._cell.until(lambda: self.outcome is not None, bound)
         return self.outcome
+
+
+def forget(cell):
+    """Let the network in memory forget what was sent on it, which tests can look at."""
+    for end in cell.loop.ends:
+        end.received.clear()
+        end.peer.received.clear()
+
+
+def kept(cell):
+    """Return what the robot loop keeps of the goal that runs: records, rows of path, messages."""
+    loop = cell.loop_task.get_coro().cr_frame.f_locals['self']
+    observer = loop._machine._observer
+    return {'records': observer._records.kept, 'rows': len(observer._tracker.path.time),
+            'unsent': len(loop._points)}

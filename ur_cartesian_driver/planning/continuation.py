@@ -31,6 +31,7 @@ from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.controlled import carried, tools
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.outputs import with_outputs
 from ur_cartesian_driver.planning.path import tcp_rows
 from ur_cartesian_driver.planning.plan import plan as plan_goal
 from ur_cartesian_driver.planning.reference import keep_hemisphere
@@ -40,6 +41,8 @@ from ur_cartesian_driver.planning.validate import check
 #: So many of the last points are planned again with the next ones: the one that is kept back, and
 #: one whose corner leads into its motion.
 CONTEXT = 2
+#: Two times nearer than this are one [s].
+SAME_TIME = 1e-6
 #: How much later than at once a spline may begin again from rest [s]: the first that is possible.
 LEADS = (0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 #: Rows of the reference along a closing piece.
@@ -94,6 +97,8 @@ class OpenGoal:
     tail: tuple[Known, ...] = ()
     #: Of a spline: behind its last point.
     state: SplineState | None = None
+    #: Its last piece with its way, where that is not firm because of outputs.
+    again: tuple[PlannedSegment, ReferencePath] | None = None
     #: Outputs that may not have been switched yet, and when that is due [s].
     outputs: tuple[tuple[float, IOCommand], ...] = ()
 
@@ -283,6 +288,7 @@ def _spline_on(on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOpti
     if not from_rest:
         return _spline_behind(on, addition, on.state, on.firm, on.shift, arm, options)
     start = SplineState(time=on.rest_time, q=on.q_rest)
+    on = replace(on, again=None, outputs=())
     refusals = []
     for lead in LEADS:
         try:
@@ -309,29 +315,88 @@ def _spline_behind(on: OpenGoal, addition: Addition, start: SplineState, behind:
         raise _renumbered(refusal, on.points) from None
     found = plan_pieces(start, later, arm, on.T_flange_tcp or on.T_flange_active, options,
                         first=on.points, tools=tools(goal, on.T_flange_active))
-    made = Plan(goal=later, segments=found.segments, reference=found.reference, start=start.q,
+    segments, reference, since = found.segments, found.reference, start.time
+    if on.again is not None:
+        again, way = on.again
+        segments, since = (again, *segments), start.time - again.duration
+        reference = _joined(way, reference)
+    made = Plan(goal=later, segments=segments, reference=reference, start=start.q,
                 T_flange_active=on.T_flange_active, T_flange_tcp=on.T_flange_tcp,
                 execution=ExecutionMode.SPLINE, remarks=found.remarks)
-    return _spline_part(replace(on, shift=shift), addition, made, found.end, behind, start.time,
-                        arm, options)
+    return _spline_part(replace(on, shift=shift), addition, made, found.end, behind, since, arm,
+                        options)
 
 
 def _spline_part(on: OpenGoal, addition: Addition, made: Plan, end: SplineState, behind: int,
                  since: float, arm: Arm, options: PlanningOptions) -> Part:
-    """Return a part whose ending is a piece to rest, where its last point moves."""
-    firm = behind + _records(made.segments)
-    point = on.points + len(addition.waypoints) - 1
-    rest_time, q_rest, ending = end.time, end.q, 0
+    """
+    Return a part whose ending is a piece to rest, where its last point moves.
+
+    Where outputs are due at the last point or later, the piece to that point belongs to the ending
+    too: they stand behind it on the wire, and where each of them is depends on what comes.
+    """
+    point, known = on.points + len(addition.waypoints) - 1, made
+    rest_time, q_rest = end.time, end.q
     if end.moves and not addition.last:
         made = _closed(made, end, point, arm, on, options)
         rest_time, q_rest = end.time + made.segments[-1].duration, made.segments[-1].joints
-        ending = 1
+    made, due = _with_outputs(on, addition, made, since)
+    pending = tuple((time, command) for time, command in due
+                    if time >= end.time - SAME_TIME and not addition.last)
+    firm = len(known.segments) - (1 if pending else 0)
+    count, ending = _records(made.segments), _records(made.segments[firm:])
+    if addition.last:
+        ending = 0
+    again = (known.segments[-1], known.reference) if pending else None
     then = replace(
-        on, points=point + 1, records=firm + ending, firm=firm, time=end.time,
-        rest_time=rest_time, told=addition.waypoints[-1].time, q_rest=q_rest, state=end)
+        on, points=point + 1, records=behind + count, firm=behind + count - ending,
+        time=end.time - (again[0].duration if again else 0.0), rest_time=rest_time,
+        told=addition.waypoints[-1].time, q_rest=q_rest, state=end, outputs=pending,
+        again=again and (again[0], _tail_of(again[1], end.time - again[0].duration)))
     return Part(plan=replace(made, goal=replace(made.goal, keep_open=not addition.last)),
                 behind=behind, since=since, ending=ending, due=rest_time,
                 text=_text(on, addition), then=then)
+
+
+def _with_outputs(on: OpenGoal, addition: Addition, made: Plan, since: float
+                  ) -> tuple[Plan, list[tuple[float, IOCommand]]]:
+    """Return a plan of pieces with the outputs on its way, and when each command is due [s]."""
+    ends, now = {}, since
+    # A piece to rest leads to no point: what is due on it is due behind the last one.
+    last = made.segments[-1]
+    closes = not last.note and last.length == 0.0
+    segments = [replace(segment, outputs=()) for segment in made.segments]
+    if closes:
+        segments[-1] = replace(segments[-1], waypoint=last.waypoint + 1)
+    for segment in segments:
+        now += segment.duration
+        ends[segment.waypoint] = now
+    first = segments[0].waypoint
+    due = [*on.outputs, *((ends[command.waypoint] + command.offset, command)
+                          for command in addition.io_commands)]
+    found = with_outputs(segments, made.reference, [
+        replace(command, waypoint=max(command.waypoint, first),
+                offset=max(0.0, time - ends[max(command.waypoint, first)]))
+        for time, command in due], since=since)
+    return replace(made, segments=tuple(
+        replace(segment, waypoint=old.waypoint, note=old.note)
+        for segment, old in zip(found, made.segments, strict=True))), due
+
+
+def _tail_of(path: ReferencePath, since: float) -> ReferencePath:
+    """Return the rows of a path from a time on [s]."""
+    row = max(int(np.searchsorted(path.time, since + SAME_TIME, side='right')) - 1, 0)
+    return ReferencePath(poses=path.poses[row:].copy(), time=path.time[row:].copy(),
+                         point=path.point[row:].copy(), room=path.room[row:].copy())
+
+
+def _joined(first: ReferencePath, second: ReferencePath) -> ReferencePath:
+    """Return two paths as one; the second begins where the first ends."""
+    poses = np.concatenate([first.poses, second.poses[1:]])
+    keep_hemisphere(poses)
+    return ReferencePath(poses=poses, time=np.concatenate([first.time, second.time[1:]]),
+                         point=np.concatenate([first.point, second.point[1:]]),
+                         room=np.concatenate([first.room, second.room[1:]]))
 
 
 def _closed(made: Plan, end: SplineState, point: int, arm: Arm, on: OpenGoal,

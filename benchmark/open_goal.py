@@ -1,0 +1,109 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A goal that is continued for as long as one likes: points sustained, memory, starvation.
+
+Producer, planner, robot loop, robot program and simulated controller run in one process on a clock
+that jumps, so the figure is what all of them together cost, and nobody has to wait for the arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import cos, pi, sin
+from pathlib import Path
+import sys
+from time import perf_counter
+from typing import Any
+
+from figures import Figure
+
+from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+
+#: From point to point, a cycle of the controller [s]; one request has so many, and is made when
+#: less than so many seconds are left.
+STEP, CHUNK, LEAD = 0.008, 500, 2.5
+#: The circle: radius [m], time once round [s], and how long it gets faster at its begin [s].
+RADIUS, ROUND, RAMP = 0.05, 4.0, 1.0
+#: How often memory is looked at, in requests.
+LOOK = 20
+
+
+def point(home: Pose, number: int, last: bool) -> Waypoint:
+    """Return a point of a circle beside the tool, with its time and twist."""
+    t, rate = STEP * number, 2.0 * pi / ROUND
+    angle, turn = (0.5 * rate / RAMP * t * t, rate / RAMP * t) if t < RAMP else (
+        rate * (t - 0.5 * RAMP), rate)
+    if last:
+        t, turn = t + 0.1, 0.0
+    c, s = cos(angle), sin(angle)
+    x, y, z = home.position
+    return Waypoint(
+        time=t, pose=Pose((x + RADIUS * s, y + RADIUS * (1.0 - c), z), home.quaternion),
+        twist=(RADIUS * turn * c, RADIUS * turn * s, 0.0, 0.0, 0.0, 0.0))
+
+
+def resident() -> float:
+    """Return the memory of this process [MB]."""
+    for line in Path('/proc/self/status').read_text().splitlines():
+        if line.startswith('VmRSS:'):
+            return float(line.split()[1]) / 1024.0
+    return 0.0
+
+
+async def carried_out(cell: Any, points: int) -> dict[str, Any]:
+    """Run an open goal of so many points; return what was seen."""
+    from open_goals import forget, kept, OpenMotion  # beside robot_cell, see run()
+
+    home = cell.memory.read().actual_tcp_pose
+
+    def chunk(first: int, count: int) -> list[Waypoint]:
+        return [point(home, k, k == points) for k in range(first, first + count)]
+
+    seen: dict[str, Any] = {'memory': [], 'kept': [], 'left': []}
+    begin, planning, number = perf_counter(), 0.0, 0
+    motion = OpenMotion(cell, Goal(waypoints=tuple(chunk(1, CHUNK)), keep_open=True,
+                                   execution=ExecutionMode.SPLINE), self_collision='off')
+    while motion.points < points:
+        if not await motion.until(lambda: (
+                motion.motion.progress and motion.progress.points_received == motion.points
+                and motion.progress.time_remaining < LEAD), 1e9):
+            break
+        seen['left'].append(motion.progress.time_remaining)
+        count = min(CHUNK, points - motion.points)
+        at = perf_counter()
+        await motion.append(chunk(motion.points + 1, count), last=motion.points + count == points)
+        planning += perf_counter() - at
+        number += 1
+        del motion.motion.progress[:-1]  # the owner of a real one keeps the newest only
+        forget(cell)
+        if number % LOOK == 0:
+            seen['memory'].append(resident())
+            seen['kept'].append(kept(cell))
+            if number % (5 * LOOK) == 0:
+                print(f'  {motion.points:,} points, {perf_counter() - begin:.0f} s, '
+                      f'{resident():.1f} MB, kept {kept(cell)}', flush=True)
+    end = await motion.ended(1e9)
+    return seen | {'seconds': perf_counter() - begin, 'planning': planning, 'outcome': end,
+                   'points': motion.points}
+
+
+def run(quick: bool, points: int = 50_000) -> Iterator[Figure]:
+    """Carry out an open goal, a piece of a spline in each cycle."""
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'support'))
+    from robot_cell import run_cell
+
+    seen = run_cell(lambda cell: carried_out(cell, 2_000 if quick else points), feedback_rate=5.0)
+    end, memory = seen['outcome'], seen['memory'] or [resident()]
+    if not end.succeeded or end.report:
+        raise RuntimeError(f'{end.text} {end.report}')
+    name = f'open goal of {seen["points"]:,} points'
+    yield Figure(benchmark='open_goal', name=f'{name}, points per second',
+                 value=seen['points'] / seen['seconds'], unit='1/s',
+                 baseline=1.0 / STEP, than='of the motion',
+                 note=f'{seen["seconds"]:.0f} s on the virtual clock; never closed, {end.text}')
+    settled = memory[min(2, len(memory) - 1)]
+    yield Figure(benchmark='open_goal', name='memory of the process at the end', unit='MB',
+                 value=memory[-1], baseline=settled, than=f'after {3 * LOOK * CHUNK:,} points',
+                 note='driver, simulated robot and producer')
