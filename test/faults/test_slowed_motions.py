@@ -28,12 +28,13 @@ DONE = {
 #: By way of execution: how far the tool may be off its path [m], and which accelerations a joint
 #: may see [rad/s^2]. A program that pauses as the arm comes to a corner does not begin the blend.
 BOUNDS = {'PRIMITIVES': (0.005, 12.0), 'SPLINE': (0.0002, 12.0),
-          'SERVO': (0.0005, 15.0), 'Open goals': (0.0002, 12.0)}
+          'SERVO': (0.0005, 15.0), 'Open goals': (0.0002, 12.0), 'Outputs': (0.005, 12.0)}
 #: A paused program calls no speedj or servoj any more, and the simulated controller then brakes as
 #: hard as the last one was allowed to.
 PAUSED = {'SPLINE': 40.0, 'SERVO': 16.0, 'Open goals': 40.0}
 MIDDLE = {'PRIMITIVES': 'mid-segment', 'SPLINE': 'between points',
-          'SERVO': 'between points', 'Open goals': 'moving'}
+          'SERVO': 'between points', 'Open goals': 'moving',
+          'Outputs': 'before the place'}
 
 
 @pytest.mark.parametrize('what', DONE)

@@ -190,4 +190,4 @@ OPEN = _mode(
         'emergency stop', "another client's program replaces ours", 'the controller crashes',
         "the program's sockets are cut")))
 
-MODES = (SPLINE, SERVO, OPEN)
+MODES = (SPLINE, SERVO, OPEN, OUTPUTS)
