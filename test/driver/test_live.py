@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.driver.channel import AimMotion, LENGTH, pack, StartMotion, unpack
 from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.driver.live import live_order, standing_order, standing_plan
@@ -13,6 +14,7 @@ from ur_cartesian_driver.driver.machines import is_slow, machine_of
 from ur_cartesian_driver.execution.live_machine import LiveMachine, TeachMachine
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.errors import RobotNotReady
 from ur_cartesian_driver.motion.pose import IDENTITY
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import PlanningOptions
@@ -73,6 +75,14 @@ def test_only_a_calibrated_arm_takes_long():
     assert is_slow(start(other))
     assert not is_slow(start())
     assert not is_slow(replace(start(), live=None))
+
+
+def test_another_robot_program_does_not_follow_targets():
+    driver = Driver(DriverConfig(wire_dialect='2.12'))
+    with pytest.raises(RobotNotReady, match=r'follow live targets; wire_dialect .* 2\.12'):
+        driver.servo_to(HERE)
+    with pytest.raises(RobotNotReady, match='does not report its state'):
+        Driver(DriverConfig()).servo_to(HERE)
 
 
 def test_a_plan_that_stands_has_nothing_on_the_wire():

@@ -18,7 +18,7 @@ from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.ros.frames import Frames, Stand, StaticFrame
-from ur_cartesian_driver.ros.servo_topics import target_from_message
+from ur_cartesian_driver.ros.servo_topics import Restraint, target_from_message
 from ur_cartesian_driver.sim.config import HOME
 
 HERE = Arm(robot_model('ur5e')).forward(HOME)
@@ -93,6 +93,15 @@ def test_what_is_far_away_is_refused_with_the_distance():
     with pytest.raises(InvalidGoal, match=r'is 0\.6 m away.*max_approach_distance is 0\.5 m'):
         check_target(far, STATE, PlanningOptions())
     check_target(far, STATE, PlanningOptions(max_approach_distance=0.0))
+
+
+def test_after_a_stop_targets_have_to_pause_before_they_are_followed():
+    restraint = Restraint(pause=2.0)
+    assert not restraint.holds(0.0)
+    restraint.impose()
+    assert [restraint.holds(0.1 + i) for i in range(5)] == [True] * 5
+    assert not restraint.holds(6.2), 'none had come for 2 s'
+    assert not restraint.holds(6.3)
 
 
 FLOATS = st.sampled_from([nan, inf, -inf, 0.0, -0.0, 1.0, -1.0, 1e-320, 1e-9, 0.7071068, 1e300])

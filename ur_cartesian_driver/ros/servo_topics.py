@@ -9,6 +9,9 @@ up the node. What cannot be followed is ignored, with a warning that says why; t
 counts until it is too old.
 
 A session lines up for the arm as a goal does, but before all of them: any goal takes its place.
+
+Whoever unlocks a robot and plays its program does not think of somebody who still sends targets.
+So after a stop they are not followed before they have paused once.
 """
 
 from __future__ import annotations
@@ -32,10 +35,11 @@ from std_srvs.srv import SetBool
 
 from ur_cartesian_driver.driver import Driver, Motion
 from ur_cartesian_driver.driver.live import check_pose, LiveSession
-from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, InvalidGoal
+from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.servo import ServoActivity, ServoReport
+from ur_cartesian_driver.motion.state import SafetyStatus
 from ur_cartesian_driver.msg import ServoState
 from ur_cartesian_driver.robot.calls import Answer
 from ur_cartesian_driver.ros.convert import nanoseconds
@@ -51,6 +55,10 @@ Message: TypeAlias = Any
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 #: As the other topics that tell the state.
 STATES = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+#: After these somebody has to look at the robot.
+STOPPED = (SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED
+           | SafetyStatus.EMERGENCY_STOPPED | SafetyStatus.ROBOT_EMERGENCY_STOPPED
+           | SafetyStatus.SYSTEM_EMERGENCY_STOPPED | SafetyStatus.VIOLATION | SafetyStatus.FAULT)
 #: How often the same kind of trouble is told, at most [s].
 COMPLAINT = 2.0
 #: How long the end of a session is waited for when the node is destroyed [s].
@@ -198,6 +206,34 @@ class _Promise:
             self.future.set_result(Answer(ok=ok, text=text))
 
 
+class Restraint:
+    """
+    Keeps targets from being followed after a stop, until they have paused.
+
+    :param pause: for so long there must have been none [s].
+    """
+
+    def __init__(self, pause: float) -> None:
+        """Begin without."""
+        self._pause = pause
+        self._holds = False
+        self._last = -inf
+
+    def impose(self) -> None:
+        """Begin to hold."""
+        self._holds = True
+
+    def holds(self, now: float) -> bool:
+        """
+        Take note of a target, and tell whether it is not to be followed.
+
+        :param now: time of a steady clock [s].
+        """
+        self._holds = self._holds and now - self._last < self._pause
+        self._last = now
+        return self._holds
+
+
 class ServoTargets:
     """Listens to targets from its construction to :meth:`close`."""
 
@@ -207,6 +243,9 @@ class ServoTargets:
         self._driver, self._turns, self._frames = driver, turns, frames
         self._max_age = driver.options.servo_target_max_age
         self._session: LiveSession | None = None
+        self._restraint = Restraint(driver.options.servo_target_timeout)
+        #: Whether there was a session yet.
+        self._has_followed = False
         # Guards what follows: the newest message that nobody has looked at.
         self._condition = threading.Condition()
         self._pending: Message = None
@@ -284,6 +323,14 @@ class ServoTargets:
 
     def _follow(self, message: Message, received: int) -> None:
         state = self._driver.state
+        if state is not None and state.safety_status & STOPPED:
+            self._restraint.impose()
+        if self._restraint.holds(monotonic()):
+            self._logger.warning(
+                'Live targets are ignored because the robot was stopped while they came: send '
+                f'none for {self._driver.options.servo_target_timeout:g} s (servo_target_timeout) '
+                'before new ones.', throttle_duration_sec=COMPLAINT)
+            return
         T_base_tcp, age = target_from_message(
             message, self._frames, now=received, max_age=self._max_age,
             stand=None if state is None else Stand.of(state))
@@ -308,10 +355,12 @@ class ServoTargets:
             return
         try:
             session = self._driver.follow_targets(T_base_tcp, age=age)
-        except BaseException:
+        except BaseException as error:
             self._turns.leave(turn)
+            if self._has_followed and isinstance(error, RobotNotReady):
+                self._restraint.impose()  # it was ready before: something has stopped it
             raise
-        self._session = session
+        self._session, self._has_followed = session, True
         if turn.successor:
             self._make_way_for(turn.successor)
         session.motion.add_done_callback(self._ending(turn))
@@ -325,6 +374,8 @@ class ServoTargets:
     def _ending(self, turn: Turn) -> Callable[[Outcome], None]:
         """Return what is done at the end of a session."""
         def ended(outcome: Outcome) -> None:
+            if outcome.code not in (ErrorCode.SUCCESSFUL, ErrorCode.PREEMPTED):
+                self._restraint.impose()
             self._session = None
             self._turns.leave(turn)
             self._tell(outcome)
