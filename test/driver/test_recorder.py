@@ -30,8 +30,8 @@ from made_up_recording import (
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.driver import recording_format
-from ur_cartesian_driver.driver.recorder import PIECE, PIECES, Recorder
+from ur_cartesian_driver.driver import DriverConfig, recording_format
+from ur_cartesian_driver.driver.recorder import head_of, PIECE, PIECES, Recorder
 from ur_cartesian_driver.driver.recording import Recording
 from ur_cartesian_driver.driver.recording_folder import keep_within, name_of
 from ur_cartesian_driver.motion.state import RuntimeState, SafetyMode
@@ -143,7 +143,7 @@ def test_nothing_is_recorded_without_a_directory(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_an_endless_motion_takes_no_memory(tmp_path):
-    count, packets = 15_000, [packet(i) for i in range(100)]
+    count, packets = 8_000, [packet(i) for i in range(100)]
     recorder = Recorder(str(tmp_path), 100.0, Said())
     recorder.start(ORDER, dict(HEAD), packet(0))
     tracemalloc.start()
@@ -303,3 +303,15 @@ def test_what_is_no_recording_is_refused(tmp_path, data):
     np.savez(file, other=np.zeros(3))
     with pytest.raises(ValueError, match='metadata'):
         Recording.load(file)
+
+
+def test_a_session_that_nothing_was_planned_for_has_no_plan(tmp_path):
+    head = head_of(ORDER, robot={}, parameters=DriverConfig(), led_by='LIVE_TARGETS')
+    record(tmp_path, [packet(i) for i in range(10)], head=head)
+    file = only_file(tmp_path)
+    assert file.stem.endswith('_live_targets_0_points')
+    found = Recording.load(file)
+    assert len(found.planned_time) == 0
+    assert np.isnan(found.deviation().position).all()
+    keep_within(tmp_path, 0.0)
+    assert list(tmp_path.iterdir()) == []

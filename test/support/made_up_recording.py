@@ -74,14 +74,14 @@ def keep_pace(recorder):
         os.sched_yield()
 
 
-def record(directory, packets, *, outcome=DONE, max_size=100.0,
+def record(directory, packets, *, head=HEAD, outcome=DONE, max_size=100.0,
            between=lambda recorder, i: None, where=lambda i: (0, 0.0)):
     """Record packets, and what is done between them; return the warnings."""
     said = Said()
     recorder = Recorder(str(directory), max_size, said)
     for i, state in enumerate(packets):
         if i == 0:
-            recorder.start(ORDER, dict(HEAD), state)
+            recorder.start(ORDER, dict(head), state)
         else:
             keep_pace(recorder)
             recorder.take(state, *where(i))

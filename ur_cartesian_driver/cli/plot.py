@@ -171,13 +171,8 @@ def _draw_time(figure: Any, recording: Recording) -> None:
     rows = _timeline(recording)
     off, speed, scaling, line = figure.subplots(
         4, 1, sharex=True, height_ratios=(1.0, 1.0, 0.8, 0.35 + 0.16 * len(rows)))
-    time, deviation = recording.time, recording.deviation()
-    off.plot(time, 1e3 * deviation.target_position, color=_TARGET, linewidth=2.4, alpha=0.5,
-             label="controller's target")
-    off.plot(time, 1e3 * deviation.position, color=_ACTUAL, linewidth=0.9, label='tool')
-    off.set_ylabel('distance from\nthe plan [mm]')
-    off.set_ylim(0.0, 1.15 * max(0.05, 1e3 * np.nan_to_num(deviation.position).max()))
-    off.legend(loc='upper right', ncols=2)
+    time = recording.time
+    _draw_deviation(off, recording)
     speed.plot(time, np.linalg.norm(recording.target_twist[:, :3], axis=1), color=_TARGET,
                linewidth=2.4, alpha=0.5, label="controller's target")
     speed.plot(time, recording.tool_speed, color=_ACTUAL, linewidth=0.9, label='tool')
@@ -190,6 +185,16 @@ def _draw_time(figure: Any, recording: Recording) -> None:
         for at, kind, _ in recording.events:
             if kind in _STRIKING:
                 axes.axvline(at, color=_STRIKING[kind], linewidth=0.8, linestyle=':')
+
+
+def _draw_deviation(axes: Any, recording: Recording) -> None:
+    off = recording.deviation()
+    axes.plot(recording.time, 1e3 * off.target_position, color=_TARGET, linewidth=2.4, alpha=0.5,
+              label="controller's target")
+    axes.plot(recording.time, 1e3 * off.position, color=_ACTUAL, linewidth=0.9, label='tool')
+    axes.set_ylabel('distance from\nthe plan [mm]')
+    axes.set_ylim(0.0, 1.15 * max(0.05, 1e3 * np.nan_to_num(off.position).max()))
+    axes.legend(loc='upper right', ncols=2)
 
 
 def _draw_scaling(axes: Any, recording: Recording) -> None:

@@ -57,20 +57,21 @@ def about(plan: Plan, options: object) -> str:
 
 
 def head_of(order: Order, *, robot: Mapping[str, str], parameters: object,
-            of_owner: str = '') -> dict[str, Any]:
+            of_owner: str = '', led_by: str = '') -> dict[str, Any]:
     """
     Return the metadata of a motion that begins now.
 
     :param robot: what is known of the robot.
     :param parameters: those of the driver, a dataclass.
     :param of_owner: what :func:`about` has said.
+    :param led_by: what leads the arm, where that is no plan.
     """
     known = json.loads(of_owner) if of_owner else {}
     planning = known.pop('planning', {})
     return {
         'format': disk.FORMAT, 'created': datetime.now(UTC).isoformat(timespec='milliseconds'),
-        'robot': dict(robot), 'execution': order.execution.name,
-        'points': int(order.reference.point[-1]) + 1 if len(order.reference.point) else 0,
+        'robot': dict(robot), 'execution': led_by or order.execution.name,
+        'points': 0 if led_by else int(order.reference.point[-1]) + 1,
         'duration': order.duration, 'due': order.due,
         'keep_open': order.open_end, 'T_base_frame': order.T_base_frame.row(),
         'T_flange_tcp': (order.T_flange_tcp or order.T_flange_active).row(),
@@ -133,7 +134,8 @@ class Recorder:
         self._begin, self._time, self._due, self._at = state.timestamp, 0.0, PERIOD, 0
         self._stale_begun = state.points_begun
         self._do(folder, folder.open)
-        self.extend(order.reference, -inf)
+        if head['points']:
+            self.extend(order.reference, -inf)
         self.note('start', f"{head['execution']}, {head['points']} points")
         self.take(state)
 

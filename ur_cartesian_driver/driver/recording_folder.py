@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.driver import recording_format as disk
 
 #: Names of recordings; other files in the directory are nobody's business.
-_OURS = re.compile(r'\d{8}-\d{6}-\d{3}_[a-z]+_\d+_points(_\d+)?\.(npz|part)')
+_OURS = re.compile(r'\d{8}-\d{6}-\d{3}_[a-z_]+_\d+_points(_\d+)?\.(npz|part)')
 
 #: Times nearer to each other than this are one [s].
 SAME_TIME = 5e-7

@@ -284,8 +284,9 @@ class RobotLoop:
         if not self._config.record_directory or self._latest is None:
             return
         status = self._link.status
+        led_by = 'LIVE_TARGETS' if request.live is not None else 'TEACH' if request.teach else ''
         self._recorder.start(request.order, head_of(
-            request.order, of_owner=request.about, parameters=self._config, robot={
+            request.order, of_owner=request.about, parameters=self._config, led_by=led_by, robot={
                 'model': status.robot_model, 'polyscope_version': status.polyscope_version,
                 'serial_number': status.serial_number}), self._latest)
 
