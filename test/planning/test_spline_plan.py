@@ -303,6 +303,23 @@ def test_a_singularity_on_the_curve_is_refused_with_value_and_bound(cell):
     assert 'PRIMITIVES with a JOINT segment' in text
 
 
+@pytest.mark.parametrize('dense', [1, 400])
+def test_a_spline_may_leave_a_singularity_but_not_come_to_one_however_dense_its_points_are(
+        make_cell, dense):
+    ends = [(0.3, -1.2, 1.5, -1.4, wrist_2, 0.2) for wrist_2 in (-0.02, -0.4)]
+    for begin, end, passes in (*[(*ends, True)], (*ends[::-1], False)):
+        cell = make_cell(q=begin)
+        shares = np.linspace(0.0, 1.0, dense + 1)[1:]
+        goal = Goal(execution=SPLINE, waypoints=tuple(
+            Waypoint(time=4.0 * share, twist=CHOOSE, acceleration=CHOOSE,
+                     pose=cell.home.interpolate(cell.tool(end), share * share * (3 - 2 * share)))
+            for share in shares.tolist()))
+        if passes:
+            plan(goal, cell.state, cell.arm, OPTIONS)
+        else:
+            assert 'of the wrist singularity' in refused(NearSingularity, cell, goal)
+
+
 def test_a_joint_at_the_end_of_its_range_is_refused(make_cell):
     cell = make_cell(q=(0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 2.0 * pi - 0.3))
     turns = [Goal(waypoints=(cell.point(turn=(0.0, 0.0, 0.5 * s), time=3.0, twist=(

@@ -26,6 +26,7 @@ from ur_cartesian_driver.planning.lookahead import Followed, place
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.pose_rows import Floats
 from ur_cartesian_driver.planning.samples import Piece
+from ur_cartesian_driver.planning.tool_spline import ToolCurve
 
 #: So near to a start at rest the arm may be singular [m], [rad] ...
 START_LENGTH = 0.001
@@ -135,6 +136,8 @@ def _leaving(pieces: Sequence[Piece], found: Followed, rows: NDArray[np.intp], m
     """
     piece = pieces[int(found.piece[rows[0]])]
     excused = np.zeros((len(rows), len(MEASURES)), dtype=np.bool_)
+    if isinstance(piece.curve, ToolCurve):
+        return excused  # splines have one start, see leaving_rows
     if piece.begin > 0.0 or _is_corner(piece) or (
             int(found.piece[rows[0]]) != _first_of(pieces, piece.index)):
         return excused  # it comes out of a corner
@@ -144,6 +147,20 @@ def _leaving(pieces: Sequence[Piece], found: Followed, rows: NDArray[np.intp], m
     excused |= (on_it & (t * length <= START_LENGTH) & (t * angle <= START_ANGLE))[:, None]
     grows = np.diff(measures[rows], axis=0, prepend=0.0) >= -_ROUNDING
     excused |= np.logical_and.accumulate((grows & on_it[:, None]) | excused, axis=0)
+    return excused
+
+
+def leaving_rows(measures: Floats, length: Floats, angle: Floats, *, rests: bool
+                 ) -> NDArray[np.bool_]:
+    """
+    Tell which places (n, 3) of a whole motion are on the way out of a singularity it starts in.
+
+    :param length: (n,) the way since its start [m], and ``angle`` the turn [rad].
+    :param rests: whether it starts at rest.
+    """
+    at_start = (rests & (length <= START_LENGTH) & (angle <= START_ANGLE))[:, None]
+    grows = np.diff(measures, axis=0, prepend=0.0) >= -_ROUNDING
+    excused: NDArray[np.bool_] = np.logical_and.accumulate(grows | at_start, axis=0)
     return excused
 
 

@@ -115,7 +115,8 @@ def plan_pieces(start: SplineState, goal: Goal, arm: Arm, T_flange_tcp: Pose,
     """
     reach = Reach(arm, T_flange_tcp)
     points = tool_points(goal, start.tool(arm, T_flange_tcp))
-    way = way_along(reach, ToolSpline.through(points), goal.waypoints, start.q, options, first)
+    way = way_along(reach, ToolSpline.through(points), goal.waypoints, start.q, options,
+                    first=first, rests=not start.moves)
     way, stretch, said = _in_time(reach, way, start, goal, options)
     track = joint_track(reach, way, start.rows(), points.quintic, options.spline_tolerance,
                         options.spline_tolerance / ANGLE_LEVER)

@@ -27,7 +27,13 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.goal import Waypoint
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.lookahead import farthest_way, Followed, followed
-from ur_cartesian_driver.planning.margins import measured, Nearest, nearest_of, too_near
+from ur_cartesian_driver.planning.margins import (
+    leaving_rows,
+    measured,
+    Nearest,
+    nearest_of,
+    too_near,
+)
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.path import ARC_CHORD_ERROR
 from ur_cartesian_driver.planning.pose_rows import angle_rows, Floats
@@ -88,12 +94,13 @@ class SplineWay:
 
 
 def way_along(reach: Reach, spline: ToolSpline, waypoints: Sequence[Waypoint], q_start: Joints,
-              options: PlanningOptions, first: int) -> SplineWay:
+              options: PlanningOptions, *, first: int, rests: bool) -> SplineWay:
     """
     Return the arm's way along a spline.
 
-    :param waypoints: those at the ends of its pieces, of which the first one has the number
-        ``first``.
+    :param waypoints: those at the ends of its pieces.
+    :param first: the number of the first of them.
+    :param rests: whether the arm is at rest at its begin.
     :param q_start: the configuration at its begin [rad].
     :raises GoalRefused: the arm cannot go there.
     """
@@ -102,17 +109,18 @@ def way_along(reach: Reach, spline: ToolSpline, waypoints: Sequence[Waypoint], q
     places = _places(spline, looks, first)
     pieces = _pieces(spline, places, first)
     found = followed(reach, pieces, q_start, places)
-    segments = first + found.piece.astype(np.int32)
-    measures = measured(reach.arm, found.q)
-    _check(reach, pieces, found, measures, waypoints, options)
     start = spline.rows(np.zeros(1, dtype=np.intp), np.zeros(1)).poses
     poses = np.concatenate([start, found.poses])
+    length = _sum(np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1))
+    angle = _sum(angle_rows(poses[:-1, 3:], poses[1:, 3:]))
+    measures = measured(reach.arm, found.q)
+    leaving = leaving_rows(measures, length[1:], angle[1:], rests=rests)
+    _check(reach, pieces, found, np.where(leaving, np.inf, measures), waypoints, options)
     return SplineWay(
         spline=spline, first=first, poses=poses, q=np.concatenate([[q_start], found.q]),
         piece=np.concatenate([[0], found.piece]), u=np.concatenate([[0.0], found.t]),
-        length=_sum(np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)),
-        angle=_sum(angle_rows(poses[:-1, 3:], poses[1:, 3:])),
-        nearest=nearest_of(reach.arm, found.q, measures, segments, found.t))
+        length=length, angle=angle, nearest=nearest_of(
+            reach.arm, found.q, measures, first + found.piece.astype(np.int32), found.t))
 
 
 def _check(reach: Reach, pieces: Sequence[Piece], found: Followed, measures: Floats,
