@@ -23,8 +23,7 @@ from ur_cartesian_driver.sim.uploads import Uploads
 GUIDE = Path(__file__).parents[1] / 'acceptance' / 'programs' / 'servoj_guide.script'
 CYCLE = 0.002
 SETTINGS = ServoSettings()
-OUTPUTS = ('timestamp', 'speed_scaling', 'runtime_state', 'actual_q', 'actual_qd',
-           *registers.SERVO_OUTPUTS)
+OUTPUTS = ('timestamp', 'speed_scaling', 'runtime_state', *registers.SERVO_OUTPUTS)
 
 
 class GuideCell:
@@ -41,8 +40,8 @@ class GuideCell:
             data = self._client.data_to_send()
         self._inputs = ready[0].inputs[0]
         self._inbox, self._outbox = deque(), deque()
-        #: Per cycle: the packet as the client gets it.
-        self.history = []
+        #: Where the arm was in each cycle.
+        self.joints = []
         text, = Uploads().feed(program.read_bytes())
         self.controller.programs.submit(text.text)
 
@@ -61,13 +60,13 @@ class GuideCell:
         :param delay: packets stay on the wire for so many cycles more than the one before did.
         """
         self.controller.step()
+        self.joints.append(self.q)
         for event in self._client.feed(b''.join(self._session.packages())):
             if isinstance(event, DataReceived):
                 self._inbox.append(feedback_of(event.values))
         while len(self._inbox) > delay:
             feedback = self._inbox.popleft()
             row = take(feedback)
-            self.history.append((feedback, self.q))
             if row is not None:
                 self._session.feed(self._inputs.pack(list(row)))
 
@@ -78,7 +77,7 @@ class GuideCell:
 
 def feedback_of(values):
     """Return a packet of :data:`OUTPUTS` as what it means."""
-    timestamp, scaling, state, _, _, mode, sequence, lag, done, repeats, skipped, size, over = values
+    timestamp, scaling, state, mode, sequence, lag, done, repeats, skipped, size, over = values
     return ServoFeedback(
         timestamp=timestamp, speed_scaling=scaling, playing=state == RuntimeState.PLAYING,
         mode=mode, last_sequence=sequence, lag=lag, setpoints_done=done, repeats=repeats,

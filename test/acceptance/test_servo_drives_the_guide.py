@@ -1,0 +1,111 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The sample program of the servoj guide carries out goals of ours: the contract is the same."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from servo_cell import GuideCell
+
+from ur_cartesian_driver.execution import (
+    EnterServo,
+    Finish,
+    Order,
+    ServoMachine,
+    ServoSettings,
+    WriteServo,
+)
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.events import CancelRequested, ServoReceived, StateReceived
+from ur_cartesian_driver.motion.goal import ExecutionMode, Tolerance
+from ur_cartesian_driver.motion.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan import ReferencePath
+from ur_cartesian_driver.motion.primitive import Spline
+from ur_cartesian_driver.motion.state import RobotState
+
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+
+REST = (0.0,) * 6
+DURATION = 0.6
+
+
+def order(home):
+    """There and on, through a point that is passed in motion."""
+    arm = Arm(robot_model('ur5e'))
+    via, to = (tuple(a + part for a in home) for part in (0.1, 0.2))
+    spline = JointSpline.of(home, [
+        Spline(target=via, velocities=(0.5,) * 6, accelerations=REST, duration=DURATION / 2),
+        Spline(target=to, velocities=REST, accelerations=REST, duration=DURATION / 2)])
+    times = np.linspace(0.0, DURATION, 121)
+    poses = [arm.forward(tuple(q)) for q in spline.rows(times)[0]]
+    return Order(
+        points=2, duration=DURATION, due=DURATION, spline=spline, execution=ExecutionMode.SERVO,
+        waypoint=np.array([0, 1], dtype=np.int32), goal_tolerance=Tolerance(position=(1e-3,) * 3),
+        reference=ReferencePath(
+            poses=np.array([[*pose.position, *pose.quaternion] for pose in poses]), time=times,
+            point=(times > DURATION / 2).astype(np.int32)))
+
+
+def state_of(controller):
+    """Return what RTDE would report; the machine's other packet."""
+    motion = controller.motion
+    return RobotState(
+        timestamp=controller.time, actual_q=motion.q, actual_qd=motion.qd, target_q=motion.q,
+        target_qd=motion.qd, actual_tcp_pose=motion.T_base_tcp, target_tcp_pose=motion.T_base_tcp,
+        actual_tcp_twist=motion.tcp_twist, target_tcp_twist=motion.tcp_twist,
+        speed_scaling=motion.scaling, runtime_state=controller.programs.state)
+
+
+def drive(slider=1.0, cancel_after=None):
+    """Run a goal on the sample program; return what was seen of it."""
+    cell = GuideCell()
+    goal = ServoMachine(order(cell.q), settings=ServoSettings(lookahead_time=0.06))
+    seen = SimpleNamespace(commands=goal.start(state_of(cell.controller)), home=cell.q, times=[],
+                           motion=[], q=[], cell=cell, spline=goal.order.spline)
+
+    def take(feedback):
+        commands = goal.step(ServoReceived(feedback=feedback), cell.time)
+        commands += goal.step(StateReceived(state=state_of(cell.controller)), cell.time)
+        if cancel_after is not None and goal.stream.motion_time >= cancel_after:
+            commands += goal.step(CancelRequested(), cell.time)
+        seen.commands += commands
+        seen.motion.append(goal.stream.motion_time)
+        seen.q.append(cell.q)
+        rows = [command.values for command in commands if isinstance(command, WriteServo)]
+        return rows[-1] if rows else None
+
+    cell.controller.set_slider(slider)
+    for _ in range(3000):
+        cell.cycle(take)
+        ends = [command for command in seen.commands if isinstance(command, Finish)]
+        if ends:
+            seen.outcome = ends[0].outcome
+            return seen
+    raise AssertionError(cell.log)
+
+
+@pytest.mark.parametrize('slider', [1.0, 0.5])
+def test_a_goal_arrives_with_the_lag_that_is_said(slider):
+    seen = drive(slider)
+    assert seen.outcome.code is ErrorCode.SUCCESSFUL, seen.outcome
+    assert seen.q[-1] == pytest.approx([a + 0.2 for a in seen.home], abs=1e-3)
+    # Behind what it was told last the arm is by the sample's lookahead, in the robot's own time.
+    motion, q = np.array(seen.motion), np.array(seen.q)
+    moving = (motion > 0.1) & (motion < DURATION - 0.01)
+    expected = seen.spline.rows(motion[moving] - 0.06)[0]
+    assert np.abs(q[moving] - expected).max() < 6e-3
+    assert any(isinstance(command, EnterServo) for command in seen.commands)
+    assert 'Buffer overflow' not in seen.cell.log
+
+
+def test_a_cancel_stops_the_sample_program_on_the_way_and_leaves_it_running():
+    seen = drive(cancel_after=0.3)
+    assert seen.outcome.code is ErrorCode.CANCELLED
+    for _ in range(400):  # the sample waits until the arm has been at rest for a while
+        seen.cell.cycle(lambda feedback: None)
+    assert 'finished exit invokes for SERVO' in seen.cell.log
+    assert seen.cell.controller.programs.running
+    assert seen.home[0] + 0.02 < seen.q[-1][0] < seen.home[0] + 0.18

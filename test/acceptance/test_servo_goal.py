@@ -1,0 +1,205 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""SERVO, from the goal to the simulated arm, in virtual time: as SPLINE, within its lag."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import robot_cell
+from robot_cell import run_cell
+
+from ur_cartesian_driver.driver.channel import MotionProgress, ServoChanged
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
+from ur_cartesian_driver.motion.servo import ServoActivity
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.spline_plan import SplineState
+from ur_cartesian_driver.planning.spline_points import tool_points
+from ur_cartesian_driver.planning.tool_spline import ToolSpline
+from ur_cartesian_driver.protocol import registers
+from ur_cartesian_driver.protocol.rtde import RtdeClient
+from ur_cartesian_driver.resources import share_path
+from ur_cartesian_driver.robot.rtde_connection import RtdeConnection
+from ur_cartesian_driver.ros.client import load_goal
+from ur_cartesian_driver.ros.convert import goal_from_message
+from ur_cartesian_driver.ros.frames import Frames, Stand
+
+pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
+
+ARM = Arm(robot_model('ur5e'))
+FOLDER = share_path() / 'config' / 'examples'
+
+
+class Run:
+    """A goal that is carried out, as its owner and the robot's clock see it."""
+
+    def __init__(self, cell, goal):
+        self.cell, self.packets, self.reports, self.progress = cell, [], [], []
+        stand = cell.memory.read()
+        self.made = plan(replace(goal(stand), execution=ExecutionMode.SERVO), stand, ARM,
+                         PlanningOptions())
+        take = cell.owner._take
+
+        def tell(notice):
+            if isinstance(notice, ServoChanged):
+                self.reports.append(notice.report)
+            elif isinstance(notice, MotionProgress):
+                self.progress.append(notice.progress)
+            take(notice)
+
+        cell.owner._take = tell
+        self.motion = cell.owner.start(self.made)
+
+    def looked(self):
+        state = self.cell.memory.read()
+        if not self.packets or state.timestamp > self.packets[-1].timestamp:
+            self.packets.append(state)
+        return self.motion.outcome is not None
+
+    async def end(self):
+        await self.cell.until(self.looked, 60.0)
+        return self.motion.outcome
+
+    def begin(self):
+        """Return when the first set-point of the motion was sent [s]."""
+        return next(report.timestamp for report in self.reports
+                    if report.activity is ServoActivity.SERVOING)
+
+
+def straight(seconds=1.0, way=0.1):
+    def goal(stand):
+        x, y, z = stand.actual_tcp_pose.position
+        there = replace(stand.actual_tcp_pose, position=(x, y + way, z))
+        return Goal(waypoints=(Waypoint(pose=there, time=seconds),))
+    return goal
+
+
+def example(name, factor):
+    def goal(stand):
+        made = goal_from_message(load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0,
+                                 stand=Stand.of(stand))
+        return replace(made, waypoints=tuple(replace(
+            point, time=factor * point.time, twist=tuple(v / factor for v in point.twist),
+            acceleration=tuple(a / factor ** 2 for a in point.acceleration))
+            for point in made.waypoints))
+    return goal
+
+
+@pytest.mark.parametrize(('name', 'factor'), [
+    pytest.param('circle', 0.45, marks=pytest.mark.exhaustive),
+    pytest.param('figure_eight', 1.0, marks=pytest.mark.exhaustive)])
+def test_every_point_is_passed_within_the_lag_that_is_reported(name, factor, monkeypatch):
+    monkeypatch.setattr(robot_cell, 'CYCLE', 0.002)  # of an e-Series
+
+    async def scenario(cell):
+        run = Run(cell, example(name, factor))
+        await run.end()
+        return run
+
+    run = run_cell(scenario, feedback_rate=500.0)
+    assert run.motion.outcome.code is ErrorCode.SUCCESSFUL, run.motion.outcome
+    goal, start = run.made.goal, SplineState(q=run.made.start)
+    curve = ToolSpline.through(tool_points(goal, start.tool(ARM, run.made.T_flange_active)))
+    times = np.array([state.timestamp for state in run.packets]) - run.begin()
+    places = np.array([state.target_tcp_pose.position for state in run.packets])
+    twists = np.array([state.target_tcp_twist for state in run.packets])
+    lag = max(progress.lag for progress in run.progress)
+    assert 0.05 < lag < 0.1
+    late = []
+    for point in (point for point in goal.waypoints if any(point.twist)):
+        asked = curve.at(np.array([point.time]))
+        fine = np.arange(point.time - 0.06, point.time + 0.2, 1e-4)
+        way = np.stack([np.interp(fine, times, x) for x in places.T], axis=1)
+        at = fine[np.argmin(np.linalg.norm(way - asked.poses[0, :3], axis=1))]
+        late.append(at - point.time)
+        twist = np.array([np.interp(at, times, v) for v in twists.T])
+        off = np.linalg.norm(twist[:3] - asked.twists[0][:3])
+        assert off < 0.01 * np.linalg.norm(asked.twists[0][:3]) + 1e-3, point
+    assert min(late) > 0.0
+    assert max(late) <= lag + 1e-3
+    assert max(late) - min(late) <= 2.0 * robot_cell.CYCLE
+    around = [np.linalg.norm(places - curve.at(times - lag + shift).poses[:, :3], axis=1)
+              for shift in np.linspace(-0.01, 0.02, 61)]
+    assert np.min(around, axis=0).max() < 2e-4
+
+
+def test_feedback_and_reports_tell_the_lag_and_the_inputs_are_given_back():
+    async def scenario(cell):
+        run = Run(cell, straight())
+        outcome = await run.end()
+        assert outcome.code is ErrorCode.SUCCESSFUL, outcome
+        lags = [progress.lag for progress in run.progress]
+        assert 0.05 < max(lags) < 0.12
+        activities = [report.activity for report in run.reports]
+        assert activities[-1] is ServoActivity.IDLE
+        assert ServoActivity.SERVOING in activities
+        last = run.reports[-1]
+        assert last.setpoints_done == pytest.approx(last.setpoints_sent, abs=1)
+        assert (last.underruns, last.overruns, last.skipped) == (0, 0, 0)
+        # Another client can have the inputs now.
+        other = RtdeConnection(RtdeClient(['timestamp'], registers.SERVO_INPUTS), lambda *_: None)
+        await other.open(robot_cell.HOST, robot_cell.RTDE)
+        # And while it has them no goal moves anything.
+        refused = Run(cell, straight(way=-0.05))
+        q = cell.q
+        outcome = await refused.end()
+        assert outcome.code is ErrorCode.ROBOT_NOT_READY
+        assert 'in use by another client' in outcome.text
+        assert cell.q == q
+        other.close()
+        await cell.until(cell.is_ready)
+        again = Run(cell, straight(way=-0.05))
+        assert (await again.end()).code is ErrorCode.SUCCESSFUL
+
+    run_cell(scenario)
+
+
+def test_slider_pause_and_cancel():
+    async def scenario(cell):
+        run = Run(cell, straight(0.8))
+        await cell.sleep(0.6)
+        cell.robot.set_speed_slider(0.0)
+        await cell.sleep(2.5)  # longer than an arm may stand for no reason
+        cell.robot.set_speed_slider(1.0)
+        outcome = await run.end()
+        assert outcome.code is ErrorCode.SUCCESSFUL, outcome
+        assert run.reports[-1].underruns == 0
+
+        run = Run(cell, straight(0.8, way=-0.1))
+        await cell.sleep(0.5)
+        cell.robot.controller.programs.pause()
+        await cell.sleep(0.5)
+        cell.robot.play_program()
+        outcome = await run.end()
+        assert outcome.code is ErrorCode.SUCCESSFUL, outcome
+
+        run = Run(cell, straight(0.8))
+        await cell.sleep(0.5)
+        cell.owner.cancel()
+        took = await cell.until(run.looked)
+        assert run.motion.outcome.code is ErrorCode.CANCELLED
+        assert took < 0.5
+        assert cell.at_rest()
+        await cell.until(cell.is_ready)
+
+    run_cell(scenario)
+
+
+def test_inputs_that_are_lost_on_the_way_brake_the_arm_and_the_program_stays():
+    async def scenario(cell):
+        run = Run(cell, straight(0.8))
+        await cell.sleep(0.5)
+        end = cell.loop.open_ends(robot_cell.RTDE)[-1]
+        end.abort()
+        outcome = await run.end()
+        assert outcome.code is ErrorCode.CONNECTION_LOST
+        assert 'RTDE inputs' in outcome.text
+        await cell.until(cell.at_rest, 0.5)
+        await cell.until(cell.is_ready)
+        again = Run(cell, straight(0.8, way=0.05))
+        assert (await again.end()).code is ErrorCode.SUCCESSFUL
+
+    run_cell(scenario)

@@ -1,0 +1,164 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The two experiments of the servoj guide, and what becomes of the lag.
+
+The tool goes up and down along the vertical axis, again and again, with the set-points at the rate
+of the packets or as our loop makes them, on the simulated controller at two positions of the speed
+slider. ``doc/servo_experiments.png`` is drawn from the same numbers by
+``scripts/draw_servo_experiments.py``.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import pi, sin
+
+import numpy as np
+from servo_cell import CYCLE, GUIDE, GuideCell
+
+from ur_cartesian_driver.execution.servo_stream import Phase, ServoSettings, ServoStream
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.inverse import nearest
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.protocol.registers import ServoMode, SyncState
+
+UNBUFFERED = GUIDE.with_name('servoj_unbuffered.script')
+#: How far up the tool goes [m], and how long there and back takes [s].
+HEIGHT, PERIOD = 0.1, 2.0
+#: So many other set-points servoj may be told before the next one of ours.
+AHEAD = 200
+#: Set-points of one period are computed once.
+ROWS = round(PERIOD / CYCLE)
+
+
+@lru_cache
+def up_and_down(home):
+    """Return the joints of one period, a row for each control step (n, 6) [rad]."""
+    arm, q, rows = Arm(robot_model('ur5e')), home, []
+    T = arm.forward(home)
+    x, y, z = T.position
+    for i in range(ROWS):
+        height = HEIGHT * sin(pi * i / ROWS) ** 2
+        q = nearest(arm, Pose((x, y, z + height), T.quaternion), q)
+        rows.append(q)
+    return np.array(rows)
+
+
+class UpAndDown:
+    """Set-points of as many periods as one likes, or without end."""
+
+    def __init__(self, rows, periods=np.inf):
+        self._rows, self._end, self._step = rows, periods * len(rows), 0.0
+        self.given, self.now = [], rows[0]
+
+    @property
+    def done(self):
+        return self._step >= self._end - 0.5
+
+    def next(self, dt):
+        self._step += dt / CYCLE
+        self.now = self._rows[round(self._step) % len(self._rows)]
+        if dt > 0.0:
+            self.given.append(self.now)
+        return tuple(self.now)
+
+
+@dataclass
+class Result:
+    """What was seen in each cycle: time [s], wanted and real joints (n, 6) [rad], lag [s]."""
+
+    times: np.ndarray
+    wanted: np.ndarray
+    actual: np.ndarray
+    lag: np.ndarray
+    #: Set-points that were written, and those of them that servoj never got.
+    written: int
+    skipped: int
+
+    @property
+    def jerkiness(self):
+        """Greatest change of a joint's acceleration from one cycle to the next [rad/s^2]."""
+        settled = self.actual[round(0.5 / CYCLE):]
+        return float(np.abs(np.diff(settled, n=3, axis=0)).max() / CYCLE**2)
+
+
+class Experiment:
+    """A robot with one of the programs, and what servoj is told there."""
+
+    def __init__(self, program):
+        self.cell = GuideCell(program)
+        self.rows = up_and_down(self.cell.q)
+        self.now, self.under_way = self.cell.q, lambda: 0.0
+        self.wanted, self.lag, self.written, self._told = [], [], [], []
+        motion = self.cell.controller.motion
+        carry_out = motion.servoj
+
+        def servoj(q, *settings):
+            if not self._told or self._told[-1] != q:
+                self._told.append(q)
+            return carry_out(q, *settings)
+
+        motion.servoj = servoj  # to hear what the program says, not to change it
+
+    def run(self, take, seconds, late):
+        """
+        Let time pass.
+
+        :param late: every so many cycles a packet comes together with the next one; 0 = never.
+        """
+        for i in range(round(seconds / CYCLE)):
+            self.cell.cycle(take, delay=int(late > 0 and i % late == 0))
+            self.wanted.append(self.now)
+            self.lag.append(self.under_way())
+
+    def result(self):
+        actual = np.array(self.cell.joints)
+        skipped, at = 0, 0
+        for row in map(tuple, self.written):  # what servoj was told is in this order too
+            found = row in self._told[at:at + AHEAD]
+            at += self._told[at:at + AHEAD].index(row) + 1 if found else 0
+            skipped += not found
+        return Result(CYCLE * np.arange(len(actual)), np.array(self.wanted), actual,
+                      np.array(self.lag), len(self.written), skipped)
+
+
+def unbuffered(slider, seconds, late=0):
+    """Write a set-point for each packet, whatever the robot makes of it."""
+    experiment = Experiment(UNBUFFERED)
+    experiment.cell.controller.set_slider(slider)
+
+    def take(_):
+        number = len(experiment.written) + 1
+        q = experiment.rows[number % ROWS]
+        experiment.written.append(q)
+        experiment.now = q
+        return (ServoMode.SERVO, number, 0, SyncState.EXTERNAL_TO_ROBOT, *q, *(0.3,) * 6,
+                number * CYCLE)
+
+    experiment.run(take, seconds, late)
+    return experiment.result()
+
+
+def buffered(slider, seconds, late=0, *, closed_loop=True):
+    """Let our side stream to the guide's sample program."""
+    experiment = Experiment(GUIDE)
+    source = UpAndDown(experiment.rows)
+    stream = ServoStream(source, ServoSettings(
+        closed_loop=closed_loop, lookahead_time=0.06,
+        **({} if closed_loop else {'most_lag': 10.0, 'buffer_depth': 5000})))
+    experiment.cell.controller.set_slider(slider)
+
+    def take(feedback):
+        row = stream.take(feedback, experiment.cell.time)
+        if stream.phase is Phase.READY:
+            stream.begin()
+        experiment.now = source.now
+        return row
+
+    experiment.under_way = lambda: stream.under_way
+    experiment.run(take, seconds, late)
+    # What is still under way is not skipped.
+    left = round(stream.under_way / CYCLE) + 2
+    experiment.written = source.given[:-left]
+    return experiment.result()
