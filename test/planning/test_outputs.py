@@ -127,8 +127,8 @@ def test_the_report_tells_them_with_their_points(cell):
     first, second, third, *_ = made.report
     assert first.endswith('; switches standard digital output 0 on in the middle of its corner')
     assert second.endswith('; switches standard digital output 0 off 0.100 s after it')
-    assert third.endswith('; switches standard analog output 0 to 0.25 (current) 0.200 s after '
-                          'it, 0.200 s after the end')
+    assert third.endswith(
+        '; switches standard analog output 0 to 0.25 (current) 0.200 s after the end')
 
 
 def test_an_arc_that_begins_beyond_the_plane_of_a_place_comes_round_to_it(cell):

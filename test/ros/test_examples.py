@@ -42,7 +42,7 @@ def kinds(name):
 
 def test_there_are_examples():
     assert set(NAMES) >= {'square', 'seam', 'postures', 'relative', 'tilt', 'tolerances', 'circle',
-                          'figure_eight', 'seam_timed'}
+                          'figure_eight', 'seam_timed', 'glue'}
 
 
 @pytest.mark.parametrize('name', NAMES)
@@ -94,6 +94,15 @@ def test_the_circle_is_round_and_even_between_its_points():
 def test_the_timed_seam_stops_only_above_it_behind_it_and_at_home():
     assert [line for line in planned('seam_timed').report if 'stops' in line][-1] == (
         'points 0, 6: the arm stops there, because the twist is 0 (NaN lets the driver choose)')
+
+
+def test_the_valve_is_open_along_the_bead_and_the_light_comes_at_the_end():
+    result = planned('glue')
+    outputs = [(segment.waypoint, output.pin, output.value, output.place is not None, output.delay)
+               for segment in result.segments for output in segment.outputs]
+    assert outputs == [(1, 2, 1.0, True, 0.0), (2, 0, 0.6, True, 0.0), (3, 0, 1.0, True, 0.0),
+                       (4, 2, 0.0, True, 0.0), (6, 3, 1.0, False, pytest.approx(0.5))]
+    assert all(segment.primitive.blend_radius > 0.0 for segment in result.segments[:-1])
 
 
 def test_the_posture_of_the_seam_is_the_one_of_its_pose():

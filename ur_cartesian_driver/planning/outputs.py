@@ -150,7 +150,7 @@ class _Way:
             behind, place, where = told, self._at_point(told), self._where(told)
         elif late > -_NOW:
             behind, place = last, None
-            where = f'{command.offset:.3f} s after it, {max(late, 0.0):.3f} s after the end'
+            where = f'{max(late, 0.0):.3f} s after the end'
         else:
             behind, place, where = self._behind(time), time, f'{command.offset:.3f} s after it'
         record = SwitchOutput(
