@@ -250,7 +250,7 @@ def _moves_part(on: OpenGoal, addition: Addition, made: Plan, since: float, behi
         outputs=_still_due(on, addition, made, since, time))
     return Part(plan=replace(made, goal=replace(made.goal, keep_open=not addition.last)),
                 behind=behind, since=since, ending=0 if addition.last else ending,
-                due=end if timed else None, text=_text(on, addition), then=then)
+                due=end + _waits(last) if timed else None, text=_text(on, addition), then=then)
 
 
 def _seen(known: Sequence[Known], k: int, arrived: dict[int, Joints], points: int) -> Known:
@@ -354,8 +354,8 @@ def _spline_part(on: OpenGoal, addition: Addition, made: Plan, end: SplineState,
         told=addition.waypoints[-1].time, q_rest=q_rest, state=end, outputs=pending,
         again=again and (again[0], _tail_of(again[1], end.time - again[0].duration)))
     return Part(plan=replace(made, goal=replace(made.goal, keep_open=not addition.last)),
-                behind=behind, since=since, ending=ending, due=rest_time,
-                text=_text(on, addition), then=then)
+                behind=behind, since=since, ending=ending,
+                due=rest_time + _waits(made.segments[-1]), text=_text(on, addition), then=then)
 
 
 def _with_outputs(on: OpenGoal, addition: Addition, made: Plan, since: float
@@ -425,6 +425,11 @@ def _standing(on: OpenGoal, q: Joints, arm: Arm) -> RobotState:
     pose = arm.forward(q) @ on.T_flange_active
     return RobotState(timestamp=0.0, actual_q=q, target_q=q, actual_tcp_pose=pose,
                       target_tcp_pose=pose, T_flange_tcp=on.T_flange_active)
+
+
+def _waits(last: PlannedSegment) -> float:
+    """Return how long the robot program waits behind a motion for its outputs [s]."""
+    return max((output.delay for output in last.outputs), default=0.0)
 
 
 def _records(segments: Sequence[PlannedSegment]) -> int:
