@@ -16,7 +16,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TypeAlias
 
-from ur_cartesian_driver.execution import states
+from ur_cartesian_driver.execution import servo_stream, states
 from ur_cartesian_driver.robot import lifecycle
 
 DIAGRAMS = Path(__file__).resolve().parents[1] / 'doc' / 'diagrams'
@@ -35,6 +35,9 @@ def pages() -> dict[str, str]:
             'A goal on its way through the robot program',
             'ur_cartesian_driver/execution/states.py',
             goal(), [signal.name for signal in states.Signal]),
+        'servo.md': page(
+            'Streaming of set-points', 'ur_cartesian_driver/execution/servo_stream.py',
+            servo(), [change.name for change in servo_stream.Change]),
     }
 
 
@@ -49,6 +52,12 @@ def goal() -> Table:
     return {state.name: {signal.name: (step.state.name, _name(step.code))
                          for signal, step in row.items()}
             for state, row in states.TRANSITIONS.items()}
+
+
+def servo() -> Table:
+    """Return the table of the streaming of set-points."""
+    return {phase.name: {change.name: (then.name, '') for change, then in row.items()}
+            for phase, row in servo_stream.TRANSITIONS.items()}
 
 
 def page(title: str, source: str, table: Table, events: Sequence[str]) -> str:
