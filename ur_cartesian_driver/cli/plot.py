@@ -219,19 +219,22 @@ def _draw_scaling(axes: Any, recording: Recording) -> None:
     axes.legend(loc='lower left', ncols=2)
 
 
-def _timeline(recording: Recording) -> list[tuple[str, NDArray[np.bool_]]]:
-    """Return what is on or off over time: outputs that were on, and pauses of the program."""
+def _timeline(recording: Recording) -> list[tuple[str, NDArray[np.float64]]]:
+    """Return what is on or off over time, or between (0 to 1): outputs, pauses of the program."""
     digital, rows = recording.digital_output, []
     for bit, name in enumerate(OUTPUT_NAMES):
         is_on = (digital >= 0) & (digital >> bit & 1 > 0)
         if is_on.any():
-            rows.append((name.replace(' digital output', ''), is_on))
+            rows.append((name.replace(' digital output', ''), is_on.astype(np.float64)))
+    for channel, values in enumerate(np.nan_to_num(recording.analog_output).T):
+        if np.ptp(values) > 0.0:
+            rows.append((f'analog {channel}, to {values.max():.3g}', values / values.max()))
     paused = recording.runtime_state == RuntimeState.PAUSED
-    return [*rows, ('paused', paused)] if paused.any() else rows
+    return [*rows, ('paused', paused.astype(np.float64))] if paused.any() else rows
 
 
 def _draw_timeline(axes: Any, recording: Recording,
-                   rows: list[tuple[str, NDArray[np.bool_]]]) -> None:
+                   rows: list[tuple[str, NDArray[np.float64]]]) -> None:
     """Draw points, outputs and pauses as lines of one chart."""
     time, points = recording.time, [(at, text.rsplit(' ', 1)[-1])
                                     for at, kind, text in recording.events if kind == 'point']
@@ -240,8 +243,8 @@ def _draw_timeline(axes: Any, recording: Recording,
         for at, number in points:
             axes.annotate(number, (at, 0.0), xytext=(3, 2), textcoords='offset points',
                           fontsize=7.0)
-    for height, (name, is_on) in enumerate(rows, start=1):
-        axes.fill_between(time, height - 0.3, height + 0.3, where=is_on.tolist(), step='post',
+    for height, (name, share) in enumerate(rows, start=1):
+        axes.fill_between(time, height - 0.3, height - 0.3 + 0.6 * share, step='post',
                           color='#e08a00' if name == 'paused' else _MARK, linewidth=0.0)
     axes.set_yticks(range(len(rows) + 1), ['to point', *(name for name, _ in rows)])
     axes.set_ylim(-0.6, len(rows) + 0.6)
