@@ -72,13 +72,18 @@ def _even(at: _Motion, qd: Floats) -> Floats:
     From link to link: an axis that is carried by w turns the velocity about it, w x (z q'), and a
     point r farther out is accelerated by e x r + w x (w x r).
     """
-    origins = [np.array(origin).T for origin in at.frames.origins]
-    axes = [np.array(axis).T for axis in at.frames.axes]
-    w, e, a = np.zeros((3, len(qd), 3))
+    origins, axes = np.array(at.frames.origins), np.array(at.frames.axes)  # (6, 3, n)
+    w, e, a = np.zeros((3, 3, len(qd)))
     for k in range(6):
-        spin = axes[k] * qd[:, k:k + 1]
-        e = e + np.cross(w, spin)
+        spin = axes[k] * qd[:, k]
+        e = e + _cross(w, spin)
         w = w + spin
-        r = (origins[k + 1] if k < 5 else at.tcp.T) - origins[k]
-        a = a + np.cross(e, r) + np.cross(w, np.cross(w, r))
-    return np.concatenate([a, e], axis=1)
+        r = (origins[k + 1] if k < 5 else at.tcp) - origins[k]
+        a = a + _cross(e, r) + _cross(w, _cross(w, r))
+    return np.concatenate([a, e]).T
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Return the products of vectors (3, n); numpy's own takes twenty times as long for few."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                     a[0] * b[1] - a[1] * b[0]])

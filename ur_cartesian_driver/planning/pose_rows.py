@@ -30,6 +30,13 @@ def multiply_rows(a: Floats, b: Floats) -> Floats:
         aw * bw - ax * bx - ay * by - az * bz), axis=1)
 
 
+def cross_rows(a: Floats, b: Floats) -> Floats:
+    """Return the products of vectors (n, 3); numpy's own takes many times as long for few."""
+    ax, ay, az = a.T
+    bx, by, bz = b.T
+    return np.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), axis=1)
+
+
 def conjugate_rows(a: Floats) -> Floats:
     """Return the inverse rotations (n, 4) of unit quaternions."""
     inverse: Floats = a * np.array((-1.0, -1.0, -1.0, 1.0))

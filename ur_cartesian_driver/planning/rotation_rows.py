@@ -20,7 +20,7 @@ from math import factorial
 import numpy as np
 
 from ur_cartesian_driver.motion.polynomials import Rates
-from ur_cartesian_driver.planning.pose_rows import Floats
+from ur_cartesian_driver.planning.pose_rows import cross_rows, Floats
 
 # Terms of the series: exact to rounding for turns up to two full turns.
 _TERMS = 26
@@ -50,10 +50,10 @@ def angular(turn: Rates) -> tuple[Floats, Floats]:
     r, v, a = turn
     b, b_s, c, c_s = _series(r)
     s = 2.0 * np.einsum('ij,ij->i', r, v)[:, None]  # the derivative of |r|^2
-    rv, ra = np.cross(r, v), np.cross(r, a)
-    rrv = np.cross(r, rv)
+    rv, ra = cross_rows(r, v), cross_rows(r, a)
+    rrv = cross_rows(r, rv)
     w = v + b * rv + c * rrv
-    e = (a + b * ra + c * (np.cross(r, ra) + np.cross(v, rv))
+    e = (a + b * ra + c * (cross_rows(r, ra) + cross_rows(v, rv))
          + s * (b_s * rv + c_s * rrv))
     return w, e
 
