@@ -26,6 +26,8 @@ MOST_ROWS = 6000
 #: More points than that are not numbered.
 MOST_NUMBERS = 12
 _AXES = 'xyz'
+#: From above, unless the height is that much more than the smaller width.
+_SHOWN = np.array([1.0, 1.0, 0.4])
 _PLANNED, _TARGET, _ACTUAL, _MARK = '#9aa5b1', '#1f77b4', '#c8372d', '#2a9d5c'
 #: Events that are marked in all charts.
 _STRIKING = {'cancel': '#e08a00', 'safety': '#c8372d', 'robot': '#c8372d', 'end': '#333333'}
@@ -126,12 +128,12 @@ def _title(recording: Recording) -> str:
 
 
 def _draw_path(figure: Any, recording: Recording) -> None:
-    """Draw the path in space, and in the plane in which it is largest."""
+    """Draw the path in space and from above, or from the side where it goes up and down most."""
     planned, actual = recording.planned_pose[:, :3], recording.actual_pose[:, :3]
     space, flat = figure.add_subplot(2, 1, 1, projection='3d'), figure.add_subplot(2, 1, 2)
     low, high = (side(np.vstack((planned, actual)), axis=0) for side in (np.min, np.max))
     extent = high - low
-    a, b = sorted(np.argsort(extent)[1:].tolist())
+    a, b = sorted(np.argsort(extent * _SHOWN)[1:].tolist())
     for axes, columns in ((space, [0, 1, 2]), (flat, [a, b])):
         axes.plot(*planned[:, columns].T, color=_PLANNED, linewidth=4.0, alpha=0.6,
                   solid_capstyle='round', label='planned')
