@@ -48,6 +48,7 @@ class Observer:
             [rad]; 0 = any way, any angle.
         """
         self._order, self._records = order, records
+        self._start = pose_from_row(order.reference.poses[0])
         self._tracker = PathTracker(order.reference)
         self._pace = Pace(order.reference) if order.knows_pace else None
         self._path_watch = Watch(order.path_tolerance, order.T_base_frame)
@@ -195,7 +196,7 @@ class Observer:
 
     def off_start(self, state: RobotState) -> str | None:
         """Return a clause that says how far the arm is from where the plan begins, or None."""
-        return self._off(pose_from_row(self._order.reference.poses[0]), state.actual_tcp_pose)
+        return self._off(self._start, state.actual_tcp_pose)
 
     def off_place(self, state: RobotState) -> str | None:
         """Return a clause that says how far the arm is from where it waits, or None."""

@@ -58,7 +58,7 @@ def ignored(goal: Goal) -> list[str]:
         say(remarks, [i for i, s in enumerate(goal.segments) if s.acceleration > 0.0 and s.type
                        in (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)],
              'the acceleration of the segment is ignored: its time counts')
-    if goal.segments and goal.segments[-1].blend_radius > 0.0:
+    if goal.segments and goal.segments[-1].blend_radius > 0.0 and not goal.keep_open:
         remarks.append(f'point {len(points) - 1}: the blend is ignored: the last point is '
                        'never blended')
     return remarks
