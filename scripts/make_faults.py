@@ -67,7 +67,8 @@ MODES_HEAD = """# The other ways of execution
 
 All above is about goals that are executed as PRIMITIVES. The following goals go through the same
 faults while they move, wait or end. What happens before a goal is on its way, and to interfaces
-that no goal uses, does not depend on its execution and stands above.
+that no goal uses, does not depend on its execution and stands above. A phase in brackets behind a
+fault is the only one in which that is looked at.
 
 """
 
@@ -106,7 +107,8 @@ def _cells(row: Row, phases: Sequence[str]) -> Sequence[str]:
     def tell(what: Callable[[Row], str]) -> str:
         return _by_phase(row, phases, what)
 
-    return (row.fault, tell(lambda at: ('goes on, ' if at.waits else '') + at.code.name),
+    where = f' ({", ".join(row.phases)})' if row.phases else ''
+    return (row.fault + where, tell(lambda at: ('goes on, ' if at.waits else '') + at.code.name),
             tell(lambda at: f'{at.bound:g} s' if _disturbs(at) else 'as without'),
             tell(lambda at: f'{at.rest:g} s' if _disturbs(at) or at.waits else 'as without'),
             tell(lambda at: at.then.name),

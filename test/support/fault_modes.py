@@ -95,16 +95,19 @@ def _times(row: Row, undisturbed: float, differing: dict[str, object]) -> dict[s
 
 def _mode(name: str, about: str, phases: dict[str, str], undisturbed: float,
           changes: dict[str, dict[str, dict[str, object]]], *, faults: Iterable[str] = FAULTS,
-          more: tuple[Row, ...] = (),
+          once: tuple[str, Iterable[str]] = ('', ()), more: tuple[Row, ...] = (),
           changes_there: dict[str, dict[str, dict[str, object]]] | None = None) -> Mode:
     """
     Return a way of execution.
 
+    :param once: further faults, and the only phase in which they are looked at.
     :param changes_there: those of the rows of the pendant, where they are others.
     """
     return Mode(
         name=name, about=about, phases=phases, undisturbed=undisturbed,
-        headless=chosen(HEADLESS, faults, phases, undisturbed, changes) + more,
+        headless=(*chosen(HEADLESS, faults, phases, undisturbed, changes), *more, *(
+            replace(row, phases=once[:1])
+            for row in chosen(HEADLESS, once[1], phases, undisturbed, changes))),
         local=chosen(LOCAL, ON_THE_PENDANT, phases, undisturbed,
                      changes if changes_there is None else changes_there),
         continued=chosen(CONTINUED, ('protective stop',), phases, undisturbed, changes))
@@ -161,9 +164,9 @@ SERVO = _mode(
             '': {'code': E.SUCCESSFUL, 'then': S.READY, 'steps': ('wait until it is over',)}},
         'the reverse socket is half-open': {'slowing down': {'code': E.SUCCESSFUL}},
         'the node is silent': {'slowing down': {'code': E.SUCCESSFUL}}},
-    faults=(*(name for name in FAULTS if name not in (
-        'the trajectory socket is half-open', 'RTDE is 0.1 s late')), *FAULTS_OF_RTDE),
-    more=SETPOINTS, changes_there={
+    faults=tuple(name for name in FAULTS if name not in (
+        'the trajectory socket is half-open', 'RTDE is 0.1 s late')),
+    once=('between points', FAULTS_OF_RTDE), more=SETPOINTS, changes_there={
         'somebody pauses the program': _LEFT_PAUSED,
         'the network cable is cut': _NOT_ENTERED | {
             '': {'steps': ('wait until it is over', 'play')}},
