@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.driver import channel, DriverConfig, DriverStatus
-from ur_cartesian_driver.execution import Order
+from ur_cartesian_driver.execution import AnswerExtension, Order
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.plan import ReferencePath
@@ -22,6 +22,7 @@ MESSAGES = [
     channel.Configure(config=DriverConfig(robot_ip='10.0.0.1', headless_mode=True)),
     channel.CancelMotion(motion=3), channel.Heartbeat(), channel.Shutdown(),
     channel.ResendProgram(),
+    channel.MotionExtended(motion=3, answer=AnswerExtension(number=1, refusal='The goal ended.')),
     channel.MotionEnded(motion=3, outcome=Outcome(code=ErrorCode.SUCCESSFUL, text='Done.')),
     channel.StatusChanged(status=DriverStatus(
         state=ConnectionState.READY, ports={'reverse_port': 50001})),

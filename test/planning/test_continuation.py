@@ -10,7 +10,7 @@ import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
-from ur_cartesian_driver.motion.errors import GoalRefused
+from ur_cartesian_driver.motion.errors import GoalRefused, NotAvailable
 from ur_cartesian_driver.motion.goal import (
     ExecutionMode,
     Goal,
@@ -26,6 +26,7 @@ from ur_cartesian_driver.motion.primitive import SwitchOutput
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.continuation import Addition, following, opened
+from ur_cartesian_driver.protocol.dialects import DIALECTS
 
 ARM = Arm(robot_model('ur5e'))
 Q = (0.3, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
@@ -197,6 +198,13 @@ def test_points_of_a_refusal_are_numbered_from_the_start_of_the_goal():
         following(part.then, Addition(waypoints=goal.waypoints[6:7],
                                       io_commands=outputs((0.0,))[3:4]), ARM, OPTIONS,
                   from_rest=False)
+
+
+@pytest.mark.parametrize('name', ['2.0', '2.10', '2.12'])
+def test_older_robot_programs_have_to_know_the_number_of_points(name):
+    goal = replace(moves(1), keep_open=True)
+    with pytest.raises(NotAvailable, match=f'wire dialect {name} has to know at the start'):
+        plan(goal, STATE, ARM, replace(OPTIONS, dialect=DIALECTS[name]))
 
 
 def test_what_is_remembered_of_a_goal_does_not_grow():
