@@ -332,6 +332,7 @@ def test_a_joint_at_the_end_of_its_range_is_refused(make_cell):
             texts.append(str(error))
     assert len(texts) == 1
     assert 'wrist_3_joint out of its range' in texts[0]
+    assert 'use PRIMITIVES with a JOINT segment.' in texts[0]
     assert texts[0].startswith('trajectory.points[0].pose, ')
 
 

@@ -147,7 +147,9 @@ def _check(reach: Reach, pieces: Sequence[Piece], found: Followed, measures: Flo
 def _said(refusal: GoalRefused) -> GoalRefused:
     """Return a refusal whose advice is good for splines, which have no JOINT segments."""
     if isinstance(refusal, NearSingularity | JointLimitExceeded):
-        text = str(refusal).replace('use a JOINT segment', 'use PRIMITIVES with a JOINT segment')
+        text = str(refusal)
+        for advice in ('use a JOINT segment', 'go there with a JOINT segment'):
+            text = text.replace(advice, 'use PRIMITIVES with a JOINT segment')
         return type(refusal)(text)
     return refusal
 
