@@ -286,12 +286,14 @@ class ServoTargets:
 
     def _take(self, message: Message) -> None:
         """Put a message down for the thread, unless it is older than one that came before."""
-        stamp = nanoseconds(message.header.stamp)
+        stamp, now = nanoseconds(message.header.stamp), self._clock.now().nanoseconds
         with self._condition:
+            if self._newest_stamp > now + self._max_age * 1e9:
+                self._newest_stamp = 0  # nobody follows that one; or a simulated clock went back
             if 0 < stamp < self._newest_stamp:
                 return
             self._newest_stamp = stamp or self._newest_stamp
-            self._pending, self._received = message, self._clock.now().nanoseconds
+            self._pending, self._received = message, now
             self._condition.notify_all()
 
     # ---- in the thread ------------------------------------------------------------------------
@@ -310,16 +312,10 @@ class ServoTargets:
                 reason = str(error).removeprefix('trajectory.')  # as of a goal, which it is not
                 self._logger.warning(f'A message on ~/servo_target is ignored: {reason}',
                                      throttle_duration_sec=COMPLAINT)
-                self._forget_future(received)
             except Exception as error:  # the next one may be better
                 self._logger.error(
                     'A message on ~/servo_target is ignored, because of a defect of the driver, '
                     f'{type(error).__name__}: {error}.', throttle_duration_sec=COMPLAINT)
-
-    def _forget_future(self, now: int) -> None:
-        """Let a stamp far in the future not silence all that come after it."""
-        with self._condition:
-            self._newest_stamp = min(self._newest_stamp, now)
 
     def _follow(self, message: Message, received: int) -> None:
         state = self._driver.state
