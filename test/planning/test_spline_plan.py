@@ -320,6 +320,17 @@ def test_a_spline_may_leave_a_singularity_but_not_come_to_one_however_dense_its_
             assert 'of the wrist singularity' in refused(NearSingularity, cell, goal)
 
 
+@pytest.mark.parametrize(('turn', 'passes'), [(pi, False), (pi - 5e-4, False), (3.0, True)])
+def test_half_a_turn_between_two_points_is_refused(cell, turn, passes):
+    goal = Goal(execution=SPLINE, waypoints=(
+        cell.point(0.01, time=1.0), cell.point(turn=(0.0, 0.0, turn), time=9.0)))
+    if passes:
+        plan(goal, cell.state, cell.arm, OPTIONS)
+        return
+    text = refused(InvalidGoal, cell, goal)
+    assert text.startswith('trajectory.points[1].pose.orientation turns the tool by 1')
+
+
 def test_a_joint_at_the_end_of_its_range_is_refused(make_cell):
     cell = make_cell(q=(0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 2.0 * pi - 0.3))
     turns = [Goal(waypoints=(cell.point(turn=(0.0, 0.0, 0.5 * s), time=3.0, twist=(

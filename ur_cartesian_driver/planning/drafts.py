@@ -32,7 +32,7 @@ _LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 #: So near to half a turn rounding on the wire, and where the arm really stands, decide in which
 #: direction a line turns the tool [rad].
-_HALF_TURN = 1e-3
+HALF_TURN = 1e-3
 #: Motions on straight lines in joint space.
 IN_JOINTS = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 #: Motions that can only be blended into from some others; all else stops before them.
@@ -122,7 +122,7 @@ class Drafts:
         i, segment = draft.index, draft.segment
         turn = start.angle_to(self._targets[i])
         follows_arc = (draft.kind == SegmentType.CIRCULAR and segment.arc_mode == ArcMode.FIXED)
-        if turn > pi - _HALF_TURN and not follows_arc:
+        if turn > pi - HALF_TURN and not follows_arc:
             raise InvalidGoal(
                 point_field(i, 'pose.orientation'), f'turns the tool by {degrees(turn):.2f} '
                 'degrees on the way, and either way round is as short: nobody can tell which the '

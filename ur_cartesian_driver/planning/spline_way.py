@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import pi
+from math import degrees, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.goal import Waypoint
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.planning.drafts import HALF_TURN
 from ur_cartesian_driver.planning.lookahead import farthest_way, Followed, followed
 from ur_cartesian_driver.planning.margins import (
     leaving_rows,
@@ -177,16 +178,22 @@ def _looked_at(spline: ToolSpline) -> tuple[NDArray[np.intp], Floats]:
 
 def _check_sizes(reach: Reach, spline: ToolSpline, looks: tuple[NDArray[np.intp], Floats],
                  first: int) -> None:
-    """Refuse pieces on which twists and accelerations carry the tool away for nothing."""
+    """Refuse pieces that turn either way round, or on which rates carry the tool far away."""
     n = len(spline.positions)
     x, turn = spline.vectors(*looks)
     x = x.reshape(n, _LOOKS, 3)
     detour = (np.linalg.norm(np.diff(x, axis=1), axis=2).sum(axis=1)
               - np.linalg.norm(x[:, -1] - x[:, 0], axis=1))
-    angle = np.linalg.norm(turn, axis=1).reshape(n, _LOOKS).max(axis=1)
+    angles = np.linalg.norm(turn, axis=1).reshape(n, _LOOKS)
+    k = int(np.argmax(angles[:, -1]))
+    if angles[k, -1] > pi - HALF_TURN:
+        raise InvalidGoal(
+            point_field(first + k, 'pose.orientation'), f'turns the tool by '
+            f'{degrees(angles[k, -1]):.2f} degrees on the way, and either way round is as short',
+            'add a point in between')
     for sizes, most, what, unit in (
             (detour, farthest_way(reach), 'a detour of', 'm'),
-            (angle, _FARTHEST_TURN, 'a turn by up to', 'rad')):
+            (angles.max(axis=1), _FARTHEST_TURN, 'a turn by up to', 'rad')):
         k = int(np.argmax(sizes > most))
         if sizes[k] > most:
             raise InvalidGoal(
