@@ -66,9 +66,11 @@ async def carried_out(cell: Any, points: int) -> dict[str, Any]:
     motion = OpenMotion(cell, Goal(waypoints=tuple(chunk(1, CHUNK)), keep_open=True,
                                    execution=ExecutionMode.SPLINE), self_collision='off')
     while motion.points < points:
-        if not await motion.until(lambda: (
+        while motion.outcome is None and not (
                 motion.motion.progress and motion.progress.points_received == motion.points
-                and motion.progress.time_remaining < LEAD), 1e9):
+                and motion.progress.time_remaining < LEAD):
+            await cell.sleep(0.1)
+        if motion.outcome is not None:
             break
         seen['left'].append(motion.progress.time_remaining)
         count = min(CHUNK, points - motion.points)
@@ -84,7 +86,9 @@ async def carried_out(cell: Any, points: int) -> dict[str, Any]:
             if number % (5 * LOOK) == 0:
                 print(f'  {motion.points:,} points, {perf_counter() - begin:.0f} s, '
                       f'{resident():.1f} MB, kept {kept(cell)}', flush=True)
-    end = await motion.ended(1e9)
+    while motion.outcome is None:
+        await cell.sleep(1.0)
+    end = motion.outcome
     return seen | {'seconds': perf_counter() - begin, 'planning': planning, 'outcome': end,
                    'points': motion.points}
 
