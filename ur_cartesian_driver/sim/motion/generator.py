@@ -16,7 +16,7 @@ none the arm creeps up to the place and stops there with a fault.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import ceil, inf, log, log2
+from math import inf, log
 from typing import TypeAlias
 
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -25,6 +25,7 @@ from ur_cartesian_driver.motion.pose import (
     Pose,
     Vector6,
 )
+from ur_cartesian_driver.sim.motion.branch import Branch
 from ur_cartesian_driver.sim.motion.calls import (
     Call,
     check_fractions,
@@ -64,18 +65,11 @@ _WITHIN = 1.0 + 1e-6
 # Beside a singularity half a step hardly turns the joints less than the whole one, so that it is
 # shortened by a power, at most this one, of what it is too long, and at most so many times that.
 _HIGHEST_POWER, _DEEPEST = 4.0, 2.0
-# The rest of a leg is walked in so many steps, or in shorter ones, down to this part of it, so
-# that none turns a joint by more [rad].
-_WALK = 8
-_LEAST_WALK = 1e-4
-_JUMP = 0.3
 # A tool motion at less than this part of its speed for so long [s] has met a wall, unless a joint
 # turns at more than this part of what it can: then it passes a singularity.
 _STALLED = 0.01
 _STALLED_AFTER = 1.0
 _TURNING = 0.2
-# Steps in which the arm changes sides are cut to this length [m, rad].
-_FINE = 1e-5
 # A joint line does not begin where the tool's path before it ends if it is so much too fast.
 _JUMP_RATIO = 50.0
 # Blends that touch do not overlap [m].
@@ -273,9 +267,10 @@ class MotionGenerator:
         """Advance by ``h`` seconds or as far as the arm can follow; None: not at all."""
         place: Place = self.q
         requested, before = h, (h, 0.0)
+        arm = self._branch()
         for _ in range(_ATTEMPTS):
             place, state = motion.preview(h)
-            q = self._solved(motion, place, h)
+            q = arm.after(place, h, lambda time: motion.preview(time)[0])
             if q is None:
                 h *= 0.5
                 continue
@@ -302,7 +297,7 @@ class MotionGenerator:
         if isinstance(motion, JointStop):
             self._motion = None
             self._come_to_rest()
-        self.fault = self._reach.why_not(self.q, self._joints(place))
+        self.fault = self._reach.why_not(self.q, arm.joints(place))
         return None
 
     def _stalls(self, place: Place, h: float, requested: float) -> bool:
@@ -310,41 +305,6 @@ class MotionGenerator:
         slow = isinstance(place, Pose) and h < _STALLED * requested
         self._stalled_for = self._stalled_for + self.cycle if slow else 0.0
         return self._stalled_for > _STALLED_AFTER
-
-    def _joints(self, place: Place) -> Vector6 | None:
-        if not isinstance(place, Pose):
-            return place
-        return self._reach.joints(place @ self._T_tcp_flange, self.q)
-
-    def _solved(self, motion: _Motion, place: Place, h: float) -> Vector6 | None:
-        """Return the joints at the end of a step of ``h`` seconds."""
-        q = self._joints(place)
-        if q is None or not isinstance(place, Pose) or not self._reach.changes_sides(self.q, q):
-            return q
-        way = self.T_base_tcp.distance_to(place) + self.T_base_tcp.angle_to(place)
-        return self._continued(motion, self.q, 0.0, h, ceil(log2(max(way / _FINE, 1.0))))
-
-    def _continued(self, motion: _Motion, q: Vector6, begin: float, end: float, halvings: int
-                   ) -> Vector6 | None:
-        """
-        Return the joints at the end of a step, come to in small steps where the arm changes sides.
-
-        Beside a singularity the solution on the other side is the nearer one after a long step,
-        while an arm that passes there swings round and stays on its side.
-
-        :param q: the joints at ``begin``, which like ``end`` counts from the last target [s].
-        """
-        place, _ = motion.preview(end)
-        if not isinstance(place, Pose):
-            return place
-        after = self._reach.joints(place @ self._T_tcp_flange, q)
-        if halvings <= 0 or after is None or not self._reach.changes_sides(q, after):
-            return after
-        middle = 0.5 * (begin + end)
-        half = self._continued(motion, q, begin, middle, halvings - 1)
-        if half is None:
-            return None
-        return self._continued(motion, half, middle, end, halvings - 1)
 
     def _tool_overspeed(self, pose: Pose) -> float:
         """Return by which factor the way to the pose is too long for one cycle."""
@@ -466,7 +426,7 @@ class MotionGenerator:
         """Go on from a leg whose blend is about to begin or has begun."""
         before = track.tip
         pose = before.leg.pose(before.leg.length)
-        q = self._waypoint_joints(before.leg)
+        q = self._branch().at_end_of(before.leg)
         if q is None and call.name.endswith('j'):
             # No joint line begins where the arm cannot come: let it fail on its way there.
             self._move, self._then = call.move, call
@@ -484,23 +444,6 @@ class MotionGenerator:
                 'it, so the arm stops at the waypoint before.'))
         room = way - call.radius - (before.radius if call.radius > 0.0 else 0.0)
         self._run(track, blended, call, room)
-
-    def _waypoint_joints(self, leg: Leg) -> Vector6 | None:
-        """Return the solution that the arm will have at the end of a leg, or None: a jump."""
-        if isinstance(leg, JointLine):
-            return leg.end
-        here, there = self.T_base_tcp, leg.pose(leg.length)
-        q, done, step = self.q, 0.0, 1.0 / _WALK
-        while done < 1.0:
-            pose = here.interpolate(there, min(done + step, 1.0))
-            after = self._reach.joints(pose @ self._T_tcp_flange, q)
-            if after is not None and lead(after, q) <= _JUMP:
-                q, done, step = after, done + step, min(2.0 * step, 1.0 / _WALK)
-            elif step < _LEAST_WALK:
-                return None
-            else:
-                step *= 0.5
-        return q
 
     def _run(self, before: Track | None, track: Track, call: Call, room: float) -> None:
         """
@@ -555,6 +498,9 @@ class MotionGenerator:
 
     def _forward(self, q: Vector6) -> Pose:
         return self.arm.forward(q) @ self._T_flange_tcp
+
+    def _branch(self) -> Branch:
+        return Branch(self._reach, self.q, self.T_base_tcp, self._T_tcp_flange)
 
     def _use_tcp(self) -> None:
         self._T_tcp_flange = self._T_flange_tcp.inverse()
