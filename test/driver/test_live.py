@@ -45,9 +45,16 @@ def test_margins_and_planes_are_those_of_goals():
     found = limits(singularity_margin_elbow=0.2, tool_radius=0.03,
                    workspace_planes=('table 0 0 0.1 0 0 2 0.02',))
     assert found.singularity_margins == (0.05, 0.2, 0.02)
-    assert found.tool_radius == 0.03
-    (table,) = found.planes
+    assert found.surroundings.tool_radius == 0.03
+    (table,) = found.surroundings.planes
     assert (table.name, table.normal, table.margin) == ('table', (0.0, 0.0, 1.0), 0.02)
+
+
+@pytest.mark.parametrize(('choice', 'expected'), [('auto', None), ('refuse', 0.02)])
+def test_the_arm_keeps_away_from_itself_where_capsules_refuse_goals(choice, expected):
+    found = limits(self_collision=choice, min_clearance=0.02).surroundings
+    assert found.min_clearance == expected
+    assert bool(found) is (expected is not None)
 
 
 def sent(message):

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution.target_follower import FollowLimits, KeepOut, TargetFollower
+from ur_cartesian_driver.execution.surroundings import KeepOut, Surroundings
+from ur_cartesian_driver.execution.target_follower import FollowLimits, TargetFollower
 from ur_cartesian_driver.kinematics.bodies import Bodies, Link
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import Geometry, robot_model
@@ -162,7 +163,7 @@ def test_without_a_target_it_brakes_and_a_new_one_continues():
 
 # --- Where it must not go ---------------------------------------------------------------------
 
-def rooms(q, planes=()):
+def rooms(q):
     """How far joints are from everything that stops them, computed the other way round."""
     lows, highs = np.array(UR5E.position_limits).T
     bodies = Bodies(NOMINAL, TCP, 0.05)
@@ -171,9 +172,9 @@ def rooms(q, planes=()):
     for name, value, margin in zip(('wrist', 'elbow', 'shoulder'), singularity_distances(
             NOMINAL, tuple(q)), LIMITS.singularity_margins, strict=True):
         yield name, value - margin
-    for plane in planes:
-        height = bodies.heights(np.array([q]), np.array([plane.normal]))[0, 0, moving].min()
-        yield plane.name, height - np.dot(plane.normal, plane.point) - plane.margin
+    height = bodies.heights(np.array([q]), np.array([TABLE.normal]))[0, 0, moving].min()
+    yield 'table', height - np.dot(TABLE.normal, TABLE.point) - TABLE.margin
+    yield 'itself', bodies.distances(np.array([q])).min() - 0.02
 
 
 TABLE = KeepOut(name='table', point=(0.0, 0.0, 0.03), normal=(0.0, 0.0, 1.0), margin=0.01)
@@ -193,9 +194,12 @@ STOPS = {
     'wrist': (replace(LIMITS, singularity_margins=(0.05, 0.0, 0.0)),
               (0.0, -1.57, 1.57, -1.57, -0.4, 0.0),
               lambda flight: turned_about_joint(flight, 4, 0.8), 'singularity_margin_wrist'),
-    'table': (replace(LIMITS, planes=(TABLE,), tool_radius=0.05), HOME,
+    'table': (replace(LIMITS, surroundings=Surroundings(planes=(TABLE,), tool_radius=0.05)), HOME,
               lambda flight: flight.beside(z=-0.5),
               'workspace plane "table", 0.0100 m is asked for'),
+    'itself': (replace(ANYWHERE, surroundings=Surroundings(min_clearance=0.02, tool_radius=0.05)),
+               HOME, lambda flight: flight.beside(x=0.42, z=-0.2),
+               'would come within .* of each other'),
     'limit': (ANYWHERE, (*HOME[:5], 2.0 * pi - 0.4),
               lambda flight: turned_about_joint(flight, 5, 0.8), 'wrist_3_joint would be at'),
 }
@@ -211,7 +215,7 @@ def test_it_stops_smoothly_before(what):
     assert not follower.arrived
     assert re.search(words, follower.blocked), follower.blocked
     flight.check_bounds()
-    left = [dict(rooms(np.array(q), limits.planes))[what] for q in flight.joints]
+    left = [dict(rooms(np.array(q)))[what] for q in flight.joints]
     assert min(left) >= -1e-6
     assert left[-1] < 0.1, 'near to where it has to stop, not anywhere'
     assert flight.go(flight.home, 2.3).arrived, 'and it is free to leave'

@@ -20,7 +20,8 @@ from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.driver.motion import Motion, OnProgress
 from ur_cartesian_driver.execution import Order
 from ur_cartesian_driver.execution.live_targets import LiveSettings
-from ur_cartesian_driver.execution.target_follower import FollowLimits, KeepOut
+from ur_cartesian_driver.execution.surroundings import KeepOut, Surroundings
+from ur_cartesian_driver.execution.target_follower import FollowLimits
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
@@ -202,10 +203,13 @@ def live_order(arm: Arm, start: Joints, options: PlanningOptions) -> LiveOrder:
         singularity_margins=(
             options.singularity_margin_wrist, options.singularity_margin_elbow,
             options.singularity_margin_shoulder),
-        planes=tuple(
-            KeepOut(name=plane.name, point=plane.point, normal=plane.normal, margin=plane.margin)
-            for plane in parse_planes(options.workspace_planes)),
-        tool_radius=options.tool_radius)
+        surroundings=Surroundings(
+            planes=tuple(KeepOut(name=plane.name, point=plane.point, normal=plane.normal,
+                                 margin=plane.margin)
+                         for plane in parse_planes(options.workspace_planes)),
+            # Capsules are thicker than the arm: they stop it only where they refuse goals.
+            min_clearance=options.min_clearance if options.self_collision == 'refuse' else None,
+            tool_radius=options.tool_radius))
     return LiveOrder(
         settings=LiveSettings(limits=limits, max_age=options.servo_target_max_age,
                               timeout=options.servo_target_timeout),

@@ -15,12 +15,10 @@ Time comes in as the length of a cycle; nobody here knows a clock.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import cos, hypot, inf, isfinite, sin, sqrt
 
-import numpy as np
-
-from ur_cartesian_driver.kinematics.bodies import Bodies, Link
+from ur_cartesian_driver.execution.surroundings import Surroundings, Watch
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import why_unreachable
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
@@ -48,23 +46,11 @@ _WORTH_IT = (0.002, 0.01)
 _ROUNDING = 1e-9
 #: How far joints stay away from the ends of their ranges [rad].
 LIMIT_MARGIN = 0.01
-#: No link is thicker [m].
-_THICKNESS = 0.3
 _SINGULARITIES = (
     ('wrist', 'rad', 'wrist_2_joint nearly straight'),
     ('elbow', 'rad', 'the arm nearly stretched'),
     ('shoulder', 'm', 'the wrist nearly above or below the shoulder'),
 )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class KeepOut:
-    """A workspace plane: what moves stays on the side to which its normal points."""
-
-    name: str
-    point: Vector3
-    normal: Vector3
-    margin: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,9 +70,8 @@ class FollowLimits:
     joint_velocity: Vector6 = (inf,) * 6
     #: Distances from the singularities: wrist [rad], elbow [rad], shoulder [m]; 0 = any.
     singularity_margins: Vector3 = (0.05, 0.05, 0.02)
-    planes: tuple[KeepOut, ...] = ()
-    #: Radius of the tool between flange and TCP, for the planes [m]; 0 = no tool.
-    tool_radius: float = 0.0
+    #: What the arm keeps away from, and itself.
+    surroundings: Surroundings = field(default_factory=Surroundings)
 
     def __post_init__(self) -> None:
         """Check the bounds."""
@@ -281,7 +266,8 @@ class _Bounds:
         self._arm = arm
         self._ranges = arm.model.position_limits
         self._margins = limits.singularity_margins
-        self._planes = _Planes(arm, T_flange_tcp, limits) if limits.planes else None
+        surroundings = limits.surroundings
+        self._watch = Watch(arm, T_flange_tcp, surroundings) if surroundings else None
 
     def why_not(self, q: Joints, q_now: Joints) -> str:
         """
@@ -303,60 +289,7 @@ class _Bounds:
                 if distance < min(margin, now - _ROUNDING):
                     return (f'the {name} singularity is {margin:g} {unit} away '
                             f'(singularity_margin_{name}: {meaning})')
-        return '' if self._planes is None else self._planes.why_not(q, q_now)
-
-
-class _Planes:
-    """
-    All that moves, against the workspace planes.
-
-    To look costs more than a cycle has, and is needed only near a plane: nothing of the arm moves
-    farther than the joints turn, times how far it can be from an axis. So after a look it is known
-    how far the joints may turn until the next one.
-    """
-
-    def __init__(self, arm: Arm, T_flange_tcp: Pose, limits: FollowLimits) -> None:
-        self._bodies = Bodies(arm, T_flange_tcp, limits.tool_radius)
-        self._arm, self._tcp = arm, T_flange_tcp
-        self._planes = limits.planes
-        self._normals = np.array([plane.normal for plane in limits.planes])
-        self._least = np.array([
-            sum(n * p for n, p in zip(plane.normal, plane.point, strict=True)) + plane.margin
-            for plane in limits.planes])
-        self._moving = [k for k, link in enumerate(self._bodies.links) if link != Link.BASE]
-        self._names = [str(self._bodies.links[k]) for k in self._moving] + ['the TCP']
-        # Nothing is farther from an axis [m].
-        self._lever = arm.model.reach + sum(map(abs, arm.model.geometry.d[3:])) \
-            + hypot(*T_flange_tcp.position) + limits.tool_radius + _THICKNESS
-        self._seen: tuple[Joints, float] | None = None
-
-    def why_not(self, q: Joints, q_now: Joints) -> str:
-        """Return what would be behind a plane; empty: nothing."""
-        if self._seen is not None:
-            q_seen, room = self._seen
-            if self._lever * sum([abs(a - b) for a, b in zip(q, q_seen, strict=True)]) < room:
-                return ''
-        rooms = self._rooms(q)
-        least = float(rooms.min())
-        self._seen = (q, least)
-        if least >= 0.0:
-            return ''
-        worse = rooms < np.minimum(0.0, self._rooms(q_now) - _ROUNDING)
-        if not worse.any():
-            return ''
-        number, which = np.unravel_index(int(np.where(worse, rooms, inf).argmin()), rooms.shape)
-        plane, name = self._planes[int(number)], self._names[int(which)]
-        return (f'{name} would come within {plane.margin + float(rooms[number, which]):.4f} m of '
-                f'the workspace plane "{plane.name}"'
-                + (f', {plane.margin:.4f} m is asked for' if plane.margin else ''))
-
-    def _rooms(self, q: Joints) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-        """Return how far (planes, bodies and TCP) are from where they must not be [m]."""
-        low = self._bodies.heights(np.array([q]), self._normals)[0][:, self._moving]
-        tcp = self._normals @ np.array((self._arm.forward(q) @ self._tcp).position)
-        rooms: np.ndarray[tuple[int, ...], np.dtype[np.float64]] = np.concatenate(
-            [low, tcp[:, None]], axis=1) - self._least[:, None]
-        return rooms
+        return '' if self._watch is None else self._watch.why_not(q, q_now)
 
 
 # --- Vectors ---------------------------------------------------------------------------------
