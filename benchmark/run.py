@@ -26,7 +26,8 @@ from figures import as_json, Figure, machine, table
 RTDE_RATE, SOAK, OPEN_GOAL = 'rtde_rate', 'soak', 'open_goal'
 #: In the order of the table: what is measured with many processes first.
 MODULES = ('goal_on_wire', 'violation_to_cancel', 'keepalive', 'points', 'load', 'servo',
-           RTDE_RATE, 'planning', 'kinematics', 'kinematics_rows', 'codecs_rtde', 'urscript_frames')
+           RTDE_RATE, 'planning', 'kinematics', 'kinematics_rows', 'codecs_rtde',
+           'urscript_frames')
 
 
 def main() -> int:

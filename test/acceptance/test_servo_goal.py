@@ -130,7 +130,7 @@ def test_every_point_is_passed_within_the_lag_that_is_reported(name, factor, mon
 
 def test_feedback_and_reports_tell_the_lag_and_the_inputs_are_given_back():
     async def scenario(cell):
-        run = Run(cell, straight())
+        run = Run(cell, straight(0.5, way=0.05))
         outcome = await run.end()
         assert outcome.code is ErrorCode.SUCCESSFUL, outcome
         lags = [progress.lag for progress in run.progress]
@@ -153,13 +153,14 @@ def test_feedback_and_reports_tell_the_lag_and_the_inputs_are_given_back():
         assert cell.q == q
         other.close()
         await cell.until(cell.is_ready)
-        again = Run(cell, straight(way=-0.05))
+        again = Run(cell, straight(0.4, way=-0.02))
         assert (await again.end()).code is ErrorCode.SUCCESSFUL
 
     run_cell(scenario)
 
 
-def test_slider_pause_and_cancel():
+@pytest.mark.exhaustive
+def test_slider_and_pause_hold_the_arm_and_no_more():
     async def scenario(cell):
         run = Run(cell, straight(0.8))
         await cell.sleep(0.6)
@@ -178,6 +179,11 @@ def test_slider_pause_and_cancel():
         outcome = await run.end()
         assert outcome.code is ErrorCode.SUCCESSFUL, outcome
 
+    run_cell(scenario)
+
+
+def test_a_cancel_stops_the_arm_on_the_way():
+    async def scenario(cell):
         run = Run(cell, straight(0.8))
         await cell.sleep(0.5)
         cell.owner.cancel()
@@ -201,7 +207,7 @@ def test_inputs_that_are_lost_on_the_way_brake_the_arm_and_the_program_stays():
         assert 'RTDE inputs' in outcome.text
         await cell.until(cell.at_rest, 0.5)
         await cell.until(cell.is_ready)
-        again = Run(cell, straight(0.8, way=0.05))
+        again = Run(cell, straight(0.3, way=0.02))
         assert (await again.end()).code is ErrorCode.SUCCESSFUL
 
     run_cell(scenario)

@@ -141,6 +141,7 @@ def test_a_setpoint_of_several_steps_is_divided_and_a_lost_write_costs_no_time()
     assert servo[OutputInteger.SETPOINTS_DONE] == before + 4
 
 
+@pytest.mark.exhaustive
 def test_a_full_buffer_is_counted_and_the_newest_setpoint_counts():
     servo = Servo(servo_buffer_depth=20).enter()
     servo.controller.set_slider(0.0)
@@ -180,7 +181,8 @@ def unknown_mode(servo):
 
 @pytest.mark.parametrize(('cause', 'text'), [
     (stale, 'no new sequence number in time'), (too_far, 'divergence thresholds'),
-    (error, 'reports the error 1'), (unknown_mode, 'a mode that there is not')])
+    (error, 'reports the error 1'),
+    pytest.param(unknown_mode, 'a mode that there is not', marks=pytest.mark.exhaustive)])
 def test_the_arm_brakes_before_the_program_halts(cause, text):
     servo = Servo().enter()
     servo.swing(200)
@@ -199,7 +201,8 @@ def test_the_arm_brakes_before_the_program_halts(cause, text):
 
 
 @pytest.mark.parametrize('leave', [
-    lambda servo: servo.leave(), lambda servo: servo.enter(ServoMode.IDLE)])
+    lambda servo: servo.leave(),
+    pytest.param(lambda servo: servo.enter(ServoMode.IDLE), marks=pytest.mark.exhaustive)])
 def test_leaving_brakes_and_the_program_goes_on(leave):
     servo = Servo().enter()
     servo.swing(200)
@@ -227,7 +230,8 @@ def test_a_driver_that_hangs_up_brakes_the_arm_too():
     assert servo.speed == 0.0
 
 
-@pytest.mark.parametrize('allowed', [False, True])
+@pytest.mark.parametrize('allowed', [
+    pytest.param(False, marks=pytest.mark.exhaustive), True])
 def test_teaching_is_possible_where_it_is_allowed_and_from_idle(allowed):
     servo = Servo(allow_teach=allowed)
     servo.enter(ServoMode.TEACH)
