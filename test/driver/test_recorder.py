@@ -31,10 +31,16 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.driver import DriverConfig, recording_format
-from ur_cartesian_driver.driver.recorder import head_of, PIECE, PIECES, Recorder
+from ur_cartesian_driver.driver.recorder import about, head_of, PIECE, PIECES, Recorder
 from ur_cartesian_driver.driver.recording import Recording
 from ur_cartesian_driver.driver.recording_folder import keep_within, name_of
-from ur_cartesian_driver.motion.state import RuntimeState, SafetyMode
+from ur_cartesian_driver.execution import order_of
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.state import RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.planning import plan, PlanningOptions
 
 # ---- what is in a file --------------------------------------------------------------------------
 
@@ -315,3 +321,20 @@ def test_a_session_that_nothing_was_planned_for_has_no_plan(tmp_path):
     assert np.isnan(found.deviation().position).all()
     keep_within(tmp_path, 0.0)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_metadata_have_what_only_the_planner_knew():
+    arm, home = Arm(robot_model('ur5e')), (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
+    pose = arm.forward(home)
+    x, y, z = pose.position
+    made = plan(Goal(waypoints=(Waypoint(pose=Pose((x, y + 0.05, z), pose.quaternion)),),
+                     frame_id='base'),
+                RobotState(timestamp=0.0, actual_q=home, target_q=home, actual_tcp_pose=pose,
+                           target_tcp_pose=pose), arm, PlanningOptions(linear_velocity=0.07))
+    head = head_of(order_of(made), robot={}, parameters=DriverConfig(keepalive_period=0.01),
+                   of_owner=about(made, PlanningOptions(linear_velocity=0.07)))
+    assert head['report'] == list(made.report)
+    assert head['frame_id'] == 'base'
+    assert head['parameters']['linear_velocity'] == 0.07
+    assert head['parameters']['keepalive_period'] == 0.01
+    json.dumps(head)
