@@ -3,12 +3,14 @@
 """What faults leave behind when they last: queues, dead connections, and who notices."""
 
 from fault_cell import do, let_happen
-from fault_goals import AroundCorners
+from fault_goals import AroundCorners, planned
 import pytest
 import robot_cell
 from robot_cell import run_cell
 
+from ur_cartesian_driver.execution.observer import STALL_BOUND
 from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.goal import IOCommand, OutputKind
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.primary_client import SILENCE
@@ -88,6 +90,20 @@ def test_sending_the_program_does_not_take_it_away_from_a_goal():
         await cell.until(lambda: goal.motion.outcome)
         assert goal.motion.outcome.succeeded, goal.motion.outcome
         assert any('a goal is running' in line for line in cell.owner.log)
+
+    run_cell(scenario)
+
+
+def test_an_output_long_after_the_end_is_waited_for():
+    """The arm stands until then, and no message was lost."""
+    async def scenario(cell):
+        late = IOCommand(waypoint=0, offset=2.0 * STALL_BOUND, pin=1, value=1.0,
+                         output=OutputKind.STANDARD_DIGITAL)
+        motion = cell.owner.start(planned(
+            cell.memory.read(), ((0.0, 0.01, 0.0),), 0.1, 1.0, io_commands=(late,)))
+        await cell.until(lambda: motion.outcome, 3.0 * STALL_BOUND)
+        assert motion.outcome.succeeded, motion.outcome
+        assert cell.robot.controller.signals.digital_out.standard[1]
 
     run_cell(scenario)
 

@@ -21,7 +21,6 @@ from ur_cartesian_driver.execution.states import Signal
 from ur_cartesian_driver.execution.tolerances import Watch
 from ur_cartesian_driver.motion.events import Progress
 from ur_cartesian_driver.motion.lever import seen_at
-from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
 from ur_cartesian_driver.motion.state import RobotState, RuntimeState
 
@@ -65,7 +64,7 @@ class Observer:
         #: How long the target has stood still while nothing held it [s].
         self._stalled_time = 0.0
         #: The same of the controller's own time, and how much of that the plan itself may stand.
-        self._stalled_scaled, self._patience = 0.0, _patience(order.reference)
+        self._stalled_scaled, self._patience = 0.0, _patience(order)
         #: The newest packet; None before the first.
         self.latest: RobotState | None = None
         #: Time since the start in which the controller's own clock ran [s].
@@ -103,7 +102,7 @@ class Observer:
         self._tracker.extend(order.reference, self._records.end(behind))
         self._records.extend(order, behind)
         self._order = order
-        self._patience = max(self._patience, _patience(order.reference))
+        self._patience = max(self._patience, _patience(order))
         if self.latest is not None:
             self._records.forget(self.begun(self.latest) - 2)
 
@@ -288,8 +287,9 @@ def _stands(before: RobotState | None, state: RobotState) -> bool:
             and state.runtime_state is RuntimeState.PLAYING)
 
 
-def _patience(path: ReferencePath) -> float:
-    """Return for how long the arm may stand on a path, of the controller's time [s]."""
+def _patience(order: Order) -> float:
+    """Return for how long the arm may stand in a motion, of the controller's time [s]."""
+    path = order.reference
     waits = np.diff(path.time)[(np.abs(np.diff(path.poses, axis=0)) < SAME_PLACE).all(axis=1)]
-    longest = float(waits.max(initial=0.0))
+    longest = max(float(waits.max(initial=0.0)), order.switching)
     return longest + STALL_BOUND if longest > 0.0 else 0.0

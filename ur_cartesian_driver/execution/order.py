@@ -29,6 +29,8 @@ class Order:
     duration: float
     #: When the last point is due [s]; None where the goal names no times.
     due: float | None = None
+    #: How long after the end of the motion the last output is switched [s]; ``due`` contains it.
+    switching: float = 0.0
     T_base_frame: Pose = IDENTITY
     #: The TCP that the plan found, the one that it needs (None = that one), and where the
     #: controlled frame is behind it.
@@ -97,7 +99,7 @@ def order_of(plan: Plan, dialect: Dialect = NEWEST, *, since: float = 0.0,
     :param ending: see :class:`Order`.
     """
     goal = plan.goal
-    times = goal.waypoints[-1].time
+    times, switching = goal.waypoints[-1].time, _waits_for_outputs(plan)
     waypoints = [segment.waypoint for segment in plan.segments
                  for _ in range(1 + len(segment.outputs))]
     ends = since + np.cumsum([segment.duration for segment in plan.segments])
@@ -107,7 +109,7 @@ def order_of(plan: Plan, dialect: Dialect = NEWEST, *, since: float = 0.0,
               if isinstance(segment.primitive, Spline)]
     return Order(
         points=len(waypoints), reference=plan.reference, duration=since + plan.duration,
-        due=times + _waits_for_outputs(plan) if times > 0.0 else None,
+        due=times + switching if times > 0.0 else None, switching=switching,
         T_base_frame=goal.T_base_frame,
         T_flange_active=plan.T_flange_active, T_flange_tcp=plan.T_flange_tcp,
         T_tcp_controlled=plan.T_tcp_controlled,
