@@ -136,7 +136,8 @@ class Recorder:
         self._do(folder, folder.open)
         if head['points']:
             self.extend(order.reference, -inf)
-        self.note('start', f"{head['execution']}, {head['points']} points")
+        count = head['points']
+        self.note('start', f"{head['execution']}, {count} point{'' if count == 1 else 's'}")
         self.take(state)
 
     def extend(self, reference: ReferencePath, since: float) -> None:
