@@ -7,7 +7,6 @@ Phases are found by looking, at the messages on the wire, at the points that the
 begun and at where the tool is; never by the time that it should take.
 """
 
-from abc import ABC, abstractmethod
 from dataclasses import replace
 from functools import lru_cache
 from math import atan2, cos, pi, sin
@@ -17,7 +16,6 @@ import robot_cell
 from robot_cell import CYCLE, RobotCell
 
 from ur_cartesian_driver.driver.continuing import encoded
-from ur_cartesian_driver.driver.live import standing_order, standing_plan
 from ur_cartesian_driver.execution import Extension
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
@@ -36,7 +34,6 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.continuation import Addition, following, opened
 from ur_cartesian_driver.protocol.dialects import NEWEST
 from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
-from ur_cartesian_driver.sim.builtins.motion import HandGuided
 
 #: Side of the way around two corners, and size of the blends there [m].
 SIDE, BLEND = 0.05, 0.015
@@ -74,7 +71,7 @@ class StartingPoint:
         return hash(self._key)
 
 
-class GoalInTrouble(ABC):
+class GoalInTrouble:
     """A goal to which something happens; its way of execution is that of a subclass."""
 
     def __init__(self, cell: RobotCell):
@@ -86,13 +83,13 @@ class GoalInTrouble(ABC):
         self._results, self._results_before = end.peer.received, len(end.peer.received)
         self.motion = None
 
-    @abstractmethod
     def plan_from(self, start: StartingPoint):
         """Return the plan; made once, as the arm begins at the same place each time."""
+        raise NotImplementedError
 
-    @abstractmethod
     def is_in(self, phase: str) -> bool:
         """Tell whether the goal is in a phase that is reached by waiting."""
+        raise NotImplementedError
 
     def send(self):
         """Send it to the robot loop."""
@@ -389,28 +386,6 @@ class Continued(AlongSpline):
         self.cell.owner.extend(points, Extension(number=1, behind=part.behind, order=order))
 
 
-class Guided(GoalInTrouble):
-    """No goal but the same machinery: a person may push the arm, until that is cancelled."""
-
-    def plan_from(self, start):
-        return standing_plan(start.state)
-
-    def send(self):
-        self.motion = self.cell.owner.run(b'', standing_order(self.plan), teach=True)
-
-    def is_in(self, phase):
-        return self._is_guided() and self.motion.progress
-
-    def note_end(self):
-        assert not self._is_guided(), 'the arm can still be pushed'
-
-    def judge(self, row, phase):
-        assert not self._is_guided(), (row.fault, phase)
-
-    def _is_guided(self):
-        return self.cell.robot.controller.hand_guided is HandGuided.TEACH
-
-
 #: The goals of the ways of execution.
 GOALS = {'SPLINE': AlongSpline, 'SERVO': Servoed, 'Open goals': Continued,
-         'Outputs': WithOutputs, 'Guided by hand': Guided}
+         'Outputs': WithOutputs}
