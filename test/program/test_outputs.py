@@ -20,6 +20,7 @@ from ur_cartesian_driver.motion.goal import OutputKind
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, Spline, SwitchOutput
 from ur_cartesian_driver.motion.signals import AnalogDomain
+from ur_cartesian_driver.program import as_program
 from ur_cartesian_driver.protocol.trajectory import MOST_OUTPUTS
 
 HOME = (0.3, -1.4, 1.5, -1.6, -1.5, 0.2)
@@ -121,6 +122,7 @@ def test_in_the_middle_of_a_corner_without_stopping(robot):
     assert apart(position, middle) < 0.6 * SPEED * STEP
 
 
+@pytest.mark.slow
 def test_a_place_that_is_come_round_to_waits_for_the_second_time(robot):
     """Three quarters around a circle: the tool begins beyond the plane of a place on it."""
     watched = Watched(robot)
@@ -198,6 +200,24 @@ def test_delays_count_from_the_end_of_the_motion_and_success_waits_for_them(robo
     for change, delay in zip(watched.changes, (0.1, 0.1, 0.25), strict=True):
         assert (change[3] - moving) * STEP == pytest.approx(delay, abs=5 * STEP)
     assert run.duration > watched.changes[-1][3] * STEP
+
+
+@pytest.mark.parametrize(('text', 'changed', 'far'), [
+    ('OUTPUT_LEAD = 1.5', 'OUTPUT_LEAD = 21.5', 20.0),
+    ('looking = outputs_done < outputs_due', 'looking = True', 25.0)])
+def test_a_changed_text_changes_the_place(text, changed, far):
+    """So the tests above would find it: in steps of the tool along the line."""
+    def edit(program):
+        assert program.count(text) == 1
+        return as_program(program.replace(text, changed))
+
+    robot = RobotInMemory('ur5e', edit=edit)
+    watched = Watched(robot)
+    place = watched.at(x=0.06)
+    robot.run([line(watched.at(y=-0.01)), line(watched.at()),
+               switch(1, place=place, heading=heading(place, 1, 0)), line(watched.at(x=0.1))],
+              on_cycle=watched)
+    assert apart(watched.changes[0][2], place.position) >= 0.9 * far * SPEED * STEP
 
 
 @pytest.mark.parametrize(('output', 'first', 'pins'), [

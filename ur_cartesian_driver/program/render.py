@@ -46,11 +46,10 @@ FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
 
 #: How the program follows splines.
 SPLINE_LAW: dict[str, float] = {
-    #: How fast the leading axis changes its speed from step to step, and brakes where a point
-    #: is late [rad/s^2]; the client library's number for speedj.
-    'ACCELERATION': 40.0,
+    #: How much faster than evenly over a step the speed changes at its beginning.
+    'HASTE': 3.0,
     #: What part of a distance from the polynomial one step takes away.
-    'CORRECTION': 0.2,
+    'CORRECTION': 0.4,
     #: How hard the last piece may end in motion [rad/s^2], and the greatest mean speed of a
     #: joint [rad/s]; the client library's numbers, as the next one.
     'BRAKING': 15.0,
