@@ -135,7 +135,7 @@ EXTENSIONS = st.builds(extension, number=st.integers(1, 9), behind=st.integers(0
 @given(events=st.lists(st.tuples(st.one_of(EVENTS, PACKETS.map(
     lambda state: StateReceived(state=state)), EXTENSIONS), st.floats(0.001, 2.0)), max_size=25),
     lends=st.booleans(), deviation=st.sampled_from([0.0, 0.002]))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_an_open_goal_ends_once_whatever_happens(events, lends, deviation):
     goal, now = stream(NOZZLE if lends else None, deviation), 0.0
     commands = goal.start(robot())
