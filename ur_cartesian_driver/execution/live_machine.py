@@ -106,7 +106,9 @@ class TeachMachine(ServoMachine):
 
     def _progress_of_stream(self) -> tuple[Signal | None, str]:
         if self.stream.trouble:
-            return Signal.FAILURE, self.stream.trouble
+            # A program ends the guiding by itself where it is about to end.
+            signal = Signal.PROGRAM_STOPPED if self.stream.is_guided else Signal.FAILURE
+            return signal, self.stream.trouble
         return super()._progress_of_stream()
 
     def _shows_goal(self) -> bool:
