@@ -95,8 +95,9 @@ def _mode(mode: Mode) -> str:
     return ''.join((
         f'## {mode.name}\n\n{mode.about}\n\n', _table(('phase', 'when'), mode.phases.items()),
         '\n', _faults(mode.headless, mode.phases), '\nIn local control:\n\n',
-        _faults(mode.local, mode.phases), '\nWith `after_robot_stop: continue`:\n\n',
-        _faults(mode.continued, mode.phases)))
+        _faults(mode.local, mode.phases),
+        *(('\nWith `after_robot_stop: continue`:\n\n', _faults(mode.continued, mode.phases))
+          if mode.continued else ())))
 
 
 def _faults(rows: Iterable[Row], phases: Iterable[str]) -> str:

@@ -16,11 +16,11 @@ pytestmark = pytest.mark.slow
 
 CONTINUE = {'after_robot_stop': 'continue'}
 CASES = [
-    pytest.param(kind, phases, row, settings, id=prefix + where + row.fault)
-    for kind, prefix, phases, tables in [
-        (AroundCorners, '', PHASES, (HEADLESS, LOCAL, CONTINUED)),
+    pytest.param(kind, phases, row, settings | more, id=prefix + where + row.fault)
+    for kind, prefix, phases, tables, more in [
+        (AroundCorners, '', PHASES, (HEADLESS, LOCAL, CONTINUED), {}),
         *((GOALS[mode.name], f'{mode.name}: ', mode.phases,
-           (mode.headless, mode.local, mode.continued)) for mode in MODES)]
+           (mode.headless, mode.local, mode.continued), mode.settings) for mode in MODES)]
     for rows, where, settings in zip(
         tables, ('', 'in local control: ', 'continued: '), ({}, {'headless': False}, CONTINUE),
         strict=True)

@@ -8,7 +8,7 @@ is slowed brakes as any other.
 """
 
 from fault_goals import AroundCorners, GOALS
-from fault_modes import MODES
+from fault_modes import GUIDED, MODES
 from fault_ways import Ways
 import pytest
 from robot_cell import run_cell
@@ -17,7 +17,8 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 
 pytestmark = pytest.mark.slow
 
-KINDS = {'PRIMITIVES': AroundCorners, **{mode.name: GOALS[mode.name] for mode in MODES}}
+KINDS = {'PRIMITIVES': AroundCorners,
+         **{mode.name: GOALS[mode.name] for mode in MODES if mode is not GUIDED}}
 #: What is done in the middle of a goal, and how long it lasts [s].
 DONE = {
     'slower and faster': [('slider 0.3', 0.1), ('slider 1', 0.2)],

@@ -163,7 +163,8 @@ async def scenario(cell: RobotCell, row: Row, phase: str, kind=AroundCorners):
     outcome = goal.motion.outcome
     assert outcome.code is row.code, f'{here}: {outcome}'
     assert outcome.text, here
-    await cell.until(cell.at_rest, max(STANDING, begin + row.rest - cell.loop.time()), here)
+    await cell.until(lambda: cell.at_rest() and goal.is_over(),
+                     max(STANDING, begin + row.rest - cell.loop.time()), here)
     goal.note_end()
     if not row.waits:
         await cell.until(lambda: cell.status.state is row.then, row.then_within, here)

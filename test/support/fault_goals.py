@@ -16,6 +16,7 @@ import robot_cell
 from robot_cell import CYCLE, RobotCell
 
 from ur_cartesian_driver.driver.continuing import encoded
+from ur_cartesian_driver.driver.live import standing_order, standing_plan
 from ur_cartesian_driver.execution import Extension
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
@@ -30,10 +31,12 @@ from ur_cartesian_driver.motion.goal import (
     Waypoint,
 )
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.continuation import Addition, following, opened
 from ur_cartesian_driver.protocol.dialects import NEWEST
 from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
+from ur_cartesian_driver.sim.builtins.motion import HandGuided
 
 #: Side of the way around two corners, and size of the blends there [m].
 SIDE, BLEND = 0.05, 0.015
@@ -119,6 +122,10 @@ class GoalInTrouble:
 
     def follow_up(self, phase):
         """Send what belongs to the goal and is still missing when the fault is there."""
+
+    def is_over(self):
+        """Tell whether the robot does nothing more of it, beside that the arm stands."""
+        return True
 
     def note_end(self):
         """Look at what is there when the goal has ended, and the arm stands."""
@@ -386,6 +393,30 @@ class Continued(AlongSpline):
         self.cell.owner.extend(points, Extension(number=1, behind=part.behind, order=order))
 
 
+class Guided(GoalInTrouble):
+    """No goal but the same machinery: a person may push the arm, until that is cancelled."""
+
+    def plan_from(self, start):
+        return standing_plan(start.state)
+
+    def send(self):
+        self.motion = self.cell.owner.run(b'', standing_order(self.plan), teach=True)
+
+    def is_in(self, phase):
+        return self._is_guided() and self.motion.progress
+
+    def is_over(self):
+        # A paused program cannot end it; the safety system holds the arm.
+        paused = self.cell.robot.controller.programs.state is RuntimeState.PAUSED
+        return paused or not self._is_guided()
+
+    def judge(self, row, phase):
+        assert not self._is_guided(), (row.fault, phase)
+
+    def _is_guided(self):
+        return self.cell.robot.controller.hand_guided is HandGuided.TEACH
+
+
 #: The goals of the ways of execution.
 GOALS = {'SPLINE': AlongSpline, 'SERVO': Servoed, 'Open goals': Continued,
-         'Outputs': WithOutputs}
+         'Outputs': WithOutputs, 'Guided by hand': Guided}

@@ -9,7 +9,7 @@ happens to interfaces that none of them uses, is not run again.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from fault_table import CONTINUED, HEADLESS, LOCAL, Row
 
@@ -31,6 +31,8 @@ class Mode:
     headless: tuple[Row, ...]
     local: tuple[Row, ...]
     continued: tuple[Row, ...]
+    #: Of the driver, beyond those of all.
+    settings: dict[str, object] = field(default_factory=dict)
     #: What of the goal takes as long as without the fault [s], where that does not disturb it.
     undisturbed: float
 
@@ -55,6 +57,9 @@ FAULTS_OF_RTDE = (
 ON_THE_PENDANT = (
     'protective stop', 'emergency stop', 'protective stop that the driver does not see',
     'somebody pauses the program', 'the network cable is cut')
+
+#: With after_robot_stop: continue.
+CONTINUES = ('protective stop',)
 
 
 def chosen(rows: Iterable[Row], names: Iterable[str], phases: Iterable[str], undisturbed: float,
@@ -95,6 +100,7 @@ def _times(row: Row, undisturbed: float, differing: dict[str, object]) -> dict[s
 
 def _mode(name: str, about: str, phases: dict[str, str], undisturbed: float,
           changes: dict[str, dict[str, dict[str, object]]], *, faults: Iterable[str] = FAULTS,
+          pendant: Iterable[str] = ON_THE_PENDANT, continued: Iterable[str] = CONTINUES,
           once: tuple[str, Iterable[str]] = ('', ()), more: tuple[Row, ...] = (),
           changes_there: dict[str, dict[str, dict[str, object]]] | None = None) -> Mode:
     """
@@ -108,9 +114,9 @@ def _mode(name: str, about: str, phases: dict[str, str], undisturbed: float,
         headless=(*chosen(HEADLESS, faults, phases, undisturbed, changes), *more, *(
             replace(row, phases=once[:1])
             for row in chosen(HEADLESS, once[1], phases, undisturbed, changes))),
-        local=chosen(LOCAL, ON_THE_PENDANT, phases, undisturbed,
+        local=chosen(LOCAL, pendant, phases, undisturbed,
                      changes if changes_there is None else changes_there),
-        continued=chosen(CONTINUED, ('protective stop',), phases, undisturbed, changes))
+        continued=chosen(CONTINUED, continued, phases, undisturbed, changes))
 
 
 SPLINE = _mode(
@@ -193,4 +199,16 @@ OPEN = _mode(
         'emergency stop', "another client's program replaces ours", 'the controller crashes',
         "the program's sockets are cut")))
 
-MODES = (SPLINE, SERVO, OPEN, OUTPUTS)
+GUIDED = replace(_mode(
+    'Guided by hand', 'No goal, but ended by the same things: `~/teach_mode` lets a person push '
+    'the arm. When it "stands" it cannot be pushed any more.',
+    {'guided': 'a person may push the arm'}, 0.0, {},
+    faults=('protective stop', 'emergency stop', 'somebody stops the program',
+            'the network cable is cut', 'protective stop that the driver does not see',
+            'RTDE is cut', "the program's sockets are cut", 'the reverse socket is half-open',
+            'the node is silent'),
+    pendant=('protective stop', 'the network cable is cut'), continued=(),
+    more=tuple(row for row in SETPOINTS if not row.phases and row.code is not E.SUCCESSFUL)),
+    settings={'allow_teach': True})
+
+MODES = (SPLINE, SERVO, OPEN, OUTPUTS, GUIDED)

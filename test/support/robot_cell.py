@@ -98,10 +98,10 @@ class Owner:
     def start(self, plan):
         return self.run(encode_points(plan.instructions), order_of(plan))
 
-    def run(self, points, order):
+    def run(self, points, order, **more):
         number = len(self.motions) + 1
         motion = self.motions[number] = Motion()
-        self.send(StartMotion(motion=number, order=order, points=points))
+        self.send(StartMotion(motion=number, order=order, points=points, **more))
         return motion
 
     def extend(self, points, extension):
