@@ -10,6 +10,7 @@ nor the feedback waits for them; the response is sent when they are taken, or re
 from __future__ import annotations
 
 from concurrent.futures import Future, ThreadPoolExecutor
+import threading
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -24,7 +25,11 @@ from ur_cartesian_driver.srv import AppendPoints
 #: How long a goal may take from its acceptance to its motion while points wait for it [s].
 BEGIN_PATIENCE = 10.0
 
+#: How many requests may wait for their turn, with their points in memory.
+MOST_WAITING = 32
+
 CLOSING = 'The driver node is shutting down.'
+TOO_MANY = f'{MOST_WAITING} requests to append points wait; send this one again later.'
 
 
 class AppendService:
@@ -34,6 +39,7 @@ class AppendService:
         """Begin to serve."""
         self._server = server
         self._thread = ThreadPoolExecutor(1, thread_name_prefix='append points')
+        self._places = threading.Semaphore(MOST_WAITING)
         self._service = _Service(node, AppendPoints, '~/append_points', self._ask,
                                  MutuallyExclusiveCallbackGroup())
 
@@ -43,13 +49,18 @@ class AppendService:
 
     def _ask(self, request: Any) -> Future[Any]:
         promise: Future[Any] = Future()
+        if not self._places.acquire(blocking=False):
+            promise.set_result(_refused(TOO_MANY))
+            return promise
+
+        def answer(done: Future[Any]) -> None:
+            self._places.release()
+            promise.set_result(_refused(CLOSING) if done.cancelled() else done.result())
+
         try:
-            planned = self._thread.submit(self._append, request)
+            self._thread.submit(self._append, request).add_done_callback(answer)
         except RuntimeError:  # the thread takes no more work
             promise.set_result(_refused(CLOSING))
-            return promise
-        planned.add_done_callback(lambda done: promise.set_result(
-            _refused(CLOSING) if done.cancelled() else done.result()))
         return promise
 
     def _append(self, request: Any) -> Any:
