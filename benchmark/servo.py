@@ -76,8 +76,8 @@ def run(quick: bool) -> Iterator[Figure]:
         other = _ur_rtde(robot, spline) if importlib.util.find_spec('rtde_control') else None
     for text, percent in PERCENTILES:
         yield Figure(benchmark=NAME, name=f'set-point off an even stream, {text}', unit='ms',
-                     value=percentile(ours.jitter, percent), than=OTHER,
-                     baseline=other and percentile(other.jitter, percent))
+                     value=round(percentile(ours.jitter, percent), 3), than=OTHER,
+                     baseline=other and round(percentile(other.jitter, percent), 3))
     for text, low, high in (('cycles without a new set-point', -1.0, 0.5),
                             ('cycles in which one was left out', 1.5, 1e9)):
         yield Figure(benchmark=NAME, name=text, unit='%', value=ours.share(low, high), than=OTHER,
