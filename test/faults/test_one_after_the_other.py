@@ -1,0 +1,54 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Each way of execution takes the place of each other one, at once, and runs to its end."""
+
+from fault_cell import go_home
+from fault_goals import AroundCorners, Continued, GOALS, Guided
+from fault_ways import Ways
+import pytest
+from robot_cell import run_cell
+
+from ur_cartesian_driver.driver.channel import CancelMotion
+from ur_cartesian_driver.motion.errors import ErrorCode
+
+pytestmark = pytest.mark.slow
+
+KINDS = {'PRIMITIVES': AroundCorners, **GOALS}
+MIDDLE = {'PRIMITIVES': 'mid-segment', 'SPLINE': 'between points', 'SERVO': 'between points',
+          'Open goals': 'moving', 'Outputs': 'before the place', 'Guided by hand': 'guided'}
+#: No joint sees more [rad/s^2], whatever takes the place of what.
+STRONGEST = 12.0
+
+
+async def make_way(cell, ways, first, second):
+    """Preempt a goal in the middle of its way, and run the next one."""
+    goal = KINDS[first](cell)
+    goal.send()
+    await ways.until(lambda: goal.is_in(MIDDLE[first]), 2.0)
+    cell.owner.send(CancelMotion(motion=len(cell.owner.motions), preempted_by='goal 7'))
+    await ways.until(lambda: goal.motion.outcome, 0.4)
+    assert goal.motion.outcome.code is ErrorCode.PREEMPTED, (first, goal.motion.outcome)
+    following = KINDS[second](cell)
+    following.send()
+    if isinstance(following, Continued):
+        await ways.until(lambda: following.is_in('moving'), 2.0)
+        following.follow_up('moving')
+    await ways.until(lambda: following.motion.outcome, 4.0)
+    outcome = following.motion.outcome
+    assert outcome.succeeded, f'{second} after {first}: {outcome}'
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize('first', KINDS)
+def test_any_way_of_execution_takes_the_place_of_any_other(first):
+    async def scenario(cell):
+        home = cell.robot.controller.motion.T_base_tcp.position
+        for second in KINDS:
+            if KINDS[second] is Guided:
+                continue
+            ways = Ways(cell)
+            await make_way(cell, ways, first, second)
+            assert ways.fastest_and_strongest()[1] < STRONGEST, (first, second)
+            await go_home(cell, home, f'{second} after {first}')
+
+    run_cell(scenario, allow_teach=True)
