@@ -28,6 +28,8 @@ from ur_cartesian_driver.motion.state import RobotState, RuntimeState
 START_POSITION, START_ANGLE = 0.001, 0.01
 #: How long the target may stand still in the middle of a goal that nothing holds [s].
 STALL_BOUND = 2.0
+#: How much longer than planned it may stand where the plan itself waits, if that is longer [s].
+WAIT_SLACK = 1.0
 #: Rows of a path that differ by less are one place, at which the plan waits [m], [rad].
 SAME_PLACE = 1e-9
 #: How far the controller's own target may be from the plan [m], [rad].
@@ -292,4 +294,4 @@ def _patience(order: Order) -> float:
     path = order.reference
     waits = np.diff(path.time)[(np.abs(np.diff(path.poses, axis=0)) < SAME_PLACE).all(axis=1)]
     longest = max(float(waits.max(initial=0.0)), order.switching)
-    return longest + STALL_BOUND if longest > 0.0 else 0.0
+    return longest + WAIT_SLACK if longest > 0.0 else 0.0
