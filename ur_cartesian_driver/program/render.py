@@ -46,8 +46,9 @@ FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
 
 #: How the program follows splines.
 SPLINE_LAW: dict[str, float] = {
-    #: How much faster than evenly over a step the speed changes at its beginning.
-    'HASTE': 3.0,
+    #: How fast the leading axis changes its speed from step to step [rad/s^2]; the client
+    #: library's number for speedj.
+    'ACCELERATION': 40.0,
     #: What part of a distance from the polynomial one step takes away.
     'CORRECTION': 0.4,
     #: How hard the last piece may end in motion [rad/s^2], and the greatest mean speed of a
@@ -58,6 +59,8 @@ SPLINE_LAW: dict[str, float] = {
     'AT_START': 0.01,
     #: Slower than this is at rest [rad/s].
     'REST': 0.0001,
+    #: Where a step is less than this nobody can tell how far it led [rad].
+    'CREEP': 1e-06,
     #: Less than this [s] or [rad] comes from rounding.
     'ROUNDING': 1e-10,
 }
