@@ -63,7 +63,7 @@ Then a protective or safeguard stop holds the goal as a pause does. Everything e
 
 """
 
-MODES_HEAD = """# The other ways of execution
+MODES_HEAD = """## The other ways of execution
 
 All above is about goals that are executed as PRIMITIVES. The following goals go through the same
 faults while they move, wait or end. What happens before a goal is on its way, and to interfaces
@@ -93,7 +93,7 @@ def page() -> str:
 def _mode(mode: Mode) -> str:
     """Return the section of a way of execution."""
     return ''.join((
-        f'## {mode.name}\n\n{mode.about}\n\n', _table(('phase', 'when'), mode.phases.items()),
+        f'### {mode.name}\n\n{mode.about}\n\n', _table(('phase', 'when'), mode.phases.items()),
         '\n', _faults(mode.headless, mode.phases), '\nIn local control:\n\n',
         _faults(mode.local, mode.phases),
         *(('\nWith `after_robot_stop: continue`:\n\n', _faults(mode.continued, mode.phases))
