@@ -292,6 +292,8 @@ def _stands(before: RobotState | None, state: RobotState) -> bool:
 def _patience(order: Order) -> float:
     """Return for how long the arm may stand in a motion, of the controller's time [s]."""
     path = order.reference
-    waits = np.diff(path.time)[(np.abs(np.diff(path.poses, axis=0)) < SAME_PLACE).all(axis=1)]
+    still = (np.abs(np.diff(path.poses, axis=0)) < SAME_PLACE).all(axis=1)
+    # A wait may have several rows: those that follow each other count as one.
+    waits = np.bincount(np.cumsum(~still), weights=np.where(still, np.diff(path.time), 0.0))
     longest = max(float(waits.max(initial=0.0)), order.switching)
     return longest + WAIT_SLACK if longest > 0.0 else 0.0
