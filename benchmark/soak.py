@@ -37,6 +37,7 @@ WARM = 70.0
 RESULT_TIMEOUT = 30.0
 RECOVERY_TIMEOUT = 60.0
 SAMPLE_PERIOD = 2.0
+NOT_READY = ErrorCode.ROBOT_NOT_READY.name
 #: What happens during one in so many goals, as a fault of the simulator; empty = nothing.
 EVENTS: tuple[tuple[str, int], ...] = (
     ('', 60), ('cancel', 15), ('preempted', 5), ('slider 0.3 at 0.02 s', 4),
@@ -106,7 +107,7 @@ class Soak:
         """Run one goal to its end, and see to it that the next one can run."""
         (event,) = [''] if self._undisturbed else self._random.choices(
             [name for name, _ in EVENTS], [weight for _, weight in EVENTS])
-        begin = time.monotonic()
+        begin, before = time.monotonic(), self.outcomes[NOT_READY]
         others = []
         try:
             handle, _ = self._client.wait(self._client.send(self._message()), RESULT_TIMEOUT)
@@ -130,6 +131,8 @@ class Soak:
         self.longest = max(self.longest, time.monotonic() - begin)
         if event not in ('', 'cancel', 'preempted'):
             self._robot.call('inject', 'slider 1')
+            self._bring_back()
+        elif self.outcomes[NOT_READY] > before:  # a machine too busy for its deadlines
             self._bring_back()
 
     def _message(self) -> FollowCartesianTrajectory.Goal:

@@ -1,10 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""From a message on ``~/servo_target`` to where the tool is to be, or to a sentence."""
+"""Messages of ``~/servo_target`` and ``~/servo_state``: what they mean, or why they are refused."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from math import inf, isfinite, nan
 
+from builtin_interfaces.msg import Duration, Time
 from geometry_msgs.msg import PoseStamped
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -15,10 +16,15 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.servo import ServoActivity, ServoReport
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.ros.frames import Frames, Stand, StaticFrame
-from ur_cartesian_driver.ros.servo_topics import Restraint, target_from_message
+from ur_cartesian_driver.ros.servo_topics import (
+    Restraint,
+    servo_state_message,
+    target_from_message,
+)
 from ur_cartesian_driver.sim.config import HOME
 
 HERE = Arm(robot_model('ur5e')).forward(HOME)
@@ -127,3 +133,16 @@ def test_anything_is_a_pose_within_reach_or_refused_with_a_sentence(numbers, fra
         assert all(map(isfinite, pose.row()))
         assert pose.distance_to(HERE) <= 0.5
         assert 0.0 <= age <= 0.2
+
+
+def test_every_figure_of_a_report_has_its_field_in_the_message():
+    numbers = {field.name: k for k, field in enumerate(fields(ServoReport))
+               if field.name not in ('activity', 'timestamp', 'joint_error', 'buffered')}
+    message = servo_state_message(
+        ServoReport(timestamp=1.0, activity=ServoActivity.SERVOING, buffered=0.25,
+                    joint_error=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6), **numbers), Time(sec=7))
+    assert {name: getattr(message, name) for name in numbers} == numbers
+    assert message.state == message.SERVOING
+    assert message.buffered == Duration(nanosec=250_000_000)
+    assert list(message.joint_error) == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6]
+    assert message.header.stamp == Time(sec=7)

@@ -102,7 +102,8 @@ def servo_state_message(report: ServoReport, stamp: Time) -> ServoState:
         setpoints_done=report.setpoints_done, buffer_size=report.buffer_size,
         buffer_capacity=report.buffer_capacity, buffered=duration_message(report.buffered),
         lag=report.lag, speed_scaling=report.speed_scaling, joint_error=report.joint_error,
-        underruns=report.underruns, overruns=report.overruns, repeats=report.repeats)
+        underruns=report.underruns, overruns=report.overruns, repeats=report.repeats,
+        skipped=report.skipped)
     message.header.stamp = stamp
     return message
 
