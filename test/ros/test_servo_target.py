@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of ``~/servo_target`` and ``~/servo_state``: what they mean, or why they are refused."""
+"""Messages of ``~/servo_target`` and ``~/servo_state``: what they mean, or why not."""
 
 from dataclasses import fields, replace
 from math import inf, isfinite, nan
