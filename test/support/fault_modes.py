@@ -55,7 +55,7 @@ FAULTS_OF_RTDE = (
     'the reverse socket is cut', 'the trajectory socket is cut')
 #: Where the program stands on the pendant.
 ON_THE_PENDANT = (
-    'protective stop', 'emergency stop', 'protective stop that the driver does not see',
+    'protective stop', 'protective stop that the driver does not see',
     'somebody pauses the program', 'the network cable is cut')
 
 #: With after_robot_stop: continue.
@@ -186,7 +186,10 @@ OUTPUTS = _mode(
      'before the time': 'the arm stands at the last point, the last output is not yet switched',
      'cancelling': 'CANCEL is on the wire, the arm still moves'},
     2.0, {'the speed slider is moved to 0': {
-        'before the time': {'waits': False, 'steps': ('move the slider up',)}}})
+        'before the time': {'waits': False, 'steps': ('move the slider up',)}}},
+    faults=tuple(name for name in FAULTS if name not in (
+        "another client's program replaces ours", 'the controller crashes')),
+    pendant=('protective stop', 'somebody pauses the program'))
 
 OPEN = _mode(
     'Open goals', 'A goal that is continued while it runs (`keep_open`); the last points are '
