@@ -10,7 +10,7 @@ import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
-from ur_cartesian_driver.motion.errors import GoalRefused, NotAvailable
+from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.goal import (
     ExecutionMode,
     Goal,
@@ -198,6 +198,41 @@ def test_points_of_a_refusal_are_numbered_from_the_start_of_the_goal():
         following(part.then, Addition(waypoints=goal.waypoints[6:7],
                                       io_commands=outputs((0.0,))[3:4]), ARM, OPTIONS,
                   from_rest=False)
+
+
+@pytest.mark.parametrize('from_rest', [False, True])
+@pytest.mark.parametrize('goal', [spline(), moves(1, timed=0.6)], ids=['spline', 'lines'])
+@pytest.mark.parametrize('times', [(-0.2, 0.4), (0.0, 0.4), (0.4, 0.4), (0.4, 0.2)], ids=str)
+def test_appended_times_go_on_increasing(times, goal, from_rest):
+    part = opened(plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS),
+                  ARM, OPTIONS)
+    told = goal.waypoints[2].time
+    waypoints = tuple(replace(point, time=told + time)
+                      for point, time in zip(goal.waypoints[3:5], times, strict=True))
+    wrong = 3 if times[0] <= 0.0 else 4
+    with pytest.raises(InvalidGoal, match=rf'points\[{wrong}\].time_from_start .*must increase'):
+        following(part.then, Addition(waypoints=waypoints), ARM, OPTIONS, from_rest=from_rest)
+
+
+@pytest.mark.parametrize('from_rest', [False, True])
+@pytest.mark.parametrize('goal', [spline(), moves(1, timed=0.6, radius=0.0)],
+                         ids=['spline', 'lines'])
+def test_a_goal_that_has_gone_on_for_hours_goes_on(goal, from_rest):
+    part = opened(plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS),
+                  ARM, OPTIONS)
+    on, late = part.then, 20_000.0
+    on = replace(on, told=on.told + late, shift=on.shift - late, tail=tuple(replace(
+        known, time_before=known.time_before + late,
+        waypoint=replace(known.waypoint, time=known.waypoint.time + late)) for known in on.tail))
+    points = goal.waypoints[3:5]
+    made = [following(state, Addition(waypoints=waypoints), ARM, OPTIONS, from_rest=from_rest)
+            for state, waypoints in ((part.then, points), (on, tuple(
+                replace(point, time=point.time + late) for point in points)))]
+    early, later = ([segment.duration for segment in one.plan.segments] for one in made)
+    assert later == pytest.approx(early, abs=2e-6)
+    with pytest.raises(InvalidGoal, match=r'gives the segment 2200 s, more than 2147 s'):
+        following(on, Addition(waypoints=(replace(points[0], time=on.told + 2200.0),)), ARM,
+                  OPTIONS, from_rest=from_rest)
 
 
 @pytest.mark.parametrize('name', ['2.0', '2.10', '2.12'])

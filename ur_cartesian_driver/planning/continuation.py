@@ -36,7 +36,7 @@ from ur_cartesian_driver.planning.path import tcp_rows
 from ur_cartesian_driver.planning.plan import plan as plan_goal
 from ur_cartesian_driver.planning.reference import keep_hemisphere
 from ur_cartesian_driver.planning.spline_plan import closing, end_state, plan_pieces, SplineState
-from ur_cartesian_driver.planning.validate import check
+from ur_cartesian_driver.planning.validate import check, point_field
 
 #: So many of the last points are planned again with the next ones: the one that is kept back, and
 #: one whose corner leads into its motion.
@@ -47,6 +47,8 @@ SAME_TIME = 1e-6
 LEADS = (0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 #: Rows of the reference along a closing piece.
 _CLOSING_ROWS = 16
+# Digits of a time that a client says [s]: nanoseconds.
+_DIGITS = 9
 #: What counts points in a sentence of the planner.
 _NUMBER = re.compile(r'\b(point |points\[|segments\[)(\d+)')
 
@@ -147,6 +149,7 @@ def following(open_goal: OpenGoal, addition: Addition, arm: Arm, options: Planni
     :raises GoalRefused: with the reason; points are numbered from the start of the goal.
     """
     _check_size(open_goal, addition, options)
+    _check_times(open_goal, addition)
     options = replace(options, max_approach_distance=0.0,
                       max_points=options.max_points + CONTEXT)
     if open_goal.goal.execution is ExecutionMode.SPLINE:
@@ -169,6 +172,20 @@ def _check_size(open_goal: OpenGoal, addition: Addition, options: PlanningOption
             raise InvalidGoal(
                 f'io_commands[{i}].point_index', f'is {command.waypoint}, and the points of this '
                 f'request are {first} to {first + count - 1}', 'name one of these')
+
+
+def _check_times(open_goal: OpenGoal, addition: Addition) -> None:
+    """Refuse points that are not later than those before them, in the times of the client."""
+    before = open_goal.told
+    if before == 0.0 and not any(point.time for point in addition.waypoints):
+        return
+    for i, point in enumerate(addition.waypoints, open_goal.points):
+        if point.time <= before:
+            raise InvalidGoal(
+                point_field(i, 'time_from_start'), f'is {point.time:g} s, and the point before it '
+                f'has {before:g} s; times must increase from point to point, also in what is '
+                'appended', 'count them from the start of the goal')
+        before = point.time
 
 
 # ---- motions of the robot -----------------------------------------------------------------------
@@ -301,7 +318,10 @@ def _spline_on(on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOpti
 
 def _spline_behind(on: OpenGoal, addition: Addition, start: SplineState, behind: int,
                    shift: float, arm: Arm, options: PlanningOptions) -> Part:
-    goal = replace(on.goal, waypoints=addition.waypoints, segments=addition.segments,
+    # Times count from the last point, so that they say how long the first segment is.
+    waypoints = tuple(replace(point, time=round(point.time - on.told, _DIGITS))
+                      for point in addition.waypoints)
+    goal = replace(on.goal, waypoints=waypoints, segments=addition.segments,
                    io_commands=tuple(replace(command, waypoint=command.waypoint - on.points)
                                      for command in addition.io_commands),
                    keep_open=not addition.last)
@@ -310,7 +330,7 @@ def _spline_behind(on: OpenGoal, addition: Addition, start: SplineState, behind:
         check(goal, options)
         about = carried(goal, standing, options).goal
         later = replace(about, waypoints=tuple(
-            replace(point, time=point.time + shift) for point in about.waypoints))
+            replace(point, time=point.time + on.told + shift) for point in about.waypoints))
     except GoalRefused as refusal:
         raise _renumbered(refusal, on.points) from None
     found = plan_pieces(start, later, arm, on.T_flange_tcp or on.T_flange_active, options,
