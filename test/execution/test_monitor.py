@@ -202,3 +202,12 @@ def test_a_target_on_the_plan_is_surely_near_it():
     tracker = PathTracker(path(*SQUARE))
     tracker.update(Pose((0.45, 0.0, 0.2001), DOWN), 0.1)
     assert tracker.is_within(0.00021, inf)
+
+
+def test_a_robot_that_says_it_is_anywhere_is_somewhere_on_the_path():
+    """Also where rows are all but the same, so that the way there is any number of their edges."""
+    rows = [(0.4 + i * 1e-4, 0.0, i * 1e-155) for i in range(2)] + [
+        (0.4001, 0.0, i * 1e-155) for i in range(2, 40)]
+    tracker = PathTracker(path(*rows))
+    tracker.update(Pose((0.4, 0.0, 1e160), DOWN), 1e161)
+    assert 0 <= tracker.place.row < len(rows)

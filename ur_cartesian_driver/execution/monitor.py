@@ -300,7 +300,8 @@ class PathTracker:
         away = np.array(point) - start
         square = np.einsum('ij,ij->i', edge, edge)
         along = np.einsum('ij,ij->i', away, edge)
-        fraction = np.divide(along, square, out=np.ones_like(along), where=square > 0.0)
+        with np.errstate(over='ignore'):  # a robot may say that it is anywhere; then it is an end
+            fraction = np.divide(along, square, out=np.ones_like(along), where=square > 0.0)
         np.minimum(np.maximum(fraction, 0.0, out=fraction), 1.0, out=fraction)
         fraction[-1] = min(fraction[-1], highest)
         fraction[0] = max(fraction[0], lowest)
