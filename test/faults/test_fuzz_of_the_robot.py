@@ -23,7 +23,7 @@ from robot_cell import (
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
@@ -42,7 +42,8 @@ attacks = st.tuples(
         st.integers(-3, 5).map(lambda number: number.to_bytes(4, 'big', signed=True)),
         # Changes to the last frame that the robot has sent: place (part of its length) and byte.
         st.lists(st.tuples(st.floats(0.0, 0.999), st.integers(0, 255)), min_size=1, max_size=6)),
-    st.booleans())
+    st.booleans(),
+    st.sampled_from([ExecutionMode.PRIMITIVES, ExecutionMode.SPLINE, ExecutionMode.SERVO]))
 
 
 def last_frame(received, width):
@@ -76,11 +77,12 @@ def say(cell, port, what):
         robot.write(data)
 
 
-def goal(cell, way):
+def goal(cell, way, execution=ExecutionMode.PRIMITIVES):
     """Return a plan to and fro along y."""
     state = cell.memory.read()
     (x, y, z), turn = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
-    return plan(Goal(waypoints=(Waypoint(pose=Pose((x, y + way, z), turn), time=TIME),)), state,
+    return plan(Goal(waypoints=(Waypoint(pose=Pose((x, y + way, z), turn), time=TIME),),
+                     execution=execution), state,
                 Arm(robot_model('ur5e')), PlanningOptions(max_tool_speed=1.0))
 
 
@@ -98,7 +100,7 @@ async def back(cell):
 
 
 async def under_attack(cell, attack, way):
-    port, what, in_motion = attack
+    port, what, in_motion, execution = attack
     await back(cell)
     q = cell.q
     if not in_motion:
@@ -107,7 +109,7 @@ async def under_attack(cell, attack, way):
         assert cell.q == q, 'nobody asked for a motion'
         return
     (x, y, z) = cell.robot.controller.motion.T_base_tcp.position
-    motion = cell.owner.start(goal(cell, way))
+    motion = cell.owner.start(goal(cell, way, execution))
     await cell.until(lambda: not cell.at_rest() or motion.outcome is not None)
     say(cell, port, what)
     await cell.until(lambda: motion.outcome is not None, 10.0)
