@@ -3,6 +3,7 @@
 """Points that are appended to a running goal by the service of the node."""
 
 import pytest
+from rclpy.duration import Duration
 from unique_identifier_msgs.msg import UUID
 
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -21,21 +22,28 @@ class Producer:
         cell.spin_until(self._client.service_is_ready)
 
     def __call__(self, handle, first_index, *steps, goal_id=None, **fields):
-        points = self.cell.goal(*steps).trajectory.points
-        return self.cell.await_(self._client.call_async(AppendPoints.Request(
-            goal_id=goal_id or handle.goal_id, first_index=first_index, points=points,
-            **fields)))
+        return self.ask(AppendPoints.Request(
+            goal_id=goal_id or handle.goal_id, first_index=first_index,
+            points=self.cell.goal(*steps).trajectory.points, **fields))
+
+    def ask(self, request):
+        return self.cell.await_(self._client.call_async(request), timeout=8.0)
 
 
 def test_a_goal_is_continued_once_for_each_request_and_ends_with_the_last(single_cell):
     cell = single_cell
     append = Producer(cell)
     handle = cell.send(cell.goal((1.0, 0.03, 0.0, 0.0), keep_open=True))
-    said = append(handle, 1, (2.0, 0.03, 0.03, 0.0), (3.0, 0.0, 0.03, 0.0))
+    request = AppendPoints.Request(goal_id=handle.goal_id, first_index=1, points=cell.goal(
+        (2.0, 0.03, 0.03, 0.0), (3.0, 0.0, 0.03, 0.0)).trajectory.points)
+    said = append.ask(request)
     assert said.accepted, said.message
     assert (said.points_received, said.message) == (3, '2 points appended, the goal has 3.')
-    again = append(handle, 1, (2.0, 0.03, 0.03, 0.0), (3.0, 0.0, 0.03, 0.0))
-    assert again == said, 'it came twice and was taken once'
+    assert append.ask(request) == said, 'it came twice and was taken once'
+    request.points[1].pose.position.z += 0.01
+    others = append.ask(request)
+    assert (others.accepted, others.points_received) == (False, 3), 'others in the same place'
+    assert 'go on with point 3' in others.message
     for index, step, text in (
             (5, (4.0, 0.0, 0.0, 0.0), 'first_index is 5, but the goal has 3 points; append'),
             (2, (4.0, 0.0, 0.0, 0.0), 'first_index is 2, but the goal has 3 points; go on with'),
@@ -62,3 +70,17 @@ def test_nothing_is_appended_to_a_goal_that_is_as_long_as_it_is(single_cell):
     assert not said.accepted
     _, result = single_cell.result(handle)
     assert result.error_code == ErrorCode.SUCCESSFUL
+
+
+def test_nobody_waits_for_a_goal_whose_time_is_to_come(single_cell):
+    cell = single_cell
+    append = Producer(cell)
+    goal = cell.goal((1.0, 0.02, 0.0, 0.0), keep_open=True)
+    goal.trajectory.header.stamp = (
+        cell.client_node.get_clock().now() + Duration(seconds=30)).to_msg()
+    handle = cell.send(goal)
+    said = append(handle, 1, (2.0, 0.0, 0.0, 0.0))
+    assert said.message == 'The goal does not move yet; append its points when it does.'
+    cell.await_(handle.cancel_goal_async())
+    _, result = cell.result(handle)
+    assert result.error_code == ErrorCode.CANCELLED

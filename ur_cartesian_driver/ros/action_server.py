@@ -281,6 +281,8 @@ class GoalRun:
         self._motion: Motion | None = None
         #: Set when the motion has begun, or never will.
         self._begun = threading.Event()
+        #: Whether it waits for its time.
+        self.waits = self.is_for_later
         #: The last request for more points that was granted, and its response.
         self.answered: tuple[object, Any] | None = None
         self._given_up = threading.Event()
@@ -353,6 +355,7 @@ class GoalRun:
         if self.is_for_later:
             self._checked(server.plan(goal))
             server.wait(self.start_time, self._given_up)
+            self.waits = False
             self._check_wanted()
             server.turns.line_up(self.turn)
             goal = replace(goal, age=0.0)

@@ -10,6 +10,8 @@ nor the feedback waits for them; the response is sent when they are taken, or re
 from __future__ import annotations
 
 from concurrent.futures import Future, ThreadPoolExecutor
+from hashlib import sha256
+import pickle
 import threading
 from typing import Any
 
@@ -17,6 +19,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
 from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNotReady
+from ur_cartesian_driver.planning.continuation import Addition
 from ur_cartesian_driver.ros.action_server import CartesianActionServer, GoalRun
 from ur_cartesian_driver.ros.convert import addition_from_message
 from ur_cartesian_driver.ros.services import PromisedService
@@ -83,12 +86,14 @@ class AppendService:
 
         :raises GoalRefused: nothing was taken.
         """
-        motion = run.motion(BEGIN_PATIENCE)
+        # Others may append to the goal that has the arm until then; nobody keeps them waiting.
+        motion = run.motion(0.0 if run.waits else BEGIN_PATIENCE)
         if motion is None or motion.continuing is None:
             raise RobotNotReady(
                 'The goal does not move yet; append its points when it does.' if motion is None
                 else 'The goal was sent without keep_open: nothing can be appended.')
-        asked = (request.first_index, len(request.points), request.last)
+        addition = addition_from_message(request)
+        asked = request.first_index, _digest(addition)
         if run.answered is not None and run.answered[0] == asked:
             return run.answered[1]  # it came twice
         points = motion.continuing.points
@@ -97,7 +102,7 @@ class AppendService:
                 'first_index', f'is {request.first_index}, but the goal has {points} points',
                 f'append point {points} first' if request.first_index > points
                 else f'go on with point {points}')
-        appended = motion.continuing.append(addition_from_message(request))
+        appended = motion.continuing.append(addition)
         response = AppendPoints.Response(
             accepted=True, message=appended.text, points_received=appended.points)
         run.answered = (asked, response)
@@ -109,6 +114,11 @@ class _Service(PromisedService):
 
     def _response(self, answer: Any) -> Any:
         return answer
+
+
+def _digest(addition: Addition) -> bytes:
+    """Return what tells additions apart; also where they contain NaN, which equals nothing."""
+    return sha256(pickle.dumps(addition)).digest()
 
 
 def _refused(text: str, points: int = 0) -> Any:
