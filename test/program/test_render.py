@@ -80,6 +80,22 @@ def test_functions_are_named_only_where_the_controller_knows_them(feature, versi
     assert feature in FEATURES
 
 
+@pytest.mark.parametrize('allowed', [False, True])
+def test_the_functions_that_let_the_arm_go_are_named_only_where_that_is_allowed(allowed):
+    program = text(allow_teach=allowed)
+    assert (' teach_mode()' in program) is (' end_teach_mode()' in program) is allowed
+    assert parse(as_program(program))
+
+
+def test_handles_of_threads_are_killed_and_not_compared():
+    """What a controller makes of a handle beside a number is written nowhere."""
+    handles = re.findall(r'(\w+) = run ', text())
+    assert len(handles) == 6
+    for handle in handles:
+        assert re.search(rf'kill {handle}\b', text())
+        assert not re.search(rf'\b{handle} *[!=]=|[!=]= *{handle}\b', text())
+
+
 @pytest.mark.parametrize('host', ['', '1.2.3.4"', 'a b', 'x\n'])
 def test_a_host_cannot_smuggle_text_into_the_program(host):
     with pytest.raises(LocalProtocolError, match='reverse_ip'):
@@ -105,7 +121,7 @@ def test_an_include_stands_in_its_place_and_takes_its_settings():
     lines = text(servoj_gain=300.0, servo_buffer_depth=3, allow_teach=True).splitlines()
     assert lines.count('thread servo_control():') == 1
     assert not [line for line in lines if line.startswith('#!')]
-    for line in ('SERVOJ_GAIN = 300.0', 'SERVO_DEPTH = 3', 'SERVO_ONES = [1, 1, 1]',
+    for line in ('SERVOJ_GAIN = 300.0', 'SERVO_DEPTH = 3', 'SERVO_ONES = [1.0, 1.0, 1.0]',
                  'SERVO_ALLOW_TEACH = True'):
         assert line in lines
 

@@ -6,8 +6,9 @@ from itertools import pairwise
 from math import pi, sin
 
 import pytest
-from robot_in_memory import REVERSE, RobotInMemory
+from robot_in_memory import REVERSE, RobotInMemory, TRAJECTORY
 
+from ur_cartesian_driver.motion.primitive import MoveJ
 from ur_cartesian_driver.program import as_program, ProgramSettings, render
 from ur_cartesian_driver.protocol.registers import (
     InputDouble,
@@ -17,7 +18,13 @@ from ur_cartesian_driver.protocol.registers import (
     ServoMode,
     SyncState,
 )
-from ur_cartesian_driver.protocol.reverse import buffered_servo, keepalive
+from ur_cartesian_driver.protocol.reverse import (
+    buffered_servo,
+    keepalive,
+    trajectory,
+    TrajectoryAction,
+)
+from ur_cartesian_driver.protocol.trajectory import encode_points
 from ur_cartesian_driver.sim.builtins.motion import HandGuided
 
 pytestmark = pytest.mark.slow
@@ -249,3 +256,50 @@ def test_teaching_is_possible_where_it_is_allowed_and_from_idle(allowed):
     servo.controller.step()
     servo.controller.step()
     assert servo.controller.hand_guided is HandGuided.NOBODY, 'teaching ends with the mode'
+
+
+def test_teaching_ends_before_the_arm_brakes_for_a_halt():
+    servo = Servo(allow_teach=True).enter(ServoMode.TEACH)
+    assert servo.controller.hand_guided is HandGuided.TEACH
+    servo.error = 1
+    servo.cycle()
+    assert servo.controller.hand_guided is HandGuided.NOBODY
+    while servo.running:
+        servo.cycle()
+    assert 'reports the error 1' in servo.log
+
+
+def test_a_refusal_of_teaching_is_told_once():
+    servo = Servo(allow_teach=False).enter(ServoMode.TEACH)
+    servo.cycle(20)
+    assert servo.log.count('teach mode is not allowed') == 1
+    assert servo[OutputInteger.ACTUAL_MODE] == ServoMode.IDLE
+
+
+def test_the_servo_waits_for_an_arm_that_another_thread_brakes():
+    """Two threads that move the arm at a time end the program."""
+    robot = RobotInMemory('ur5e')
+    robot._ready()
+    controller, sockets = robot.controller, [robot._socket(port) for port in (REVERSE, TRAJECTORY)]
+    timeout = round(1000.0 * TIMEOUT)
+    sockets[0].feed(trajectory(TrajectoryAction.START, 1, timeout).encode())
+    sockets[1].feed(encode_points([MoveJ(target=(0.5,) * 6, duration=2.0)]))
+    for _ in range(500):
+        sockets[0].feed(trajectory(TrajectoryAction.NOOP, 0, timeout).encode())
+        controller.step()
+    assert max(map(abs, controller.qd)) > 0.1
+    inputs = controller.signals.inputs
+    inputs.integers[InputInteger.DESIRED_MODE] = int(ServoMode.SERVO)
+    inputs.integers[InputInteger.EXTERNAL_SYNC_STATE] = int(SyncState.EXTERNAL_TO_ROBOT)
+    for sequence in range(1, 400):
+        inputs.integers[InputInteger.SEQUENCE_ID] = sequence
+        first = InputDouble.DESIRED_JOINT_POSITIONS
+        inputs.floats[first:first + 6] = controller.motion.q
+        first = InputDouble.MAX_JOINT_DIVERGENCE_THRESHOLDS
+        inputs.floats[first:first + 6] = [FAR] * 6
+        sockets[0].feed(buffered_servo(timeout).encode())
+        controller.step()
+    out = controller.signals.outputs
+    assert controller.programs.running, controller.announcements.log
+    assert max(map(abs, controller.qd)) == 0.0
+    assert out.integers[OutputInteger.ACTUAL_MODE] == ServoMode.SERVO

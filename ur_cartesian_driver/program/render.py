@@ -13,7 +13,8 @@ program that start with ``#!`` are instructions for this module:
     the file ``NAME.script`` stands here.
 ``#! if FEATURE`` ... ``#! end``
     kept only where the controller's software has the feature, because a controller refuses a
-    program that names a function which it does not know.
+    program that names a function which it does not know. ``teach`` is no matter of the software:
+    it is kept where teaching is allowed.
 """
 
 from __future__ import annotations
@@ -138,6 +139,8 @@ def _lines(name: str, settings: ProgramSettings) -> Iterator[str]:
                 yield from constants(settings)
             case ['#!', 'include', part]:
                 yield from _lines(part, settings)
+            case ['#!', 'if', 'teach']:
+                keep = settings.allow_teach
             case ['#!', 'if', feature] if feature in FEATURES:
                 keep = has_feature(feature, settings.version)
             case ['#!', 'end']:
@@ -178,7 +181,8 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield from _enum('TCP', script_command.TcpHold)
     yield f'OUTPUTS_WAITING = {trajectory.MOST_OUTPUTS}'
     yield f'OUTPUT_WORDS = {OUTPUT_WORDS}'
-    yield f'OUTPUT_ONES = {[1] * trajectory.MOST_OUTPUTS}'
+    # Of floats, as the matrices that are made with them.
+    yield f'OUTPUT_ONES = {[1.0] * trajectory.MOST_OUTPUTS}'
     yield f'OUTPUT_ROW = {[0.0] * OUTPUT_WORDS}'
     yield f'OUTPUT_LEAD = {OUTPUT_LEAD}'
     yield from _enum('OUTPUT', OutputKind)
@@ -196,7 +200,8 @@ def _servo_constants(settings: ProgramSettings) -> Iterator[str]:
     yield f'SERVO_ALLOW_TEACH = {settings.allow_teach}'
     yield f'SERVO_DEPTH = {settings.servo_buffer_depth}'
     # A list as long as the buffer: old controllers have no other way to make one.
-    yield f'SERVO_ONES = [{", ".join("1" * settings.servo_buffer_depth)}]'
+    yield f'SERVO_ONES = {[1.0] * settings.servo_buffer_depth}'
+    yield f'SERVO_ROW = {[0.0] * 6}'
     yield f'SERVO_MOST_STEPS = {SERVO_MOST_STEPS}'
     yield f'SERVO_MOST_REPEATS = {SERVO_MOST_REPEATS}'
     yield f'SERVO_NEAR = {[SERVO_NEAR] * 6}'
