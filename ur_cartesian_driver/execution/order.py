@@ -102,14 +102,16 @@ def order_of(plan: Plan, dialect: Dialect = NEWEST, *, since: float = 0.0,
     times, switching = goal.waypoints[-1].time, _waits_for_outputs(plan)
     waypoints = [segment.waypoint for segment in plan.segments
                  for _ in range(1 + len(segment.outputs))]
+    duration = since + plan.duration
     ends = since + np.cumsum([segment.duration for segment in plan.segments])
     asks = ends - [_left_at_blend(segment) for segment in plan.segments]
     records = [1 + len(segment.outputs) for segment in plan.segments]
     pieces = [segment.primitive for segment in plan.segments
               if isinstance(segment.primitive, Spline)]
     return Order(
-        points=len(waypoints), reference=plan.reference, duration=since + plan.duration,
-        due=times + switching if times > 0.0 else None, switching=switching,
+        points=len(waypoints), reference=plan.reference, duration=duration,
+        # What was slowed as the owner wants it (on_too_fast) is not late by that.
+        due=max(times, duration) + switching if times > 0.0 else None, switching=switching,
         T_base_frame=goal.T_base_frame,
         T_flange_active=plan.T_flange_active, T_flange_tcp=plan.T_flange_tcp,
         T_tcp_controlled=plan.T_tcp_controlled,
