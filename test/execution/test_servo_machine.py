@@ -150,6 +150,17 @@ def test_a_program_that_does_not_answer_ends_the_goal_before_anything_moves():
     assert {c.values[0] for c in cell.commands if isinstance(c, WriteServo)} == {0}
 
 
+@pytest.mark.parametrize('T_flange_tcp', [None, NOZZLE])
+def test_an_arm_that_was_moved_since_the_plan_is_not_torn_to_its_start(T_flange_tcp):
+    cell = Cell(machine(T_flange_tcp))
+    cell.joint = 0.05
+    cell.until(State.ENDED)
+    assert cell.outcome.code is ErrorCode.ROBOT_NOT_READY
+    assert 'The arm is 0.0500 m' in cell.outcome.text
+    assert 'it moved meanwhile' in cell.outcome.text
+    assert {c.values[0] for c in cell.commands if isinstance(c, WriteServo)} == {0}
+
+
 @pytest.mark.parametrize(('event', 'code'), [
     (CancelRequested(), ErrorCode.CANCELLED), (PreemptRequested(), ErrorCode.PREEMPTED)])
 def test_a_wish_is_written_at_once_and_answered_by_leaving(event, code):

@@ -291,3 +291,16 @@ def test_every_phase_has_a_way_out_by_a_stop(phase):
 def test_settings_that_cannot_work_are_refused(changes, text):
     with pytest.raises(ValueError, match=text):
         ServoSettings(**changes)
+
+
+def test_the_first_write_that_the_arm_follows_has_what_the_source_says_then():
+    """A robot program takes the joint positions of that write, even if no set-point is due."""
+    source, robot = Ramp(), Robot()
+    stream = ServoStream(source, SETTINGS)
+    run(stream, robot, seconds=0.1, begin=False)
+    assert stream.phase is Phase.READY
+    source.time = 0.25  # the arm stands elsewhere by now
+    stream.begin()
+    row = stream.take(robot.cycle(), 1.0)
+    assert row[0] == ServoMode.SERVO
+    assert row[4:10] == (0.25,) * 6

@@ -175,9 +175,8 @@ class ServoMachine(TrajectoryMachine):
         return super()._judge(state, now)
 
     def _is_armed(self, state: RobotState) -> bool:
-        if self.stream.phase is not Phase.READY:
-            return False
-        return self.loan is None or super()._is_armed(state)
+        # Set-points begin where the plan does: an arm that was moved since would be torn there.
+        return self.stream.phase is Phase.READY and super()._is_armed(state)
 
     def _why_not_armed(self) -> str:
         if self.stream.phase is Phase.READY:

@@ -227,6 +227,8 @@ class ServoStream:
         """Let the arm follow the set-points from now on."""
         self._change(Change.BEGUN)
         self._first_servo = self._sequence + 1
+        # What the source says now, as the first write may come before its first set-point.
+        self._joints = self._source.next(0.0)
 
     def stop(self) -> tuple[float, ...] | None:
         """Leave the servo; return what is to be written at once, if anything can be."""
