@@ -150,6 +150,33 @@ def test_joint_segments_may_turn(cell):
     assert reached.angle_to(end) < 1e-6
 
 
+def spline_of(cell, angular):
+    """A spline of the nozzle, past a point with a velocity along x and an angular one."""
+    start = nozzle(cell)
+    goal = goal_of(moved(start, x=0.03, y=0.02), moved(start, x=0.06))
+    passing, end = goal.waypoints
+    return replace(goal, waypoints=(
+        replace(passing, time=1.0, twist=(0.06, 0.0, 0.0, *angular)), replace(end, time=2.0)))
+
+
+@pytest.mark.parametrize('options', [CHANGE, KEEP])
+@pytest.mark.parametrize('angular', [(0.0,) * 3, (float('nan'),) * 3], ids=['zero', 'chosen'])
+def test_a_spline_that_does_not_turn_has_the_twist_asked_for(cell, angular, options):
+    made = plan(spline_of(cell, angular), cell.state, cell.arm, options)
+    path, time = nozzle_of(made), made.reference.time
+    row = int(np.searchsorted(time, 1.0))
+    before, after = ((path[row + k] - path[row + k - 1]) / (time[row + k] - time[row + k - 1])
+                     for k in (0, 1))
+    assert 0.5 * (before + after) == pytest.approx([0.06, 0.0, 0.0], abs=5e-4)
+    assert path[row] == pytest.approx(np.array(moved(nozzle(cell), x=0.03, y=0.02).position))
+
+
+def test_a_spline_whose_tool_turns_at_a_point_is_not_carried_over(cell):
+    with pytest.raises(InvalidGoal, match=r'points\[0\]\.twist\.angular turns nozzle.*allow_tcp'):
+        plan(spline_of(cell, (0.0, 0.2, 0.0)), cell.state, cell.arm, KEEP)
+    plan(spline_of(cell, (0.0, 0.2, 0.0)), cell.state, cell.arm, CHANGE)
+
+
 @pytest.mark.parametrize('options', [CHANGE, KEEP])
 def test_a_first_point_at_time_zero_is_where_the_controlled_frame_stands(cell, options):
     start = nozzle(cell)

@@ -12,12 +12,12 @@ active TCP, which is exact as long as the tool does not turn.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import degrees
+from math import degrees, isnan
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.lever import acceleration_at, seen_at, twist_at
-from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose, rotate
+from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose, rotate, Vector6
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.validate import (
@@ -116,11 +116,24 @@ def _check_turns(goal: Goal, T_base_start: Pose) -> None:
                 point_field(i, 'pose.orientation'), f'turns {_name(goal)} by {degrees(angle):.2f} '
                 'degrees on the way; a frame that is not the TCP of the robot keeps to a line or '
                 'an arc only if it does not turn, and the TCP must not change', remedy)
+        if is_spline(goal):
+            _check_rates(goal, i, remedy)
         if segment.type == SegmentType.CIRCULAR and segment.arc_mode == ArcMode.FIXED:
             raise InvalidGoal(
                 segment_field(i, 'arc_mode'), f'is FIXED, which turns {_name(goal)} along with '
                 'the arc; that needs the TCP of the robot to be there, and it must not change',
                 'use UNCONSTRAINED, or set allow_tcp_change to true')
+
+
+def _check_rates(goal: Goal, index: int, remedy: str) -> None:
+    """Refuse a point of a spline at which the tool turns; NaN chooses that it does not."""
+    point = goal.waypoints[index]
+    for field, values in (('twist', point.twist), ('acceleration', point.acceleration)):
+        if any(value != 0.0 and not isnan(value) for value in values[3:]):
+            raise InvalidGoal(
+                f'{point_field(index, field)}.angular', f'turns {_name(goal)}; a frame that is '
+                'not the TCP of the robot keeps to a spline only if it does not turn, and the TCP '
+                'must not change', remedy)
 
 
 def _about_tcp(goal: Goal, T_controlled_tcp: Pose) -> Goal:
@@ -135,9 +148,17 @@ def _about_tcp(goal: Goal, T_controlled_tcp: Pose) -> Goal:
 def _waypoint(point: Waypoint, T_controlled_tcp: Pose) -> Waypoint:
     pose = Pose(point.pose.position, normalize(point.pose.quaternion))
     lever = rotate(pose.quaternion, T_controlled_tcp.position)
+    twist, acceleration = _steady(point.twist), _steady(point.acceleration)
     return replace(
-        point, pose=pose @ T_controlled_tcp, twist=twist_at(point.twist, lever),
-        acceleration=acceleration_at(point.acceleration, point.twist, lever))
+        point, pose=pose @ T_controlled_tcp, twist=twist_at(twist, lever),
+        acceleration=acceleration_at(acceleration, twist, lever))
+
+
+def _steady(rates: Vector6) -> Vector6:
+    """Return rates whose angular part is 0 where it may be chosen."""
+    x, y, z, *angular = rates
+    a, b, c = (0.0 if isnan(value) else value for value in angular)
+    return (x, y, z, a, b, c)
 
 
 def _segment(segment: Segment, point: Waypoint, T_controlled_tcp: Pose) -> Segment:
