@@ -235,6 +235,18 @@ def test_a_goal_that_has_gone_on_for_hours_goes_on(goal, from_rest):
                   OPTIONS, from_rest=from_rest)
 
 
+@pytest.mark.parametrize('goal', [moves(1, offsets=(0.0, 0.3)), spline(offsets=(0.0, 0.3))],
+                         ids=['lines', 'spline'])
+def test_outputs_of_a_refusal_are_numbered_as_in_the_request(goal):
+    part = opened(plan(replace(goal, **of(goal, 0, 4), keep_open=True), STATE, ARM, OPTIONS),
+                  ARM, OPTIONS)
+    assert part.then.outputs, 'some of before may still be due'
+    wrong = replace(goal.io_commands[8], pin=9)
+    with pytest.raises(InvalidGoal, match=r'^io_commands\[0\]\.pin is 9'):
+        following(part.then, Addition(**of(goal, 4, 6, io_commands=(wrong,))), ARM, OPTIONS,
+                  from_rest=False)
+
+
 @pytest.mark.parametrize('name', ['2.0', '2.10', '2.12'])
 def test_older_robot_programs_have_to_know_the_number_of_points(name):
     goal = replace(moves(1), keep_open=True)

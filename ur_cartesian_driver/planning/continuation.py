@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.controlled import carried, tools
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.outputs import with_outputs
+from ur_cartesian_driver.planning.outputs import check_outputs, with_outputs
 from ur_cartesian_driver.planning.path import tcp_rows
 from ur_cartesian_driver.planning.plan import plan as plan_goal
 from ur_cartesian_driver.planning.reference import keep_hemisphere
@@ -148,7 +148,7 @@ def following(open_goal: OpenGoal, addition: Addition, arm: Arm, options: Planni
     :param from_rest: whether the ending was sent, so that the arm stands, or is about to.
     :raises GoalRefused: with the reason; points are numbered from the start of the goal.
     """
-    _check_size(open_goal, addition, options)
+    _check_by_itself(open_goal, addition, options)
     _check_times(open_goal, addition)
     options = replace(options, max_approach_distance=0.0,
                       max_points=options.max_points + CONTEXT)
@@ -157,7 +157,7 @@ def following(open_goal: OpenGoal, addition: Addition, arm: Arm, options: Planni
     return _moves_on(open_goal, addition, arm, options, from_rest)
 
 
-def _check_size(open_goal: OpenGoal, addition: Addition, options: PlanningOptions) -> None:
+def _check_by_itself(open_goal: OpenGoal, addition: Addition, options: PlanningOptions) -> None:
     count, first = len(addition.waypoints), open_goal.points
     if not count:
         raise InvalidGoal('points', 'is empty', 'give at least one point, or set last')
@@ -172,6 +172,16 @@ def _check_size(open_goal: OpenGoal, addition: Addition, options: PlanningOption
             raise InvalidGoal(
                 f'io_commands[{i}].point_index', f'is {command.waypoint}, and the points of this '
                 f'request are {first} to {first + count - 1}', 'name one of these')
+    # By themselves, too: what is planned has older ones in front of them.
+    check_outputs(replace(
+        open_goal.goal, waypoints=addition.waypoints, io_commands=_numbered(addition, first)),
+        options)
+
+
+def _numbered(addition: Addition, first: int) -> tuple[IOCommand, ...]:
+    """Return the commands of an addition, with waypoints counted from a point."""
+    return tuple(replace(command, waypoint=command.waypoint - first)
+                 for command in addition.io_commands)
 
 
 def _check_times(open_goal: OpenGoal, addition: Addition) -> None:
@@ -219,15 +229,13 @@ def _moves_on(on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptio
 def _outputs_due(on: OpenGoal, addition: Addition, first: int, pending: int, since: float
                  ) -> tuple[IOCommand, ...]:
     """Return the commands of a part; those before it that are still due count from its start."""
-    new = [replace(command, waypoint=command.waypoint - first)
-           for command in addition.io_commands]
     old = []
     for due, command in on.outputs:
         if command.waypoint == on.points - 1:
             old.append(replace(command, waypoint=command.waypoint - first))
         elif due > since and pending:
             old.append(replace(command, waypoint=pending - 1, offset=due - since))
-    return (*old, *new)
+    return (*old, *_numbered(addition, first))
 
 
 def _moved(made: Plan, first: int, waypoint: int, since: float) -> Plan:
@@ -322,9 +330,7 @@ def _spline_behind(on: OpenGoal, addition: Addition, start: SplineState, behind:
     waypoints = tuple(replace(point, time=round(point.time - on.told, _DIGITS))
                       for point in addition.waypoints)
     goal = replace(on.goal, waypoints=waypoints, segments=addition.segments,
-                   io_commands=tuple(replace(command, waypoint=command.waypoint - on.points)
-                                     for command in addition.io_commands),
-                   keep_open=not addition.last)
+                   io_commands=_numbered(addition, on.points), keep_open=not addition.last)
     standing = _standing(on, start.q, arm)
     try:
         check(goal, options)
