@@ -293,3 +293,32 @@ def test_every_event_in_every_state_leads_to_one_end(state):
             cell.event(Tick())
         cell.event(LinkLost(link='RTDE', reason='the end of the test'))
         assert cell.outcome.text.endswith('.'), (state, event)
+
+
+def test_a_target_that_trails_by_many_dense_points_is_on_the_path():
+    points, trail = 100, 20  # 2 ms each; 40 ms of servoj at 0.5 m/s are 20 mm
+    at = np.linspace(0.0, 1.0, points + 1)
+    speed = (LENGTH / DURATION,) * 6
+    goal = ServoMachine(Order(
+        points=points, duration=DURATION, execution=ExecutionMode.SERVO,
+        waypoint=np.arange(points, dtype=np.int32), spline=JointSpline.of(REST, [Spline(
+            target=(LENGTH * part,) * 6, velocities=REST if part == 1.0 else speed,
+            duration=DURATION / points) for part in at[1:]]),
+        reference=ReferencePath(
+            poses=np.array([[LENGTH * part, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0] for part in at]),
+            point=np.array([0, *range(points)], dtype=np.int32), time=DURATION * at)),
+        settings=ServoSettings())
+
+    class Trailing(Cell):
+        def event(self, event):
+            if isinstance(event, StateReceived):
+                self.led.append(event.state.target_q[0])
+                before, now = ([0.0] * trail + self.led)[-trail - 2:-trail]
+                event = StateReceived(state=robot(now, (now - before) / STEP,
+                                                  timestamp=event.state.timestamp))
+            super().event(event)
+
+    cell = Trailing(goal)
+    cell.led = [0.0]
+    cell.until(State.ENDED)
+    assert cell.outcome.code is ErrorCode.SUCCESSFUL, cell.outcome

@@ -63,6 +63,8 @@ class Observer:
         self._stale_begun: int | None = None
         #: How many motions of the goal the robot had begun in trajectories before this one.
         self._motions_before = 0
+        #: By how many motions the controller's target may be behind the one that was begun last.
+        self.trail = 0
         #: How long the target has stood still while nothing held it [s].
         self._stalled_time = 0.0
         #: The same of the controller's own time, and how much of that the plan itself may stand.
@@ -122,7 +124,7 @@ class Observer:
         if before is not None:  # it may have braked since
             fastest = max(fastest, speed(before.target_tcp_twist))
         self._tracker.update(state.target_tcp_pose, 2.0 * passed * fastest,
-                             self._records.running(begun))
+                             self._records.running(begun, self.trail))
 
     # ---- how far it is ------------------------------------------------------------------------
 

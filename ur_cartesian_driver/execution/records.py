@@ -50,17 +50,19 @@ class Records:
             return self._first
         return self._motions[self._index(motions)] + 1
 
-    def running(self, motions: int) -> tuple[int, int] | None:
+    def running(self, motions: int, trail: int = 0) -> tuple[int, int] | None:
         """
         Return to which points the motion that was begun last and the one before it lead.
 
         :param motions: how many are begun; None is returned for 0.
+        :param trail: so many motions earlier is the one before it, because the arm may be there.
         """
         if motions <= self._first_motion:
             return None
         last = self._index(motions)
+        before = last - 1 - trail
         return (self._waypoints[self._motions[last] - self._first],
-                self._waypoints[self._motions[last - 1] - self._first] if last else -1)
+                self._waypoints[self._motions[before] - self._first] if before >= 0 else -1)
 
     def before(self, waypoint: int) -> int:
         """Return how many records stand before those of a point."""

@@ -57,6 +57,9 @@ SERVO_LINK = 'RTDE inputs'
 #: A robot program that reads our sequence numbers is not stalled, wherever the arm stands: so
 #: lately has it to have read one [s].
 ANSWERS_WITHIN = 1.0
+#: The controller's target is behind the set-point that the arm is led to by about the lookahead
+#: time of ``servoj``, by more with a low gain: so many lookahead times at most.
+TRAIL = 4.0
 
 
 class ServoMachine(TrajectoryMachine):
@@ -82,6 +85,7 @@ class ServoMachine(TrajectoryMachine):
             source = SplineSetpoints(order.spline)
         self.state = State.ARMING
         self.stream = ServoStream(source, settings)
+        self._trail = TRAIL * settings.lookahead_time
         self._read = -1
         self._last_answer = -inf
         self._is_timed = False
@@ -110,15 +114,17 @@ class ServoMachine(TrajectoryMachine):
         if isinstance(event, ServoReceived):
             commands = self._stream_on(event.feedback, now)
         elif isinstance(event, StateReceived):
-            event = StateReceived(state=replace(event.state, points_begun=self._begun()))
+            begun = self._begun(self.stream.motion_time)
+            self._observer.trail = begun - self._begun(self.stream.motion_time - self._trail)
+            event = StateReceived(state=replace(event.state, points_begun=begun))
         return commands + super().step(event, now)
 
-    def _begun(self) -> int:
-        """Return how many pieces of the spline the arm was led into; 0 = none, or unknown."""
+    def _begun(self, time: float) -> int:
+        """Return how many pieces of the spline begin until a time [s]; 0 = none, or unknown."""
         spline = self.order.spline
-        if spline is None or self.stream.motion_time <= 0.0:
+        if spline is None or time <= 0.0:
             return 0
-        return spline.piece(self.stream.motion_time) + 1
+        return spline.piece(time) + 1
 
     def _stream_on(self, feedback: ServoFeedback, now: float) -> list[Command]:
         """Answer a packet of the servo's registers with a write."""
@@ -202,6 +208,10 @@ class ServoMachine(TrajectoryMachine):
 
     def _enter_restoring(self, signal: Signal, now: float) -> list[Command]:
         return [*self._stop_streaming(), *super()._enter_restoring(signal, now)]
+
+    def _enter_ending(self, signal: Signal, now: float) -> list[Command]:
+        # A program that begins now must not find set-points in the inputs.
+        return [*self._stop_streaming(), *super()._enter_ending(signal, now)]
 
     def _enter_ended(self, signal: Signal, now: float) -> list[Command]:
         return [*self._stop_streaming(), LeaveServo(), *self._about_stream(),
