@@ -71,9 +71,10 @@ def test_the_age_counts_from_the_stamp(session):
     session.take(0.3, age=0.15)
     session.run(0.064)
     assert session.follower.target is None, 'it was 0.15 s old when it came'
-    session.take(0.1, age=0.25)
-    assert session.follower.target is None
-    assert session.live.left_out == 1
+    for age in (0.25, float('nan')):
+        session.take(0.1, age=age)
+        assert session.follower.target is None
+    assert session.live.left_out == 2
 
 
 def test_the_newest_stamp_wins_whatever_comes_last(session):

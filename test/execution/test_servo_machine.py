@@ -189,6 +189,18 @@ def test_a_program_that_leaves_by_itself_ends_the_goal():
     assert 'left the servo by itself' in cell.outcome.text
 
 
+def test_a_program_that_takes_the_place_of_a_lost_one_finds_no_setpoints_in_the_inputs():
+    cell = Cell(machine()).until(State.MOVING)
+    for _ in range(60):
+        cell.cycle()
+    assert cell.row[0] == 2
+    cell.event(LinkLost(link='program', reason='it has ended'))
+    assert cell.goal.state is State.ENDING
+    for _ in range(20):
+        assert cell.row[0] == 0
+        cell.cycle()
+
+
 def test_lost_inputs_end_a_moving_goal_and_the_program_is_told_to_brake():
     cell = Cell(machine()).until(State.MOVING)
     cell.event(LinkLost(link=SERVO_LINK, reason='it closed'))

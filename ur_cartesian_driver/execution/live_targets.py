@@ -65,7 +65,7 @@ class LiveTargets:
         """
         stamp = now - max(0.0, age)
         self._last_came = now
-        if stamp <= self._stamp or age > self._settings.max_age:
+        if stamp <= self._stamp or not age <= self._settings.max_age:  # NaN is no age
             self.left_out += 1
             return
         self._stamp = stamp
