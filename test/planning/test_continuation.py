@@ -235,6 +235,17 @@ def test_a_goal_that_has_gone_on_for_hours_goes_on(goal, from_rest):
                   OPTIONS, from_rest=from_rest)
 
 
+def test_what_appended_points_ask_for_in_vain_is_told():
+    goal = moves(1, timed=0.6, radius=0.0)
+    part = opened(plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS),
+                  ARM, OPTIONS)
+    waypoints = tuple(replace(point, twist=(0.1, 0, 0, 0, 0, 0)) for point in goal.waypoints[3:5])
+    for points, told in ((waypoints, ' Points 3, 4: twist is ignored: UR motion commands stop or '
+                                     'blend at a point.'), (goal.waypoints[3:5], '')):
+        text = following(part.then, Addition(waypoints=points), ARM, OPTIONS, from_rest=False).text
+        assert text == f'2 points appended, the goal has 5.{told}'
+
+
 @pytest.mark.parametrize('goal', [moves(1, offsets=(0.0, 0.3)), spline(offsets=(0.0, 0.3))],
                          ids=['lines', 'spline'])
 def test_outputs_of_a_refusal_are_numbered_as_in_the_request(goal):

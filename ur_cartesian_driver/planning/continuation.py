@@ -35,7 +35,9 @@ from ur_cartesian_driver.planning.outputs import check_outputs, with_outputs
 from ur_cartesian_driver.planning.path import tcp_rows
 from ur_cartesian_driver.planning.plan import plan as plan_goal
 from ur_cartesian_driver.planning.reference import keep_hemisphere
+from ur_cartesian_driver.planning.report import ignored
 from ur_cartesian_driver.planning.spline_plan import closing, end_state, plan_pieces, SplineState
+from ur_cartesian_driver.planning.spline_points import remarks as point_remarks
 from ur_cartesian_driver.planning.validate import check, point_field
 
 #: So many of the last points are planned again with the next ones: the one that is kept back, and
@@ -477,4 +479,12 @@ def _text(on: OpenGoal, addition: Addition) -> str:
     count = len(addition.waypoints)
     points = 'point' if count == 1 else 'points'
     end = ', these are the last' if addition.last else ''
-    return f'{count} {points} appended, the goal has {on.points + count}{end}.'
+    return ' '.join([f'{count} {points} appended, the goal has {on.points + count}{end}.',
+                     *(f'{remark[:1].upper()}{remark[1:]}.' for remark in _ignored(on, addition))])
+
+
+def _ignored(on: OpenGoal, addition: Addition) -> list[str]:
+    """Return what is to be said of points that ask for what is not done."""
+    goal = replace(on.goal, waypoints=addition.waypoints, segments=addition.segments,
+                   keep_open=not addition.last)
+    return (point_remarks if goal.execution is ExecutionMode.SPLINE else ignored)(goal, on.points)

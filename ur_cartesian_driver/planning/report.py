@@ -39,27 +39,28 @@ def smallest(legs: Sequence[Leg]) -> str:
     return f'nearest of all: {leg.nearest} of the way to point {leg.index}'
 
 
-def ignored(goal: Goal) -> list[str]:
-    """Return a remark for everything in a checked goal that has no effect."""
+def ignored(goal: Goal, first: int = 0) -> list[str]:
+    """Return a remark for all that has no effect in a checked goal; points count from first."""
     remarks: list[str] = []
     timed = is_timed(goal)
-    points = list(enumerate(goal.waypoints))
+    points = list(enumerate(goal.waypoints, first))
     if timed:
         say(remarks, [i for i, p in points if any(p.twist)],
-             'twist is ignored: UR motion commands stop or blend at a point')
+            'twist is ignored: UR motion commands stop or blend at a point')
     else:
-        say(remarks, [i for i, p in points if any(p.twist) and not _takes_twist(goal, i)],
-             'twist is ignored: the segment has a velocity of its own, or no speed of the tool')
+        say(remarks, [i for i, p in points if any(p.twist) and not _takes_twist(goal, i - first)],
+            'twist is ignored: the segment has a velocity of its own, or no speed of the tool')
     say(remarks, [i for i, p in points if any(p.acceleration)],
-         'acceleration is ignored: UR motion commands cannot meet it')
+        'acceleration is ignored: UR motion commands cannot meet it')
     say(remarks, [i for i, p in points if any(p.jerk)],
-         'jerk is ignored: no robot motion takes it')
+        'jerk is ignored: no robot motion takes it')
     if timed:
-        say(remarks, [i for i, s in enumerate(goal.segments) if s.acceleration > 0.0 and s.type
-                       in (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)],
-             'the acceleration of the segment is ignored: its time counts')
+        say(remarks, [i for i, s in enumerate(goal.segments, first)
+                      if s.acceleration > 0.0 and s.type in (
+                          SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)],
+            'the acceleration of the segment is ignored: its time counts')
     if goal.segments and goal.segments[-1].blend_radius > 0.0 and not goal.keep_open:
-        remarks.append(f'point {len(points) - 1}: the blend is ignored: the last point is '
+        remarks.append(f'point {points[-1][0]}: the blend is ignored: the last point is '
                        'never blended')
     return remarks
 
