@@ -213,10 +213,6 @@ class ServoMachine(TrajectoryMachine):
         # A program that begins now must not find set-points in the inputs.
         return [*self._stop_streaming(), *super()._enter_ending(signal, now)]
 
-    def _enter_ending(self, signal: Signal, now: float) -> list[Command]:
-        # A program that begins now must not find set-points in the inputs.
-        return [*self._stop_streaming(), *super()._enter_ending(signal, now)]
-
     def _enter_ended(self, signal: Signal, now: float) -> list[Command]:
         return [*self._stop_streaming(), LeaveServo(), *self._about_stream(),
                 *super()._enter_ended(signal, now)]
