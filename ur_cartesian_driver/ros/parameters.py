@@ -292,6 +292,8 @@ DECLARATIONS: tuple[Declaration, ...] = (
                 0.0, 50.0),
     Declaration('servo_state_rate', 'How often ~/servo_state is published at most [Hz]; 0: never.',
                 0.0, 500.0),
+    Declaration('feedback_rate', 'How often a goal sends feedback [Hz].', 0.5, 500.0),
+    # -- set-points
     Declaration('servoj_gain', 'SERVO: how stiff servoj holds a set-point.', 100.0, 2000.0),
     Declaration('servoj_lookahead_time', 'SERVO: how far servoj looks ahead, and so lags behind '
                 '[s].', 0.03, 0.2),
@@ -303,13 +305,13 @@ DECLARATIONS: tuple[Declaration, ...] = (
                 'farther from its set-point [rad].', 0.01, 3.0),
     Declaration('allow_teach', 'Whether people may push the arm in the teach mode of the servo; '
                 'the robot program is made for it.'),
+    # -- goals that go on
     Declaration('stream_horizon', 'Goals with keep_open: planned time of the motion that the '
                 'robot is given ahead [s]; at least twice stream_margin.', 0.1, 60.0),
     Declaration('stream_margin', 'Goals with keep_open: how long before the robot runs out of '
                 'points it is brought to rest, if no more come [s].', 0.02, 10.0),
     Declaration('keep_open_timeout', 'Goals with keep_open: how long one waits at rest for more '
                 'points until it ends [s]; 0: without end.', 0.0, 86400.0),
-    Declaration('feedback_rate', 'How often a goal sends feedback [Hz].', 0.5, 500.0),
     # -- what is recorded
     Declaration('record_directory', 'Directory in which each motion is recorded, a file each, to '
                 'be drawn by `ur-cartesian plot`; empty: nothing is.'),
