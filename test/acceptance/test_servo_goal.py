@@ -150,10 +150,12 @@ def test_feedback_and_reports_tell_the_lag_and_the_inputs_are_given_back():
         outcome = await refused.end()
         assert outcome.code is ErrorCode.ROBOT_NOT_READY
         assert 'in use by another client' in outcome.text
-        assert cell.q == q
-        other.close()
+        assert cell.q == pytest.approx(q, abs=1e-7)  # what is left of the goal before dies out
+        # But for a moment it waits for somebody who is about to hang up.
         await cell.until(cell.is_ready)
         again = Run(cell, straight(0.4, way=-0.02))
+        await cell.sleep(0.1)
+        other.close()
         assert (await again.end()).code is ErrorCode.SUCCESSFUL
 
     run_cell(scenario)

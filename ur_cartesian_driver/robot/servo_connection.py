@@ -4,12 +4,16 @@
 The RTDE connection of streamed set-points: opened for a goal, closed behind it.
 
 Inputs belong to the client that asked for them, so they are held no longer than they are needed.
+Whoever had them last, a goal of ours maybe, gives them back when the controller finds its
+connection closed; until then they are asked for again and again, for a short while.
+
 What the robot program reports of the set-points comes on the same connection, so the packets that
 every other goal waits for stay as they are.
 """
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -20,9 +24,11 @@ from ur_cartesian_driver.protocol.rtde import RtdeClient, Values
 from ur_cartesian_driver.robot.rtde_connection import RtdeConnection
 
 OUTPUTS = ('timestamp', 'speed_scaling', 'runtime_state', *SERVO_OUTPUTS)
+#: For so long is it tried to get the inputs, and so long is the pause between two attempts [s].
+PATIENCE, PAUSE = 0.3, 0.02
 
 
-class ServoConnection(RtdeConnection):
+class ServoConnection:
     """Used once, from one event loop: run it, write to it, close it."""
 
     def __init__(self, on_feedback: Callable[[ServoFeedback], None]) -> None:
@@ -31,9 +37,9 @@ class ServoConnection(RtdeConnection):
 
         :param on_feedback: a packet came in.
         """
-        super().__init__(RtdeClient(outputs=OUTPUTS, inputs=SERVO_INPUTS), self._on_row)
         self._on_feedback = on_feedback
         self._is_open = True
+        self._attempt: _Attempt | None = None
 
     async def run(self, host: str, port: int, on_end: Callable[[str], None]) -> None:
         """
@@ -42,31 +48,66 @@ class ServoConnection(RtdeConnection):
         :param on_end: it could not be opened, or was lost, and why; not after
             :meth:`close`.
         """
-        try:
-            await self.open(host, port)
-            # Whoever has closed it meanwhile could not hang up yet.
-            reason = await self.ended() if self._is_open else ''
-        except OSError as error:
-            reason = str(error)
-        finally:
-            super().close()
+        loop = asyncio.get_running_loop()
+        give_up, reason = loop.time() + PATIENCE, ''
+        while self._is_open:
+            self._attempt = attempt = _Attempt(self._on_row)
+            reason = await attempt.serve(host, port)
+            if attempt.has_inputs or loop.time() >= give_up:
+                break
+            await asyncio.sleep(PAUSE)
         if self._is_open:
             self._is_open = False
             on_end(reason)
 
     def write_row(self, values: Sequence[float]) -> None:
         """Write all inputs in their order, if the connection is there."""
-        if self._is_open and self._inputs:
-            self._connection.send(self._inputs[0].pack(values))
+        if self._is_open and self._attempt is not None:
+            self._attempt.write_row(values)
 
     def close(self) -> None:
         """Hang up, behind what was written."""
         self._is_open = False
-        super().close()
+        if self._attempt is not None:
+            self._attempt.close()
 
     def _on_row(self, _: Sequence[str], values: Values) -> None:
         if self._is_open:
             self._on_feedback(feedback_of(values))
+
+
+class _Attempt(RtdeConnection):
+    """One connection to the robot, which may not give the inputs."""
+
+    def __init__(self, on_values: Callable[[Sequence[str], Values], None]) -> None:
+        super().__init__(RtdeClient(outputs=OUTPUTS, inputs=SERVO_INPUTS), on_values)
+        self._is_wanted = True
+
+    @property
+    def has_inputs(self) -> bool:
+        """Whether the robot has given them."""
+        return bool(self._inputs)
+
+    async def serve(self, host: str, port: int) -> str:
+        """Serve until it ends, and return why."""
+        try:
+            await self.open(host, port)
+            # Whoever has closed it meanwhile could not hang up yet.
+            return await self.ended() if self._is_wanted else ''
+        except OSError as error:
+            return str(error)
+        finally:
+            self.close()
+
+    def write_row(self, values: Sequence[float]) -> None:
+        """Write all inputs in their order, once they are there."""
+        if self._inputs:
+            self._connection.send(self._inputs[0].pack(values))
+
+    def close(self) -> None:
+        """Hang up, behind what was written."""
+        self._is_wanted = False
+        super().close()
 
 
 def feedback_of(values: tuple[Any, ...]) -> ServoFeedback:
