@@ -395,6 +395,22 @@ def test_slow_stretches_all_times_and_keeps_the_way(cell):
     assert np.linalg.norm(twist[:, :3], axis=1).max() == pytest.approx(0.25, rel=0.01)
 
 
+@pytest.mark.parametrize('linear', [True, False], ids=['tool', 'joints'])
+def test_accelerations_are_slowed_to_their_limit_and_no_further(cell, linear):
+    goal, limit = goal_of(cell, 13), 0.1 if linear else 0.3
+    name = 'max_linear_acceleration' if linear else 'max_joint_acceleration'
+    made = plan(goal, cell.state, cell.arm, replace(
+        OPTIONS, on_too_fast='slow', **{name: limit}))
+    assert any(f'because of {name}' in line for line in made.report)
+    # Beside the points, where the acceleration of a cubic jumps.
+    ends = np.cumsum([segment.duration for segment in made.segments])
+    times = np.sort(np.concatenate([np.linspace(0.0, ends[-1], 400), ends[:-1] - 1e-6]))[1:-1]
+    q, qd, qdd = joints_of(made).rows(times)
+    _, tool = tool_rates(cell.arm, cell.T_flange_tcp, q, qd, qdd)
+    most = np.linalg.norm(tool[:, :3], axis=1).max() if linear else np.abs(qdd).max()
+    assert most == pytest.approx(limit, rel=0.05)
+
+
 def test_a_workspace_plane_is_kept_between_the_points_too(cell):
     low = cell.home.position[2] - 0.03
     plane = replace(OPTIONS, workspace_planes=(f'table 0 0 {low} 0 0 1',))
@@ -507,6 +523,17 @@ def test_a_closing_piece_keeps_to_the_range_of_a_joint_or_is_refused(cell):
     assert piece.duration < 1.5 / 4.0
     with pytest.raises(JointLimitExceeded, match='wrist_3_joint is so near to the end'):
         closing(replace(state, q=(*q[:5], 2.0 * pi - 1e-4)), cell.arm, 4.0)
+
+
+def test_a_closing_piece_keeps_to_the_speed_of_a_joint_that_gets_faster_still(cell):
+    fastest = cell.arm.model.max_joint_speed[5]
+    state = SplineState(q=cell.state.actual_q, qd=(0.0,) * 5 + (0.98 * fastest,),
+                        qdd=(0.0,) * 5 + (8.0,))
+    piece = closing(state, cell.arm, 1.0)
+    _, speeds, _ = JointSpline.of(state.q, [piece], velocities=state.qd,
+                                  accelerations=state.qdd).rows(np.linspace(0.0, piece.duration))
+    assert speeds[1, 5] > speeds[0, 5]
+    assert speeds.max() < 1.02 * fastest
 
 
 def test_the_way_to_rest_behind_an_open_end_is_checked_too(cell):
