@@ -25,7 +25,7 @@ from ur_cartesian_driver.robot.rtde_connection import RtdeConnection
 
 OUTPUTS = ('timestamp', 'speed_scaling', 'runtime_state', *SERVO_OUTPUTS)
 #: For so long is it tried to get the inputs, and so long is the pause between two attempts [s].
-PATIENCE, PAUSE = 0.3, 0.02
+PATIENCE, PAUSE = 0.2, 0.02
 
 
 class ServoConnection:
