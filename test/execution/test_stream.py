@@ -9,6 +9,7 @@ import numpy as np
 from ur_cartesian_driver.execution import (
     AnswerExtension,
     Extension,
+    Finish,
     LendTcp,
     Order,
     SendControl,
@@ -115,6 +116,43 @@ def test_points_for_a_motion_that_was_closed_have_to_begin_at_rest():
     assert actions(commands) == [(TrajectoryAction.STREAM_START, 0)]
     assert sent(commands) == [(10, 14)]
     assert machine.state is State.MOVING
+
+
+def test_a_motion_goes_on_when_a_packet_shows_the_arm_at_rest_and_counts_its_own_records():
+    machine, _ = started(count=10)
+    run(machine, 0.0, 0.72)
+    machine.step(Extension(number=1, behind=10, order=order(11, 5)), 0.74)
+    run(machine, 0.76, 0.98)
+    success = TrajectoryEnded(result=TrajectoryResult.SUCCESS)
+    assert actions(machine.step(success, 1.0)) == [], 'packets may be late'
+    commands = machine.step(packet(1.0, 10, moves=False), 1.02)
+    assert actions(commands) == [(TrajectoryAction.STREAM_START, 0)]
+    commands = machine.step(Extension(number=2, behind=0, order=None), 1.04)
+    assert actions(commands) == [(TrajectoryAction.STREAM_END, 5)]
+
+
+def test_the_time_at_rest_makes_nothing_late():
+    machine, _ = started(count=10)
+    machine.order = replace(machine.order, goal_time_tolerance=0.2)
+    run(machine, 0.0, 0.98)
+    for k in range(100):
+        machine.step(rest_at(1.0 + 0.01 * k, 1.0, 10), 1.0 + 0.01 * k)
+    machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
+    machine.step(Extension(number=1, behind=10, order=order(
+        11, 5, open_end=False, ending=0, due=1.5, goal_time_tolerance=0.2)), 2.0)
+    machine.step(rest_at(2.02, 1.0, 10), 2.02)
+    for k in range(1, 26):
+        machine.step(rest_at(2.02 + 0.02 * k, 1.0 + 0.02 * k, 1 + k // 5), 2.02 + 0.02 * k)
+    commands = machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.6)
+    commands += machine.step(rest_at(2.6, 1.5, 5), 2.6)
+    (outcome,) = [c.outcome for c in commands if isinstance(c, Finish)]
+    assert outcome.succeeded, outcome.text
+
+
+def rest_at(time, place, begun):
+    """The robot is at rest where the plan has it at another time."""
+    return StateReceived(state=replace(
+        packet(place, begun, moves=False).state, timestamp=time))
 
 
 def test_the_word_that_they_are_the_last_sends_the_ending_with_the_others():

@@ -491,13 +491,16 @@ def test_an_open_goal_may_be_planned_to_end_moving(cell):
     assert 'passes it' in part.segments[-1].note
 
 
-def test_a_moving_start_is_not_slowed(cell):
+def test_what_is_planned_in_parts_is_not_slowed(cell):
     goal = goal_of(cell, 16)
     slow = replace(OPTIONS, on_too_fast='slow')
     start = SplineState(q=cell.state.actual_q, qd=(0.1,) * 6)
     fast = replace(goal, waypoints=(replace(goal.waypoints[0], time=0.1),))
-    with pytest.raises(TooFast):
+    text = r'give all points \d+\.\d+ times the time \(and twists and accelerations to match\)\.$'
+    with pytest.raises(TooFast, match=text):
         plan_pieces(start, fast, cell.arm, cell.T_flange_tcp, slow)
+    with pytest.raises(TooFast, match=text):
+        plan(replace(fast, keep_open=True, execution=SPLINE), cell.state, cell.arm, slow)
 
 
 @pytest.mark.parametrize('qdd', [(0.0,) * 6, (0.3, -0.5, 0.2, 0.8, -0.4, 0.1)])

@@ -44,15 +44,19 @@ class Excess:
     #: Which limit.
     name: str
 
-    def refusal(self) -> TooFast:
-        """Return the refusal of the goal."""
+    def refusal(self, *, may_slow: bool = True) -> TooFast:
+        """
+        Return the refusal of the goal.
+
+        :param may_slow: whether the driver could give it more time.
+        """
         return TooFast(
             point_field(self.point, 'time_from_start'),
             f'gives too little time: after {100.0 * self.fraction:.0f} % of it {self.what} needs '
             f'{self.needed:.3f} {self.unit}, and allowed are {self.allowed:.3f} {self.unit} '
             f'({self.name})',
             f'give all points {ceil(1e3 * self.factor) / 1e3:.3f} times the time (and twists and '
-            'accelerations to match), or set on_too_fast to slow')
+            f'accelerations to match){", or set on_too_fast to slow" if may_slow else ""}')
 
 
 @dataclass(frozen=True, slots=True)

@@ -183,8 +183,9 @@ def _in_time(reach: Reach, way: SplineWay, start: SplineState, goal: Goal,
     found = excess(reach, way, options)
     if found is None:
         return way, 1.0, []
-    if options.on_too_fast != 'slow' or start.moves or goal.keep_open:
-        raise found.refusal()
+    in_parts = start.moves or goal.keep_open
+    if options.on_too_fast != 'slow' or in_parts:
+        raise found.refusal(may_slow=not in_parts)
     way = way.stretched(found.factor)
     longest = int(np.argmax(np.diff(way.spline.times)))
     time = float(np.diff(way.spline.times)[longest])
