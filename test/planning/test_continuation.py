@@ -201,6 +201,16 @@ def test_points_of_a_refusal_are_numbered_from_the_start_of_the_goal():
 
 
 @pytest.mark.parametrize('from_rest', [False, True])
+def test_a_goal_of_speeds_takes_no_times(from_rest):
+    goal = moves(1)
+    part = opened(plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS),
+                  ARM, OPTIONS)
+    with pytest.raises(InvalidGoal, match=r'points\[3\].time_from_start is 9 s, .* no times'):
+        following(part.then, Addition(waypoints=(replace(goal.waypoints[3], time=9.0),)), ARM,
+                  OPTIONS, from_rest=from_rest)
+
+
+@pytest.mark.parametrize('from_rest', [False, True])
 @pytest.mark.parametrize('goal', [spline(), moves(1, timed=0.6)], ids=['spline', 'lines'])
 @pytest.mark.parametrize('times', [(-0.2, 0.4), (0.0, 0.4), (0.4, 0.4), (0.4, 0.2)], ids=str)
 def test_appended_times_go_on_increasing(times, goal, from_rest):

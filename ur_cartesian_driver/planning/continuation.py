@@ -192,6 +192,10 @@ def _check_times(open_goal: OpenGoal, addition: Addition) -> None:
     if before == 0.0 and not any(point.time for point in addition.waypoints):
         return
     for i, point in enumerate(addition.waypoints, open_goal.points):
+        if open_goal.told == 0.0 and open_goal.points > 1:
+            raise InvalidGoal(
+                point_field(i, 'time_from_start'), f'is {point.time:g} s, and the points before '
+                'have no times: speeds count in this goal', 'leave it 0 in all points')
         if point.time <= before:
             raise InvalidGoal(
                 point_field(i, 'time_from_start'), f'is {point.time:g} s, and the point before it '
