@@ -156,8 +156,8 @@ def test_an_arm_that_was_moved_since_the_plan_is_not_torn_to_its_start(T_flange_
     cell.joint = 0.05
     cell.until(State.ENDED)
     assert cell.outcome.code is ErrorCode.ROBOT_NOT_READY
-    assert 'The arm is 0.0500 m' in cell.outcome.text
-    assert 'it moved meanwhile' in cell.outcome.text
+    assert 'A joint is 0.0500 rad away' in cell.outcome.text
+    assert 'the arm was moved meanwhile' in cell.outcome.text
     assert {c.values[0] for c in cell.commands if isinstance(c, WriteServo)} == {0}
 
 

@@ -24,6 +24,8 @@ from __future__ import annotations
 from dataclasses import replace
 from math import inf
 
+import numpy as np
+
 from ur_cartesian_driver.execution.commands import (
     Command,
     EnterServo,
@@ -34,7 +36,7 @@ from ur_cartesian_driver.execution.commands import (
     ReportServo,
     WriteServo,
 )
-from ur_cartesian_driver.execution.observer import MAX_PLAN_DEVIATION
+from ur_cartesian_driver.execution.observer import MAX_PLAN_DEVIATION, START_ANGLE
 from ur_cartesian_driver.execution.order import Order
 from ur_cartesian_driver.execution.servo_source import Setpoints, SplineSetpoints
 from ur_cartesian_driver.execution.servo_stream import Phase, ServoSettings, ServoStream
@@ -181,12 +183,27 @@ class ServoMachine(TrajectoryMachine):
         return super()._judge(state, now)
 
     def _is_armed(self, state: RobotState) -> bool:
-        # Set-points begin where the plan does: an arm that was moved since would be torn there.
-        return self.stream.phase is Phase.READY and super()._is_armed(state)
+        return (self.stream.phase is Phase.READY and self._off_start(state) <= START_ANGLE
+                and (self.loan is None or super()._is_armed(state)))
+
+    def _off_start(self, state: RobotState) -> float:
+        """
+        Return how far a joint is from the first set-point of a plan [rad].
+
+        An arm that was moved since it was planned would be torn there.
+        """
+        spline = self.order.spline
+        if spline is None:
+            return 0.0
+        return float(np.abs(spline.at(float(spline.times[0]))[0] - state.target_q).max())
 
     def _why_not_armed(self) -> str:
         if self.stream.phase is Phase.READY:
-            return super()._why_not_armed()
+            state = self._observer.latest
+            off = 0.0 if state is None else self._off_start(state)
+            return super()._why_not_armed() if off <= START_ANGLE else (
+                f'a joint is {off:.4f} rad away from where the set-points begin: the arm was '
+                'moved meanwhile')
         if self.stream.phase is Phase.OPENING:
             return (f'the robot did not give its RTDE inputs within {TCP_BOUND:g} s; nothing was '
                     'moved')

@@ -192,8 +192,8 @@ class TrajectoryMachine:
 
     def _is_armed(self, state: RobotState) -> bool:
         """Tell whether the robot has the TCP of the goal, and reports it where the plan begins."""
-        has_tcp = self.loan is None or self.loan.has_robot(state)
-        return has_tcp and self._observer.off_start(state) is None
+        assert self.loan is not None
+        return self.loan.has_robot(state) and self._observer.off_start(state) is None
 
     def _arrival(self, state: RobotState, now: float) -> tuple[Signal | None, str]:
         """Return what it means that the arm rests after the program's SUCCESS."""
@@ -242,7 +242,7 @@ class TrajectoryMachine:
 
     def _why_not_armed(self) -> str:
         state = self._observer.latest
-        if state is not None and (self.loan is None or self.loan.has_robot(state)):
+        if state is not None and self.loan is not None and self.loan.has_robot(state):
             return self._observer.off_start(state) or ''
         return (f'the robot did not take the TCP of the goal within {TCP_BOUND:g} s: its program '
                 'is paused, or does not know that command; nothing was moved')
