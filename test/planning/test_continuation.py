@@ -25,7 +25,8 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import SwitchOutput
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.continuation import Addition, following, opened
+from ur_cartesian_driver.planning.continuation import following, opened
+from ur_cartesian_driver.planning.open_goal import Addition
 from ur_cartesian_driver.protocol.dialects import DIALECTS
 
 ARM = Arm(robot_model('ur5e'))

@@ -33,7 +33,8 @@ from ur_cartesian_driver.motion.goal import (
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.continuation import Addition, following, opened
+from ur_cartesian_driver.planning.continuation import following, opened
+from ur_cartesian_driver.planning.open_goal import Addition
 from ur_cartesian_driver.protocol.dialects import NEWEST
 from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
 from ur_cartesian_driver.sim.builtins.motion import HandGuided

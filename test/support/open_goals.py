@@ -10,7 +10,8 @@ from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.goal import Segment, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.continuation import Addition, opened
+from ur_cartesian_driver.planning.continuation import opened
+from ur_cartesian_driver.planning.open_goal import Addition
 from ur_cartesian_driver.protocol.dialects import NEWEST
 
 BLEND = Segment(blend_radius=0.01, velocity=0.2, acceleration=1.0)

@@ -23,7 +23,8 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Progress
 from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.planning.continuation import Addition, following, OpenGoal, Part
+from ur_cartesian_driver.planning.continuation import following, Part
+from ur_cartesian_driver.planning.open_goal import Addition, OpenGoal
 from ur_cartesian_driver.protocol.dialects import Dialect
 from ur_cartesian_driver.protocol.trajectory import encode_points
 
@@ -135,7 +136,7 @@ class Continuing:
             if not answer.refusal:
                 self._goal = part.then
                 return Appended(points=part.then.points, text=part.text + (
-                    _from_rest(part.then.shift - before.shift) if from_rest else ''))
+                    _from_rest(part.then.told > 0.0) if from_rest else ''))
             if not answer.from_rest:
                 break
         raise RobotNotReady(answer.refusal)
@@ -195,7 +196,11 @@ class Continuing:
                 future.set_result(AnswerExtension(number=number, refusal=self._ended))
 
 
-def _from_rest(later: float) -> str:
-    """Return what is said where the motion had been closed."""
-    clause = f', {later:.3f} s later than their times say' if later > 0.0 else ''
+def _from_rest(timed: bool) -> str:
+    """
+    Return what is said where the motion had been closed.
+
+    Not how much later: the arm may have waited, and may still wait.
+    """
+    clause = ', later than their times say' if timed else ''
     return f' The motion had come to rest before them, and goes on from there{clause}.'

@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.errors import RobotNotReady
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.goal import IOCommand, Segment, Waypoint
 from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.planning.continuation import Addition
+from ur_cartesian_driver.planning.open_goal import Addition
 
 OnProgress = Callable[[Progress], None]
 

@@ -22,23 +22,29 @@ import re
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal
-from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, IOCommand, Segment, Waypoint
+from ur_cartesian_driver.motion.errors import GoalRefused
+from ur_cartesian_driver.motion.goal import ExecutionMode, IOCommand, Segment
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
-from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.controlled import carried, tools
+from ur_cartesian_driver.planning.open_goal import (
+    Addition,
+    check_addition,
+    Known,
+    numbered,
+    OpenGoal,
+)
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.outputs import check_outputs, with_outputs
+from ur_cartesian_driver.planning.outputs import with_outputs
 from ur_cartesian_driver.planning.path import tcp_rows
 from ur_cartesian_driver.planning.plan import plan as plan_goal
 from ur_cartesian_driver.planning.reference import keep_hemisphere
 from ur_cartesian_driver.planning.report import ignored
 from ur_cartesian_driver.planning.spline_plan import closing, end_state, plan_pieces, SplineState
 from ur_cartesian_driver.planning.spline_points import remarks as point_remarks
-from ur_cartesian_driver.planning.validate import check, point_field
+from ur_cartesian_driver.planning.validate import check
 
 #: So many of the last points are planned again with the next ones: the one that is kept back, and
 #: one whose corner leads into its motion.
@@ -53,58 +59,6 @@ _CLOSING_ROWS = 16
 _DIGITS = 9
 #: What counts points in a sentence of the planner.
 _NUMBER = re.compile(r'\b(point |points\[|segments\[)(\d+)')
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Addition:
-    """What a client appends."""
-
-    waypoints: tuple[Waypoint, ...] = ()
-    #: Empty, or one for each waypoint.
-    segments: tuple[Segment, ...] = ()
-    #: Their waypoints are numbered from the start of the goal.
-    io_commands: tuple[IOCommand, ...] = ()
-    #: Whether nothing comes behind it.
-    last: bool = False
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Known:
-    """A point that may have to be planned again, and where the arm was before it."""
-
-    waypoint: Waypoint
-    segment: Segment
-    q_before: Joints
-    time_before: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class OpenGoal:
-    """What has to be remembered of a goal so that it can go on; as much, however long it is."""
-
-    #: Without its points.
-    goal: Goal
-    T_flange_active: Pose
-    T_flange_tcp: Pose | None
-    points: int
-    #: On the wire, and how many of them are not given up.
-    records: int
-    firm: int
-    #: When the firm ones end and when all of them do, in the time of the motion [s].
-    time: float
-    rest_time: float
-    #: What the client's times lack to those of the motion, and the last of the client's [s].
-    shift: float
-    told: float
-    #: Where the arm rests in the end [rad].
-    q_rest: Joints
-    tail: tuple[Known, ...] = ()
-    #: Of a spline: behind its last point.
-    state: SplineState | None = None
-    #: Its last piece with its way, where that is not firm because of outputs.
-    again: tuple[PlannedSegment, ReferencePath] | None = None
-    #: Outputs that may not have been switched yet, and when that is due [s].
-    outputs: tuple[tuple[float, IOCommand], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -150,58 +104,12 @@ def following(open_goal: OpenGoal, addition: Addition, arm: Arm, options: Planni
     :param from_rest: whether the ending was sent, so that the arm stands, or is about to.
     :raises GoalRefused: with the reason; points are numbered from the start of the goal.
     """
-    _check_by_itself(open_goal, addition, options)
-    _check_times(open_goal, addition)
+    check_addition(open_goal, addition, options)
     options = replace(options, max_approach_distance=0.0,
                       max_points=options.max_points + CONTEXT)
     if open_goal.goal.execution is ExecutionMode.SPLINE:
         return _spline_on(open_goal, addition, arm, options, from_rest)
     return _moves_on(open_goal, addition, arm, options, from_rest)
-
-
-def _check_by_itself(open_goal: OpenGoal, addition: Addition, options: PlanningOptions) -> None:
-    count, first = len(addition.waypoints), open_goal.points
-    if not count:
-        raise InvalidGoal('points', 'is empty', 'give at least one point, or set last')
-    if count > options.max_points:
-        raise InvalidGoal('points', f'has {count} points, more than max_points = '
-                          f'{options.max_points}', 'append them in several requests')
-    if addition.segments and len(addition.segments) != count:
-        raise InvalidGoal('segments', f'has {len(addition.segments)} entries for {count} points',
-                          'give none, or exactly one for each point')
-    for i, command in enumerate(addition.io_commands):
-        if not first <= command.waypoint < first + count:
-            raise InvalidGoal(
-                f'io_commands[{i}].point_index', f'is {command.waypoint}, and the points of this '
-                f'request are {first} to {first + count - 1}', 'name one of these')
-    # By themselves, too: what is planned has older ones in front of them.
-    check_outputs(replace(
-        open_goal.goal, waypoints=addition.waypoints, io_commands=_numbered(addition, first)),
-        options)
-
-
-def _numbered(addition: Addition, first: int) -> tuple[IOCommand, ...]:
-    """Return the commands of an addition, with waypoints counted from a point."""
-    return tuple(replace(command, waypoint=command.waypoint - first)
-                 for command in addition.io_commands)
-
-
-def _check_times(open_goal: OpenGoal, addition: Addition) -> None:
-    """Refuse points that are not later than those before them, in the times of the client."""
-    before = open_goal.told
-    if before == 0.0 and not any(point.time for point in addition.waypoints):
-        return
-    for i, point in enumerate(addition.waypoints, open_goal.points):
-        if open_goal.told == 0.0 and open_goal.points > 1:
-            raise InvalidGoal(
-                point_field(i, 'time_from_start'), f'is {point.time:g} s, and the points before '
-                'have no times: speeds count in this goal', 'leave it 0 in all points')
-        if point.time <= before:
-            raise InvalidGoal(
-                point_field(i, 'time_from_start'), f'is {point.time:g} s, and the point before it '
-                f'has {before:g} s; times must increase from point to point, also in what is '
-                'appended', 'count them from the start of the goal')
-        before = point.time
 
 
 # ---- motions of the robot -----------------------------------------------------------------------
@@ -241,7 +149,7 @@ def _outputs_due(on: OpenGoal, addition: Addition, first: int, pending: int, sin
             old.append(replace(command, waypoint=command.waypoint - first))
         elif due > since and pending:
             old.append(replace(command, waypoint=pending - 1, offset=due - since))
-    return (*old, *_numbered(addition, first))
+    return (*old, *numbered(addition, first))
 
 
 def _moved(made: Plan, first: int, waypoint: int, since: float) -> Plan:
@@ -336,7 +244,7 @@ def _spline_behind(on: OpenGoal, addition: Addition, start: SplineState, behind:
     waypoints = tuple(replace(point, time=round(point.time - on.told, _DIGITS))
                       for point in addition.waypoints)
     goal = replace(on.goal, waypoints=waypoints, segments=addition.segments,
-                   io_commands=_numbered(addition, on.points), keep_open=not addition.last)
+                   io_commands=numbered(addition, on.points), keep_open=not addition.last)
     standing = _standing(on, start.q, arm)
     try:
         check(goal, options)

@@ -19,7 +19,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
 from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNotReady
-from ur_cartesian_driver.planning.continuation import Addition
+from ur_cartesian_driver.planning.open_goal import Addition
 from ur_cartesian_driver.ros.action_server import CartesianActionServer, GoalRun
 from ur_cartesian_driver.ros.convert import addition_from_message
 from ur_cartesian_driver.ros.services import PromisedService

@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.goal import (
 )
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector3, Vector6
 from ur_cartesian_driver.motion.signals import AnalogDomain
-from ur_cartesian_driver.planning.continuation import Addition
+from ur_cartesian_driver.planning.open_goal import Addition
 from ur_cartesian_driver.ros.frames import Frames, Stand
 
 #: Generated message classes carry no types.

@@ -1,0 +1,120 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What is known of a goal that may go on (keep_open), and what a client may append to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.goal import Goal, IOCommand, Segment, Waypoint
+from ur_cartesian_driver.motion.plan import PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.outputs import check_outputs
+from ur_cartesian_driver.planning.spline_plan import SplineState
+from ur_cartesian_driver.planning.validate import point_field
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Addition:
+    """What a client appends."""
+
+    waypoints: tuple[Waypoint, ...] = ()
+    #: Empty, or one for each waypoint.
+    segments: tuple[Segment, ...] = ()
+    #: Their waypoints are numbered from the start of the goal.
+    io_commands: tuple[IOCommand, ...] = ()
+    #: Whether nothing comes behind it.
+    last: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Known:
+    """A point that may have to be planned again, and where the arm was before it."""
+
+    waypoint: Waypoint
+    segment: Segment
+    q_before: Joints
+    time_before: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class OpenGoal:
+    """What has to be remembered of a goal so that it can go on; as much, however long it is."""
+
+    #: Without its points.
+    goal: Goal
+    T_flange_active: Pose
+    T_flange_tcp: Pose | None
+    points: int
+    #: On the wire, and how many of them are not given up.
+    records: int
+    firm: int
+    #: When the firm ones end and when all of them do, in the time of the motion [s].
+    time: float
+    rest_time: float
+    #: What the client's times lack to those of the motion, and the last of the client's [s].
+    shift: float
+    told: float
+    #: Where the arm rests in the end [rad].
+    q_rest: Joints
+    tail: tuple[Known, ...] = ()
+    #: Of a spline: behind its last point.
+    state: SplineState | None = None
+    #: Its last piece with its way, where that is not firm because of outputs.
+    again: tuple[PlannedSegment, ReferencePath] | None = None
+    #: Outputs that may not have been switched yet, and when that is due [s].
+    outputs: tuple[tuple[float, IOCommand], ...] = ()
+
+
+def check_addition(open_goal: OpenGoal, addition: Addition, options: PlanningOptions) -> None:
+    """
+    Check what can be known wrong of an addition without looking where the arm is.
+
+    :raises GoalRefused: with the reason; points are numbered from the start of the goal.
+    """
+    count, first = len(addition.waypoints), open_goal.points
+    if not count:
+        raise InvalidGoal('points', 'is empty', 'give at least one point, or set last')
+    if count > options.max_points:
+        raise InvalidGoal('points', f'has {count} points, more than max_points = '
+                          f'{options.max_points}', 'append them in several requests')
+    if addition.segments and len(addition.segments) != count:
+        raise InvalidGoal('segments', f'has {len(addition.segments)} entries for {count} points',
+                          'give none, or exactly one for each point')
+    for i, command in enumerate(addition.io_commands):
+        if not first <= command.waypoint < first + count:
+            raise InvalidGoal(
+                f'io_commands[{i}].point_index', f'is {command.waypoint}, and the points of this '
+                f'request are {first} to {first + count - 1}', 'name one of these')
+    # By themselves, too: what is planned has older ones in front of them.
+    check_outputs(replace(
+        open_goal.goal, waypoints=addition.waypoints, io_commands=numbered(addition, first)),
+        options)
+    _check_times(open_goal, addition)
+
+
+def numbered(addition: Addition, first: int) -> tuple[IOCommand, ...]:
+    """Return the commands of an addition, with waypoints counted from a point."""
+    return tuple(replace(command, waypoint=command.waypoint - first)
+                 for command in addition.io_commands)
+
+
+def _check_times(open_goal: OpenGoal, addition: Addition) -> None:
+    """Refuse points that are not later than those before them, in the times of the client."""
+    before = open_goal.told
+    if before == 0.0 and not any(point.time for point in addition.waypoints):
+        return
+    for i, point in enumerate(addition.waypoints, open_goal.points):
+        if open_goal.told == 0.0 and open_goal.points > 1:
+            raise InvalidGoal(
+                point_field(i, 'time_from_start'), f'is {point.time:g} s, and the points before '
+                'have no times: speeds count in this goal', 'leave it 0 in all points')
+        if point.time <= before:
+            raise InvalidGoal(
+                point_field(i, 'time_from_start'), f'is {point.time:g} s, and the point before it '
+                f'has {before:g} s; times must increase from point to point, also in what is '
+                'appended', 'count them from the start of the goal')
+        before = point.time
