@@ -100,6 +100,15 @@ def test_the_session_ends_when_no_target_came_for_long(session):
     assert session.live.done
 
 
+@pytest.mark.parametrize(('count', 'said'), [
+    (0, '0 targets were followed'), (1, '1 target was followed'), (2, '2 targets were followed')])
+def test_targets_are_counted_in_the_report(session, count, said):
+    for _ in range(count):
+        session.take(0.1)
+        session.run(0.01)
+    assert session.live.report[0] == said
+
+
 def test_it_does_not_end_before_the_arm_rests(session):
     session.run(0.9)
     session.take(0.3)

@@ -105,7 +105,8 @@ class LiveTargets:
     @property
     def report(self) -> tuple[str, ...]:
         """What the session was, in lines for people."""
-        lines = [f'{self.taken} targets were followed']
+        lines = ['1 target was followed' if self.taken == 1
+                 else f'{self.taken} targets were followed']
         if self.left_out:
             lines.append(f'{self.left_out} came after a newer one or were older than '
                          f'{self._settings.max_age:g} s, and were left out')
