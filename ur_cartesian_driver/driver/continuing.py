@@ -61,13 +61,16 @@ class Continuing:
     def __init__(self, motion: int, opened: Part, *, dialect: Dialect,
                  arm_and_options: Callable[[], tuple[Arm, PlanningOptions]],
                  send: Callable[[ExtendMotion], None],
-                 progress: Callable[[], Progress | None]) -> None:
+                 progress: Callable[[], Progress | None],
+                 timeout: float = ANSWER_TIMEOUT) -> None:
         """
         Prepare.
 
         :param arm_and_options: for planning, as they are then.
         :param progress: the newest report of the motion.
+        :param timeout: how long to wait for an answer [s].
         """
+        self._timeout = timeout
         self._motion, self._dialect = motion, dialect
         self._arm_and_options, self._send, self._progress = arm_and_options, send, progress
         self._goal: OpenGoal = opened.then
@@ -77,6 +80,7 @@ class Continuing:
         # Guards what follows.
         self._lock = threading.Lock()
         self._asked: dict[int, Future[AnswerExtension]] = {}
+        #: Why nothing can be appended any more; empty = it can.
         self._ended = ''
         self._numbers = itertools.count(1)
 
@@ -170,9 +174,11 @@ class Continuing:
             future = self._asked[number] = Future()
         self._send(offer)
         try:
-            return future.result(ANSWER_TIMEOUT)
+            return future.result(self._timeout)
         except TimeoutError:
-            return AnswerExtension(number=number, refusal='The robot loop does not answer.')
+            # It may have taken them all the same; so nobody knows where more would begin.
+            self._ended = 'The robot loop has not answered: nothing can be appended any more.'
+            return AnswerExtension(number=number, refusal=self._ended)
         finally:
             with self._lock:
                 self._asked.pop(number, None)
