@@ -87,6 +87,27 @@ def test_the_functions_that_let_the_arm_go_are_named_only_where_that_is_allowed(
     assert parse(as_program(program))
 
 
+def test_nothing_inside_a_function_has_the_name_of_a_global():
+    """Which of the two a controller means is written for assignments only."""
+    everywhere, function, inside = set(), '', []
+    for line in text(allow_teach=True).splitlines():
+        if header := re.match(r'(?:def|thread) (\w+)\((.*)\):', line):
+            function = header[1]
+            inside += [(function, name) for name in re.findall(r'\w+', header[2])]
+        elif line == 'end':
+            function = ''
+        elif name := re.match(r'\s*(local )?(\w+) = ', line):
+            if not function:
+                everywhere.add(name[2])
+            elif name[1]:
+                inside.append((function, name[2]))
+            else:
+                assert name[2] in everywhere | {local for where, local in inside
+                                                if where == function}, (function, name[2])
+    assert len(inside) > 50
+    assert not [place for place in inside if place[1] in everywhere]
+
+
 def test_handles_of_threads_are_killed_and_not_compared():
     """What a controller makes of a handle beside a number is written nowhere."""
     handles = re.findall(r'(\w+) = run ', text())
