@@ -158,6 +158,8 @@ REFUSALS = [
      InvalidGoal, 'trajectory.points[1].acceleration contains nan'),
     # times
     (with_point(TIMED, 2, time=2.0), InvalidGoal, 'trajectory.points[2].time_from_start is 2 s'),
+    (replace(with_point(TIMED, 2, time=2.0), execution=ExecutionMode.SPLINE), InvalidGoal,
+     'must increase from point to point; correct it'),
     (with_point(TIMED, 1, time=0.5), InvalidGoal, 'trajectory.points[1].time_from_start is 0.5 s'),
     (with_point(TIMED, 2, time=0.0), InvalidGoal, 'trajectory.points[2].time_from_start is 0 s'),
     (with_point(PLAIN, 2, time=1.0), InvalidGoal, 'trajectory.points[1].time_from_start is 0 s'),

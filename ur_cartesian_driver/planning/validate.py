@@ -221,7 +221,8 @@ def _times(goal: Goal, options: PlanningOptions) -> None:
         if point.time < 0.0 or (i > 0 and point.time <= before):
             raise InvalidGoal(
                 point_field(i, 'time_from_start'), f'is {point.time:g} s after {before:g} s; '
-                'times must increase from point to point', 'or set all to 0 for speeds')
+                'times must increase from point to point',
+                'correct it' if is_spline(goal) else 'or set all to 0 for speeds')
         if point.time - before > options.max_segment_time:
             raise InvalidGoal(
                 point_field(i, 'time_from_start'), f'gives the segment {point.time - before:g} s, '
