@@ -170,6 +170,16 @@ def assert_same(one, other):
             assert a == b, (name, one, other)
 
 
+@pytest.mark.parametrize('sizes', [(4, 1, 1, 1, 1, 1), (3, 3, 2, 1), (1, 4, 2, 1, 1)], ids=str)
+@pytest.mark.parametrize('offset', [0.34, 0.36, 0.7, 0.74])
+@pytest.mark.parametrize('types', [(4,), (1, 1, 2)], ids=str)
+def test_outputs_due_beside_the_end_of_a_part_are_switched_once(types, offset, sizes):
+    goal = moves(*types, offsets=(offset,))
+    wire, _, _ = in_parts(goal, sizes)
+    pins = [record.pin for record in wire if isinstance(record, SwitchOutput)]
+    assert sorted(pins) == sorted(command.pin for command in goal.io_commands)
+
+
 @pytest.mark.parametrize('known', [1, 2, 3])
 def test_a_goal_may_begin_with_the_point_at_which_the_arm_stands(known):
     goal = Goal(waypoints=tuple(Waypoint(pose=HOME if k == 0 else pose(k), time=0.9 * k)
@@ -287,4 +297,4 @@ def test_what_is_remembered_of_a_goal_does_not_grow():
             waypoints=goal.waypoints[:4], segments=(goal.segments[0],) * 4,
             io_commands=commands), ARM, OPTIONS, from_rest=False)
         held.append((len(part.then.tail), len(part.then.outputs)))
-    assert set(held) == {(2, 2)}, 'what belongs to the last two points'
+    assert set(held) == {(2, 1)}, 'two points, and what stands behind the last of them'

@@ -15,6 +15,7 @@ is a piece that brakes behind the last point (:func:`~.spline_plan.closing`).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 import re
@@ -26,7 +27,7 @@ from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.goal import ExecutionMode, IOCommand, Segment
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
-from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.primitive import Joints, SwitchOutput
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.controlled import carried, tools
 from ur_cartesian_driver.planning.open_goal import (
@@ -186,7 +187,7 @@ def _moves_part(on: OpenGoal, addition: Addition, made: Plan, since: float, behi
     then = replace(
         on, points=points, records=behind + count, firm=behind + count - ending, time=time,
         rest_time=end, told=told, q_rest=last.joints, tail=tuple(tail),
-        outputs=_still_due(on, addition, made, since, time))
+        outputs=_still_due(on, addition, made, since))
     return Part(plan=replace(made, goal=replace(made.goal, keep_open=not addition.last)),
                 behind=behind, since=since, ending=0 if addition.last else ending,
                 due=end + _waits(last) if timed else None, text=_text(on, addition), then=then)
@@ -201,20 +202,36 @@ def _seen(known: Sequence[Known], k: int, arrived: dict[int, Joints], points: in
     return replace(here, q_before=q, time_before=known[k - 1].waypoint.time)
 
 
-def _still_due(on: OpenGoal, addition: Addition, made: Plan, since: float, firm_time: float
+def _still_due(on: OpenGoal, addition: Addition, made: Plan, since: float
                ) -> tuple[tuple[float, IOCommand], ...]:
-    """Return the commands that the next part has to look at again."""
+    """
+    Return the commands whose records belong to the ending: the next part looks at them again.
+
+    Not those that are due later than the last firm motion ends: one that comes before the motion
+    behind it returns stands in front of that, and is firm. The earlier ones of the same kind are
+    those with the earlier records.
+    """
     ends, now = {}, since
     for segment in made.segments:
         now += segment.duration
         ends[segment.waypoint] = now
-    last = on.points + len(addition.waypoints) - 1
     commands = [
         *((ends[c.waypoint] + c.offset if c.waypoint in ends else due, c)
           for due, c in on.outputs),
         *((ends.get(c.waypoint, since) + c.offset, c) for c in addition.io_commands)]
-    return tuple((due, command) for due, command in commands
-                 if due > firm_time or command.waypoint == last)
+    firm = Counter(_kind(record) for segment in made.segments[:-1] for record in segment.outputs)
+    still = []
+    for due, command in sorted(commands, key=lambda one: one[0]):
+        kind = _kind(command)
+        if firm[kind]:
+            firm[kind] -= 1
+        else:
+            still.append((due, command))
+    return tuple(still)
+
+
+def _kind(output: IOCommand | SwitchOutput) -> tuple[object, ...]:
+    return output.output, output.pin, output.value, output.domain
 
 
 # ---- splines ------------------------------------------------------------------------------------
