@@ -8,20 +8,21 @@ from robot_cell import REVERSE, run_cell, TRAJECTORY
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import Goal, Waypoint
+from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 
-def ended_by(fault, **settings):
+def ended_by(fault, execution=ExecutionMode.PRIMITIVES, time=2.0, **settings):
     """Run a goal that something ends half-way; return outcome and the last status."""
     async def scene(cell):
         state = cell.memory.read()
         (x, y, z), turn = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
-        made = plan(Goal(waypoints=(Waypoint(pose=Pose((x, y + 0.2, z), turn), time=2.0),)),
-                    state, Arm(robot_model('ur5e')), PlanningOptions(max_tool_speed=1.0))
+        made = plan(Goal(waypoints=(Waypoint(pose=Pose((x, y + 0.2, z), turn), time=time),),
+                         execution=execution), state, Arm(robot_model('ur5e')),
+                    PlanningOptions(max_tool_speed=1.0, calibration_known=True))
         motion = cell.owner.start(made)
         await cell.until(lambda: not cell.at_rest())
         await fault(cell)
@@ -71,7 +72,9 @@ async def exception(cell):
 @pytest.mark.parametrize(('fault', 'code', 'links'), [
     (cut_reverse, ErrorCode.PROGRAM_STOPPED, ['reverse_port: ', 'program PLAYING -> STOP']),
     (cut_trajectory, ErrorCode.PROGRAM_STOPPED, ['trajectory_port: ', 'program PLAYING -> STOP']),
-    (freeze_reverse, ErrorCode.PROGRAM_STOPPED, ['the other side closed', 'PLAYING -> STOP']),
+    (freeze_reverse, ErrorCode.PROGRAM_STOPPED,
+     ['the other side closed', 'PLAYING -> STOP',
+      'the robot program says: the driver was silent for too long']),
     (stop_by_dashboard, ErrorCode.PROGRAM_STOPPED,
      ['the other side closed', 'program PLAYING -> STOP']),
     (protective_stop, ErrorCode.PROTECTIVE_STOP,
@@ -89,3 +92,14 @@ def test_the_chain_says_who_did_what_and_when(fault, code, links):
     assert 'it waits 0.2 s for one, the longest pause between two was 0.02' in chain[-1]
     for line in chain:
         assert line.partition(' before: ')[2] in status.last_error
+
+
+async def nothing(cell):
+    """Wait for what happens by itself."""
+
+
+def test_an_arm_that_cannot_follow_its_set_points_is_told_as_that():
+    outcome, _ = ended_by(nothing, ExecutionMode.SERVO, 1.0, servo_max_divergence=0.01)
+    assert outcome.code is ErrorCode.PROGRAM_STOPPED
+    assert any('the robot program says: buffered servo: the arm is farther from a set-point than '
+               'the divergence thresholds allow' in line for line in whys(outcome)), outcome

@@ -2,6 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The robot's side: the URScript program, and what fills it with the constants of the protocol."""
 
-from ur_cartesian_driver.program.render import as_program, ProgramSettings, render
+from ur_cartesian_driver.program.render import (
+    as_program,
+    PROGRAM_NAME,
+    ProgramSettings,
+    render,
+)
 
-__all__ = ['ProgramSettings', 'as_program', 'render']
+__all__ = ['PROGRAM_NAME', 'ProgramSettings', 'as_program', 'render']

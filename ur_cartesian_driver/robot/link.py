@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, Tr
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.program import as_program, ProgramSettings, render
+from ur_cartesian_driver.program import as_program, PROGRAM_NAME, ProgramSettings, render
 from ur_cartesian_driver.protocol import primary
 from ur_cartesian_driver.protocol.dialects import NEWEST
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
@@ -113,7 +113,7 @@ class RobotLink:
         self._primary = PrimaryClient(PrimaryListener(
             configuration=self._on_configuration, geometry=self._on_kinematics,
             error=self._robot_error, trouble=self._error,
-            text=lambda text: self._on_log(logging.INFO, f'robot: {text}')))
+            text=self._robot_text))
         self._program = ProgramSockets(settings, ProgramListener(
             connected=self._on_program_connected, lost=self._on_program_lost,
             result=lambda result: self._on_event(TrajectoryEnded(result=result)),
@@ -487,6 +487,13 @@ class RobotLink:
         """Take what the robot says is wrong."""
         self._evidence.note(text, is_robot_error=True)
         self._error(text)
+
+    def _robot_text(self, text: str) -> None:
+        """Take a line of the robot's log; what our program says may be why something ends."""
+        self._on_log(logging.INFO, f'robot: {text}')
+        program, _, said = text.partition(': ')
+        if program == PROGRAM_NAME and said:
+            self._evidence.note(f'the robot program says: {said}')
 
     def _error(self, text: str) -> None:
         self._tell(last_error=stamped(text))
