@@ -142,6 +142,8 @@ def streams(client: Client) -> None:
     time.sleep(0.8)
     client.note('speedL', before=before)
     control.speedStop()
+    # Its two connections read packets of their own: the answer may be ahead of the newest state.
+    client.until(lambda: max(map(abs, receive.getActualTCPSpeed())) < 1e-9)
     client.note('speedStop')
     control.moveJ([home[0] + 1.0, *home[1:]], 0.5, 1.0, True)
     client.until(lambda: receive.getActualQd()[0] > 0.4)
