@@ -137,7 +137,7 @@ def note_cycles(robot: SimulatedRobot) -> list[float]:
         beginnings.append(time.monotonic())
         step()
 
-    robot.controller.step = noted  # type: ignore[method-assign]
+    robot.controller.step = noted  # type: ignore[method-assign]  # what is measured
     return beginnings
 
 

@@ -102,7 +102,7 @@ def told(robot: SimulatedRobot) -> Mapping[str, Callable[..., Any]]:
         seen.clear()
         return taken
 
-    motion.servoj = servoj  # type: ignore[method-assign]
+    motion.servoj = servoj  # type: ignore[method-assign]  # what is measured
     return {'told': take}
 
 

@@ -21,7 +21,7 @@ from matplotlib import pyplot as plt
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / 'test' / 'support'))
 
-from servo_experiments import buffered, Result, unbuffered  # noqa: E402
+from servo_experiments import buffered, Result, unbuffered  # noqa: E402  # found by the path
 
 SECONDS = 3.0
 #: Joints of the guide's plots.

@@ -92,13 +92,9 @@ def timed(event, now):
     return StateReceived(state=RobotState(**changes | {'timestamp': now}))
 
 
-@pytest.mark.slow
-@given(events=st.lists(st.tuples(EVENTS, st.floats(0.001, 2.0)), max_size=25),
-       lends=st.booleans())
-@settings(max_examples=150, deadline=None)
-def test_a_goal_ends_once_whatever_happens(events, lends):
-    goal, now = machine(NOZZLE if lends else None), 0.0
-    commands = goal.start(robot())
+def commands_of(goal, events):
+    """Return all that a goal asks for: at these events, the loss of RTDE, and until its bound."""
+    commands, now = goal.start(robot()), 0.0
     for event, later in events:
         now += later
         commands += goal.step(timed(event, now), now)
@@ -106,6 +102,16 @@ def test_a_goal_ends_once_whatever_happens(events, lends):
     for _ in range(round(BOUND / 0.02)):
         now += 0.02
         commands += goal.step(Tick(), now)
+    return commands
+
+
+@pytest.mark.slow
+@given(events=st.lists(st.tuples(EVENTS, st.floats(0.001, 2.0)), max_size=25),
+       lends=st.booleans())
+@settings(max_examples=150, deadline=None)
+def test_a_goal_ends_once_whatever_happens(events, lends):
+    goal = machine(NOZZLE if lends else None)
+    commands = commands_of(goal, events)
     (end,) = [command for command in commands if isinstance(command, Finish)]
     assert isinstance(end.outcome.code, ErrorCode)
     assert end.outcome.text.endswith('.')
@@ -137,15 +143,8 @@ EXTENSIONS = st.builds(extension, number=st.integers(1, 9), behind=st.integers(0
     lends=st.booleans(), deviation=st.sampled_from([0.0, 0.002]))
 @settings(max_examples=60, deadline=None)
 def test_an_open_goal_ends_once_whatever_happens(events, lends, deviation):
-    goal, now = stream(NOZZLE if lends else None, deviation), 0.0
-    commands = goal.start(robot())
-    for event, later in events:
-        now += later
-        commands += goal.step(timed(event, now), now)
-    commands += goal.step(LinkLost(link='RTDE', reason='the end of the test'), now)
-    for _ in range(round(BOUND / 0.02)):
-        now += 0.02
-        commands += goal.step(Tick(), now)
+    goal = stream(NOZZLE if lends else None, deviation)
+    commands = commands_of(goal, events)
     (end,) = [command for command in commands if isinstance(command, Finish)]
     assert end.outcome.text.endswith('.')
     assert goal.state is State.ENDED

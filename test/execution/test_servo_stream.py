@@ -165,7 +165,10 @@ def test_the_buffer_neither_runs_empty_nor_over_where_little_is_late(slider, pau
 def test_whatever_is_late_nothing_is_lost_and_the_motion_arrives(slider, pauses):
     source = Ramp(end=0.4)
     stream, robot = ServoStream(source, SETTINGS), Robot()
-    raised = lambda t: slider(t) if t < 1.5 else 1.0  # noqa: E731
+
+    def raised(t):
+        return slider(t) if t < 1.5 else 1.0
+
     assert run(stream, robot, seconds=8.0, slider=raised, stalls=spaced(pauses)) is not None
     assert robot.most <= DEPTH
     times = np.array([q[0] for q in robot.done])

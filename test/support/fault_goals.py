@@ -76,7 +76,13 @@ class StartingPoint:
 
 
 class GoalInTrouble:
-    """A goal to which something happens; its way of execution is that of a subclass."""
+    """
+    A goal to which something happens; its way of execution is that of a subclass.
+
+    That has ``plan_from(start)``, which returns the plan (made once, as the arm begins at the same
+    place each time), and ``is_in(phase)``, which tells whether the goal is in a phase that is
+    reached by waiting.
+    """
 
     def __init__(self, cell: RobotCell):
         self.cell = cell
@@ -86,14 +92,6 @@ class GoalInTrouble:
         (end,) = cell.loop.open_ends(robot_cell.TRAJECTORY)
         self._results, self._results_before = end.peer.received, len(end.peer.received)
         self.motion = None
-
-    def plan_from(self, start: StartingPoint):
-        """Return the plan; made once, as the arm begins at the same place each time."""
-        raise NotImplementedError
-
-    def is_in(self, phase: str) -> bool:
-        """Tell whether the goal is in a phase that is reached by waiting."""
-        raise NotImplementedError
 
     def send(self):
         """Send it to the robot loop."""

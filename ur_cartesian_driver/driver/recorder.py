@@ -26,12 +26,14 @@ from typing import Any
 import numpy as np
 
 from ur_cartesian_driver.driver import recording_format as disk
+from ur_cartesian_driver.driver.config import DriverConfig
 from ur_cartesian_driver.driver.recording_folder import Folder
 from ur_cartesian_driver.execution import Order
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.planning import PlanningOptions
 
 #: Rows of a piece of memory, how many there are, and the longest time until one is written [s]:
 #: what a killed process loses.
@@ -46,7 +48,7 @@ MOST_LINES = 1000
 MEGABYTE = 1_000_000
 
 
-def about(plan: Plan, options: object) -> str:
+def about(plan: Plan, options: PlanningOptions) -> str:
     """Return what only the owner of the plan knows of it, as JSON: its report, the options."""
     lines = plan.report
     if len(lines) > MOST_LINES:
@@ -56,7 +58,7 @@ def about(plan: Plan, options: object) -> str:
                        'planning': _parameters(options)}, default=str)
 
 
-def head_of(order: Order, *, robot: Mapping[str, str], parameters: object,
+def head_of(order: Order, *, robot: Mapping[str, str], parameters: DriverConfig,
             of_owner: str = '', led_by: str = '') -> dict[str, Any]:
     """
     Return the metadata of a motion that begins now.
@@ -288,7 +290,7 @@ class _Worker:
             job()
 
 
-def _parameters(options: object) -> dict[str, Any]:
+def _parameters(options: DriverConfig | PlanningOptions) -> dict[str, Any]:
     """Return the fields of a dataclass that JSON can hold."""
-    return {f.name: value for f in fields(options)  # type: ignore[arg-type]
+    return {f.name: value for f in fields(options)
             if isinstance(value := getattr(options, f.name), bool | int | float | str | tuple)}

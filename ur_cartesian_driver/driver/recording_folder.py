@@ -62,7 +62,7 @@ class Folder:
         # Says that we live; it goes with the process, however that ends.
         fcntl.flock(self._rows.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._plan = disk.GrowingArray(self._path / disk.PLAN, disk.PLANNED)
-        self._notes = open(self._path / disk.NOTES, 'xb', buffering=0)  # noqa: SIM115
+        self._notes = open(self._path / disk.NOTES, 'xb', buffering=0)  # noqa: SIM115  # open until close()
         self._write_head()
 
     def write_rows(self, rows: memoryview) -> None:

@@ -17,7 +17,7 @@ from os import replace as replace_file
 from pathlib import Path
 import shutil
 import struct
-from typing import Any, BinaryIO, TypeAlias
+from typing import Any, TypeAlias
 import zipfile
 
 import numpy as np
@@ -77,7 +77,7 @@ class GrowingArray:
         self._dtype = dtype
         self.count = 0
         # Unbuffered: what could not be written must not be tried again when it is closed.
-        self.file = open(path, 'xb', buffering=0)  # noqa: SIM115
+        self.file = open(path, 'xb', buffering=0)  # noqa: SIM115  # open until close()
         self._write(_npy_header(dtype, (0,)))
 
     def append(self, rows: bytes | memoryview, count: int) -> None:
@@ -244,7 +244,6 @@ def _write_column(archive: zipfile.ZipFile, name: str, column: NDArray[Any],
 def _write_member(archive: zipfile.ZipFile, name: str, dtype: np.dtype[Any],
                   shape: tuple[int, ...], parts: Iterable[NDArray[Any]]) -> None:
     with archive.open(f'{name}.npy', 'w', force_zip64=True) as raw:
-        file: BinaryIO = raw  # type: ignore[assignment]
-        file.write(_npy_header(dtype, shape))
+        raw.write(_npy_header(dtype, shape))
         for part in parts:
-            file.write(part.tobytes())
+            raw.write(part.tobytes())
