@@ -74,8 +74,10 @@ def ros_prefixes() -> str:
         return sourced
     spec = importlib.util.find_spec('ament_package')
     if spec is None or spec.origin is None:
-        sys.exit('No ROS 2 to build with: AMENT_PREFIX_PATH is not set, and the wheel '
-                 'ros-jazzy-ament-package is not installed (scripts/setup.sh does that).')
+        sys.exit(
+            'No ROS 2 to build with: AMENT_PREFIX_PATH is not set, and the wheel '
+            'ros-jazzy-ament-package is not installed (scripts/setup.sh does that).'
+        )
     return str(Path(spec.origin).parents[4])  # PREFIX/lib/pythonX.Y/site-packages/NAME/FILE
 
 
@@ -93,16 +95,22 @@ def cmake_install() -> Path:
     environment = {**os.environ, 'AMENT_PREFIX_PATH': prefixes, 'CMAKE_PREFIX_PATH': prefixes}
     jobs = os.environ.get('CMAKE_BUILD_PARALLEL_LEVEL') or str(os.cpu_count())
     configure = [
-        'cmake', '-S', str(ROOT), '-B', str(build),
+        'cmake',
+        '-S',
+        str(ROOT),
+        '-B',
+        str(build),
         f'-DCMAKE_INSTALL_PREFIX={stage}',
         f'-DCMAKE_PROJECT_INCLUDE={ROOT / "cmake" / "ros_wheels.cmake"}',
         f'-DPython3_EXECUTABLE={sys.executable}',
         '-DCMAKE_BUILD_TYPE=Release',
         '-DBUILD_TESTING=OFF',
     ]
-    for command in (configure,
-                    ['cmake', '--build', str(build), '--parallel', jobs],
-                    ['cmake', '--install', str(build)]):
+    for command in (
+        configure,
+        ['cmake', '--build', str(build), '--parallel', jobs],
+        ['cmake', '--install', str(build)],
+    ):
         subprocess.run(command, check=True, env=environment)
     return stage
 
@@ -140,8 +148,11 @@ class BuildInterfaces(build_ext):
         """
         if path.suffix not in ('.py', '.so') or (ROOT / NAME / inside).exists():
             return
-        library = (self.get_finalized_command('install').install_lib
-                   if self.editable_mode else self.build_lib)
+        library = (
+            self.get_finalized_command('install').install_lib
+            if self.editable_mode
+            else self.build_lib
+        )
         target = Path(library, NAME, inside)
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(path, target)

@@ -23,14 +23,33 @@ def run(quick: bool) -> Iterator[Figure]:
     frame = recipe.pack(values)
     payload = frame[3:]
     plain = struct.Struct(f'>{len(payload) // 8}d')
-    numbers = plain.unpack(payload[:plain.size])
+    numbers = plain.unpack(payload[: plain.size])
     for name, function, baseline, than in (
-            ('pack', lambda: recipe.pack(values), lambda: plain.pack(*numbers),
-             'struct.pack of as many bytes'),
-            ('unpack', lambda: recipe.unpack(payload), lambda: plain.unpack(payload[:plain.size]),
-             'struct.unpack of as many bytes'),
-            ('values to RobotState', lambda: robot_state(values), lambda: recipe.unpack(payload),
-             'unpack')):
-        yield Figure(benchmark=NAME, name=name, value=1e6 * seconds_each(function, budget),
-                     unit='us', baseline=1e6 * seconds_each(baseline, budget), than=than,
-                     note=f'{len(frame)} bytes')
+        (
+            'pack',
+            lambda: recipe.pack(values),
+            lambda: plain.pack(*numbers),
+            'struct.pack of as many bytes',
+        ),
+        (
+            'unpack',
+            lambda: recipe.unpack(payload),
+            lambda: plain.unpack(payload[: plain.size]),
+            'struct.unpack of as many bytes',
+        ),
+        (
+            'values to RobotState',
+            lambda: robot_state(values),
+            lambda: recipe.unpack(payload),
+            'unpack',
+        ),
+    ):
+        yield Figure(
+            benchmark=NAME,
+            name=name,
+            value=1e6 * seconds_each(function, budget),
+            unit='us',
+            baseline=1e6 * seconds_each(baseline, budget),
+            than=than,
+            note=f'{len(frame)} bytes',
+        )

@@ -78,9 +78,13 @@ def _or_none(value: object) -> object:
 
 def machine() -> dict[str, object]:
     """Return what the figures depend on."""
-    return {'date': strftime('%Y-%m-%d'), 'python': platform.python_version(),
-            'system': platform.platform(), 'cores': len(os.sched_getaffinity(0)),
-            'load': os.getloadavg()[0]}
+    return {
+        'date': strftime('%Y-%m-%d'),
+        'python': platform.python_version(),
+        'system': platform.platform(),
+        'cores': len(os.sched_getaffinity(0)),
+        'load': os.getloadavg()[0],
+    }
 
 
 def percentile(values: Sequence[float], percent: float) -> float:

@@ -47,8 +47,12 @@ class Times:
 
 def run(quick: bool) -> Iterator[Figure]:
     """Send the same goal a few times and cancel it each time."""
-    with simulator() as robot, wire_tap() as (tap, parameters), node(robot, **parameters), \
-            TimedClient() as client:
+    with (
+        simulator() as robot,
+        wire_tap() as (tap, parameters),
+        node(robot, **parameters),
+        TimedClient() as client,
+    ):
         message = goal_message(POINTS)
         goals = [_one_goal(client, tap, message) for _ in range(4 if quick else 12)]
     # The first goal finds everything cold (imports, caches): said apart.
@@ -67,23 +71,36 @@ def _one_goal(client: TimedClient, tap: Child, message: object) -> Times:
     marks += tap.call('marks')
     client.spin(0.2)
     return Times(
-        sent=sent, accepted=accepted, cancel_requested=cancel_requested,
+        sent=sent,
+        accepted=accepted,
+        cancel_requested=cancel_requested,
         first_point=next(m.time for m in marks if m.port == 'trajectory_port'),
-        cancel_on_wire=next(m.time for m in marks if m.is_trajectory_action
-                            and m.action == TrajectoryAction.CANCEL))
+        cancel_on_wire=next(
+            m.time for m in marks if m.is_trajectory_action and m.action == TrajectoryAction.CANCEL
+        ),
+    )
 
 
 def _goal_figures(goals: Sequence[Times]) -> Iterator[Figure]:
     name = f'goal of {POINTS:,} points'
     warm = goals[1:]
     times = [_ms(g.accepted, g.first_point) for g in warm]
-    yield Figure(benchmark=name, name='accepted -> first point on the wire, p50',
-                 value=median(times), unit='ms',
-                 baseline=median([_ms(g.sent, g.accepted) for g in warm]),
-                 than='ROS: sent -> accepted', note=f'{len(warm)} goals')
+    yield Figure(
+        benchmark=name,
+        name='accepted -> first point on the wire, p50',
+        value=median(times),
+        unit='ms',
+        baseline=median([_ms(g.sent, g.accepted) for g in warm]),
+        than='ROS: sent -> accepted',
+        note=f'{len(warm)} goals',
+    )
     yield Figure(benchmark=name, name='the same, slowest', value=max(times), unit='ms')
-    yield Figure(benchmark=name, name='the same, first goal of the node',
-                 value=_ms(goals[0].accepted, goals[0].first_point), unit='ms')
+    yield Figure(
+        benchmark=name,
+        name='the same, first goal of the node',
+        value=_ms(goals[0].accepted, goals[0].first_point),
+        unit='ms',
+    )
 
 
 def _breakdown(totals: Sequence[float]) -> Iterator[Figure]:
@@ -98,28 +115,44 @@ def _breakdown(totals: Sequence[float]) -> Iterator[Figure]:
 
     def handed_over() -> object:
         request = channel.StartMotion(motion=1, order=order_of(planned), points=points)
-        return channel.unpack(channel.pack(request)[channel.LENGTH.size:])
+        return channel.unpack(channel.pack(request)[channel.LENGTH.size :])
 
     left = total
     for part, step in (
-            ('conversion', lambda: goal_from_message(message, frames, now=0)),
-            ('planning', lambda: plan(goal, state, arm, options)),
-            ('encoding', lambda: encode_points(s.primitive for s in planned.segments)),
-            ('packing and unpacking for the other process', handed_over)):
+        ('conversion', lambda: goal_from_message(message, frames, now=0)),
+        ('planning', lambda: plan(goal, state, arm, options)),
+        ('encoding', lambda: encode_points(s.primitive for s in planned.segments)),
+        ('packing and unpacking for the other process', handed_over),
+    ):
         taken = 1e3 * seconds(step, repeat=5)
         left -= taken
-        yield Figure(benchmark=name, name=part, value=taken, unit='ms', baseline=total,
-                     than='the whole')
-    yield Figure(benchmark=name, name='rest: threads, pipe, sockets, busy cores', value=left,
-                 unit='ms', baseline=total, than='the whole')
+        yield Figure(
+            benchmark=name, name=part, value=taken, unit='ms', baseline=total, than='the whole'
+        )
+    yield Figure(
+        benchmark=name,
+        name='rest: threads, pipe, sockets, busy cores',
+        value=left,
+        unit='ms',
+        baseline=total,
+        than='the whole',
+    )
 
 
 def _cancel_figures(goals: Sequence[Times]) -> Iterator[Figure]:
     times = [_ms(g.cancel_requested, g.cancel_on_wire) for g in goals]
-    for text, value in (('p50', median(times)), ('p90', percentile(times, 90)),
-                        ('slowest', max(times))):
-        yield Figure(benchmark='cancel', name=f'client call -> CANCEL on the wire, {text}',
-                     value=value, unit='ms', note=f'{len(times)} goals')
+    for text, value in (
+        ('p50', median(times)),
+        ('p90', percentile(times, 90)),
+        ('slowest', max(times)),
+    ):
+        yield Figure(
+            benchmark='cancel',
+            name=f'client call -> CANCEL on the wire, {text}',
+            value=value,
+            unit='ms',
+            note=f'{len(times)} goals',
+        )
 
 
 def _ms(start: int, end: int) -> float:

@@ -36,33 +36,62 @@ def run(quick: bool) -> Iterator[Figure]:
     """Listen to the idle driver, then to the busy one."""
     points, idle_time = (10_000, 3.0) if quick else (100_000, 20.0)
     message = goal_message(points)
-    with simulator() as robot, wire_tap() as (tap, parameters), \
-            node(robot, max_points=points, node_timeout=60.0, **parameters), \
-            TimedClient() as client:
+    with (
+        simulator() as robot,
+        wire_tap() as (tap, parameters),
+        node(robot, max_points=points, node_timeout=60.0, **parameters),
+        TimedClient() as client,
+    ):
         tap.call('marks')
         time.sleep(idle_time)
         idle = _gaps(tap.call('marks'))
         busy = _busy(client, tap, message)
-        halted = (tap.call('hang_ups') > 0
-                  or robot.call('state').runtime_state is not RuntimeState.PLAYING)
+        halted = (
+            tap.call('hang_ups') > 0
+            or robot.call('state').runtime_state is not RuntimeState.PLAYING
+        )
     name = f'keepalives while {points:,} points arrive'
     gaps = _gaps(busy.marks)
     for text, percent in PERCENTILES:
-        yield Figure(benchmark=name, name=f'gap on the reverse socket, {text}',
-                     value=percentile(gaps, percent), unit='ms',
-                     baseline=percentile(idle, percent), than='idle',
-                     note=f'{len(gaps)} gaps, idle {len(idle)}')
-    for text, begin, end in (('received', busy.sent, busy.accepted),
-                             ('converted, planned, encoded', busy.accepted, busy.start),
-                             ('handed over, started', busy.start, busy.marks[-1].time)):
-        yield Figure(benchmark=name, name=f'longest while it is {text}',
-                     value=max(_gaps(busy.marks, begin, end), default=float('nan')), unit='ms')
-    yield Figure(benchmark=name, name='times that the robot program halted', value=float(halted),
-                 unit='', note=f'it does after {READ_TIMEOUT:g} ms without a message')
-    yield Figure(benchmark=name, name='goal sent -> accepted',
-                 value=1e-9 * (busy.accepted - busy.sent), unit='s')
-    yield Figure(benchmark=name, name='accepted -> first point on the wire',
-                 value=1e-9 * (busy.first_point - busy.accepted), unit='s')
+        yield Figure(
+            benchmark=name,
+            name=f'gap on the reverse socket, {text}',
+            value=percentile(gaps, percent),
+            unit='ms',
+            baseline=percentile(idle, percent),
+            than='idle',
+            note=f'{len(gaps)} gaps, idle {len(idle)}',
+        )
+    for text, begin, end in (
+        ('received', busy.sent, busy.accepted),
+        ('converted, planned, encoded', busy.accepted, busy.start),
+        ('handed over, started', busy.start, busy.marks[-1].time),
+    ):
+        yield Figure(
+            benchmark=name,
+            name=f'longest while it is {text}',
+            value=max(_gaps(busy.marks, begin, end), default=float('nan')),
+            unit='ms',
+        )
+    yield Figure(
+        benchmark=name,
+        name='times that the robot program halted',
+        value=float(halted),
+        unit='',
+        note=f'it does after {READ_TIMEOUT:g} ms without a message',
+    )
+    yield Figure(
+        benchmark=name,
+        name='goal sent -> accepted',
+        value=1e-9 * (busy.accepted - busy.sent),
+        unit='s',
+    )
+    yield Figure(
+        benchmark=name,
+        name='accepted -> first point on the wire',
+        value=1e-9 * (busy.first_point - busy.accepted),
+        unit='s',
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,8 +106,9 @@ class Busy:
     @property
     def start(self) -> int:
         """The last message before the one that starts the motion."""
-        return max(m.time for m in self.marks
-                   if m.port == 'reverse_port' and not m.is_trajectory_action)
+        return max(
+            m.time for m in self.marks if m.port == 'reverse_port' and not m.is_trajectory_action
+        )
 
 
 def _busy(client: TimedClient, tap: Child, message: object) -> Busy:
@@ -93,12 +123,15 @@ def _busy(client: TimedClient, tap: Child, message: object) -> Busy:
     # Not `cancelled`: a robot program that halted is a figure here.
     client.wait(handle.cancel_goal_async())
     client.wait(handle.get_result_async())
-    return Busy(sent=sent, accepted=accepted, first_point=first_point,
-                marks=[m for m in marks if m.time >= sent])
+    return Busy(
+        sent=sent,
+        accepted=accepted,
+        first_point=first_point,
+        marks=[m for m in marks if m.time >= sent],
+    )
 
 
 def _gaps(marks: Sequence[Mark], begin: float = -inf, end: float = inf) -> list[float]:
     """Return the times between messages on the reverse socket [ms]; those that end in a window."""
     times = [m.time for m in marks if m.port == 'reverse_port']
-    return [1e-6 * (after - before) for before, after in pairwise(times)
-            if begin < after <= end]
+    return [1e-6 * (after - before) for before, after in pairwise(times) if begin < after <= end]

@@ -35,35 +35,63 @@ def run(quick: bool) -> Iterator[Figure]:
 
     yield _figure('forward', joints, arm.forward, reference.forward if reference else None)
     yield _figure('inverse, all branches', poses, lambda pose: solutions(arm, pose))
-    yield _figure('inverse, nearest to a seed 0.1 rad off',
-                  list(zip(poses, seeds, strict=True)), lambda task: nearest(arm, *task),
-                  (lambda task: reference.inverse(*task)) if reference else None,
-                  than='pinocchio, CLIK')
+    yield _figure(
+        'inverse, nearest to a seed 0.1 rad off',
+        list(zip(poses, seeds, strict=True)),
+        lambda task: nearest(arm, *task),
+        (lambda task: reference.inverse(*task)) if reference else None,
+        than='pinocchio, CLIK',
+    )
     found = [nearest(arm, *task) for task in zip(poses, seeds, strict=True)]
-    yield _agreement('the solution that was meant, found', joints, found,
-                     [reference.inverse(*task) for task in zip(poses, seeds, strict=True)]
-                     if reference else None)
+    yield _agreement(
+        'the solution that was meant, found',
+        joints,
+        found,
+        [reference.inverse(*task) for task in zip(poses, seeds, strict=True)]
+        if reference
+        else None,
+    )
 
 
-def _figure(name: str, tasks: Sequence[Any], solve: Callable[[Any], object],
-            other: Callable[[Any], object] | None = None, than: str = 'pinocchio') -> Figure:
+def _figure(
+    name: str,
+    tasks: Sequence[Any],
+    solve: Callable[[Any], object],
+    other: Callable[[Any], object] | None = None,
+    than: str = 'pinocchio',
+) -> Figure:
     def each(function: Callable[[Any], object]) -> float:
         return 1e6 * seconds(lambda: [function(task) for task in tasks], repeat=3) / len(tasks)
 
-    return Figure(benchmark=NAME, name=name, value=each(solve), unit='us',
-                  baseline=None if other is None else each(other), than=than,
-                  note=f'{len(tasks)} poses')
+    return Figure(
+        benchmark=NAME,
+        name=name,
+        value=each(solve),
+        unit='us',
+        baseline=None if other is None else each(other),
+        than=than,
+        note=f'{len(tasks)} poses',
+    )
 
 
-def _agreement(name: str, joints: Sequence[Vector6], found: Sequence[Any],
-               other: Sequence[Any] | None) -> Figure:
+def _agreement(
+    name: str, joints: Sequence[Vector6], found: Sequence[Any], other: Sequence[Any] | None
+) -> Figure:
     def share(answers: Sequence[Any]) -> float:
-        meant = sum(q is not None and max(map(_difference, q, joint)) < 1e-4
-                    for q, joint in zip(answers, joints, strict=True))
+        meant = sum(
+            q is not None and max(map(_difference, q, joint)) < 1e-4
+            for q, joint in zip(answers, joints, strict=True)
+        )
         return 100.0 * meant / len(joints)
 
-    return Figure(benchmark=NAME, name=name, value=share(found), unit='%',
-                  baseline=None if other is None else share(other), than='pinocchio, CLIK')
+    return Figure(
+        benchmark=NAME,
+        name=name,
+        value=share(found),
+        unit='%',
+        baseline=None if other is None else share(other),
+        than='pinocchio, CLIK',
+    )
 
 
 def _difference(a: float, b: float) -> float:
@@ -97,7 +125,8 @@ class Pinocchio:
             if np.linalg.norm(twist) < ACCEPTED:
                 return q
             J = pin.computeFrameJacobian(
-                self._model, self._data, q, self._frame, pin.ReferenceFrame.LOCAL)
+                self._model, self._data, q, self._frame, pin.ReferenceFrame.LOCAL
+            )
             J = pin.Jlog6(error.inverse()) @ J
             q = q + J.T @ np.linalg.solve(J @ J.T + DAMPING * np.eye(6), twist)
         return None

@@ -46,14 +46,28 @@ def _followed(name: str, arm: Arm, poses: Rows, joints: Rows) -> Iterator[Figure
         sparse = poses[:ROWS_ONE_BY_ONE]
         other = len(sparse) / seconds(lambda: _one_by_one(reference, sparse), repeat=2)
     path = follow(arm, poses, START)
-    yield Figure(benchmark=NAME, name=f'{name}, followed', value=len(poses) / taken, unit='1/s',
-                 baseline=other, than='pinocchio, CLIK from the row before',
-                 note=f'{len(poses)} poses')
+    yield Figure(
+        benchmark=NAME,
+        name=f'{name}, followed',
+        value=len(poses) / taken,
+        unit='1/s',
+        baseline=other,
+        than='pinocchio, CLIK from the row before',
+        note=f'{len(poses)} poses',
+    )
     back = arm.forward_rows(path.q) - poses
-    yield Figure(benchmark=NAME, name=f'{name}, largest error of position',
-                 value=1e9 * float(np.linalg.norm(back[:, :3], axis=1).max()), unit='nm')
-    yield Figure(benchmark=NAME, name=f'{name}, largest error of a joint',
-                 value=1e9 * float(np.abs(path.q - joints).max()), unit='nrad')
+    yield Figure(
+        benchmark=NAME,
+        name=f'{name}, largest error of position',
+        value=1e9 * float(np.linalg.norm(back[:, :3], axis=1).max()),
+        unit='nm',
+    )
+    yield Figure(
+        benchmark=NAME,
+        name=f'{name}, largest error of a joint',
+        value=1e9 * float(np.abs(path.q - joints).max()),
+        unit='nrad',
+    )
 
 
 def _one_by_one(reference: Any, poses: Rows) -> None:

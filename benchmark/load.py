@@ -40,8 +40,11 @@ def run(quick: bool) -> Iterator[Figure]:
         with node(robot) as driver, TimedClient() as client:
             # The robot loop is the node's only child.
             (robot_loop,) = children_of(driver)
-            pids = {'simulator': robot.pid, 'driver, node process': driver,
-                    'driver, robot process': robot_loop}
+            pids = {
+                'simulator': robot.pid,
+                'driver, node process': driver,
+                'driver, robot process': robot_loop,
+            }
             time.sleep(1.0)
             idle = _sample(robot, pids, duration)
             handle, _ = client.wait(client.send(goal_message(POINTS)))
@@ -68,16 +71,26 @@ def _cpu(empty: Sample, situations: Mapping[str, Sample]) -> Iterator[Figure]:
     for name in situations['idle'].cpu:
         for situation, sample in situations.items():
             if name in sample.cpu:
-                yield Figure(benchmark='processor time at 500 Hz', name=f'{name}, {situation}',
-                             value=100.0 * sample.cpu[name], unit='%', baseline=baseline,
-                             than='empty 500 Hz loop', note='of one core')
+                yield Figure(
+                    benchmark='processor time at 500 Hz',
+                    name=f'{name}, {situation}',
+                    value=100.0 * sample.cpu[name],
+                    unit='%',
+                    baseline=baseline,
+                    than='empty 500 Hz loop',
+                    note='of one core',
+                )
 
 
 def _late(empty: Sample, situations: Mapping[str, Sample]) -> Iterator[Figure]:
     for situation, sample in situations.items():
         for text, percent in (('p50', 50.0), ('p99', 99.0), ('worst', 100.0)):
-            yield Figure(benchmark='simulator, how late cycles begin',
-                         name=f'{situation}, {text}',
-                         value=percentile(sample.late, percent), unit='ms',
-                         baseline=percentile(empty.late, percent), than='empty loop, alone',
-                         note=f'{len(sample.late):,} cycles')
+            yield Figure(
+                benchmark='simulator, how late cycles begin',
+                name=f'{situation}, {text}',
+                value=percentile(sample.late, percent),
+                unit='ms',
+                baseline=percentile(empty.late, percent),
+                than='empty loop, alone',
+                note=f'{len(sample.late):,} cycles',
+            )

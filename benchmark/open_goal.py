@@ -33,15 +33,20 @@ LOOK = 20
 def point(home: Pose, number: int, last: bool) -> Waypoint:
     """Return a point of a circle beside the tool, with its time and twist."""
     t, rate = STEP * number, 2.0 * pi / ROUND
-    angle, turn = (0.5 * rate / RAMP * t * t, rate / RAMP * t) if t < RAMP else (
-        rate * (t - 0.5 * RAMP), rate)
+    angle, turn = (
+        (0.5 * rate / RAMP * t * t, rate / RAMP * t)
+        if t < RAMP
+        else (rate * (t - 0.5 * RAMP), rate)
+    )
     if last:
         t, turn = t + 0.1, 0.0
     c, s = cos(angle), sin(angle)
     x, y, z = home.position
     return Waypoint(
-        time=t, pose=Pose((x + RADIUS * s, y + RADIUS * (1.0 - c), z), home.quaternion),
-        twist=(RADIUS * turn * c, RADIUS * turn * s, 0.0, 0.0, 0.0, 0.0))
+        time=t,
+        pose=Pose((x + RADIUS * s, y + RADIUS * (1.0 - c), z), home.quaternion),
+        twist=(RADIUS * turn * c, RADIUS * turn * s, 0.0, 0.0, 0.0, 0.0),
+    )
 
 
 def resident() -> float:
@@ -63,12 +68,17 @@ async def carried_out(cell: Any, points: int) -> dict[str, Any]:
 
     seen: dict[str, Any] = {'memory': [], 'kept': [], 'left': []}
     begin, planning, number = perf_counter(), 0.0, 0
-    motion = OpenMotion(cell, Goal(waypoints=tuple(chunk(1, CHUNK)), keep_open=True,
-                                   execution=ExecutionMode.SPLINE), self_collision='off')
+    motion = OpenMotion(
+        cell,
+        Goal(waypoints=tuple(chunk(1, CHUNK)), keep_open=True, execution=ExecutionMode.SPLINE),
+        self_collision='off',
+    )
     while motion.points < points:
         while motion.outcome is None and not (
-                motion.motion.progress and motion.progress.points_received == motion.points
-                and motion.progress.time_remaining < LEAD):
+            motion.motion.progress
+            and motion.progress.points_received == motion.points
+            and motion.progress.time_remaining < LEAD
+        ):
             await cell.sleep(0.1)
         if motion.outcome is not None:
             break
@@ -84,13 +94,20 @@ async def carried_out(cell: Any, points: int) -> dict[str, Any]:
             seen['memory'].append(resident())
             seen['kept'].append(kept(cell))
             if number % (5 * LOOK) == 0:
-                print(f'  {motion.points:,} points, {perf_counter() - begin:.0f} s, '
-                      f'{resident():.1f} MB, kept {kept(cell)}', flush=True)
+                print(
+                    f'  {motion.points:,} points, {perf_counter() - begin:.0f} s, '
+                    f'{resident():.1f} MB, kept {kept(cell)}',
+                    flush=True,
+                )
     while motion.outcome is None:
         await cell.sleep(1.0)
     end = motion.outcome
-    return seen | {'seconds': perf_counter() - begin, 'planning': planning, 'outcome': end,
-                   'points': motion.points}
+    return seen | {
+        'seconds': perf_counter() - begin,
+        'planning': planning,
+        'outcome': end,
+        'points': motion.points,
+    }
 
 
 def run(quick: bool, points: int = 50_000) -> Iterator[Figure]:
@@ -103,11 +120,22 @@ def run(quick: bool, points: int = 50_000) -> Iterator[Figure]:
     if not end.succeeded or end.report:
         raise RuntimeError(f'{end.text} {end.report}')
     name = f'open goal of {seen["points"]:,} points'
-    yield Figure(benchmark='open_goal', name=f'{name}, points per second',
-                 value=seen['points'] / seen['seconds'], unit='1/s',
-                 baseline=1.0 / STEP, than='of the motion',
-                 note=f'{seen["seconds"]:.0f} s on the virtual clock; never closed, {end.text}')
+    yield Figure(
+        benchmark='open_goal',
+        name=f'{name}, points per second',
+        value=seen['points'] / seen['seconds'],
+        unit='1/s',
+        baseline=1.0 / STEP,
+        than='of the motion',
+        note=f'{seen["seconds"]:.0f} s on the virtual clock; never closed, {end.text}',
+    )
     settled = memory[min(2, len(memory) - 1)]
-    yield Figure(benchmark='open_goal', name='memory of the process at the end', unit='MB',
-                 value=memory[-1], baseline=settled, than=f'after {3 * LOOK * CHUNK:,} points',
-                 note='driver, simulated robot and producer')
+    yield Figure(
+        benchmark='open_goal',
+        name='memory of the process at the end',
+        unit='MB',
+        value=memory[-1],
+        baseline=settled,
+        than=f'after {3 * LOOK * CHUNK:,} points',
+        note='driver, simulated robot and producer',
+    )

@@ -35,22 +35,32 @@ def meander(points: int) -> Iterator[Pose]:
         layer, row = divmod(rest, ALONG)
         column = column if rest % 2 == 0 else ALONG - 1 - column
         row = row if layer % 2 == 0 else ALONG - 1 - row
-        yield Pose((x + STEP * (column - ALONG // 2), y + STEP * (row - ALONG // 2),
-                    z - 0.15 + STEP * layer), home.quaternion)
+        yield Pose(
+            (
+                x + STEP * (column - ALONG // 2),
+                y + STEP * (row - ALONG // 2),
+                z - 0.15 + STEP * layer,
+            ),
+            home.quaternion,
+        )
 
 
 def goal(points: int, blend_radius: float = 0.0) -> Goal:
     """Return a goal through the meander, to a stop at its end; the speeds are the driver's own."""
     segments = [Segment(blend_radius=blend_radius)] * (points - 1) + [Segment()]
-    return Goal(waypoints=tuple(Waypoint(pose=pose) for pose in meander(points)),
-                segments=tuple(segments) if blend_radius > 0.0 else ())
+    return Goal(
+        waypoints=tuple(Waypoint(pose=pose) for pose in meander(points)),
+        segments=tuple(segments) if blend_radius > 0.0 else (),
+    )
 
 
 def at_home(arm: Arm) -> RobotState:
     """Return the state of an arm that stands at home."""
     pose = arm.forward(HOME)
-    return RobotState(timestamp=0.0, actual_q=HOME, target_q=HOME, actual_tcp_pose=pose,
-                      target_tcp_pose=pose)
+    return RobotState(
+        timestamp=0.0, actual_q=HOME, target_q=HOME, actual_tcp_pose=pose, target_tcp_pose=pose
+    )
+
 
 def calibrated_arm() -> Arm:
     """Return an arm that is off its model by about a millimetre in every length, and a mrad."""
@@ -62,6 +72,13 @@ def calibrated_arm() -> Arm:
         return (a, b, c, d, e, f)
 
     nominal = model.geometry
-    return Arm(model, replace(
-        nominal, a=off(nominal.a, 1e-3), d=off(nominal.d, 1e-3), alpha=off(nominal.alpha, 1e-3),
-        theta=off(nominal.theta, 1e-3)))
+    return Arm(
+        model,
+        replace(
+            nominal,
+            a=off(nominal.a, 1e-3),
+            d=off(nominal.d, 1e-3),
+            alpha=off(nominal.alpha, 1e-3),
+            theta=off(nominal.theta, 1e-3),
+        ),
+    )

@@ -33,14 +33,30 @@ def run(quick: bool) -> Iterator[Figure]:
         for corner, arm in product(corners, arms):
             goal = paths.goal(points, corners[corner])
             state = paths.at_home(arms[arm])
-            taken = [1e3 * seconds(partial(
-                plan, goal, state, arms[arm], PlanningOptions(self_collision=choice)),
-                repeat=3 if points == 1_000 else 1) for choice in ('off', 'auto')]
+            taken = [
+                1e3
+                * seconds(
+                    partial(plan, goal, state, arms[arm], PlanningOptions(self_collision=choice)),
+                    repeat=3 if points == 1_000 else 1,
+                )
+                for choice in ('off', 'auto')
+            ]
             name = f'{points:,} points 5 mm apart, {corner}, {arm}'
-            yield Figure(benchmark='planning', name=name, value=taken[0], unit='ms',
-                         note=f'{1e3 * taken[0] / points:.0f} us a point, no collisions')
-            yield Figure(benchmark='planning', name=f'{name}, collisions', value=taken[1],
-                         unit='ms', baseline=taken[0], than='without')
+            yield Figure(
+                benchmark='planning',
+                name=name,
+                value=taken[0],
+                unit='ms',
+                note=f'{1e3 * taken[0] / points:.0f} us a point, no collisions',
+            )
+            yield Figure(
+                benchmark='planning',
+                name=f'{name}, collisions',
+                value=taken[1],
+                unit='ms',
+                baseline=taken[0],
+                than='without',
+            )
         for arm in arms:
             yield _spline(points, arm, arms[arm])
 
@@ -49,12 +65,17 @@ def _spline(points: int, name: str, arm: Arm) -> Figure:
     """Plan the same points with times and twists, from Cartesian curve to joint pieces."""
     goal, state = _timed(paths.goal(points)), paths.at_home(arm)
     options = PlanningOptions(self_collision='off')
-    taken = 1e3 * seconds(partial(plan, goal, state, arm, options),
-                          repeat=3 if points == 1_000 else 1)
+    taken = 1e3 * seconds(
+        partial(plan, goal, state, arm, options), repeat=3 if points == 1_000 else 1
+    )
     pieces = len(plan(goal, state, arm, options).segments)
-    return Figure(benchmark='planning', name=f'{points:,} timed points with twists, {name}',
-                  value=taken, unit='ms',
-                  note=f'{1e3 * taken / points:.0f} us a point, {pieces:,} spline pieces')
+    return Figure(
+        benchmark='planning',
+        name=f'{points:,} timed points with twists, {name}',
+        value=taken,
+        unit='ms',
+        note=f'{1e3 * taken / points:.0f} us a point, {pieces:,} spline pieces',
+    )
 
 
 def _timed(goal: Goal) -> Goal:
@@ -62,6 +83,11 @@ def _timed(goal: Goal) -> Goal:
     places = np.array([point.pose.position for point in goal.waypoints])
     speeds = np.zeros((len(places), 6))
     speeds[1:-1, :3] = (places[2:] - places[:-2]) / (2.0 * PERIOD)
-    return replace(goal, execution=ExecutionMode.SPLINE, waypoints=tuple(
-        replace(point, time=LEAD + PERIOD * k, twist=tuple(speed))
-        for k, (point, speed) in enumerate(zip(goal.waypoints, speeds.tolist(), strict=True))))
+    return replace(
+        goal,
+        execution=ExecutionMode.SPLINE,
+        waypoints=tuple(
+            replace(point, time=LEAD + PERIOD * k, twist=tuple(speed))
+            for k, (point, speed) in enumerate(zip(goal.waypoints, speeds.tolist(), strict=True))
+        ),
+    )

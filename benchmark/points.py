@@ -50,10 +50,14 @@ def _encoding(points: int) -> Figure:
     packer = struct.Struct(f'>{POINT_FIELDS}i')
     words = tuple(range(POINT_FIELDS))
     return Figure(
-        benchmark=NAME, name='encoded', unit='1/s',
+        benchmark=NAME,
+        name='encoded',
+        unit='1/s',
         value=points / seconds(lambda: encode_points(primitives), repeat=3),
         baseline=points / seconds(lambda: [packer.pack(*words) for _ in range(points)], repeat=3),
-        than='struct.pack of the words alone', note=f'{points:,} points')
+        than='struct.pack of the words alone',
+        note=f'{points:,} points',
+    )
 
 
 def _sending(points: int) -> Iterator[Figure]:
@@ -61,20 +65,34 @@ def _sending(points: int) -> Iterator[Figure]:
         baseline = _plain_socket(reader, points)
         ports = reader.call('ports')
         config = DriverConfig(
-            robot_ip=HOST, ur_type=paths.MODEL, rtde_port=ports.rtde, primary_port=ports.primary,
-            dashboard_port=ports.dashboard, reverse_port=0, script_sender_port=0,
-            trajectory_port=0, script_command_port=0, robot_loop='process',
+            robot_ip=HOST,
+            ur_type=paths.MODEL,
+            rtde_port=ports.rtde,
+            primary_port=ports.primary,
+            dashboard_port=ports.dashboard,
+            reverse_port=0,
+            script_sender_port=0,
+            trajectory_port=0,
+            script_command_port=0,
+            robot_loop='process',
             # The reader claims progress while the arm stands.
-            max_plan_deviation=0.0, max_plan_deviation_angle=0.0)
+            max_plan_deviation=0.0,
+            max_plan_deviation_angle=0.0,
+        )
         with Driver(config, PlanningOptions(max_points=points)) as driver:
             _until(lambda: driver.status.state is ConnectionState.CONNECTED)
             reader.call('join', dict(driver.status.ports))
             driver.wait_ready(10.0)
             taken = _through_driver(driver, driver.plan(paths.goal(points)), reader, points)
-    yield Figure(benchmark=NAME, name='sent through the driver', unit='1/s',
-                 value=points / taken, baseline=points / baseline,
-                 than='the same bytes, plain sockets',
-                 note=f'{points:,} points, the window bounds it to {BOUND:,} after the first 500')
+    yield Figure(
+        benchmark=NAME,
+        name='sent through the driver',
+        unit='1/s',
+        value=points / taken,
+        baseline=points / baseline,
+        than='the same bytes, plain sockets',
+        note=f'{points:,} points, the window bounds it to {BOUND:,} after the first 500',
+    )
 
 
 def _through_driver(driver: Driver, plan: Plan, reader: Child, points: int) -> float:
@@ -114,8 +132,9 @@ def _read(connection: Connection) -> None:
     with SimulatedRobot(config) as robot, ExitStack() as sockets:
         robot.run_script(STAND_IN)
         reader = Reader(robot, sockets)
-        answer_calls(connection, {
-            'ports': lambda: robot.ports, 'join': reader.join, 'times': reader.times})
+        answer_calls(
+            connection, {'ports': lambda: robot.ports, 'join': reader.join, 'times': reader.times}
+        )
 
 
 class Reader:
@@ -135,8 +154,9 @@ class Reader:
             if name in ports:
                 sock = socket.create_connection((HOST, ports[name]))
                 self._sockets.enter_context(sock)
-                threading.Thread(target=self._take, args=(sock, name == 'trajectory_port'),
-                                 daemon=True).start()
+                threading.Thread(
+                    target=self._take, args=(sock, name == 'trajectory_port'), daemon=True
+                ).start()
 
     def times(self, points: int) -> tuple[float, float]:
         """Return when the first and the last of so many points came."""

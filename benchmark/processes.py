@@ -113,19 +113,23 @@ def simulator(calls: Calls = no_calls, **settings: Any) -> Iterator[Child]:
 def _simulate(connection: Connection, calls: Calls, settings: dict[str, Any]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent
     any_port: dict[str, Any] = {
-        field.name: 0 for field in fields(SimulatorConfig) if field.name.endswith('_port')}
+        field.name: 0 for field in fields(SimulatorConfig) if field.name.endswith('_port')
+    }
     config = SimulatorConfig(**any_port | settings)
     with SimulatedRobot(config) as robot:
         beginnings = note_cycles(robot)
-        answer_calls(connection, {
-            'ports': lambda: robot.ports,
-            'state': robot.state,
-            'run_script': robot.run_script,
-            'inject': robot.inject,
-            'begin': beginnings.clear,
-            'cycles': lambda: list(beginnings),
-            **calls(robot),
-        })
+        answer_calls(
+            connection,
+            {
+                'ports': lambda: robot.ports,
+                'state': robot.state,
+                'run_script': robot.run_script,
+                'inject': robot.inject,
+                'begin': beginnings.clear,
+                'cycles': lambda: list(beginnings),
+                **calls(robot),
+            },
+        )
 
 
 def note_cycles(robot: SimulatedRobot) -> list[float]:
@@ -186,13 +190,31 @@ def node(robot: Child, **parameters: object) -> Iterator[int]:
     """Run the driver node for a simulated robot until its program runs; yield the node's id."""
     ports = robot.call('ports')
     parameters = {
-        'robot_ip': HOST, 'ur_type': 'ur5e', 'headless_mode': 'true', 'rtde_port': ports.rtde,
-        'primary_port': ports.primary, 'dashboard_port': ports.dashboard, 'reverse_port': 0,
-        'script_sender_port': 0, 'trajectory_port': 0, 'script_command_port': 0} | parameters
+        'robot_ip': HOST,
+        'ur_type': 'ur5e',
+        'headless_mode': 'true',
+        'rtde_port': ports.rtde,
+        'primary_port': ports.primary,
+        'dashboard_port': ports.dashboard,
+        'reverse_port': 0,
+        'script_sender_port': 0,
+        'trajectory_port': 0,
+        'script_command_port': 0,
+    } | parameters
     settings = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
     process = subprocess.Popen(
-        [sys.executable, '-m', 'ur_cartesian_driver.ros.node', '--ros-args', '--log-level',
-         'error', *settings], stdout=subprocess.DEVNULL, start_new_session=True)
+        [
+            sys.executable,
+            '-m',
+            'ur_cartesian_driver.ros.node',
+            '--ros-args',
+            '--log-level',
+            'error',
+            *settings,
+        ],
+        stdout=subprocess.DEVNULL,
+        start_new_session=True,
+    )
     try:
         _wait_for_program(robot, process)
         yield process.pid

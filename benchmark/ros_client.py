@@ -39,8 +39,12 @@ class TimedClient:
             raise TimeoutError(f'Nobody serves {ACTION}.')
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 traceback: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
         """Leave the graph."""
         self._executor.shutdown()
         self._client.destroy()
@@ -85,11 +89,13 @@ def goal_message(points: int) -> FollowCartesianTrajectory.Goal:
     """Return a goal in plain form: poses, nothing else."""
     goal = FollowCartesianTrajectory.Goal()
     goal.trajectory.points = [
-        CartesianTrajectoryPoint(pose=_message(pose)) for pose in paths.meander(points)]
+        CartesianTrajectoryPoint(pose=_message(pose)) for pose in paths.meander(points)
+    ]
     return goal
 
 
 def _message(pose: Pose) -> PoseMessage:
     (x, y, z), (qx, qy, qz, qw) = pose.position, pose.quaternion
-    return PoseMessage(position=Point(x=x, y=y, z=z),
-                       orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
+    return PoseMessage(
+        position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw)
+    )

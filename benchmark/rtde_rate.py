@@ -23,8 +23,17 @@ from ur_cartesian_driver.protocol.rtde import DataReceived, RtdeClient
 BENCHMARK = 'RTDE at 500 Hz in real time'
 QUICK_SECONDS = 3.0
 
-_OUTPUTS = ('timestamp', 'actual_q', 'actual_qd', 'actual_TCP_pose', 'actual_TCP_speed',
-            'speed_scaling', 'robot_mode', 'safety_mode', 'runtime_state')
+_OUTPUTS = (
+    'timestamp',
+    'actual_q',
+    'actual_qd',
+    'actual_TCP_pose',
+    'actual_TCP_speed',
+    'speed_scaling',
+    'robot_mode',
+    'safety_mode',
+    'runtime_state',
+)
 _MOVING = """def moving():
   while True:
     movej([0.5, -1.5, 1.5, -1.5, -1.5, 0.0])
@@ -60,8 +69,13 @@ def run(quick: bool, seconds: float) -> Iterator[Figure]:
         cycles, empty = (_milliseconds(process) for process in (robot, loop))
     yield from _rate(received)
     yield from _lateness(received, cycles, empty)
-    yield Figure(benchmark=BENCHMARK, name='processor time of the simulator', unit='%',
-                 value=100.0 * used / duration, note='of one core, in motion, one client')
+    yield Figure(
+        benchmark=BENCHMARK,
+        name='processor time of the simulator',
+        unit='%',
+        value=100.0 * used / duration,
+        note='of one core, in motion, one client',
+    )
 
 
 def _packages(wire: socket.socket) -> Iterator[tuple[float, float]]:
@@ -98,13 +112,23 @@ def _rate(received: Received) -> Iterator[Figure]:
     rate = (len(arrivals) - 1) / taken
     note = f'{len(arrivals):,} packages in {taken:.0f} s'
     yield Figure(benchmark=BENCHMARK, name='mean rate', value=rate, unit='Hz', note=note)
-    yield Figure(benchmark=BENCHMARK, name='mean rate, off by', unit='%',
-                 value=100.0 * abs(rate * PERIOD - 1.0))
+    yield Figure(
+        benchmark=BENCHMARK,
+        name='mean rate, off by',
+        unit='%',
+        value=100.0 * abs(rate * PERIOD - 1.0),
+    )
     skipped = sum(round((b - a) / PERIOD) != 1 for a, b in pairwise(stamps))
-    yield Figure(benchmark=BENCHMARK, name='timestamps that are not one cycle on',
-                 value=skipped, unit='')
-    yield Figure(benchmark=BENCHMARK, name='drift', value=1e3 * _drift(received), unit='ms',
-                 note='of the earliest arrivals, last tenth against first')
+    yield Figure(
+        benchmark=BENCHMARK, name='timestamps that are not one cycle on', value=skipped, unit=''
+    )
+    yield Figure(
+        benchmark=BENCHMARK,
+        name='drift',
+        value=1e3 * _drift(received),
+        unit='ms',
+        note='of the earliest arrivals, last tenth against first',
+    )
 
 
 def _drift(received: Received) -> float:
@@ -114,16 +138,22 @@ def _drift(received: Received) -> float:
     return min(behind[-tenth:]) - min(behind[:tenth])
 
 
-def _lateness(received: Received, cycles: Sequence[float], empty: Sequence[float]
-              ) -> Iterator[Figure]:
+def _lateness(
+    received: Received, cycles: Sequence[float], empty: Sequence[float]
+) -> Iterator[Figure]:
     behind = [b - a for a, b in zip(received.stamps, received.arrivals, strict=True)]
     earliest = min(behind)
     arrivals = [1e3 * (late - earliest) for late in behind]
     for name, late in (('cycle begins late', cycles), ('package arrives late', arrivals)):
         for text, percent in (('p50', 50.0), ('p99', 99.0), ('worst', 100.0)):
-            yield Figure(benchmark=BENCHMARK, name=f'{name}, {text}', unit='ms',
-                         value=percentile(late, percent), baseline=percentile(empty, percent),
-                         than='empty loop beside it')
+            yield Figure(
+                benchmark=BENCHMARK,
+                name=f'{name}, {text}',
+                unit='ms',
+                value=percentile(late, percent),
+                baseline=percentile(empty, percent),
+                than='empty loop beside it',
+            )
 
 
 def _milliseconds(process: Child) -> list[float]:

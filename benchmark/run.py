@@ -25,9 +25,20 @@ from figures import as_json, Figure, machine, table
 #: Those that are told how much to measure; soak and open goal are no part of a usual run.
 RTDE_RATE, SOAK, OPEN_GOAL = 'rtde_rate', 'soak', 'open_goal'
 #: In the order of the table: what is measured with many processes first.
-MODULES = ('goal_on_wire', 'violation_to_cancel', 'keepalive', 'points', 'load', 'servo',
-           RTDE_RATE, 'planning', 'kinematics', 'kinematics_rows', 'codecs_rtde',
-           'urscript_frames')
+MODULES = (
+    'goal_on_wire',
+    'violation_to_cancel',
+    'keepalive',
+    'points',
+    'load',
+    'servo',
+    RTDE_RATE,
+    'planning',
+    'kinematics',
+    'kinematics_rows',
+    'codecs_rtde',
+    'urscript_frames',
+)
 
 
 def main() -> int:
@@ -65,20 +76,36 @@ def main() -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description='Measure the driver and the simulated robot.')
-    parser.add_argument('--only', action='append', choices=(*MODULES, SOAK, OPEN_GOAL),
-                        metavar='NAME', help='only this one (may be repeated): '
-                        f'{", ".join((*MODULES, SOAK, OPEN_GOAL))}')
-    parser.add_argument('--quick', action='store_true',
-                        help='smaller goals, shorter times: to see that it runs')
-    parser.add_argument('--seconds', type=float, default=30.0,
-                        help=f'how long {RTDE_RATE} measures (600 for the record), and {SOAK} '
-                             'lasts (1800)')
-    parser.add_argument('--goals', type=int, default=10_000,
-                        help=f'after so many goals {SOAK} ends sooner')
-    parser.add_argument('--points', type=int, default=50_000,
-                        help=f'how many points {OPEN_GOAL} has (1000000 for the record)')
-    parser.add_argument('--undisturbed', action='store_true',
-                        help=f'nothing happens during the goals of {SOAK}: as many as can be')
+    parser.add_argument(
+        '--only',
+        action='append',
+        choices=(*MODULES, SOAK, OPEN_GOAL),
+        metavar='NAME',
+        help=f'only this one (may be repeated): {", ".join((*MODULES, SOAK, OPEN_GOAL))}',
+    )
+    parser.add_argument(
+        '--quick', action='store_true', help='smaller goals, shorter times: to see that it runs'
+    )
+    parser.add_argument(
+        '--seconds',
+        type=float,
+        default=30.0,
+        help=f'how long {RTDE_RATE} measures (600 for the record), and {SOAK} lasts (1800)',
+    )
+    parser.add_argument(
+        '--goals', type=int, default=10_000, help=f'after so many goals {SOAK} ends sooner'
+    )
+    parser.add_argument(
+        '--points',
+        type=int,
+        default=50_000,
+        help=f'how many points {OPEN_GOAL} has (1000000 for the record)',
+    )
+    parser.add_argument(
+        '--undisturbed',
+        action='store_true',
+        help=f'nothing happens during the goals of {SOAK}: as many as can be',
+    )
     parser.add_argument('--json', metavar='FILE', help='write the figures as JSON, - = print them')
     return parser
 

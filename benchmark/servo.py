@@ -38,8 +38,14 @@ from ur_cartesian_driver.sim import SimulatedRobot
 NAME = 'set-points at 500 Hz'
 #: ``ur-rtde`` knows only the ports of a real robot, so the simulator has an address of its own.
 ROBOT, HERE = '127.0.19.1', '127.0.0.1'
-PORTS = {'primary_port': 30001, 'secondary_port': 30002, 'realtime_port': 30003,
-         'rtde_port': 30004, 'dashboard_port': 29999, 'interpreter_port': 30020}
+PORTS = {
+    'primary_port': 30001,
+    'secondary_port': 30002,
+    'realtime_port': 30003,
+    'rtde_port': 30004,
+    'dashboard_port': 29999,
+    'interpreter_port': 30020,
+}
 STEP = 0.002
 GAIN, LOOKAHEAD = 2000.0, 0.03
 OTHER = 'ur-rtde'
@@ -75,17 +81,36 @@ def run(quick: bool) -> Iterator[Figure]:
         ours, spline = _servo(robot, seconds)
         other = _ur_rtde(robot, spline) if importlib.util.find_spec('rtde_control') else None
     for text, percent in PERCENTILES:
-        yield Figure(benchmark=NAME, name=f'set-point off an even stream, {text}', unit='ms',
-                     value=round(percentile(ours.jitter, percent), 3), than=OTHER,
-                     baseline=other and round(percentile(other.jitter, percent), 3))
-    for text, low, high in (('cycles without a new set-point', -1.0, 0.5),
-                            ('cycles in which one was left out', 1.5, 1e9)):
-        yield Figure(benchmark=NAME, name=text, unit='%', value=ours.share(low, high), than=OTHER,
-                     baseline=other and other.share(low, high))
-    yield Figure(benchmark=NAME, name='arm behind what was sent last', unit='ms',
-                 value=1e3 * ours.lag, baseline=other and 1e3 * other.lag, than=OTHER,
-                 note=f'of it {1e3 * LOOKAHEAD:g} ms the lookahead of servoj; ours keeps 40 ms in '
-                      'the buffer')
+        yield Figure(
+            benchmark=NAME,
+            name=f'set-point off an even stream, {text}',
+            unit='ms',
+            value=round(percentile(ours.jitter, percent), 3),
+            than=OTHER,
+            baseline=other and round(percentile(other.jitter, percent), 3),
+        )
+    for text, low, high in (
+        ('cycles without a new set-point', -1.0, 0.5),
+        ('cycles in which one was left out', 1.5, 1e9),
+    ):
+        yield Figure(
+            benchmark=NAME,
+            name=text,
+            unit='%',
+            value=ours.share(low, high),
+            than=OTHER,
+            baseline=other and other.share(low, high),
+        )
+    yield Figure(
+        benchmark=NAME,
+        name='arm behind what was sent last',
+        unit='ms',
+        value=1e3 * ours.lag,
+        baseline=other and 1e3 * other.lag,
+        than=OTHER,
+        note=f'of it {1e3 * LOOKAHEAD:g} ms the lookahead of servoj; ours keeps 40 ms in '
+        'the buffer',
+    )
 
 
 def told(robot: SimulatedRobot) -> Mapping[str, Callable[..., Any]]:
@@ -108,9 +133,17 @@ def told(robot: SimulatedRobot) -> Mapping[str, Callable[..., Any]]:
 
 def _servo(robot: Child, seconds: float) -> tuple[Streamed, JointSpline]:
     config = DriverConfig(
-        robot_ip=ROBOT, ur_type='ur5e', headless_mode=True, allowed_peers=(ROBOT, HERE),
-        reverse_port=0, script_sender_port=0, trajectory_port=0, script_command_port=0,
-        servoj_gain=GAIN, servoj_lookahead_time=LOOKAHEAD)
+        robot_ip=ROBOT,
+        ur_type='ur5e',
+        headless_mode=True,
+        allowed_peers=(ROBOT, HERE),
+        reverse_port=0,
+        script_sender_port=0,
+        trajectory_port=0,
+        script_command_port=0,
+        servoj_gain=GAIN,
+        servoj_lookahead_time=LOOKAHEAD,
+    )
     lags: list[float] = []
 
     def note(progress: Progress) -> None:
@@ -135,8 +168,10 @@ def _goal(here: Pose, seconds: float) -> Goal:
 
 def spline_of(plan: Plan) -> JointSpline:
     """Return the joints over time that a plan streams."""
-    return JointSpline.of(plan.start, [segment.primitive for segment in plan.segments
-                                       if isinstance(segment.primitive, Spline)])
+    return JointSpline.of(
+        plan.start,
+        [segment.primitive for segment in plan.segments if isinstance(segment.primitive, Spline)],
+    )
 
 
 def _ur_rtde(robot: Child, spline: JointSpline) -> Streamed:
@@ -146,8 +181,12 @@ def _ur_rtde(robot: Child, spline: JointSpline) -> Streamed:
     with tempfile.TemporaryDirectory() as folder:
         path, sent = Path(folder) / 'rows.npy', Path(folder) / 'sent.npy'
         np.save(path, rows)
-        subprocess.run([sys.executable, __file__, str(path), str(sent)], check=True, timeout=120.0,
-                       stdout=subprocess.DEVNULL)
+        subprocess.run(
+            [sys.executable, __file__, str(path), str(sent)],
+            check=True,
+            timeout=120.0,
+            stdout=subprocess.DEVNULL,
+        )
         newest, actual = np.load(sent)
     inner = slice(round(FIRST * len(newest)), round(LAST * len(newest)))
     behind = _place(spline, newest[inner]) - _place(spline, actual[inner])
@@ -159,8 +198,9 @@ def _streamed(robot: Child, spline: JointSpline, lag: float) -> Streamed:
     places = _place(spline, np.array([q for _, q in seen]))
     # While the arm goes there; it is led back to the start by another program.
     inner = (places > FIRST * spline.duration) & (places < LAST * spline.duration)
-    return Streamed(cycles=np.array([float(cycle) for cycle, _ in seen])[inner],
-                    places=places[inner], lag=lag)
+    return Streamed(
+        cycles=np.array([float(cycle) for cycle, _ in seen])[inner], places=places[inner], lag=lag
+    )
 
 
 def _place(spline: JointSpline, q: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -40,10 +40,18 @@ SAMPLE_PERIOD = 2.0
 NOT_READY = ErrorCode.ROBOT_NOT_READY.name
 #: What happens during one in so many goals, as a fault of the simulator; empty = nothing.
 EVENTS: tuple[tuple[str, int], ...] = (
-    ('', 60), ('cancel', 15), ('preempted', 5), ('slider 0.3 at 0.02 s', 4),
-    ('slider 0 at 0.02 s', 2), ('pause at 0.02 s', 2), ('protective_stop at 0.02 s', 2),
-    ('stop at 0.02 s', 3), ('drop rtde at 0.02 s for 0.1 s', 2),
-    ('drop primary at 0.02 s for 0.1 s', 2), ('drop sockets at 0.02 s for 0.1 s', 4))
+    ('', 60),
+    ('cancel', 15),
+    ('preempted', 5),
+    ('slider 0.3 at 0.02 s', 4),
+    ('slider 0 at 0.02 s', 2),
+    ('pause at 0.02 s', 2),
+    ('protective_stop at 0.02 s', 2),
+    ('stop at 0.02 s', 3),
+    ('drop rtde at 0.02 s for 0.1 s', 2),
+    ('drop primary at 0.02 s for 0.1 s', 2),
+    ('drop sockets at 0.02 s for 0.1 s', 4),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,18 +69,30 @@ class Footprint:
         root = Path(f'/proc/{pid}')
         pages = int((root / 'statm').read_text().split()[1])
         mapped = (root / 'maps').read_text()
-        names = {line.split(maxsplit=5)[5] for line in mapped.splitlines()
-                 if '/dev/shm/' in line or '/memfd:' in line}
-        return cls(pages * os.sysconf('SC_PAGESIZE') / 1e6,
-                   len(list((root / 'task').iterdir())), len(list((root / 'fd').iterdir())),
-                   len(names))
+        names = {
+            line.split(maxsplit=5)[5]
+            for line in mapped.splitlines()
+            if '/dev/shm/' in line or '/memfd:' in line
+        }
+        return cls(
+            pages * os.sysconf('SC_PAGESIZE') / 1e6,
+            len(list((root / 'task').iterdir())),
+            len(list((root / 'fd').iterdir())),
+            len(names),
+        )
 
 
 class Soak:
     """One run."""
 
-    def __init__(self, robot: Child, client: TimedClient, pids: Mapping[str, int],
-                 undisturbed: bool, seed: int = 1) -> None:
+    def __init__(
+        self,
+        robot: Child,
+        client: TimedClient,
+        pids: Mapping[str, int],
+        undisturbed: bool,
+        seed: int = 1,
+    ) -> None:
         """
         Prepare; :meth:`run` does it.
 
@@ -105,8 +125,13 @@ class Soak:
 
     def _goal(self) -> None:
         """Run one goal to its end, and see to it that the next one can run."""
-        (event,) = [''] if self._undisturbed else self._random.choices(
-            [name for name, _ in EVENTS], [weight for _, weight in EVENTS])
+        (event,) = (
+            ['']
+            if self._undisturbed
+            else self._random.choices(
+                [name for name, _ in EVENTS], [weight for _, weight in EVENTS]
+            )
+        )
         begin, before = time.monotonic(), self.outcomes[NOT_READY]
         others = []
         try:
@@ -143,9 +168,12 @@ class Soak:
         for i in range(self._random.randint(1, most)):
             offset = [self._random.uniform(-way, way) for _ in range(3)]
             position = (x + offset[0], y + offset[1], z + offset[2])
-            points.append(CartesianTrajectoryPoint(
-                pose=_message(Pose(position, self._home.quaternion)),
-                time_from_start=Duration(nanosec=round(1e9 * step) * (i + 1))))
+            points.append(
+                CartesianTrajectoryPoint(
+                    pose=_message(Pose(position, self._home.quaternion)),
+                    time_from_start=Duration(nanosec=round(1e9 * step) * (i + 1)),
+                )
+            )
         message = FollowCartesianTrajectory.Goal()
         message.trajectory.points = points
         message.validate_only = self._random.random() < 0.05
@@ -161,20 +189,25 @@ class Soak:
         answer: Any = None
         while time.monotonic() < deadline:
             answer, _ = self._client.wait(
-                self._recover.call_async(Trigger.Request()), RECOVERY_TIMEOUT)
+                self._recover.call_async(Trigger.Request()), RECOVERY_TIMEOUT
+            )
             if answer.success:
                 return
             self._client.spin(0.2)
         raise TimeoutError(f'the robot does not recover: {answer.message}')
 
 
-def run(quick: bool, seconds: float = 300.0, goals: int = 10_000,
-        undisturbed: bool = False) -> Iterator[Figure]:
+def run(
+    quick: bool, seconds: float = 300.0, goals: int = 10_000, undisturbed: bool = False
+) -> Iterator[Figure]:
     """Soak for a time or a number of goals, whichever is reached first."""
     if quick:
         seconds = min(seconds, 20.0)
-    with simulator(unlock_delay=0.1) as robot, \
-            node(robot, max_tool_speed=1.0) as driver, TimedClient() as client:
+    with (
+        simulator(unlock_delay=0.1) as robot,
+        node(robot, max_tool_speed=1.0) as driver,
+        TimedClient() as client,
+    ):
         (robot_loop,) = children_of(driver)
         soak = Soak(robot, client, {'node': driver, 'robot process': robot_loop}, undisturbed)
         begin = time.monotonic()
@@ -182,12 +215,15 @@ def run(quick: bool, seconds: float = 300.0, goals: int = 10_000,
         duration = time.monotonic() - begin
         same = children_of(driver) == [robot_loop]
     note = f'{duration:.0f} s; ' + ', '.join(
-        f'{count} {name}' for name, count in soak.outcomes.most_common())
-    yield Figure(benchmark=NAME, name='goals that ended', value=soak.outcomes.total(), unit='',
-                 note=note)
+        f'{count} {name}' for name, count in soak.outcomes.most_common()
+    )
+    yield Figure(
+        benchmark=NAME, name='goals that ended', value=soak.outcomes.total(), unit='', note=note
+    )
     yield Figure(benchmark=NAME, name='goals without a result', value=soak.missing, unit='')
-    yield Figure(benchmark=NAME, name='longest time from goal to result', value=soak.longest,
-                 unit='s')
+    yield Figure(
+        benchmark=NAME, name='longest time from goal to result', value=soak.longest, unit='s'
+    )
     yield Figure(benchmark=NAME, name='robot process replaced', value=float(not same), unit='')
     for name, samples in soak.samples.items():
         yield from _growth(name, samples)
@@ -201,8 +237,16 @@ def _growth(name: str, samples: list[tuple[float, Footprint]]) -> Iterator[Figur
     early = [footprint for at, footprint in samples if warm <= at <= warm + fifth]
     late = [footprint for at, footprint in samples if at >= end - fifth]
     for field, unit in zip(fields(Footprint), ('MB', '', '', ''), strict=True):
-        first, last = (percentile([getattr(footprint, field.name) for footprint in part], 50.0)
-                       for part in (early, late))
-        yield Figure(benchmark=NAME, name=f'{name}, {field.name}', value=last, unit=unit,
-                     baseline=first, than=f'{warm:.0f} s after the start',
-                     note='median of the last fifth')
+        first, last = (
+            percentile([getattr(footprint, field.name) for footprint in part], 50.0)
+            for part in (early, late)
+        )
+        yield Figure(
+            benchmark=NAME,
+            name=f'{name}, {field.name}',
+            value=last,
+            unit=unit,
+            baseline=first,
+            than=f'{warm:.0f} s after the start',
+            note='median of the last fifth',
+        )

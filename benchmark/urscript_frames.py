@@ -46,21 +46,44 @@ end
 def run(quick: bool) -> Iterator[Figure]:
     """Run frames without a controller, then whole cycles of one."""
     budget = 0.1 if quick else 0.5
-    text = as_program(render(ProgramSettings(
-        host='127.0.0.1', reverse_port=1, trajectory_port=2, script_command_port=3)))
-    yield Figure(benchmark=NAME, name='parse the robot program', unit='ms',
-                 value=1e3 * seconds_each(lambda: parse(text), budget),
-                 note=f'{len(text.splitlines())} lines')
+    text = as_program(
+        render(
+            ProgramSettings(
+                host='127.0.0.1', reverse_port=1, trajectory_port=2, script_command_port=3
+            )
+        )
+    )
+    yield Figure(
+        benchmark=NAME,
+        name='parse the robot program',
+        unit='ms',
+        value=1e3 * seconds_each(lambda: parse(text), budget),
+        note=f'{len(text.splitlines())} lines',
+    )
     machine = Machine(parse(WORK), core_builtins() | {'sync': _sync})
-    yield Figure(benchmark=NAME, name='frame with 100 rounds of a loop', unit='us',
-                 value=1e6 * seconds_each(machine.step, budget),
-                 baseline=1e6 * seconds_each(_work, budget), than='the same in Python')
+    yield Figure(
+        benchmark=NAME,
+        name='frame with 100 rounds of a loop',
+        unit='us',
+        value=1e6 * seconds_each(machine.step, budget),
+        baseline=1e6 * seconds_each(_work, budget),
+        than='the same in Python',
+    )
     nothing = 1e6 * _cycle('', budget)
-    for name, program in (('nothing running', ''), ('an empty loop', IDLE),
-                          ('a straight line', MOVING)):
-        yield Figure(benchmark='cycle of the simulated controller', name=name, unit='us',
-                     value=1e6 * _cycle(program, budget), baseline=nothing,
-                     than='nothing running', note='2,000 us are there')
+    for name, program in (
+        ('nothing running', ''),
+        ('an empty loop', IDLE),
+        ('a straight line', MOVING),
+    ):
+        yield Figure(
+            benchmark='cycle of the simulated controller',
+            name=name,
+            unit='us',
+            value=1e6 * _cycle(program, budget),
+            baseline=nothing,
+            than='nothing running',
+            note='2,000 us are there',
+        )
 
 
 def _cycle(program: str, budget: float) -> float:

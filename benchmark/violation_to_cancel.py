@@ -79,10 +79,15 @@ def run(quick: bool) -> Iterator[Figure]:
     """Push the arm off its path again and again."""
     cancels: list[Reaction] = []
     echoes: list[Reaction] = []
-    with simulator(_note_packets) as robot, _relay(robot) as (relay, settings), _echo(relay), \
-            Driver(DriverConfig(
-                robot_ip=HOST, ur_type=paths.MODEL, headless_mode=True, **settings),
-                PlanningOptions(max_tool_speed=1.0)) as driver:
+    with (
+        simulator(_note_packets) as robot,
+        _relay(robot) as (relay, settings),
+        _echo(relay),
+        Driver(
+            DriverConfig(robot_ip=HOST, ur_type=paths.MODEL, headless_mode=True, **settings),
+            PlanningOptions(max_tool_speed=1.0),
+        ) as driver,
+    ):
         driver.wait_ready(TIMEOUT)
         home = driver.state.actual_tcp_pose
         _violate(driver, robot, home, 0)  # nothing is measured cold
@@ -97,18 +102,38 @@ def run(quick: bool) -> Iterator[Figure]:
         yield from _compare(than, cancels, [e for e in echoes if e.reads == reads], making)
 
 
-def _compare(than: str, cancels: Sequence[Reaction], echoes: Sequence[Reaction],
-             making: Mapping[float, float]) -> Iterator[Figure]:
+def _compare(
+    than: str,
+    cancels: Sequence[Reaction],
+    echoes: Sequence[Reaction],
+    making: Mapping[float, float],
+) -> Iterator[Figure]:
     """Yield the times of both, first without, then with the making of the packet."""
     note = f'{len(cancels)} violations, {len(echoes)} echoes'
-    for name, begun in (('packet -> CANCEL on the wire', lambda _: 0.0),
-                        ('cycle -> CANCEL at the robot', making.__getitem__)):
+    for name, begun in (
+        ('packet -> CANCEL on the wire', lambda _: 0.0),
+        ('cycle -> CANCEL at the robot', making.__getitem__),
+    ):
         ours, theirs = ([begun(r.cycle) + r.taken for r in which] for which in (cancels, echoes))
         for text, percent in (('p50', 50.0), ('p90', 90.0), ('p99', 99.0), ('longest', 100.0)):
-            yield Figure(benchmark=NAME, name=f'{name}, {text}', value=percentile(ours, percent),
-                         unit='ms', baseline=percentile(theirs, percent), than=than, note=note)
-    yield Figure(benchmark=NAME, name='CANCEL is there before the next cycle',
-                 value=_in_time(ours), unit='%', baseline=_in_time(theirs), than=than, note=note)
+            yield Figure(
+                benchmark=NAME,
+                name=f'{name}, {text}',
+                value=percentile(ours, percent),
+                unit='ms',
+                baseline=percentile(theirs, percent),
+                than=than,
+                note=note,
+            )
+    yield Figure(
+        benchmark=NAME,
+        name='CANCEL is there before the next cycle',
+        value=_in_time(ours),
+        unit='%',
+        baseline=_in_time(theirs),
+        than=than,
+        note=note,
+    )
 
 
 def _in_time(times: Sequence[float]) -> float:
@@ -124,8 +149,13 @@ def _violate(driver: Driver, robot: Child, home: Pose, trial: int) -> None:
     """
     x, y, z = home.position
     there = Pose((x, y + (0.1 if trial % 2 == 0 else -0.1), z), home.quaternion)
-    motion = driver.start(driver.plan(Goal(
-        waypoints=(Waypoint(pose=there),), path_tolerance=Tolerance(position=(BOUND,) * 3))))
+    motion = driver.start(
+        driver.plan(
+            Goal(
+                waypoints=(Waypoint(pose=there),), path_tolerance=Tolerance(position=(BOUND,) * 3)
+            )
+        )
+    )
     robot.call('inject', f'offset pose x {PUSH} at 0.01 m for 0.05 s')
     outcome = motion.result(TIMEOUT)
     if outcome.code is not ErrorCode.PATH_TOLERANCE_VIOLATED:
@@ -136,8 +166,11 @@ def _violate(driver: Driver, robot: Child, home: Pose, trial: int) -> None:
 def _cancelled(relay: Child) -> Reaction:
     """Return how the first packet with the push in it was answered by CANCEL."""
     cycle, pushed = relay.call('pushed')
-    cancel = next(m.time for m in relay.call('marks') if m.is_trajectory_action
-                  and m.action == TrajectoryAction.CANCEL)
+    cancel = next(
+        m.time
+        for m in relay.call('marks')
+        if m.is_trajectory_action and m.action == TrajectoryAction.CANCEL
+    )
     return Reaction(cycle, 1e-6 * (cancel - pushed))
 
 
@@ -175,19 +208,33 @@ def _relay(robot: Child) -> Iterator[tuple[Child, dict[str, object]]]:
     """Run the relay; yield it (calls: ``marks``, ``await_push``, ...) and the parameters."""
     ports = robot.call('ports')
     with child(_run_relay, ports.rtde) as relay:
-        yield relay, {
-            'reverse_ip': TAP_HOST, 'primary_port': ports.primary, 'script_sender_port': 0,
-            'dashboard_port': ports.dashboard, **relay.call('ports')}
+        yield (
+            relay,
+            {
+                'reverse_ip': TAP_HOST,
+                'primary_port': ports.primary,
+                'script_sender_port': 0,
+                'dashboard_port': ports.dashboard,
+                **relay.call('ports'),
+            },
+        )
 
 
 def _run_relay(connection: Connection, rtde_port: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     relay = RelayWithEcho(rtde_port)
     threading.Thread(target=relay.run, daemon=True).start()
-    answer_calls(connection, {
-        'ports': lambda: relay.ports, 'echo_port': lambda: relay.echo_port,
-        'marks': relay.take, 'await_push': relay.await_push,
-        'pushed': lambda: relay.pushed, 'echoed': lambda: relay.echoed})
+    answer_calls(
+        connection,
+        {
+            'ports': lambda: relay.ports,
+            'echo_port': lambda: relay.echo_port,
+            'marks': relay.take,
+            'await_push': relay.await_push,
+            'pushed': lambda: relay.pushed,
+            'echoed': lambda: relay.echoed,
+        },
+    )
 
 
 @contextmanager

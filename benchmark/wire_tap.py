@@ -53,8 +53,9 @@ def wire_tap() -> Iterator[tuple[Child, dict[str, object]]]:
         yield tap, {'reverse_ip': TAP_HOST, **tap.call('ports')}
 
 
-def marks_until_first_point(tap: Child, spin: Callable[[float], None],
-                            timeout: float) -> list[Mark]:
+def marks_until_first_point(
+    tap: Child, spin: Callable[[float], None], timeout: float
+) -> list[Mark]:
     """
     Wait for a point on the wire and return all marks until then.
 
@@ -75,8 +76,10 @@ def _tap(connection: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     relay = Relay()
     threading.Thread(target=relay.run, daemon=True).start()
-    answer_calls(connection, {
-        'ports': lambda: relay.ports, 'marks': relay.take, 'hang_ups': lambda: relay.hang_ups})
+    answer_calls(
+        connection,
+        {'ports': lambda: relay.ports, 'marks': relay.take, 'hang_ups': lambda: relay.hang_ups},
+    )
 
 
 class Relay:
@@ -158,7 +161,9 @@ class Way:
     def note(self, marks: list[Mark], now: int, data: bytes) -> None:
         """Add what came from the driver to the marks."""
         if self.noted == 'reverse_port':
-            marks += [Mark(now, self.noted, len(data), message.mode, message.payload[0])
-                      for message in self._messages.feed(data)]
+            marks += [
+                Mark(now, self.noted, len(data), message.mode, message.payload[0])
+                for message in self._messages.feed(data)
+            ]
         elif self.noted:
             marks.append(Mark(now, self.noted, len(data)))

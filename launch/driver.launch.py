@@ -14,45 +14,75 @@ from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
-MODELS = ['ur3', 'ur5', 'ur10', 'ur3e', 'ur5e', 'ur7e', 'ur10e', 'ur12e', 'ur16e', 'ur8long',
-          'ur15', 'ur18', 'ur20', 'ur30']
+MODELS = [
+    'ur3',
+    'ur5',
+    'ur10',
+    'ur3e',
+    'ur5e',
+    'ur7e',
+    'ur10e',
+    'ur12e',
+    'ur16e',
+    'ur8long',
+    'ur15',
+    'ur18',
+    'ur20',
+    'ur30',
+]
 PACKAGE = 'ur_cartesian_driver'
 
 ARGUMENTS = [
     DeclareLaunchArgument(
-        'ur_type', choices=MODELS,
-        description='Model of the robot; a robot that reports another one is refused.'),
+        'ur_type',
+        choices=MODELS,
+        description='Model of the robot; a robot that reports another one is refused.',
+    ),
+    DeclareLaunchArgument('robot_ip', description='Address of the robot.'),
     DeclareLaunchArgument(
-        'robot_ip', description='Address of the robot.'),
-    DeclareLaunchArgument(
-        'reverse_ip', default_value='',
+        'reverse_ip',
+        default_value='',
         description='Address at which the robot reaches this computer (NAT, containers). Empty: '
-                    'the local address of the connection to the robot.'),
+        'the local address of the connection to the robot.',
+    ),
     DeclareLaunchArgument(
-        'headless_mode', default_value='false', choices=['true', 'false'],
+        'headless_mode',
+        default_value='false',
+        choices=['true', 'false'],
         description='Send the robot program directly, instead of serving it to the External '
-                    'Control URCap. Needs remote control on the pendant.'),
+        'Control URCap. Needs remote control on the pendant.',
+    ),
     DeclareLaunchArgument(
-        'tf_prefix', default_value='',
-        description='Prefix of joint and frame names, for example left_.'),
+        'tf_prefix',
+        default_value='',
+        description='Prefix of joint and frame names, for example left_.',
+    ),
     DeclareLaunchArgument(
-        'reverse_port', default_value='50001',
-        description='Port to which the robot program connects for control messages.'),
+        'reverse_port',
+        default_value='50001',
+        description='Port to which the robot program connects for control messages.',
+    ),
     DeclareLaunchArgument(
-        'script_sender_port', default_value='50002',
-        description='Port that serves the robot program to the External Control URCap.'),
+        'script_sender_port',
+        default_value='50002',
+        description='Port that serves the robot program to the External Control URCap.',
+    ),
     DeclareLaunchArgument(
-        'trajectory_port', default_value='50003',
-        description='Port to which the robot program connects for trajectory points.'),
+        'trajectory_port',
+        default_value='50003',
+        description='Port to which the robot program connects for trajectory points.',
+    ),
     DeclareLaunchArgument(
-        'script_command_port', default_value='50004',
-        description='Port to which the robot program connects for single commands.'),
-    DeclareLaunchArgument(
-        'namespace', default_value='', description='Namespace of the node.'),
+        'script_command_port',
+        default_value='50004',
+        description='Port to which the robot program connects for single commands.',
+    ),
+    DeclareLaunchArgument('namespace', default_value='', description='Namespace of the node.'),
     DeclareLaunchArgument(
         'config_file',
         default_value=PathJoinSubstitution([FindPackageShare(PACKAGE), 'config', 'driver.yaml']),
-        description='YAML file with parameters; the arguments above go before it.'),
+        description='YAML file with parameters; the arguments above go before it.',
+    ),
 ]
 STRINGS = ['ur_type', 'robot_ip', 'reverse_ip', 'tf_prefix']
 PORTS = ['reverse_port', 'script_sender_port', 'trajectory_port', 'script_command_port']
@@ -62,8 +92,10 @@ def generate_launch_description():
     """Return the arguments and the node."""
     # Without a type, launch would read a value as YAML: robot_ip 10 would become a number.
     types = {'headless_mode': bool, **dict.fromkeys(STRINGS, str), **dict.fromkeys(PORTS, int)}
-    parameters = {name: ParameterValue(LaunchConfiguration(name), value_type=type_)
-                  for name, type_ in types.items()}
+    parameters = {
+        name: ParameterValue(LaunchConfiguration(name), value_type=type_)
+        for name, type_ in types.items()
+    }
     driver = Node(
         package=PACKAGE,
         executable='driver',

@@ -16,18 +16,21 @@ from launch_ros.substitutions import ExecutableInPackage, FindPackageShare
 PACKAGE = 'ur_cartesian_driver'
 
 ARGUMENTS = [
+    DeclareLaunchArgument('ur_type', default_value='ur5e', description='Model of the robot.'),
     DeclareLaunchArgument(
-        'ur_type', default_value='ur5e', description='Model of the robot.'),
+        'robot_ip',
+        default_value='127.0.0.1',
+        description='Address at which the simulated controller listens.',
+    ),
     DeclareLaunchArgument(
-        'robot_ip', default_value='127.0.0.1',
-        description='Address at which the simulated controller listens.'),
+        'polyscope',
+        default_value='',
+        description='Version of the simulated controller. Empty: the newest for the model.',
+    ),
     DeclareLaunchArgument(
-        'polyscope', default_value='',
-        description='Version of the simulated controller. Empty: the newest for the model.'),
-    DeclareLaunchArgument(
-        'tf_prefix', default_value='', description='Prefix of joint and frame names.'),
-    DeclareLaunchArgument(
-        'namespace', default_value='', description='Namespace of the node.'),
+        'tf_prefix', default_value='', description='Prefix of joint and frame names.'
+    ),
+    DeclareLaunchArgument('namespace', default_value='', description='Namespace of the node.'),
 ]
 
 
@@ -36,9 +39,12 @@ def generate_launch_description():
     simulator = ExecuteProcess(
         cmd=[
             ExecutableInPackage(package=PACKAGE, executable='sim'),
-            '--model', LaunchConfiguration('ur_type'),
-            '--host', LaunchConfiguration('robot_ip'),
-            '--polyscope', LaunchConfiguration('polyscope'),
+            '--model',
+            LaunchConfiguration('ur_type'),
+            '--host',
+            LaunchConfiguration('robot_ip'),
+            '--polyscope',
+            LaunchConfiguration('polyscope'),
         ],
         output='screen',
         on_exit=Shutdown(),
@@ -46,10 +52,13 @@ def generate_launch_description():
     ports = ['reverse_port', 'script_sender_port', 'trajectory_port', 'script_command_port']
     driver = IncludeLaunchDescription(
         PythonLaunchDescriptionSource(
-            PathJoinSubstitution([FindPackageShare(PACKAGE), 'launch', 'driver.launch.py'])),
+            PathJoinSubstitution([FindPackageShare(PACKAGE), 'launch', 'driver.launch.py'])
+        ),
         launch_arguments={
-            **{name: LaunchConfiguration(name)
-               for name in ('ur_type', 'robot_ip', 'tf_prefix', 'namespace')},
+            **{
+                name: LaunchConfiguration(name)
+                for name in ('ur_type', 'robot_ip', 'tf_prefix', 'namespace')
+            },
             'headless_mode': 'true',
             **dict.fromkeys(ports, '0'),  # any free ones: nothing has to be known beforehand
         }.items(),

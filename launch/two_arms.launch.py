@@ -23,13 +23,17 @@ ARGUMENTS = [
     DeclareLaunchArgument('left_ur_type', default_value='ur5e', description='Its model.'),
     DeclareLaunchArgument('right_ur_type', default_value='ur5e', description='Its model.'),
     DeclareLaunchArgument(
-        'headless_mode', default_value='false', choices=['true', 'false'],
+        'headless_mode',
+        default_value='false',
+        choices=['true', 'false'],
         description='Send the robot programs directly, instead of serving them to the External '
-                    'Control URCap. Needs remote control on the pendants.'),
+        'Control URCap. Needs remote control on the pendants.',
+    ),
     DeclareLaunchArgument(
         'config_file',
         default_value=PathJoinSubstitution([FindPackageShare(PACKAGE), 'config', 'driver.yaml']),
-        description='YAML file with parameters for both; what is said here goes before it.'),
+        description='YAML file with parameters for both; what is said here goes before it.',
+    ),
 ]
 PORTS = ['reverse_port', 'script_sender_port', 'trajectory_port', 'script_command_port']
 #: The pendant has to know the script sender: 50002 of the left robot, 50012 of the right one.
@@ -38,6 +42,7 @@ FIRST_PORT = {'left': 50001, 'right': 50011}
 
 def driver(side):
     """Return the node of one side."""
+
     def text(name):
         # Without a type, launch would read a value as YAML: robot_ip 10 would become a number.
         return ParameterValue(LaunchConfiguration(f'{side}_{name}'), value_type=str)

@@ -29,43 +29,60 @@ def pages() -> dict[str, str]:
     """Return the text of each file of doc/diagrams/ by its name."""
     return {
         'connection.md': page(
-            'The connection to the robot', 'ur_cartesian_driver/robot/lifecycle.py',
-            connection(), [change.name for change in lifecycle.Change]),
+            'The connection to the robot',
+            'ur_cartesian_driver/robot/lifecycle.py',
+            connection(),
+            [change.name for change in lifecycle.Change],
+        ),
         'trajectory.md': page(
             'A goal on its way through the robot program',
             'ur_cartesian_driver/execution/states.py',
-            goal(), [signal.name for signal in states.Signal]),
+            goal(),
+            [signal.name for signal in states.Signal],
+        ),
         'servo.md': page(
-            'Streaming of set-points', 'ur_cartesian_driver/execution/servo_stream.py',
-            servo(), [change.name for change in servo_stream.Change]),
+            'Streaming of set-points',
+            'ur_cartesian_driver/execution/servo_stream.py',
+            servo(),
+            [change.name for change in servo_stream.Change],
+        ),
     }
 
 
 def connection() -> Table:
     """Return the table of the connection."""
-    return {state.name: {change.name: (then.name, '') for change, then in row.items()}
-            for state, row in lifecycle.TRANSITIONS.items()}
+    return {
+        state.name: {change.name: (then.name, '') for change, then in row.items()}
+        for state, row in lifecycle.TRANSITIONS.items()
+    }
 
 
 def goal() -> Table:
     """Return the table of a goal; the remark is the error code that is decided there."""
-    return {state.name: {signal.name: (step.state.name, _name(step.code))
-                         for signal, step in row.items()}
-            for state, row in states.TRANSITIONS.items()}
+    return {
+        state.name: {
+            signal.name: (step.state.name, _name(step.code)) for signal, step in row.items()
+        }
+        for state, row in states.TRANSITIONS.items()
+    }
 
 
 def servo() -> Table:
     """Return the table of the streaming of set-points."""
-    return {phase.name: {change.name: (then.name, '') for change, then in row.items()}
-            for phase, row in servo_stream.TRANSITIONS.items()}
+    return {
+        phase.name: {change.name: (then.name, '') for change, then in row.items()}
+        for phase, row in servo_stream.TRANSITIONS.items()
+    }
 
 
 def page(title: str, source: str, table: Table, events: Sequence[str]) -> str:
     """Return a page: the diagram, and the whole table with what leaves a state as it is."""
-    return (f'# {title}\n\n'
-            f'Made by `scripts/make_diagrams.py` from `TRANSITIONS` of\n'
-            f'[{source}](../../{source}), where the states are described. Do not edit.\n\n'
-            f'```mermaid\n{diagram(table)}```\n\n{rows(table, events)}')
+    return (
+        f'# {title}\n\n'
+        f'Made by `scripts/make_diagrams.py` from `TRANSITIONS` of\n'
+        f'[{source}](../../{source}), where the states are described. Do not edit.\n\n'
+        f'```mermaid\n{diagram(table)}```\n\n{rows(table, events)}'
+    )
 
 
 def diagram(table: Table) -> str:
@@ -76,8 +93,7 @@ def diagram(table: Table) -> str:
         for event, (then, _) in row.items():
             if then != state:
                 arrows.setdefault(then, []).append(event)
-        lines += [f'    {state} --> {then}: {", ".join(names)}'
-                  for then, names in arrows.items()]
+        lines += [f'    {state} --> {then}: {", ".join(names)}' for then, names in arrows.items()]
         if not row:
             lines.append(f'    {state} --> [*]')
     return '\n'.join(lines) + '\n'
@@ -86,8 +102,10 @@ def diagram(table: Table) -> str:
 def rows(table: Table, events: Sequence[str]) -> str:
     """Return the table in Markdown: a row for each event, a column for each state."""
     lines = [_row('', *table), _row(*['---'] * (1 + len(table)))]
-    lines += [_row(event, *(_cell(state, row.get(event)) for state, row in table.items()))
-              for event in events]
+    lines += [
+        _row(event, *(_cell(state, row.get(event)) for state, row in table.items()))
+        for event in events
+    ]
     return '\n'.join(lines) + '\n'
 
 

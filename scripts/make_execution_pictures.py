@@ -33,14 +33,16 @@ class Picture:
     happens: Callable[[Any], Coroutine[None, None, Any]]
 
 
-def a_goal(name: str, *faults: str,
-           execution: str = '') -> Callable[[Any], Coroutine[None, None, Any]]:
+def a_goal(
+    name: str, *faults: str, execution: str = ''
+) -> Callable[[Any], Coroutine[None, None, Any]]:
     """
     Return the execution of an example.
 
     :param faults: as on the command line of ``ur-cartesian sim``.
     :param execution: in the place of that of the file.
     """
+
     async def happens(cell: Any) -> Any:
         from ur_cartesian_driver.cli.commands import goal_file
         from ur_cartesian_driver.kinematics.chain import Arm
@@ -53,13 +55,15 @@ def a_goal(name: str, *faults: str,
         from ur_cartesian_driver.sim.fault_text import parse_fault
 
         state = cell.memory.read()
-        goal = goal_from_message(load_goal(goal_file(name)), Frames(), now=0,
-                                 stand=Stand.of(state))
+        goal = goal_from_message(
+            load_goal(goal_file(name)), Frames(), now=0, stand=Stand.of(state)
+        )
         cell.robot.inject(*map(parse_fault, faults))
         if execution:
             goal = replace(goal, execution=ExecutionMode[execution])
-        motion = cell.owner.start(plan(
-            goal, state, Arm(robot_model(cell.robot.config.model)), PlanningOptions()))
+        motion = cell.owner.start(
+            plan(goal, state, Arm(robot_model(cell.robot.config.model)), PlanningOptions())
+        )
         await cell.until(lambda: motion.outcome is not None, 120.0)
         return motion.outcome
 
@@ -73,12 +77,18 @@ async def a_late_producer(cell: Any) -> Any:
     from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, ZERO6
 
     home = cell.memory.read().actual_tcp_pose
-    motion = OpenMotion(cell, Goal(waypoints=tuple(circle(home, 1, 10)), keep_open=True,
-                                   execution=ExecutionMode.SPLINE))
+    motion = OpenMotion(
+        cell,
+        Goal(waypoints=tuple(circle(home, 1, 10)), keep_open=True, execution=ExecutionMode.SPLINE),
+    )
     while motion.points < 80:
         late = motion.points == 40
-        await motion.until(lambda late=late: motion.motion.progress and (
-            motion.progress.waits if late else motion.progress.time_remaining < 0.5))
+        await motion.until(
+            lambda late=late: (
+                motion.motion.progress
+                and (motion.progress.waits if late else motion.progress.time_remaining < 0.5)
+            )
+        )
         if late:
             await cell.sleep(0.6)
         points = circle(home, motion.points + 1, 10)
@@ -92,20 +102,26 @@ async def a_late_producer(cell: Any) -> Any:
 PICTURES = {
     'primitives': Picture(
         title='Lines, an arc and blends (PRIMITIVES); the speed slider at 50 % for a while',
-        happens=a_goal('seam', 'slider 0.5 at 0.6 m', 'slider 1 at 0.7 m')),
+        happens=a_goal('seam', 'slider 0.5 at 0.6 m', 'slider 1 at 0.7 m'),
+    ),
     'spline': Picture(
         title='A figure eight with times and twists (SPLINE): no stop, no corner',
-        happens=a_goal('figure_eight')),
+        happens=a_goal('figure_eight'),
+    ),
     'servo': Picture(
         title='The same by set-points (SERVO); the speed slider at 50 % for a while',
-        happens=a_goal('figure_eight', 'slider 0.5 at 0.3 m', 'slider 1 at 0.5 m',
-                       execution='SERVO')),
+        happens=a_goal(
+            'figure_eight', 'slider 0.5 at 0.3 m', 'slider 1 at 0.5 m', execution='SERVO'
+        ),
+    ),
     'outputs': Picture(
         title='A bead of glue: a valve that opens and closes on the way (io_commands)',
-        happens=a_goal('glue')),
+        happens=a_goal('glue'),
+    ),
     'open': Picture(
         title='Points that come while the arm goes (keep_open); once they come too late',
-        happens=a_late_producer),
+        happens=a_late_producer,
+    ),
 }
 
 

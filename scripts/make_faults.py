@@ -72,8 +72,14 @@ fault is the only one in which that is looked at.
 
 """
 
-TITLES = ('fault', 'the goal ends', 'result within', 'arm stands within', 'then the driver is',
-          'what to do')
+TITLES = (
+    'fault',
+    'the goal ends',
+    'result within',
+    'arm stands within',
+    'then the driver is',
+    'what to do',
+)
 
 
 def page() -> str:
@@ -82,22 +88,44 @@ def page() -> str:
     from fault_table import CONTINUED, HEADLESS, LOCAL, PHASES
 
     travel = max(row.at(phase).travel for row in LOCAL for phase in PHASES)
-    return ''.join((
-        HEAD, '## Phases\n\n', _table(('phase', 'when'), PHASES.items()), '\n',
-        HEADLESS_HEAD, _faults(HEADLESS, PHASES), '\n',
-        LOCAL_HEAD.format(travel=travel), _faults(LOCAL, PHASES), '\n',
-        CONTINUED_HEAD, _faults(CONTINUED, PHASES), '\n', MODES_HEAD,
-        '\n'.join(map(_mode, MODES))))
+    return ''.join(
+        (
+            HEAD,
+            '## Phases\n\n',
+            _table(('phase', 'when'), PHASES.items()),
+            '\n',
+            HEADLESS_HEAD,
+            _faults(HEADLESS, PHASES),
+            '\n',
+            LOCAL_HEAD.format(travel=travel),
+            _faults(LOCAL, PHASES),
+            '\n',
+            CONTINUED_HEAD,
+            _faults(CONTINUED, PHASES),
+            '\n',
+            MODES_HEAD,
+            '\n'.join(map(_mode, MODES)),
+        )
+    )
 
 
 def _mode(mode: Mode) -> str:
     """Return the section of a way of execution."""
-    return ''.join((
-        f'### {mode.name}\n\n{mode.about}\n\n', _table(('phase', 'when'), mode.phases.items()),
-        '\n', _faults(mode.headless, mode.phases), '\nIn local control:\n\n',
-        _faults(mode.local, mode.phases),
-        *(('\nWith `after_robot_stop: continue`:\n\n', _faults(mode.continued, mode.phases))
-          if mode.continued else ())))
+    return ''.join(
+        (
+            f'### {mode.name}\n\n{mode.about}\n\n',
+            _table(('phase', 'when'), mode.phases.items()),
+            '\n',
+            _faults(mode.headless, mode.phases),
+            '\nIn local control:\n\n',
+            _faults(mode.local, mode.phases),
+            *(
+                ('\nWith `after_robot_stop: continue`:\n\n', _faults(mode.continued, mode.phases))
+                if mode.continued
+                else ()
+            ),
+        )
+    )
 
 
 def _faults(rows: Iterable[Row], phases: Iterable[str]) -> str:
@@ -109,11 +137,14 @@ def _cells(row: Row, phases: Sequence[str]) -> Sequence[str]:
         return _by_phase(row, phases, what)
 
     where = f' ({", ".join(row.phases)})' if row.phases else ''
-    return (row.fault + where, tell(lambda at: ('goes on, ' if at.waits else '') + at.code.name),
-            tell(lambda at: f'{at.bound:g} s' if _disturbs(at) else 'as without'),
-            tell(lambda at: f'{at.rest:g} s' if _disturbs(at) or at.waits else 'as without'),
-            tell(lambda at: at.then.name),
-            tell(lambda at: ', '.join(_needed(at.steps)) or 'nothing'))
+    return (
+        row.fault + where,
+        tell(lambda at: ('goes on, ' if at.waits else '') + at.code.name),
+        tell(lambda at: f'{at.bound:g} s' if _disturbs(at) else 'as without'),
+        tell(lambda at: f'{at.rest:g} s' if _disturbs(at) or at.waits else 'as without'),
+        tell(lambda at: at.then.name),
+        tell(lambda at: ', '.join(_needed(at.steps)) or 'nothing'),
+    )
 
 
 def _disturbs(row: Row) -> bool:
@@ -122,7 +153,7 @@ def _disturbs(row: Row) -> bool:
 
 def _needed(steps: Sequence[str]) -> list[str]:
     """Return the steps without the vain play of a third client."""
-    return [step for i, step in enumerate(steps) if tuple(steps[i:i + 2]) != ('play', 'resend')]
+    return [step for i, step in enumerate(steps) if tuple(steps[i : i + 2]) != ('play', 'resend')]
 
 
 def _by_phase(row: Row, phases: Sequence[str], tell: Callable[[Row], str]) -> str:
@@ -134,8 +165,9 @@ def _by_phase(row: Row, phases: Sequence[str], tell: Callable[[Row], str]) -> st
     if usual not in phases_of:  # what would be usual is in no phase
         usual = next(iter(phases_of))
     phases_of.pop(usual)
-    return '<br>'.join([usual, *(f'{", ".join(phases)}: {text}'
-                                 for text, phases in phases_of.items())])
+    return '<br>'.join(
+        [usual, *(f'{", ".join(phases)}: {text}' for text, phases in phases_of.items())]
+    )
 
 
 def _table(titles: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -12,8 +12,10 @@ settings.load_profile('any machine')
 
 def pytest_addoption(parser):
     parser.addoption(
-        '--no-skips', action='store_true',
-        help='count what is skipped as failed: `make test` runs where all is installed')
+        '--no-skips',
+        action='store_true',
+        help='count what is skipped as failed: `make test` runs where all is installed',
+    )
 
 
 @pytest.hookimpl(wrapper=True)

@@ -18,16 +18,21 @@ NAME = 'ur_cartesian_driver'
 PACKAGE = Path(ur_cartesian_driver.__file__).parent
 GENERATED = {f'{NAME}.{kind}' for kind in ('action', 'msg', 'srv')}
 MAY_IMPORT_GENERATED = ('ros/', 'pytest_plugin.py')
-HEADER = ('# Copyright 2026 the ur_cartesian_driver contributors\n'
-          '# SPDX-License-Identifier: Apache-2.0\n')
+HEADER = (
+    '# Copyright 2026 the ur_cartesian_driver contributors\n'
+    '# SPDX-License-Identifier: Apache-2.0\n'
+)
 NAMES_WITHOUT_A_CONCEPT = ('common', 'helper', 'manager', 'misc', 'util')
 
 
 def modules():
     """Return our own modules, by path in the package; an installed package also has others."""
     paths = (path.relative_to(PACKAGE) for path in PACKAGE.rglob('*.py'))
-    return {path.as_posix(): PACKAGE / path for path in sorted(paths)
-            if path.parts[0] not in ('action', 'msg', 'srv')}
+    return {
+        path.as_posix(): PACKAGE / path
+        for path in sorted(paths)
+        if path.parts[0] not in ('action', 'msg', 'srv')
+    }
 
 
 def imported(tree: ast.AST) -> set[str]:
@@ -43,14 +48,18 @@ def imported(tree: ast.AST) -> set[str]:
 
 
 def generated_imports(tree: ast.AST) -> set[str]:
-    return {name for name in imported(tree)
-            if '.'.join(name.split('.')[:2]) in GENERATED}
+    return {name for name in imported(tree) if '.'.join(name.split('.')[:2]) in GENERATED}
 
 
-@pytest.mark.parametrize('source', [
-    'import ur_cartesian_driver.msg', 'from ur_cartesian_driver import action',
-    'from ur_cartesian_driver.srv import AppendPoints', 'import ur_cartesian_driver.msg as m',
-])
+@pytest.mark.parametrize(
+    'source',
+    [
+        'import ur_cartesian_driver.msg',
+        'from ur_cartesian_driver import action',
+        'from ur_cartesian_driver.srv import AppendPoints',
+        'import ur_cartesian_driver.msg as m',
+    ],
+)
 def test_an_import_of_generated_modules_is_seen(source):
     assert generated_imports(ast.parse(source))
 
@@ -59,8 +68,9 @@ def test_an_import_of_our_own_modules_is_not_taken_for_a_generated_one():
     assert not generated_imports(ast.parse('from ur_cartesian_driver.motion import pose'))
 
 
-@pytest.mark.parametrize('name', [name for name in modules()
-                                  if not name.startswith(MAY_IMPORT_GENERATED)])
+@pytest.mark.parametrize(
+    'name', [name for name in modules() if not name.startswith(MAY_IMPORT_GENERATED)]
+)
 def test_only_the_ros_border_imports_generated_modules(name):
     assert generated_imports(ast.parse(modules()[name].read_text())) == set()
 
@@ -72,8 +82,11 @@ def test_a_module_says_its_licence_and_what_it_is_for(name):
     assert ast.get_docstring(ast.parse(source))
 
 
-@pytest.mark.parametrize('path', sorted(Path(__file__).parent.rglob('*.py')),
-                         ids=lambda p: p.relative_to(Path(__file__).parent).as_posix())
+@pytest.mark.parametrize(
+    'path',
+    sorted(Path(__file__).parent.rglob('*.py')),
+    ids=lambda p: p.relative_to(Path(__file__).parent).as_posix(),
+)
 def test_a_test_says_its_licence(path):
     assert path.read_text().startswith(HEADER)
 
@@ -84,7 +97,10 @@ def test_no_module_is_named_for_having_no_concept():
 
 
 def test_a_package_that_may_be_anywhere_is_imported_by_its_full_name():
-    relative = [name for name, path in modules().items()
-                for node in ast.walk(ast.parse(path.read_text()))
-                if isinstance(node, ast.ImportFrom) and node.level]
+    relative = [
+        name
+        for name, path in modules().items()
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.ImportFrom) and node.level
+    ]
     assert relative == []

@@ -33,7 +33,8 @@ from ur_cartesian_driver.sim.faults import After
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(
-    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has the documents')
+    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has the documents'
+)
 
 ERRORS = CHECKOUT / 'doc' / 'errors.md'
 #: Codes that no example of one goal and one robot can show.
@@ -43,21 +44,26 @@ WITHOUT_EXAMPLE = {ErrorCode.PREEMPTED}
 def examples(document, *names):
     """Return the blocks whose first command is one of the names, as words and output."""
     found = []
-    for body in re.findall(r'^```console\n(.*?)^```$', document.read_text(encoding='utf-8'),
-                           re.DOTALL | re.MULTILINE):
+    for body in re.findall(
+        r'^```console\n(.*?)^```$', document.read_text(encoding='utf-8'), re.DOTALL | re.MULTILINE
+    ):
         lines = body.splitlines()
-        commands = [shlex.split(line, comments=True)[1:]
-                    for line in takewhile(lambda line: line.startswith('$ '), lines)]
+        commands = [
+            shlex.split(line, comments=True)[1:]
+            for line in takewhile(lambda line: line.startswith('$ '), lines)
+        ]
         if commands and commands[0][:1] == ['ur-cartesian'] and commands[0][1] in names:
-            found.append((commands, '\n'.join(lines[len(commands):])))
+            found.append((commands, '\n'.join(lines[len(commands) :])))
     return found
 
 
 def all_examples(*names):
-    return [pytest.param(commands, shown, id=f'{document.stem}-{" ".join(commands[-1][1:])}')
-            for document in sorted(CHECKOUT.glob('doc/*.md'))
-            for commands, shown in examples(document, *names)
-            if 'validate' in names or len(commands) == 2]
+    return [
+        pytest.param(commands, shown, id=f'{document.stem}-{" ".join(commands[-1][1:])}')
+        for document in sorted(CHECKOUT.glob('doc/*.md'))
+        for commands, shown in examples(document, *names)
+        if 'validate' in names or len(commands) == 2
+    ]
 
 
 def assert_shows(shown, came):
@@ -83,13 +89,15 @@ def test_validate_says_what_the_document_shows(commands, shown, capsys):
 def sent(cell, words):
     """Return the plan of a goal for the robot of a cell."""
     state = cell.memory.read()
-    goal = goal_from_message(load_goal(goal_file(words.file)), Frames(), now=0,
-                             stand=Stand.of(state))
+    goal = goal_from_message(
+        load_goal(goal_file(words.file)), Frames(), now=0, stand=Stand.of(state)
+    )
     return plan(goal, state, Arm(robot_model(cell.robot.config.model)), PlanningOptions())
 
 
 def ended(sim, send, cancel_after):
     """Return how a goal ends while the faults of a ``sim`` happen."""
+
     async def scenario(cell):
         cell.robot.inject(*sim.faults)
         motion = cell.owner.start(sent(cell, send))
@@ -104,11 +112,22 @@ def ended(sim, send, cancel_after):
 
 def by_a_robot_that_is_not_ready(sim, send):
     """Return how a goal ends for a robot that cannot take it."""
-    with SimulatedRobot(simulator_config(sim)) as robot, Driver(DriverConfig(
-            rtde_port=robot.ports.rtde, primary_port=robot.ports.primary,
-            dashboard_port=robot.ports.dashboard, reverse_port=0, script_sender_port=0,
-            trajectory_port=0, script_command_port=0, robot_loop='thread',
-            headless_mode=True)) as driver:
+    with (
+        SimulatedRobot(simulator_config(sim)) as robot,
+        Driver(
+            DriverConfig(
+                rtde_port=robot.ports.rtde,
+                primary_port=robot.ports.primary,
+                dashboard_port=robot.ports.dashboard,
+                reverse_port=0,
+                script_sender_port=0,
+                trajectory_port=0,
+                script_command_port=0,
+                robot_loop='thread',
+                headless_mode=True,
+            )
+        ) as driver,
+    ):
         deadline = monotonic() + 10.0
         while driver.status.state is not ConnectionState.CONNECTED:
             assert monotonic() < deadline
@@ -128,8 +147,9 @@ def status_line(code, text):
 @pytest.mark.parametrize(('commands', 'shown'), all_examples('sim'))
 def test_a_goal_ends_as_the_document_shows(commands, shown):
     (_, *sim), (_, *send) = commands
-    started = parser().parse_args([*sim, '--rtde-port', '0', '--primary-port', '0',
-                                   '--dashboard-port', '0'])
+    started = parser().parse_args(
+        [*sim, '--rtde-port', '0', '--primary-port', '0', '--dashboard-port', '0']
+    )
     request = parser().parse_args(send)
     # A reader needs some time between the commands.
     assert not [fault for fault in started.faults if isinstance(fault.when, After)]
@@ -152,6 +172,11 @@ def test_every_code_has_an_example():
 
 def test_every_goal_for_an_error_is_in_the_document():
     folder = share_path() / 'config' / 'examples' / 'errors'
-    used = {word for commands, _ in examples(ERRORS, 'validate', 'sim') for words in commands
-            for word in words if word.startswith('errors/')}
+    used = {
+        word
+        for commands, _ in examples(ERRORS, 'validate', 'sim')
+        for words in commands
+        for word in words
+        if word.startswith('errors/')
+    }
     assert used == {f'errors/{path.stem}' for path in folder.glob('*.yaml')}

@@ -84,27 +84,53 @@ FZI = {
     },
 }
 FZI_CODES = {
-    'SUCCESSFUL': 0, 'INVALID_GOAL': -1, 'INVALID_JOINTS': -2, 'OLD_HEADER_TIMESTAMP': -3,
-    'PATH_TOLERANCE_VIOLATED': -4, 'GOAL_TOLERANCE_VIOLATED': -5, 'INVALID_POSTURE': -6,
+    'SUCCESSFUL': 0,
+    'INVALID_GOAL': -1,
+    'INVALID_JOINTS': -2,
+    'OLD_HEADER_TIMESTAMP': -3,
+    'PATH_TOLERANCE_VIOLATED': -4,
+    'GOAL_TOLERANCE_VIOLATED': -5,
+    'INVALID_POSTURE': -6,
 }
 ALL = [
-    *FZI, DriverStatus, IOCommand, IOStates, MotionSegment, RobotModeMessage, SafetyModeMessage,
-    ServoState, ToolData,
-    *(part for service in (AppendPoints, Load, Popup, RawRequest, SetIO, SetPayload,
-                           SetSpeedSliderFraction, SetTCP)
-      for part in (service.Request, service.Response)),
+    *FZI,
+    DriverStatus,
+    IOCommand,
+    IOStates,
+    MotionSegment,
+    RobotModeMessage,
+    SafetyModeMessage,
+    ServoState,
+    ToolData,
+    *(
+        part
+        for service in (
+            AppendPoints,
+            Load,
+            Popup,
+            RawRequest,
+            SetIO,
+            SetPayload,
+            SetSpeedSliderFraction,
+            SetTCP,
+        )
+        for part in (service.Request, service.Response)
+    ),
 ]
 
 
 def constants(message: type, pattern: str = '') -> dict[str, int]:
-    return {name: getattr(message, name) for name in dir(type(message))
-            if re.match('[A-Z]', name) and re.match(pattern, name)}
+    return {
+        name: getattr(message, name)
+        for name in dir(type(message))
+        if re.match('[A-Z]', name) and re.match(pattern, name)
+    }
 
 
 @pytest.mark.parametrize('message', FZI, ids=lambda m: m.__name__)
 def test_fields_of_the_proposal_stand_first_and_are_unchanged(message):
     fields = list(message.get_fields_and_field_types().items())
-    assert fields[:len(FZI[message])] == list(FZI[message].items())
+    assert fields[: len(FZI[message])] == list(FZI[message].items())
 
 
 @pytest.mark.parametrize('message', list(FZI)[:4], ids=lambda m: m.__name__)
@@ -123,37 +149,44 @@ def test_error_codes_are_distinct_and_without_gaps():
     assert len(codes) == 19
 
 
-@pytest.mark.parametrize(('message', 'pattern', 'values'), [
-    (MotionSegment, '(?!ARC_)', range(7)),
-    (MotionSegment, 'ARC_', range(2)),
-    (IOCommand, '.*_(DIGITAL|ANALOG)$', range(4)),
-    (FollowCartesianTrajectory.Goal, 'EXECUTION_', range(4)),
-    (DriverStatus, '(?!ROBOT_MODE_|SAFETY_MODE_)', range(7)),
-    (ServoState, '', range(5)),
-])
+@pytest.mark.parametrize(
+    ('message', 'pattern', 'values'),
+    [
+        (MotionSegment, '(?!ARC_)', range(7)),
+        (MotionSegment, 'ARC_', range(2)),
+        (IOCommand, '.*_(DIGITAL|ANALOG)$', range(4)),
+        (FollowCartesianTrajectory.Goal, 'EXECUTION_', range(4)),
+        (DriverStatus, '(?!ROBOT_MODE_|SAFETY_MODE_)', range(7)),
+        (ServoState, '', range(5)),
+    ],
+)
 def test_constants_of_a_choice_count_up(message, pattern, values):
     assert sorted(constants(message, pattern).values()) == list(values)
 
 
-@pytest.mark.parametrize(('enum', 'message', 'prefix', 'only_in_the_message'), [
-    (ErrorCode, FollowCartesianTrajectory.Result, '', {}),
-    (ExecutionMode, FollowCartesianTrajectory.Goal, 'EXECUTION_', {}),
-    (SegmentType, MotionSegment, '(?!ARC_)', {}),
-    (ArcMode, MotionSegment, 'ARC_', {}),
-    (OutputKind, IOCommand, '(?=.*_(DIGITAL|ANALOG)$)', {}),
-    (RobotMode, DriverStatus, 'ROBOT_MODE_', {'UNKNOWN': -2}),
-    (SafetyMode, DriverStatus, 'SAFETY_MODE_', {'UNKNOWN': 0}),
-    (RobotMode, RobotModeMessage, '', {'UNKNOWN': -2}),
-    (SafetyMode, SafetyModeMessage, '', {'UNKNOWN': 0}),
-    (AnalogDomain, IOStates, '', {}),
-    (AnalogDomain, ToolData, '', {}),
-    (AnalogDomain, IOCommand, '(?=CURRENT|VOLTAGE)', {}),
-    (AnalogDomain, SetIO.Request, '(?=CURRENT|VOLTAGE)', {}),
-    (OutputKind, SetIO.Request, '(?=.*_(DIGITAL|ANALOG)$)', {}),
-])
+@pytest.mark.parametrize(
+    ('enum', 'message', 'prefix', 'only_in_the_message'),
+    [
+        (ErrorCode, FollowCartesianTrajectory.Result, '', {}),
+        (ExecutionMode, FollowCartesianTrajectory.Goal, 'EXECUTION_', {}),
+        (SegmentType, MotionSegment, '(?!ARC_)', {}),
+        (ArcMode, MotionSegment, 'ARC_', {}),
+        (OutputKind, IOCommand, '(?=.*_(DIGITAL|ANALOG)$)', {}),
+        (RobotMode, DriverStatus, 'ROBOT_MODE_', {'UNKNOWN': -2}),
+        (SafetyMode, DriverStatus, 'SAFETY_MODE_', {'UNKNOWN': 0}),
+        (RobotMode, RobotModeMessage, '', {'UNKNOWN': -2}),
+        (SafetyMode, SafetyModeMessage, '', {'UNKNOWN': 0}),
+        (AnalogDomain, IOStates, '', {}),
+        (AnalogDomain, ToolData, '', {}),
+        (AnalogDomain, IOCommand, '(?=CURRENT|VOLTAGE)', {}),
+        (AnalogDomain, SetIO.Request, '(?=CURRENT|VOLTAGE)', {}),
+        (OutputKind, SetIO.Request, '(?=.*_(DIGITAL|ANALOG)$)', {}),
+    ],
+)
 def test_our_own_types_use_the_numbers_of_the_messages(enum, message, prefix, only_in_the_message):
-    numbers = {re.sub(f'^{prefix}', '', name): value
-               for name, value in constants(message, prefix).items()}
+    numbers = {
+        re.sub(f'^{prefix}', '', name): value for name, value in constants(message, prefix).items()
+    }
     assert numbers == {member.name: member.value for member in enum} | only_in_the_message
 
 
@@ -176,7 +209,8 @@ def test_a_goal_survives_the_way_over_the_wire():
         point.pose.position.x = 0.1 * i
         point.jerk.angular.y = math.nan if i == 2 else 2.5
         point.posture = CartesianPosture(
-            posture_joint_names=['elbow_joint'], posture_joint_values=[1.5])
+            posture_joint_names=['elbow_joint'], posture_joint_values=[1.5]
+        )
         goal.trajectory.points.append(point)
         goal.segments.append(MotionSegment(type=MotionSegment.CIRCULAR, blend_radius=0.01 * i))
     goal.io_commands = [IOCommand(point_index=1, output=IOCommand.STANDARD_ANALOG, value=0.5)]
@@ -192,8 +226,11 @@ def test_an_empty_message_survives_the_way_over_the_wire(message):
 
 
 def interface_files():
-    return sorted(path for kind in ('msg', 'srv', 'action')
-                  for path in (share_path() / kind).glob(f'*.{kind}'))
+    return sorted(
+        path
+        for kind in ('msg', 'srv', 'action')
+        for path in (share_path() / kind).glob(f'*.{kind}')
+    )
 
 
 def documented_fields(text: str) -> dict[str, str]:
@@ -214,20 +251,29 @@ def documented_fields(text: str) -> dict[str, str]:
 
 def test_there_are_interface_files():
     assert {path.stem for path in interface_files()} >= {
-        'CartesianTrajectory', 'FollowCartesianTrajectory', 'AppendPoints'}
+        'CartesianTrajectory',
+        'FollowCartesianTrajectory',
+        'AppendPoints',
+    }
 
 
 @pytest.mark.parametrize('path', interface_files(), ids=lambda p: p.name)
 def test_every_quantity_has_its_unit_in_a_comment(path):
     unit = re.compile(r'\[[^\]]+\]|fraction|[Pp]art of|0 to 1|from \w+ to')
     quantities = ('float64', 'geometry_msgs/', 'builtin_interfaces/Duration')
-    bare = [field for field, comment in documented_fields(path.read_text()).items()
-            if field.startswith(quantities) and not unit.search(comment)]
+    bare = [
+        field
+        for field, comment in documented_fields(path.read_text()).items()
+        if field.startswith(quantities) and not unit.search(comment)
+    ]
     assert not bare, f'{path.name}: say the unit of {bare}'
 
 
 @pytest.mark.parametrize('path', interface_files(), ids=lambda p: p.name)
 def test_every_field_is_documented(path):
-    bare = [field for field, comment in documented_fields(path.read_text()).items()
-            if not comment.strip()]
+    bare = [
+        field
+        for field, comment in documented_fields(path.read_text()).items()
+        if not comment.strip()
+    ]
     assert not bare, f'{path.name}: say what {bare} mean'

@@ -17,16 +17,30 @@ from ur_cartesian_driver.resources import share_path
 CHECKOUT = Path(__file__).resolve().parents[1]
 NAME = 'ur_cartesian_driver'
 needs_checkout = pytest.mark.skipif(
-    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has this file')
+    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has this file'
+)
 
 EXECUTABLES = ['driver', 'demo', 'send', 'sim', 'validate', 'where']
 LAUNCH_ARGUMENTS = {
     'driver.launch.py': {
-        'ur_type', 'robot_ip', 'reverse_ip', 'headless_mode', 'tf_prefix', 'reverse_port',
-        'script_sender_port', 'trajectory_port', 'script_command_port', 'namespace', 'config_file',
+        'ur_type',
+        'robot_ip',
+        'reverse_ip',
+        'headless_mode',
+        'tf_prefix',
+        'reverse_port',
+        'script_sender_port',
+        'trajectory_port',
+        'script_command_port',
+        'namespace',
+        'config_file',
     },
     'two_arms.launch.py': {
-        'left_robot_ip', 'right_robot_ip', 'left_ur_type', 'right_ur_type', 'headless_mode',
+        'left_robot_ip',
+        'right_robot_ip',
+        'left_ur_type',
+        'right_ur_type',
+        'headless_mode',
         'config_file',
     },
     'simulated_robot.launch.py': {'ur_type', 'robot_ip', 'polyscope', 'tf_prefix', 'namespace'},
@@ -59,8 +73,11 @@ def test_the_changelog_has_a_place_for_what_comes_next():
 @needs_checkout
 def test_every_interface_file_is_built():
     named = set(re.findall(r'"((?:msg|srv|action)/\w+\.\w+)"', cmake_lists()))
-    there = {f'{path.parent.name}/{path.name}'
-             for kind in ('msg', 'srv', 'action') for path in (CHECKOUT / kind).iterdir()}
+    there = {
+        f'{path.parent.name}/{path.name}'
+        for kind in ('msg', 'srv', 'action')
+        for path in (CHECKOUT / kind).iterdir()
+    }
     assert named == there
 
 
@@ -94,13 +111,16 @@ def test_the_command_line_has_the_command_of_an_executable(command, capsys):
 
 
 def test_console_scripts_and_executables_call_the_same_functions():
-    scripts = {script.name: script.value
-               for script in metadata.distribution(NAME).entry_points.select(
-                   group='console_scripts')}
+    scripts = {
+        script.name: script.value
+        for script in metadata.distribution(NAME).entry_points.select(group='console_scripts')
+    }
     if not scripts:
         pytest.skip('console scripts come with pip; this is an installation by colcon')
     assert scripts == {
-        'ur-cartesian-driver': f'{NAME}.ros.node:main', 'ur-cartesian': f'{NAME}.cli:main'}
+        'ur-cartesian-driver': f'{NAME}.ros.node:main',
+        'ur-cartesian': f'{NAME}.cli:main',
+    }
     for name, command in (('driver', 'ur-cartesian-driver'), ('sim', 'ur-cartesian')):
         module, function = scripts[command].split(':')
         source = (prefix_with_executables() / name).read_text()
@@ -119,15 +139,25 @@ def test_files_that_are_not_python_are_installed_with_the_package():
     assert any(path.name.endswith('.script') for path in package.joinpath('program').iterdir())
 
 
-@pytest.mark.parametrize('path', [
-    'config/driver.yaml', 'launch/driver.launch.py', 'msg/CartesianTrajectory.msg', 'package.xml'])
+@pytest.mark.parametrize(
+    'path',
+    [
+        'config/driver.yaml',
+        'launch/driver.launch.py',
+        'msg/CartesianTrajectory.msg',
+        'package.xml',
+    ],
+)
 def test_data_files_are_found(path):
     assert (share_path() / path).is_file()
 
 
 def calls(tree, name):
-    return [node for node in ast.walk(tree)
-            if isinstance(node, ast.Call) and ast.unparse(node.func) == name]
+    return [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == name
+    ]
 
 
 @pytest.mark.parametrize('name', LAUNCH_ARGUMENTS)
@@ -151,23 +181,42 @@ def test_the_launch_file_of_the_simulator_knows_the_arguments_of_the_other():
 
 def test_a_launch_file_starts_an_executable_that_is_installed():
     for path in sorted((share_path() / 'launch').glob('*.launch.py')):
-        started = [keyword.value for node in ast.walk(ast.parse(path.read_text()))
-                   if isinstance(node, ast.Call) for keyword in node.keywords
-                   if keyword.arg == 'executable']
+        started = [
+            keyword.value
+            for node in ast.walk(ast.parse(path.read_text()))
+            if isinstance(node, ast.Call)
+            for keyword in node.keywords
+            if keyword.arg == 'executable'
+        ]
         assert started, path.name
         assert {ast.literal_eval(value) for value in started} <= set(EXECUTABLES)
 
 
 def test_ros_packages_that_pip_installs_are_dependencies_of_the_ros_package():
-    required = {re.match(r'[\w-]+', line)[0] for line in metadata.requires(NAME) or []
-                if 'extra ==' not in line}
+    required = {
+        re.match(r'[\w-]+', line)[0]
+        for line in metadata.requires(NAME) or []
+        if 'extra ==' not in line
+    }
     if not required:
         pytest.skip('requirements come with pip; this is an installation by colcon')
-    ros = {name.removeprefix('ros-jazzy-').replace('-', '_')
-           for name in required if name.startswith('ros-jazzy-')}
-    depends = {element.text for kind in ('depend', 'exec_depend')
-               for element in package_xml().iter(kind)}
+    ros = {
+        name.removeprefix('ros-jazzy-').replace('-', '_')
+        for name in required
+        if name.startswith('ros-jazzy-')
+    }
+    depends = {
+        element.text for kind in ('depend', 'exec_depend') for element in package_xml().iter(kind)
+    }
     assert ros - depends == set()
     # Not on PyPI; the driver does without them there.
-    assert depends - ros == {'launch', 'launch_ros', 'tf2_msgs', 'tf2_ros', 'pinocchio',
-                             'python3-matplotlib', 'python3-numpy', 'python3-yaml'}
+    assert depends - ros == {
+        'launch',
+        'launch_ros',
+        'tf2_msgs',
+        'tf2_ros',
+        'pinocchio',
+        'python3-matplotlib',
+        'python3-numpy',
+        'python3-yaml',
+    }

@@ -31,8 +31,11 @@ def moved(x, y, z):
 
 def made(*segments):
     flipped = Posture(names=('elbow_joint',), values=(-1.5,))
-    points = (Waypoint(pose=moved(0.1, 0.0, 0.0)), Waypoint(pose=moved(0.1, 0.2, 0.0)),
-              Waypoint(pose=moved(0.0, 0.2, 0.05), posture=flipped))
+    points = (
+        Waypoint(pose=moved(0.1, 0.0, 0.0)),
+        Waypoint(pose=moved(0.1, 0.2, 0.0)),
+        Waypoint(pose=moved(0.0, 0.2, 0.05), posture=flipped),
+    )
     return plan(Goal(waypoints=points, segments=segments), STATE, ARM, PlanningOptions())
 
 
@@ -77,18 +80,23 @@ def test_postures_are_those_of_the_start_and_of_each_segment():
     _, *lines = (line.split() for line in postures(PLAN).splitlines())
     assert [line[0] for line in lines] == ['start', *(str(s.waypoint) for s in PLAN.segments)]
     assert [[float(q) for q in line[1:]] for line in lines] == [
-        pytest.approx(q, abs=5e-5) for q in (PLAN.start, *(s.joints for s in PLAN.segments))]
+        pytest.approx(q, abs=5e-5) for q in (PLAN.start, *(s.joints for s in PLAN.segments))
+    ]
 
 
 def test_the_joints_of_a_spline_are_those_of_its_pieces_and_lead_to_the_poses():
     through = Waypoint(pose=moved(0.0, 0.1, 0.0), time=1.5, twist=(0.0, 0.1, 0.05, 0.0, 0.0, 0.1))
-    spline = plan(Goal(waypoints=(through, Waypoint(pose=moved(0.1, 0.2, 0.0), time=3.0))),
-                  STATE, ARM, PlanningOptions())
+    spline = plan(
+        Goal(waypoints=(through, Waypoint(pose=moved(0.1, 0.2, 0.0), time=3.0))),
+        STATE,
+        ARM,
+        PlanningOptions(),
+    )
     preview = sample(spline, ARM, TOOL, 0.01)
     for q, pose in zip(preview.joints, preview.poses, strict=True):
         assert np.allclose((ARM.forward(q) @ TOOL).position, pose[:3], atol=6e-5)
     for segment in spline.segments:
-        ends = sum(s.duration for s in spline.segments[:spline.segments.index(segment) + 1])
+        ends = sum(s.duration for s in spline.segments[: spline.segments.index(segment) + 1])
         row = round(ends / 0.01)
         if abs(0.01 * row - ends) < 1e-9:
             assert np.allclose(preview.joints[row], segment.joints, atol=1e-9)

@@ -22,11 +22,16 @@ from ur_cartesian_driver.resources import share_path
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(
-    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has the documents')
+    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has the documents'
+)
 
 README = CHECKOUT / 'README.md'
-DOCUMENTS = [README, CHECKOUT / 'CONTRIBUTING.md', CHECKOUT / 'benchmark' / 'README.md',
-             *sorted(CHECKOUT.glob('doc/**/*.md'))]
+DOCUMENTS = [
+    README,
+    CHECKOUT / 'CONTRIBUTING.md',
+    CHECKOUT / 'benchmark' / 'README.md',
+    *sorted(CHECKOUT.glob('doc/**/*.md')),
+]
 #: Programs that the documents start and that are no part of this package.
 FOREIGN = {'git', 'cd', '.', 'export', 'make', 'rosdep', 'colcon', 'pip', 'ros2'}
 
@@ -38,8 +43,13 @@ def name_of(document):
 def blocks(document, *languages):
     """Return the fenced blocks of a document in one of the languages."""
     text = document.read_text(encoding='utf-8')
-    return [body for language, body in re.findall(
-        r'^ *```(\w*)\n(.*?)^ *```$', text, re.DOTALL | re.MULTILINE) if language in languages]
+    return [
+        body
+        for language, body in re.findall(
+            r'^ *```(\w*)\n(.*?)^ *```$', text, re.DOTALL | re.MULTILINE
+        )
+        if language in languages
+    ]
 
 
 def commands(document):
@@ -48,8 +58,9 @@ def commands(document):
     for body in blocks(document, 'bash'):
         found += lines_of(body)
     for body in blocks(document, 'console'):
-        found += lines_of('\n'.join(
-            line[2:] for line in body.splitlines() if line.startswith('$ ')))
+        found += lines_of(
+            '\n'.join(line[2:] for line in body.splitlines() if line.startswith('$ '))
+        )
     return found
 
 
@@ -70,9 +81,12 @@ def lines_of(text):
 
 
 def snippets():
-    return [pytest.param(body, id=f'{name_of(document)}-{number}')
-            for document in DOCUMENTS if document.is_file()
-            for number, body in enumerate(blocks(document, 'python'))]
+    return [
+        pytest.param(body, id=f'{name_of(document)}-{number}')
+        for document in DOCUMENTS
+        if document.is_file()
+        for number, body in enumerate(blocks(document, 'python'))
+    ]
 
 
 def snippet(part):
@@ -94,7 +108,8 @@ def send_goal():
 def test_send_goal_names_the_action_that_is_served(send_goal):
     assert send_goal[3:5] == [
         '/ur_cartesian_driver/follow_cartesian_trajectory',
-        'ur_cartesian_driver/action/FollowCartesianTrajectory']
+        'ur_cartesian_driver/action/FollowCartesianTrajectory',
+    ]
     assert len(send_goal) == 6
 
 
@@ -102,7 +117,8 @@ def test_send_goal_is_the_goal_of_the_square_example(send_goal):
     from ur_cartesian_driver.ros.client import load_goal
 
     assert load_goal(send_goal[5]) == load_goal(
-        share_path() / 'config' / 'examples' / 'square.yaml')
+        share_path() / 'config' / 'examples' / 'square.yaml'
+    )
 
 
 def test_send_goal_passes_planning_from_home_and_takes_ten_seconds(send_goal):
@@ -134,8 +150,9 @@ def test_what_where_prints_is_a_point_of_a_goal():
     printed = point_as_yaml(standing_at(arm, HOME)).replace('-0.000000', '0.000000')
     goal = load_goal(f'trajectory:\n  points:\n{indent(printed, "    ")}')
     position = goal.trajectory.points[0].pose.position
-    assert (position.x, position.y, position.z) == pytest.approx(arm.forward(HOME).position,
-                                                                 abs=1e-6)
+    assert (position.x, position.y, position.z) == pytest.approx(
+        arm.forward(HOME).position, abs=1e-6
+    )
     (shown,) = [body for body in blocks(README, 'console') if 'ur-cartesian where' in body]
     assert printed.splitlines()[3:] == shown.splitlines()[4:]
 
@@ -151,8 +168,10 @@ def test_python_snippet_compiles(body):
 @pytest.mark.slow
 def test_snippet_without_ros_moves_the_arm(ur_sim, capsys):
     ports = ur_sim.ports
-    there = (f"robot_ip='127.0.0.1', rtde_port={ports.rtde}, primary_port={ports.primary}, "
-             'reverse_port=0, script_sender_port=0, trajectory_port=0, script_command_port=0')
+    there = (
+        f"robot_ip='127.0.0.1', rtde_port={ports.rtde}, primary_port={ports.primary}, "
+        'reverse_port=0, script_sender_port=0, trajectory_port=0, script_command_port=0'
+    )
     body = snippet('DriverConfig(')
     assert "robot_ip='127.0.0.1'" in body
     exec(body.replace("robot_ip='127.0.0.1'", there), {})
@@ -169,8 +188,13 @@ def test_snippet_of_an_action_client_moves_the_arm(ur_sim, cartesian_driver):
     spinning.start()
     try:
         ended = subprocess.run(
-            [sys.executable, '-c', snippet('ActionClient(')], capture_output=True, text=True,
-            timeout=60, check=False, env=os.environ)
+            [sys.executable, '-c', snippet('ActionClient(')],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+            env=os.environ,
+        )
     finally:
         executor.shutdown()
         spinning.join()
@@ -191,8 +215,7 @@ def test_snippet_of_a_test_passes(ur_sim, cartesian_driver):
 def test_commands_exist(document):
     for words in commands(document):
         if words[0] == 'ur-cartesian':
-            parser().parse_args(
-                [word.replace('FILE', 'square') for word in words[1:]])
+            parser().parse_args([word.replace('FILE', 'square') for word in words[1:]])
         elif words[0] == 'ur-cartesian-driver':
             check_parameters(words)
         elif words[0].startswith('scripts/'):
@@ -226,8 +249,11 @@ def check_launch(words):
 def test_links_lead_to_files(document):
     text = document.read_text(encoding='utf-8')
     targets = re.findall(r'\]\(([^)#]+)(?:#[^)]*)?\)', text)
-    missing = [target for target in targets if not target.startswith('https://')
-               and not (document.parent / target).exists()]
+    missing = [
+        target
+        for target in targets
+        if not target.startswith('https://') and not (document.parent / target).exists()
+    ]
     assert missing == []
 
 
@@ -235,8 +261,9 @@ def test_readme_leads_to_every_document():
     linked = set()
     for document in DOCUMENTS:
         text = document.read_text(encoding='utf-8')
-        linked |= {(document.parent / target).resolve()
-                   for target in re.findall(r'\]\(([^)#]+)\)', text)}
+        linked |= {
+            (document.parent / target).resolve() for target in re.findall(r'\]\(([^)#]+)\)', text)
+        }
         if document == CHECKOUT / 'doc' / 'architecture.md':
             linked |= set((CHECKOUT / 'doc' / 'diagrams').glob('*.md'))
     assert [name_of(d) for d in DOCUMENTS[1:] if d not in linked] == []
@@ -249,17 +276,22 @@ def test_every_error_code_is_described_with_its_number():
     text = (CHECKOUT / 'doc' / 'errors.md').read_text(encoding='utf-8')
     described = re.findall(r'^### (\w+), (-?\d+)$', text, re.MULTILINE)
     assert {(name, int(number)) for name, number in described} == {
-        (code.name, code.value) for code in ErrorCode}
+        (code.name, code.value) for code in ErrorCode
+    }
     assert len(described) == len(ErrorCode)
 
 
 def test_every_parameter_that_is_named_as_one_exists():
     from ur_cartesian_driver.ros.parameters import defaults
 
-    (table,) = re.findall(r'^\| parameter \|.*?\n\n', README.read_text(encoding='utf-8'),
-                          re.DOTALL | re.MULTILINE)
-    named = [name for line in table.strip().splitlines()[2:]
-             for name in re.findall(r'`(\w+)`', line.split('|')[1])]
+    (table,) = re.findall(
+        r'^\| parameter \|.*?\n\n', README.read_text(encoding='utf-8'), re.DOTALL | re.MULTILINE
+    )
+    named = [
+        name
+        for line in table.strip().splitlines()[2:]
+        for name in re.findall(r'`(\w+)`', line.split('|')[1])
+    ]
     assert named
     assert set(named) <= set(defaults())
 
@@ -267,16 +299,19 @@ def test_every_parameter_that_is_named_as_one_exists():
 def test_every_robot_model_is_listed():
     from ur_cartesian_driver.kinematics.robots import MODELS
 
-    (section,) = re.findall(r'^## Robots\n(.*?)^## ', README.read_text(encoding='utf-8'),
-                            re.DOTALL | re.MULTILINE)
+    (section,) = re.findall(
+        r'^## Robots\n(.*?)^## ', README.read_text(encoding='utf-8'), re.DOTALL | re.MULTILINE
+    )
     assert set(re.findall(r'\bur\d+(?:e|long)?\b', section)) == set(MODELS)
 
 
 def test_diagrams_are_those_of_the_tables():
     spec = importlib.util.spec_from_file_location(
-        'make_diagrams', CHECKOUT / 'scripts' / 'make_diagrams.py')
+        'make_diagrams', CHECKOUT / 'scripts' / 'make_diagrams.py'
+    )
     make_diagrams = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(make_diagrams)
     directory = CHECKOUT / 'doc' / 'diagrams'
-    assert {path.name: path.read_text(encoding='utf-8') for path in directory.glob('*.md')} == \
-        make_diagrams.pages(), 'run python scripts/make_diagrams.py'
+    assert {
+        path.name: path.read_text(encoding='utf-8') for path in directory.glob('*.md')
+    } == make_diagrams.pages(), 'run python scripts/make_diagrams.py'

@@ -30,16 +30,29 @@ PACKAGE = CHECKOUT / 'ur_cartesian_driver'
 pytestmark = pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the documents')
 
 #: Where the sentences come from; the simulator says what a robot says itself.
-SOURCES = [*PACKAGE.glob('robot/*.py'), *PACKAGE.glob('driver/*.py'),
-           PACKAGE / 'protocol' / 'rtde.py', PACKAGE / 'ros' / 'node.py',
-           *PACKAGE.glob('sim/*.py')]
+SOURCES = [
+    *PACKAGE.glob('robot/*.py'),
+    *PACKAGE.glob('driver/*.py'),
+    PACKAGE / 'protocol' / 'rtde.py',
+    PACKAGE / 'ros' / 'node.py',
+    *PACKAGE.glob('sim/*.py'),
+]
 ROBOT_PROGRAM = PACKAGE / 'program' / 'driver.script'
 
-ROBOTS = [RobotState(timestamp=1.0, actual_q=(0.0,) * 6, robot_mode=mode, safety_mode=safety,
-                     runtime_state=runtime)
-          for mode, safety in ([(mode, SafetyMode.NORMAL) for mode in RobotMode]
-                               + [(RobotMode.RUNNING, safety) for safety in SafetyMode])
-          for runtime in RuntimeState]
+ROBOTS = [
+    RobotState(
+        timestamp=1.0,
+        actual_q=(0.0,) * 6,
+        robot_mode=mode,
+        safety_mode=safety,
+        runtime_state=runtime,
+    )
+    for mode, safety in (
+        [(mode, SafetyMode.NORMAL) for mode in RobotMode]
+        + [(RobotMode.RUNNING, safety) for safety in SafetyMode]
+    )
+    for runtime in RuntimeState
+]
 
 
 def table(first_column):
@@ -47,8 +60,11 @@ def table(first_column):
     text = PAGE.read_text(encoding='utf-8')
     found = re.findall(rf'^\| {first_column} \|.*\n\|[ -|]*\n((?:\|.*\n)+)', text, re.MULTILINE)
     assert found
-    return [[cell.strip() for cell in line.strip('|').split(' | ')]
-            for rows in found for line in rows.splitlines()]
+    return [
+        [cell.strip() for cell in line.strip('|').split(' | ')]
+        for rows in found
+        for line in rows.splitlines()
+    ]
 
 
 def quoted(cell):
@@ -59,7 +75,8 @@ def quoted(cell):
 
 def sentences():
     rows = [row[0] for row in table('sentence')] + [
-        row[1] for column in ('state', 'where') for row in table(column)]
+        row[1] for column in ('state', 'where') for row in table(column)
+    ]
     assert all(map(quoted, rows))
     return [quoted(row) for row in rows]
 
@@ -86,19 +103,39 @@ def test_every_state_is_in_the_table_with_its_number():
 
 
 def test_all_that_can_be_needed_is_on_the_page():
-    said = {what_is_needed(state, robot, program_connected=connected, headless_mode=headless,
-                           tcp_owed=owed, program_is_ending=ending, foreign_program=foreign)
-            for state, robot, connected, headless, owed, ending, foreign in product(
-                ConnectionState, [None, *ROBOTS], *[(False, True)] * 5)} - {''}
+    said = {
+        what_is_needed(
+            state,
+            robot,
+            program_connected=connected,
+            headless_mode=headless,
+            tcp_owed=owed,
+            program_is_ending=ending,
+            foreign_program=foreign,
+        )
+        for state, robot, connected, headless, owed, ending, foreign in product(
+            ConnectionState, [None, *ROBOTS], *[(False, True)] * 5
+        )
+    } - {''}
     assert len(said) > 10
     assert [text for text in sorted(said) if not is_on_page(text)] == []
 
 
 def test_all_that_a_recovery_leaves_to_a_person_is_on_the_page():
-    steps = [next_step(Situation(connection=state, robot=robot, program_connected=connected,
-                                 headless=headless, remote_control=remote))
-             for state, robot, connected, headless, remote in product(
-                 ConnectionState, ROBOTS, (False, True), (False, True), (None, False))]
+    steps = [
+        next_step(
+            Situation(
+                connection=state,
+                robot=robot,
+                program_connected=connected,
+                headless=headless,
+                remote_control=remote,
+            )
+        )
+        for state, robot, connected, headless, remote in product(
+            ConnectionState, ROBOTS, (False, True), (False, True), (None, False)
+        )
+    ]
     said = {step.text for step in steps if step.step is Step.PERSON} - {''}
     assert len(said) > 10
     assert [text for text in sorted(said) if not is_on_page(text)] == []
@@ -113,8 +150,9 @@ def texts(tree):
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             yield re.sub(r'%\.?\d*[a-z]', '\0', node.value)
         elif isinstance(node, ast.JoinedStr):
-            yield ''.join(part.value if isinstance(part, ast.Constant) else '\0'
-                          for part in node.values)
+            yield ''.join(
+                part.value if isinstance(part, ast.Constant) else '\0' for part in node.values
+            )
 
 
 @pytest.fixture(scope='module')
@@ -123,8 +161,7 @@ def written():
     found = {text for path in SOURCES for text in texts(ast.parse(path.read_text()))}
     # A line in the log of a robot ends in a value.
     found |= {f'{text}\0' for text in re.findall(r'"([^"\n]+)"', ROBOT_PROGRAM.read_text())}
-    return [(pattern(text, '\0'), len(text.replace('\0', ''))) for text in found
-            if len(text) > 10]
+    return [(pattern(text, '\0'), len(text.replace('\0', ''))) for text in found if len(text) > 10]
 
 
 async def refusals_of_the_system():
@@ -133,8 +170,9 @@ async def refusals_of_the_system():
     with socket.create_server(('127.0.0.1', 0)) as taken:
         port = taken.getsockname()[1]
         for host in ('127.0.0.1', '192.0.2.1'):  # RFC 5737: nobody's
-            listener = Listener('reverse_port', on_open=print, on_data=print, on_closed=print,
-                                on_refused=print)
+            listener = Listener(
+                'reverse_port', on_open=print, on_data=print, on_closed=print, on_refused=print
+            )
             with pytest.raises(OSError, match='port') as refused:
                 await listener.open(host, port, frozenset())
             said.append(str(refused.value))
@@ -146,8 +184,10 @@ async def refusals_of_the_system():
 
 def can_say(written, said):
     """Tell whether a text says something, at least half of it in its own words."""
-    return any(length >= 0.5 * len(said.replace('...', '')) and fits.fullmatch(said)
-               for fits, length in written)
+    return any(
+        length >= 0.5 * len(said.replace('...', '')) and fits.fullmatch(said)
+        for fits, length in written
+    )
 
 
 def test_each_quoted_sentence_is_written_in_the_source(written):
@@ -156,8 +196,12 @@ def test_each_quoted_sentence_is_written_in_the_source(written):
     heard = asyncio.run(refusals_of_the_system())
     assert [text for text in heard if not is_on_page(text)] == []
     # These two consist of two texts each, and are looked for the other way round above.
-    left = {text for text in on_page if 'A program runs on the robot' not in text
-            and not any(pattern(text).fullmatch(one) for one in heard)}
+    left = {
+        text
+        for text in on_page
+        if 'A program runs on the robot' not in text
+        and not any(pattern(text).fullmatch(one) for one in heard)
+    }
     assert [text for text in sorted(left) if not can_say(written, text)] == []
 
 

@@ -53,8 +53,9 @@ def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
     end = float(reference.time[-1])
     time = np.minimum(np.arange(ceil(end / period - 1e-9) + 1) * period, end)
     # Where times repeat the later row counts, as the robot passes through both at once.
-    row = np.clip(np.searchsorted(reference.time, time, side='right') - 1,
-                  0, max(len(reference.time) - 2, 0))
+    row = np.clip(
+        np.searchsorted(reference.time, time, side='right') - 1, 0, max(len(reference.time) - 2, 0)
+    )
     span = reference.time[np.minimum(row + 1, len(reference.time) - 1)] - reference.time[row]
     share = np.clip((time - reference.time[row]) / np.where(span > 0.0, span, 1.0), 0.0, 1.0)
     share[time >= end] = 1.0
@@ -81,8 +82,10 @@ def postures(plan: Plan) -> str:
     names = [name.removesuffix('_joint') for name in JOINT_NAMES]
     lines = [f'{"point":>5}  ' + ' '.join(f'{name:>13}' for name in names) + ' [rad]']
     ends = (segments[-1] for segments in _to_points(plan))
-    for point, joints in [('start', plan.start),
-                          *((str(segment.waypoint), segment.joints) for segment in ends)]:
+    for point, joints in [
+        ('start', plan.start),
+        *((str(segment.waypoint), segment.joints) for segment in ends),
+    ]:
         # + 0.0: no -0.0000
         lines.append(f'{point:>5}  ' + ' '.join(f'{round(q, 4) + 0.0:13.4f}' for q in joints))
     return '\n'.join(lines)
@@ -90,18 +93,24 @@ def postures(plan: Plan) -> str:
 
 def _to_points(plan: Plan) -> list[list[PlannedSegment]]:
     """Return what leads to each point, several pieces where it is a spline."""
-    return [list(segments) for _, segments in groupby(
-        plan.segments, key=lambda segment: segment.waypoint)]
+    return [
+        list(segments)
+        for _, segments in groupby(plan.segments, key=lambda segment: segment.waypoint)
+    ]
 
 
 def _line(segments: Sequence[PlannedSegment]) -> str:
     primitive, pieces = segments[-1].primitive, len(segments)
     name = type(primitive).__name__ + (f' x {pieces}' if pieces > 1 else '')
     blend = 1e3 * getattr(primitive, 'blend_radius', 0.0)
-    length, angle, duration = (sum(getattr(segment, quantity) for segment in segments)
-                               for quantity in ('length', 'angle', 'duration'))
-    return (f'{segments[0].waypoint:>5}  {name:<10} {length:7.3f} m {degrees(angle):6.1f}'
-            f'\N{DEGREE SIGN} {duration:7.3f} s {blend:4.0f} mm')
+    length, angle, duration = (
+        sum(getattr(segment, quantity) for segment in segments)
+        for quantity in ('length', 'angle', 'duration')
+    )
+    return (
+        f'{segments[0].waypoint:>5}  {name:<10} {length:7.3f} m {degrees(angle):6.1f}'
+        f'\N{DEGREE SIGN} {duration:7.3f} s {blend:4.0f} mm'
+    )
 
 
 def _spline(plan: Plan) -> JointSpline:
@@ -112,11 +121,13 @@ def _spline(plan: Plan) -> JointSpline:
 def _between(reference: ReferencePath, row: int, share: float) -> Pose:
     after = min(row + 1, len(reference.poses) - 1)
     return pose_from_row(reference.poses[row]).interpolate(
-        pose_from_row(reference.poses[after]), share)
+        pose_from_row(reference.poses[after]), share
+    )
 
 
-def _joints(plan: Plan, arm: Arm, T_tcp_flange: Pose, poses: list[Pose],
-            place: NDArray[np.float64]) -> NDArray[np.float64]:
+def _joints(
+    plan: Plan, arm: Arm, T_tcp_flange: Pose, poses: list[Pose], place: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """
     Return joint positions for poses at places of the reference path (rows and fractions).
 
@@ -147,8 +158,7 @@ class _JointLine:
 
     def at(self, place: float) -> Joints:
         u = min(1.0, max(0.0, (place - self.first) / max(1, self.last - self.first)))
-        a, b, c, d, e, f = (x + u * (y - x)
-                            for x, y in zip(self.q_start, self.q_end, strict=True))
+        a, b, c, d, e, f = (x + u * (y - x) for x, y in zip(self.q_start, self.q_end, strict=True))
         return (a, b, c, d, e, f)
 
 
@@ -161,6 +171,7 @@ def _joint_lines(plan: Plan) -> dict[int, _JointLine]:
         if isinstance(segment.primitive, MoveJ | OptimoveJ):
             first, last = np.searchsorted(point, [segment.waypoint, segment.waypoint + 1])
             lines[segment.waypoint] = _JointLine(
-                q, segment.joints, max(0, int(first) - 1), int(last) - 1)
+                q, segment.joints, max(0, int(first) - 1), int(last) - 1
+            )
         q = segment.joints
     return lines

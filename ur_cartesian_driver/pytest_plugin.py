@@ -43,9 +43,11 @@ READY_TIMEOUT = 10.0
 def pytest_configure(config: pytest.Config) -> None:
     """Register the markers."""
     config.addinivalue_line(
-        'markers', 'ur_sim(**config): fields of the SimulatorConfig of the ur_sim fixture')
+        'markers', 'ur_sim(**config): fields of the SimulatorConfig of the ur_sim fixture'
+    )
     config.addinivalue_line(
-        'markers', 'cartesian_driver(**parameters): parameters of the cartesian_driver fixture')
+        'markers', 'cartesian_driver(**parameters): parameters of the cartesian_driver fixture'
+    )
 
 
 @pytest.fixture
@@ -68,8 +70,10 @@ def private_ros_graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]
     """
     with contextlib.ExitStack() as stack, pytest.MonkeyPatch.context() as environment:
         domain = next(d for d in DOMAINS if _taken(d, stack))
-        for name, value in {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-                            'ROS_LOG_DIR': str(tmp_path_factory.mktemp('ros_log'))}.items():
+        for name, value in {
+            'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+            'ROS_LOG_DIR': str(tmp_path_factory.mktemp('ros_log')),
+        }.items():
             if name not in os.environ:
                 environment.setenv(name, value)
         environment.setenv('ROS_DOMAIN_ID', str(domain))
@@ -88,8 +92,9 @@ def _taken(domain: int, stack: contextlib.ExitStack) -> bool:
 
 
 @pytest.fixture
-def cartesian_driver(request: pytest.FixtureRequest, private_ros_graph: int,
-                     ur_sim: SimulatedRobot) -> Iterator[CartesianDriverNode]:
+def cartesian_driver(
+    request: pytest.FixtureRequest, private_ros_graph: int, ur_sim: SimulatedRobot
+) -> Iterator[CartesianDriverNode]:
     """Yield the driver's node, ready for goals of ``ur_sim``; destroyed afterwards."""
     import rclpy
     from rclpy.utilities import get_default_context
@@ -97,13 +102,20 @@ def cartesian_driver(request: pytest.FixtureRequest, private_ros_graph: int,
     from ur_cartesian_driver.ros import CartesianDriverNode
 
     parameters: dict[str, Any] = {
-        'robot_ip': ur_sim.config.host, 'ur_type': ur_sim.config.model, 'headless_mode': True,
-        'robot_loop': 'thread', 'rtde_port': ur_sim.ports.rtde,
-        'primary_port': ur_sim.ports.primary, 'dashboard_port': ur_sim.ports.dashboard,
-        'reverse_port': 0, 'script_sender_port': 0, 'trajectory_port': 0,
+        'robot_ip': ur_sim.config.host,
+        'ur_type': ur_sim.config.model,
+        'headless_mode': True,
+        'robot_loop': 'thread',
+        'rtde_port': ur_sim.ports.rtde,
+        'primary_port': ur_sim.ports.primary,
+        'dashboard_port': ur_sim.ports.dashboard,
+        'reverse_port': 0,
+        'script_sender_port': 0,
+        'trajectory_port': 0,
         'script_command_port': 0,
         # Robot, driver and test share one interpreter, which can be busy for longer than 0.2 s.
-        'robot_receive_timeout': 1.0} | _marked(request, 'cartesian_driver')
+        'robot_receive_timeout': 1.0,
+    } | _marked(request, 'cartesian_driver')
     started_here = not get_default_context().ok()
     if started_here:
         rclpy.init()

@@ -21,11 +21,14 @@ def share_path() -> Path:
     if (checkout / 'package.xml').is_file():
         return checkout
     # The wheels of ROS 2 do not set AMENT_PREFIX_PATH; without it there is no index to ask.
-    for prefix in [*filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)),
-                   sys.prefix]:
+    for prefix in [
+        *filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)),
+        sys.prefix,
+    ]:
         share = Path(prefix, 'share', NAME)
         if (share / 'package.xml').is_file():
             return share
     raise FileNotFoundError(
         f'The data files of {NAME} are not installed: there is no share/{NAME}/package.xml in '
-        f'AMENT_PREFIX_PATH or {sys.prefix}. Build the package with colcon or install it by pip.')
+        f'AMENT_PREFIX_PATH or {sys.prefix}. Build the package with colcon or install it by pip.'
+    )

@@ -56,6 +56,7 @@ class Recording:
 @pytest.fixture
 def record(ur_sim):
     """Return a context manager that records RTDE through a connection of its own."""
+
     @contextmanager
     def recorder():
         recording = Recording()
@@ -99,7 +100,7 @@ def trajectory_bytes(ur_sim, make_driver):
 
     def points():
         assert len(received) % POINT_SIZE == 0
-        return [bytes(received[i:i + POINT_SIZE]) for i in range(0, len(received), POINT_SIZE)]
+        return [bytes(received[i : i + POINT_SIZE]) for i in range(0, len(received), POINT_SIZE)]
 
     return points
 
@@ -113,15 +114,24 @@ class DriverFactory:
 
     def __call__(self, options=None, **settings):
         config = {
-            'robot_ip': '127.0.0.1', 'ur_type': self._robot.config.model, 'headless_mode': True,
-            'rtde_port': self._robot.ports.rtde, 'primary_port': self._robot.ports.primary,
-            'dashboard_port': self._robot.ports.dashboard, 'reverse_port': 0,
-            'script_sender_port': 0, 'trajectory_port': 0, 'script_command_port': 0,
+            'robot_ip': '127.0.0.1',
+            'ur_type': self._robot.config.model,
+            'headless_mode': True,
+            'rtde_port': self._robot.ports.rtde,
+            'primary_port': self._robot.ports.primary,
+            'dashboard_port': self._robot.ports.dashboard,
+            'reverse_port': 0,
+            'script_sender_port': 0,
+            'trajectory_port': 0,
+            'script_command_port': 0,
             'robot_loop': 'thread',
             # Robot, driver and test share one interpreter, and two cores with other tests.
-            'robot_receive_timeout': 1.0}
-        driver = Driver(DriverConfig(**config | settings),
-                        PlanningOptions(**{'max_tool_speed': 1.0} | (options or {})))
+            'robot_receive_timeout': 1.0,
+        }
+        driver = Driver(
+            DriverConfig(**config | settings),
+            PlanningOptions(**{'max_tool_speed': 1.0} | (options or {})),
+        )
         self._drivers.append(driver)
         driver.open()
         return driver

@@ -25,10 +25,19 @@ pytestmark = [pytest.mark.slow, pytest.mark.acceptance, pytest.mark.ur_sim(frequ
 
 READY = 10.0
 NOZZLE = Pose((0.01, -0.02, 0.15), (0.0, 0.6, 0.0, 0.8))
-QUICK = pytest.mark.ur_sim(frequency=125.0, unlock_delay=0.3, power_on_time=0.05,
-                           brake_release_time=0.05)
-ACTIONS = ('power on', 'power off', 'brake release', 'stop', 'pause', 'unlock protective stop',
-           'restart safety', 'close popup')
+QUICK = pytest.mark.ur_sim(
+    frequency=125.0, unlock_delay=0.3, power_on_time=0.05, brake_release_time=0.05
+)
+ACTIONS = (
+    'power on',
+    'power off',
+    'brake release',
+    'stop',
+    'pause',
+    'unlock protective stop',
+    'restart safety',
+    'close popup',
+)
 
 
 def test_settings_are_done_when_the_robot_reports_them(driver, ur_sim):
@@ -43,9 +52,11 @@ def test_settings_are_done_when_the_robot_reports_them(driver, ur_sim):
 
 
 def test_a_digital_output_is_set_and_no_other(driver, ur_sim):
-    for kind, pin, bit in ((OutputKind.STANDARD_DIGITAL, 2, 2),
-                           (OutputKind.CONFIGURABLE_DIGITAL, 7, 15),
-                           (OutputKind.TOOL_DIGITAL, 1, 17)):
+    for kind, pin, bit in (
+        (OutputKind.STANDARD_DIGITAL, 2, 2),
+        (OutputKind.CONFIGURABLE_DIGITAL, 7, 15),
+        (OutputKind.TOOL_DIGITAL, 1, 17),
+    ):
         assert driver.set_digital_output(kind, pin, True).ok
         assert ur_sim.state().digital_outputs == 1 << bit
         assert driver.set_digital_output(kind, pin, False).ok
@@ -78,8 +89,11 @@ def test_inputs_that_another_client_holds_are_named(driver, ur_sim):
 def test_settings_wait_for_the_end_of_a_goal(driver, home):
     motion = driver.start(driver.plan(Goal(waypoints=(Waypoint(time=3.0, pose=home(z=0.05)),))))
     wait_for(lambda: driver.status.state is ConnectionState.EXECUTING)
-    for answer in (driver.set_tcp(NOZZLE), driver.set_payload(1.0),
-                   driver.dashboard('load installation', 'default.installation')):
+    for answer in (
+        driver.set_tcp(NOZZLE),
+        driver.set_payload(1.0),
+        driver.dashboard('load installation', 'default.installation'),
+    ):
         assert not answer.ok
         assert answer.text.startswith('A goal is running')
     assert driver.set_speed_slider(0.9).ok  # it only slows the goal
@@ -141,11 +155,12 @@ def test_dashboard_commands_are_done_when_the_robot_reports_them(driver, ur_sim)
 @QUICK
 @pytest.mark.parametrize('stop', ['protective stop', 'power off', 'program stopped', 'fault'])
 def test_recover_brings_the_robot_back(driver, ur_sim, stop):
-    {'protective stop': ur_sim.protective_stop,
-     'power off': lambda: ur_sim.call(lambda c: c.power_off()),
-     'program stopped': ur_sim.stop_program,
-     'fault': lambda: ur_sim.call(lambda c: c.safety_event(SafetyEvent.FAULT)),
-     }[stop]()
+    {
+        'protective stop': ur_sim.protective_stop,
+        'power off': lambda: ur_sim.call(lambda c: c.power_off()),
+        'program stopped': ur_sim.stop_program,
+        'fault': lambda: ur_sim.call(lambda c: c.safety_event(SafetyEvent.FAULT)),
+    }[stop]()
     wait_for(lambda: driver.status.state is not ConnectionState.READY)
     answer = driver.recover()
     assert answer.ok, answer.text
@@ -177,7 +192,8 @@ def test_recover_goes_no_further_than_it_may(driver, ur_sim):
 
 @pytest.mark.ur_sim(frequency=125.0, remote_control=False)
 def test_a_program_that_is_sent_in_local_control_is_refused_with_the_reason(
-        make_driver, ur_sim, monkeypatch):
+    make_driver, ur_sim, monkeypatch
+):
     driver = make_driver()
     wait_for(lambda: 'read-only' in driver.status.last_error)
     with monkeypatch.context() as patch:
@@ -185,7 +201,8 @@ def test_a_program_that_is_sent_in_local_control_is_refused_with_the_reason(
         answer = driver.call(SendProgram()).result(READY)
     assert not answer.ok
     assert answer.text.endswith(
-        'The robot is in local control: switch it to remote control, then try again.')
+        'The robot is in local control: switch it to remote control, then try again.'
+    )
     ur_sim.call(lambda c: setattr(c, 'remote_control', True))
     assert driver.call(SendProgram()).result(READY).ok
 
@@ -214,8 +231,7 @@ def served_program(driver):
 
 
 @QUICK
-def test_recover_plays_the_program_of_the_pendant_where_that_is_how_it_comes(
-        make_driver, ur_sim):
+def test_recover_plays_the_program_of_the_pendant_where_that_is_how_it_comes(make_driver, ur_sim):
     driver = make_driver(headless_mode=False)
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
     answer = driver.recover()
@@ -284,10 +300,16 @@ def test_every_call_to_a_robot_that_is_not_there_is_answered(make_driver):
     with socket.create_server(('127.0.0.1', 0)) as closed:
         port = closed.getsockname()[1]
     driver = make_driver(rtde_port=port, primary_port=port, dashboard_port=port)
-    for answer in (driver.dashboard('power on'), driver.dashboard_line('running'),
-                   driver.set_tcp(NOZZLE), driver.set_payload(1.0), driver.zero_ftsensor(),
-                   driver.set_speed_slider(0.5), driver.recover(),
-                   driver.set_digital_output(OutputKind.TOOL_DIGITAL, 0, True)):
+    for answer in (
+        driver.dashboard('power on'),
+        driver.dashboard_line('running'),
+        driver.set_tcp(NOZZLE),
+        driver.set_payload(1.0),
+        driver.zero_ftsensor(),
+        driver.set_speed_slider(0.5),
+        driver.recover(),
+        driver.set_digital_output(OutputKind.TOOL_DIGITAL, 0, True),
+    ):
         assert not answer.ok
         assert answer.text.endswith('.')
 
@@ -314,7 +336,8 @@ def test_calls_are_answered_when_the_robot_loop_dies_or_the_driver_closes(make_d
     driver.close()
     assert not pending.result(5.0).ok
     assert driver.call(SetTcp(T_flange_tcp=NOZZLE)).result(0.0).text == (
-        'The driver is closed; open it.')
+        'The driver is closed; open it.'
+    )
 
 
 def test_a_defect_of_ours_is_an_answer_too(driver):

@@ -51,22 +51,25 @@ def test_cancel_brings_the_arm_to_rest_and_the_next_goal_runs(driver, long_goal,
     outcome = motion.result(3.0)
     assert outcome.code is ErrorCode.CANCELLED
     assert at_rest(ur_sim)
-    assert driver.execute(Goal(waypoints=(Waypoint(pose=home(), time=1.0),)),
-                          timeout=10.0).succeeded
+    assert driver.execute(
+        Goal(waypoints=(Waypoint(pose=home(), time=1.0),)), timeout=10.0
+    ).succeeded
 
 
 def test_cancel_in_the_middle_of_many_points(driver, home):
     """The points that were sent and not run are thrown away, not run with the next goal."""
-    points = tuple(Waypoint(pose=home(y=0.0002 * (i + 1)), time=0.01 * (i + 1))
-                   for i in range(900))
+    points = tuple(
+        Waypoint(pose=home(y=0.0002 * (i + 1)), time=0.01 * (i + 1)) for i in range(900)
+    )
     motion = moving(driver, Goal(waypoints=points))
     motion.cancel()
     assert motion.result(4.0).code is ErrorCode.CANCELLED
     here = driver.state.actual_tcp_pose
     x, y, z = here.position
     target = Pose((x, y, z + 0.02), here.quaternion)
-    assert driver.execute(Goal(waypoints=(Waypoint(pose=target, time=0.5),)),
-                          timeout=10.0).succeeded
+    assert driver.execute(
+        Goal(waypoints=(Waypoint(pose=target, time=0.5),)), timeout=10.0
+    ).succeeded
     assert driver.state.actual_tcp_pose.distance_to(target) < 1e-4
 
 
@@ -147,8 +150,10 @@ def test_a_robot_of_another_model_is_refused(make_driver):
 
 @pytest.mark.ur_sim(model='ur5', polyscope='3.15.8')
 def test_old_software_is_not_sent_what_it_does_not_know(driver, home):
-    goal = Goal(waypoints=(Waypoint(pose=home(y=0.01)),),
-                segments=(Segment(type=SegmentType.OPTIMIZED_LINEAR),))
+    goal = Goal(
+        waypoints=(Waypoint(pose=home(y=0.01)),),
+        segments=(Segment(type=SegmentType.OPTIMIZED_LINEAR),),
+    )
     outcome = driver.execute(goal)
     assert outcome.code is ErrorCode.INVALID_GOAL
     assert 'PolyScope 5.21' in outcome.text
@@ -187,7 +192,8 @@ def test_something_else_than_a_robot_is_not_waited_for_without_end(make_driver):
 
 @pytest.mark.parametrize(('number', 'bound'), [(signal.SIGKILL, 3.0), (signal.SIGSTOP, 8.0)])
 def test_the_robot_loop_s_process_can_die_or_hang(
-        make_driver, long_goal, ur_sim, driver, number, bound):
+    make_driver, long_goal, ur_sim, driver, number, bound
+):
     driver.close()
     wait_for(lambda: ur_sim.state().runtime_state.name == 'STOPPED')
     driver = make_driver(robot_loop='process')
@@ -212,7 +218,8 @@ def test_a_driver_with_a_robot_loop_that_hangs_can_be_closed(make_driver, driver
 
 
 def test_a_robot_loop_that_dies_does_not_bring_back_a_program_that_was_stopped(
-        make_driver, ur_sim, driver):
+    make_driver, ur_sim, driver
+):
     driver.close()
     wait_for(lambda: ur_sim.state().runtime_state.name == 'STOPPED')
     driver = make_driver(robot_loop='process')
@@ -232,11 +239,21 @@ def test_the_arm_stops_when_the_owner_falls_silent(ur_sim, make_driver, home, lo
     del home
     driver.close()
     wait_for(lambda: ur_sim.state().runtime_state.name == 'STOPPED')
-    silent = Driver(DriverConfig(
-        robot_loop='thread', headless_mode=True, node_timeout=0.5, reverse_port=0,
-        trajectory_port=0, script_command_port=0, script_sender_port=0,
-        rtde_port=ur_sim.ports.rtde, primary_port=ur_sim.ports.primary,
-        robot_receive_timeout=1.0), auto_heartbeat=False)
+    silent = Driver(
+        DriverConfig(
+            robot_loop='thread',
+            headless_mode=True,
+            node_timeout=0.5,
+            reverse_port=0,
+            trajectory_port=0,
+            script_command_port=0,
+            script_sender_port=0,
+            rtde_port=ur_sim.ports.rtde,
+            primary_port=ur_sim.ports.primary,
+            robot_receive_timeout=1.0,
+        ),
+        auto_heartbeat=False,
+    )
     with silent:
         silent.wait_ready(5.0)
         motion = silent.start(silent.plan(long_goal))
@@ -271,8 +288,9 @@ class Relay:
                 robot = socket.create_connection(('127.0.0.1', self._target))
                 self._pairs.append((client, robot))
                 for source, sink in ((client, robot), (robot, client)):
-                    threading.Thread(target=self._forward, args=(source, sink),
-                                     daemon=True).start()
+                    threading.Thread(
+                        target=self._forward, args=(source, sink), daemon=True
+                    ).start()
 
     @staticmethod
     def _forward(source, sink):
@@ -307,8 +325,9 @@ def test_a_program_that_outlives_rtde_is_taken_up_again(make_driver, ur_sim):
         assert driver.status.state is not ConnectionState.READY
         wait_for(lambda: at_rest(ur_sim))
         driver.wait_ready(5.0)
-        assert driver.execute(Goal(waypoints=(Waypoint(pose=pose, time=1.0),)),
-                              timeout=10.0).succeeded
+        assert driver.execute(
+            Goal(waypoints=(Waypoint(pose=pose, time=1.0),)), timeout=10.0
+        ).succeeded
 
 
 @pytest.mark.ur_sim(power='off', power_on_time=0.1, brake_release_time=0.1)

@@ -96,10 +96,21 @@ class Cell:
     def __init__(self, stack):
         self._stack = stack
         self._environment = {**os.environ, 'PYTHONUNBUFFERED': '1'}
-        self.simulator = stack.enter_context(process(
-            'sim', '--model', 'ur5', '--rtde-port', '0', '--primary-port', '0',
-            '--dashboard-port', '0', environment=self._environment,
-            stdout=subprocess.PIPE))
+        self.simulator = stack.enter_context(
+            process(
+                'sim',
+                '--model',
+                'ur5',
+                '--rtde-port',
+                '0',
+                '--primary-port',
+                '0',
+                '--dashboard-port',
+                '0',
+                environment=self._environment,
+                stdout=subprocess.PIPE,
+            )
+        )
         line = self.simulator.stdout.readline()
         self.ports = dict(re.findall(r'(RTDE|primary|dashboard) (\d+)', line))
         self.witness = Witness(int(self.ports['RTDE']))
@@ -110,21 +121,37 @@ class Cell:
 
     def start_node(self):
         parameters = {
-            'ur_type': 'ur5', 'headless_mode': 'true', 'node_timeout': NODE_TIMEOUT,
+            'ur_type': 'ur5',
+            'headless_mode': 'true',
+            'node_timeout': NODE_TIMEOUT,
             'rtde_port': self.ports['RTDE'],
-            'primary_port': self.ports['primary'], 'dashboard_port': self.ports['dashboard'],
-            'reverse_port': 0, 'script_sender_port': 0, 'trajectory_port': 0,
-            'script_command_port': 0}
+            'primary_port': self.ports['primary'],
+            'dashboard_port': self.ports['dashboard'],
+            'reverse_port': 0,
+            'script_sender_port': 0,
+            'trajectory_port': 0,
+            'script_command_port': 0,
+        }
         settings = [w for name, value in parameters.items() for w in ('-p', f'{name}:={value}')]
-        self.node = self._stack.enter_context(process(
-            '--ros-args', '--log-level', 'fatal', *settings, environment=self._environment,
-            module='ur_cartesian_driver.ros.node'))
+        self.node = self._stack.enter_context(
+            process(
+                '--ros-args',
+                '--log-level',
+                'fatal',
+                *settings,
+                environment=self._environment,
+                module='ur_cartesian_driver.ros.node',
+            )
+        )
 
     @property
     def robot_process(self):
         """The id of the robot process: the only child of the node."""
-        (child,) = (word for task in Path(f'/proc/{self.node.pid}/task').iterdir()
-                    for word in (task / 'children').read_text().split())
+        (child,) = (
+            word
+            for task in Path(f'/proc/{self.node.pid}/task').iterdir()
+            for word in (task / 'children').read_text().split()
+        )
         return int(child)
 
     def moving(self, client):
@@ -134,7 +161,8 @@ class Cell:
             client.wait_ready(10.0)
             ended = self.pool.submit(self._send, client)
             self.witness.until(
-                lambda ended=ended: self.witness.speed > MOVING or ended.done(), 5.0)
+                lambda ended=ended: self.witness.speed > MOVING or ended.done(), 5.0
+            )
             if not ended.done():
                 return ended
             # Result and status go different ways: READY may be that of the process before.
@@ -164,7 +192,9 @@ class Cell:
         status, outcome, when = ended.result(result + SLACK + 1.0)
         assert when - begin < result + SLACK
         assert (status, outcome.error_code) == (
-            GoalStatus.STATUS_ABORTED, ErrorCode.CONNECTION_LOST), outcome.error_string
+            GoalStatus.STATUS_ABORTED,
+            ErrorCode.CONNECTION_LOST,
+        ), outcome.error_string
         self.note(what, standstill, when - begin)
 
     @staticmethod

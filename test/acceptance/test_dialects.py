@@ -63,14 +63,22 @@ class SavedCell(RobotCell):
     def start_goal(self, *points):
         """Send a goal of (waypoint, segment) as the driver does; return plan and motion."""
         goal = Goal(waypoints=tuple(w for w, _ in points), segments=tuple(s for _, s in points))
-        made = plan(goal, self.memory.read(), self.arm,
-                    PlanningOptions(dialect=self.dialect, max_tool_speed=1.0))
+        made = plan(
+            goal,
+            self.memory.read(),
+            self.arm,
+            PlanningOptions(dialect=self.dialect, max_tool_speed=1.0),
+        )
         owner = self.owner
         number = len(owner.motions) + 1
         motion = owner.motions[number] = Motion()
-        owner.send(StartMotion(motion=number, order=order_of(made, self.dialect),
-                               points=encode_points((s.primitive for s in made.segments),
-                                                    self.dialect)))
+        owner.send(
+            StartMotion(
+                motion=number,
+                order=order_of(made, self.dialect),
+                points=encode_points((s.primitive for s in made.segments), self.dialect),
+            )
+        )
         return made, motion
 
     async def run_goal(self, *points, bound=120.0):
@@ -120,14 +128,21 @@ def run_saved(scenario, program, dialect=None, turned=0.0):
 @pytest.mark.parametrize('name', NAMES)
 def test_each_dialect_runs_joint_moves_lines_blends_and_arcs(name):
     async def scenario(cell):
-        corners = [cell.pose(y=0.03), cell.pose(x=0.03, y=0.03), cell.pose(x=0.03),
-                   cell.pose(x=0.03, y=-0.04)]
+        corners = [
+            cell.pose(y=0.03),
+            cell.pose(x=0.03, y=0.03),
+            cell.pose(x=0.03),
+            cell.pose(x=0.03, y=-0.04),
+        ]
         made, outcome = await cell.run_goal(
             (Waypoint(pose=corners[0], posture=cell.posture(corners[0])), Segment(type=JOINT)),
             (Waypoint(pose=corners[1]), Segment(blend_radius=0.01, velocity=0.05)),
             (Waypoint(pose=corners[2], posture=cell.posture(corners[2])), Segment()),
-            (Waypoint(pose=corners[3], posture=cell.posture(corners[3])),
-             Segment(type=CIRCULAR, via=cell.pose(x=0.05, y=-0.02))))
+            (
+                Waypoint(pose=corners[3], posture=cell.posture(corners[3])),
+                Segment(type=CIRCULAR, via=cell.pose(x=0.05, y=-0.02)),
+            ),
+        )
         assert outcome.code is ErrorCode.SUCCESSFUL, outcome.text
         here = cell.robot.controller.motion.T_base_tcp
         assert here.distance_to(corners[3]) < 1e-5
@@ -139,9 +154,11 @@ def test_each_dialect_runs_joint_moves_lines_blends_and_arcs(name):
         begin = cell.loop.time()
         _, outcome = await cell.run_goal(
             (Waypoint(pose=cell.pose(y=0.01), time=0.5), Segment(blend_radius=0.002)),
-            (Waypoint(pose=cell.pose(z=0.02), time=1.2504), Segment(type=JOINT)))
+            (Waypoint(pose=cell.pose(z=0.02), time=1.2504), Segment(type=JOINT)),
+        )
         assert outcome.code is ErrorCode.SUCCESSFUL, outcome.text
         assert cell.loop.time() - begin == pytest.approx(1.25, abs=0.1)
+
     run_saved(scenario, name)
 
 
@@ -149,7 +166,8 @@ def test_each_dialect_runs_joint_moves_lines_blends_and_arcs(name):
 def test_each_dialect_cancels_and_goes_on(name):
     async def scenario(cell):
         _, motion = cell.start_goal(
-            *((Waypoint(pose=cell.pose(y=0.1 * (i + 1) / 50)), Segment()) for i in range(50)))
+            *((Waypoint(pose=cell.pose(y=0.1 * (i + 1) / 50)), Segment()) for i in range(50))
+        )
         await cell.until(lambda: cell.memory.read().target_tcp_twist[1] > 0.01)
         cell.owner.cancel()
         await cell.until(lambda: motion.outcome is not None)
@@ -158,41 +176,62 @@ def test_each_dialect_cancels_and_goes_on(name):
         # All that was on its way to the old goal has been read.
         _, outcome = await cell.run_goal((Waypoint(pose=cell.pose(x=0.02)), Segment()))
         assert outcome.code is ErrorCode.SUCCESSFUL, outcome.text
+
     run_saved(scenario, name)
 
 
 def test_two_thousand_points_reach_a_program_that_tells_no_progress():
     """More than four windows of points: they move on with the place on the path."""
+
     async def scenario(cell):
         home = cell.pose()
         x, y, z = home.position
-        points = [(Waypoint(pose=type(home)((x + 1e-4 * i, y + 5e-5 * (i % 2), z),
-                                            home.quaternion), time=0.008 * i), Segment())
-                  for i in range(1, 2001)]
+        points = [
+            (
+                Waypoint(
+                    pose=type(home)((x + 1e-4 * i, y + 5e-5 * (i % 2), z), home.quaternion),
+                    time=0.008 * i,
+                ),
+                Segment(),
+            )
+            for i in range(1, 2001)
+        ]
         made, outcome = await cell.run_goal(*points)
         assert outcome.code is ErrorCode.SUCCESSFUL, outcome.text
         assert cell.memory.read().points_begun == 0
         assert len(made.segments) == 2000
+
     run_saved(scenario, '2.10')
 
 
 # ---- the wrong program ------------------------------------------------------------------------
 
 #: By kind of motion: the segment, and whether the goal has times.
-KINDS = {'timed line': (Segment(), True), 'line': (Segment(velocity=0.05), False),
-         'timed joint move': (Segment(type=JOINT), True),
-         'joint move': (Segment(type=JOINT), False)}
+KINDS = {
+    'timed line': (Segment(), True),
+    'line': (Segment(velocity=0.05), False),
+    'timed joint move': (Segment(type=JOINT), True),
+    'joint move': (Segment(type=JOINT), False),
+}
 #: Driver, program: the kinds that this program reads as they were meant, or nearly.
 HARMLESS = {
-    ('2.0', '2.10'): {*KINDS}, ('2.10', '2.0'): {'line', 'joint move'},
+    ('2.0', '2.10'): {*KINDS},
+    ('2.10', '2.0'): {'line', 'joint move'},
     ('2.10', '2.12'): {'timed line', 'timed joint move', 'joint move'},
-    ('2.0', '2.14'): {'joint move'}, ('2.14', '2.0'): set(), ('2.14', '2.10'): {'timed line'},
+    ('2.0', '2.14'): {'joint move'},
+    ('2.14', '2.0'): set(),
+    ('2.14', '2.10'): {'timed line'},
 }
 
 
-@pytest.mark.parametrize(('kind', 'driver', 'program', 'turned'), [
-    *((kind, *pair, 0.0) for kind in KINDS for pair in HARMLESS),
-    ('line', '2.14', '2.0', 0.6), ('line', '2.14', '2.10', 0.6)])
+@pytest.mark.parametrize(
+    ('kind', 'driver', 'program', 'turned'),
+    [
+        *((kind, *pair, 0.0) for kind in KINDS for pair in HARMLESS),
+        ('line', '2.14', '2.0', 0.6),
+        ('line', '2.14', '2.10', 0.6),
+    ],
+)
 def test_a_wrong_program_makes_no_wild_move(kind, driver, program, turned):
     """
     A program of another dialect ends the goal, unless it does what is meant.
@@ -204,8 +243,12 @@ def test_a_wrong_program_makes_no_wild_move(kind, driver, program, turned):
 
     async def scenario(cell):
         target = cell.pose(y=0.05)
-        _, outcome = await cell.run_goal((Waypoint(
-            pose=target, posture=cell.posture(target), time=1.0 if timed else 0.0), segment))
+        _, outcome = await cell.run_goal(
+            (
+                Waypoint(pose=target, posture=cell.posture(target), time=1.0 if timed else 0.0),
+                segment,
+            )
+        )
         assert cell.fastest < 0.25
         assert cell.farthest < 0.0501
         if kind in HARMLESS[driver, program]:
@@ -219,4 +262,5 @@ def test_a_wrong_program_makes_no_wild_move(kind, driver, program, turned):
         else:
             assert outcome.code is ErrorCode.PROGRAM_STOPPED
             assert 'v is' in cell.status.last_error
+
     run_saved(scenario, program, driver, turned)

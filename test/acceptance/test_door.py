@@ -35,15 +35,20 @@ def test_only_the_robot_gets_in_and_only_where_it_is_looked_for(driver, caplog):
         with pytest.raises(ConnectionRefusedError):
             socket.create_connection((OTHER, port), timeout=5.0)  # not on all networks
         assert not knock(port)
-        wait_for(lambda name=name: f'{name}: {OTHER} may not connect; add it to allowed_peers if '
-                 'it is the robot' in caplog.messages)
+        wait_for(
+            lambda name=name: (
+                f'{name}: {OTHER} may not connect; add it to allowed_peers if '
+                'it is the robot' in caplog.messages
+            )
+        )
     assert driver.status.state is ConnectionState.READY, 'the robot program is not disturbed'
 
 
 @pytest.mark.ur_sim(frequency=125.0)
 def test_others_get_in_where_they_are_named(make_driver):
-    driver = make_driver(allowed_peers=('127.0.0.1', OTHER), bind_address='0.0.0.0',
-                         reverse_ip='127.0.0.1')
+    driver = make_driver(
+        allowed_peers=('127.0.0.1', OTHER), bind_address='0.0.0.0', reverse_ip='127.0.0.1'
+    )
     driver.wait_ready(5.0)
     port = driver.status.ports['script_sender_port']
     assert knock(port, OTHER)

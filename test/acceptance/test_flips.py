@@ -56,16 +56,20 @@ def outwards(arm):
 def past_the_column(arm):
     """The centre of the wrist 0.2 mm beside the column over the base."""
     d4, d6 = arm.geometry.d[3], arm.geometry.d[5]
-    wrist = Pose((hypot(d4, 0.008), 0.0, arm.geometry.d[0] + 0.6 * arm.model.reach),
-                 arm.forward((0.5, -1.2, 1.6, -2.0, -1.2, 0.3)).quaternion)
+    wrist = Pose(
+        (hypot(d4, 0.008), 0.0, arm.geometry.d[0] + 0.6 * arm.model.reach),
+        arm.forward((0.5, -1.2, 1.6, -2.0, -1.2, 0.3)).quaternion,
+    )
     return line(arm, wrist @ Pose((0.0, 0.0, d6)), (0.0, 1.0, 0.0), 0.15)
 
 
 def line(arm, middle, direction, half):
     """Return where an arm stands at the beginning of a line, and the end of the line."""
     way = half * arm.model.reach * np.array(direction)
-    ends = [Pose(tuple((np.array(middle.position) + side * way).tolist()), middle.quaternion)
-            for side in (-1.0, 1.0)]
+    ends = [
+        Pose(tuple((np.array(middle.position) + side * way).tolist()), middle.quaternion)
+        for side in (-1.0, 1.0)
+    ]
     q = nearest(arm, ends[0], (0.5, -1.2, 1.6, -2.0, -1.2, 0.3))
     return q, ends[1]
 
@@ -88,7 +92,8 @@ def test_a_flip_is_named_fails_as_a_line_and_passes_as_a_joint_move(robot_of, mo
     behind = other_side(arm, end, came_to(arm, q, end), flip)
     goal = Goal(
         waypoints=(Waypoint(pose=end, posture=Posture(names=JOINT_NAMES, values=behind)),),
-        segments=(Segment(type=SegmentType.LINEAR, velocity=0.3, acceleration=2.0),))
+        segments=(Segment(type=SegmentType.LINEAR, velocity=0.3, acceleration=2.0),),
+    )
 
     state = robot.place(q, IDENTITY)
     with pytest.raises((NearSingularity, InvalidPosture)) as refusal:
@@ -127,8 +132,9 @@ def other_side(arm, pose, q, flip):
     k = ('shoulder', 'elbow', 'wrist').index(flip)
     signs[k] *= -1
     found = [other for other in solutions(arm, pose, q) if signs_of(arm, other) == signs]
-    return tuple(a + 2.0 * pi * round((b - a) / (2.0 * pi))
-                 for a, b in zip(found[0], q, strict=True))
+    return tuple(
+        a + 2.0 * pi * round((b - a) / (2.0 * pi)) for a, b in zip(found[0], q, strict=True)
+    )
 
 
 def signs_of(arm, q):

@@ -36,8 +36,14 @@ QUARTER = pi / 2.0
 
 def link_matrix(theta, d, a, alpha):
     ct, st, ca, sa = cos(theta), sin(theta), cos(alpha), sin(alpha)
-    return np.array([[ct, -st * ca, st * sa, a * ct], [st, ct * ca, -ct * sa, a * st],
-                     [0.0, sa, ca, d], [0.0, 0.0, 0.0, 1.0]])
+    return np.array(
+        [
+            [ct, -st * ca, st * sa, a * ct],
+            [st, ct * ca, -ct * sa, a * st],
+            [0.0, sa, ca, d],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
 
 
 def places(geometry, joints, T_flange_frame):
@@ -45,8 +51,9 @@ def places(geometry, joints, T_flange_frame):
     matrices = []
     for q in joints:
         T = np.eye(4)
-        for row in zip(np.add(geometry.theta, q), geometry.d, geometry.a, geometry.alpha,
-                       strict=True):
+        for row in zip(
+            np.add(geometry.theta, q), geometry.d, geometry.a, geometry.alpha, strict=True
+        ):
             T = T @ link_matrix(*row)
         matrices.append(T @ T_flange_frame.matrix())
     return np.array(matrices)
@@ -87,17 +94,25 @@ def moved(pose, x=0.0, y=0.0, z=0.0, turn=0.0):
     """Return a pose moved [m] along the axes of base, and turned [rad] about a skew one."""
     a, b, c = pose.position
     axis = np.array([0.1, -0.2, 1.0])
-    turned = Pose((0.0, 0.0, 0.0), quaternion_from_rotation_vector(
-        tuple(turn * axis / np.linalg.norm(axis)))) @ pose
+    turned = (
+        Pose(
+            (0.0, 0.0, 0.0),
+            quaternion_from_rotation_vector(tuple(turn * axis / np.linalg.norm(axis))),
+        )
+        @ pose
+    )
     return Pose((a + x, b + y, c + z), turned.quaternion)
 
 
 def goal_of(points, frame, T_flange_frame=None, segments=()):
     """Return a goal of (time, pose in base), given in another frame."""
-    return Goal(waypoints=tuple(Waypoint(pose=frame.inverse() @ pose, time=time)
-                                for time, pose in points),
-                segments=segments, T_base_frame=frame, T_flange_controlled=T_flange_frame,
-                controlled_frame='' if T_flange_frame is None else 'nozzle')
+    return Goal(
+        waypoints=tuple(Waypoint(pose=frame.inverse() @ pose, time=time) for time, pose in points),
+        segments=segments,
+        T_base_frame=frame,
+        T_flange_controlled=T_flange_frame,
+        controlled_frame='' if T_flange_frame is None else 'nozzle',
+    )
 
 
 def off_line(points, a, b):
@@ -121,29 +136,55 @@ BASE_LINK = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
 TABLE = Pose((0.2, -0.3, 0.1), quaternion_from_rotation_vector((0.2, 0.4, 1.0)))
 
 
-@pytest.mark.parametrize(('T_flange_frame', 'frame'), [
-    pytest.param(NOZZLE, BASE_LINK, id='nozzle in base_link',
-                 marks=pytest.mark.ur_sim(frequency=125.0)),
-    *(pytest.param(T, TABLE, id=f'{name} in a static frame, calibrated', marks=pytest.mark.ur_sim(
-        frequency=125.0, geometry=random_calibration(MODELS['ur5e'], 3)))
-      for name, T in (('tool0', IDENTITY), ('flange', FLANGE)))])
+@pytest.mark.parametrize(
+    ('T_flange_frame', 'frame'),
+    [
+        pytest.param(
+            NOZZLE, BASE_LINK, id='nozzle in base_link', marks=pytest.mark.ur_sim(frequency=125.0)
+        ),
+        *(
+            pytest.param(
+                T,
+                TABLE,
+                id=f'{name} in a static frame, calibrated',
+                marks=pytest.mark.ur_sim(
+                    frequency=125.0, geometry=random_calibration(MODELS['ur5e'], 3)
+                ),
+            )
+            for name, T in (('tool0', IDENTITY), ('flange', FLANGE))
+        ),
+    ],
+)
 def test_the_named_frame_keeps_to_line_and_arcs_while_it_turns(
-        tooled, ur_sim, record, T_flange_frame, frame):
+    tooled, ur_sim, record, T_flange_frame, frame
+):
     start = stand(tooled, T_flange_frame)
-    corners = [start, moved(start, y=0.1, turn=QUARTER), moved(start, y=0.1, z=0.1),
-               moved(start, z=0.1)]
+    corners = [
+        start,
+        moved(start, y=0.1, turn=QUARTER),
+        moved(start, y=0.1, z=0.1),
+        moved(start, z=0.1),
+    ]
     vias = [None, moved(start, y=0.12, z=0.05), moved(start, x=0.02, y=0.05, z=0.1)]
     goal = goal_of(
-        [(1.0 * (k + 1), pose) for k, pose in enumerate(corners[1:])], frame, T_flange_frame,
-        segments=(Segment(), *(
-            Segment(type=SegmentType.CIRCULAR, via=frame.inverse() @ via, arc_mode=mode)
-            for via, mode in zip(vias[1:], (ArcMode.UNCONSTRAINED, ArcMode.FIXED), strict=True))))
+        [(1.0 * (k + 1), pose) for k, pose in enumerate(corners[1:])],
+        frame,
+        T_flange_frame,
+        segments=(
+            Segment(),
+            *(
+                Segment(type=SegmentType.CIRCULAR, via=frame.inverse() @ via, arc_mode=mode)
+                for via, mode in zip(vias[1:], (ArcMode.UNCONSTRAINED, ArcMode.FIXED), strict=True)
+            ),
+        ),
+    )
     seen = []
     with record() as recording:
         outcome = tooled.execute(goal, on_progress=seen.append, timeout=20.0)
     assert outcome.succeeded, outcome.text
     assert outcome.report[-1] == (
-        'the TCP of the robot was set for the goal, and is what it was before')
+        'the TCP of the robot was set for the goal, and is what it was before'
+    )
     assert has_own_tcp(ur_sim)
 
     geometry = ur_sim.config.geometry or MODELS['ur5e'].geometry
@@ -151,8 +192,10 @@ def test_the_named_frame_keeps_to_line_and_arcs_while_it_turns(
     points = where[:, :3, 3]
     a, b, c, d = (np.array(pose.position) for pose in corners)
     via_1, via_2 = (np.array(via.position) for via in vias[1:])
-    off = np.min([off_line(points, a, b), off_circle(points, b, via_1, c),
-                  off_circle(points, c, via_2, d)], axis=0)
+    off = np.min(
+        [off_line(points, a, b), off_circle(points, b, via_1, c), off_circle(points, c, via_2, d)],
+        axis=0,
+    )
     assert off.max() < 1e-4
     for place in (a, b, c, d, via_1, via_2):
         assert np.linalg.norm(points - place, axis=1).min() < 0.003
@@ -178,8 +221,9 @@ def test_the_next_goal_finds_the_tcp_of_before(tooled, ur_sim):
         nozzle = k % 2 == 0
         start = stand(tooled, NOZZLE if nozzle else TCP)
         target = moved(start, y=0.01)
-        outcome = tooled.execute(goal_of([(0.2, target)], IDENTITY, NOZZLE if nozzle else None),
-                                 timeout=9.0)
+        outcome = tooled.execute(
+            goal_of([(0.2, target)], IDENTITY, NOZZLE if nozzle else None), timeout=9.0
+        )
         assert outcome.succeeded, outcome.text
         assert tooled.state.T_flange_tcp.distance_to(TCP) < 1e-9
         assert stand(tooled, NOZZLE if nozzle else TCP).distance_to(target) < 1e-4
@@ -204,8 +248,9 @@ def test_a_tcp_that_is_changed_between_goals_is_the_one_that_moves(tooled, ur_si
 def moving(driver, turn=QUARTER):
     """Start a long goal of the nozzle and return its motion when the arm is under way."""
     start = stand(driver, NOZZLE)
-    motion = driver.start(driver.plan(goal_of(
-        [(5.0, moved(start, y=0.2, turn=turn))], IDENTITY, NOZZLE)))
+    motion = driver.start(
+        driver.plan(goal_of([(5.0, moved(start, y=0.2, turn=turn))], IDENTITY, NOZZLE))
+    )
     wait_for(lambda: max(map(abs, driver.state.actual_qd)) > 0.02)
     assert driver.state.T_flange_tcp.distance_to(NOZZLE) < 1e-6
     return motion
@@ -226,8 +271,11 @@ def test_a_robot_that_stops_gets_its_tcp_back(tooled, ur_sim, stop):
     motion = moving(tooled)
     getattr(ur_sim, stop)()
     outcome = motion.result(4.0)
-    assert outcome.code in (ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP,
-                            ErrorCode.PROGRAM_STOPPED)
+    assert outcome.code in (
+        ErrorCode.PROTECTIVE_STOP,
+        ErrorCode.EMERGENCY_STOP,
+        ErrorCode.PROGRAM_STOPPED,
+    )
     wait_for(lambda: has_own_tcp(ur_sim, 1e-11))
     if stop == 'protective_stop':
         wait_for(lambda: unlocked(ur_sim))
@@ -244,7 +292,8 @@ def unlocked(ur_sim):
 
 @pytest.mark.ur_sim(frequency=125.0, unlock_delay=0.1)
 def test_without_headless_mode_the_next_program_puts_the_tcp_back_before_a_goal(
-        make_driver, ur_sim):
+    make_driver, ur_sim
+):
     set_tcp(ur_sim, TCP)
     driver = make_driver(headless_mode=False)
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
@@ -299,8 +348,10 @@ def test_the_robot_program_puts_the_tcp_back_when_the_driver_dies(make_driver, u
 
 
 @pytest.mark.ur_sim(frequency=125.0)
-@pytest.mark.parametrize(('interface', 'code'), [
-    ('rtde', ErrorCode.CONNECTION_LOST), ('reverse', ErrorCode.PROGRAM_STOPPED)])
+@pytest.mark.parametrize(
+    ('interface', 'code'),
+    [('rtde', ErrorCode.CONNECTION_LOST), ('reverse', ErrorCode.PROGRAM_STOPPED)],
+)
 def test_a_wire_that_breaks_leaves_the_tcp_as_it_was(tooled, ur_sim, interface, code):
     motion = moving(tooled)
     if interface == 'rtde':
@@ -312,12 +363,17 @@ def test_a_wire_that_breaks_leaves_the_tcp_as_it_was(tooled, ur_sim, interface, 
 
 
 @pytest.mark.ur_sim(frequency=125.0)
-@pytest.mark.parametrize(('stop', 'code', 'text'), [
-    (None, ErrorCode.ROBOT_NOT_READY, 'did not take the TCP of the goal'),
-    ('cancel', ErrorCode.CANCELLED, 'before anything moved'),
-    ('protective_stop', ErrorCode.PROTECTIVE_STOP, 'before anything moved')])
+@pytest.mark.parametrize(
+    ('stop', 'code', 'text'),
+    [
+        (None, ErrorCode.ROBOT_NOT_READY, 'did not take the TCP of the goal'),
+        ('cancel', ErrorCode.CANCELLED, 'before anything moved'),
+        ('protective_stop', ErrorCode.PROTECTIVE_STOP, 'before anything moved'),
+    ],
+)
 def test_nothing_moves_on_a_robot_that_does_not_take_the_tcp(
-        make_driver, ur_sim, stop, code, text):
+    make_driver, ur_sim, stop, code, text
+):
     set_tcp(ur_sim, TCP)
     driver = make_driver(headless_mode=False)
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
@@ -328,8 +384,9 @@ def test_nothing_moves_on_a_robot_that_does_not_take_the_tcp(
     driver.wait_ready(5.0)
     q = ur_sim.state().q
     start = stand(driver, NOZZLE)
-    motion = driver.start(driver.plan(goal_of(
-        [(2.0, moved(start, y=0.1, turn=QUARTER))], IDENTITY, NOZZLE)))
+    motion = driver.start(
+        driver.plan(goal_of([(2.0, moved(start, y=0.1, turn=QUARTER))], IDENTITY, NOZZLE))
+    )
     wait_for(lambda: 'no TCP' in ur_sim.state().messages)
     if stop == 'cancel':
         motion.cancel()

@@ -30,8 +30,11 @@ class Client:
         self.driver, self.executor = driver, executor
         self.node = Node('test_client')
         self.feedback = []
-        self._actions = ActionClient(self.node, FollowCartesianTrajectory,
-                                     '/ur_cartesian_driver/follow_cartesian_trajectory')
+        self._actions = ActionClient(
+            self.node,
+            FollowCartesianTrajectory,
+            '/ur_cartesian_driver/follow_cartesian_trajectory',
+        )
         executor.add_node(driver)
         executor.add_node(self.node)
         assert self.spin_until(self._actions.server_is_ready)
@@ -47,8 +50,11 @@ class Client:
         return future.result()
 
     def send(self, goal):
-        handle = self.wait(self._actions.send_goal_async(
-            goal, lambda message: self.feedback.append(message.feedback)))
+        handle = self.wait(
+            self._actions.send_goal_async(
+                goal, lambda message: self.feedback.append(message.feedback)
+            )
+        )
         assert handle.accepted
         return handle
 
@@ -62,8 +68,10 @@ class Client:
         self.node.destroy_node()
 
 
-@pytest.fixture(params=[SingleThreadedExecutor, MultiThreadedExecutor],
-                ids=['single-threaded', 'multi-threaded'])
+@pytest.fixture(
+    params=[SingleThreadedExecutor, MultiThreadedExecutor],
+    ids=['single-threaded', 'multi-threaded'],
+)
 def client(request, cartesian_driver):
     made = Client(cartesian_driver, request.param())
     yield made
@@ -81,7 +89,8 @@ def goal_at(driver, *offsets, seconds=0.5):
         point.time_from_start.nanosec = round(total % 1 * 1e9)
         position, orientation = point.pose.position, point.pose.orientation
         position.x, position.y, position.z = (
-            a + b for a, b in zip(pose.position, (x, y, z), strict=True))
+            a + b for a, b in zip(pose.position, (x, y, z), strict=True)
+        )
         orientation.x, orientation.y, orientation.z, orientation.w = pose.quaternion
         goal.trajectory.points.append(point)
     return goal

@@ -36,18 +36,25 @@ class Session:
         state = cell.memory.read()
         self.start = state.target_tcp_pose
         plan = standing_plan(state)
-        cell.owner.send(StartMotion(
-            motion=self.number, points=b'', order=standing_order(plan),
-            live=live_order(ARM, state.target_q, PlanningOptions(
-                **{'servo_target_timeout': 0.6} | options))))
+        cell.owner.send(
+            StartMotion(
+                motion=self.number,
+                points=b'',
+                order=standing_order(plan),
+                live=live_order(
+                    ARM, state.target_q, PlanningOptions(**{'servo_target_timeout': 0.6} | options)
+                ),
+            )
+        )
 
     def beside(self, x=0.0, y=0.0, z=0.0):
         px, py, pz = self.start.position
         return Pose((px + x, py + y, pz + z), self.start.quaternion)
 
     def aim(self, x=0.0, y=0.0, z=0.0, age=0.0):
-        self.cell.owner.send(AimMotion(
-            motion=self.number, T_base_tcp=self.beside(x, y, z), age=age))
+        self.cell.owner.send(
+            AimMotion(motion=self.number, T_base_tcp=self.beside(x, y, z), age=age)
+        )
 
     async def lead(self, seconds, way):
         """Tell targets for some time: ``way(t)`` is beside the start."""
@@ -139,11 +146,14 @@ async def _hang_up(cell):
     await cell.crash_robot()
 
 
-@pytest.mark.parametrize(('what', 'code'), [
-    (_cancel, ErrorCode.CANCELLED),
-    (_protective_stop, ErrorCode.PROTECTIVE_STOP),
-    (_hang_up, ErrorCode.CONNECTION_LOST),
-])
+@pytest.mark.parametrize(
+    ('what', 'code'),
+    [
+        (_cancel, ErrorCode.CANCELLED),
+        (_protective_stop, ErrorCode.PROTECTIVE_STOP),
+        (_hang_up, ErrorCode.CONNECTION_LOST),
+    ],
+)
 def test_what_ends_a_goal_ends_a_session(what, code):
     async def scenario(cell):
         session = Session(cell)
@@ -168,8 +178,7 @@ def test_a_person_may_guide_the_arm_until_that_is_ended():
     async def scenario(cell):
         motion = cell.owner.motions[1] = Motion()
         plan = standing_plan(cell.memory.read())
-        cell.owner.send(StartMotion(
-            motion=1, points=b'', order=standing_order(plan), teach=True))
+        cell.owner.send(StartMotion(motion=1, points=b'', order=standing_order(plan), teach=True))
         if not cell.config.allow_teach:
             await cell.until(lambda: motion.outcome is not None, 2.0)
             assert not motion.progress

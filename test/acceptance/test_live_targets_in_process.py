@@ -17,11 +17,15 @@ from std_srvs.srv import SetBool
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint, ServoState
 
-pytestmark = [pytest.mark.acceptance, pytest.mark.slow,
-              # The tests pay for each cycle.
-              pytest.mark.ur_sim(frequency=125.0),
-              pytest.mark.cartesian_driver(
-                  servo_target_enabled=True, servo_target_timeout=0.5, allow_teach=True)]
+pytestmark = [
+    pytest.mark.acceptance,
+    pytest.mark.slow,
+    # The tests pay for each cycle.
+    pytest.mark.ur_sim(frequency=125.0),
+    pytest.mark.cartesian_driver(
+        servo_target_enabled=True, servo_target_timeout=0.5, allow_teach=True
+    ),
+]
 
 PAGE = Path(__file__).resolve().parents[2] / 'doc' / 'live_targets.md'
 NAME = '/ur_cartesian_driver'
@@ -76,7 +80,8 @@ class Sender(Node):
         self.states = []
         self.teach = self.create_client(SetBool, f'{NAME}/teach_mode')
         self.actions = ActionClient(
-            self, FollowCartesianTrajectory, f'{NAME}/follow_cartesian_trajectory')
+            self, FollowCartesianTrajectory, f'{NAME}/follow_cartesian_trajectory'
+        )
         self.targets = self.create_publisher(PoseStamped, f'{NAME}/servo_target', 1)
         self.create_subscription(ServoState, f'{NAME}/servo_state', self.states.append, 10)
 
@@ -107,9 +112,13 @@ class Sender(Node):
 
 @pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the documents')
 def test_the_example_of_the_page_leads_the_tool_on_its_circle(ur_sim, cell_with):
-    code = next(body for body in re.findall(
-        r'^```python\n(.*?)^```$', PAGE.read_text(), re.DOTALL | re.MULTILINE)
-        if 'class Circle' in body)
+    code = next(
+        body
+        for body in re.findall(
+            r'^```python\n(.*?)^```$', PAGE.read_text(), re.DOTALL | re.MULTILINE
+        )
+        if 'class Circle' in body
+    )
     names = {'__name__': 'example'}
     exec(code, names)
     _, y0, z0 = ur_sim.state().T_base_tcp.position
@@ -160,7 +169,6 @@ def test_a_goal_takes_its_place_and_people_may_guide_the_arm(ur_sim, cell_with):
     cell.until(lambda: targets.idle)
     cell.until(lambda: sender.states[-1].state == ServoState.IDLE)
     assert max(map(abs, ur_sim.state().qd)) < 1e-6
-
 
     # The third claim: teach mode is a service.
     def teach(on):

@@ -46,15 +46,24 @@ def spline(home, first, count, last):
 
 #: How the points are joined; points with their segments; and how long before the end of what is
 #: known its ending begins: a line from blend to rest, or a piece to rest [s].
-KINDS = {'lines': (ExecutionMode.PRIMITIVES, lines, 0.4),
-         'spline': (ExecutionMode.SPLINE, spline, 0.06)}
+KINDS = {
+    'lines': (ExecutionMode.PRIMITIVES, lines, 0.4),
+    'spline': (ExecutionMode.SPLINE, spline, 0.06),
+}
 
 
 def goal(kind, home, count, **changes):
     execution, make, _ = KINDS[kind]
     waypoints, segments = make(home, 1, count, not changes.get('keep_open', True))
-    return Goal(**{'waypoints': tuple(waypoints), 'segments': tuple(segments),
-                   'execution': execution, 'keep_open': True} | changes)
+    return Goal(
+        **{
+            'waypoints': tuple(waypoints),
+            'segments': tuple(segments),
+            'execution': execution,
+            'keep_open': True,
+        }
+        | changes
+    )
 
 
 class Speeds:
@@ -77,7 +86,7 @@ class Speeds:
         """Return them (cycles, 6) [rad/s], without the rest behind the end."""
         self._task.cancel()
         rows = np.array(self.rows)
-        return rows[:np.flatnonzero(rows.any(axis=1))[-1] + 1]
+        return rows[: np.flatnonzero(rows.any(axis=1))[-1] + 1]
 
 
 async def produced(cell, kind, total, chunk, lead):
@@ -86,8 +95,12 @@ async def produced(cell, kind, total, chunk, lead):
     motion = OpenMotion(cell, goal(kind, home, chunk))
     while motion.points < total:
         assert await motion.until(
-            lambda: motion.motion.progress and motion.progress.points_received == motion.points
-            and motion.progress.time_remaining < lead)
+            lambda: (
+                motion.motion.progress
+                and motion.progress.points_received == motion.points
+                and motion.progress.time_remaining < lead
+            )
+        )
         count = min(chunk, total - motion.points)
         last = motion.points + count == total
         points, segments = KINDS[kind][1](home, motion.points + 1, count, last)
@@ -101,8 +114,14 @@ async def produced(cell, kind, total, chunk, lead):
 async def at_once(cell, kind, total):
     """Run the same as a goal whose points are all known."""
     home, speeds = cell.memory.read().actual_tcp_pose, Speeds(cell)
-    motion = cell.owner.start(plan(goal(kind, home, total, keep_open=False), cell.memory.read(),
-                                   ARM, PlanningOptions(max_tool_speed=1.0)))
+    motion = cell.owner.start(
+        plan(
+            goal(kind, home, total, keep_open=False),
+            cell.memory.read(),
+            ARM,
+            PlanningOptions(max_tool_speed=1.0),
+        )
+    )
     await cell.until(lambda: motion.outcome, 60.0)
     assert motion.outcome.succeeded
     return speeds.stop()
@@ -182,7 +201,8 @@ def test_nobody_waits_for_ever():
         assert end.code is ErrorCode.CANCELLED
         assert end.text == (
             'No more points, and no word that there are none, came within keep_open_timeout = '
-            '0.5 s (at rest behind point 5, waiting for more).')
+            '0.5 s (at rest behind point 5, waiting for more).'
+        )
         await cell.until(cell.is_ready)
         with pytest.raises(GoalRefused, match=r'^The goal has ended\.$'):
             await motion.append(corners(motion.home, 7, 1), (BLEND,))
@@ -196,9 +216,10 @@ def test_points_that_are_refused_leave_the_goal_as_it_was():
         motion = OpenMotion(cell, goal('lines', home, 5))
         far = replace(corners(home, 6, 1)[0], pose=moved(home, 2.0, 0.0, 0.0))
         for wrong, text in (
-                (([*corners(home, 6, 1), far], (BLEND,) * 2), r'points\[6\]'),
-                ((corners(home, 6, 2), (BLEND,)), 'segments has 1 entries for 2 points'),
-                (((), ()), r'^points is empty; give at least one point, or set last\.$')):
+            (([*corners(home, 6, 1), far], (BLEND,) * 2), r'points\[6\]'),
+            ((corners(home, 6, 2), (BLEND,)), 'segments has 1 entries for 2 points'),
+            (((), ()), r'^points is empty; give at least one point, or set last\.$'),
+        ):
             with pytest.raises(GoalRefused, match=text):
                 await motion.append(*wrong)
         await motion.append(corners(home, 6, 5), (BLEND,) * 5, last=True)
@@ -216,9 +237,12 @@ SWITCHES = [(3, 0.0), (4, 0.0), (4, 0.03), (4, 0.25), (5, 0.0), (9, 0.0), (14, 0
 
 def switches(first, count):
     return tuple(
-        IOCommand(waypoint=point, offset=offset, output=OutputKind.STANDARD_DIGITAL, pin=k,
-                  value=1.0) for k, (point, offset) in enumerate(SWITCHES)
-        if first <= point < first + count)
+        IOCommand(
+            waypoint=point, offset=offset, output=OutputKind.STANDARD_DIGITAL, pin=k, value=1.0
+        )
+        for k, (point, offset) in enumerate(SWITCHES)
+        if first <= point < first + count
+    )
 
 
 async def outputs_at(cell, kind, chunk):
@@ -236,15 +260,21 @@ async def outputs_at(cell, kind, chunk):
 
     watch = asyncio.ensure_future(look())
     if chunk == 15:
-        motion = cell.owner.start(plan(
-            goal(kind, home, 15, keep_open=False, io_commands=switches(0, 15)),
-            cell.memory.read(), ARM, PlanningOptions(max_tool_speed=1.0)))
+        motion = cell.owner.start(
+            plan(
+                goal(kind, home, 15, keep_open=False, io_commands=switches(0, 15)),
+                cell.memory.read(),
+                ARM,
+                PlanningOptions(max_tool_speed=1.0),
+            )
+        )
         await cell.until(lambda: motion.outcome, 60.0)
     else:
         motion = OpenMotion(cell, goal(kind, home, chunk, io_commands=switches(0, chunk)))
         while motion.points < 15:
-            assert await motion.until(lambda: motion.motion.progress
-                                      and motion.progress.time_remaining < HORIZON)
+            assert await motion.until(
+                lambda: motion.motion.progress and motion.progress.time_remaining < HORIZON
+            )
             last = motion.points + chunk == 15
             points, segments = KINDS[kind][1](home, motion.points + 1, chunk, last)
             await motion.append(points, segments, switches(motion.points, chunk), last=last)
@@ -263,19 +293,26 @@ def test_outputs_are_switched_as_if_all_points_had_been_known(kind):
 
 def test_memory_stays_the_same_however_long_a_goal_goes_on():
     """Hundreds of pieces of a spline, a cycle each: no starvation, and nothing that grows."""
+
     async def scenario(cell):
         home, sizes, blocks = cell.memory.read().actual_tcp_pose, [], []
 
         def part(first):
             return circle(home, first, 125, step=CYCLE)
 
-        motion = OpenMotion(cell, Goal(waypoints=tuple(part(1)), keep_open=True,
-                                       execution=ExecutionMode.SPLINE), self_collision='off')
+        motion = OpenMotion(
+            cell,
+            Goal(waypoints=tuple(part(1)), keep_open=True, execution=ExecutionMode.SPLINE),
+            self_collision='off',
+        )
         while motion.points < 750:
             assert await motion.until(
-                lambda: motion.motion.progress
-                and motion.progress.points_received == motion.points
-                and motion.progress.time_remaining < HORIZON), motion.outcome.text
+                lambda: (
+                    motion.motion.progress
+                    and motion.progress.points_received == motion.points
+                    and motion.progress.time_remaining < HORIZON
+                )
+            ), motion.outcome.text
             await motion.append(part(motion.points + 1))
             forget(cell)
             del motion.motion.progress[:-1]

@@ -22,7 +22,8 @@ def full(q, off=0.0):
 
 
 def test_a_joint_approach_with_lines_and_arcs_arrives_in_its_postures(
-        driver, home, record, trajectory_bytes):
+    driver, home, record, trajectory_bytes
+):
     """The acceptance of everything that carries a posture, with postures 0.1 rad off."""
     arm, q0 = driver.arm, driver.state.actual_q
     start = home(x=0.05, y=-0.1)
@@ -34,22 +35,36 @@ def test_a_joint_approach_with_lines_and_arcs_arrives_in_its_postures(
 
     # approach, two lines with blends, four arcs of 60 degrees
     points = [start, home(x=0.05, y=-0.02), home(x=0.05, y=0.0, z=0.02), on_circle(0.0)]
-    segments = [Segment(type=SegmentType.JOINT), Segment(blend_radius=0.01),
-                Segment(blend_radius=0.005), Segment()]
+    segments = [
+        Segment(type=SegmentType.JOINT),
+        Segment(blend_radius=0.01),
+        Segment(blend_radius=0.005),
+        Segment(),
+    ]
     postures = [full(q_start, 0.1), Posture(), Posture(), Posture()]
-    for i, (target, via) in enumerate([(False, False), (True, True), (True, False),
-                                       (False, True)]):
+    for i, (target, via) in enumerate(
+        [(False, False), (True, True), (True, False), (False, True)]
+    ):
         begin = i * pi / 3
         end_pose, via_pose = on_circle(begin + pi / 3), on_circle(begin + pi / 6)
         q_end, q_via = (nearest(arm, pose, q_start) for pose in (end_pose, via_pose))
         points.append(end_pose)
         postures.append(full(q_end, 0.1) if target else Posture())
-        segments.append(Segment(
-            type=SegmentType.CIRCULAR, via=via_pose, velocity=0.1,
-            via_posture=full(q_via, 0.1) if via else Posture()))
-    goal = Goal(segments=tuple(segments), waypoints=tuple(
-        Waypoint(pose=pose, posture=posture)
-        for pose, posture in zip(points, postures, strict=True)))
+        segments.append(
+            Segment(
+                type=SegmentType.CIRCULAR,
+                via=via_pose,
+                velocity=0.1,
+                via_posture=full(q_via, 0.1) if via else Posture(),
+            )
+        )
+    goal = Goal(
+        segments=tuple(segments),
+        waypoints=tuple(
+            Waypoint(pose=pose, posture=posture)
+            for pose, posture in zip(points, postures, strict=True)
+        ),
+    )
 
     with record() as recording:
         outcome = driver.execute(goal, timeout=60.0)
@@ -57,9 +72,15 @@ def test_a_joint_approach_with_lines_and_arcs_arrives_in_its_postures(
 
     sent = [decode_point(point) for point in trajectory_bytes()]
     assert [motion_type(p) for p in sent] == [
-        MotionType.MOVEJ_POSE, MotionType.MOVEL, MotionType.MOVEL, MotionType.MOVEL,
-        MotionType.MOVEC, MotionType.MOVEC_JOINT, MotionType.MOVEC_JOINT_POSE,
-        MotionType.MOVEC_POSE_JOINT]
+        MotionType.MOVEJ_POSE,
+        MotionType.MOVEL,
+        MotionType.MOVEL,
+        MotionType.MOVEL,
+        MotionType.MOVEC,
+        MotionType.MOVEC_JOINT,
+        MotionType.MOVEC_JOINT_POSE,
+        MotionType.MOVEC_POSE_JOINT,
+    ]
     assert isinstance(sent[0], MoveJ)
     assert sent[0].q_near == pytest.approx([v + 0.1 for v in q_start], abs=1e-6)
     assert [p.blend_radius for p in sent[1:4]] == [0.01, 0.005, 0.0]
@@ -80,8 +101,10 @@ def nearest_row(recording, pose):
 def test_a_partial_posture_chooses_the_elbow(driver, home, trajectory_bytes):
     arm, q0 = driver.arm, driver.state.actual_q
     elbow_down = Posture(names=('elbow_joint',), values=(-1.5,))
-    goal = Goal(waypoints=(Waypoint(pose=home(x=0.02), posture=elbow_down),),
-                segments=(Segment(type=SegmentType.JOINT, velocity=1.5, acceleration=3.0),))
+    goal = Goal(
+        waypoints=(Waypoint(pose=home(x=0.02), posture=elbow_down),),
+        segments=(Segment(type=SegmentType.JOINT, velocity=1.5, acceleration=3.0),),
+    )
     outcome = driver.execute(goal, timeout=30.0)
     assert outcome.code is ErrorCode.SUCCESSFUL, outcome.text
     q = driver.state.actual_q
@@ -94,8 +117,12 @@ def test_a_partial_posture_chooses_the_elbow(driver, home, trajectory_bytes):
 
 def test_a_line_carries_its_posture_on_the_wire(driver, home, trajectory_bytes):
     q = nearest(driver.arm, home(y=0.05), driver.state.actual_q)
-    goal = Goal(waypoints=(Waypoint(pose=home(y=0.05), time=1.0, posture=full(q)),
-                           Waypoint(pose=home(), time=2.0)))
+    goal = Goal(
+        waypoints=(
+            Waypoint(pose=home(y=0.05), time=1.0, posture=full(q)),
+            Waypoint(pose=home(), time=2.0),
+        )
+    )
     assert driver.execute(goal, timeout=30.0).succeeded
     with_posture, without = (decode_point(p) for p in trajectory_bytes())
     assert isinstance(with_posture, MoveL)
@@ -122,6 +149,7 @@ def test_poses_are_those_of_the_active_tcp(driver, ur_sim, home, record):
     pose = driver.state.actual_tcp_pose
     target = Pose((pose.position[0], pose.position[1] + 0.1, pose.position[2]), pose.quaternion)
     with record() as recording:
-        assert driver.execute(Goal(waypoints=(Waypoint(pose=target, time=1.0),)),
-                              timeout=30.0).succeeded
+        assert driver.execute(
+            Goal(waypoints=(Waypoint(pose=target, time=1.0),)), timeout=30.0
+        ).succeeded
     assert recording.positions[-1] == pytest.approx(target.position, abs=1e-4)

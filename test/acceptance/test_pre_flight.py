@@ -60,8 +60,10 @@ def test_what_passes_arrives_and_what_is_refused_fails(model, robot_of, record_p
         if at_the_border(robot, case):
             counts['border'] += 1
         else:
-            wrong.append(f'{model} {number} ({case.family}): the planner says '
-                         f'{verdict.refusal or "yes"!r}, the robot {verdict.trouble or "yes"!r}')
+            wrong.append(
+                f'{model} {number} ({case.family}): the planner says '
+                f'{verdict.refusal or "yes"!r}, the robot {verdict.trouble or "yes"!r}'
+            )
     line = f'{GOALS} goals: ' + ', '.join(f'{counts[kind]} {kind}' for kind in (*LEAST, *MOST))
     print(f'{model}: {line}')
     record_property('pre_flight', line)
@@ -83,8 +85,10 @@ def test_paths_fit_a_kinematics_that_owes_nothing_to_ours(model, robot_of):
         if verdict.planner != 'passes' or verdict.trouble:
             continue
         tool, run = pose_matrix(case.T_flange_tcp), verdict.run
-        corners = [dh_forward(geometry, case.q) @ tool,
-                   *(pose_matrix(waypoint.pose) for waypoint in case.goal.waypoints)]
+        corners = [
+            dh_forward(geometry, case.q) @ tool,
+            *(pose_matrix(waypoint.pose) for waypoint in case.goal.waypoints),
+        ]
         assert distances(dh_forward(geometry, run.q) @ tool, corners[-1]) < WIRE
         for row in rng.integers(len(run.joints), size=3):
             T_base_tcp = dh_forward(geometry, run.joints[row]) @ tool
@@ -95,7 +99,10 @@ def test_paths_fit_a_kinematics_that_owes_nothing_to_ours(model, robot_of):
 
 def is_straight(segment):
     return segment.blend_radius == 0.0 and segment.type in (
-        SegmentType.LINEAR, SegmentType.PROCESS, SegmentType.OPTIMIZED_LINEAR)
+        SegmentType.LINEAR,
+        SegmentType.PROCESS,
+        SegmentType.OPTIMIZED_LINEAR,
+    )
 
 
 def distances(a, b):

@@ -46,13 +46,14 @@ def test_after_a_timeout_the_arm_is_free_for_the_next_goal(driver, home, short_g
 
 
 def test_a_newer_goal_takes_the_place_of_a_running_one(driver, home):
-    motion = driver.start(driver.plan(Goal(waypoints=(
-        Waypoint(pose=home(y=0.2), time=4.0),))))
+    motion = driver.start(driver.plan(Goal(waypoints=(Waypoint(pose=home(y=0.2), time=4.0),))))
     wait_for(lambda: max(map(abs, driver.state.target_qd)) > 0.05)
     beyond = Goal(waypoints=(Waypoint(pose=home(z=-5.0), time=60.0),))
     assert driver.execute(beyond, preempt=True).code is ErrorCode.INVALID_GOAL
-    assert driver.execute(Goal(waypoints=(Waypoint(pose=home(), time=1.0),))
-                          ).code is ErrorCode.ROBOT_NOT_READY
+    assert (
+        driver.execute(Goal(waypoints=(Waypoint(pose=home(), time=1.0),))).code
+        is ErrorCode.ROBOT_NOT_READY
+    )
     assert driver.rest_state.actual_q != driver.state.actual_q
     assert not motion.done()
     back = Goal(waypoints=(Waypoint(pose=home(), time=1.0),))
@@ -68,8 +69,12 @@ def test_the_way_there_and_the_way_back_keep_a_tight_path_tolerance(driver, home
     tolerance = Tolerance(position=(0.002,) * 3)
     there = [0.002 * (i + 1) for i in range(10)]
     for ways in (there, there[-2::-1], there, there[-2::-1]):
-        goal = Goal(path_tolerance=tolerance, waypoints=tuple(
-            Waypoint(pose=home(y=y), time=0.05 * (i + 1)) for i, y in enumerate(ways)))
+        goal = Goal(
+            path_tolerance=tolerance,
+            waypoints=tuple(
+                Waypoint(pose=home(y=y), time=0.05 * (i + 1)) for i, y in enumerate(ways)
+            ),
+        )
         outcome = driver.execute(goal, timeout=10.0)
         assert outcome.succeeded, outcome.text
 
@@ -113,6 +118,9 @@ def test_a_calibration_far_from_the_model_is_warned_of(make_driver, bound, warns
     driver.wait_ready(10.0)
     wait_for(lambda: driver.arm.calibrated)
     driver.close()
-    warned = [record for record in caplog.records
-              if 'up to 20.0 mm from where the model ur5e' in record.getMessage()]
+    warned = [
+        record
+        for record in caplog.records
+        if 'up to 20.0 mm from where the model ur5e' in record.getMessage()
+    ]
     assert bool(warned) is warns

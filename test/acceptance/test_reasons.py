@@ -17,12 +17,19 @@ pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 def ended_by(fault, execution=ExecutionMode.PRIMITIVES, time=2.0, **settings):
     """Run a goal that something ends half-way; return outcome and the last status."""
+
     async def scene(cell):
         state = cell.memory.read()
         (x, y, z), turn = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
-        made = plan(Goal(waypoints=(Waypoint(pose=Pose((x, y + 0.2, z), turn), time=time),),
-                         execution=execution), state, Arm(robot_model('ur5e')),
-                    PlanningOptions(max_tool_speed=1.0, calibration_known=True))
+        made = plan(
+            Goal(
+                waypoints=(Waypoint(pose=Pose((x, y + 0.2, z), turn), time=time),),
+                execution=execution,
+            ),
+            state,
+            Arm(robot_model('ur5e')),
+            PlanningOptions(max_tool_speed=1.0, calibration_known=True),
+        )
         motion = cell.owner.start(made)
         await cell.until(lambda: not cell.at_rest())
         await fault(cell)
@@ -69,19 +76,39 @@ async def exception(cell):
     cell.robot.inject('program_fault')
 
 
-@pytest.mark.parametrize(('fault', 'code', 'links'), [
-    (cut_reverse, ErrorCode.PROGRAM_STOPPED, ['reverse_port: ', 'program PLAYING -> STOP']),
-    (cut_trajectory, ErrorCode.PROGRAM_STOPPED, ['trajectory_port: ', 'program PLAYING -> STOP']),
-    (freeze_reverse, ErrorCode.PROGRAM_STOPPED,
-     ['the other side closed', 'PLAYING -> STOP',
-      'the robot program says: the driver was silent for too long']),
-    (stop_by_dashboard, ErrorCode.PROGRAM_STOPPED,
-     ['the other side closed', 'program PLAYING -> STOP']),
-    (protective_stop, ErrorCode.PROTECTIVE_STOP,
-     ['safety mode NORMAL -> PROTECTIVE_STOP', 'the robot reports C']),
-    (emergency_stop, ErrorCode.EMERGENCY_STOP, ['-> ROBOT_EMERGENCY_STOP']),
-    (crash, ErrorCode.CONNECTION_LOST, ['RTDE: ']),
-], ids=lambda value: getattr(value, '__name__', ''))
+@pytest.mark.parametrize(
+    ('fault', 'code', 'links'),
+    [
+        (cut_reverse, ErrorCode.PROGRAM_STOPPED, ['reverse_port: ', 'program PLAYING -> STOP']),
+        (
+            cut_trajectory,
+            ErrorCode.PROGRAM_STOPPED,
+            ['trajectory_port: ', 'program PLAYING -> STOP'],
+        ),
+        (
+            freeze_reverse,
+            ErrorCode.PROGRAM_STOPPED,
+            [
+                'the other side closed',
+                'PLAYING -> STOP',
+                'the robot program says: the driver was silent for too long',
+            ],
+        ),
+        (
+            stop_by_dashboard,
+            ErrorCode.PROGRAM_STOPPED,
+            ['the other side closed', 'program PLAYING -> STOP'],
+        ),
+        (
+            protective_stop,
+            ErrorCode.PROTECTIVE_STOP,
+            ['safety mode NORMAL -> PROTECTIVE_STOP', 'the robot reports C'],
+        ),
+        (emergency_stop, ErrorCode.EMERGENCY_STOP, ['-> ROBOT_EMERGENCY_STOP']),
+        (crash, ErrorCode.CONNECTION_LOST, ['RTDE: ']),
+    ],
+    ids=lambda value: getattr(value, '__name__', ''),
+)
 def test_the_chain_says_who_did_what_and_when(fault, code, links):
     outcome, status = ended_by(fault)
     assert outcome.code is code, outcome
@@ -101,5 +128,8 @@ async def nothing(cell):
 def test_an_arm_that_cannot_follow_its_set_points_is_told_as_that():
     outcome, _ = ended_by(nothing, ExecutionMode.SERVO, 1.0, servo_max_divergence=0.01)
     assert outcome.code is ErrorCode.PROGRAM_STOPPED
-    assert any('the robot program says: buffered servo: the arm is farther from a set-point than '
-               'the divergence thresholds allow' in line for line in whys(outcome)), outcome
+    assert any(
+        'the robot program says: buffered servo: the arm is farther from a set-point than '
+        'the divergence thresholds allow' in line
+        for line in whys(outcome)
+    ), outcome

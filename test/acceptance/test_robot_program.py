@@ -46,8 +46,9 @@ def upload(ur_sim, text):
 def short_goal(driver, y=0.02):
     pose = driver.state.actual_tcp_pose
     x0, y0, z0 = pose.position
-    return Goal(waypoints=(Waypoint(time=0.4, pose=type(pose)((x0, y0 + y, z0),
-                                                              pose.quaternion)),))
+    return Goal(
+        waypoints=(Waypoint(time=0.4, pose=type(pose)((x0, y0 + y, z0), pose.quaternion)),)
+    )
 
 
 def test_the_served_program_runs_as_it_is(served, ur_sim):
@@ -59,8 +60,15 @@ def test_the_served_program_runs_as_it_is(served, ur_sim):
 
 def test_a_program_with_other_names_does_the_same(served, ur_sim):
     driver, text = served
-    for name in ('run_point', 'points_left', 'abandon_trajectory', 'run_trajectory', 'kind',
-                 'read_timeout', 'dial_all'):
+    for name in (
+        'run_point',
+        'points_left',
+        'abandon_trajectory',
+        'run_trajectory',
+        'kind',
+        'read_timeout',
+        'dial_all',
+    ):
         text, count = re.subn(rf'\b{name}\b', f'renamed_{name}', text)
         assert count >= 2
     upload(ur_sim, as_program(text))
@@ -70,8 +78,10 @@ def test_a_program_with_other_names_does_the_same(served, ur_sim):
 
 def test_a_line_that_is_added_is_carried_out(served, ur_sim):
     driver, text = served
-    text = text.replace('  local kind = point[POINT_TYPE]',
-                        '  local kind = point[POINT_TYPE]\n  textmsg("this point is a ", kind)')
+    text = text.replace(
+        '  local kind = point[POINT_TYPE]',
+        '  local kind = point[POINT_TYPE]\n  textmsg("this point is a ", kind)',
+    )
     upload(ur_sim, as_program(text))
     driver.wait_ready(5.0)
     assert driver.execute(short_goal(driver), timeout=10.0).succeeded
@@ -97,12 +107,16 @@ def test_a_changed_result_changes_the_outcome(served, ur_sim):
     assert outcome.code is ErrorCode.EXECUTION_FAILED
 
 
-@pytest.mark.parametrize(('line', 'replacement', 'expected'), [
-    ('begin_motion()', 'no_such_function()', 'compile_error_name_not_found:no_such_function:'),
-    ('local kind = point[POINT_TYPE]', 'local kind = = 3', 'syntax_error_on_line:'),
-])
+@pytest.mark.parametrize(
+    ('line', 'replacement', 'expected'),
+    [
+        ('begin_motion()', 'no_such_function()', 'compile_error_name_not_found:no_such_function:'),
+        ('local kind = point[POINT_TYPE]', 'local kind = = 3', 'syntax_error_on_line:'),
+    ],
+)
 def test_a_broken_program_is_refused_with_line_and_column(
-        served, ur_sim, line, replacement, expected):
+    served, ur_sim, line, replacement, expected
+):
     driver, text = served
     program = as_program(text)
     assert line in program
@@ -114,8 +128,11 @@ def test_a_broken_program_is_refused_with_line_and_column(
         primary.sendall(('\n'.join(lines) + '\n\n').encode())
         decoder, errors = PrimaryDecoder(), []
         while not errors:
-            errors = [frame for frame in decoder.feed(primary.recv(65536))
-                      if isinstance(frame, RuntimeExceptionMessage)]
+            errors = [
+                frame
+                for frame in decoder.feed(primary.recv(65536))
+                if isinstance(frame, RuntimeExceptionMessage)
+            ]
     assert errors[0].text.startswith(expected)
     assert errors[0].line == at + 1
     assert errors[0].column >= 1

@@ -36,35 +36,62 @@ def order(home):
     """There and on, through a point that is passed in motion."""
     arm = Arm(robot_model('ur5e'))
     via, to = (tuple(a + part for a in home) for part in (0.1, 0.2))
-    spline = JointSpline.of(home, [
-        Spline(target=via, velocities=(0.5,) * 6, accelerations=REST, duration=DURATION / 2),
-        Spline(target=to, velocities=REST, accelerations=REST, duration=DURATION / 2)])
+    spline = JointSpline.of(
+        home,
+        [
+            Spline(target=via, velocities=(0.5,) * 6, accelerations=REST, duration=DURATION / 2),
+            Spline(target=to, velocities=REST, accelerations=REST, duration=DURATION / 2),
+        ],
+    )
     times = np.linspace(0.0, DURATION, 121)
     poses = [arm.forward(tuple(q)) for q in spline.rows(times)[0]]
     return Order(
-        points=2, duration=DURATION, due=DURATION, spline=spline, execution=ExecutionMode.SERVO,
-        waypoint=np.array([0, 1], dtype=np.int32), goal_tolerance=Tolerance(position=(1e-3,) * 3),
+        points=2,
+        duration=DURATION,
+        due=DURATION,
+        spline=spline,
+        execution=ExecutionMode.SERVO,
+        waypoint=np.array([0, 1], dtype=np.int32),
+        goal_tolerance=Tolerance(position=(1e-3,) * 3),
         reference=ReferencePath(
-            poses=np.array([[*pose.position, *pose.quaternion] for pose in poses]), time=times,
-            point=(times > DURATION / 2).astype(np.int32)))
+            poses=np.array([[*pose.position, *pose.quaternion] for pose in poses]),
+            time=times,
+            point=(times > DURATION / 2).astype(np.int32),
+        ),
+    )
 
 
 def state_of(controller):
     """Return what RTDE would report; the machine's other packet."""
     motion = controller.motion
     return RobotState(
-        timestamp=controller.time, actual_q=motion.q, actual_qd=motion.qd, target_q=motion.q,
-        target_qd=motion.qd, actual_tcp_pose=motion.T_base_tcp, target_tcp_pose=motion.T_base_tcp,
-        actual_tcp_twist=motion.tcp_twist, target_tcp_twist=motion.tcp_twist,
-        speed_scaling=motion.scaling, runtime_state=controller.programs.state)
+        timestamp=controller.time,
+        actual_q=motion.q,
+        actual_qd=motion.qd,
+        target_q=motion.q,
+        target_qd=motion.qd,
+        actual_tcp_pose=motion.T_base_tcp,
+        target_tcp_pose=motion.T_base_tcp,
+        actual_tcp_twist=motion.tcp_twist,
+        target_tcp_twist=motion.tcp_twist,
+        speed_scaling=motion.scaling,
+        runtime_state=controller.programs.state,
+    )
 
 
 def drive(slider=1.0, cancel_after=None):
     """Run a goal on the sample program; return what was seen of it."""
     cell = GuideCell()
     goal = ServoMachine(order(cell.q), settings=ServoSettings(lookahead_time=0.06))
-    seen = SimpleNamespace(commands=goal.start(state_of(cell.controller)), home=cell.q, times=[],
-                           motion=[], q=[], cell=cell, spline=goal.order.spline)
+    seen = SimpleNamespace(
+        commands=goal.start(state_of(cell.controller)),
+        home=cell.q,
+        times=[],
+        motion=[],
+        q=[],
+        cell=cell,
+        spline=goal.order.spline,
+    )
 
     def take(feedback):
         commands = goal.step(ServoReceived(feedback=feedback), cell.time)
@@ -87,8 +114,7 @@ def drive(slider=1.0, cancel_after=None):
     raise AssertionError(cell.log)
 
 
-@pytest.mark.parametrize('slider', [
-    1.0, pytest.param(0.5, marks=pytest.mark.exhaustive)])
+@pytest.mark.parametrize('slider', [1.0, pytest.param(0.5, marks=pytest.mark.exhaustive)])
 def test_a_goal_arrives_with_the_lag_that_is_said(slider):
     seen = drive(slider)
     assert seen.outcome.code is ErrorCode.SUCCESSFUL, seen.outcome

@@ -26,8 +26,10 @@ def test_without_a_buffer_setpoints_are_skipped_when_the_robot_is_slower_or_a_pa
     assert late.skipped >= late.written // 8
 
 
-@pytest.mark.parametrize(('slider', 'late'), [
-    (0.5, 0), *(pytest.param(1.0, late, marks=pytest.mark.exhaustive) for late in (0, 7))])
+@pytest.mark.parametrize(
+    ('slider', 'late'),
+    [(0.5, 0), *(pytest.param(1.0, late, marks=pytest.mark.exhaustive) for late in (0, 7))],
+)
 def test_with_the_buffer_none_is_skipped(slider, late):
     seen = buffered(slider, 0.8, late)
     assert seen.skipped == 0

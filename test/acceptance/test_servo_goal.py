@@ -39,8 +39,9 @@ class Run:
     def __init__(self, cell, goal):
         self.cell, self.packets, self.reports, self.progress = cell, [], [], []
         stand = cell.memory.read()
-        self.made = plan(replace(goal(stand), execution=ExecutionMode.SERVO), stand, ARM,
-                         PlanningOptions())
+        self.made = plan(
+            replace(goal(stand), execution=ExecutionMode.SERVO), stand, ARM, PlanningOptions()
+        )
         take = cell.owner._take
 
         def tell(notice):
@@ -65,8 +66,11 @@ class Run:
 
     def begin(self):
         """Return when the first set-point of the motion was sent [s]."""
-        return next(report.timestamp for report in self.reports
-                    if report.activity is ServoActivity.SERVOING)
+        return next(
+            report.timestamp
+            for report in self.reports
+            if report.activity is ServoActivity.SERVOING
+        )
 
 
 def straight(seconds=1.0, way=0.1):
@@ -74,23 +78,38 @@ def straight(seconds=1.0, way=0.1):
         x, y, z = stand.actual_tcp_pose.position
         there = replace(stand.actual_tcp_pose, position=(x, y + way, z))
         return Goal(waypoints=(Waypoint(pose=there, time=seconds),))
+
     return goal
 
 
 def example(name, factor):
     def goal(stand):
-        made = goal_from_message(load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0,
-                                 stand=Stand.of(stand))
-        return replace(made, waypoints=tuple(replace(
-            point, time=factor * point.time, twist=tuple(v / factor for v in point.twist),
-            acceleration=tuple(a / factor ** 2 for a in point.acceleration))
-            for point in made.waypoints))
+        made = goal_from_message(
+            load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0, stand=Stand.of(stand)
+        )
+        return replace(
+            made,
+            waypoints=tuple(
+                replace(
+                    point,
+                    time=factor * point.time,
+                    twist=tuple(v / factor for v in point.twist),
+                    acceleration=tuple(a / factor**2 for a in point.acceleration),
+                )
+                for point in made.waypoints
+            ),
+        )
+
     return goal
 
 
-@pytest.mark.parametrize(('name', 'factor'), [
-    pytest.param('circle', 0.45, marks=pytest.mark.exhaustive),
-    pytest.param('figure_eight', 1.0, marks=pytest.mark.exhaustive)])
+@pytest.mark.parametrize(
+    ('name', 'factor'),
+    [
+        pytest.param('circle', 0.45, marks=pytest.mark.exhaustive),
+        pytest.param('figure_eight', 1.0, marks=pytest.mark.exhaustive),
+    ],
+)
 def test_every_point_is_passed_within_the_lag_that_is_reported(name, factor, monkeypatch):
     monkeypatch.setattr(robot_cell, 'CYCLE', 0.002)  # of an e-Series
 
@@ -122,9 +141,12 @@ def test_every_point_is_passed_within_the_lag_that_is_reported(name, factor, mon
     assert max(late) <= lag + 1e-3
     assert max(late) - min(late) <= 2.0 * robot_cell.CYCLE
     end = goal.waypoints[-1].time
-    around = [np.linalg.norm(places - curve.at(np.clip(
-        times - lag + shift, 0.0, end)).poses[:, :3], axis=1)
-        for shift in np.linspace(-0.01, 0.02, 61)]
+    around = [
+        np.linalg.norm(
+            places - curve.at(np.clip(times - lag + shift, 0.0, end)).poses[:, :3], axis=1
+        )
+        for shift in np.linspace(-0.01, 0.02, 61)
+    ]
     assert np.min(around, axis=0).max() < 2e-4
 
 

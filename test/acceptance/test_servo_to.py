@@ -13,8 +13,10 @@ from ur_cartesian_driver.motion.pose import multiply, quaternion_from_rotation_v
 from ur_cartesian_driver.sim.calibration import random_calibration
 
 pytestmark = [
-    pytest.mark.acceptance, pytest.mark.slow,
-    pytest.mark.ur_sim(frequency=125.0, geometry=random_calibration(robot_model('ur5e'), 7))]
+    pytest.mark.acceptance,
+    pytest.mark.slow,
+    pytest.mark.ur_sim(frequency=125.0, geometry=random_calibration(robot_model('ur5e'), 7)),
+]
 
 OPTIONS = {'servo_target_timeout': 0.3}
 

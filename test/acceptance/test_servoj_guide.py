@@ -31,8 +31,16 @@ IDLE, TEACH, SERVO = 0, 1, 2
 WAITING, EXTERNAL_TO_ROBOT = 0, 2
 THRESHOLD = 0.3
 
-OUTPUTS = ('timestamp', 'actual_q', 'actual_qd', 'speed_scaling', 'runtime_state',
-           'output_int_register_24', 'output_int_register_25', 'output_double_register_24')
+OUTPUTS = (
+    'timestamp',
+    'actual_q',
+    'actual_qd',
+    'speed_scaling',
+    'runtime_state',
+    'output_int_register_24',
+    'output_int_register_25',
+    'output_double_register_24',
+)
 MODE, SEQUENCE, ERROR, SYNC = (f'input_int_register_{i}' for i in range(24, 28))
 JOINTS = [f'input_double_register_{i}' for i in range(24, 30)]
 THRESHOLDS = [f'input_double_register_{i}' for i in range(30, 36)]
@@ -46,7 +54,8 @@ class ExternalController:
         self.controller = Controller(SimulatorConfig())
         self._session = RtdeSession(self.controller, set())
         self._client = RtdeClient(
-            OUTPUTS, [MODE, SEQUENCE, ERROR, SYNC, *JOINTS, *THRESHOLDS, STATE_TIME])
+            OUTPUTS, [MODE, SEQUENCE, ERROR, SYNC, *JOINTS, *THRESHOLDS, STATE_TIME]
+        )
         self._slider = RtdeClient(['timestamp'], ['speed_slider_mask', 'speed_slider_fraction'])
         self._inputs = self._connect(self._session, self._client)
         self._slider_session = RtdeSession(self.controller, set())
@@ -58,22 +67,30 @@ class ExternalController:
         self.cycle()
         self.hold(self.q)
         # As a script port does; text without indentation has no line that ends it for sure.
-        program, = Uploads().feed(PROGRAM.read_bytes())
+        (program,) = Uploads().feed(PROGRAM.read_bytes())
         self.controller.programs.submit(program.text)
 
     @staticmethod
     def _connect(session, client):
         data, ready = client.start(), []
         while not ready:
-            ready = [event for event in client.feed(session.feed(data))
-                     if isinstance(event, Ready)]
+            ready = [
+                event for event in client.feed(session.feed(data)) if isinstance(event, Ready)
+            ]
             data = client.data_to_send()
         return ready[0].inputs[0]
 
     def __getattr__(self, name):
         """Return what the newest packet says."""
-        fields = {'q': 1, 'qd': 2, 'scaling': 3, 'state': 4, 'mode': 5, 'last_sequence': 6,
-                  'lag': 7}
+        fields = {
+            'q': 1,
+            'qd': 2,
+            'scaling': 3,
+            'state': 4,
+            'mode': 5,
+            'last_sequence': 6,
+            'lag': 7,
+        }
         if name not in fields:
             raise AttributeError(name)
         return self.packets[-1][fields[name]]
@@ -148,9 +165,11 @@ def servo(client):
 
 def swing(home, amplitude=0.2, period=2.0):
     """Return a smooth motion of two joints, there and back."""
+
     def path(time):
         way = amplitude * sin(pi * time / period) ** 2
         return (home[0] + way, home[1] - 0.5 * way, *home[2:])
+
     return path
 
 
@@ -160,8 +179,11 @@ def test_program_begins_idle_and_reports_the_sequence_of_the_client(client):
     client.wait(0.5)
     # Written in one cycle, read by the program and reported in the next.
     assert client.values[SEQUENCE] - client.last_sequence == 1
-    assert client.log == ['external_control init starting', 'external_control init done',
-                          f'max_joint_divergence_thresholds = {[THRESHOLD] * 6}']
+    assert client.log == [
+        'external_control init starting',
+        'external_control init done',
+        f'max_joint_divergence_thresholds = {[THRESHOLD] * 6}',
+    ]
 
 
 def test_modes_follow_the_client_with_their_entry_and_exit(client):
@@ -189,7 +211,7 @@ def test_arm_follows_the_stream_with_the_lookahead_as_its_lag(servo):
     servo.stream(path, 2.0)
     # The program's lookahead is 0.06 s, and a waypoint takes 3 cycles through the registers.
     late = round(0.06 / CYCLE) + 3
-    for i, packet in enumerate(servo.packets[start + late:]):
+    for i, packet in enumerate(servo.packets[start + late :]):
         assert packet[1] == pytest.approx(path((i + 1) * CYCLE), abs=3e-3)
     servo.wait(0.5)
     assert servo.q == pytest.approx(path(2.0), abs=1e-4)
@@ -270,8 +292,10 @@ def test_sequence_that_grows_now_and_then_is_enough(servo):
     assert not servo.stopped
 
 
-@pytest.mark.parametrize(('error', 'text'), [
-    (1, 'stopping external control'), (7, 'unknown external error received: external_error = 7')])
+@pytest.mark.parametrize(
+    ('error', 'text'),
+    [(1, 'stopping external control'), (7, 'unknown external error received: external_error = 7')],
+)
 def test_error_of_the_client_halts_the_program_and_the_arm_brakes(servo, error, text):
     servo.stream(swing(servo.q), 1.0)
     servo.values[ERROR] = error
@@ -297,8 +321,10 @@ def test_program_follows_a_client_over_tcp_in_real_time(ur_sim):
     values = dict.fromkeys([MODE, SEQUENCE, ERROR, SYNC, *JOINTS, *THRESHOLDS, STATE_TIME], 0)
     values |= dict.fromkeys(THRESHOLDS, THRESHOLD) | {MODE: SERVO, SYNC: EXTERNAL_TO_ROBOT}
     inputs, path, time, q = None, None, 0.0, ()
-    with create_connection(('127.0.0.1', ur_sim.ports.rtde), 5.0) as rtde, create_connection(
-            ('127.0.0.1', ur_sim.ports.primary), 5.0) as primary:
+    with (
+        create_connection(('127.0.0.1', ur_sim.ports.rtde), 5.0) as rtde,
+        create_connection(('127.0.0.1', ur_sim.ports.primary), 5.0) as primary,
+    ):
         rtde.sendall(client.start())
         while time < 1.5:
             for event in client.feed(rtde.recv(65536)):

@@ -67,10 +67,15 @@ class Run:
 
 def carried_out(goal_from):
     """Run a goal that is made from where the arm stands."""
+
     async def scenario(cell):
         stand = cell.memory.read()
-        made = plan(replace(goal_from(stand), execution=ExecutionMode.SPLINE), stand, ARM,
-                    PlanningOptions())
+        made = plan(
+            replace(goal_from(stand), execution=ExecutionMode.SPLINE),
+            stand,
+            ARM,
+            PlanningOptions(),
+        )
         packets = []
 
         def looked():
@@ -78,38 +83,60 @@ def carried_out(goal_from):
             if not packets or state.timestamp > packets[-1].timestamp:
                 packets.append(state)
             return motion.outcome is not None
+
         motion = cell.owner.start(made)
         await cell.until(looked, 60.0)
         return run_of(made, motion.outcome, packets)
+
     return run_cell(scenario)
 
 
 def run_of(made, outcome, packets):
     begin = next(before.timestamp for before, after in pairwise(packets) if any(after.target_qd))
-    return Run(made, outcome, np.array([state.timestamp - begin for state in packets]),
-               np.array([state.target_tcp_pose.position for state in packets]),
-               np.array([state.target_tcp_twist for state in packets]))
+    return Run(
+        made,
+        outcome,
+        np.array([state.timestamp - begin for state in packets]),
+        np.array([state.target_tcp_pose.position for state in packets]),
+        np.array([state.target_tcp_twist for state in packets]),
+    )
 
 
 def times_as_long(goal, factor):
     """Return a goal that goes the same way in so many times the time."""
-    return replace(goal, waypoints=tuple(replace(
-        point, time=factor * point.time, twist=tuple(v / factor for v in point.twist),
-        acceleration=tuple(a / factor ** 2 for a in point.acceleration))
-        for point in goal.waypoints))
+    return replace(
+        goal,
+        waypoints=tuple(
+            replace(
+                point,
+                time=factor * point.time,
+                twist=tuple(v / factor for v in point.twist),
+                acceleration=tuple(a / factor**2 for a in point.acceleration),
+            )
+            for point in goal.waypoints
+        ),
+    )
 
 
 def example(name, stand):
-    return goal_from_message(load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0,
-                             stand=Stand.of(stand))
+    return goal_from_message(
+        load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0, stand=Stand.of(stand)
+    )
 
 
-@pytest.mark.parametrize(('name', 'factor'), [
-    ('circle', 0.45),
-    *(pytest.param(name, 1.0, marks=pytest.mark.exhaustive)
-      for name in ('circle', 'figure_eight', 'seam_timed'))])
+@pytest.mark.parametrize(
+    ('name', 'factor'),
+    [
+        ('circle', 0.45),
+        *(
+            pytest.param(name, 1.0, marks=pytest.mark.exhaustive)
+            for name in ('circle', 'figure_eight', 'seam_timed')
+        ),
+    ],
+)
 def test_every_point_is_passed_in_time_with_its_twist_and_the_tool_keeps_to_the_curve(
-        name, factor, monkeypatch):
+    name, factor, monkeypatch
+):
     monkeypatch.setattr(robot_cell, 'CYCLE', 0.002)  # of an e-Series
     run = carried_out(lambda stand: times_as_long(example(name, stand), factor))
     assert run.outcome.code is ErrorCode.SUCCESSFUL, run.outcome.text
@@ -125,8 +152,10 @@ def test_every_point_is_passed_in_time_with_its_twist_and_the_tool_keeps_to_the_
             assert np.linalg.norm(twist[part] - asked[part]) < bound, point
     assert abs(run.stands - points[-1].time) < 3.5 * robot_cell.CYCLE
     # From where the curve is around that time.
-    around = [np.linalg.norm(run.places - curve.at(run.times + lag).poses[:, :3], axis=1)
-              for lag in np.linspace(-0.006, 0.006, 25)]
+    around = [
+        np.linalg.norm(run.places - curve.at(run.times + lag).poses[:, :3], axis=1)
+        for lag in np.linspace(-0.006, 0.006, 25)
+    ]
     assert np.min(around, axis=0)[run.times < run.stands].max() < 2e-4
     between = (run.times > passed[0].time) & (run.times < passed[-1].time)
     assert np.linalg.norm(run.twists[between, :3], axis=1).min() > 0.005  # no stop
@@ -136,8 +165,13 @@ def test_an_arm_that_waits_at_a_point_for_long_is_not_stuck():
     def goal(stand):
         x, y, z = stand.actual_tcp_pose.position
         there = replace(stand.actual_tcp_pose, position=(x, y + 0.02, z))
-        return Goal(waypoints=tuple(Waypoint(time=time, pose=pose) for time, pose in (
-            (0.5, there), (4.0, there), (4.5, stand.actual_tcp_pose))))
+        return Goal(
+            waypoints=tuple(
+                Waypoint(time=time, pose=pose)
+                for time, pose in ((0.5, there), (4.0, there), (4.5, stand.actual_tcp_pose))
+            )
+        )
+
     run = carried_out(goal)
     assert run.outcome.code is ErrorCode.SUCCESSFUL, run.outcome.text
     waits = (run.times > 0.55) & (run.times < 3.95)

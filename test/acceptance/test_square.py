@@ -16,8 +16,11 @@ pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 @pytest.fixture
 def square(home):
     corners = [home(), home(y=0.2), home(x=0.2, y=0.2), home(x=0.2), home()]
-    return [corner.position for corner in corners], Goal(waypoints=tuple(
-        Waypoint(pose=corner, time=2.5 * (i + 1)) for i, corner in enumerate(corners[1:])))
+    return [corner.position for corner in corners], Goal(
+        waypoints=tuple(
+            Waypoint(pose=corner, time=2.5 * (i + 1)) for i, corner in enumerate(corners[1:])
+        )
+    )
 
 
 def distances_to_line(points, a, b):

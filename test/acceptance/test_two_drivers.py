@@ -40,7 +40,8 @@ def test_a_port_that_another_driver_listens_on_is_named(driver, make_driver):
         wait_for(lambda second=second, name=name: name in second.status.message)
         assert second.status.message == (
             f'No connection to the robot: cannot listen on 127.0.0.1 port {port} (address already '
-            f'in use): another driver may use it; set {name} to a free port or to 0.')
+            f'in use): another driver may use it; set {name} to a free port or to 0.'
+        )
         second.close()
 
 
@@ -53,8 +54,9 @@ def test_an_address_that_is_not_ours_is_named_with_its_parameter(make_driver):
 
 @pytest.mark.ur_sim(frequency=125.0)
 def test_inputs_that_another_client_holds_are_named(driver, ur_sim):
-    client = RtdeClient(['timestamp'], inputs=('standard_digital_output_mask',
-                                               'standard_digital_output'))
+    client = RtdeClient(
+        ['timestamp'], inputs=('standard_digital_output_mask', 'standard_digital_output')
+    )
     with socket.create_connection(('127.0.0.1', ur_sim.ports.rtde)) as other:
         other.sendall(client.start())
         while not client.feed(other.recv(65536)):

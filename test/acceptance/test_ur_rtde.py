@@ -55,8 +55,11 @@ class Client:
 
     def note(self, name: str, **values: Any) -> None:
         self.readings[name] = values | {
-            'q': self.receive.getActualQ(), 'pose': self.receive.getActualTCPPose(),
-            'qd': self.receive.getActualQd(), 'twist': self.receive.getActualTCPSpeed()}
+            'q': self.receive.getActualQ(),
+            'pose': self.receive.getActualTCPPose(),
+            'qd': self.receive.getActualQd(),
+            'twist': self.receive.getActualTCPSpeed(),
+        }
 
     @contextlib.contextmanager
     def sampled(self, name: str) -> Iterator[None]:
@@ -106,8 +109,12 @@ def moves(client: Client) -> None:
     client.note('moveJ_IK', done=control.moveJ_IK(near, 1.05, 3.0), target=near)
     corners = [offset(near, z=0.08), offset(near, x=0.08, z=0.08), offset(near, x=0.08)]
     with client.sampled('blended'):
-        control.moveL([[*corner, 0.2, 1.2, radius]
-                       for corner, radius in zip(corners, (0.02, 0.03, 0.0), strict=True)])
+        control.moveL(
+            [
+                [*corner, 0.2, 1.2, radius]
+                for corner, radius in zip(corners, (0.02, 0.03, 0.0), strict=True)
+            ]
+        )
     client.readings['blended']['corners'] = [near, *corners]
     start = receive.getActualTCPPose()
     via, end = offset(start, x=0.04, y=0.04), offset(start, x=0.08)
@@ -116,8 +123,13 @@ def moves(client: Client) -> None:
     client.readings['movec'] |= {'start': start, 'via': via, 'end': end}
     client.note('again', done=client.upload() and control.moveJ(HOME, 1.5, 3.0))
     asked = control.getInverseKinematics(near, target)
-    client.note('kinematics', forward=control.getForwardKinematics(target, TOOL),
-                joints=target, inverse=asked, of=near)
+    client.note(
+        'kinematics',
+        forward=control.getForwardKinematics(target, TOOL),
+        joints=target,
+        inverse=asked,
+        of=near,
+    )
     control.setTcp(TOOL)
     client.until(lambda: receive.getActualTCPPose()[:3] != client.readings['again']['pose'][:3])
     client.note('tcp', offset=control.getTCPOffset())
@@ -161,17 +173,27 @@ def streams(client: Client) -> None:
 
 def signals(client: Client) -> None:
     control, receive, io = client.control, client.receive, client.io
-    names = [name for name in dir(receive) if name.startswith(('getA', 'getF', 'getJ', 'getP',
-                                                               'getR', 'getS', 'getT', 'is'))]
+    names = [
+        name
+        for name in dir(receive)
+        if name.startswith(('getA', 'getF', 'getJ', 'getP', 'getR', 'getS', 'getT', 'is'))
+    ]
     client.note('getters', values={name: getattr(receive, name)() for name in names})
     later = receive.getTimestamp()
     client.note('clock', ticks=client.until(lambda: receive.getTimestamp() > later + 0.1))
-    for done in (io.setStandardDigitalOut(3, True), io.setConfigurableDigitalOut(2, True),
-                 io.setToolDigitalOut(1, True), io.setAnalogOutputVoltage(1, 0.25)):
+    for done in (
+        io.setStandardDigitalOut(3, True),
+        io.setConfigurableDigitalOut(2, True),
+        io.setToolDigitalOut(1, True),
+        io.setAnalogOutputVoltage(1, 0.25),
+    ):
         assert done
     client.until(lambda: receive.getDigitalOutState(17))
-    client.note('outputs', bits=receive.getActualDigitalOutputBits(),
-                volts=receive.getStandardAnalogOutput1())
+    client.note(
+        'outputs',
+        bits=receive.getActualDigitalOutputBits(),
+        volts=receive.getStandardAnalogOutput1(),
+    )
     io.setStandardDigitalOut(3, False)
     client.note('cleared', cleared=client.until(lambda: not receive.getDigitalOutState(3)))
     io.setSpeedSlider(0.5)
@@ -179,18 +201,31 @@ def signals(client: Client) -> None:
     q = receive.getActualQ()
     began = receive.getTimestamp()
     control.moveJ([q[0] + 0.5, *q[1:]], 0.5, 2.0)
-    client.note('slow', took=receive.getTimestamp() - began,
-                fraction=receive.getTargetSpeedFraction(), scaling=receive.getSpeedScaling())
+    client.note(
+        'slow',
+        took=receive.getTimestamp() - began,
+        fraction=receive.getTargetSpeedFraction(),
+        scaling=receive.getSpeedScaling(),
+    )
 
 
 def power(client: Client) -> None:
     control, receive, dashboard = client.control, client.receive, client.dashboard
-    modes = [dashboard.robotmode(), dashboard.safetymode(), dashboard.isInRemoteControl(),
-             dashboard.running()]
+    modes = [
+        dashboard.robotmode(),
+        dashboard.safetymode(),
+        dashboard.isInRemoteControl(),
+        dashboard.running(),
+    ]
     control.triggerProtectiveStop()
     client.until(receive.isProtectiveStopped)
-    client.note('stopped', before=modes, safety=dashboard.safetymode(),
-                running=control.isProgramRunning(), moved=control.moveJ(HOME, 1.0, 1.0))
+    client.note(
+        'stopped',
+        before=modes,
+        safety=dashboard.safetymode(),
+        running=control.isProgramRunning(),
+        moved=control.moveJ(HOME, 1.0, 1.0),
+    )
     refused = ''
     try:
         dashboard.unlockProtectiveStop()
@@ -201,8 +236,12 @@ def power(client: Client) -> None:
     dashboard.unlockProtectiveStop()
     client.until(lambda: not receive.isProtectiveStopped())
     q = [HOME[0] + 0.1, *HOME[1:]]
-    client.note('unlocked', refused=refused, safety=dashboard.safetymode(),
-                moved=client.upload() and control.moveJ(q, 1.0, 2.0))
+    client.note(
+        'unlocked',
+        refused=refused,
+        safety=dashboard.safetymode(),
+        moved=client.upload() and control.moveJ(q, 1.0, 2.0),
+    )
     control.stopScript()
     dashboard.powerOff()
     off = client.until(lambda: receive.getRobotMode() == 3)
@@ -210,8 +249,11 @@ def power(client: Client) -> None:
     idle = client.until(lambda: receive.getRobotMode() == 5)
     dashboard.brakeRelease()
     running = client.until(lambda: receive.getRobotMode() == 7)
-    client.note('cycled', modes=[off, idle, running],
-                moved=client.upload() and control.moveJ(HOME, 1.0, 2.0))
+    client.note(
+        'cycled',
+        modes=[off, idle, running],
+        moved=client.upload() and control.moveJ(HOME, 1.0, 2.0),
+    )
     dashboard.stop()
     client.note('ended', ended=client.until(lambda: not control.isProgramRunning()))
 
@@ -226,8 +268,13 @@ def play(scene: str) -> dict[str, Any]:
     """Let the client play a scene against a simulator of its own; return what it read."""
     with simulator() as robot:
         done = subprocess.run(
-            [sys.executable, str(Path(__file__)), scene, robot.config.host], text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=TIMEOUT, check=False)
+            [sys.executable, str(Path(__file__)), scene, robot.config.host],
+            text=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            timeout=TIMEOUT,
+            check=False,
+        )
         log = '\n'.join(robot.state().messages[-20:])
     assert done.returncode == 0, f'{done.stdout}\n{log}'
     return json.loads(done.stdout.splitlines()[-1])
@@ -260,8 +307,14 @@ def forward(q: list[float]) -> np.ndarray:
     T = np.eye(4)
     for theta, a_i, d_i, alpha_i in zip(q, a, d, alpha, strict=True):
         c, s, ca, sa = np.cos(theta), np.sin(theta), np.cos(alpha_i), np.sin(alpha_i)
-        T = T @ np.array([[c, -s * ca, s * sa, a_i * c], [s, c * ca, -c * sa, a_i * s],
-                          [0.0, sa, ca, d_i], [0.0, 0.0, 0.0, 1.0]])
+        T = T @ np.array(
+            [
+                [c, -s * ca, s * sa, a_i * c],
+                [s, c * ca, -c * sa, a_i * s],
+                [0.0, sa, ca, d_i],
+                [0.0, 0.0, 0.0, 1.0],
+            ]
+        )
     return T
 
 
@@ -306,7 +359,8 @@ def test_its_moves_end_where_they_should_on_the_paths_that_were_asked_for():
 
     assert seen['moveJ_IK']['done']
     assert matrix(seen['moveJ_IK']['pose']) == pytest.approx(
-        matrix(seen['moveJ_IK']['target']), abs=1e-6)
+        matrix(seen['moveJ_IK']['target']), abs=1e-6
+    )
 
     near, up, over, end = (np.array(c) for c in seen['blended']['corners'])
     path = positions(seen['blended'])
@@ -316,9 +370,11 @@ def test_its_moves_end_where_they_should_on_the_paths_that_were_asked_for():
         outside = path[distance > radius + 1e-4]
         assert len(outside) < len(path)
     away = (np.linalg.norm(path - up[:3], axis=1) > 0.0201) & (
-        np.linalg.norm(path - over[:3], axis=1) > 0.0301)
-    nearest = np.min([from_line(path[away], *ends) for ends in (
-        (near, up), (up, over), (over, end))], axis=0)
+        np.linalg.norm(path - over[:3], axis=1) > 0.0301
+    )
+    nearest = np.min(
+        [from_line(path[away], *ends) for ends in ((near, up), (up, over), (over, end))], axis=0
+    )
     assert nearest.max() < 1e-4
     assert seen['blended']['pose'] == pytest.approx(list(end), abs=1e-4)
 
@@ -333,11 +389,13 @@ def test_its_moves_end_where_they_should_on_the_paths_that_were_asked_for():
     assert seen['again']['q'] == pytest.approx(HOME, abs=1e-6)
     kinematics = seen['kinematics']
     assert matrix(kinematics['forward']) == pytest.approx(
-        forward(kinematics['joints']) @ matrix(TOOL), abs=1e-6)
+        forward(kinematics['joints']) @ matrix(TOOL), abs=1e-6
+    )
     assert forward(kinematics['inverse']) == pytest.approx(matrix(kinematics['of']), abs=1e-6)
     assert seen['tcp']['offset'] == pytest.approx(TOOL, abs=1e-9)
     assert matrix(seen['tcp']['pose']) == pytest.approx(
-        forward(seen['tcp']['q']) @ matrix(TOOL), abs=1e-6)
+        forward(seen['tcp']['q']) @ matrix(TOOL), abs=1e-6
+    )
 
 
 @pytest.mark.acceptance

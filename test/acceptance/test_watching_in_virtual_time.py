@@ -33,7 +33,8 @@ AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
 PUSHES = {
     'pose': (('position', 'orientation'), (0.02, 0.2), (0.005, 0.05)),
     'twist': (('linear velocity', 'angular velocity'), (0.5, 0.5), (0.1, 0.1)),
-    'acceleration': (('linear acceleration', 'angular acceleration'), (3.0, 3.0), (1.0, 1.0))}
+    'acceleration': (('linear acceleration', 'angular acceleration'), (3.0, 3.0), (1.0, 1.0)),
+}
 #: The tool points down: what is an axis of base to a push is one of the tool to an orientation.
 TOOL_AXES = {'x': 'y', 'y': 'x', 'z': 'z'}
 NAMES = (*REQUIRED, *OPTIONAL)
@@ -43,9 +44,11 @@ RECIPE = Recipe(NAMES, [OUTPUT_TYPES[name] for name in NAMES])
 def moved(pose, offset, turn=(0.0, 0.0, 0.0)):
     """A pose moved along base axes [m] and turned about tool axes [rad]."""
     turned = Pose((0, 0, 0), pose.quaternion) @ Pose(
-        (0, 0, 0), quaternion_from_rotation_vector(turn))
-    return Pose(tuple(a + b for a, b in zip(pose.position, offset, strict=True)),
-                turned.quaternion)
+        (0, 0, 0), quaternion_from_rotation_vector(turn)
+    )
+    return Pose(
+        tuple(a + b for a, b in zip(pose.position, offset, strict=True)), turned.quaternion
+    )
 
 
 def planned(cell, goal):
@@ -113,26 +116,44 @@ def times_of_cancel(notes):
 def tolerance_of_one(quantity, axis, limit, others=-1.0):
     limits = {name: [others] * 6 for name in PUSHES}
     limits[quantity][axis] = limit
-    return Tolerance(position=tuple(limits['pose'][:3]), orientation=tuple(limits['pose'][3:]),
-                     twist=tuple(limits['twist']), acceleration=tuple(limits['acceleration']))
+    return Tolerance(
+        position=tuple(limits['pose'][:3]),
+        orientation=tuple(limits['pose'][3:]),
+        twist=tuple(limits['twist']),
+        acceleration=tuple(limits['acceleration']),
+    )
 
 
 @pytest.mark.parametrize('quantity', PUSHES)
 def test_each_axis_stops_the_arm_in_the_cycle_of_the_packet_that_violates(quantity):
     """CANCEL is on the wire before time goes on; the axis is named; all others are unchecked."""
+
     async def scenario(cell):
         home = cell.memory.read().actual_tcp_pose
         rtde, reverse = Tapped(cell, RTDE), Tapped(cell, REVERSE)
         for there, (axis, sign) in enumerate(
-                (axis, sign) for axis in range(6) for sign in (1.0, -1.0)):
+            (axis, sign) for axis in range(6) for sign in (1.0, -1.0)
+        ):
             names, sizes, limits = (values[axis // 3] for values in PUSHES[quantity])
             watched = TOOL_AXES['xyz'[axis % 3]] if names == 'orientation' else 'xyz'[axis % 3]
             at = 'xyz'.index(watched) + 3 * (axis // 3)
-            motion, _ = await executed(cell, Goal(
-                waypoints=(Waypoint(pose=moved(home, ((0.03, 0.05, 0.0), (0.0,) * 3)[there % 2])),
-                           ), path_tolerance=tolerance_of_one(quantity, at, limits)),
-                Deviation(quantity=quantity, axis=AXES[axis], shape='offset',
-                          amount=sign * sizes, when=Travelled(0.005), duration=0.05))
+            motion, _ = await executed(
+                cell,
+                Goal(
+                    waypoints=(
+                        Waypoint(pose=moved(home, ((0.03, 0.05, 0.0), (0.0,) * 3)[there % 2])),
+                    ),
+                    path_tolerance=tolerance_of_one(quantity, at, limits),
+                ),
+                Deviation(
+                    quantity=quantity,
+                    axis=AXES[axis],
+                    shape='offset',
+                    amount=sign * sizes,
+                    when=Travelled(0.005),
+                    duration=0.05,
+                ),
+            )
             assert motion.outcome.code is ErrorCode.PATH_TOLERANCE_VIOLATED, (axis, sign)
             assert f'point 0 {names} {watched} is off by' in motion.outcome.text
             violated = next(times_of_pushed(rtde.notes, quantity, axis, limits))
@@ -148,16 +169,27 @@ def test_each_axis_stops_the_arm_in_the_cycle_of_the_packet_that_violates(quanti
 @pytest.mark.parametrize('quantity', PUSHES)
 def test_a_push_on_an_axis_without_a_limit_stops_nothing(quantity, limit):
     """The limit of every other quantity, and of the push's two other axes, is narrow."""
+
     async def scenario(cell):
         home = cell.memory.read().actual_tcp_pose
         for axis in range(6):
             size = PUSHES[quantity][1][axis // 3]
-            goal = Goal(waypoints=(Waypoint(pose=moved(home, (0.02, 0.0, 0.0))),
-                                   Waypoint(pose=home)),
-                        path_tolerance=tolerance_without(quantity, axis, limit))
-            motion, _ = await executed(cell, goal, Deviation(
-                quantity=quantity, axis=AXES[axis], shape='offset', amount=size,
-                when=Travelled(0.005), duration=0.05))
+            goal = Goal(
+                waypoints=(Waypoint(pose=moved(home, (0.02, 0.0, 0.0))), Waypoint(pose=home)),
+                path_tolerance=tolerance_without(quantity, axis, limit),
+            )
+            motion, _ = await executed(
+                cell,
+                goal,
+                Deviation(
+                    quantity=quantity,
+                    axis=AXES[axis],
+                    shape='offset',
+                    amount=size,
+                    when=Travelled(0.005),
+                    duration=0.05,
+                ),
+            )
             assert motion.outcome.succeeded, (AXES[axis], motion.outcome.text)
             await asyncio.sleep(0.1)
 
@@ -167,21 +199,25 @@ def test_a_push_on_an_axis_without_a_limit_stops_nothing(quantity, limit):
 def tolerance_without(quantity, axis, limit):
     """A narrow tolerance of everything that such a push does not touch."""
     narrow = {'pose': [1e-3] * 3 + [1e-2] * 3, 'twist': [0.01] * 6, 'acceleration': [0.1] * 6}
-    touched = 'xyz'.index(TOOL_AXES['xyz'[axis - 3]]) + 3 if (
-        quantity == 'pose' and axis >= 3) else axis
+    touched = (
+        'xyz'.index(TOOL_AXES['xyz'[axis - 3]]) + 3 if (quantity == 'pose' and axis >= 3) else axis
+    )
     narrow[quantity][touched] = limit
     if quantity == 'acceleration':  # what accelerates becomes fast
         narrow['twist'][axis] = limit
-    return Tolerance(position=tuple(narrow['pose'][:3]), orientation=tuple(narrow['pose'][3:]),
-                     twist=tuple(narrow['twist']), acceleration=tuple(narrow['acceleration']))
+    return Tolerance(
+        position=tuple(narrow['pose'][:3]),
+        orientation=tuple(narrow['pose'][3:]),
+        twist=tuple(narrow['twist']),
+        acceleration=tuple(narrow['acceleration']),
+    )
 
 
 # ---- what never trips -------------------------------------------------------------------------
 
 RUNS, BATCHES = 100, 10
 #: As a user of a process with a tool would set them.
-TIGHT = Tolerance(position=(5e-4,) * 3, orientation=(5e-3,) * 3,
-                  twist=(0.02,) * 3 + (0.1,) * 3)
+TIGHT = Tolerance(position=(5e-4,) * 3, orientation=(5e-3,) * 3, twist=(0.02,) * 3 + (0.1,) * 3)
 #: What sensors add [m, rad], [m/s, rad/s]: standard deviations.
 NOISE = (('pose', 2e-5), ('twist', 1e-4))
 #: What no other time may be missed by: the slider and pauses stop the clock of the goal too [s].
@@ -196,27 +232,40 @@ def random_goal(cell, random, share):
     for _ in range(random.randint(2, 3)):
         duration = max(0.06, 0.5 * share) * random.uniform(0.8, 1.2)
         time += duration
-        length = 0.1 * duration ** 2  # which takes half a metre per second squared
+        length = 0.1 * duration**2  # which takes half a metre per second squared
         step = [random.uniform(-1.0, 1.0) * length for _ in range(3)]
         turn = [random.uniform(-1.0, 1.0) * length for _ in range(3)]
         here = moved(here, step, turn)
         waypoints.append(Waypoint(pose=here, time=time))
         segments.append(Segment(type=random.choice(KINDS)))
-    return Goal(waypoints=tuple(waypoints), segments=tuple(segments), path_tolerance=TIGHT,
-                goal_tolerance=TIGHT, goal_time_tolerance=ON_TIME)
+    return Goal(
+        waypoints=tuple(waypoints),
+        segments=tuple(segments),
+        path_tolerance=TIGHT,
+        goal_tolerance=TIGHT,
+        goal_time_tolerance=ON_TIME,
+    )
 
 
 def troubles(random, slider, duration):
     """What people do while it moves: the slider, up to two times, and a pause in half the runs."""
     instants = sorted(random.uniform(0.0, duration) for _ in range(3))
-    faults = [Slider(fraction=slider), *(
-        Slider(fraction=min(1.0, max(0.01, slider * random.uniform(0.3, 3.0))),
-               when=After(instant))
-        for instant in instants[:random.randint(0, 2)])]
+    faults = [
+        Slider(fraction=slider),
+        *(
+            Slider(
+                fraction=min(1.0, max(0.01, slider * random.uniform(0.3, 3.0))),
+                when=After(instant),
+            )
+            for instant in instants[: random.randint(0, 2)]
+        ),
+    ]
     pause = random.uniform(0.1, 0.3) if random.random() < 0.5 else 0.0
     if pause:
-        faults += [Event(action=Action.PAUSE, when=After(instants[2])),
-                   Event(action=Action.PLAY, when=After(instants[2] + pause))]
+        faults += [
+            Event(action=Action.PAUSE, when=After(instants[2])),
+            Event(action=Action.PLAY, when=After(instants[2] + pause)),
+        ]
     return faults, pause
 
 
@@ -226,9 +275,15 @@ def test_no_slider_and_no_pause_ever_fails_a_goal(batch):
     async def scenario(cell):
         controller = cell.robot.controller
         if batch % 2:
-            cell.robot.inject(*(
-                Deviation(quantity=quantity, axis=axis, shape='noise', amount=amount, seed=batch)
-                for quantity, amount in NOISE for axis in AXES))
+            cell.robot.inject(
+                *(
+                    Deviation(
+                        quantity=quantity, axis=axis, shape='noise', amount=amount, seed=batch
+                    )
+                    for quantity, amount in NOISE
+                    for axis in AXES
+                )
+            )
         for number in range(RUNS // BATCHES):
             random = Random(f'{batch} {number}')
             slider = 0.01 * (1 + (BATCHES * number + batch) % 100)  # each of 1 to 100 %, once

@@ -20,8 +20,14 @@ from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, robot_model
 from ur_cartesian_driver.ros.client import load_goal
 
 EXAMPLES = ['postures', 'seam', 'square']
-HOME = (0.0, -1.5707963267948966, 1.5707963267948966, -1.5707963267948966, -1.5707963267948966,
-        0.0)
+HOME = (
+    0.0,
+    -1.5707963267948966,
+    1.5707963267948966,
+    -1.5707963267948966,
+    -1.5707963267948966,
+    0.0,
+)
 
 
 @pytest.mark.parametrize('example', EXAMPLES)
@@ -52,8 +58,10 @@ def test_validate_names_the_code_of_a_refusal(capsys):
 
 def test_validate_takes_the_parameters_of_a_file_and_single_ones_before_those(tmp_path, capsys):
     file = tmp_path / 'cell.yaml'
-    file.write_text('/**/ur_cartesian_driver:\n  ros__parameters:\n    ur_type: ur10e\n'
-                    '    max_approach_distance: 0.1\n    on_too_fast: slow\n')
+    file.write_text(
+        '/**/ur_cartesian_driver:\n  ros__parameters:\n    ur_type: ur10e\n'
+        '    max_approach_distance: 0.1\n    on_too_fast: slow\n'
+    )
     options = ['validate', 'square', '--params-file', str(file)]
     assert main(options) == 1
     assert 'max_approach_distance = 0.1 m' in capsys.readouterr().err
@@ -63,13 +71,16 @@ def test_validate_takes_the_parameters_of_a_file_and_single_ones_before_those(tm
     assert 'because of max_tool_speed = 0.1 m/s' in plan
 
 
-@pytest.mark.parametrize(('words', 'says'), [
-    (['-p', 'max_tool_sped:=1.0'], 'did you mean max_tool_speed?'),
-    (['-p', 'max_tool_speed'], 'NAME:=VALUE'),
-    (['-p', 'max_tool_speed:=1'], 'write 1.0'),
-    (['-p', 'static_frames:=[a b'], 'not YAML'),
-    (['--params-file', 'package.xml'], 'no parameters for a node'),
-])
+@pytest.mark.parametrize(
+    ('words', 'says'),
+    [
+        (['-p', 'max_tool_sped:=1.0'], 'did you mean max_tool_speed?'),
+        (['-p', 'max_tool_speed'], 'NAME:=VALUE'),
+        (['-p', 'max_tool_speed:=1'], 'write 1.0'),
+        (['-p', 'static_frames:=[a b'], 'not YAML'),
+        (['--params-file', 'package.xml'], 'no parameters for a node'),
+    ],
+)
 def test_validate_refuses_parameters_as_the_node_does(words, says, capsys, tmp_path):
     if words[0] == '--params-file':
         (tmp_path / words[1]).write_text('other:\n  ros__parameters: {}\n')
@@ -86,8 +97,9 @@ def test_the_first_of_six_numbers_may_be_negative(capsys):
 def test_validate_takes_tcp_and_calibration(capsys):
     assert main(['validate', 'square', '--tcp', '0,0,0.1,0,0,0', '--calibration-seed', '3']) == 0
     first, *_ = capsys.readouterr().out.splitlines()
-    assert first == ('ur5e with its calibration, joints 0 -1.571 1.571 -1.571 -1.571 0 rad, '
-                     'TCP 0 0 0.1 0 0 0')
+    assert first == (
+        'ur5e with its calibration, joints 0 -1.571 1.571 -1.571 -1.571 0 rad, TCP 0 0 0.1 0 0 0'
+    )
 
 
 def test_validate_reads_standard_input_and_puts_a_prefix_before_names(capsys, monkeypatch):
@@ -124,6 +136,7 @@ def test_where_nobody_is_says_so(capsys, unused_port):
 @pytest.fixture
 def unused_port():
     import socket
+
     with socket.socket() as s:
         s.bind(('127.0.0.1', 0))
         yield s.getsockname()[1]
@@ -139,10 +152,25 @@ def test_an_arm_that_is_said_to_stand_somewhere_stands_there():
 @pytest.mark.slow
 def test_the_simulator_says_where_it_listens_and_ends_on_a_signal():
     process = subprocess.Popen(
-        [sys.executable, '-m', 'ur_cartesian_driver.cli', 'sim', '--rtde-port', '0',
-         '--primary-port', '0', '--dashboard-port', '0', '--model', 'ur10e'],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        env=os.environ | {'PYTHONUNBUFFERED': '1'})
+        [
+            sys.executable,
+            '-m',
+            'ur_cartesian_driver.cli',
+            'sim',
+            '--rtde-port',
+            '0',
+            '--primary-port',
+            '0',
+            '--dashboard-port',
+            '0',
+            '--model',
+            'ur10e',
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {'PYTHONUNBUFFERED': '1'},
+    )
     try:
         line = process.stdout.readline()
         assert line.startswith('simulated ur10e on 127.0.0.1: RTDE ')
@@ -156,8 +184,20 @@ def test_the_simulator_says_where_it_listens_and_ends_on_a_signal():
 
 
 def test_a_taken_port_is_one_sentence(ur_sim, capsys):
-    assert main(['sim', '--rtde-port', str(ur_sim.ports.rtde), '--primary-port', '0',
-                 '--dashboard-port', '0']) == 1
+    assert (
+        main(
+            [
+                'sim',
+                '--rtde-port',
+                str(ur_sim.ports.rtde),
+                '--primary-port',
+                '0',
+                '--dashboard-port',
+                '0',
+            ]
+        )
+        == 1
+    )
     error = capsys.readouterr().err
     assert str(ur_sim.ports.rtde) in error
     assert error.count('\n') == 1
@@ -167,9 +207,20 @@ def test_a_taken_port_is_one_sentence(ur_sim, capsys):
 def test_the_picture_shows_what_was_recorded(tmp_path):
     pytest.importorskip('matplotlib')
     record = tmp_path / 'feedback.jsonl'
-    record.write_text(''.join(json.dumps({
-        'stamp': 0.1 * i, 'desired': [0.01 * i, 0.0, 0.2], 'actual': [0.01 * i, 1e-5, 0.2],
-        'speed': 0.1}) + '\n' for i in range(20)))
+    record.write_text(
+        ''.join(
+            json.dumps(
+                {
+                    'stamp': 0.1 * i,
+                    'desired': [0.01 * i, 0.0, 0.2],
+                    'actual': [0.01 * i, 1e-5, 0.2],
+                    'speed': 0.1,
+                }
+            )
+            + '\n'
+            for i in range(20)
+        )
+    )
     drawing = tmp_path / 'picture.png'
     picture.draw(record, drawing, 'a line')
     assert drawing.read_bytes().startswith(b'\x89PNG')

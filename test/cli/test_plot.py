@@ -16,8 +16,12 @@ from ur_cartesian_driver.motion.state import RuntimeState
 
 def busy(i):
     """A packet of a motion in which much happens."""
-    return packet(i, 1 + i // 100, target_speed_fraction=0.5, runtime_state=(
-        RuntimeState.PAUSED if 50 <= i < 80 else RuntimeState.PLAYING))
+    return packet(
+        i,
+        1 + i // 100,
+        target_speed_fraction=0.5,
+        runtime_state=(RuntimeState.PAUSED if 50 <= i < 80 else RuntimeState.PLAYING),
+    )
 
 
 def switch(recorder, i):
@@ -59,7 +63,8 @@ def test_without_matplotlib_one_sentence_says_so(tmp_path, monkeypatch, capsys):
     assert main(['plot', str(tmp_path)]) == 1
     assert capsys.readouterr().err == (
         'ur-cartesian plot: no picture without matplotlib; install it (extra `plot`), or take '
-        '--csv\n')
+        '--csv\n'
+    )
 
 
 def test_a_directory_without_recordings_is_named(tmp_path, capsys):

@@ -16,8 +16,9 @@ def test_a_fault_that_is_not_understood_is_one_sentence_with_the_word(capsys):
     with pytest.raises(SystemExit):
         main(['sim', '--fault', 'drop rtde in 5 s'])
     last = capsys.readouterr().err.splitlines()[-1]
-    assert last.endswith("The fault 'drop rtde in 5 s' is not understood at 'in'; "
-                         "expected 'at', 'for' or the end.")
+    assert last.endswith(
+        "The fault 'drop rtde in 5 s' is not understood at 'in'; expected 'at', 'for' or the end."
+    )
 
 
 def test_an_interface_that_there_is_not_is_one_sentence(capsys):
@@ -35,8 +36,16 @@ def test_a_calibration_that_there_is_not_is_one_sentence(capsys):
 
 
 def test_options_reach_the_robot():
-    options = ['--rate', '0', '--calibration-seed', '3', '--fault', 'stop at 2 s', '--fault',
-               'drop rtde']
+    options = [
+        '--rate',
+        '0',
+        '--calibration-seed',
+        '3',
+        '--fault',
+        'stop at 2 s',
+        '--fault',
+        'drop rtde',
+    ]
     arguments = parser().parse_args(['sim', '--model', 'ur10e', *options])
     config = commands.simulator_config(arguments)
     assert config.rate == 0.0

@@ -20,16 +20,20 @@ from ur_cartesian_driver.robot.status import Gaps
 
 MESSAGES = [
     channel.Configure(config=DriverConfig(robot_ip='10.0.0.1', headless_mode=True)),
-    channel.CancelMotion(motion=3), channel.Heartbeat(), channel.Shutdown(),
+    channel.CancelMotion(motion=3),
+    channel.Heartbeat(),
+    channel.Shutdown(),
     channel.ResendProgram(),
     channel.MotionExtended(motion=3, answer=AnswerExtension(number=1, refusal='The goal ended.')),
     channel.MotionEnded(motion=3, outcome=Outcome(code=ErrorCode.SUCCESSFUL, text='Done.')),
-    channel.StatusChanged(status=DriverStatus(
-        state=ConnectionState.READY, ports={'reverse_port': 50001})),
+    channel.StatusChanged(
+        status=DriverStatus(state=ConnectionState.READY, ports={'reverse_port': 50001})
+    ),
     channel.CallRobot(number=2, call=calls.SetTcp(T_flange_tcp=Pose((0.0, 0.0, 0.1)))),
     channel.CallAnswered(number=2, answer=calls.Answer(ok=True, text='The TCP is set.')),
     channel.Alive(gaps=Gaps(reports=0.002, keepalives=0.021)),
-    channel.LogLine(level=30, text='a line')]
+    channel.LogLine(level=30, text='a line'),
+]
 
 
 @pytest.mark.parametrize('message', MESSAGES, ids=lambda m: type(m).__name__)
@@ -42,10 +46,12 @@ def test_a_message_arrives_as_it_was_sent(message):
 
 def test_a_large_order_arrives_whole():
     n = 20_000
-    reference = ReferencePath(poses=np.ones((n, 7)), point=np.zeros(n, np.int32),
-                              time=np.arange(n, dtype=float))
-    sent = channel.StartMotion(motion=1, order=Order(
-        points=n, reference=reference, duration=1.0), points=bytes(84 * n))
+    reference = ReferencePath(
+        poses=np.ones((n, 7)), point=np.zeros(n, np.int32), time=np.arange(n, dtype=float)
+    )
+    sent = channel.StartMotion(
+        motion=1, order=Order(points=n, reference=reference, duration=1.0), points=bytes(84 * n)
+    )
     ours, theirs = socket.socketpair()
     with ours, theirs:
         thread = threading.Thread(target=ours.sendall, args=(channel.pack(sent),))

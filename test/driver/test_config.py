@@ -7,12 +7,23 @@ import pytest
 from ur_cartesian_driver.driver import DriverConfig
 
 
-@pytest.mark.parametrize(('field', 'value'), [
-    ('robot_loop', 'fiber'), ('after_robot_stop', 'wait'),
-    ('robot_receive_timeout', 0.0), ('keepalive_period', -1.0),
-    ('feedback_rate', 0.0), ('node_timeout', float('nan')), ('stop_deceleration', 0.0),
-    ('stream_margin', 0.0), ('stream_horizon', 0.3), ('keep_open_timeout', -1.0),
-    ('rtde_frequency', 1), ('rtde_frequency', float('nan'))])
+@pytest.mark.parametrize(
+    ('field', 'value'),
+    [
+        ('robot_loop', 'fiber'),
+        ('after_robot_stop', 'wait'),
+        ('robot_receive_timeout', 0.0),
+        ('keepalive_period', -1.0),
+        ('feedback_rate', 0.0),
+        ('node_timeout', float('nan')),
+        ('stop_deceleration', 0.0),
+        ('stream_margin', 0.0),
+        ('stream_horizon', 0.3),
+        ('keep_open_timeout', -1.0),
+        ('rtde_frequency', 1),
+        ('rtde_frequency', float('nan')),
+    ],
+)
 def test_a_value_out_of_range_is_named(field, value):
     with pytest.raises(ValueError, match=field) as error:
         DriverConfig(**{field: value})

@@ -24,8 +24,9 @@ from ur_cartesian_driver.protocol.dialects import NEWEST
 ARM = Arm(robot_model('ur5e'))
 Q = (0.3, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 HOME = ARM.forward(Q)
-STATE = RobotState(timestamp=0.0, actual_q=Q, target_q=Q, actual_tcp_pose=HOME,
-                   target_tcp_pose=HOME)
+STATE = RobotState(
+    timestamp=0.0, actual_q=Q, target_q=Q, actual_tcp_pose=HOME, target_tcp_pose=HOME
+)
 OPTIONS = PlanningOptions(self_collision='off')
 
 
@@ -43,11 +44,21 @@ def sent():
 @pytest.fixture
 def goal(sent):
     """A goal of one point whose robot loop answers as the test says."""
+
     def made(timeout=60.0):
-        part = opened(plan(Goal(waypoints=(point(1),), keep_open=True), STATE, ARM, OPTIONS),
-                      ARM, OPTIONS)
-        return Continuing(1, part, dialect=NEWEST, arm_and_options=lambda: (ARM, OPTIONS),
-                          send=sent.put, progress=lambda: None, timeout=timeout)
+        part = opened(
+            plan(Goal(waypoints=(point(1),), keep_open=True), STATE, ARM, OPTIONS), ARM, OPTIONS
+        )
+        return Continuing(
+            1,
+            part,
+            dialect=NEWEST,
+            arm_and_options=lambda: (ARM, OPTIONS),
+            send=sent.put,
+            progress=lambda: None,
+            timeout=timeout,
+        )
+
     return made
 
 

@@ -23,8 +23,9 @@ from ur_cartesian_driver.sim.config import HOME
 UR5E = robot_model('ur5e')
 ARM = Arm(UR5E)
 HERE = ARM.forward(HOME)
-STATE = RobotState(timestamp=0.0, actual_q=HOME, target_q=HOME, actual_tcp_pose=HERE,
-                   target_tcp_pose=HERE)
+STATE = RobotState(
+    timestamp=0.0, actual_q=HOME, target_q=HOME, actual_tcp_pose=HERE, target_tcp_pose=HERE
+)
 
 
 def limits(**options):
@@ -42,8 +43,11 @@ def test_joints_are_as_fast_as_both_bounds_allow():
 
 
 def test_margins_and_planes_are_those_of_goals():
-    found = limits(singularity_margin_elbow=0.2, tool_radius=0.03,
-                   workspace_planes=('table 0 0 0.1 0 0 2 0.02',))
+    found = limits(
+        singularity_margin_elbow=0.2,
+        tool_radius=0.03,
+        workspace_planes=('table 0 0 0.1 0 0 2 0.02',),
+    )
     assert found.singularity_margins == (0.05, 0.2, 0.02)
     assert found.surroundings.tool_radius == 0.03
     (table,) = found.surroundings.planes
@@ -59,12 +63,19 @@ def test_the_arm_keeps_away_from_itself_where_capsules_refuse_goals(choice, expe
 
 def sent(message):
     """Return a message as the robot loop gets it."""
-    return unpack(pack(message)[LENGTH.size:])
+    return unpack(pack(message)[LENGTH.size :])
 
 
 def start(arm=ARM, **fields):
-    return sent(StartMotion(motion=7, points=b'', order=standing_order(standing_plan(STATE)),
-                            live=live_order(arm, HOME, PlanningOptions()), **fields))
+    return sent(
+        StartMotion(
+            motion=7,
+            points=b'',
+            order=standing_order(standing_plan(STATE)),
+            live=live_order(arm, HOME, PlanningOptions()),
+            **fields,
+        )
+    )
 
 
 def test_a_session_and_its_targets_come_through_the_pipe():
@@ -73,8 +84,9 @@ def test_a_session_and_its_targets_come_through_the_pipe():
     aim = sent(AimMotion(motion=7, T_base_tcp=HERE, age=0.05))
     machine.aim(aim.T_base_tcp, aim.age, 10.0)
     assert machine.live.taken == 1
-    assert isinstance(machine_of(replace(start(), live=None, teach=True), DriverConfig()),
-                      TeachMachine)
+    assert isinstance(
+        machine_of(replace(start(), live=None, teach=True), DriverConfig()), TeachMachine
+    )
 
 
 def test_only_a_calibrated_arm_takes_long():

@@ -34,10 +34,18 @@ def corner(cell):
     """A goal of two lines with a blend between them, from where the arm stands."""
     home = cell.memory.read().actual_tcp_pose
     places = ((0.0, 0.05, 0.0), (0.04, 0.05, 0.0))
-    return Goal(waypoints=tuple(
-        Waypoint(pose=Pose(tuple(a + b for a, b in zip(home.position, place, strict=True)),
-                           home.quaternion)) for place in places),
-        segments=(Segment(blend_radius=0.01), Segment()))
+    return Goal(
+        waypoints=tuple(
+            Waypoint(
+                pose=Pose(
+                    tuple(a + b for a, b in zip(home.position, place, strict=True)),
+                    home.quaternion,
+                )
+            )
+            for place in places
+        ),
+        segments=(Segment(blend_radius=0.01), Segment()),
+    )
 
 
 async def executed(cell, goal, act=None):
@@ -71,6 +79,7 @@ def kinds(recording):
 
 def test_a_recording_equals_what_happened(tmp_path):
     """Packet by packet, with a slider that moves and an output that somebody switches."""
+
     async def scenario(cell):
         cell.robot.inject(Slider(fraction=0.5, when=Travelled(0.02)))
 
@@ -98,8 +107,13 @@ def test_a_recording_equals_what_happened(tmp_path):
     assert found.metadata['outcome']['text'] == outcome.text
     assert found.metadata['robot']['model'] == 'ur5e'
     assert [text for _, _, text in found.events] == [
-        'PRIMITIVES, 2 points', 'on the way to point 0', 'standard digital output 3: on',
-        'speed slider at 50 %', 'on the way to point 1', f'SUCCESSFUL: {outcome.text}']
+        'PRIMITIVES, 2 points',
+        'on the way to point 0',
+        'standard digital output 3: on',
+        'speed slider at 50 %',
+        'on the way to point 1',
+        f'SUCCESSFUL: {outcome.text}',
+    ]
     off = found.deviation()
     assert off.position.max() < 1e-3
     assert off.planned_time[-1] == pytest.approx(made.duration, abs=1e-6)
@@ -124,7 +138,8 @@ def test_each_motion_is_a_file_that_says_how_it_ended(tmp_path):
     ends = run_cell(scenario, record_directory=str(tmp_path))
     cancelled, stopped = recorded(tmp_path)
     assert [found.metadata['outcome']['text'] for found in (cancelled, stopped)] == [
-        end.text for end in ends]
+        end.text for end in ends
+    ]
     assert cancelled.metadata['outcome']['name'] == ErrorCode.CANCELLED.name
     assert stopped.metadata['outcome']['report'] == list(ends[1].report)
     assert 'cancel' in kinds(cancelled)
@@ -151,12 +166,21 @@ def test_a_goal_does_not_care_for_a_directory_that_cannot_be_written(tmp_path):
 @pytest.mark.parametrize('late', [False, True], ids=['in time', 'late'])
 def test_the_recording_of_an_open_goal_has_the_path_that_was_gone(tmp_path, late):
     """The ending that each part was planned with is in the plan only where the arm went it."""
+
     async def scenario(cell):
         home = cell.memory.read().actual_tcp_pose
-        motion = OpenMotion(cell, Goal(
-            waypoints=tuple(circle(home, 1, 4)), execution=ExecutionMode.SPLINE, keep_open=True))
-        await motion.until(lambda: motion.motion.progress and (
-            motion.progress.waits if late else motion.progress.time_remaining < 0.6))
+        motion = OpenMotion(
+            cell,
+            Goal(
+                waypoints=tuple(circle(home, 1, 4)), execution=ExecutionMode.SPLINE, keep_open=True
+            ),
+        )
+        await motion.until(
+            lambda: (
+                motion.motion.progress
+                and (motion.progress.waits if late else motion.progress.time_remaining < 0.6)
+            )
+        )
         points = circle(home, 5, 4)
         points[-1] = replace(points[-1], time=points[-1].time + 0.1, twist=ZERO6)
         await motion.append(points, last=True)
@@ -179,8 +203,7 @@ def test_the_recording_of_a_stream_of_set_points_has_its_lag(tmp_path):
         home = cell.memory.read().actual_tcp_pose
         points = circle(home, 1, 10)
         points[-1] = replace(points[-1], twist=ZERO6)
-        return await executed(cell, Goal(
-            waypoints=tuple(points), execution=ExecutionMode.SERVO))
+        return await executed(cell, Goal(waypoints=tuple(points), execution=ExecutionMode.SERVO))
 
     _, outcome, _ = run_cell(scenario, record_directory=str(tmp_path))
     assert outcome.succeeded, outcome.text
@@ -195,8 +218,14 @@ def test_the_recording_of_a_stream_of_set_points_has_its_lag(tmp_path):
 
 def test_an_output_that_the_goal_switches_is_recorded_where_it_switched(tmp_path):
     async def scenario(cell):
-        goal = replace(corner(cell), io_commands=(IOCommand(
-            waypoint=0, offset=0.0, output=OutputKind.STANDARD_DIGITAL, pin=5, value=1.0),))
+        goal = replace(
+            corner(cell),
+            io_commands=(
+                IOCommand(
+                    waypoint=0, offset=0.0, output=OutputKind.STANDARD_DIGITAL, pin=5, value=1.0
+                ),
+            ),
+        )
         return await executed(cell, goal)
 
     _, outcome, _ = run_cell(scenario, record_directory=str(tmp_path), io_publish_rate=125.0)

@@ -51,12 +51,14 @@ def test_a_recording_holds_every_packet_as_it_came(tmp_path):
     found = Recording.load(only_file(tmp_path))
     np.testing.assert_array_equal(found.time, [p.timestamp - START for p in packets])
     for name, values in {
-            'actual_q': [p.actual_q for p in packets],
-            'target_q': [p.target_q for p in packets],
-            'actual_pose': [p.actual_tcp_pose.row() for p in packets],
-            'target_pose': [p.target_tcp_pose.row() for p in packets],
-            'actual_twist': [p.actual_tcp_twist for p in packets],
-            'speed_scaling': [1.0] * 1000, 'safety_mode': [SafetyMode.NORMAL] * 1000}.items():
+        'actual_q': [p.actual_q for p in packets],
+        'target_q': [p.target_q for p in packets],
+        'actual_pose': [p.actual_tcp_pose.row() for p in packets],
+        'target_pose': [p.target_tcp_pose.row() for p in packets],
+        'actual_twist': [p.actual_tcp_twist for p in packets],
+        'speed_scaling': [1.0] * 1000,
+        'safety_mode': [SafetyMode.NORMAL] * 1000,
+    }.items():
         np.testing.assert_array_equal(getattr(found, name), values, err_msg=name)
     assert np.isnan(found.lag).all()
 
@@ -68,8 +70,12 @@ def test_numpy_alone_opens_a_recording_without_pickle(tmp_path):
         head = json.loads(file['metadata'].item())
     assert shapes['actual_pose'] == (10, 7)
     assert shapes['planned_pose'] == (4, 7)
-    assert head['outcome'] == {'code': 0, 'name': 'SUCCESSFUL', 'text': 'Done.',
-                               'report': ['a line']}
+    assert head['outcome'] == {
+        'code': 0,
+        'name': 'SUCCESSFUL',
+        'text': 'Done.',
+        'report': ['a line'],
+    }
     assert head['report'] == ['point 0: there']
     assert head['parameters']['x'] == 1
     assert head['parameters']['ur_type'] == 'ur5e'
@@ -95,11 +101,19 @@ def test_events_are_what_changed_and_what_was_noted_in_the_order_of_time(tmp_pat
 
     def state(i):
         begun = 7 if i < 5 else 1 if i < 100 else 2  # 7: of the goal before
-        return packet(i, begun, target_speed_fraction=0.5 if i >= 200 else 1.0, runtime_state=(
-            RuntimeState.PAUSED if 250 <= i < 280 else RuntimeState.PLAYING))
+        return packet(
+            i,
+            begun,
+            target_speed_fraction=0.5 if i >= 200 else 1.0,
+            runtime_state=(RuntimeState.PAUSED if 250 <= i < 280 else RuntimeState.PLAYING),
+        )
 
-    record(tmp_path, map(state, range(400)), between=between,
-           where=lambda i: (int(i >= 100), 1.0 - 0.001 * i))
+    record(
+        tmp_path,
+        map(state, range(400)),
+        between=between,
+        where=lambda i: (int(i >= 100), 1.0 - 0.001 * i),
+    )
     found = Recording.load(only_file(tmp_path))
     assert [(round(time / PERIOD), kind, text) for time, kind, text in found.events] == [
         (0, 'start', 'PRIMITIVES, 2 points'),
@@ -111,7 +125,8 @@ def test_events_are_what_changed_and_what_was_noted_in_the_order_of_time(tmp_pat
         (250, 'program', 'robot program PAUSED'),
         (280, 'program', 'robot program PLAYING'),
         (300, 'cancel', ''),
-        (399, 'end', 'SUCCESSFUL: Done.')]
+        (399, 'end', 'SUCCESSFUL: Done.'),
+    ]
     assert list(found.points_begun[[4, 5, 399]]) == [0, 1, 2]
     np.testing.assert_allclose(found.buffered[1:], 1.0 - 0.001 * np.arange(1, 400))
 
@@ -204,8 +219,9 @@ def test_a_full_disk_ends_the_recording_with_one_sentence_and_keeps_what_was_wri
     assert 'record_directory' in sentence
     found = Recording.load(only_file(tmp_path))
     assert 200 < len(found.time) < 420
-    np.testing.assert_array_equal(found.time, [i * PERIOD + START - START for i in range(
-        len(found.time))])
+    np.testing.assert_array_equal(
+        found.time, [i * PERIOD + START - START for i in range(len(found.time))]
+    )
     assert found.metadata['outcome'] is None
 
 
@@ -263,10 +279,12 @@ os.kill(os.getpid(), signal.SIGKILL)
 @pytest.mark.slow
 def test_what_a_killed_process_has_written_can_be_read_and_becomes_a_file_later(tmp_path):
     scene, tmp_path = tmp_path / 'scene', tmp_path / 'recordings'
-    scene.write_bytes(pickle.dumps((ORDER, HEAD, [
-        packet(i, runtime_state=RuntimeState.PLAYING) for i in range(1000)])))
-    ended = subprocess.run(
-        [sys.executable, '-c', KILLED, str(tmp_path), str(scene)], check=False)
+    scene.write_bytes(
+        pickle.dumps(
+            (ORDER, HEAD, [packet(i, runtime_state=RuntimeState.PLAYING) for i in range(1000)])
+        )
+    )
+    ended = subprocess.run([sys.executable, '-c', KILLED, str(tmp_path), str(scene)], check=False)
     assert ended.returncode == -signal.SIGKILL
     folder = only_file(tmp_path)
     assert folder.suffix == '.part'
@@ -327,12 +345,20 @@ def test_the_metadata_have_what_only_the_planner_knew():
     arm, home = Arm(robot_model('ur5e')), (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
     pose = arm.forward(home)
     x, y, z = pose.position
-    made = plan(Goal(waypoints=(Waypoint(pose=Pose((x, y + 0.05, z), pose.quaternion)),),
-                     frame_id='base'),
-                RobotState(timestamp=0.0, actual_q=home, target_q=home, actual_tcp_pose=pose,
-                           target_tcp_pose=pose), arm, PlanningOptions(linear_velocity=0.07))
-    head = head_of(order_of(made), robot={}, parameters=DriverConfig(keepalive_period=0.01),
-                   of_owner=about(made, PlanningOptions(linear_velocity=0.07)))
+    made = plan(
+        Goal(waypoints=(Waypoint(pose=Pose((x, y + 0.05, z), pose.quaternion)),), frame_id='base'),
+        RobotState(
+            timestamp=0.0, actual_q=home, target_q=home, actual_tcp_pose=pose, target_tcp_pose=pose
+        ),
+        arm,
+        PlanningOptions(linear_velocity=0.07),
+    )
+    head = head_of(
+        order_of(made),
+        robot={},
+        parameters=DriverConfig(keepalive_period=0.01),
+        of_owner=about(made, PlanningOptions(linear_velocity=0.07)),
+    )
     assert head['report'] == list(made.report)
     assert head['frame_id'] == 'base'
     assert head['parameters']['linear_velocity'] == 0.07

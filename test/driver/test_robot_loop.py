@@ -14,8 +14,7 @@ from ur_cartesian_driver.motion.events import Outcome
 
 
 def test_an_owner_that_does_not_read_costs_no_memory_and_misses_no_end():
-    ended = channel.MotionEnded(
-        motion=1, outcome=Outcome(code=ErrorCode.SUCCESSFUL, text='Done.'))
+    ended = channel.MotionEnded(motion=1, outcome=Outcome(code=ErrorCode.SUCCESSFUL, text='Done.'))
 
     async def scene():
         ours, theirs = socket.socketpair()

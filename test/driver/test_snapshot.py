@@ -36,18 +36,35 @@ def memories():
 numbers = st.floats(-1e6, 1e6)
 vectors = st.tuples(*[numbers] * 6)
 poses = st.builds(
-    lambda p, r: Pose(p, quaternion_from_rotation_vector(r)), st.tuples(*[numbers] * 3),
-    st.tuples(*[st.floats(-3.0, 3.0)] * 3))
+    lambda p, r: Pose(p, quaternion_from_rotation_vector(r)),
+    st.tuples(*[numbers] * 3),
+    st.tuples(*[st.floats(-3.0, 3.0)] * 3),
+)
 states = st.builds(
-    RobotState, timestamp=numbers, actual_q=vectors, actual_qd=vectors, target_q=vectors,
-    target_qd=vectors, actual_tcp_pose=poses, actual_tcp_twist=vectors, target_tcp_pose=poses,
-    target_tcp_twist=vectors, actual_tcp_wrench=vectors, T_flange_tcp=poses,
-    speed_scaling=numbers, target_speed_fraction=numbers, robot_mode=st.sampled_from(RobotMode),
-    safety_mode=st.sampled_from(SafetyMode), runtime_state=st.sampled_from(RuntimeState),
+    RobotState,
+    timestamp=numbers,
+    actual_q=vectors,
+    actual_qd=vectors,
+    target_q=vectors,
+    target_qd=vectors,
+    actual_tcp_pose=poses,
+    actual_tcp_twist=vectors,
+    target_tcp_pose=poses,
+    target_tcp_twist=vectors,
+    actual_tcp_wrench=vectors,
+    T_flange_tcp=poses,
+    speed_scaling=numbers,
+    target_speed_fraction=numbers,
+    robot_mode=st.sampled_from(RobotMode),
+    safety_mode=st.sampled_from(SafetyMode),
+    runtime_state=st.sampled_from(RuntimeState),
     robot_status=st.integers(0, 15).map(RobotStatus),
     safety_status=st.integers(0, 0xFFF).map(SafetyStatus),
-    points_begun=st.integers(0, 2**31 - 1), actual_tcp_acceleration=st.none() | vectors,
-    target_tcp_acceleration=st.none() | vectors, joint_torque=st.none() | vectors)
+    points_begun=st.integers(0, 2**31 - 1),
+    actual_tcp_acceleration=st.none() | vectors,
+    target_tcp_acceleration=st.none() | vectors,
+    joint_torque=st.none() | vectors,
+)
 
 
 @given(states)
@@ -78,8 +95,9 @@ def test_a_reader_never_sees_half_of_a_state(memories):
         i = 0
         while not end.is_set():
             i += 1
-            writer.write(replace(template, timestamp=float(i), actual_q=(float(i),) * 6,
-                                 points_begun=i))
+            writer.write(
+                replace(template, timestamp=float(i), actual_q=(float(i),) * 6, points_begun=i)
+            )
 
     thread = threading.Thread(target=write)
     thread.start()

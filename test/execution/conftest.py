@@ -36,19 +36,31 @@ class Cell:
         """Return a pose moved from home along base axes [m], turned about tool axes [rad]."""
         a, b, c = self.home.position
         turned = Pose((0, 0, 0), self.home.quaternion) @ Pose(
-            (0, 0, 0), quaternion_from_rotation_vector(turn))
+            (0, 0, 0), quaternion_from_rotation_vector(turn)
+        )
         return Pose((a + x, b + y, c + z), turned.quaternion)
 
     def plan(self, points, segments=(), **fields):
         """Return the plan of a goal through poses, from home."""
-        goal = Goal(waypoints=tuple(Waypoint(pose=pose) for pose in points),
-                    segments=tuple(segments), **fields)
-        state = RobotState(timestamp=0.0, actual_q=HOME, actual_tcp_pose=self.home,
-                           T_flange_tcp=self.T_flange_tcp)
+        goal = Goal(
+            waypoints=tuple(Waypoint(pose=pose) for pose in points),
+            segments=tuple(segments),
+            **fields,
+        )
+        state = RobotState(
+            timestamp=0.0, actual_q=HOME, actual_tcp_pose=self.home, T_flange_tcp=self.T_flange_tcp
+        )
         return plan(goal, state, self.arm, PlanningOptions(max_tool_speed=1.0))
 
-    def run(self, made, *, scale=lambda t: 1.0, disturb=lambda t, state: state,
-            instead=None, **settings):
+    def run(
+        self,
+        made,
+        *,
+        scale=lambda t: 1.0,
+        disturb=lambda t, state: state,
+        instead=None,
+        **settings,
+    ):
         """
         Run a plan, and hand every packet to a machine, in the cycle in which it was made.
 
@@ -67,14 +79,26 @@ class Cell:
             nonlocal twists
             before, twists = twists, robot.tcp_twist
             rate = tuple((b - a) / CYCLE for a, b in zip(before, twists, strict=True))
-            return disturb(time, RobotState(
-                timestamp=time, actual_q=robot.q, actual_qd=robot.qd, target_q=robot.q,
-                target_qd=robot.qd, actual_tcp_pose=robot.T_base_tcp,
-                target_tcp_pose=robot.T_base_tcp, actual_tcp_twist=twists,
-                target_tcp_twist=twists, actual_tcp_acceleration=rate,
-                target_tcp_acceleration=rate, T_flange_tcp=self.T_flange_tcp,
-                speed_scaling=scale(time), runtime_state=RuntimeState.PLAYING,
-                points_begun=begun))
+            return disturb(
+                time,
+                RobotState(
+                    timestamp=time,
+                    actual_q=robot.q,
+                    actual_qd=robot.qd,
+                    target_q=robot.q,
+                    target_qd=robot.qd,
+                    actual_tcp_pose=robot.T_base_tcp,
+                    target_tcp_pose=robot.T_base_tcp,
+                    actual_tcp_twist=twists,
+                    target_tcp_twist=twists,
+                    actual_tcp_acceleration=rate,
+                    target_tcp_acceleration=rate,
+                    T_flange_tcp=self.T_flange_tcp,
+                    speed_scaling=scale(time),
+                    runtime_state=RuntimeState.PLAYING,
+                    points_begun=begun,
+                ),
+            )
 
         def cycle():
             nonlocal time

@@ -44,12 +44,20 @@ BOUND = 10.0
 
 def machine(T_flange_tcp):
     poses = np.array([[0.1 * i, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0] for i in range(POINTS + 1)])
-    return TrajectoryMachine(Order(
-        points=POINTS, duration=3.0, T_flange_tcp=T_flange_tcp, reference=ReferencePath(
-            poses=poses, point=np.maximum(np.arange(POINTS + 1) - 1, 0).astype(np.int32),
-            time=np.arange(POINTS + 1.0)),
-        path_tolerance=Tolerance(position=(0.01,) * 3),
-        goal_tolerance=Tolerance(position=(0.001,) * 3)))
+    return TrajectoryMachine(
+        Order(
+            points=POINTS,
+            duration=3.0,
+            T_flange_tcp=T_flange_tcp,
+            reference=ReferencePath(
+                poses=poses,
+                point=np.maximum(np.arange(POINTS + 1) - 1, 0).astype(np.int32),
+                time=np.arange(POINTS + 1.0),
+            ),
+            path_tolerance=Tolerance(position=(0.01,) * 3),
+            goal_tolerance=Tolerance(position=(0.001,) * 3),
+        )
+    )
 
 
 def stream(T_flange_tcp, deviation):
@@ -62,26 +70,43 @@ def robot(part=0.0, off=0.0, speed=0.0, begun=0, T_flange_tcp=IDENTITY, **change
     target = Pose((0.3 * part, 0.0, 0.2), (0.0, 0.0, 0.0, 1.0))
     actual = Pose((0.3 * part, off, 0.2), (0.0, 0.0, 0.0, 1.0))
     return RobotState(
-        actual_q=(0.0,) * 6, actual_qd=(speed, 0.0, 0.0, 0.0, 0.0, 0.0), target_tcp_pose=target,
-        actual_tcp_pose=actual, target_tcp_twist=(speed, 0.0, 0.0, 0.0, 0.0, 0.0),
-        points_begun=begun, T_flange_tcp=T_flange_tcp,
-        **{'timestamp': 0.0, 'runtime_state': RuntimeState.PLAYING} | changes)
+        actual_q=(0.0,) * 6,
+        actual_qd=(speed, 0.0, 0.0, 0.0, 0.0, 0.0),
+        target_tcp_pose=target,
+        actual_tcp_pose=actual,
+        target_tcp_twist=(speed, 0.0, 0.0, 0.0, 0.0, 0.0),
+        points_begun=begun,
+        T_flange_tcp=T_flange_tcp,
+        **{'timestamp': 0.0, 'runtime_state': RuntimeState.PLAYING} | changes,
+    )
 
 
-SAFETY = [SafetyStatus.NORMAL_MODE, SafetyStatus.NORMAL_MODE, SafetyStatus.PROTECTIVE_STOPPED,
-          SafetyStatus.EMERGENCY_STOPPED, SafetyStatus.FAULT]
+SAFETY = [
+    SafetyStatus.NORMAL_MODE,
+    SafetyStatus.NORMAL_MODE,
+    SafetyStatus.PROTECTIVE_STOPPED,
+    SafetyStatus.EMERGENCY_STOPPED,
+    SafetyStatus.FAULT,
+]
 PACKETS = st.builds(
-    robot, part=st.floats(0.0, 1.0), off=st.sampled_from([0.0, 0.0, 0.005, 0.02]),
-    speed=st.sampled_from([0.0, 0.1]), begun=st.integers(0, POINTS),
-    T_flange_tcp=st.sampled_from([IDENTITY, NOZZLE]), safety_status=st.sampled_from(SAFETY),
+    robot,
+    part=st.floats(0.0, 1.0),
+    off=st.sampled_from([0.0, 0.0, 0.005, 0.02]),
+    speed=st.sampled_from([0.0, 0.1]),
+    begun=st.integers(0, POINTS),
+    T_flange_tcp=st.sampled_from([IDENTITY, NOZZLE]),
+    safety_status=st.sampled_from(SAFETY),
     runtime_state=st.sampled_from([RuntimeState.PLAYING] * 4 + list(RuntimeState)),
     robot_mode=st.sampled_from([RobotMode.RUNNING] * 4 + [RobotMode.POWER_OFF]),
-    speed_scaling=st.sampled_from([1.0, 0.0]))
+    speed_scaling=st.sampled_from([1.0, 0.0]),
+)
 EVENTS = st.one_of(
-    PACKETS.map(lambda state: StateReceived(state=state)), st.just(Tick()),
+    PACKETS.map(lambda state: StateReceived(state=state)),
+    st.just(Tick()),
     st.sampled_from([TrajectoryEnded(result=result) for result in TrajectoryResult]),
     st.sampled_from([CancelRequested(), PreemptRequested()]),
-    st.sampled_from([LinkLost(link=link, reason='it closed') for link in ('program', 'RTDE')]))
+    st.sampled_from([LinkLost(link=link, reason='it closed') for link in ('program', 'RTDE')]),
+)
 
 
 def timed(event, now):
@@ -106,8 +131,7 @@ def commands_of(goal, events):
 
 
 @pytest.mark.slow
-@given(events=st.lists(st.tuples(EVENTS, st.floats(0.001, 2.0)), max_size=25),
-       lends=st.booleans())
+@given(events=st.lists(st.tuples(EVENTS, st.floats(0.001, 2.0)), max_size=25), lends=st.booleans())
 @settings(max_examples=150, deadline=None)
 def test_a_goal_ends_once_whatever_happens(events, lends):
     goal = machine(NOZZLE if lends else None)
@@ -116,8 +140,12 @@ def test_a_goal_ends_once_whatever_happens(events, lends):
     assert isinstance(end.outcome.code, ErrorCode)
     assert end.outcome.text.endswith('.')
     assert goal.state is State.ENDED
-    sent = [index for command in commands if isinstance(command, SendPoints)
-            for index in range(command.first, command.end)]
+    sent = [
+        index
+        for command in commands
+        if isinstance(command, SendPoints)
+        for index in range(command.first, command.end)
+    ]
     assert sent == list(range(len(sent))), 'each point once, in order'
     assert len(sent) <= POINTS
 
@@ -127,20 +155,44 @@ def extension(number, behind, begin, count, last):
     x = 0.1 * (begin + np.arange(count))
     poses = np.stack([x, *np.tile([[0.0], [0.2], [0.0], [0.0], [0.0], [1.0]], count)], axis=1)
     point, time = np.arange(begin, begin + count) - 1, np.arange(begin, begin + count, dtype=float)
-    return Extension(number=number, behind=behind, order=None if not count else Order(
-        points=count, duration=float(begin + count), open_end=not last, ending=0 if last else 1,
-        reference=ReferencePath(poses=poses, point=point.astype(np.int32), time=time),
-        waypoint=point.astype(np.int32)))
+    return Extension(
+        number=number,
+        behind=behind,
+        order=None
+        if not count
+        else Order(
+            points=count,
+            duration=float(begin + count),
+            open_end=not last,
+            ending=0 if last else 1,
+            reference=ReferencePath(poses=poses, point=point.astype(np.int32), time=time),
+            waypoint=point.astype(np.int32),
+        ),
+    )
 
 
-EXTENSIONS = st.builds(extension, number=st.integers(1, 9), behind=st.integers(0, 8),
-                       begin=st.integers(1, 8), count=st.integers(0, 4), last=st.booleans())
+EXTENSIONS = st.builds(
+    extension,
+    number=st.integers(1, 9),
+    behind=st.integers(0, 8),
+    begin=st.integers(1, 8),
+    count=st.integers(0, 4),
+    last=st.booleans(),
+)
 
 
 @pytest.mark.slow
-@given(events=st.lists(st.tuples(st.one_of(EVENTS, PACKETS.map(
-    lambda state: StateReceived(state=state)), EXTENSIONS), st.floats(0.001, 2.0)), max_size=25),
-    lends=st.booleans(), deviation=st.sampled_from([0.0, 0.002]))
+@given(
+    events=st.lists(
+        st.tuples(
+            st.one_of(EVENTS, PACKETS.map(lambda state: StateReceived(state=state)), EXTENSIONS),
+            st.floats(0.001, 2.0),
+        ),
+        max_size=25,
+    ),
+    lends=st.booleans(),
+    deviation=st.sampled_from([0.0, 0.002]),
+)
 @settings(max_examples=60, deadline=None)
 def test_an_open_goal_ends_once_whatever_happens(events, lends, deviation):
     goal = stream(NOZZLE if lends else None, deviation)
@@ -153,8 +205,12 @@ def test_an_open_goal_ends_once_whatever_happens(events, lends, deviation):
     ended = next(i for i, c in enumerate(commands) if isinstance(c, Finish))
     assert len(answers) == len(asked), 'who appends is answered, also behind the end'
     assert all(answer.refusal for answer in answers if commands.index(answer) > ended)
-    sent = [index for command in commands if isinstance(command, SendPoints)
-            for index in range(command.first, command.end)]
+    sent = [
+        index
+        for command in commands
+        if isinstance(command, SendPoints)
+        for index in range(command.first, command.end)
+    ]
     assert sent == list(range(len(sent))), 'each record once, in order'
     counts_fit(commands)
 

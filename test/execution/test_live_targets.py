@@ -100,8 +100,10 @@ def test_the_session_ends_when_no_target_came_for_long(session):
     assert session.live.done
 
 
-@pytest.mark.parametrize(('count', 'said'), [
-    (0, '0 targets were followed'), (1, '1 target was followed'), (2, '2 targets were followed')])
+@pytest.mark.parametrize(
+    ('count', 'said'),
+    [(0, '0 targets were followed'), (1, '1 target was followed'), (2, '2 targets were followed')],
+)
 def test_targets_are_counted_in_the_report(session, count, said):
     for _ in range(count):
         session.take(0.1)
@@ -126,8 +128,9 @@ def test_it_does_not_end_before_the_arm_rests(session):
 def test_what_stops_it_is_reported_once_in_words(session):
     for i in range(30):
         x, y, z = session.home.position
-        session.live.take(Pose((x - 0.45 - 1e-3 * (i % 3), y, z), session.home.quaternion), 0.0,
-                          session.now)
+        session.live.take(
+            Pose((x - 0.45 - 1e-3 * (i % 3), y, z), session.home.quaternion), 0.0, session.now
+        )
         session.run(0.1)
     assert session.live.blocked
     why = [line for line in session.live.report if line.startswith('the arm was stopped: ')]

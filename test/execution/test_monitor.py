@@ -22,8 +22,12 @@ def path(*positions, quaternions=None, points=None, **rest):
     quaternions = quaternions or [DOWN] * len(positions)
     poses = np.array([[*p, *q] for p, q in zip(positions, quaternions, strict=True)])
     points = points or [max(0, i - 1) for i in range(len(positions))]
-    return ReferencePath(poses=poses, point=np.array(points, dtype=np.int32),
-                         time=np.arange(len(positions), dtype=float), **rest)
+    return ReferencePath(
+        poses=poses,
+        point=np.array(points, dtype=np.int32),
+        time=np.arange(len(positions), dtype=float),
+        **rest,
+    )
 
 
 SQUARE = [(0.4, 0.0, 0.2), (0.6, 0.0, 0.2), (0.6, 0.2, 0.2), (0.4, 0.2, 0.2), (0.4, 0.0, 0.2)]
@@ -124,9 +128,11 @@ def test_the_tool_may_lag_as_its_speed_explains_and_not_more(twist, lag, side):
     tracker.update(Pose((0.5, 0.0, 0.2), DOWN), 0.2)
     near, far = 0.5 + 0.9 * side * lag, 0.5 + side * (lag + 0.003)
     assert tracker.desired(Pose((near, 0.0, 0.2), DOWN), twist).position == pytest.approx(
-        (near, 0.0, 0.2))
+        (near, 0.0, 0.2)
+    )
     assert tracker.desired(Pose((far, 0.0, 0.2), DOWN), twist).position == pytest.approx(
-        (0.5 + side * lag, 0.0, 0.2))
+        (0.5 + side * lag, 0.0, 0.2)
+    )
 
 
 def test_a_tool_that_is_pushed_around_moves_nothing_but_itself():
@@ -144,7 +150,8 @@ def test_there_is_no_lag_before_the_start_or_behind_the_end(x):
     tracker.update(Pose((x, 0.0, 0.2), DOWN), 0.2)
     outside = x + (0.01 if x > 0.5 else -0.01)
     assert tracker.desired(Pose((outside, 0.0, 0.2), DOWN), FAST).position == pytest.approx(
-        (x, 0.0, 0.2))
+        (x, 0.0, 0.2)
+    )
 
 
 def test_a_turn_lags_as_a_way_does():
@@ -187,8 +194,10 @@ def test_what_is_surely_near_the_plan_is_near_it(seed):
     tracker = PathTracker(path(*ends, quaternions=list(quaternions)))
     place = tracker.pose(Place(0, draw.uniform(0.0, 1.0)))
     size = 10.0 ** draw.uniform(-6.0, -1.0)
-    target = place @ Pose(tuple(size * draw.normal(size=3)),
-                          quaternion_from_rotation_vector(10.0 * size * draw.normal(size=3)))
+    target = place @ Pose(
+        tuple(size * draw.normal(size=3)),
+        quaternion_from_rotation_vector(10.0 * size * draw.normal(size=3)),
+    )
     tracker.update(target, 1.0)
     way, angle = tracker.deviation(target)
     for part in (0.5, 0.99):  # neither limit is kept, then one of them is not
@@ -207,7 +216,8 @@ def test_a_target_on_the_plan_is_surely_near_it():
 def test_a_robot_that_says_it_is_anywhere_is_somewhere_on_the_path():
     """Also where rows are all but the same, so that the way there is any number of their edges."""
     rows = [(0.4 + i * 1e-4, 0.0, i * 1e-155) for i in range(2)] + [
-        (0.4001, 0.0, i * 1e-155) for i in range(2, 40)]
+        (0.4001, 0.0, i * 1e-155) for i in range(2, 40)
+    ]
     tracker = PathTracker(path(*rows))
     tracker.update(Pose((0.4, 0.0, 1e160), DOWN), 1e161)
     assert 0 <= tracker.place.row < len(rows)

@@ -16,10 +16,16 @@ from ur_cartesian_driver.motion.state import RobotState, RuntimeState
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 
 #: 0.1 m in 1 s, then a turn of 1 rad about z in 2 s, its quaternion with the other sign.
-POSES = np.array([[0.4, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0], [0.5, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0],
-                  [0.5, 0.0, 0.2, 0.0, 0.0, -np.sin(0.5), -np.cos(0.5)]])
-PATH = ReferencePath(poses=POSES, point=np.array([0, 0, 1], dtype=np.int32),
-                     time=np.array([0.0, 1.0, 3.0]))
+POSES = np.array(
+    [
+        [0.4, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0],
+        [0.5, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0],
+        [0.5, 0.0, 0.2, 0.0, 0.0, -np.sin(0.5), -np.cos(0.5)],
+    ]
+)
+PATH = ReferencePath(
+    poses=POSES, point=np.array([0, 0, 1], dtype=np.int32), time=np.array([0.0, 1.0, 3.0])
+)
 FASTEST = PEAK * 0.1 + HARMLESS[0], PEAK * 0.5 + HARMLESS[1]
 
 
@@ -27,14 +33,17 @@ def twist(v=0.0, w=0.0):
     return (0.0, v, 0.0, 0.0, 0.0, w)
 
 
-@pytest.mark.parametrize(('moved', 'elapsed', 'planned', 'clause'), [
-    (twist(FASTEST[0] - 1e-6), 1.0, 1.0, None),
-    (twist(FASTEST[0] + 1e-6), 1.0, 1.0, 'm/s'),
-    (twist(w=FASTEST[1] - 1e-3), 1.0, 1.0, None),
-    (twist(w=FASTEST[1] + 1e-3), 1.0, 1.0, 'rad/s'),
-    (ZERO6, BEGIN + SLOW * 0.5 - 0.01, 0.5, None),
-    (ZERO6, BEGIN + SLOW * 0.5 + 0.01, 0.5, 'controller is where the plan is after 0.50 s'),
-])
+@pytest.mark.parametrize(
+    ('moved', 'elapsed', 'planned', 'clause'),
+    [
+        (twist(FASTEST[0] - 1e-6), 1.0, 1.0, None),
+        (twist(FASTEST[0] + 1e-6), 1.0, 1.0, 'm/s'),
+        (twist(w=FASTEST[1] - 1e-3), 1.0, 1.0, None),
+        (twist(w=FASTEST[1] + 1e-3), 1.0, 1.0, 'rad/s'),
+        (ZERO6, BEGIN + SLOW * 0.5 - 0.01, 0.5, None),
+        (ZERO6, BEGIN + SLOW * 0.5 + 0.01, 0.5, 'controller is where the plan is after 0.50 s'),
+    ],
+)
 def test_the_bounds_follow_from_the_plan(moved, elapsed, planned, clause):
     said = Pace(PATH).violation(moved, elapsed, planned)
     if clause is None:
@@ -45,17 +54,29 @@ def test_the_bounds_follow_from_the_plan(moved, elapsed, planned, clause):
 
 
 def test_a_path_that_stands_still_bounds_nothing_but_harm():
-    still = ReferencePath(poses=POSES[:1].repeat(2, axis=0), point=np.zeros(2, dtype=np.int32),
-                          time=np.array([0.0, 1.0]))
+    still = ReferencePath(
+        poses=POSES[:1].repeat(2, axis=0),
+        point=np.zeros(2, dtype=np.int32),
+        time=np.array([0.0, 1.0]),
+    )
     assert Pace(still).violation(twist(0.9 * HARMLESS[0]), 0.1, 0.0) is None
 
 
 def robot(time, x=0.4, v=0.0, begun=0, qd=0.0):
     pose = Pose((x, 0.0, 0.2))
-    return StateReceived(state=RobotState(
-        timestamp=time, actual_q=ZERO6, actual_qd=(qd,) * 6, actual_tcp_pose=pose,
-        target_tcp_pose=pose, actual_tcp_twist=twist(v), target_tcp_twist=twist(v),
-        runtime_state=RuntimeState.PLAYING, points_begun=begun))
+    return StateReceived(
+        state=RobotState(
+            timestamp=time,
+            actual_q=ZERO6,
+            actual_qd=(qd,) * 6,
+            actual_tcp_pose=pose,
+            target_tcp_pose=pose,
+            actual_tcp_twist=twist(v),
+            target_tcp_twist=twist(v),
+            runtime_state=RuntimeState.PLAYING,
+            points_begun=begun,
+        )
+    )
 
 
 def machine(**changes):
@@ -69,9 +90,15 @@ def is_cancelled(commands):
     return SendControl(action=TrajectoryAction.CANCEL, count=2) in commands
 
 
-@pytest.mark.parametrize(('begun', 'order', 'stopped'), [
-    (0, {}, True), (1, {}, False), (1, {'reports_begun': False}, True),
-    (0, {'knows_pace': False}, False)])
+@pytest.mark.parametrize(
+    ('begun', 'order', 'stopped'),
+    [
+        (0, {}, True),
+        (1, {}, False),
+        (1, {'reports_begun': False}, True),
+        (0, {'knows_pace': False}, False),
+    ],
+)
 def test_only_who_tells_no_progress_is_watched(begun, order, stopped):
     made = machine(**order)
     assert is_cancelled(made.step(robot(0.01, x=0.4001, v=0.5, begun=begun), 0.01)) == stopped
@@ -107,7 +134,12 @@ def test_a_packet_from_before_the_end_is_waited_out():
     state = robot(0.2, x=0.5).state
     turned = Pose((0.5, 0.0, 0.2), tuple(POSES[2, 3:]))
     arrived = RobotState(
-        timestamp=0.2, actual_q=ZERO6, actual_qd=ZERO6, actual_tcp_pose=turned,
-        target_tcp_pose=turned, runtime_state=state.runtime_state)
+        timestamp=0.2,
+        actual_q=ZERO6,
+        actual_qd=ZERO6,
+        actual_tcp_pose=turned,
+        target_tcp_pose=turned,
+        runtime_state=state.runtime_state,
+    )
     (end,) = outcome(made.step(StateReceived(state=arrived), 0.2))
     assert end.code is ErrorCode.SUCCESSFUL

@@ -48,29 +48,52 @@ BOUND = 10.0
 
 def machine(T_flange_tcp=None):
     poses = np.array([[LENGTH * part, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0] for part in (0.0, 0.5, 1.0)])
-    spline = JointSpline.of(REST, [Spline(
-        target=(LENGTH,) * 6, velocities=REST, accelerations=REST, duration=DURATION)])
-    return ServoMachine(Order(
-        points=1, duration=DURATION, due=DURATION, T_flange_tcp=T_flange_tcp, spline=spline,
-        execution=ExecutionMode.SERVO, waypoint=np.array([0], dtype=np.int32),
-        reference=ReferencePath(
-            poses=poses, point=np.zeros(3, dtype=np.int32), time=np.linspace(0.0, DURATION, 3)),
-        goal_tolerance=Tolerance(position=(0.001,) * 3)), settings=ServoSettings())
+    spline = JointSpline.of(
+        REST,
+        [Spline(target=(LENGTH,) * 6, velocities=REST, accelerations=REST, duration=DURATION)],
+    )
+    return ServoMachine(
+        Order(
+            points=1,
+            duration=DURATION,
+            due=DURATION,
+            T_flange_tcp=T_flange_tcp,
+            spline=spline,
+            execution=ExecutionMode.SERVO,
+            waypoint=np.array([0], dtype=np.int32),
+            reference=ReferencePath(
+                poses=poses, point=np.zeros(3, dtype=np.int32), time=np.linspace(0.0, DURATION, 3)
+            ),
+            goal_tolerance=Tolerance(position=(0.001,) * 3),
+        ),
+        settings=ServoSettings(),
+    )
 
 
 def robot(joint=0.0, speed=0.0, T_flange_tcp=IDENTITY, **changes):
     """Return a packet of a robot whose tool is as many metres as its joints are radians."""
     pose = Pose((joint, 0.0, 0.2), (0.0, 0.0, 0.0, 1.0))
     return RobotState(
-        actual_q=(joint,) * 6, target_q=(joint,) * 6, actual_qd=(speed,) * 6,
-        target_tcp_pose=pose, actual_tcp_pose=pose, T_flange_tcp=T_flange_tcp,
+        actual_q=(joint,) * 6,
+        target_q=(joint,) * 6,
+        actual_qd=(speed,) * 6,
+        target_tcp_pose=pose,
+        actual_tcp_pose=pose,
+        T_flange_tcp=T_flange_tcp,
         target_tcp_twist=(speed, 0.0, 0.0, 0.0, 0.0, 0.0),
-        **{'timestamp': 0.0, 'runtime_state': RuntimeState.PLAYING} | changes)
+        **{'timestamp': 0.0, 'runtime_state': RuntimeState.PLAYING} | changes,
+    )
 
 
 def registers(mode=0, sequence=0, lag=0.0, timestamp=0.0, playing=True):
-    return ServoFeedback(timestamp=timestamp, speed_scaling=1.0, playing=playing, mode=mode,
-                         last_sequence=sequence, lag=lag)
+    return ServoFeedback(
+        timestamp=timestamp,
+        speed_scaling=1.0,
+        playing=playing,
+        mode=mode,
+        last_sequence=sequence,
+        lag=lag,
+    )
 
 
 class Cell:
@@ -100,13 +123,22 @@ class Cell:
             self.lag = max(0.0, self.lag + self.row[-1] - self.read - STEP)
             self.read = self.row[-1]
         tcp = NOZZLE if any(isinstance(c, LendTcp) for c in self.commands) else IDENTITY
-        self.event(ServoReceived(feedback=registers(
-            mode, sequence, self.lag, timestamp=self.now)))
+        self.event(ServoReceived(feedback=registers(mode, sequence, self.lag, timestamp=self.now)))
         if self.goal.state is until:
             return
-        self.event(StateReceived(state=robot(
-            **{'joint': self.joint, 'speed': (self.joint - before) / STEP,
-               'T_flange_tcp': tcp, 'timestamp': self.now} | changes)))
+        self.event(
+            StateReceived(
+                state=robot(
+                    **{
+                        'joint': self.joint,
+                        'speed': (self.joint - before) / STEP,
+                        'T_flange_tcp': tcp,
+                        'timestamp': self.now,
+                    }
+                    | changes
+                )
+            )
+        )
 
     def until(self, state, bound=3.0):
         while self.goal.state is not state:
@@ -137,8 +169,10 @@ def test_inputs_of_another_client_end_the_goal_before_anything_moves():
     cell = Cell(machine())
     cell.event(LinkLost(link=SERVO_LINK, reason='the inputs are in use by another client.'))
     assert cell.outcome.code is ErrorCode.ROBOT_NOT_READY
-    assert cell.outcome.text == ('The robot does not take set-points: the inputs are in use by '
-                                 'another client (before anything moved).')
+    assert cell.outcome.text == (
+        'The robot does not take set-points: the inputs are in use by '
+        'another client (before anything moved).'
+    )
 
 
 def test_a_program_that_does_not_answer_ends_the_goal_before_anything_moves():
@@ -161,8 +195,10 @@ def test_an_arm_that_was_moved_since_the_plan_is_not_torn_to_its_start(T_flange_
     assert {c.values[0] for c in cell.commands if isinstance(c, WriteServo)} == {0}
 
 
-@pytest.mark.parametrize(('event', 'code'), [
-    (CancelRequested(), ErrorCode.CANCELLED), (PreemptRequested(), ErrorCode.PREEMPTED)])
+@pytest.mark.parametrize(
+    ('event', 'code'),
+    [(CancelRequested(), ErrorCode.CANCELLED), (PreemptRequested(), ErrorCode.PREEMPTED)],
+)
 def test_a_wish_is_written_at_once_and_answered_by_leaving(event, code):
     cell = Cell(machine()).until(State.MOVING)
     for _ in range(60):
@@ -211,8 +247,7 @@ def test_lost_inputs_end_a_moving_goal_and_the_program_is_told_to_brake():
 @pytest.mark.slow
 def test_a_dwell_is_no_stall_while_the_program_reads():
     goal = machine()
-    goal.stream._source = type('Dwell', (), {
-        'done': False, 'next': lambda self, dt: (0.0,) * 6})()
+    goal.stream._source = type('Dwell', (), {'done': False, 'next': lambda self, dt: (0.0,) * 6})()
     cell = Cell(goal).until(State.MOVING)
     for _ in range(1050):  # 2.1 s, longer than an arm may stand for no reason
         cell.cycle()
@@ -230,29 +265,49 @@ def test_due_counts_from_when_the_arm_can_follow():
     assert goal.order.due > DURATION
 
 
-SAFETY = [SafetyStatus.NORMAL_MODE, SafetyStatus.NORMAL_MODE, SafetyStatus.PROTECTIVE_STOPPED,
-          SafetyStatus.EMERGENCY_STOPPED, SafetyStatus.FAULT]
+SAFETY = [
+    SafetyStatus.NORMAL_MODE,
+    SafetyStatus.NORMAL_MODE,
+    SafetyStatus.PROTECTIVE_STOPPED,
+    SafetyStatus.EMERGENCY_STOPPED,
+    SafetyStatus.FAULT,
+]
 PACKETS = st.builds(
-    robot, joint=st.floats(0.0, LENGTH), speed=st.sampled_from([0.0, 0.1]),
-    T_flange_tcp=st.sampled_from([IDENTITY, NOZZLE]), safety_status=st.sampled_from(SAFETY),
+    robot,
+    joint=st.floats(0.0, LENGTH),
+    speed=st.sampled_from([0.0, 0.1]),
+    T_flange_tcp=st.sampled_from([IDENTITY, NOZZLE]),
+    safety_status=st.sampled_from(SAFETY),
     runtime_state=st.sampled_from([RuntimeState.PLAYING] * 4 + list(RuntimeState)),
     robot_mode=st.sampled_from([RobotMode.RUNNING] * 4 + [RobotMode.POWER_OFF]),
-    speed_scaling=st.sampled_from([1.0, 0.0]))
-FEEDBACK = st.builds(registers, mode=st.integers(0, 3), sequence=st.integers(-2, 40),
-                     lag=st.sampled_from([0.0, 0.01, 1.0]), timestamp=st.floats(0.0, 100.0),
-                     playing=st.booleans())
+    speed_scaling=st.sampled_from([1.0, 0.0]),
+)
+FEEDBACK = st.builds(
+    registers,
+    mode=st.integers(0, 3),
+    sequence=st.integers(-2, 40),
+    lag=st.sampled_from([0.0, 0.01, 1.0]),
+    timestamp=st.floats(0.0, 100.0),
+    playing=st.booleans(),
+)
 EVENTS = st.one_of(
-    PACKETS.map(lambda state: StateReceived(state=state)), st.just(Tick()),
+    PACKETS.map(lambda state: StateReceived(state=state)),
+    st.just(Tick()),
     FEEDBACK.map(lambda feedback: ServoReceived(feedback=feedback)),
     st.sampled_from([TrajectoryEnded(result=result) for result in TrajectoryResult]),
     st.sampled_from([CancelRequested(), PreemptRequested()]),
-    st.sampled_from([LinkLost(link=link, reason='it closed')
-                     for link in ('program', 'RTDE', SERVO_LINK)]))
+    st.sampled_from(
+        [LinkLost(link=link, reason='it closed') for link in ('program', 'RTDE', SERVO_LINK)]
+    ),
+)
 
 
 @pytest.mark.slow
-@given(good=st.integers(0, 250), lends=st.booleans(),
-       events=st.lists(st.tuples(EVENTS, st.floats(0.001, 2.0)), max_size=15))
+@given(
+    good=st.integers(0, 250),
+    lends=st.booleans(),
+    events=st.lists(st.tuples(EVENTS, st.floats(0.001, 2.0)), max_size=15),
+)
 @settings(max_examples=25, deadline=None)
 def test_a_goal_ends_once_whatever_happens(good, events, lends):
     cell = Cell(machine(NOZZLE if lends else None))
@@ -277,19 +332,31 @@ WAYS = {
     State.ARMING: lambda cell: None,
     State.MOVING: lambda cell: cell.until(State.MOVING),
     State.SETTLING: lambda cell: cell.until(State.SETTLING),
-    State.STOPPING: lambda cell: (cell.until(State.MOVING), cell.cycle(),
-                                  cell.event(CancelRequested())),
-    State.HALTING: lambda cell: (cell.until(State.MOVING), [cell.cycle() for _ in range(60)],
-                                 cell.event(CancelRequested()), cell.cycle(speed=1.0)),
+    State.STOPPING: lambda cell: (
+        cell.until(State.MOVING),
+        cell.cycle(),
+        cell.event(CancelRequested()),
+    ),
+    State.HALTING: lambda cell: (
+        cell.until(State.MOVING),
+        [cell.cycle() for _ in range(60)],
+        cell.event(CancelRequested()),
+        cell.cycle(speed=1.0),
+    ),
     State.RESTORING: lambda cell: cell.until(State.RESTORING),
     State.ENDING: lambda cell: cell.event(LinkLost(link='program', reason='it closed')),
     State.ENDED: lambda cell: cell.until(State.ENDED),
 }
-EACH = [StateReceived(state=robot()), ServoReceived(feedback=registers()), Tick(),
-        StateReceived(state=robot(safety_status=SafetyStatus.PROTECTIVE_STOPPED)),
-        CancelRequested(), PreemptRequested(),
-        *(TrajectoryEnded(result=result) for result in TrajectoryResult),
-        *(LinkLost(link=link, reason='it closed') for link in ('program', 'RTDE', SERVO_LINK))]
+EACH = [
+    StateReceived(state=robot()),
+    ServoReceived(feedback=registers()),
+    Tick(),
+    StateReceived(state=robot(safety_status=SafetyStatus.PROTECTIVE_STOPPED)),
+    CancelRequested(),
+    PreemptRequested(),
+    *(TrajectoryEnded(result=result) for result in TrajectoryResult),
+    *(LinkLost(link=link, reason='it closed') for link in ('program', 'RTDE', SERVO_LINK)),
+]
 
 
 @pytest.mark.slow
@@ -311,23 +378,40 @@ def test_a_target_that_trails_by_many_dense_points_is_on_the_path():
     points, trail = 100, 20  # 2 ms each; 40 ms of servoj at 0.5 m/s are 20 mm
     at = np.linspace(0.0, 1.0, points + 1)
     speed = (LENGTH / DURATION,) * 6
-    goal = ServoMachine(Order(
-        points=points, duration=DURATION, execution=ExecutionMode.SERVO,
-        waypoint=np.arange(points, dtype=np.int32), spline=JointSpline.of(REST, [Spline(
-            target=(LENGTH * part,) * 6, velocities=REST if part == 1.0 else speed,
-            duration=DURATION / points) for part in at[1:]]),
-        reference=ReferencePath(
-            poses=np.array([[LENGTH * part, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0] for part in at]),
-            point=np.array([0, *range(points)], dtype=np.int32), time=DURATION * at)),
-        settings=ServoSettings())
+    goal = ServoMachine(
+        Order(
+            points=points,
+            duration=DURATION,
+            execution=ExecutionMode.SERVO,
+            waypoint=np.arange(points, dtype=np.int32),
+            spline=JointSpline.of(
+                REST,
+                [
+                    Spline(
+                        target=(LENGTH * part,) * 6,
+                        velocities=REST if part == 1.0 else speed,
+                        duration=DURATION / points,
+                    )
+                    for part in at[1:]
+                ],
+            ),
+            reference=ReferencePath(
+                poses=np.array([[LENGTH * part, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0] for part in at]),
+                point=np.array([0, *range(points)], dtype=np.int32),
+                time=DURATION * at,
+            ),
+        ),
+        settings=ServoSettings(),
+    )
 
     class Trailing(Cell):
         def event(self, event):
             if isinstance(event, StateReceived):
                 self.led.append(event.state.target_q[0])
-                before, now = ([0.0] * trail + self.led)[-trail - 2:-trail]
-                event = StateReceived(state=robot(now, (now - before) / STEP,
-                                                  timestamp=event.state.timestamp))
+                before, now = ([0.0] * trail + self.led)[-trail - 2 : -trail]
+                event = StateReceived(
+                    state=robot(now, (now - before) / STEP, timestamp=event.state.timestamp)
+                )
             super().event(event)
 
     cell = Trailing(goal)

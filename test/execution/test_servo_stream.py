@@ -74,10 +74,16 @@ class Robot:
                 else:
                     self.empty += 1
         return ServoFeedback(
-            timestamp=60.0 + self.cycles * self.step, speed_scaling=self.scale,
-            playing=self.playing, mode=self.mode, last_sequence=self.sequence,
-            lag=len(self.rows) * self.step, setpoints_done=len(self.done),
-            buffer_size=len(self.rows), skipped=self.skipped)
+            timestamp=60.0 + self.cycles * self.step,
+            speed_scaling=self.scale,
+            playing=self.playing,
+            mode=self.mode,
+            last_sequence=self.sequence,
+            lag=len(self.rows) * self.step,
+            setpoints_done=len(self.done),
+            buffer_size=len(self.rows),
+            skipped=self.skipped,
+        )
 
     def _read(self):
         if self.inputs is None or self.inputs['input_int_register_25'] <= self.sequence:
@@ -133,12 +139,14 @@ def spaced(pauses):
 
 
 SLIDERS = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=5).map(
-    lambda levels: lambda t: levels[min(int(t / 0.3), len(levels) - 1)])
+    lambda levels: lambda t: levels[min(int(t / 0.3), len(levels) - 1)]
+)
 
 
 @pytest.mark.slow
-@given(slider=SLIDERS, pauses=st.lists(st.tuples(st.integers(30, 200), st.integers(0, 8)),
-                                       max_size=6))
+@given(
+    slider=SLIDERS, pauses=st.lists(st.tuples(st.integers(30, 200), st.integers(0, 8)), max_size=6)
+)
 @settings(max_examples=15, deadline=None)
 def test_the_buffer_neither_runs_empty_nor_over_where_little_is_late(slider, pauses):
     stream, robot = ServoStream(Ramp(), SETTINGS), Robot()
@@ -159,8 +167,9 @@ def test_the_buffer_neither_runs_empty_nor_over_where_little_is_late(slider, pau
 
 
 @pytest.mark.slow
-@given(slider=SLIDERS, pauses=st.lists(st.tuples(st.integers(1, 60), st.integers(0, 150)),
-                                       max_size=6))
+@given(
+    slider=SLIDERS, pauses=st.lists(st.tuples(st.integers(1, 60), st.integers(0, 150)), max_size=6)
+)
 @settings(max_examples=15, deadline=None)
 def test_whatever_is_late_nothing_is_lost_and_the_motion_arrives(slider, pauses):
     source = Ramp(end=0.4)
@@ -206,8 +215,13 @@ def test_with_the_loop_open_the_lag_grows_by_what_the_slider_takes():
     stream, robot = ServoStream(Ramp(), opened), Robot()
     run(stream, robot, seconds=0.2)
     lags = []
-    run(stream, robot, seconds=0.8, slider=lambda t: 0.5,
-        watch=lambda: lags.append(stream.under_way))
+    run(
+        stream,
+        robot,
+        seconds=0.8,
+        slider=lambda t: 0.5,
+        watch=lambda: lags.append(stream.under_way),
+    )
     assert lags[-1] - lags[150] == pytest.approx(0.5 * (len(lags) - 151) * STEP, abs=0.01)
 
 
@@ -257,9 +271,13 @@ def test_packets_in_one_go_are_answered_once():
 
 
 def test_a_spline_is_sampled_where_it_is():
-    spline = JointSpline.of(HOME, [
-        Spline(target=OUT, velocities=REST, accelerations=REST, duration=0.7),
-        Spline(target=HOME, velocities=REST, accelerations=REST, duration=0.31)])
+    spline = JointSpline.of(
+        HOME,
+        [
+            Spline(target=OUT, velocities=REST, accelerations=REST, duration=0.7),
+            Spline(target=HOME, velocities=REST, accelerations=REST, duration=0.31),
+        ],
+    )
     source, time = SplineSetpoints(spline), 0.0
     for dt in (0.0, *[0.002] * 200, 0.004, 0.0, 0.001, *[0.002] * 200, 0.5):
         time += dt
@@ -268,8 +286,11 @@ def test_a_spline_is_sampled_where_it_is():
 
 
 @pytest.mark.slow
-@given(passed=st.lists(st.tuples(st.floats(0.0, 0.1), st.floats(0.0, 1.0), st.floats(0.0, 0.3)),
-                       max_size=40))
+@given(
+    passed=st.lists(
+        st.tuples(st.floats(0.0, 0.1), st.floats(0.0, 1.0), st.floats(0.0, 0.3)), max_size=40
+    )
+)
 def test_the_clock_is_never_negative_nor_fast_and_leaves_the_rest_of_the_buffer(passed):
     clock = ServoClock(step=STEP, target=0.04, most=0.2)
     for time, scaling, under_way in passed:
@@ -283,14 +304,23 @@ def test_every_phase_has_a_way_out_by_a_stop(phase):
     seen, ahead = set(), {phase}
     while ahead:
         seen |= ahead
-        ahead = {TRANSITIONS[p][c] for p in ahead for c in (Change.STOP, Change.PROGRAM_LEFT)
-                 if c in TRANSITIONS[p]} - seen
+        ahead = {
+            TRANSITIONS[p][c]
+            for p in ahead
+            for c in (Change.STOP, Change.PROGRAM_LEFT)
+            if c in TRANSITIONS[p]
+        } - seen
     assert Phase.LEFT in seen
 
 
-@pytest.mark.parametrize(('changes', 'text'), [
-    ({'target_lag': 0.3}, 'servo_target_lag'), ({'target_lag': 0.001}, 'servo_target_lag'),
-    ({'target_lag': 0.1, 'buffer_depth': 20}, 'needs room for 50')])
+@pytest.mark.parametrize(
+    ('changes', 'text'),
+    [
+        ({'target_lag': 0.3}, 'servo_target_lag'),
+        ({'target_lag': 0.001}, 'servo_target_lag'),
+        ({'target_lag': 0.1, 'buffer_depth': 20}, 'needs room for 50'),
+    ],
+)
 def test_settings_that_cannot_work_are_refused(changes, text):
     with pytest.raises(ValueError, match=text):
         ServoSettings(**changes)

@@ -23,30 +23,52 @@ from ur_cartesian_driver.motion.state import RobotState, RuntimeState
 
 TARGET = Pose((0.6, 0.0, 0.2))
 AT_REST = RobotState(
-    timestamp=0.0, actual_q=ZERO6, actual_qd=ZERO6, actual_tcp_pose=TARGET,
-    target_tcp_pose=TARGET, actual_tcp_acceleration=ZERO6, target_tcp_acceleration=ZERO6,
-    runtime_state=RuntimeState.PLAYING)
+    timestamp=0.0,
+    actual_q=ZERO6,
+    actual_qd=ZERO6,
+    actual_tcp_pose=TARGET,
+    target_tcp_pose=TARGET,
+    actual_tcp_acceleration=ZERO6,
+    target_tcp_acceleration=ZERO6,
+    runtime_state=RuntimeState.PLAYING,
+)
 #: When the goal is due, by the controller's clock [s].
 DUE = 2.0
 POINT = Order(
-    points=1, duration=DUE, due=DUE, T_base_frame=IDENTITY, reference=ReferencePath(
+    points=1,
+    duration=DUE,
+    due=DUE,
+    T_base_frame=IDENTITY,
+    reference=ReferencePath(
         poses=np.array([[0.4, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0], TARGET.row()]),
-        point=np.zeros(2, dtype=np.int32), time=np.array([0.0, DUE])))
+        point=np.zeros(2, dtype=np.int32),
+        time=np.array([0.0, DUE]),
+    ),
+)
 LIMIT = 0.01
 ONE = (LIMIT, -1.0, -1.0)
 MOVED = (0.02, 0.0, 0.0)
 #: What is still wrong when the program has arrived, and the tolerance that sees it.
 WRONG = [
     ('position x', {'actual_tcp_pose': Pose((0.62, 0.0, 0.2))}, {'position': ONE}),
-    ('orientation x', {'actual_tcp_pose': Pose(
-        TARGET.position, quaternion_from_rotation_vector(MOVED))}, {'orientation': ONE}),
+    (
+        'orientation x',
+        {'actual_tcp_pose': Pose(TARGET.position, quaternion_from_rotation_vector(MOVED))},
+        {'orientation': ONE},
+    ),
     ('linear velocity x', {'actual_tcp_twist': MOVED + (0.0,) * 3}, {'twist': ONE + (-1.0,) * 3}),
-    ('angular velocity x', {'actual_tcp_twist': (0.0,) * 3 + MOVED},
-     {'twist': (-1.0,) * 3 + ONE}),
-    ('linear acceleration x', {'actual_tcp_acceleration': MOVED + (0.0,) * 3},
-     {'acceleration': ONE + (-1.0,) * 3}),
-    ('angular acceleration x', {'actual_tcp_acceleration': (0.0,) * 3 + MOVED},
-     {'acceleration': (-1.0,) * 3 + ONE})]
+    ('angular velocity x', {'actual_tcp_twist': (0.0,) * 3 + MOVED}, {'twist': (-1.0,) * 3 + ONE}),
+    (
+        'linear acceleration x',
+        {'actual_tcp_acceleration': MOVED + (0.0,) * 3},
+        {'acceleration': ONE + (-1.0,) * 3},
+    ),
+    (
+        'angular acceleration x',
+        {'actual_tcp_acceleration': (0.0,) * 3 + MOVED},
+        {'acceleration': (-1.0,) * 3 + ONE},
+    ),
+]
 
 
 def arrived(late=0.0, **order):
@@ -65,7 +87,8 @@ def outcome(commands):
 
 @pytest.mark.parametrize(('text', 'state', 'tolerance'), WRONG, ids=[row[0] for row in WRONG])
 def test_what_is_not_in_its_tolerance_in_time_is_named_and_what_has_none_is_not(
-        text, state, tolerance):
+    text, state, tolerance
+):
     packet = StateReceived(state=replace(AT_REST, **state))
     machine, _ = arrived(goal_tolerance=Tolerance(**tolerance), goal_time_tolerance=0.5)
     assert outcome(machine.step(packet, DUE + 0.499)) is None
@@ -78,8 +101,11 @@ def test_what_is_not_in_its_tolerance_in_time_is_named_and_what_has_none_is_not(
         assert outcome(machine.step(packet, DUE + 0.1)).succeeded
 
 
-@pytest.mark.parametrize(('tolerance', 'patience'), [(0.5, 0.5), (0.0, 1.0), (-1.0, inf)],
-                         ids=['given', 'zero is a second', 'negative is without end'])
+@pytest.mark.parametrize(
+    ('tolerance', 'patience'),
+    [(0.5, 0.5), (0.0, 1.0), (-1.0, inf)],
+    ids=['given', 'zero is a second', 'negative is without end'],
+)
 def test_the_arm_may_settle_for_the_time_tolerance(tolerance, patience):
     moves = StateReceived(state=replace(AT_REST, actual_qd=(0.1,) + (0.0,) * 5))
     machine, _ = arrived(goal_time_tolerance=tolerance)
@@ -93,9 +119,16 @@ def test_the_arm_may_settle_for_the_time_tolerance(tolerance, patience):
         assert outcome(machine.step(StateReceived(state=AT_REST), last)).succeeded
 
 
-@pytest.mark.parametrize(('tolerance', 'late', 'fails'), [
-    (0.5, 0.499, False), (0.5, 0.501, True), (0.0, 0.999, False), (0.0, 1.001, True),
-    (-1.0, 1.5, False)])
+@pytest.mark.parametrize(
+    ('tolerance', 'late', 'fails'),
+    [
+        (0.5, 0.499, False),
+        (0.5, 0.501, True),
+        (0.0, 0.999, False),
+        (0.0, 1.001, True),
+        (-1.0, 1.5, False),
+    ],
+)
 def test_a_goal_is_late_by_more_than_its_time_tolerance(tolerance, late, fails):
     machine, commands = arrived(late, goal_time_tolerance=tolerance)
     if fails:

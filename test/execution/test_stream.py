@@ -35,27 +35,46 @@ def order(first, count, **fields):
     k = np.arange(first - 1, first + count)
     poses = np.zeros((count + 1, 7))
     poses[:, 0], poses[:, 6] = SPEED * STEP * k, 1.0
-    return Order(**{
-        'points': count, 'duration': STEP * (first + count - 1), 'open_end': True, 'ending': 1,
-        'reference': ReferencePath(poses=poses, point=np.maximum(k - 1, first - 1).astype(
-            np.int32), time=STEP * k),
-        'waypoint': np.arange(first - 1, first - 1 + count, dtype=np.int32)} | fields)
+    return Order(
+        **{
+            'points': count,
+            'duration': STEP * (first + count - 1),
+            'open_end': True,
+            'ending': 1,
+            'reference': ReferencePath(
+                poses=poses, point=np.maximum(k - 1, first - 1).astype(np.int32), time=STEP * k
+            ),
+            'waypoint': np.arange(first - 1, first - 1 + count, dtype=np.int32),
+        }
+        | fields
+    )
 
 
 def packet(time, begun=0, moves=True, T_flange_tcp=IDENTITY):
     """The robot is where the plan has it at a time."""
     pose, v = Pose((SPEED * time, 0.0, 0.0)), SPEED if moves else 0.0
-    return StateReceived(state=RobotState(
-        timestamp=time, actual_q=(time,) * 6, target_q=(time,) * 6, actual_qd=(v,) * 6,
-        actual_tcp_pose=pose, target_tcp_pose=pose, target_tcp_twist=(v, 0, 0, 0, 0, 0),
-        points_begun=begun, runtime_state=RuntimeState.PLAYING, T_flange_tcp=T_flange_tcp))
+    return StateReceived(
+        state=RobotState(
+            timestamp=time,
+            actual_q=(time,) * 6,
+            target_q=(time,) * 6,
+            actual_qd=(v,) * 6,
+            actual_tcp_pose=pose,
+            target_tcp_pose=pose,
+            target_tcp_twist=(v, 0, 0, 0, 0, 0),
+            points_begun=begun,
+            runtime_state=RuntimeState.PLAYING,
+            T_flange_tcp=T_flange_tcp,
+        )
+    )
 
 
 def run(machine, begin, end):
     """Move the arm from time to time [s]; return the commands."""
     times = np.arange(round(begin / 0.02), round(end / 0.02) + 1) * 0.02
-    return [c for t in times.tolist()
-            for c in machine.step(packet(t, int(t / STEP + 1e-9) + 1), t)]
+    return [
+        c for t in times.tolist() for c in machine.step(packet(t, int(t / STEP + 1e-9) + 1), t)
+    ]
 
 
 def sent(commands):
@@ -108,7 +127,8 @@ def test_points_for_a_motion_that_was_closed_have_to_begin_at_rest():
     assert answer.refusal == 'The motion was closed before these points came.'
     later = replace(order(11, 5), reference=order(11, 5).reference)
     assert machine.step(Extension(number=2, behind=10, order=later), 0.74) == [
-        AnswerExtension(number=2)], 'they wait until the arm is at rest'
+        AnswerExtension(number=2)
+    ], 'they wait until the arm is at rest'
     run(machine, 0.76, 0.98)
     machine.step(packet(1.0, 10, moves=False), 1.0)
     commands = machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 1.01)
@@ -138,8 +158,14 @@ def test_the_time_at_rest_makes_nothing_late():
     for k in range(100):
         machine.step(rest_at(1.0 + 0.01 * k, 1.0, 10), 1.0 + 0.01 * k)
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
-    machine.step(Extension(number=1, behind=10, order=order(
-        11, 5, open_end=False, ending=0, due=1.5, goal_time_tolerance=0.2)), 2.0)
+    machine.step(
+        Extension(
+            number=1,
+            behind=10,
+            order=order(11, 5, open_end=False, ending=0, due=1.5, goal_time_tolerance=0.2),
+        ),
+        2.0,
+    )
     machine.step(rest_at(2.02, 1.0, 10), 2.02)
     for k in range(1, 26):
         machine.step(rest_at(2.02 + 0.02 * k, 1.0 + 0.02 * k, 1 + k // 5), 2.02 + 0.02 * k)
@@ -151,8 +177,7 @@ def test_the_time_at_rest_makes_nothing_late():
 
 def rest_at(time, place, begun):
     """The robot is at rest where the plan has it at another time."""
-    return StateReceived(state=replace(
-        packet(place, begun, moves=False).state, timestamp=time))
+    return StateReceived(state=replace(packet(place, begun, moves=False).state, timestamp=time))
 
 
 def test_the_word_that_they_are_the_last_sends_the_ending_with_the_others():
@@ -176,8 +201,9 @@ def test_points_may_come_before_the_tcp_of_the_goal_is_set():
     machine = StreamMachine(order(1, 5, T_flange_tcp=NOZZLE))
     (lend,) = machine.start(packet(0.0, moves=False).state)
     assert isinstance(lend, LendTcp)
-    assert machine.step(Extension(number=1, behind=4, order=order(5, 10, T_flange_tcp=NOZZLE)),
-                        0.01) == [AnswerExtension(number=1)]
+    assert machine.step(
+        Extension(number=1, behind=4, order=order(5, 10, T_flange_tcp=NOZZLE)), 0.01
+    ) == [AnswerExtension(number=1)]
     commands = machine.step(packet(0.0, moves=False, T_flange_tcp=NOZZLE), 0.02)
     assert machine.state is State.MOVING
     assert sent(commands)[0][0] == 0
@@ -205,5 +231,6 @@ def test_records_keep_their_numbers_when_earlier_ones_are_forgotten():
         assert forgetful.end(k) == whole.end(k)
         assert forgetful.before(k - 1) == whole.before(k - 1)
     assert [forgetful.running(k) for k in range(14, 31)] == [
-        whole.running(k) for k in range(14, 31)]
+        whole.running(k) for k in range(14, 31)
+    ]
     assert forgetful.total == whole.total

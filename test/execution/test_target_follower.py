@@ -21,14 +21,21 @@ from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vecto
 
 UR5E = robot_model('ur5e')
 NOMINAL = Arm(UR5E)
-CALIBRATED = Arm(UR5E, Geometry(
-    a=tuple(v + 4e-4 for v in UR5E.geometry.a), d=tuple(v - 3e-4 for v in UR5E.geometry.d),
-    alpha=tuple(v + 1e-3 for v in UR5E.geometry.alpha), theta=(1e-3, -8e-4, 5e-4, 0.0, 1e-3, 0.0)))
+CALIBRATED = Arm(
+    UR5E,
+    Geometry(
+        a=tuple(v + 4e-4 for v in UR5E.geometry.a),
+        d=tuple(v - 3e-4 for v in UR5E.geometry.d),
+        alpha=tuple(v + 1e-3 for v in UR5E.geometry.alpha),
+        theta=(1e-3, -8e-4, 5e-4, 0.0, 1e-3, 0.0),
+    ),
+)
 HOME = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
 TCP = Pose((0.01, 0.0, 0.12), quaternion_from_rotation_vector((0.0, 0.3, 0.0)))
 DT = 0.008
-LIMITS = FollowLimits(linear_velocity=0.25, linear_acceleration=1.0, angular_velocity=1.0,
-                      angular_acceleration=4.0)
+LIMITS = FollowLimits(
+    linear_velocity=0.25, linear_acceleration=1.0, angular_velocity=1.0, angular_acceleration=4.0
+)
 
 
 class Flight:
@@ -44,7 +51,8 @@ class Flight:
         """Where the tool began, moved along the axes of base, and turned about its own."""
         px, py, pz = self.home.position
         return Pose((px + x, py + y, pz + z), self.home.quaternion) @ Pose(
-            quaternion=quaternion_from_rotation_vector(turn))
+            quaternion=quaternion_from_rotation_vector(turn)
+        )
 
     def run(self, seconds):
         for _ in range(round(seconds / self.dt)):
@@ -62,15 +70,16 @@ class Flight:
         """Speeds and accelerations of the tool are within the bounds, and are those told."""
         limits, dt = self.follower.limits, self.dt
         for speeds, most, acceleration in (
-                (self.linear, limits.linear_velocity, limits.linear_acceleration),
-                (self.angular, limits.angular_velocity, limits.angular_acceleration)):
+            (self.linear, limits.linear_velocity, limits.linear_acceleration),
+            (self.angular, limits.angular_velocity, limits.angular_acceleration),
+        ):
             v = np.array(speeds)
             assert np.linalg.norm(v, axis=1).max() <= most * (1.0 + 1e-9)
             assert np.linalg.norm(np.diff(v, axis=0), axis=1).max() <= acceleration * dt * (
-                1.0 + 1e-6)
+                1.0 + 1e-6
+            )
         places = np.array([pose.position for pose in self.poses])
-        assert np.diff(places, axis=0) / dt == pytest.approx(
-            np.array(self.linear[1:]), abs=1e-9)
+        assert np.diff(places, axis=0) / dt == pytest.approx(np.array(self.linear[1:]), abs=1e-9)
 
 
 @pytest.mark.parametrize('arm', [NOMINAL, CALIBRATED], ids=['nominal', 'calibrated'])
@@ -157,11 +166,13 @@ def test_without_a_target_it_brakes_and_a_new_one_continues():
     where = follower.T_base_tcp
     assert flight.go(target, 1.5).arrived
     assert where.distance_to(flight.home) == pytest.approx(
-        2.0 * 0.5 * 0.25**2 / 1.0 + 0.25 * 0.05, abs=0.003)
+        2.0 * 0.5 * 0.25**2 / 1.0 + 0.25 * 0.05, abs=0.003
+    )
     flight.check_bounds()
 
 
 # --- Where it must not go ---------------------------------------------------------------------
+
 
 def rooms(q):
     """How far joints are from everything that stops them, computed the other way round."""
@@ -169,8 +180,12 @@ def rooms(q):
     bodies = Bodies(NOMINAL, TCP, 0.05)
     moving = [k for k, link in enumerate(bodies.links) if link != Link.BASE]
     yield 'limit', min(np.minimum(q - lows, highs - q))
-    for name, value, margin in zip(('wrist', 'elbow', 'shoulder'), singularity_distances(
-            NOMINAL, tuple(q)), LIMITS.singularity_margins, strict=True):
+    for name, value, margin in zip(
+        ('wrist', 'elbow', 'shoulder'),
+        singularity_distances(NOMINAL, tuple(q)),
+        LIMITS.singularity_margins,
+        strict=True,
+    ):
         yield name, value - margin
     height = bodies.heights(np.array([q]), np.array([TABLE.normal]))[0, 0, moving].min()
     yield 'table', height - np.dot(TABLE.normal, TABLE.point) - TABLE.margin
@@ -191,17 +206,30 @@ def turned_about_joint(flight, joint, angle):
 #: Limits, joints at the start, where to (from the flight), a word of the sentence.
 STOPS = {
     'elbow': (LIMITS, HOME, lambda flight: flight.beside(x=-1.0), 'reach|elbow'),
-    'wrist': (replace(LIMITS, singularity_margins=(0.05, 0.0, 0.0)),
-              (0.0, -1.57, 1.57, -1.57, -0.4, 0.0),
-              lambda flight: turned_about_joint(flight, 4, 0.8), 'singularity_margin_wrist'),
-    'table': (replace(LIMITS, surroundings=Surroundings(planes=(TABLE,), tool_radius=0.05)), HOME,
-              lambda flight: flight.beside(z=-0.5),
-              'workspace plane "table", 0.0100 m is asked for'),
-    'itself': (replace(ANYWHERE, surroundings=Surroundings(min_clearance=0.02, tool_radius=0.05)),
-               HOME, lambda flight: flight.beside(x=0.42, z=-0.2),
-               'would come within .* of each other'),
-    'limit': (ANYWHERE, (*HOME[:5], 2.0 * pi - 0.4),
-              lambda flight: turned_about_joint(flight, 5, 0.8), 'wrist_3_joint would be at'),
+    'wrist': (
+        replace(LIMITS, singularity_margins=(0.05, 0.0, 0.0)),
+        (0.0, -1.57, 1.57, -1.57, -0.4, 0.0),
+        lambda flight: turned_about_joint(flight, 4, 0.8),
+        'singularity_margin_wrist',
+    ),
+    'table': (
+        replace(LIMITS, surroundings=Surroundings(planes=(TABLE,), tool_radius=0.05)),
+        HOME,
+        lambda flight: flight.beside(z=-0.5),
+        'workspace plane "table", 0.0100 m is asked for',
+    ),
+    'itself': (
+        replace(ANYWHERE, surroundings=Surroundings(min_clearance=0.02, tool_radius=0.05)),
+        HOME,
+        lambda flight: flight.beside(x=0.42, z=-0.2),
+        'would come within .* of each other',
+    ),
+    'limit': (
+        ANYWHERE,
+        (*HOME[:5], 2.0 * pi - 0.4),
+        lambda flight: turned_about_joint(flight, 5, 0.8),
+        'wrist_3_joint would be at',
+    ),
 }
 
 
@@ -259,8 +287,9 @@ def test_an_arm_that_begins_too_near_may_leave():
     assert flight.go(turned_about_joint(flight, 4, -0.1), 0.5).arrived
 
 
-@pytest.mark.parametrize('field', ['linear_velocity', 'linear_acceleration', 'angular_velocity',
-                                   'angular_acceleration'])
+@pytest.mark.parametrize(
+    'field', ['linear_velocity', 'linear_acceleration', 'angular_velocity', 'angular_acceleration']
+)
 def test_bounds_are_positive(field):
     with pytest.raises(ValueError, match=field):
         replace(LIMITS, **{field: 0.0})

@@ -70,10 +70,14 @@ def test_tries_become_rare_until_something_changes(loan):
     assert loan.is_due(robot(NOZZLE), 100.0)
 
 
-@pytest.mark.parametrize(('other', 'expected'), [
-    (Pose((0.0, 5e-7, 0.2 - 5e-7)), True),
-    (Pose((0.0, 0.0, 0.2), quaternion_from_rotation_vector((5e-7, 5e-7, 5e-7))), True),
-    (Pose((0.0, 3e-6, 0.2)), False),
-    (Pose((0.0, 0.0, 0.2), quaternion_from_rotation_vector((3e-6, 0.0, 0.0))), False)])
+@pytest.mark.parametrize(
+    ('other', 'expected'),
+    [
+        (Pose((0.0, 5e-7, 0.2 - 5e-7)), True),
+        (Pose((0.0, 0.0, 0.2), quaternion_from_rotation_vector((5e-7, 5e-7, 5e-7))), True),
+        (Pose((0.0, 3e-6, 0.2)), False),
+        (Pose((0.0, 0.0, 0.2), quaternion_from_rotation_vector((3e-6, 0.0, 0.0))), False),
+    ],
+)
 def test_what_the_wire_rounds_is_the_same_tcp(other, expected):
     assert same_tcp(NOZZLE, other) is expected

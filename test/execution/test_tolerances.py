@@ -23,25 +23,39 @@ WANTED = Pose((0.4, -0.2, 0.3), DOWN)
 TWIST = (0.1, -0.2, 0.05, 0.3, 0.2, -0.4)
 RATE = (1.0, -2.0, 0.5, 3.0, 2.0, -4.0)
 ON_TIME = RobotState(
-    timestamp=0.0, actual_q=ZERO6, actual_tcp_pose=WANTED, target_tcp_pose=WANTED,
-    actual_tcp_twist=TWIST, target_tcp_twist=TWIST, actual_tcp_acceleration=RATE,
-    target_tcp_acceleration=RATE)
+    timestamp=0.0,
+    actual_q=ZERO6,
+    actual_tcp_pose=WANTED,
+    target_tcp_pose=WANTED,
+    actual_tcp_twist=TWIST,
+    target_tcp_twist=TWIST,
+    actual_tcp_acceleration=RATE,
+    target_tcp_acceleration=RATE,
+)
 #: A frame in which all axes of base mean something else.
 TURNED = Pose((1.0, 2.0, 3.0), quaternion_from_rotation_vector((0.3, -1.1, 0.7)))
 #: Field of the tolerance, and where its three axes begin there.
 FIELDS = {
-    'position': ('position', 0), 'orientation': ('orientation', 0),
-    'linear velocity': ('twist', 0), 'angular velocity': ('twist', 3),
-    'linear acceleration': ('acceleration', 0), 'angular acceleration': ('acceleration', 3)}
+    'position': ('position', 0),
+    'orientation': ('orientation', 0),
+    'linear velocity': ('twist', 0),
+    'angular velocity': ('twist', 3),
+    'linear acceleration': ('acceleration', 0),
+    'angular acceleration': ('acceleration', 3),
+}
 AXES = [(name, axis) for name in FIELDS for axis in range(3)]
 
 
 def limit(name, values, others=-1.0):
     """A tolerance of one quantity; of all others it is `others`."""
-    limits = {'position': [others] * 3, 'orientation': [others] * 3, 'twist': [others] * 6,
-              'acceleration': [others] * 6}
+    limits = {
+        'position': [others] * 3,
+        'orientation': [others] * 3,
+        'twist': [others] * 6,
+        'acceleration': [others] * 6,
+    }
     field, first = FIELDS[name]
-    limits[field][first:first + 3] = values
+    limits[field][first : first + 3] = values
     return Tolerance(**{key: tuple(value) for key, value in limits.items()})
 
 
@@ -78,12 +92,17 @@ def test_each_axis_trips_alone_and_is_named(name, axis, sign, frame):
         limits[other_axis] = 0.002
         clause = Watch(limit(other, limits), frame).violation(WANTED, packet)
         if (other, other_axis) == (name, axis):
-            assert clause == (f'{name} {"xyz"[axis]} is off by 0.002100 {unit}, '
-                              f'the tolerance is 0.002000 {unit}')
+            assert clause == (
+                f'{name} {"xyz"[axis]} is off by 0.002100 {unit}, the tolerance is 0.002000 {unit}'
+            )
         else:
             assert clause is None
-    all_axes = Tolerance(position=(0.002,) * 3, orientation=(0.002,) * 3, twist=(0.002,) * 6,
-                         acceleration=(0.002,) * 6)
+    all_axes = Tolerance(
+        position=(0.002,) * 3,
+        orientation=(0.002,) * 3,
+        twist=(0.002,) * 6,
+        acceleration=(0.002,) * 6,
+    )
     clause = Watch(all_axes, frame).violation(WANTED, packet)
     assert clause.startswith(f'{name} {"xyz"[axis]} is off')
 
@@ -93,8 +112,10 @@ def test_each_axis_trips_alone_and_is_named(name, axis, sign, frame):
 def test_zero_negative_and_larger_limits_let_it_pass(name, axis, bound):
     limits = [0.001] * 3  # so that the quantity is watched
     limits[axis] = bound
-    assert Watch(limit(name, limits, 0.0), IDENTITY).violation(
-        WANTED, disturbed(name, axis, 0.0021)) is None
+    assert (
+        Watch(limit(name, limits, 0.0), IDENTITY).violation(WANTED, disturbed(name, axis, 0.0021))
+        is None
+    )
 
 
 def test_a_tolerance_without_a_limit_watches_nothing():
@@ -115,7 +136,8 @@ def test_what_is_no_number_is_outside():
     assert 'linear acceleration x is off by nan' in watched.violation(WANTED, silent)
     broken = replace(ON_TIME, actual_tcp_pose=Pose((nan, 0.0, 0.0), DOWN))
     assert 'is off by nan m' in Watch(limit('position', [1.0] * 3), IDENTITY).violation(
-        WANTED, broken)
+        WANTED, broken
+    )
 
 
 def test_opposite_signs_of_a_quaternion_are_no_error():

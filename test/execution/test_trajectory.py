@@ -50,18 +50,30 @@ def order(points=1, **changes):
     positions = np.linspace(START, END, points + 1)
     poses = np.hstack([positions, np.tile([0.0, 0.0, 0.0, 1.0], (points + 1, 1))])
     reference = ReferencePath(
-        poses=poses, point=np.maximum(np.arange(points + 1) - 1, 0).astype(np.int32),
-        time=np.linspace(0.0, 2.0, points + 1))
+        poses=poses,
+        point=np.maximum(np.arange(points + 1) - 1, 0).astype(np.int32),
+        time=np.linspace(0.0, 2.0, points + 1),
+    )
     return Order(points=points, reference=reference, duration=2.0, **changes)
 
 
 def robot(part=0.0, timestamp=0.0, qd=MOVING, **changes):
     position = tuple(a + part * (b - a) for a, b in zip(START, END, strict=True))
-    return StateReceived(state=RobotState(
-        timestamp=timestamp, actual_q=REST, actual_qd=qd, **{
-            'actual_tcp_pose': Pose(position), 'target_tcp_pose': Pose(position),
-            'actual_tcp_twist': MOVING, 'target_tcp_twist': MOVING,
-            'runtime_state': RuntimeState.PLAYING} | changes))
+    return StateReceived(
+        state=RobotState(
+            timestamp=timestamp,
+            actual_q=REST,
+            actual_qd=qd,
+            **{
+                'actual_tcp_pose': Pose(position),
+                'target_tcp_pose': Pose(position),
+                'actual_tcp_twist': MOVING,
+                'target_tcp_twist': MOVING,
+                'runtime_state': RuntimeState.PLAYING,
+            }
+            | changes,
+        )
+    )
 
 
 def started(**changes):
@@ -79,8 +91,9 @@ def with_tcp(T_flange_tcp, part=0.0, qd=REST, **changes):
 
 def lent(**changes):
     """Return a machine whose goal needs another TCP, in ARMING, and its first commands."""
-    machine = TrajectoryMachine(order(T_flange_active=OWN, T_flange_tcp=NOZZLE, **changes),
-                                max_plan_deviation=(0.0, 0.0))
+    machine = TrajectoryMachine(
+        order(T_flange_active=OWN, T_flange_tcp=NOZZLE, **changes), max_plan_deviation=(0.0, 0.0)
+    )
     return machine, machine.start(with_tcp(OWN).state)
 
 
@@ -129,15 +142,20 @@ def outcome(commands):
 
 def test_a_motion_starts_with_start_and_its_points():
     commands = TrajectoryMachine(order(points=3)).start(robot().state)
-    assert commands == [SendControl(action=TrajectoryAction.START, count=3),
-                        SendPoints(first=0, end=3)]
+    assert commands == [
+        SendControl(action=TrajectoryAction.START, count=3),
+        SendPoints(first=0, end=3),
+    ]
 
 
 def test_a_motion_that_arrives_succeeds():
     machine = started()
     machine.step(robot(1.0, timestamp=2.0), 2.0)
-    assert not [c for c in machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
-                if isinstance(c, Finish)]
+    assert not [
+        c
+        for c in machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
+        if isinstance(c, Finish)
+    ]
     end = outcome(machine.step(robot(1.0, timestamp=2.01, qd=REST), 2.01))
     assert end.code is ErrorCode.SUCCESSFUL
     assert '2.000 s' in end.text
@@ -150,8 +168,9 @@ def test_points_beyond_the_window_wait_for_the_robot():
     commands = machine.step(robot(0.0, points_begun=10), 0.1)
     assert SendPoints(first=500, end=510) in commands
     machine.step(CancelRequested(), 0.2)
-    assert not [c for c in machine.step(robot(0.0, points_begun=50), 0.3)
-                if isinstance(c, SendPoints)]
+    assert not [
+        c for c in machine.step(robot(0.0, points_begun=50), 0.3) if isinstance(c, SendPoints)
+    ]
 
 
 def test_the_count_of_the_last_trajectory_is_not_taken_for_this_one_s():
@@ -159,8 +178,11 @@ def test_the_count_of_the_last_trajectory_is_not_taken_for_this_one_s():
     machine.start(robot(points_begun=4).state)
 
     def place(count, part):
-        (report,) = (c for c in machine.step(robot(part, points_begun=count), next(times))
-                     if isinstance(c, Report))
+        (report,) = (
+            c
+            for c in machine.step(robot(part, points_begun=count), next(times))
+            if isinstance(c, Report)
+        )
         return report.progress.waypoint
 
     times = iter(range(1, 9))
@@ -181,9 +203,13 @@ def test_cancel_brakes_waits_for_the_answer_and_for_rest():
     assert outcome(machine.step(robot(0.3, qd=REST), 1.3)).code is ErrorCode.CANCELLED
 
 
-@pytest.mark.parametrize(('first', 'second', 'code'), [
-    (PreemptRequested(by='goal 7'), CancelRequested(), ErrorCode.PREEMPTED),
-    (CancelRequested(), PreemptRequested(), ErrorCode.CANCELLED)])
+@pytest.mark.parametrize(
+    ('first', 'second', 'code'),
+    [
+        (PreemptRequested(by='goal 7'), CancelRequested(), ErrorCode.PREEMPTED),
+        (CancelRequested(), PreemptRequested(), ErrorCode.CANCELLED),
+    ],
+)
 def test_of_a_cancel_and_a_preemption_the_first_counts(first, second, code):
     machine = started()
     cancel = SendControl(action=TrajectoryAction.CANCEL, count=1)
@@ -251,20 +277,30 @@ def test_leaving_the_path_stops_the_arm_and_names_point_axis_value_and_limit():
     machine = started(path_tolerance=Tolerance(position=(0.0, 0.001, 0.0)))
     off = robot(0.5)
     pose = off.state.actual_tcp_pose
-    off = StateReceived(state=replace(off.state, actual_tcp_pose=Pose(
-        (pose.position[0], -0.0015, pose.position[2]))))
+    off = StateReceived(
+        state=replace(
+            off.state, actual_tcp_pose=Pose((pose.position[0], -0.0015, pose.position[2]))
+        )
+    )
     assert any(isinstance(c, SendControl) for c in machine.step(off, 1.0))
     machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 1.1)
     end = outcome(machine.step(robot(0.5, qd=REST), 1.2))
     assert end.code is ErrorCode.PATH_TOLERANCE_VIOLATED
-    assert end.text == ('On the way to point 0 position y is off by 0.001500 m, '
-                        'the tolerance is 0.001000 m.')
+    assert end.text == (
+        'On the way to point 0 position y is off by 0.001500 m, the tolerance is 0.001000 m.'
+    )
 
 
-@pytest.mark.parametrize(('pose', 'text'), [
-    (Pose((0.41, 0.0021, 0.2)), '0.002100 m, max_plan_deviation is 0.002000 m'),
-    (Pose((0.41, 0.0, 0.2), quaternion_from_rotation_vector((0.0, 0.021, 0.0))),
-     '0.021000 rad, max_plan_deviation_angle is 0.020000 rad')])
+@pytest.mark.parametrize(
+    ('pose', 'text'),
+    [
+        (Pose((0.41, 0.0021, 0.2)), '0.002100 m, max_plan_deviation is 0.002000 m'),
+        (
+            Pose((0.41, 0.0, 0.2), quaternion_from_rotation_vector((0.0, 0.021, 0.0))),
+            '0.021000 rad, max_plan_deviation_angle is 0.020000 rad',
+        ),
+    ],
+)
 def test_a_controller_that_makes_another_motion_is_stopped_in_the_same_step(pose, text):
     machine = TrajectoryMachine(order())
     machine.start(robot().state)
@@ -290,8 +326,11 @@ def test_a_controller_within_the_bounds_or_without_any_goes_on(limits):
 def test_nothing_is_watched_before_the_program_has_begun():
     """The TCP may still be another one; it is changed before the first point."""
     machine = TrajectoryMachine(order(path_tolerance=Tolerance(position=(0.001,) * 3)))
-    elsewhere = {'actual_tcp_pose': Pose((0.4, 0, 0)), 'target_tcp_pose': Pose((0.4, 0, 0)),
-                 'target_tcp_twist': REST}
+    elsewhere = {
+        'actual_tcp_pose': Pose((0.4, 0, 0)),
+        'target_tcp_pose': Pose((0.4, 0, 0)),
+        'target_tcp_twist': REST,
+    }
     machine.start(robot(**elsewhere, points_begun=7).state)
     machine.step(robot(**elsewhere, points_begun=7), 0.0)
     machine.step(robot(**elsewhere, points_begun=0), 0.1)
@@ -301,8 +340,9 @@ def test_nothing_is_watched_before_the_program_has_begun():
 
 
 def test_an_arm_that_does_not_settle_violates_the_goal_tolerance():
-    machine = started(goal_tolerance=Tolerance(position=(0.001, 0.0, 0.0)),
-                      goal_time_tolerance=0.5)
+    machine = started(
+        goal_tolerance=Tolerance(position=(0.001, 0.0, 0.0)), goal_time_tolerance=0.5
+    )
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
     assert machine.step(robot(0.95, timestamp=2.4, qd=REST), 2.4)[-1:] != []
     end = outcome(machine.step(robot(0.95, timestamp=2.5, qd=REST), 2.5))
@@ -332,15 +372,22 @@ def test_a_paused_robot_is_not_late_whatever_it_says_of_its_speed():
     machine = started(due=2.0, goal_time_tolerance=0.1)
     for i in range(1, 41):
         paused = 10 < i <= 30
-        machine.step(robot(0.5 if paused else i / 40, timestamp=0.1 * i, runtime_state=(
-            RuntimeState.PAUSED if paused else RuntimeState.PLAYING)), 0.1 * i)
+        machine.step(
+            robot(
+                0.5 if paused else i / 40,
+                timestamp=0.1 * i,
+                runtime_state=(RuntimeState.PAUSED if paused else RuntimeState.PLAYING),
+            ),
+            0.1 * i,
+        )
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 4.0)
     assert outcome(machine.step(robot(1.0, timestamp=4.1, qd=REST), 4.1)).succeeded
 
 
 def test_an_arm_that_settles_in_time_succeeds():
-    machine = started(goal_tolerance=Tolerance(position=(0.001, 0.0, 0.0)),
-                      goal_time_tolerance=0.5)
+    machine = started(
+        goal_tolerance=Tolerance(position=(0.001, 0.0, 0.0)), goal_time_tolerance=0.5
+    )
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
     machine.step(robot(0.95, timestamp=2.3, qd=REST), 2.3)
     machine.step(robot(0.999, timestamp=2.4), 2.4)
@@ -349,8 +396,9 @@ def test_an_arm_that_settles_in_time_succeeds():
 
 
 def test_an_arm_may_settle_without_end():
-    machine = started(goal_tolerance=Tolerance(position=(0.001, 0.0, 0.0)),
-                      goal_time_tolerance=-1.0)
+    machine = started(
+        goal_tolerance=Tolerance(position=(0.001, 0.0, 0.0)), goal_time_tolerance=-1.0
+    )
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
     machine.step(robot(0.95, timestamp=900.0, qd=REST), 900.0)
     assert machine.state is State.SETTLING
@@ -359,9 +407,12 @@ def test_an_arm_may_settle_without_end():
 def test_progress_is_reported_at_its_rate():
     machine = TrajectoryMachine(order(), feedback_period=0.1)
     machine.start(robot().state)
-    reports = [c for i in range(100)
-               for c in machine.step(robot(i / 200, timestamp=0.01 * i), 0.01 * i)
-               if isinstance(c, Report)]
+    reports = [
+        c
+        for i in range(100)
+        for c in machine.step(robot(i / 200, timestamp=0.01 * i), 0.01 * i)
+        if isinstance(c, Report)
+    ]
     assert len(reports) == 10
     fractions = [r.progress.fraction for r in reports]
     assert fractions == sorted(fractions)
@@ -370,20 +421,34 @@ def test_progress_is_reported_at_its_rate():
 @pytest.mark.parametrize('state', list(State))
 @pytest.mark.parametrize('signal', list(Signal))
 def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
-    own = {State.SETTLING: {Signal.SETTLED, Signal.LATE, Signal.DEVIATION},
-           State.STOPPING: {Signal.LATE, Signal.UNANSWERED},
-           State.HALTING: {Signal.AT_REST, Signal.LATE},
-           State.ARMING: {Signal.ARMED, Signal.LATE},
-           State.RESTORING: {Signal.RESTORED, Signal.LATE},
-           State.MOVING: {Signal.VIOLATION, Signal.DEVIATION, Signal.STALLED, Signal.STARVING},
-           State.CLOSING: {Signal.VIOLATION, Signal.DEVIATION, Signal.STALLED},
-           State.WAITING: {Signal.EXTENDED, Signal.LAST, Signal.DEVIATION, Signal.LATE},
-           State.ENDING: {Signal.LATE}}
-    judged = {Signal.ARMED, Signal.RESTORED, Signal.SETTLED, Signal.AT_REST, Signal.LATE,
-              Signal.UNANSWERED, Signal.VIOLATION, Signal.DEVIATION, Signal.STALLED,
-              Signal.STARVING, Signal.EXTENDED, Signal.LAST}
+    own = {
+        State.SETTLING: {Signal.SETTLED, Signal.LATE, Signal.DEVIATION},
+        State.STOPPING: {Signal.LATE, Signal.UNANSWERED},
+        State.HALTING: {Signal.AT_REST, Signal.LATE},
+        State.ARMING: {Signal.ARMED, Signal.LATE},
+        State.RESTORING: {Signal.RESTORED, Signal.LATE},
+        State.MOVING: {Signal.VIOLATION, Signal.DEVIATION, Signal.STALLED, Signal.STARVING},
+        State.CLOSING: {Signal.VIOLATION, Signal.DEVIATION, Signal.STALLED},
+        State.WAITING: {Signal.EXTENDED, Signal.LAST, Signal.DEVIATION, Signal.LATE},
+        State.ENDING: {Signal.LATE},
+    }
+    judged = {
+        Signal.ARMED,
+        Signal.RESTORED,
+        Signal.SETTLED,
+        Signal.AT_REST,
+        Signal.LATE,
+        Signal.UNANSWERED,
+        Signal.VIOLATION,
+        Signal.DEVIATION,
+        Signal.STALLED,
+        Signal.STARVING,
+        Signal.EXTENDED,
+        Signal.LAST,
+    }
     possible = state is not State.ENDED and (
-        signal not in judged or signal in own.get(state, set()))
+        signal not in judged or signal in own.get(state, set())
+    )
     assert (signal in TRANSITIONS[state]) == possible
 
 
@@ -391,12 +456,21 @@ def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
 RUNNING = [s for s in State if s not in (State.RESTORING, State.ENDED)]
 
 STOPPED_STATES = [
-    pytest.param({'safety_status': SafetyStatus.PROTECTIVE_STOPPED}, Signal.PROTECTIVE_STOP,
-                 id='protective stop'),
-    pytest.param({'safety_status': SafetyStatus.SAFEGUARD_STOPPED}, Signal.PROTECTIVE_STOP,
-                 id='safeguard stop'),
-    pytest.param({'safety_status': SafetyStatus.EMERGENCY_STOPPED}, Signal.EMERGENCY_STOP,
-                 id='emergency stop'),
+    pytest.param(
+        {'safety_status': SafetyStatus.PROTECTIVE_STOPPED},
+        Signal.PROTECTIVE_STOP,
+        id='protective stop',
+    ),
+    pytest.param(
+        {'safety_status': SafetyStatus.SAFEGUARD_STOPPED},
+        Signal.PROTECTIVE_STOP,
+        id='safeguard stop',
+    ),
+    pytest.param(
+        {'safety_status': SafetyStatus.EMERGENCY_STOPPED},
+        Signal.EMERGENCY_STOP,
+        id='emergency stop',
+    ),
     pytest.param({'robot_mode': RobotMode.POWER_OFF}, Signal.PROGRAM_STOPPED, id='power off'),
 ]
 
@@ -410,8 +484,9 @@ def test_a_robot_that_stops_by_itself_ends_the_goal_in_every_state(state, change
     assert machine.state is State.ENDED
 
 
-@pytest.mark.parametrize(('link', 'code'), [('program', ErrorCode.PROGRAM_STOPPED),
-                                        ('RTDE', ErrorCode.CONNECTION_LOST)])
+@pytest.mark.parametrize(
+    ('link', 'code'), [('program', ErrorCode.PROGRAM_STOPPED), ('RTDE', ErrorCode.CONNECTION_LOST)]
+)
 @pytest.mark.parametrize('state', RUNNING)
 def test_a_lost_link_ends_the_goal_in_every_state_and_says_who_hung_up(state, link, code):
     machine = brought_to(state)
@@ -421,9 +496,14 @@ def test_a_lost_link_ends_the_goal_in_every_state_and_says_who_hung_up(state, li
     assert 'it closed' in end.text or state is State.ENDING
 
 
-@pytest.mark.parametrize('deeper', [
-    LinkLost(link='RTDE', reason='it closed'), robot(0.5, safety_status=SafetyStatus.FAULT),
-    robot(0.5, safety_status=SafetyStatus.EMERGENCY_STOPPED)])
+@pytest.mark.parametrize(
+    'deeper',
+    [
+        LinkLost(link='RTDE', reason='it closed'),
+        robot(0.5, safety_status=SafetyStatus.FAULT),
+        robot(0.5, safety_status=SafetyStatus.EMERGENCY_STOPPED),
+    ],
+)
 def test_what_took_the_program_with_it_is_the_reason_whichever_is_heard_of_first(deeper):
     gone = LinkLost(link='program', reason='it hung up')
     first, then = started(), started()
@@ -438,8 +518,11 @@ def test_what_took_the_program_with_it_is_the_reason_whichever_is_heard_of_first
 def standing(machine, seconds, **changes):
     """Let the arm stand in the middle of the path; return the commands."""
     times = [0.1 * i for i in range(1, round(10.0 * seconds) + 1)]
-    return [command for t in times
-            for command in machine.step(robot(0.5, timestamp=t, qd=REST, **changes), t)]
+    return [
+        command
+        for t in times
+        for command in machine.step(robot(0.5, timestamp=t, qd=REST, **changes), t)
+    ]
 
 
 def test_an_arm_that_stands_for_no_reason_does_not_stand_for_ever():
@@ -448,9 +531,14 @@ def test_an_arm_that_stands_for_no_reason_does_not_stand_for_ever():
     assert any(isinstance(c, StopProgram) for c in commands)
 
 
-@pytest.mark.parametrize('reason', [
-    {'runtime_state': RuntimeState.PAUSED}, {'speed_scaling': 0.0},
-    {'target_speed_fraction': 0.0}])
+@pytest.mark.parametrize(
+    'reason',
+    [
+        {'runtime_state': RuntimeState.PAUSED},
+        {'speed_scaling': 0.0},
+        {'target_speed_fraction': 0.0},
+    ],
+)
 def test_an_arm_that_is_held_may_stand_as_long_as_it_likes(reason):
     machine = started()
     assert not [c for c in standing(machine, 20.0, **reason) if isinstance(c, Finish)]
@@ -462,9 +550,17 @@ def test_a_protective_stop_ends_the_program_so_that_the_motion_cannot_resume():
     assert any(isinstance(c, StopProgram) for c in commands)
 
 
-@pytest.mark.parametrize('event', [
-    CancelRequested(), PreemptRequested(), Tick(), robot(0.5), LinkLost(link='RTDE', reason=''),
-    *(TrajectoryEnded(result=result) for result in TrajectoryResult)])
+@pytest.mark.parametrize(
+    'event',
+    [
+        CancelRequested(),
+        PreemptRequested(),
+        Tick(),
+        robot(0.5),
+        LinkLost(link='RTDE', reason=''),
+        *(TrajectoryEnded(result=result) for result in TrajectoryResult),
+    ],
+)
 def test_nothing_happens_after_the_end(event):
     assert brought_to(State.ENDED).step(event, 9.0) == []
 
@@ -486,9 +582,12 @@ def test_the_tcp_is_set_first_and_nothing_is_sent_before_the_robot_has_it():
     # The same packet may still show the pose of the old TCP.
     elsewhere = Pose((0.4, 0.05, 0.2))
     assert SendPoints(first=0, end=3) not in machine.step(
-        with_tcp(NOZZLE, actual_tcp_pose=elsewhere), 0.03)
+        with_tcp(NOZZLE, actual_tcp_pose=elsewhere), 0.03
+    )
     assert machine.step(with_tcp(NOZZLE), 0.04)[:2] == [
-        SendControl(action=TrajectoryAction.START, count=3), SendPoints(first=0, end=3)]
+        SendControl(action=TrajectoryAction.START, count=3),
+        SendPoints(first=0, end=3),
+    ]
 
 
 def test_a_tcp_within_the_resolution_of_the_wire_has_arrived():
@@ -585,12 +684,19 @@ def test_a_tcp_that_does_not_come_back_is_said_and_left_to_the_owner():
 
 def test_tolerances_and_reports_are_about_the_controlled_frame():
     """The TCP is where it should be, but turned: the frame at the end of the lever is off."""
-    machine = started(T_tcp_controlled=Pose((0.0, 0.0, 0.1)),
-                      path_tolerance=Tolerance(position=(0.001, 0.0, 0.0)))
+    machine = started(
+        T_tcp_controlled=Pose((0.0, 0.0, 0.1)),
+        path_tolerance=Tolerance(position=(0.001, 0.0, 0.0)),
+    )
     turned = Pose((0.5, 0.0, 0.2), quaternion_from_rotation_vector((0.0, 0.02, 0.0)))
-    packet = robot(0.5, timestamp=1.0, actual_tcp_pose=turned, actual_tcp_twist=(
-        0.1, 0.0, 0.0, 0.0, 0.5, 0.0), actual_tcp_acceleration=(0.0,) * 6,
-        target_tcp_acceleration=(0.0, 0.0, 0.0, 0.0, 2.0, 0.0))
+    packet = robot(
+        0.5,
+        timestamp=1.0,
+        actual_tcp_pose=turned,
+        actual_tcp_twist=(0.1, 0.0, 0.0, 0.0, 0.5, 0.0),
+        actual_tcp_acceleration=(0.0,) * 6,
+        target_tcp_acceleration=(0.0, 0.0, 0.0, 0.0, 2.0, 0.0),
+    )
     assert machine.step(packet, 1.0) == [SendControl(action=TrajectoryAction.CANCEL, count=1)]
     (report,) = (c.progress for c in machine.step(packet, 1.002) if isinstance(c, Report))
     assert report.desired_pose.position == pytest.approx((0.5, 0.0, 0.3), abs=1e-3)

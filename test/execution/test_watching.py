@@ -24,10 +24,15 @@ TYPE = SegmentType
 #: Cycles by which the arm lags behind its target.
 LAG = 4
 #: What an arm with that lag keeps; its speeds and accelerations lag too.
-TIGHT = Tolerance(position=(2e-4,) * 3, orientation=(2e-3,) * 3,
-                  twist=(0.05,) * 3 + (0.2,) * 3)
-NAMES = ['position', 'orientation', 'linear velocity', 'angular velocity', 'linear acceleration',
-         'angular acceleration']
+TIGHT = Tolerance(position=(2e-4,) * 3, orientation=(2e-3,) * 3, twist=(0.05,) * 3 + (0.2,) * 3)
+NAMES = [
+    'position',
+    'orientation',
+    'linear velocity',
+    'angular velocity',
+    'linear acceleration',
+    'angular acceleration',
+]
 #: Size of the disturbance, and the limit; along the path a lag explains a part of the first.
 SIZES = {'position': (0.02, 0.005), 'orientation': (0.2, 0.05)}
 
@@ -37,8 +42,12 @@ def lagging():
 
     def disturb(_, state):
         past.append(state)
-        return replace(state, actual_tcp_pose=past[0].actual_tcp_pose,
-                       actual_tcp_twist=past[0].actual_tcp_twist, actual_qd=past[0].actual_qd)
+        return replace(
+            state,
+            actual_tcp_pose=past[0].actual_tcp_pose,
+            actual_tcp_twist=past[0].actual_tcp_twist,
+            actual_qd=past[0].actual_qd,
+        )
 
     return disturb
 
@@ -61,27 +70,45 @@ def slider(seed):
 
 def sent(answers):
     """The packets that were answered with CANCEL."""
-    return [k for k, commands in enumerate(answers) for command in commands
-            if isinstance(command, SendControl) and command.action is TrajectoryAction.CANCEL]
+    return [
+        k
+        for k, commands in enumerate(answers)
+        for command in commands
+        if isinstance(command, SendControl) and command.action is TrajectoryAction.CANCEL
+    ]
 
 
 def succeeded(answers):
-    return [c.outcome.code for commands in answers for c in commands
-            if isinstance(c, Finish)] == [ErrorCode.SUCCESSFUL]
+    return [c.outcome.code for commands in answers for c in commands if isinstance(c, Finish)] == [
+        ErrorCode.SUCCESSFUL
+    ]
 
 
 def corners(cell, kinds, radius):
-    points = [cell.pose(x=0.03), cell.pose(x=0.03, y=0.03, turn=(0.1, 0.0, 0.0)),
-              cell.pose(y=0.03, z=0.02, turn=(0.1, 0.0, 0.2)), cell.pose()]
+    points = [
+        cell.pose(x=0.03),
+        cell.pose(x=0.03, y=0.03, turn=(0.1, 0.0, 0.0)),
+        cell.pose(y=0.03, z=0.02, turn=(0.1, 0.0, 0.2)),
+        cell.pose(),
+    ]
     last = len(points) - 1
-    return points, [Segment(type=kind, blend_radius=0.0 if i == last else radius, velocity=0.2)
-                    for i, kind in enumerate(kinds)]
+    return points, [
+        Segment(type=kind, blend_radius=0.0 if i == last else radius, velocity=0.2)
+        for i, kind in enumerate(kinds)
+    ]
 
 
 @pytest.mark.parametrize('radius', [0.0, 0.01])
-@pytest.mark.parametrize('kinds', [
-    [TYPE.LINEAR] * 4, [TYPE.JOINT] * 4, [TYPE.PROCESS] * 4,
-    [TYPE.LINEAR, TYPE.JOINT, TYPE.JOINT, TYPE.LINEAR]], ids=lambda kinds: kinds[1].name)
+@pytest.mark.parametrize(
+    'kinds',
+    [
+        [TYPE.LINEAR] * 4,
+        [TYPE.JOINT] * 4,
+        [TYPE.PROCESS] * 4,
+        [TYPE.LINEAR, TYPE.JOINT, TYPE.JOINT, TYPE.LINEAR],
+    ],
+    ids=lambda kinds: kinds[1].name,
+)
 def test_corners_and_blends_never_trip(cell, kinds, radius):
     made = cell.plan(*corners(cell, kinds, radius), path_tolerance=TIGHT)
     machine, answers = cell.run(made, disturb=lagging())
@@ -91,8 +118,10 @@ def test_corners_and_blends_never_trip(cell, kinds, radius):
 @pytest.mark.slow
 @pytest.mark.parametrize('seed', range(12))
 def test_sliders_and_pauses_never_trip(cell, seed):
-    made = cell.plan(*corners(cell, [TYPE.LINEAR, TYPE.JOINT, TYPE.PROCESS, TYPE.LINEAR], 0.005),
-                     path_tolerance=TIGHT)
+    made = cell.plan(
+        *corners(cell, [TYPE.LINEAR, TYPE.JOINT, TYPE.PROCESS, TYPE.LINEAR], 0.005),
+        path_tolerance=TIGHT,
+    )
     machine, answers = cell.run(made, scale=slider(seed), disturb=lagging())
     assert sent(answers) == [], machine._text
 
@@ -111,8 +140,12 @@ def test_a_disturbance_trips_its_axis_in_the_cycle_it_comes_in(cell, name, axis,
     size, bound = SIZES.get(name, (0.5, 0.1))
     limits = [-1.0] * 18
     limits[3 * NAMES.index(name) + axis] = bound
-    tolerance = Tolerance(position=tuple(limits[:3]), orientation=tuple(limits[3:6]),
-                          twist=tuple(limits[6:12]), acceleration=tuple(limits[12:]))
+    tolerance = Tolerance(
+        position=tuple(limits[:3]),
+        orientation=tuple(limits[3:6]),
+        twist=tuple(limits[6:12]),
+        acceleration=tuple(limits[12:]),
+    )
     made = cell.plan([cell.pose(x=0.02, y=0.02)], path_tolerance=tolerance)
     packets = []
 
@@ -150,8 +183,9 @@ def test_an_arm_that_only_lags_is_not_off_its_path(cell):
     assert sent(answers) == [], machine._text
 
 
-@pytest.mark.parametrize('elsewhere', [{'x': 0.05, 'z': 0.01}, {'y': -0.05},
-                                       {'x': 0.05, 'turn': (0.0, 0.3, 0.0)}])
+@pytest.mark.parametrize(
+    'elsewhere', [{'x': 0.05, 'z': 0.01}, {'y': -0.05}, {'x': 0.05, 'turn': (0.0, 0.3, 0.0)}]
+)
 def test_another_motion_than_the_planned_one_is_stopped(cell, elsewhere):
     made = cell.plan([cell.pose(x=0.05)])
     machine, answers = cell.run(made, instead=cell.plan([cell.pose(**elsewhere)]))

@@ -43,6 +43,7 @@ def test_a_pause_leaves_no_queue_behind_which_a_goal_would_wait():
 @pytest.mark.parametrize('fault', ['half_open primary', 'drop primary for 1 s'])
 def test_a_stop_is_followed_up_also_when_the_primary_interface_was_dead(fault):
     """Nothing else can end a program that is paused by a protective stop."""
+
     async def scenario(cell):
         await let_happen(cell, fault)
         await cell.sleep(2.0 * SILENCE + 0.5)
@@ -58,6 +59,7 @@ def test_a_stop_is_followed_up_also_when_the_primary_interface_was_dead(fault):
 
 def test_who_pulls_the_cable_for_a_moment_is_not_taken_for_ready():
     """The sockets of a program that has ended behind a cut cable look as if it was there."""
+
     async def scenario(cell):
         await let_happen(cell, 'freeze all')
         await cell.until(lambda: cell.status.state is ConnectionState.DISCONNECTED)
@@ -96,11 +98,18 @@ def test_sending_the_program_does_not_take_it_away_from_a_goal():
 
 def test_an_output_long_after_the_end_is_waited_for():
     """The arm stands until then, and no message was lost."""
+
     async def scenario(cell):
-        late = IOCommand(waypoint=0, offset=2.0 * STALL_BOUND, pin=1, value=1.0,
-                         output=OutputKind.STANDARD_DIGITAL)
-        motion = cell.owner.start(planned(
-            cell.memory.read(), ((0.0, 0.01, 0.0),), 0.1, 1.0, io_commands=(late,)))
+        late = IOCommand(
+            waypoint=0,
+            offset=2.0 * STALL_BOUND,
+            pin=1,
+            value=1.0,
+            output=OutputKind.STANDARD_DIGITAL,
+        )
+        motion = cell.owner.start(
+            planned(cell.memory.read(), ((0.0, 0.01, 0.0),), 0.1, 1.0, io_commands=(late,))
+        )
         await cell.until(lambda: motion.outcome, 3.0 * STALL_BOUND)
         assert motion.outcome.succeeded, motion.outcome
         assert cell.robot.controller.signals.digital_out.standard[1]

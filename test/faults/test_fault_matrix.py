@@ -19,12 +19,25 @@ CASES = [
     pytest.param(kind, phases, row, settings | more, id=prefix + where + row.fault)
     for kind, prefix, phases, tables, more in [
         (AroundCorners, '', PHASES, (HEADLESS, LOCAL, CONTINUED), {}),
-        *((GOALS[mode.name], f'{mode.name}: ', mode.phases,
-           (mode.headless, mode.local, mode.continued), mode.settings) for mode in MODES)]
+        *(
+            (
+                GOALS[mode.name],
+                f'{mode.name}: ',
+                mode.phases,
+                (mode.headless, mode.local, mode.continued),
+                mode.settings,
+            )
+            for mode in MODES
+        ),
+    ]
     for rows, where, settings in zip(
-        tables, ('', 'in local control: ', 'continued: '), ({}, {'headless': False}, CONTINUE),
-        strict=True)
-    for row in rows]
+        tables,
+        ('', 'in local control: ', 'continued: '),
+        ({}, {'headless': False}, CONTINUE),
+        strict=True,
+    )
+    for row in rows
+]
 
 
 @pytest.mark.exhaustive
@@ -41,8 +54,17 @@ def test_every_fault_that_can_be_injected_is_in_the_table():
     causes = ' '.join(cause for row in HEADLESS for cause in row.cause)
     words = set(causes.split())
     assert {action.value for action in faults.Action} <= words
-    assert {'slider', 'foreign_motion', 'drop', 'half_open', 'silence', 'delay', 'throttle',
-            'garbage', *faults.SHAPES} <= words
+    assert {
+        'slider',
+        'foreign_motion',
+        'drop',
+        'half_open',
+        'silence',
+        'delay',
+        'throttle',
+        'garbage',
+        *faults.SHAPES,
+    } <= words
     for interface in ('rtde', 'primary', 'sockets'):
         for kind in ('drop', 'half_open', 'silence', 'delay', 'throttle', 'garbage'):
             assert f'{kind} {interface}' in causes

@@ -17,5 +17,6 @@ def test_the_page_about_faults_is_that_of_the_table():
     spec = importlib.util.spec_from_file_location('make_faults', SCRIPT)
     make_faults = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(make_faults)
-    assert make_faults.PAGE.read_text(encoding='utf-8') == make_faults.page(), \
+    assert make_faults.PAGE.read_text(encoding='utf-8') == make_faults.page(), (
         'run python scripts/make_faults.py'
+    )

@@ -41,16 +41,18 @@ attacks = st.tuples(
         # Results that nobody has, or that are forged.
         st.integers(-3, 5).map(lambda number: number.to_bytes(4, 'big', signed=True)),
         # Changes to the last frame that the robot has sent: place (part of its length) and byte.
-        st.lists(st.tuples(st.floats(0.0, 0.999), st.integers(0, 255)), min_size=1, max_size=6)),
+        st.lists(st.tuples(st.floats(0.0, 0.999), st.integers(0, 255)), min_size=1, max_size=6),
+    ),
     st.booleans(),
-    st.sampled_from([ExecutionMode.PRIMITIVES, ExecutionMode.SPLINE, ExecutionMode.SERVO]))
+    st.sampled_from([ExecutionMode.PRIMITIVES, ExecutionMode.SPLINE, ExecutionMode.SERVO]),
+)
 
 
 def last_frame(received, width):
     """Return the last whole frame of a stream."""
     at = frame = 0
     while at + width <= len(received):
-        size = int.from_bytes(received[at:at + width], 'big')
+        size = int.from_bytes(received[at : at + width], 'big')
         if at + size > len(received):
             break
         frame, at = at, at + size
@@ -81,9 +83,14 @@ def goal(cell, way, execution=ExecutionMode.PRIMITIVES):
     """Return a plan to and fro along y."""
     state = cell.memory.read()
     (x, y, z), turn = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
-    return plan(Goal(waypoints=(Waypoint(pose=Pose((x, y + way, z), turn), time=TIME),),
-                     execution=execution), state,
-                Arm(robot_model('ur5e')), PlanningOptions(max_tool_speed=1.0))
+    return plan(
+        Goal(
+            waypoints=(Waypoint(pose=Pose((x, y + way, z), turn), time=TIME),), execution=execution
+        ),
+        state,
+        Arm(robot_model('ur5e')),
+        PlanningOptions(max_tool_speed=1.0),
+    )
 
 
 async def back(cell):
@@ -132,8 +139,13 @@ async def undisturbed(cell, way):
     return motion.outcome
 
 
-@settings(max_examples=4, deadline=None, suppress_health_check=list(HealthCheck),
-          derandomize=True, phases=[Phase.generate])  # an example takes seconds: no shrinking
+@settings(
+    max_examples=4,
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+    derandomize=True,
+    phases=[Phase.generate],
+)  # an example takes seconds: no shrinking
 @given(st.lists(attacks, min_size=8, max_size=8))
 def test_a_robot_may_say_anything(said):
     tripped = []

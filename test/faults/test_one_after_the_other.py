@@ -14,8 +14,14 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 pytestmark = pytest.mark.slow
 
 KINDS = {'PRIMITIVES': AroundCorners, **GOALS}
-MIDDLE = {'PRIMITIVES': 'mid-segment', 'SPLINE': 'between points', 'SERVO': 'between points',
-          'Open goals': 'moving', 'Outputs': 'before the place', 'Guided by hand': 'guided'}
+MIDDLE = {
+    'PRIMITIVES': 'mid-segment',
+    'SPLINE': 'between points',
+    'SERVO': 'between points',
+    'Open goals': 'moving',
+    'Outputs': 'before the place',
+    'Guided by hand': 'guided',
+}
 #: No joint sees more [rad/s^2], whatever takes the place of what.
 STRONGEST = 12.0
 

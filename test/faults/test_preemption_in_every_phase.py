@@ -32,9 +32,11 @@ PHASES = {
 
 
 def said(cell, first):
-    return [TrajectoryAction(message.payload[0]) for message in cell.control_messages(first)
-            if message.mode is ControlMode.FORWARD
-            and message.payload[0] in (START, CANCEL)]
+    return [
+        TrajectoryAction(message.payload[0])
+        for message in cell.control_messages(first)
+        if message.mode is ControlMode.FORWARD and message.payload[0] in (START, CANCEL)
+    ]
 
 
 async def preempted(cell, phase):
@@ -56,10 +58,17 @@ async def preempted(cell, phase):
     if phase == 'settling':  # what kept it from settling moves the measured pose
         cell.robot.clear_faults()
         await cell.sleep(2.0 * CYCLE)
-    back = tuple(a - b for a, b in zip(
-        home, cell.robot.controller.motion.T_base_tcp.position, strict=True))
-    following = cell.owner.start(planned(cell.memory.read(), (
-        back if max(map(abs, back)) > 1e-3 else (0.0, 0.01, 0.0),), 0.25, 2.0))
+    back = tuple(
+        a - b for a, b in zip(home, cell.robot.controller.motion.T_base_tcp.position, strict=True)
+    )
+    following = cell.owner.start(
+        planned(
+            cell.memory.read(),
+            (back if max(map(abs, back)) > 1e-3 else (0.0, 0.01, 0.0),),
+            0.25,
+            2.0,
+        )
+    )
     await ways.until(lambda: following.outcome, 3.0)
     assert following.outcome.succeeded, f'{phase}: {following.outcome}'
     assert said(cell, first) == messages, phase

@@ -17,8 +17,10 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 
 pytestmark = pytest.mark.slow
 
-KINDS = {'PRIMITIVES': AroundCorners,
-         **{mode.name: GOALS[mode.name] for mode in (SPLINE, SERVO, OPEN)}}
+KINDS = {
+    'PRIMITIVES': AroundCorners,
+    **{mode.name: GOALS[mode.name] for mode in (SPLINE, SERVO, OPEN)},
+}
 #: What is done in the middle of a goal, and how long it lasts [s].
 DONE = {
     'slower and faster': [('slider 0.3', 0.1), ('slider 1', 0.2)],
@@ -27,13 +29,21 @@ DONE = {
 }
 #: By way of execution: how far the tool may be off its path [m], and which accelerations a joint
 #: may see [rad/s^2]. A program that pauses as the arm comes to a corner does not begin the blend.
-BOUNDS = {'PRIMITIVES': (0.005, 12.0), 'SPLINE': (0.0002, 12.0),
-          'SERVO': (0.0005, 15.0), 'Open goals': (0.0002, 12.0)}
+BOUNDS = {
+    'PRIMITIVES': (0.005, 12.0),
+    'SPLINE': (0.0002, 12.0),
+    'SERVO': (0.0005, 15.0),
+    'Open goals': (0.0002, 12.0),
+}
 #: A paused program calls no speedj or servoj any more, and the simulated controller then brakes as
 #: hard as the last one was allowed to.
 PAUSED = {'SPLINE': 41.0, 'SERVO': 16.0, 'Open goals': 41.0}
-MIDDLE = {'PRIMITIVES': 'mid-segment', 'SPLINE': 'between points',
-          'SERVO': 'between points', 'Open goals': 'moving'}
+MIDDLE = {
+    'PRIMITIVES': 'mid-segment',
+    'SPLINE': 'between points',
+    'SERVO': 'between points',
+    'Open goals': 'moving',
+}
 
 
 @pytest.mark.exhaustive

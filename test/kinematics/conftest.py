@@ -88,8 +88,7 @@ def table_of(lines):
         next_z = lines.directions[i]
         normal = np.cross(z, next_z)
         normal /= np.linalg.norm(normal)
-        d, a, _ = np.linalg.solve(
-            np.column_stack([z, normal, -next_z]), lines.points[i] - origin)
+        d, a, _ = np.linalg.solve(np.column_stack([z, normal, -next_z]), lines.points[i] - origin)
         rows.append((angle_about(z, x, normal), d, a, angle_about(normal, z, next_z)))
         origin, x, z = origin + d * z + a * normal, normal, next_z
     flange_x, flange = lines.flange[:3, 0], lines.flange[:3, 3]
@@ -105,7 +104,8 @@ def angle_about(axis, start, end):
 def calibrated(name, seed, turn=1e-3, shift=3e-4):
     """A calibrated arm of the model, and its axes."""
     lines = perturbed_lines(
-        MODELS[name].geometry, np.random.default_rng([seed, *name.encode()]), turn, shift)
+        MODELS[name].geometry, np.random.default_rng([seed, *name.encode()]), turn, shift
+    )
     return Arm(MODELS[name], table_of(lines)), lines
 
 

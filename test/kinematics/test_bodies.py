@@ -61,7 +61,7 @@ def closest(points, others):
 SEGMENTS = {
     'crossing': ((0, 0, 0), (2, 0, 0), (1, -1, 0.5), (0, 2, 0), 0.5),
     'end against the middle': ((0, 0, 0), (2, 0, 0), (1, 1, 0), (0, 2, 0), 1.0),
-    'end against end': ((0, 0, 0), (1, 0, 0), (2, 1, 0), (1, 1, 0), 2 ** 0.5),
+    'end against end': ((0, 0, 0), (1, 0, 0), (2, 1, 0), (1, 1, 0), 2**0.5),
     'parallel beside each other': ((0, 0, 0), (2, 0, 0), (1, 0.3, 0), (2, 0, 0), 0.3),
     'antiparallel': ((0, 0, 0), (2, 0, 0), (3, 0.3, 0), (-2, 0, 0), 0.3),
     'parallel behind each other': ((0, 0, 0), (1, 0, 0), (2, 0, 0), (1, 0, 0), 1.0),
@@ -89,6 +89,7 @@ def test_no_two_points_of_random_segments_are_nearer_than_their_distance(rng):
 
 
 # -- where the bodies are -------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize('name', MODELS)
 def test_the_last_link_ends_in_the_flange_and_the_tool_in_the_tcp(name, rng):
@@ -118,8 +119,10 @@ def test_tubes_join_the_housings_of_their_joints(rng):
     for model in MODELS.values():
         ends = Bodies(Arm(model)).cylinders(random_joints(rng, 1))[0]
         links = Bodies(Arm(model)).links
-        for link, length in ((Link.UPPER_ARM, model.geometry.a[1]),
-                             (Link.FOREARM, model.geometry.a[2])):
+        for link, length in (
+            (Link.UPPER_ARM, model.geometry.a[1]),
+            (Link.FOREARM, model.geometry.a[2]),
+        ):
             first, tube, last = (ends[k] for k, of in enumerate(links) if of == link)
             assert np.linalg.norm(tube[1] - tube[0]) == pytest.approx(-length)
             for place, housing in ((tube[0], first), (tube[1], last)):
@@ -132,7 +135,8 @@ def test_capsules_contain_their_cylinders(rng):
     q = random_joints(rng, 2)
     for ends, covers in zip(bodies.cylinders(q), bodies.capsules(q), strict=True):
         for (start, end), radius, cover, thick in zip(
-                ends, bodies.radii, covers, bodies.capsule_radii, strict=True):
+            ends, bodies.radii, covers, bodies.capsule_radii, strict=True
+        ):
             axis = (end - start) / np.linalg.norm(end - start)
             across = np.cross(axis, rng.normal(size=3))
             across *= radius / np.linalg.norm(across)
@@ -143,6 +147,7 @@ def test_capsules_contain_their_cylinders(rng):
 
 # -- distances ------------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize('name', ['ur3e', 'ur10'])
 def test_distances_are_those_of_the_nearest_points_of_the_capsules(name, rng):
     bodies = Bodies(Arm(MODELS[name]), TCP, tool_radius=0.03)
@@ -152,9 +157,13 @@ def test_distances_are_those_of_the_nearest_points_of_the_capsules(name, rng):
         for pair, distance in zip(bodies.pairs, distances, strict=True):
             found = min(
                 closest(lines[row, i], lines[row, j])
-                - bodies.capsule_radii[i] - bodies.capsule_radii[j]
-                for i, of in enumerate(bodies.links) if of == pair[0]
-                for j, other in enumerate(bodies.links) if other == pair[1])
+                - bodies.capsule_radii[i]
+                - bodies.capsule_radii[j]
+                for i, of in enumerate(bodies.links)
+                if of == pair[0]
+                for j, other in enumerate(bodies.links)
+                if other == pair[1]
+            )
             assert distance - 1e-9 <= found < distance + 0.02, pair
 
 
@@ -171,7 +180,7 @@ def test_rows_do_not_know_of_each_other(rng):
     q = random_joints(rng, 600)  # more than one block
     together = bodies.distances(q)
     for row in (0, 255, 256, 599):
-        np.testing.assert_array_equal(bodies.distances(q[row:row + 1])[0], together[row])
+        np.testing.assert_array_equal(bodies.distances(q[row : row + 1])[0], together[row])
 
 
 @pytest.mark.parametrize('name', MODELS)
@@ -197,7 +206,12 @@ def test_a_tool_counts_when_it_has_a_radius():
     assert all(Link.TOOL not in pair for pair in Bodies(arm, tool_radius=0.1).pairs)
     with_tool = Bodies(arm, TCP, tool_radius=0.03)
     assert {a for a, b in with_tool.pairs if b == Link.TOOL} == {
-        Link.BASE, Link.SHOULDER, Link.UPPER_ARM, Link.FOREARM, Link.WRIST_1}
+        Link.BASE,
+        Link.SHOULDER,
+        Link.UPPER_ARM,
+        Link.FOREARM,
+        Link.WRIST_1,
+    }
     # Turned back, a long tool lies in the upper arm while the arm itself is free.
     long = Bodies(arm, Pose((0, 0, 0.6), (0, 0, 0, 1)), tool_radius=0.03)
     q = np.array([[0, -2.2, 2.4, -0.2, -H, 0]])

@@ -38,7 +38,8 @@ def test_nominal_poses_are_the_product_of_the_link_matrices(name, matrix_product
     arm = Arm(MODELS[name])
     for q in random_joints(10):
         np.testing.assert_allclose(
-            arm.forward(q).matrix(), matrix_product(arm.geometry, q), atol=1e-14)
+            arm.forward(q).matrix(), matrix_product(arm.geometry, q), atol=1e-14
+        )
 
 
 @pytest.mark.parametrize('name', MODELS)
@@ -58,10 +59,12 @@ def test_pinocchio_finds_the_same_poses_and_the_same_jacobian(is_calibrated, cal
     assert list(model.names)[1:] == list(JOINT_NAMES)
     for q in random_joints(5):
         jacobian = pinocchio.computeFrameJacobian(
-            model, data, q, tool0, pinocchio.LOCAL_WORLD_ALIGNED)
+            model, data, q, tool0, pinocchio.LOCAL_WORLD_ALIGNED
+        )
         pinocchio.framesForwardKinematics(model, data, q)
         np.testing.assert_allclose(
-            arm.forward(q).matrix(), data.oMf[tool0].homogeneous, atol=1e-11)
+            arm.forward(q).matrix(), data.oMf[tool0].homogeneous, atol=1e-11
+        )
         np.testing.assert_allclose(arm.jacobian(q), jacobian, atol=1e-11)
 
 
@@ -98,11 +101,13 @@ def test_frames_end_in_the_flange(calibrated_arm):
         frames, matrix = arm.frames(q), arm.forward(q).matrix()
         np.testing.assert_allclose(frames.position, matrix[:3, 3], atol=1e-11)
         np.testing.assert_allclose(
-            np.column_stack([frames.x, frames.y, frames.z]), matrix[:3, :3], atol=1e-13)
+            np.column_stack([frames.x, frames.y, frames.z]), matrix[:3, :3], atol=1e-13
+        )
 
 
-@pytest.mark.parametrize('T_flange_tcp', [Pose(), Pose.from_rotation_vector(
-    (0.05, -0.1, 0.2, 0.3, 0.2, -0.4))])
+@pytest.mark.parametrize(
+    'T_flange_tcp', [Pose(), Pose.from_rotation_vector((0.05, -0.1, 0.2, 0.3, 0.2, -0.4))]
+)
 def test_the_jacobian_is_the_derivative_of_the_tcp(T_flange_tcp, calibrated_arm):
     step = 1e-5
     for arm in Arm(UR5E), calibrated_arm('ur5e'):
@@ -111,12 +116,14 @@ def test_the_jacobian_is_the_derivative_of_the_tcp(T_flange_tcp, calibrated_arm)
             assert jacobian.shape == (6, 6)
             for joint in range(6):
                 change = np.eye(6)[joint] * step
-                before, after = (
-                    arm.forward(q + c) @ T_flange_tcp for c in (-change, change))
-                turn = Pose(quaternion=after.quaternion) @ Pose(
-                    quaternion=before.quaternion).inverse()
-                twist = np.concatenate([
-                    np.subtract(after.position, before.position), turn.rotation_vector()[3:]])
+                before, after = (arm.forward(q + c) @ T_flange_tcp for c in (-change, change))
+                turn = (
+                    Pose(quaternion=after.quaternion)
+                    @ Pose(quaternion=before.quaternion).inverse()
+                )
+                twist = np.concatenate(
+                    [np.subtract(after.position, before.position), turn.rotation_vector()[3:]]
+                )
                 np.testing.assert_allclose(jacobian[:, joint], twist / (2 * step), atol=2e-8)
 
 
@@ -144,7 +151,8 @@ def test_five_joints_are_not_an_arm():
 
 def test_a_table_with_pi_rounded_as_controllers_report_it_is_the_nominal_one():
     reported = replace(
-        UR5E.geometry, alpha=(1.570796327, 0.0, 0.0, 1.570796327, -1.570796327, 0.0))
+        UR5E.geometry, alpha=(1.570796327, 0.0, 0.0, 1.570796327, -1.570796327, 0.0)
+    )
     assert not Arm(UR5E, reported).calibrated
     assert Arm(UR5E, reported).geometry is UR5E.geometry
 
@@ -156,7 +164,8 @@ def test_a_table_that_differs_is_a_calibration():
     assert arm.geometry is geometry
     assert repr(arm) == '<Arm ur5e, calibrated>'
     assert pose_from_row(arm.forward_rows(np.zeros((1, 6)))[0]).distance_to(
-        Arm(UR5E).forward((0.0,) * 6)) == pytest.approx(1e-5)
+        Arm(UR5E).forward((0.0,) * 6)
+    ) == pytest.approx(1e-5)
 
 
 def test_two_arms_are_as_far_apart_as_their_flanges():

@@ -63,6 +63,7 @@ def assert_all_solve(arm, found, T_base_flange):
 
 # --- Every solution ----------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize('name', MODELS)
 def test_all_solutions_lead_to_the_pose_and_the_source_is_one_of_them(name):
     arm = Arm(MODELS[name])
@@ -119,7 +120,8 @@ def test_where_solutions_meet_the_source_is_found(name, singular_postures):
 
 @pytest.mark.parametrize('name', ['ur3e', 'ur5', 'ur20'])
 def test_where_solutions_meet_a_calibrated_arm_finds_the_seed(
-        name, singular_postures, calibrated_arm):
+    name, singular_postures, calibrated_arm
+):
     arm = calibrated_arm(name)
     for q in singular_postures.values():
         T_base_flange = arm.forward(q)
@@ -158,8 +160,12 @@ def test_what_goes_forward_comes_back(q):
 
 
 @settings(max_examples=100)
-@given(x=st.floats(-1.2, 1.2), y=st.floats(-1.2, 1.2), z=st.floats(-1.2, 1.2),
-       rotation=st.tuples(*[st.floats(-pi, pi)] * 3))
+@given(
+    x=st.floats(-1.2, 1.2),
+    y=st.floats(-1.2, 1.2),
+    z=st.floats(-1.2, 1.2),
+    rotation=st.tuples(*[st.floats(-pi, pi)] * 3),
+)
 def test_a_pose_either_has_solutions_or_a_reason_why_not(x, y, z, rotation):
     pose = Pose.from_rotation_vector((x, y, z, *rotation))
     found = solutions(UR5E, pose)
@@ -170,9 +176,11 @@ def test_a_pose_either_has_solutions_or_a_reason_why_not(x, y, z, rotation):
 
 # --- The nearest -------------------------------------------------------------------------------
 
+
 def all_turns(q):
-    return product(*[[angle + k * tau for k in (-1, 0, 1) if abs(angle + k * tau) <= tau]
-                     for angle in q])
+    return product(
+        *[[angle + k * tau for k in (-1, 0, 1) if abs(angle + k * tau) <= tau] for angle in q]
+    )
 
 
 def test_the_nearest_is_the_nearest_of_every_branch_and_every_turn():
@@ -215,8 +223,9 @@ def test_the_nearest_of_a_calibrated_arm_is_the_nearest_of_its_solutions(calibra
 def test_following_a_path_of_a_calibrated_arm_stays_on_one_branch(calibrated_arm):
     arm = calibrated_arm('ur5e')
     start = arm.forward(READY)
-    end = Pose((start.position[0] + 0.1, start.position[1] - 0.2, start.position[2]),
-               start.quaternion)
+    end = Pose(
+        (start.position[0] + 0.1, start.position[1] - 0.2, start.position[2]), start.quaternion
+    )
     path = [READY]
     for i in range(1, 21):
         path.append(nearest(arm, start.interpolate(end, i / 20), path[-1]))
@@ -268,6 +277,7 @@ def test_out_of_reach_there_is_no_nearest(calibrated_arm):
 
 # --- Next to a singularity of a calibrated arm -------------------------------------------------
 
+
 def next_to(singularity, arm, n):
     """Joint positions close to one singularity and away from the two others."""
     rows = np.random.default_rng(17).uniform(-pi, pi, (40 * n, 6))
@@ -276,8 +286,11 @@ def next_to(singularity, arm, n):
     if singularity == 'wrist':
         rows[:, 4] *= 0.01
     measures = postures(arm, rows)
-    size = {'shoulder': np.abs(measures.shoulder) / 0.1, 'elbow': np.abs(measures.elbow) / 0.3,
-            'wrist': np.abs(measures.wrist) / 0.3}
+    size = {
+        'shoulder': np.abs(measures.shoulder) / 0.1,
+        'elbow': np.abs(measures.elbow) / 0.3,
+        'wrist': np.abs(measures.wrist) / 0.3,
+    }
     away = np.all([size[name] > 1.0 for name in size if name != singularity], axis=0)
     return [tuple(row) for row in rows[away & (size[singularity] < 0.33)][:n].tolist()]
 
@@ -308,13 +321,21 @@ def test_of_twins_the_nearest_is_the_nearer(singularity, calibrated_arm):
         found = solutions(arm, T_base_flange, seed=q)
         for solution in found:
             q_near = tuple(angle + 0.02 for angle in solution)
-            least = min(dist(q_near, turned) for other in found for turned in [tuple(
-                near + remainder(angle - near, tau)
-                for angle, near in zip(other, q_near, strict=True))])
+            least = min(
+                dist(q_near, turned)
+                for other in found
+                for turned in [
+                    tuple(
+                        near + remainder(angle - near, tau)
+                        for angle, near in zip(other, q_near, strict=True)
+                    )
+                ]
+            )
             assert dist(nearest(arm, T_base_flange, q_near), q_near) < least + 1e-6
 
 
 # --- Partial postures --------------------------------------------------------------------------
+
 
 @pytest.mark.parametrize('is_calibrated', [False, True])
 @pytest.mark.parametrize(('named', 'sign'), [({2: 1.5}, 1), ({2: -1.5}, -1), ({4: 1.0}, 1)])
@@ -339,8 +360,7 @@ def test_of_equally_near_solutions_the_one_near_to_before_is_taken(is_calibrated
 def test_no_named_joint_means_the_nearest_to_before():
     T_base_flange = UR5E.forward(READY)
     for before in random_joints(5):
-        assert nearest_in(UR5E, T_base_flange, {}, before) == nearest(
-            UR5E, T_base_flange, before)
+        assert nearest_in(UR5E, T_base_flange, {}, before) == nearest(UR5E, T_base_flange, before)
 
 
 def test_turns_count_in_the_named_joints():
@@ -360,20 +380,36 @@ def test_of_two_turns_equally_near_the_one_near_to_before_is_taken():
 
 # --- Reasons -----------------------------------------------------------------------------------
 
-@pytest.mark.parametrize(('position', 'reason'), [
-    ((2.0, 0.0, 0.3), r'wrist 1 would be 1\.\d{4} m from the shoulder, and upper arm and '
-                      r'forearm together reach 0\.8172 m'),
-    ((0.05, 0.02, 0.9), r'the wrist would be 0\.0539 m from the axis of the base, and it '
-                        r'cannot come nearer than 0\.1333 m'),
-])
+
+@pytest.mark.parametrize(
+    ('position', 'reason'),
+    [
+        (
+            (2.0, 0.0, 0.3),
+            r'wrist 1 would be 1\.\d{4} m from the shoulder, and upper arm and '
+            r'forearm together reach 0\.8172 m',
+        ),
+        (
+            (0.05, 0.02, 0.9),
+            r'the wrist would be 0\.0539 m from the axis of the base, and it '
+            r'cannot come nearer than 0\.1333 m',
+        ),
+    ],
+)
 def test_the_reason_names_the_distance_and_the_bound(position, reason):
     clause = why_unreachable(UR5E, Pose(position, TOOL_DOWN))
     assert re.search(reason, clause), clause
 
 
-@pytest.mark.parametrize(('value', 'bound', 'texts'), [
-    (0.9, 0.8172, ('0.9000', '0.8172')), (0.817203, 0.8172, ('0.817203', '0.817200')),
-    (0.8172, 0.8172, ('0.817200000', '0.817200000')), (1e300, 0.8172, ('1e+300', '0.8172'))])
+@pytest.mark.parametrize(
+    ('value', 'bound', 'texts'),
+    [
+        (0.9, 0.8172, ('0.9000', '0.8172')),
+        (0.817203, 0.8172, ('0.817203', '0.817200')),
+        (0.8172, 0.8172, ('0.817200000', '0.817200000')),
+        (1e300, 0.8172, ('1e+300', '0.8172')),
+    ],
+)
 def test_a_value_beyond_its_bound_reads_as_another_number(value, bound, texts):
     assert told_apart(value, bound) == texts
 
@@ -386,19 +422,23 @@ def test_a_reachable_pose_has_no_reason(calibrated_arm):
 def test_the_reason_names_the_joint_and_its_limits():
     arm = limited(UR5E, 0, 1.0, 1.2)
     clause = why_unreachable(arm, arm.forward(READY))
-    assert clause == ('shoulder_pan_joint would be at 0.3000 rad, and its limits are 1.0000 to '
-                      '1.2000 rad')
+    assert clause == (
+        'shoulder_pan_joint would be at 0.3000 rad, and its limits are 1.0000 to 1.2000 rad'
+    )
 
 
 def test_a_folded_arm_is_named_as_the_reason():
     # The only arm whose links differ by more than twice d5, so that no flip of the wrist helps.
     arm = Arm(MODELS['ur8long'])
     clause = why_unreachable(arm, Pose((0.0, -0.1824, 0.35)))
-    assert clause == ('wrist 1 would be 0.1366 m from the shoulder, and the folded arm comes no '
-                      'nearer than 0.1840 m')
+    assert clause == (
+        'wrist 1 would be 0.1366 m from the shoulder, and the folded arm comes no '
+        'nearer than 0.1840 m'
+    )
 
 
 # --- Sweeps ------------------------------------------------------------------------------------
+
 
 @pytest.mark.slow
 @pytest.mark.parametrize('name', MODELS)

@@ -14,8 +14,15 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.meshes import Meshes, WITH_MESHES
 from ur_cartesian_driver.kinematics.robots import MODELS
 
-FRAMES = ('base_link', 'shoulder_link', 'upper_arm_link', 'forearm_link', 'wrist_1_link',
-          'wrist_2_link', 'wrist_3_link')
+FRAMES = (
+    'base_link',
+    'shoulder_link',
+    'upper_arm_link',
+    'forearm_link',
+    'wrist_1_link',
+    'wrist_2_link',
+    'wrist_3_link',
+)
 
 
 @pytest.fixture(scope='module')
@@ -50,15 +57,18 @@ def test_meshes_are_where_the_robot_description_moves_them(name, all_meshes, pin
     data, arm = model.createData(), Arm(MODELS[name])
     for q in random_joints(10):
         pinocchio.framesForwardKinematics(model, data, q)
-        T_world = {frame: data.oMf[model.getFrameId(frame)]
-                   for frame in ('base', 'tool0', *FRAMES)}
+        T_world = {
+            frame: data.oMf[model.getFrameId(frame)] for frame in ('base', 'tool0', *FRAMES)
+        }
         T_base_world = T_world['base'].inverse()
         np.testing.assert_allclose(
-            arm.forward(q).matrix(), (T_base_world * T_world['tool0']).homogeneous, atol=1e-10)
+            arm.forward(q).matrix(), (T_base_world * T_world['tool0']).homogeneous, atol=1e-10
+        )
         # In these descriptions every mesh has the frame of its link.
         for T, frame in zip(all_meshes[name].T_base_meshes(q), FRAMES, strict=True):
             np.testing.assert_allclose(
-                T, (T_base_world * T_world[frame]).homogeneous, atol=1e-10, err_msg=frame)
+                T, (T_base_world * T_world[frame]).homogeneous, atol=1e-10, err_msg=frame
+            )
 
 
 def test_on_a_calibrated_arm_the_meshes_go_with_the_real_axes(calibrated_arm, pinocchio):
@@ -84,11 +94,13 @@ def test_cylinders_and_capsules_contain_the_meshes(name, all_meshes):
             assert len(points) > 100
         points = points @ T[:3, :3].T + T[:3, 3]
         mine = [k for k, of in enumerate(bodies.links) if of == link]
-        outside = np.min([beyond_cylinder(points, *cylinders[k], bodies.radii[k])
-                          for k in mine], axis=0)
+        outside = np.min(
+            [beyond_cylinder(points, *cylinders[k], bodies.radii[k]) for k in mine], axis=0
+        )
         assert outside.max() < 0.003 if link == Link.BASE else outside.max() < 1e-4, Link(link)
-        outside = np.min([beyond_capsule(points, *capsules[k], bodies.capsule_radii[k])
-                          for k in mine], axis=0)
+        outside = np.min(
+            [beyond_capsule(points, *capsules[k], bodies.capsule_radii[k]) for k in mine], axis=0
+        )
         assert outside.max() < (0.003 if link == Link.BASE else 0.0), Link(link)
 
 
@@ -148,8 +160,9 @@ def test_pairs_that_are_left_out_never_meet_first(name, all_meshes):
     q[:, 4] = turns
     assert meshes.distances((Link.WRIST_1, Link.WRIST_3), q).min() > 0.01
     q = np.zeros((225, 6))
-    q[:, 3:5] = np.stack(np.meshgrid(np.linspace(-pi, pi, 15), np.linspace(-pi, pi, 15)),
-                         axis=-1).reshape(-1, 2)
+    q[:, 3:5] = np.stack(
+        np.meshgrid(np.linspace(-pi, pi, 15), np.linspace(-pi, pi, 15)), axis=-1
+    ).reshape(-1, 2)
     near, _ = meshes.nearer_than(0.0, (Link.FOREARM, Link.WRIST_2), q)
     hits = near & (meshes.distances((Link.FOREARM, Link.WRIST_3), q) > 0.0)
     assert (np.abs(q[hits, 4]) < 1.0).all() if name == 'ur5' else not hits.any()

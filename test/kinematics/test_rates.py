@@ -27,8 +27,10 @@ def arm(request, calibrated_arm):
 def tool_at(arm, t):
     """The TCP and its rotation matrix, by poses and not by frames."""
     poses = [arm.forward(q) @ TOOL for q in A + B * t + 0.5 * C * t * t]
-    return (np.array([pose.position for pose in poses]),
-            np.array([pose.matrix()[:3, :3] for pose in poses]))
+    return (
+        np.array([pose.position for pose in poses]),
+        np.array([pose.matrix()[:3, :3] for pose in poses]),
+    )
 
 
 def test_the_twist_is_the_derivative_of_the_pose(arm):
@@ -43,8 +45,9 @@ def test_the_twist_is_the_derivative_of_the_pose(arm):
 def test_the_acceleration_is_the_derivative_of_the_twist(arm):
     h = 1e-5
     _, acceleration = tool_rates(arm, TOOL, A, B, C)
-    before, after = (tool_rates(arm, TOOL, A + B * t + 0.5 * C * t * t, B + C * t, C)[0]
-                     for t in (-h, h))
+    before, after = (
+        tool_rates(arm, TOOL, A + B * t + 0.5 * C * t * t, B + C * t, C)[0] for t in (-h, h)
+    )
     np.testing.assert_allclose((after - before) / (2.0 * h), acceleration, atol=1e-7)
 
 

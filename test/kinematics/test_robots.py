@@ -52,7 +52,6 @@ def test_a_table_must_be_six_finite_numbers_wide(column):
 
 def test_the_difference_of_two_tables_is_that_of_their_worst_number():
     geometry = robot_model('ur5e').geometry
-    other = replace(geometry, theta=(0.0, 0.0, -2e-4, 0.0, 0.0, 0.0),
-                    a=(1e-4, *geometry.a[1:]))
+    other = replace(geometry, theta=(0.0, 0.0, -2e-4, 0.0, 0.0, 0.0), a=(1e-4, *geometry.a[1:]))
     assert geometry.difference(other) == 2e-4
     assert geometry.difference(geometry) == 0.0

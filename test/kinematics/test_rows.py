@@ -49,14 +49,17 @@ def assert_lead_to(forward, found, poses, within=1e-9):
     """By a forward kinematics that gives matrices."""
     for row, place in np.argwhere(found.exists):
         np.testing.assert_allclose(
-            forward(found.q[row, place]), pose_from_row(poses[row]).matrix(), atol=within)
+            forward(found.q[row, place]), pose_from_row(poses[row]).matrix(), atol=within
+        )
 
 
 # --- All branches ------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize('name', MODELS)
 def test_the_reference_is_among_the_branches_and_all_lead_to_it(
-        name, golden_poses, matrix_product):
+    name, golden_poses, matrix_product
+):
     arm, cases = Arm(MODELS[name]), golden_poses[name]['cases']
     poses = np.array([case['position'] + case['quaternion_xyzw'] for case in cases])
     found = branches(arm, poses)
@@ -84,15 +87,18 @@ def test_nominal_branches_are_the_solutions_of_each_pose(name):
 
 @pytest.mark.parametrize('name', MODELS)
 def test_calibrated_branches_lead_to_the_pose_by_the_measured_axes(
-        name, calibrated_arm_with_lines):
+    name, calibrated_arm_with_lines
+):
     arm, lines = calibrated_arm_with_lines(name, 1)
     source = random_rows(60, seed=5)
     source = source[np.abs(np.sin(source[:, 4])) > 0.25][:25]
     poses = arm.forward_rows(source)
     found = branches(arm, poses)
     assert_lead_to(lines.forward, found, poses)
-    missed = sum(miss(q[exists], joints).min() > 1e-6
-                 for q, exists, joints in zip(found.q, found.exists, source, strict=True))
+    missed = sum(
+        miss(q[exists], joints).min() > 1e-6
+        for q, exists, joints in zip(found.q, found.exists, source, strict=True)
+    )
     assert missed == 0
 
 
@@ -110,7 +116,8 @@ def test_calibrated_branches_are_the_solutions_of_each_pose(calibrated_arm):
 @pytest.mark.parametrize('name', MODELS)
 @pytest.mark.parametrize('is_calibrated', [False, True])
 def test_singular_and_stretched_poses_have_branches(
-        name, is_calibrated, singular_postures, calibrated_arm):
+    name, is_calibrated, singular_postures, calibrated_arm
+):
     arm = calibrated_arm(name) if is_calibrated else Arm(MODELS[name])
     source = np.array([*singular_postures.values(), above_the_shoulder(Arm(MODELS[name]))])
     poses = arm.forward_rows(source)
@@ -142,6 +149,7 @@ def test_with_a_straight_wrist_wrist_3_is_what_was_asked_for(singular_postures):
 
 
 # --- Along a path ------------------------------------------------------------------------------
+
 
 def one_by_one(arm, poses, before):
     rows = []
@@ -176,8 +184,10 @@ def test_the_nearest_of_many_are_the_nearest_of_each(is_calibrated, calibrated_a
     near = rows + np.random.default_rng(6).uniform(-0.3, 0.3, rows.shape)
     poses = arm.forward_rows(rows)
     poses[::10, 2] += 3.0  # out of reach
-    wanted = [nearest(arm, pose_from_row(pose), tuple(q)) or (nan,) * 6
-              for pose, q in zip(poses, near, strict=True)]
+    wanted = [
+        nearest(arm, pose_from_row(pose), tuple(q)) or (nan,) * 6
+        for pose, q in zip(poses, near, strict=True)
+    ]
     np.testing.assert_allclose(nearest_rows(arm, poses, near), wanted, atol=1e-6)
 
 
@@ -206,15 +216,20 @@ def test_at_a_limit_the_arm_jumps_and_the_step_tells():
 
 
 def test_a_branch_that_the_limits_forbid_is_left():
-    arm = Arm(replace(UR5E.model, position_limits=((-tau, tau),) * 2 + ((-tau, 2.1),)
-                      + ((-tau, tau),) * 3))
+    arm = Arm(
+        replace(
+            UR5E.model, position_limits=((-tau, tau),) * 2 + ((-tau, 2.1),) + ((-tau, tau),) * 3
+        )
+    )
     source = np.linspace(READY, (0.3, -1.6, 2.3, -1.8, -1.5, 0.4), 100)
     path = follow(arm, arm.forward_rows(source), READY)
     row = int(np.argmax(path.step))
     assert source[row - 1, 2] <= 2.1 < source[row, 2]
     assert path.found.all()
-    assert (postures(arm, path.q[[row - 1, row]]).branch[0]
-            != postures(arm, path.q[[row - 1, row]]).branch[1])
+    assert (
+        postures(arm, path.q[[row - 1, row]]).branch[0]
+        != postures(arm, path.q[[row - 1, row]]).branch[1]
+    )
 
 
 def test_rows_out_of_reach_are_passed_over(calibrated_arm):
@@ -249,9 +264,16 @@ def test_no_rows_are_followed_to_no_rows(calibrated_arm):
 
 # --- Measures ----------------------------------------------------------------------------------
 
+
 def test_measures_vanish_where_the_arm_is_singular(singular_postures):
-    rows = np.array([singular_postures['wrist straight'], singular_postures['stretched'],
-                     singular_postures['elbow folded'], above_the_shoulder(UR5E)])
+    rows = np.array(
+        [
+            singular_postures['wrist straight'],
+            singular_postures['stretched'],
+            singular_postures['elbow folded'],
+            above_the_shoulder(UR5E),
+        ]
+    )
     measures = postures(UR5E, rows)
     assert abs(measures.wrist[0]) < 1e-12
     assert np.abs(measures.elbow[[1, 2]]).max() < 1e-12
@@ -282,10 +304,12 @@ def test_the_product_of_the_measures_is_the_determinant_of_the_jacobian(q):
     _, a2, a3, *_ = UR5E.geometry.a
     product = measures.shoulder[0] * measures.elbow[0] * measures.wrist[0] * a2 * a3
     assert np.linalg.det(UR5E.jacobian(q)) == pytest.approx(product, abs=1e-13) or (
-        np.linalg.det(UR5E.jacobian(q)) == pytest.approx(-product, abs=1e-13))
+        np.linalg.det(UR5E.jacobian(q)) == pytest.approx(-product, abs=1e-13)
+    )
 
 
 # --- The chain in rows -------------------------------------------------------------------------
+
 
 def test_jacobians_of_rows_are_those_of_each(calibrated_arm):
     for arm in UR5E, calibrated_arm('ur5e'):
@@ -296,6 +320,7 @@ def test_jacobians_of_rows_are_those_of_each(calibrated_arm):
 
 
 # --- Sweeps ------------------------------------------------------------------------------------
+
 
 @pytest.mark.slow
 @pytest.mark.parametrize('name', MODELS)

@@ -21,9 +21,12 @@ HOME = (0.0, -1.57, 1.57, -1.57, -1.57, 0.0)
 def calibrated(seed=3):
     """A UR5e as one comes from the factory: half a millimetre and a milliradian off everywhere."""
     random = np.random.default_rng(seed)
-    columns = {name: tuple(float(v + random.normal(0.0, 1e-3 if name in 'alpha theta' else 5e-4))
-                           for v in column)
-               for name, column in UR5E.geometry.columns().items()}
+    columns = {
+        name: tuple(
+            float(v + random.normal(0.0, 1e-3 if name in 'alpha theta' else 5e-4)) for v in column
+        )
+        for name, column in UR5E.geometry.columns().items()
+    }
     return Arm(UR5E, Geometry(**columns))
 
 
@@ -48,7 +51,8 @@ def test_a_long_way_step_by_step_ends_on_the_branch_where_it_began(arm):
         x, y, z = here.position
         q = track(arm, Pose((x + 0.001 * i, y, z - 0.0005 * i), here.quaternion), q)
     assert q == pytest.approx(
-        nearest(arm, Pose((x + 0.2, y, z - 0.1), here.quaternion), HOME), abs=1e-8)
+        nearest(arm, Pose((x + 0.2, y, z - 0.1), here.quaternion), HOME), abs=1e-8
+    )
 
 
 @ARMS
@@ -69,4 +73,5 @@ def test_beyond_its_reach_there_is_nothing(arm):
 @given(q=st.tuples(*[st.floats(-3.0, 3.0)] * 6))
 def test_singularities_are_as_far_as_the_planner_says(arm, q):
     assert singularity_distances(arm, q) == pytest.approx(
-        tuple(measured(arm, np.array([q]))[0]), abs=1e-12)
+        tuple(measured(arm, np.array([q]))[0]), abs=1e-12
+    )

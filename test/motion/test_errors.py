@@ -61,8 +61,14 @@ def test_codes_are_distinct_but_for_the_kinds_of_invalid_goal():
 
 def test_the_numbers_of_the_original_action_are_kept():
     assert [ErrorCode(n).name for n in range(0, -7, -1)] == [
-        'SUCCESSFUL', 'INVALID_GOAL', 'INVALID_JOINTS', 'OLD_HEADER_TIMESTAMP',
-        'PATH_TOLERANCE_VIOLATED', 'GOAL_TOLERANCE_VIOLATED', 'INVALID_POSTURE']
+        'SUCCESSFUL',
+        'INVALID_GOAL',
+        'INVALID_JOINTS',
+        'OLD_HEADER_TIMESTAMP',
+        'PATH_TOLERANCE_VIOLATED',
+        'GOAL_TOLERANCE_VIOLATED',
+        'INVALID_POSTURE',
+    ]
 
 
 @pytest.mark.parametrize('cls', [ProtocolError, LocalProtocolError, RemoteProtocolError])

@@ -34,13 +34,20 @@ def reference(m=3, poses=None, point=None, time=None):
     return ReferencePath(
         poses=np.zeros((m, 7)) if poses is None else poses,
         point=np.zeros(m, np.int32) if point is None else point,
-        time=np.zeros(m) if time is None else time)
+        time=np.zeros(m) if time is None else time,
+    )
 
 
 def planned(waypoint, duration):
     return PlannedSegment(
-        primitive=MoveL(target=IDENTITY), waypoint=waypoint, length=0.1, angle=0.0,
-        duration=duration, joints=ZEROS, note=f'segment {waypoint}: MOVEL, 0.1 m')
+        primitive=MoveL(target=IDENTITY),
+        waypoint=waypoint,
+        length=0.1,
+        angle=0.0,
+        duration=duration,
+        joints=ZEROS,
+        note=f'segment {waypoint}: MOVEL, 0.1 m',
+    )
 
 
 def goal(n=2):
@@ -48,15 +55,22 @@ def goal(n=2):
 
 
 def plan():
-    return Plan(goal=goal(), segments=(planned(0, 1.5), planned(1, 0.25)),
-                reference=reference(), start=ZEROS, remarks=('jerk is ignored',))
+    return Plan(
+        goal=goal(),
+        segments=(planned(0, 1.5), planned(1, 0.25)),
+        reference=reference(),
+        start=ZEROS,
+        remarks=('jerk is ignored',),
+    )
 
 
 def constants_of(interface, prefix):
     """Read the constants ``uint8 PREFIX_NAME=1`` of a message or action file."""
     text = (share_path() / interface).read_text()
-    return {name: int(value)
-            for name, value in re.findall(rf'^\w+ {prefix}(\w+)\s*=\s*(-?\d+)', text, re.M)}
+    return {
+        name: int(value)
+        for name, value in re.findall(rf'^\w+ {prefix}(\w+)\s*=\s*(-?\d+)', text, re.M)
+    }
 
 
 @pytest.mark.parametrize('value', [goal(), Posture(), Segment(), Tolerance(), planned(0, 1.0)])
@@ -87,8 +101,10 @@ def test_a_malformed_posture_still_is_a_preference(posture):
     assert posture
 
 
-@pytest.mark.parametrize('wrong', [
-    {'poses': np.zeros((3, 6))}, {'point': np.zeros(2, np.int32)}, {'time': np.zeros((3, 1))}])
+@pytest.mark.parametrize(
+    'wrong',
+    [{'poses': np.zeros((3, 6))}, {'point': np.zeros(2, np.int32)}, {'time': np.zeros((3, 1))}],
+)
 def test_a_path_of_unequal_columns_is_refused(wrong):
     with pytest.raises(ValueError, match='shapes differ'):
         reference(**wrong)
@@ -108,7 +124,10 @@ def test_the_duration_of_a_plan_is_the_sum_of_its_segments():
 
 def test_the_report_has_a_line_for_each_segment_then_the_remarks():
     assert plan().report == (
-        'segment 0: MOVEL, 0.1 m', 'segment 1: MOVEL, 0.1 m', 'jerk is ignored')
+        'segment 0: MOVEL, 0.1 m',
+        'segment 1: MOVEL, 0.1 m',
+        'jerk is ignored',
+    )
 
 
 @pytest.mark.parametrize('code', ErrorCode)
@@ -116,13 +135,16 @@ def test_only_success_is_a_success(code):
     assert Outcome(code=code, text='').succeeded == (code == 0)
 
 
-@pytest.mark.parametrize(('interface', 'enum', 'prefix'), [
-    ('msg/MotionSegment.msg', SegmentType, ''),
-    ('msg/MotionSegment.msg', ArcMode, 'ARC_'),
-    ('msg/IOCommand.msg', OutputKind, ''),
-    ('action/FollowCartesianTrajectory.action', ExecutionMode, 'EXECUTION_'),
-    ('action/FollowCartesianTrajectory.action', ErrorCode, ''),
-])
+@pytest.mark.parametrize(
+    ('interface', 'enum', 'prefix'),
+    [
+        ('msg/MotionSegment.msg', SegmentType, ''),
+        ('msg/MotionSegment.msg', ArcMode, 'ARC_'),
+        ('msg/IOCommand.msg', OutputKind, ''),
+        ('action/FollowCartesianTrajectory.action', ExecutionMode, 'EXECUTION_'),
+        ('action/FollowCartesianTrajectory.action', ErrorCode, ''),
+    ],
+)
 def test_the_numbers_are_those_of_the_interfaces(interface, enum, prefix):
     constants = constants_of(interface, prefix)
     assert {member.name: member.value for member in enum}.items() <= constants.items()

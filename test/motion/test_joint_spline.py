@@ -13,9 +13,15 @@ START = (0.1, -1.5, 1.6, -1.2, -1.4, 0.3)
 
 def pieces(quintic):
     random = np.random.default_rng(7)
-    return [Spline(target=tuple(random.normal(size=6)), velocities=tuple(random.normal(size=6)),
-                   accelerations=tuple(random.normal(size=6)) if quintic else None,
-                   duration=float(random.uniform(0.05, 2.0))) for _ in range(5)]
+    return [
+        Spline(
+            target=tuple(random.normal(size=6)),
+            velocities=tuple(random.normal(size=6)),
+            accelerations=tuple(random.normal(size=6)) if quintic else None,
+            duration=float(random.uniform(0.05, 2.0)),
+        )
+        for _ in range(5)
+    ]
 
 
 @pytest.mark.parametrize('quintic', [True, False])

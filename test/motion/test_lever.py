@@ -53,15 +53,21 @@ def test_twist_and_acceleration_are_those_of_the_other_point(t):
     there = twist_at(twist(body, t), lever)
     assert there == pytest.approx(twist(frame, t), abs=1e-5)
     assert acceleration_at(acceleration(body, t), twist(body, t), lever) == pytest.approx(
-        acceleration(frame, t), abs=1e-4)
+        acceleration(frame, t), abs=1e-4
+    )
 
 
 def test_a_state_is_carried_to_a_frame_and_back():
     state = RobotState(
-        timestamp=1.0, actual_q=(0.1,) * 6, T_flange_tcp=Pose((0.0, 0.0, 0.1)),
-        actual_tcp_pose=body(0.4), target_tcp_pose=body(0.41),
-        actual_tcp_twist=twist(body, 0.4), target_tcp_twist=twist(body, 0.41),
-        actual_tcp_acceleration=acceleration(body, 0.4))
+        timestamp=1.0,
+        actual_q=(0.1,) * 6,
+        T_flange_tcp=Pose((0.0, 0.0, 0.1)),
+        actual_tcp_pose=body(0.4),
+        target_tcp_pose=body(0.41),
+        actual_tcp_twist=twist(body, 0.4),
+        target_tcp_twist=twist(body, 0.41),
+        actual_tcp_acceleration=acceleration(body, 0.4),
+    )
     there = seen_at(state, FRAME)
     assert there.actual_tcp_pose.distance_to(frame(0.4)) < 1e-12
     assert there.target_tcp_twist == pytest.approx(twist(frame, 0.41), abs=1e-5)

@@ -51,8 +51,10 @@ def assert_same(a, b, within=1e-12):
 
 def sum_of(a, b):
     """URScript's pose_add: positions are added, rotations multiplied."""
-    return Pose(tuple(x + y for x, y in zip(a.position, b.position, strict=True)),
-                multiply(a.quaternion, b.quaternion))
+    return Pose(
+        tuple(x + y for x, y in zip(a.position, b.position, strict=True)),
+        multiply(a.quaternion, b.quaternion),
+    )
 
 
 # --- References ----------------------------------------------------------------------------------
@@ -84,6 +86,7 @@ def test_the_examples_of_the_script_manual_are_met(function):
 
 
 # --- The group -----------------------------------------------------------------------------------
+
 
 @given(a=POSES, b=POSES, c=POSES)
 def test_composition_is_associative(a, b, c):
@@ -134,6 +137,7 @@ def test_distances_do_not_depend_on_the_frame(a, b, c):
 
 # --- Conversions ---------------------------------------------------------------------------------
 
+
 @given(a=POSES)
 def test_the_matrix_comes_back(a):
     assert_same(Pose.from_matrix(a.matrix()), a)
@@ -147,9 +151,18 @@ def test_the_rotation_vector_comes_back_and_is_no_longer_than_pi(a):
     assert_same(pose(values), a)
 
 
-@pytest.mark.parametrize('vector', [
-    (0.0, 0.0, 0.0), (1e-12, 0.0, 0.0), (0.0, -1e-9, 1e-9), (0.0, 1e-6, 0.0),
-    (pi - 1e-9, 0.0, 0.0), (0.0, -3.0, 0.0), (1.0, -2.0, 0.5)])
+@pytest.mark.parametrize(
+    'vector',
+    [
+        (0.0, 0.0, 0.0),
+        (1e-12, 0.0, 0.0),
+        (0.0, -1e-9, 1e-9),
+        (0.0, 1e-6, 0.0),
+        (pi - 1e-9, 0.0, 0.0),
+        (0.0, -3.0, 0.0),
+        (1.0, -2.0, 0.5),
+    ],
+)
 def test_rotation_vectors_shorter_than_pi_come_back_as_they_are(vector):
     quaternion = quaternion_from_rotation_vector(vector)
     assert rotation_vector_from_quaternion(quaternion) == pytest.approx(vector, abs=1e-15)
@@ -198,6 +211,7 @@ def test_rows_come_back_as_poses(poses):
 
 
 # --- Between two poses ---------------------------------------------------------------------------
+
 
 @given(a=POSES, b=POSES)
 def test_interpolation_begins_and_ends_at_its_poses(a, b):

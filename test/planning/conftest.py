@@ -22,8 +22,11 @@ class Cell:
         self.arm = Arm(robot_model(model))
         self.T_flange_tcp = Pose((0.0, 0.02, 0.1), quaternion_from_rotation_vector((0.1, 0, 0.2)))
         self.state = RobotState(
-            timestamp=0.0, actual_q=q, T_flange_tcp=self.T_flange_tcp,
-            actual_tcp_pose=self.arm.forward(q) @ self.T_flange_tcp)
+            timestamp=0.0,
+            actual_q=q,
+            T_flange_tcp=self.T_flange_tcp,
+            actual_tcp_pose=self.arm.forward(q) @ self.T_flange_tcp,
+        )
 
     @property
     def home(self):
@@ -37,7 +40,8 @@ class Cell:
         """Return a pose moved from home along base axes [m], turned about tool axes [rad]."""
         a, b, c = self.home.position
         turned = Pose((0, 0, 0), self.home.quaternion) @ Pose(
-            (0, 0, 0), quaternion_from_rotation_vector(turn))
+            (0, 0, 0), quaternion_from_rotation_vector(turn)
+        )
         return Pose((a + x, b + y, c + z), turned.quaternion)
 
     def point(self, x=0.0, y=0.0, z=0.0, time=0.0, turn=(0.0, 0.0, 0.0), **fields):

@@ -43,6 +43,7 @@ def needs_meshes(model='ur5'):
 
 # -- self-collision -------------------------------------------------------------------------------
 
+
 @pytest.mark.parametrize('choice', ['warn', 'auto', 'refuse', 'off'])
 def test_capsules_warn_unless_they_are_told_to_refuse(choice):
     clear = check(way(HOME, FOLDED), self_collision=choice)
@@ -89,8 +90,11 @@ def test_meshes_let_pass_what_only_capsules_refuse():
     q, lower = q[lower.min(axis=1) < 0.005], lower[lower.min(axis=1) < 0.005]
     passed = 0
     for row, least in zip(q, lower, strict=True):
-        exact = min(meshes.distances(pair, row[None])[0]
-                    for pair, d in zip(bodies.pairs, least, strict=True) if d < 0.005)
+        exact = min(
+            meshes.distances(pair, row[None])[0]
+            for pair, d in zip(bodies.pairs, least, strict=True)
+            if d < 0.005
+        )
         clear = check(row[None], model='ur5')
         assert (clear.violation is None) == (exact >= 0.005)
         passed += clear.violation is None
@@ -107,8 +111,11 @@ def test_min_clearance_is_how_near_it_may_come():
 
 @pytest.mark.parametrize('model', MODELS)
 def test_an_everyday_way_is_clear(model):
-    for end in ((0.5, -2.0, 2.2, -1.8, -H, 0.3), (0, -0.8, 1.2, -2.0, -H, 0),
-                (0, -H, 0, -H, 0, 0)):
+    for end in (
+        (0.5, -2.0, 2.2, -1.8, -H, 0.3),
+        (0, -0.8, 1.2, -2.0, -H, 0),
+        (0, -H, 0, -H, 0, 0),
+    ):
         clear = check(way(HOME, end), model=model, tcp=TOOL, tool_radius=0.04)
         assert clear.violation is None
         assert clear.warning is None
@@ -130,13 +137,17 @@ def test_a_tool_is_checked_against_the_arm():
 
 # -- planes ---------------------------------------------------------------------------------------
 
+
 def test_a_plane_refuses_the_side_that_its_normal_does_not_point_into():
     """HOME has the flange at x < 0 and z > 0 in ``base``."""
     x, _, z = Arm(MODELS['ur5e']).forward(HOME).position
     for text, inside in (
-            (f'p 0 0 {-0.05} 0 0 1', True), (f'p 0 0 {z - 0.05} 0 0 -1', False),
-            (f'p {x - 0.2} 0 0 1 0 0', True), (f'p {x + 0.01} 0 0 1 0 0', False),
-            (f'p {x - 0.2} 0 0 -1 0 0', False)):
+        (f'p 0 0 {-0.05} 0 0 1', True),
+        (f'p 0 0 {z - 0.05} 0 0 -1', False),
+        (f'p {x - 0.2} 0 0 1 0 0', True),
+        (f'p {x + 0.01} 0 0 1 0 0', False),
+        (f'p {x - 0.2} 0 0 -1 0 0', False),
+    ):
         margin = check(way(HOME, HOME), self_collision='off', workspace_planes=(text,)).margin
         assert (margin > 0.0) == inside, text
 
@@ -156,8 +167,9 @@ def test_the_margin_of_a_plane_is_kept():
     assert check(q, start=(0, -H, 0, -H, 0, 0), tcp=TOOL, workspace_planes=near).violation is None
     wider = (f'table 0 0 {z - 0.03} 0 0 1 0.04',)
     found = check(q, start=(0, -H, 0, -H, 0, 0), tcp=TOOL, workspace_planes=wider).violation
-    assert found.text == ('the TCP comes within 0.0300 m of the workspace plane "table", '
-                          '0.0400 m is asked for')
+    assert found.text == (
+        'the TCP comes within 0.0300 m of the workspace plane "table", 0.0400 m is asked for'
+    )
     assert 'workspace_planes' in found.help
 
 
@@ -166,8 +178,13 @@ def test_a_tool_may_work_on_a_plane_and_go_no_deeper():
     arm = Arm(MODELS['ur5e'])
     z = (arm.forward(HOME) @ TOOL).position[2]
     for depth, passes in ((0.0, True), (0.001, False)):
-        clear = check(way(HOME, HOME)[:1], start=(0, -H, 0, -H, 0, 0), tcp=TOOL, tool_radius=0.03,
-                      workspace_planes=(f'table 0 0 {z + depth} 0 0 1',))
+        clear = check(
+            way(HOME, HOME)[:1],
+            start=(0, -H, 0, -H, 0, 0),
+            tcp=TOOL,
+            tool_radius=0.03,
+            workspace_planes=(f'table 0 0 {z + depth} 0 0 1',),
+        )
         assert (clear.violation is None) == passes
 
 
@@ -265,7 +282,8 @@ def test_a_refusal_names_segment_and_fraction():
     assert clear.violation.row >= 30
     assert str(refusal.value) == (
         f'trajectory.points[3].pose, {percent:.1f} % of the way to it: {clear.violation.text}; '
-        f'{clear.violation.help}.')
+        f'{clear.violation.help}.'
+    )
 
 
 def test_a_warning_goes_into_the_report_with_the_smallest_distance():
@@ -274,11 +292,13 @@ def test_a_warning_goes_into_the_report_with_the_smallest_distance():
     assert 'upper arm and wrist 1 come within' in warned[0]
     assert warned[1] == 'clearance: none between upper arm and wrist 1'
     assert remarks(check(way(HOME, HOME)), SEGMENT, FRACTION) == [
-        'clearance: at least 0.043 m between forearm and wrist 3']
+        'clearance: at least 0.043 m between forearm and wrist 3'
+    ]
     assert remarks(check(way(HOME, HOME), self_collision='off'), SEGMENT, FRACTION) == []
 
 
 # -- whole goals ----------------------------------------------------------------------------------
+
 
 def posture(q):
     return Posture(names=JOINT_NAMES, values=tuple(q))
@@ -288,8 +308,7 @@ def folding(cell):
     """A goal that moves a little and then closes the elbow, from where the cell's arm stands."""
     start = cell.state.actual_q
     near = tuple(np.add(start, (0.1, 0, 0, 0, 0, 0)))
-    points = tuple(Waypoint(pose=cell.tool(q), posture=posture(q))
-                   for q in (near, FOLDED))
+    points = tuple(Waypoint(pose=cell.tool(q), posture=posture(q)) for q in (near, FOLDED))
     return Goal(waypoints=points, segments=(Segment(type=SegmentType.JOINT),) * 2)
 
 
@@ -302,16 +321,23 @@ def test_a_goal_that_folds_the_arm_into_itself_is_a_collision(make_cell):
     with pytest.raises(CollisionPredicted) as refusal:
         plan(folding(cell), cell.state, cell.arm, FREE)
     assert CODES[type(refusal.value)] == ErrorCode.COLLISION == -10
-    assert re.match(r'trajectory\.points\[1\]\.pose, 9\d\.\d % of the way to it: upper arm and '
-                    r'wrist 1 come within 0\.00\d\d m of each other, 0\.0050 m is asked for; ',
-                    str(refusal.value))
+    assert re.match(
+        r'trajectory\.points\[1\]\.pose, 9\d\.\d % of the way to it: upper arm and '
+        r'wrist 1 come within 0\.00\d\d m of each other, 0\.0050 m is asked for; ',
+        str(refusal.value),
+    )
 
 
 def test_where_only_capsules_tell_the_report_warns(make_cell):
     cell = make_cell(model='ur5e')
     made = plan(folding(cell), cell.state, cell.arm, FREE)
-    assert [remark for remark in made.remarks if re.match(
-        r'point 1: 9\d\.\d % of the way to it, upper arm and wrist 1 come within', remark)]
+    assert [
+        remark
+        for remark in made.remarks
+        if re.match(
+            r'point 1: 9\d\.\d % of the way to it, upper arm and wrist 1 come within', remark
+        )
+    ]
     assert 'clearance: none between upper arm and wrist 1' in made.remarks
     refusing = replace(FREE, self_collision='refuse')
     with pytest.raises(CollisionPredicted, match=r'trajectory\.points\[1\]'):
@@ -325,8 +351,11 @@ def test_a_goal_that_crosses_a_plane_is_a_collision(cell):
         options = PlanningOptions(workspace_planes=(f'table 0 0 {z - depth} 0 0 1',))
         with pytest.raises(CollisionPredicted) as refusal:
             plan(goal, cell.state, cell.arm, options)
-        said = re.match(r'trajectory\.points\[1\]\.pose, (.*) % of the way to it: the TCP goes '
-                        r'0\.00.. m beyond the workspace plane "table"; ', str(refusal.value))
+        said = re.match(
+            r'trajectory\.points\[1\]\.pose, (.*) % of the way to it: the TCP goes '
+            r'0\.00.. m beyond the workspace plane "table"; ',
+            str(refusal.value),
+        )
         assert 0.0 < float(said[1]) / 100 - depth / 0.1 < 0.021  # a sample each 2 mm
     options = PlanningOptions(workspace_planes=(f'table 0 0 {z - 0.11} 0 0 1',))
     assert plan(goal, cell.state, cell.arm, options).segments
@@ -335,6 +364,8 @@ def test_a_goal_that_crosses_a_plane_is_a_collision(cell):
 def test_a_goal_may_lead_out_of_a_collision(make_cell):
     needs_meshes()
     cell = make_cell(FOLDED, model='ur5')
-    goal = Goal(waypoints=(Waypoint(pose=cell.tool(HOME), posture=posture(HOME)),),
-                segments=(Segment(type=SegmentType.JOINT),))
+    goal = Goal(
+        waypoints=(Waypoint(pose=cell.tool(HOME), posture=posture(HOME)),),
+        segments=(Segment(type=SegmentType.JOINT),),
+    )
     assert plan(goal, cell.state, cell.arm, FREE).segments

@@ -36,9 +36,14 @@ def moved(pose, x=0.0, y=0.0, z=0.0, turn=(0.0, 0.0, 0.0)):
 
 def goal_of(*poses, segments=(), frame=IDENTITY, **fields):
     """Return a goal whose poses in base are these, given in a frame."""
-    return Goal(waypoints=tuple(Waypoint(pose=frame.inverse() @ pose) for pose in poses),
-                segments=segments, T_base_frame=frame, controlled_frame='nozzle',
-                T_flange_controlled=T_FLANGE_NOZZLE, **fields)
+    return Goal(
+        waypoints=tuple(Waypoint(pose=frame.inverse() @ pose) for pose in poses),
+        segments=segments,
+        T_base_frame=frame,
+        controlled_frame='nozzle',
+        T_flange_controlled=T_FLANGE_NOZZLE,
+        **fields,
+    )
 
 
 def off_line(points, a, b):
@@ -81,9 +86,12 @@ def test_the_active_tcp_by_another_name_changes_nothing(cell, change):
 def test_a_goal_that_does_not_turn_is_carried_over_to_the_tcp(cell):
     start = nozzle(cell)
     via, end = moved(start, y=0.05, z=0.03), moved(start, y=0.1)
-    goal = goal_of(end, moved(start, y=0.02), segments=(
-        Segment(type=SegmentType.CIRCULAR, via=BASE_LINK.inverse() @ via), Segment()),
-        frame=BASE_LINK)
+    goal = goal_of(
+        end,
+        moved(start, y=0.02),
+        segments=(Segment(type=SegmentType.CIRCULAR, via=BASE_LINK.inverse() @ via), Segment()),
+        frame=BASE_LINK,
+    )
     made = plan(goal, cell.state, cell.arm, KEEP)
     assert made.T_flange_tcp is None
     assert any('carried over from nozzle' in line for line in made.report)
@@ -109,9 +117,15 @@ def circle(a, b, c):
 def test_the_orientation_of_a_via_does_not_move_the_arc(cell):
     start = nozzle(cell)
     via = moved(start, y=0.05, z=0.03, turn=(0.0, 0.0, 1.0))
-    made = [plan(goal_of(moved(start, y=0.1), segments=(
-        Segment(type=SegmentType.CIRCULAR, via=pose),)), cell.state, cell.arm, KEEP)
-        for pose in (via, Pose(via.position, start.quaternion))]
+    made = [
+        plan(
+            goal_of(moved(start, y=0.1), segments=(Segment(type=SegmentType.CIRCULAR, via=pose),)),
+            cell.state,
+            cell.arm,
+            KEEP,
+        )
+        for pose in (via, Pose(via.position, start.quaternion))
+    ]
     assert np.allclose(*(m.reference.poses for m in made), atol=1e-9)
 
 
@@ -119,10 +133,16 @@ def test_the_orientation_of_a_via_does_not_move_the_arc(cell):
 def test_a_turn_on_the_way_needs_the_tcp_and_is_refused_with_point_and_angle(cell, kind):
     start = nozzle(cell)
     via = moved(start, y=0.05, z=0.03) if kind == SegmentType.CIRCULAR else None
-    goal = goal_of(moved(start, y=0.05), moved(start, y=0.1, turn=(0.0, radians(2.0), 0.0)),
-                   segments=(Segment(), Segment(type=kind, via=via)))
-    with pytest.raises(InvalidGoal, match=r'points\[1\]\.pose\.orientation turns nozzle by 2\.00 '
-                                          r'degrees.*JOINT.*allow_tcp_change'):
+    goal = goal_of(
+        moved(start, y=0.05),
+        moved(start, y=0.1, turn=(0.0, radians(2.0), 0.0)),
+        segments=(Segment(), Segment(type=kind, via=via)),
+    )
+    with pytest.raises(
+        InvalidGoal,
+        match=r'points\[1\]\.pose\.orientation turns nozzle by 2\.00 '
+        r'degrees.*JOINT.*allow_tcp_change',
+    ):
         plan(goal, cell.state, cell.arm, KEEP)
 
 
@@ -134,8 +154,14 @@ def test_the_way_to_the_first_point_counts_too(cell):
 
 def test_an_arc_that_keeps_to_its_tangent_turns(cell):
     start = nozzle(cell)
-    goal = goal_of(moved(start, y=0.1), segments=(Segment(
-        type=SegmentType.CIRCULAR, via=moved(start, y=0.05, z=0.03), arc_mode=ArcMode.FIXED),))
+    goal = goal_of(
+        moved(start, y=0.1),
+        segments=(
+            Segment(
+                type=SegmentType.CIRCULAR, via=moved(start, y=0.05, z=0.03), arc_mode=ArcMode.FIXED
+            ),
+        ),
+    )
     with pytest.raises(InvalidGoal, match=r'segments\[0\]\.arc_mode is FIXED'):
         plan(goal, cell.state, cell.arm, KEEP)
 
@@ -155,8 +181,13 @@ def spline_of(cell, angular):
     start = nozzle(cell)
     goal = goal_of(moved(start, x=0.03, y=0.02), moved(start, x=0.06))
     passing, end = goal.waypoints
-    return replace(goal, waypoints=(
-        replace(passing, time=1.0, twist=(0.06, 0.0, 0.0, *angular)), replace(end, time=2.0)))
+    return replace(
+        goal,
+        waypoints=(
+            replace(passing, time=1.0, twist=(0.06, 0.0, 0.0, *angular)),
+            replace(end, time=2.0),
+        ),
+    )
 
 
 @pytest.mark.parametrize('options', [CHANGE, KEEP])
@@ -165,8 +196,9 @@ def test_a_spline_that_does_not_turn_has_the_twist_asked_for(cell, angular, opti
     made = plan(spline_of(cell, angular), cell.state, cell.arm, options)
     path, time = nozzle_of(made), made.reference.time
     row = int(np.searchsorted(time, 1.0))
-    before, after = ((path[row + k] - path[row + k - 1]) / (time[row + k] - time[row + k - 1])
-                     for k in (0, 1))
+    before, after = (
+        (path[row + k] - path[row + k - 1]) / (time[row + k] - time[row + k - 1]) for k in (0, 1)
+    )
     assert 0.5 * (before + after) == pytest.approx([0.06, 0.0, 0.0], abs=5e-4)
     assert path[row] == pytest.approx(np.array(moved(nozzle(cell), x=0.03, y=0.02).position))
 
@@ -182,21 +214,29 @@ def test_a_first_point_at_time_zero_is_where_the_controlled_frame_stands(cell, o
     start = nozzle(cell)
     times = (0.0, 1.0)
     goal = goal_of(start, moved(start, y=0.05))
-    goal = replace(goal, waypoints=tuple(
-        replace(point, time=time) for point, time in zip(goal.waypoints, times, strict=True)))
+    goal = replace(
+        goal,
+        waypoints=tuple(
+            replace(point, time=time) for point, time in zip(goal.waypoints, times, strict=True)
+        ),
+    )
     assert len(plan(goal, cell.state, cell.arm, options).segments) == 1
 
 
 @pytest.mark.parametrize('options', [CHANGE, KEEP])
 @pytest.mark.parametrize(('beyond', 'refused'), [(0.01, None), (-0.01, CollisionPredicted)])
 def test_the_tool_that_is_mounted_keeps_clear_also_when_the_flange_is_moved(
-        cell, options, beyond, refused):
+    cell, options, beyond, refused
+):
     """The TCP points down and goes down by 5 cm, to a table a little below or above."""
     tcp = cell.state.actual_tcp_pose.position[2]
     flange = cell.arm.forward(cell.state.actual_q)
     assert flange.position[2] > tcp + 0.09
-    options = replace(options, self_collision='off', workspace_planes=(
-        f'table 0 0 {tcp - 0.05 - beyond} 0 0 1 0',))
+    options = replace(
+        options,
+        self_collision='off',
+        workspace_planes=(f'table 0 0 {tcp - 0.05 - beyond} 0 0 1 0',),
+    )
     goal = replace(goal_of(moved(flange, y=0.02, z=-0.05)), T_flange_controlled=IDENTITY)
     if refused is None:
         assert plan(goal, cell.state, cell.arm, options).segments

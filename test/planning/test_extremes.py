@@ -47,20 +47,29 @@ def test_a_point_in_millimetres_or_beyond_the_moon_is_refused_at_once(cell, z):
 
 
 @pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.JOINT, TYPE.PROCESS])
-@pytest.mark.parametrize('point', [{'y': 0.05}, {'turn': (0.0, 0.0, 0.5)},
-                                   {'y': 0.01, 'turn': (0.0, 0.0, 0.5)}])
+@pytest.mark.parametrize(
+    'point', [{'y': 0.05}, {'turn': (0.0, 0.0, 0.5)}, {'y': 0.01, 'turn': (0.0, 0.0, 0.5)}]
+)
 def test_a_huge_speed_or_acceleration_becomes_one_that_the_arm_has(cell, kind, point):
     segment = Segment(type=kind, velocity=1e300, acceleration=1e300)
     made = sent(cell, Goal(waypoints=(cell.point(**point),), segments=(segment,)))
     q, q_end = cell.state.actual_q, made.segments[0].joints
-    fastest = max(abs(b - a) / speed for a, b, speed in zip(
-        q, q_end, cell.arm.model.max_joint_speed, strict=True))
+    fastest = max(
+        abs(b - a) / speed
+        for a, b, speed in zip(q, q_end, cell.arm.model.max_joint_speed, strict=True)
+    )
     assert made.duration > fastest
 
 
-@pytest.mark.parametrize(('field', 'value', 'kind'), [
-    ('acceleration', 1e-300, TYPE.LINEAR), ('acceleration', 1e-7, TYPE.JOINT),
-    ('velocity', 1e-300, TYPE.LINEAR), ('velocity', 1e-9, TYPE.OPTIMIZED_LINEAR)])
+@pytest.mark.parametrize(
+    ('field', 'value', 'kind'),
+    [
+        ('acceleration', 1e-300, TYPE.LINEAR),
+        ('acceleration', 1e-7, TYPE.JOINT),
+        ('velocity', 1e-300, TYPE.LINEAR),
+        ('velocity', 1e-9, TYPE.OPTIMIZED_LINEAR),
+    ],
+)
 def test_what_would_be_zero_on_the_wire_is_refused(cell, field, value, kind):
     segment = Segment(**{'type': kind, field: value})
     with pytest.raises(InvalidGoal, match=r'points\[0\].*raise'):
@@ -87,26 +96,37 @@ def beside_the_wrist(make_cell, **fields):
 @pytest.mark.parametrize('choice', ['slow', 'refuse'])
 def test_a_time_that_the_wire_cannot_carry_is_refused_and_not_proposed(make_cell, choice):
     cell, goal = beside_the_wrist(make_cell, time=3.0)
-    with pytest.raises(TooFast, match=(
+    with pytest.raises(
+        TooFast,
+        match=(
             r'points\[0\]\.time_from_start .* because of .*wrist_1_joint at 50 % of the way it '
-            r'takes \d{5} s, more than max_segment_time = 2147 s; go around')):
+            r'takes \d{5} s, more than max_segment_time = 2147 s; go around'
+        ),
+    ):
         sent(cell, goal, singularity_margin_wrist=0.0, on_too_fast=choice)
 
 
 @pytest.mark.parametrize('turn', [0.0, 0.5])
 def test_blends_that_touch_leave_numbers_that_can_be_sent(cell, turn):
     """Nothing is left of the line between them, so a speed on it means nothing."""
-    points = tuple(cell.point(0.02 * k, turn=(0.0, 0.0, (k % 2) * turn), time=float(k))
-                   for k in (1, 2, 3))
-    made = sent(cell, Goal(waypoints=points, segments=(
-        Segment(blend_radius=0.01), Segment(blend_radius=0.01), Segment())))
+    points = tuple(
+        cell.point(0.02 * k, turn=(0.0, 0.0, (k % 2) * turn), time=float(k)) for k in (1, 2, 3)
+    )
+    made = sent(
+        cell,
+        Goal(
+            waypoints=points,
+            segments=(Segment(blend_radius=0.01), Segment(blend_radius=0.01), Segment()),
+        ),
+    )
     assert made.segments[1].primitive.duration == pytest.approx(1.0)
     assert made.segments[1].primitive.acceleration < 10.0
 
 
 def test_a_line_that_turns_so_slowly_that_no_time_carries_it_is_refused(cell):
-    goal = Goal(waypoints=(cell.point(0.1, turn=(0.0, 0.0, 0.5)),),
-                segments=(Segment(velocity=1e-5),))
+    goal = Goal(
+        waypoints=(cell.point(0.1, turn=(0.0, 0.0, 0.5)),), segments=(Segment(velocity=1e-5),)
+    )
     with pytest.raises(InvalidGoal, match='more than max_segment_time = 2147 s; raise velocity'):
         sent(cell, goal)
 
@@ -115,9 +135,15 @@ def test_the_time_of_an_optimized_line_is_that_of_its_way_not_of_its_worst_place
     """Beside a singularity the arm is slow for a moment; a movel is slow all the way."""
     cell, goal = beside_the_wrist(make_cell, type=TYPE.OPTIMIZED_LINEAR)
     made = sent(cell, goal, singularity_margin_wrist=0.0, max_tool_speed=0.0)
-    wrist = max(abs(b - a) / speed for a, b, speed in zip(
-        cell.state.actual_q, made.segments[0].joints, cell.arm.model.max_joint_speed,
-        strict=True))
+    wrist = max(
+        abs(b - a) / speed
+        for a, b, speed in zip(
+            cell.state.actual_q,
+            made.segments[0].joints,
+            cell.arm.model.max_joint_speed,
+            strict=True,
+        )
+    )
     assert wrist < 0.3 * made.duration < 2.0 * wrist
 
 
@@ -149,8 +175,10 @@ def test_absurd_numbers_in_a_spline_are_refused_at_once_or_can_be_sent(cell, fie
             point = replace(point, pose=Pose((value, 0.0, 0.0), point.pose.quaternion))
     goal = Goal(waypoints=(point, cell.point(time=time + 1.0)), execution=ExecutionMode.SPLINE)
     begin = process_time()
-    for options in ({}, {'on_too_fast': 'slow', 'max_tool_speed': 0.0,
-                         'max_approach_distance': 0.0}):
+    for options in (
+        {},
+        {'on_too_fast': 'slow', 'max_tool_speed': 0.0, 'max_approach_distance': 0.0},
+    ):
         try:
             sent(cell, goal, self_collision='off', **options)
         except GoalRefused:
@@ -166,8 +194,9 @@ def test_a_spline_that_turns_the_tool_more_than_once_around_names_its_point(cell
 
 
 def test_a_spline_of_kilometres_is_refused_before_it_is_looked_at(cell):
-    wide = tuple(cell.point(0.01, time=1.0 + k, twist=(40.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-                 for k in range(2000))
+    wide = tuple(
+        cell.point(0.01, time=1.0 + k, twist=(40.0, 0.0, 0.0, 0.0, 0.0, 0.0)) for k in range(2000)
+    )
     goal = Goal(waypoints=(*wide, cell.point(time=2001.0)))
     begin = process_time()
     with pytest.raises(InvalidGoal, match=r'a detour of|would have to be looked at in'):

@@ -40,8 +40,12 @@ from ur_cartesian_driver.planning.samples import Piece, places_on, STEP_ANGLE, S
 TYPE = SegmentType
 #: Where only the way of the arm counts.
 FREE = PlanningOptions(max_approach_distance=0.0, self_collision='off')
-NO_MARGINS = replace(FREE, singularity_margin_wrist=0.0, singularity_margin_elbow=0.0,
-                     singularity_margin_shoulder=0.0)
+NO_MARGINS = replace(
+    FREE,
+    singularity_margin_wrist=0.0,
+    singularity_margin_elbow=0.0,
+    singularity_margin_shoulder=0.0,
+)
 
 
 def refusal(error, cell, goal, options=FREE):
@@ -109,8 +113,9 @@ def test_a_line_past_a_straight_wrist_is_refused_by_name_where_it_is_nearest(mak
 def elbow(cell):
     """Return the angle of the elbow of a pose without a turn of the base, -1 where none is."""
     shape, pan = shape_of(cell.arm), cell.state.actual_q[0]
-    return lambda flange: min((abs(q[2]) for q in closed_form(shape, flange)
-                               if abs(q[0] - pan) < 0.5), default=-1.0)
+    return lambda flange: min(
+        (abs(q[2]) for q in closed_form(shape, flange) if abs(q[0] - pan) < 0.5), default=-1.0
+    )
 
 
 def stretching(make_cell, angle):
@@ -153,8 +158,12 @@ def column_line(make_cell, beside):
     far, radius = hypot(x, y), abs(shape.d4) + beside
     inwards = np.array((-x, -y)) / far
     angle = np.arcsin(radius / far)
-    turned = np.array((inwards[0] * np.cos(angle) - inwards[1] * np.sin(angle),
-                       inwards[0] * np.sin(angle) + inwards[1] * np.cos(angle)))
+    turned = np.array(
+        (
+            inwards[0] * np.cos(angle) - inwards[1] * np.sin(angle),
+            inwards[0] * np.sin(angle) + inwards[1] * np.cos(angle),
+        )
+    )
     way = 2.0 * np.sqrt(far * far - radius * radius) * turned
     return cell, cell.pose(way[0], way[1])
 
@@ -163,7 +172,8 @@ def test_a_line_past_the_shoulder_is_refused_by_name_where_it_is_nearest(make_ce
     cell, end = column_line(make_cell, 5e-4)
     shape = shape_of(cell.arm)
     u, nearest_way = least_on_line(
-        cell, end, lambda flange: hypot(*wrist_centre(shape, flange)[:2]))
+        cell, end, lambda flange: hypot(*wrist_centre(shape, flange)[:2])
+    )
     assert nearest_way == pytest.approx(abs(shape.d4) + 5e-4, abs=1e-6)
     text = refusal(NearSingularity, cell, to(end))
     assert 'of the shoulder singularity' in text
@@ -185,8 +195,11 @@ def test_a_line_through_the_column_over_the_base_is_out_of_reach_where_it_enters
 
 @pytest.mark.parametrize('name', ['wrist', 'shoulder'])
 def test_joint_moves_pass_singularities_and_may_replace_the_line(make_cell, name):
-    cell, end = (across(make_cell, WRIST, (0.0, 1.0, 0.0)) if name == 'wrist'
-                 else column_line(make_cell, 5e-4))
+    cell, end = (
+        across(make_cell, WRIST, (0.0, 1.0, 0.0))
+        if name == 'wrist'
+        else column_line(make_cell, 5e-4)
+    )
     joint = replace(to(end), segments=(Segment(type=TYPE.JOINT),))
     assert isinstance(plan(joint, cell.state, cell.arm, FREE).segments[0].primitive, MoveJ)
     made = plan(to(end), cell.state, cell.arm, replace(FREE, on_posture_change='movej'))
@@ -201,8 +214,10 @@ def test_a_line_in_a_run_that_becomes_a_joint_move_leaves_the_others_as_they_wer
     cell, end = across(make_cell, WRIST, (0.0, 1.0, 0.0), half=0.1)
     line = Line.between(cell.home, end)
     poses = [line.pose(u) for u in (0.1, 0.2, 0.9, 1.0)]
-    goal = Goal(waypoints=tuple(Waypoint(pose=pose) for pose in poses),
-                segments=(Segment(), Segment(), Segment(blend_radius=0.002), Segment()))
+    goal = Goal(
+        waypoints=tuple(Waypoint(pose=pose) for pose in poses),
+        segments=(Segment(), Segment(), Segment(blend_radius=0.002), Segment()),
+    )
     made = plan(goal, cell.state, cell.arm, replace(FREE, on_posture_change='movej'))
     kinds = [type(segment.primitive) for segment in made.segments]
     assert kinds == [MoveL, MoveL, MoveJ, MoveL]
@@ -250,8 +265,10 @@ def test_a_corner_that_leads_out_of_a_joint_move_is_no_start_at_rest(make_cell):
     behind = make_cell((0.0, -pi / 2, pi / 2, -pi / 2, 0.3, 0.0))
     straight = make_cell((0.0, -pi / 2, pi / 2, -pi / 2, -1e-4, 0.0))
     radius = straight.home.distance_to(behind.home)
-    goal = Goal(waypoints=(Waypoint(pose=behind.home), Waypoint(pose=behind.pose(0.0, -0.1, 0.0))),
-                segments=(Segment(type=TYPE.JOINT, blend_radius=radius), Segment()))
+    goal = Goal(
+        waypoints=(Waypoint(pose=behind.home), Waypoint(pose=behind.pose(0.0, -0.1, 0.0))),
+        segments=(Segment(type=TYPE.JOINT, blend_radius=radius), Segment()),
+    )
     text = refusal(NearSingularity, cell, goal)
     assert text.startswith('trajectory.points[0].pose, ')
     assert 'wrist' in text
@@ -287,12 +304,16 @@ def test_a_blended_corner_is_looked_at_and_not_the_point_that_it_leaves_out(make
     middle = line.pose(0.5)
     centre = np.array(wrist_centre(shape, middle @ cell.T_flange_tcp.inverse()))
     inwards = -centre[:2] / hypot(*centre[:2])
-    corner = Pose(tuple(np.array(middle.position) + np.append(0.035 * inwards, 0.0)),
-                  middle.quaternion)
+    corner = Pose(
+        tuple(np.array(middle.position) + np.append(0.035 * inwards, 0.0)), middle.quaternion
+    )
 
     def goal(radius):
-        return Goal(waypoints=(Waypoint(pose=corner), Waypoint(pose=end)),
-                    segments=(Segment(blend_radius=radius), Segment()))
+        return Goal(
+            waypoints=(Waypoint(pose=corner), Waypoint(pose=end)),
+            segments=(Segment(blend_radius=radius), Segment()),
+        )
+
     assert 'points[0].pose' in refusal(Unreachable, cell, goal(0.0), NO_MARGINS)
     wide = 0.9 * min(line.length, cell.home.distance_to(corner), corner.distance_to(end))
     assert len(plan(goal(wide), cell.state, cell.arm, NO_MARGINS).segments) == 2
@@ -302,8 +323,9 @@ def test_two_thousand_points_in_a_wrong_frame_are_refused_at_once(cell):
     geometry = cell.arm.geometry
     measured = Arm(cell.arm.model, replace(geometry, a=tuple(a - 2e-4 for a in geometry.a)))
     assert measured.calibrated
-    state = replace(cell.state, actual_tcp_pose=measured.forward(cell.state.actual_q)
-                    @ cell.T_flange_tcp)
+    state = replace(
+        cell.state, actual_tcp_pose=measured.forward(cell.state.actual_q) @ cell.T_flange_tcp
+    )
     goal = Goal(waypoints=tuple(cell.point(0.005 * i) for i in range(1, 2001)))
     begin = process_time()
     with pytest.raises(GoalRefused):
@@ -335,8 +357,11 @@ def test_places_are_dense_and_on_their_curves(cell, a, b, radius, fillet):
     if min(first.length, second.length) <= 2.5 * radius:
         return
     (corner,) = corners([Meeting(first, second, radius, fillet)])
-    pieces = [Piece.part(0, first, 0.0, corner.leave), Piece.corner(0, corner),
-              Piece.part(1, second, corner.join, 1.0)]
+    pieces = [
+        Piece.part(0, first, 0.0, corner.leave),
+        Piece.corner(0, corner),
+        Piece.part(1, second, corner.join, 1.0),
+    ]
     places = places_on(pieces)
     rows = np.concatenate([[cell.home.row()], places.poses])
     assert np.linalg.norm(np.diff(rows[:, :3], axis=0), axis=1).max() <= 2.0 * STEP_LENGTH + 1e-9
@@ -345,7 +370,8 @@ def test_places_are_dense_and_on_their_curves(cell, a, b, radius, fillet):
     for k, t, pose in zip(places.piece, places.t, places.poses, strict=True):
         one = pieces[k].pose(float(t))
         assert np.allclose(one.row(), pose, atol=1e-9) or np.allclose(
-            one.row()[3:], -pose[3:], atol=1e-9)
+            one.row()[3:], -pose[3:], atol=1e-9
+        )
 
 
 @settings(max_examples=15, deadline=None)
@@ -370,8 +396,12 @@ def test_the_joints_of_many_places_are_those_of_each_after_the_other(cell, a, b)
 def test_a_corner_between_joint_moves_stays_in_joint_space(cell):
     q = np.array(cell.state.actual_q)
     way = JointLine.between(cell.arm, cell.T_flange_tcp, tuple(q), tuple(q + 0.3))
-    back = JointLine.between(cell.arm, cell.T_flange_tcp, tuple(q + 0.3), tuple(
-        q + np.array((0.5, 0.3, 0.2, 0.3, 0.3, 0.1))))
+    back = JointLine.between(
+        cell.arm,
+        cell.T_flange_tcp,
+        tuple(q + 0.3),
+        tuple(q + np.array((0.5, 0.3, 0.2, 0.3, 0.3, 0.1))),
+    )
     (corner,) = corners([Meeting(way, back, 0.02, False)])
     rows = corner.joint_rows(np.array((0.0, 1.0)))
     assert rows[0] == pytest.approx(way.joints(corner.leave))
@@ -384,8 +414,10 @@ def test_a_corner_between_joint_moves_stays_in_joint_space(cell):
 
 def test_every_line_says_what_came_nearest_and_the_last_remark_the_least_of_all(cell):
     points = (cell.point(0.05), cell.point(0.05, 0.1), cell.point(0.0, 0.1))
-    goal = Goal(waypoints=points, segments=(
-        Segment(blend_radius=0.01), Segment(type=TYPE.JOINT), Segment()))
+    goal = Goal(
+        waypoints=points,
+        segments=(Segment(blend_radius=0.01), Segment(type=TYPE.JOINT), Segment()),
+    )
     made = plan(goal, cell.state, cell.arm, FREE)
     for segment in made.segments:
         assert re.search(r'; nearest: .* [\d.]+ (rad|m) at \d+ %$', segment.note)

@@ -34,10 +34,16 @@ def command(waypoint=0, offset=0.0, output=OutputKind.STANDARD_DIGITAL, pin=0, v
 
 
 def square(cell, *commands, radius=0.01, kind=SegmentType.LINEAR, **changes):
-    segments = tuple(Segment(type=kind, velocity=0.1, acceleration=1.0, blend_radius=r)
-                     for r in (radius, radius, 0.0))
-    return Goal(waypoints=tuple(cell.point(x, y) for x, y in CORNERS), segments=segments,
-                io_commands=commands, **changes)
+    segments = tuple(
+        Segment(type=kind, velocity=0.1, acceleration=1.0, blend_radius=r)
+        for r in (radius, radius, 0.0)
+    )
+    return Goal(
+        waypoints=tuple(cell.point(x, y) for x, y in CORNERS),
+        segments=segments,
+        io_commands=commands,
+        **changes,
+    )
 
 
 def planned(cell, goal, options=OPTIONS):
@@ -57,7 +63,7 @@ def base_direction(record):
 
 def test_in_a_corner_the_place_is_that_of_the_path_nearest_to_the_point(cell):
     made = planned(cell, square(cell, command(0)))
-    (waypoint, record), = records(made)
+    ((waypoint, record),) = records(made)
     assert waypoint == 0
     corner = np.array(cell.pose(*CORNERS[0]).position)
     place = np.array(record.place.position)
@@ -73,13 +79,14 @@ def test_at_a_stop_it_is_switched_at_once(cell):
     made = planned(cell, square(cell, command(0), command(2), radius=0.0))
     assert records(made) == [
         (waypoint, SwitchOutput(output=OutputKind.STANDARD_DIGITAL, pin=0, value=1.0))
-        for waypoint in (0, 2)]
+        for waypoint in (0, 2)
+    ]
 
 
 def test_a_time_after_a_point_is_a_place_on_the_way_behind_it(cell):
     """At 0.1 m/s: 0.2 s after the middle of the first corner, on the second side."""
     made = planned(cell, square(cell, command(0, offset=0.2)))
-    (waypoint, record), = records(made)
+    ((waypoint, record),) = records(made)
     assert waypoint == 0
     x, y, _ = np.array(record.place.position) - np.array(cell.home.position)
     assert x == pytest.approx(0.05, abs=1e-6)
@@ -89,10 +96,11 @@ def test_a_time_after_a_point_is_a_place_on_the_way_behind_it(cell):
 
 def test_a_time_in_a_later_corner_stands_behind_the_motion_that_returns_there(cell):
     made = planned(cell, square(cell, command(0, offset=0.47)))
-    (waypoint, record), = records(made)
+    ((waypoint, record),) = records(made)
     assert waypoint == 1
-    apart = [a - b for a, b in zip(
-        record.place.position, cell.pose(*CORNERS[1]).position, strict=True)]
+    apart = [
+        a - b for a, b in zip(record.place.position, cell.pose(*CORNERS[1]).position, strict=True)
+    ]
     assert hypot(*apart) < 0.01
 
 
@@ -106,11 +114,22 @@ def test_what_lies_behind_the_end_is_a_delay(cell):
 
 
 def test_outputs_stand_in_the_order_of_their_times_and_else_as_they_were_given(cell):
-    made = planned(cell, square(
-        cell, command(1, pin=4), command(0, pin=1), command(0, offset=0.1, pin=3),
-        command(0, pin=2)))
+    made = planned(
+        cell,
+        square(
+            cell,
+            command(1, pin=4),
+            command(0, pin=1),
+            command(0, offset=0.1, pin=3),
+            command(0, pin=2),
+        ),
+    )
     assert [(waypoint, record.pin) for waypoint, record in records(made)] == [
-        (0, 1), (0, 2), (0, 3), (1, 4)]
+        (0, 1),
+        (0, 2),
+        (0, 3),
+        (1, 4),
+    ]
 
 
 def test_the_wire_carries_them_behind_their_motions(cell):
@@ -121,14 +140,21 @@ def test_the_wire_carries_them_behind_their_motions(cell):
 
 
 def test_the_report_tells_them_with_their_points(cell):
-    made = planned(cell, square(
-        cell, command(0), command(1, offset=0.1, value=0.0),
-        command(2, offset=0.2, output=OutputKind.STANDARD_ANALOG, value=0.25)))
+    made = planned(
+        cell,
+        square(
+            cell,
+            command(0),
+            command(1, offset=0.1, value=0.0),
+            command(2, offset=0.2, output=OutputKind.STANDARD_ANALOG, value=0.25),
+        ),
+    )
     first, second, third, *_ = made.report
     assert first.endswith('; switches standard digital output 0 on in the middle of its corner')
     assert second.endswith('; switches standard digital output 0 off 0.100 s after it')
     assert third.endswith(
-        '; switches standard analog output 0 to 0.25 (current) 0.200 s after the end')
+        '; switches standard analog output 0 to 0.25 (current) 0.200 s after the end'
+    )
 
 
 def test_an_arc_that_begins_beyond_the_plane_of_a_place_comes_round_to_it(cell):
@@ -136,19 +162,25 @@ def test_an_arc_that_begins_beyond_the_plane_of_a_place_comes_round_to_it(cell):
     r = 0.05
     goal = Goal(
         waypoints=(cell.point(x=-0.02), cell.point(), cell.point(x=r, y=-r)),
-        segments=(Segment(velocity=0.1), Segment(velocity=0.1), Segment(
-            type=SegmentType.CIRCULAR, velocity=0.1, via=cell.pose(x=2 * r))),
-        io_commands=(command(1, offset=0.8), command(1, offset=1.8)))
+        segments=(
+            Segment(velocity=0.1),
+            Segment(velocity=0.1),
+            Segment(type=SegmentType.CIRCULAR, velocity=0.1, via=cell.pose(x=2 * r)),
+        ),
+        io_commands=(command(1, offset=0.8), command(1, offset=1.8)),
+    )
     early, late = (record for _, record in records(planned(cell, goal)))
     assert not early.comes_round
     assert late.comes_round
 
 
 def test_a_turn_in_place_has_a_heading_about_its_axis(cell):
-    goal = Goal(waypoints=(cell.point(x=0.02), cell.point(x=0.02, turn=(0.0, 0.0, 1.0))),
-                segments=(Segment(velocity=0.1), Segment(velocity=0.5)),
-                io_commands=(command(0, offset=1.0),))
-    (waypoint, record), = records(planned(cell, goal))
+    goal = Goal(
+        waypoints=(cell.point(x=0.02), cell.point(x=0.02, turn=(0.0, 0.0, 1.0))),
+        segments=(Segment(velocity=0.1), Segment(velocity=0.5)),
+        io_commands=(command(0, offset=1.0),),
+    )
+    ((waypoint, record),) = records(planned(cell, goal))
     assert waypoint == 0
     assert record.heading == pytest.approx((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), abs=1e-6)
 
@@ -156,14 +188,23 @@ def test_a_turn_in_place_has_a_heading_about_its_axis(cell):
 @pytest.mark.parametrize('offset', [0.0, 0.25])
 def test_along_a_spline_the_place_is_where_the_tool_is_at_that_time(cell, offset):
     twist = (0.04, 0.0, 0.0, 0.0, 0.0, 0.0)
-    goal = Goal(waypoints=(cell.point(x=0.02, time=1.0, twist=twist),
-                           cell.point(x=0.06, y=0.01, time=2.0, twist=twist),
-                           cell.point(x=0.1, time=3.5)),
-                execution=ExecutionMode.SPLINE, io_commands=(command(1, offset=offset),))
+    goal = Goal(
+        waypoints=(
+            cell.point(x=0.02, time=1.0, twist=twist),
+            cell.point(x=0.06, y=0.01, time=2.0, twist=twist),
+            cell.point(x=0.1, time=3.5),
+        ),
+        execution=ExecutionMode.SPLINE,
+        io_commands=(command(1, offset=offset),),
+    )
     made = planned(cell, goal)
-    (_, record), = records(made)
-    before = sum(segment.duration for segment in made.segments[:next(
-        k + 1 for k, segment in enumerate(made.segments) if segment.outputs)])
+    ((_, record),) = records(made)
+    before = sum(
+        segment.duration
+        for segment in made.segments[
+            : next(k + 1 for k, segment in enumerate(made.segments) if segment.outputs)
+        ]
+    )
     assert before <= 2.0 + offset + 1e-6
     times, poses = made.reference.time, made.reference.poses
     there = [np.interp(2.0 + offset, times, poses[:, axis]) for axis in range(3)]
@@ -173,10 +214,16 @@ def test_along_a_spline_the_place_is_where_the_tool_is_at_that_time(cell, offset
 
 def test_where_a_spline_stops_it_is_switched_at_once(cell):
     twist = (0.04, 0.0, 0.0, 0.0, 0.0, 0.0)
-    goal = Goal(waypoints=(cell.point(x=0.02, time=1.0, twist=twist),
-                           cell.point(x=0.06, time=2.0), cell.point(x=0.1, time=3.5)),
-                execution=ExecutionMode.SPLINE, io_commands=(command(1),))
-    (_, record), = records(planned(cell, goal))
+    goal = Goal(
+        waypoints=(
+            cell.point(x=0.02, time=1.0, twist=twist),
+            cell.point(x=0.06, time=2.0),
+            cell.point(x=0.1, time=3.5),
+        ),
+        execution=ExecutionMode.SPLINE,
+        io_commands=(command(1),),
+    )
+    ((_, record),) = records(planned(cell, goal))
     assert record.place is None
 
 
@@ -193,7 +240,8 @@ REFUSED = [
     (command(output=OutputKind.STANDARD_ANALOG, value=-inf), r'\.value is -inf'),
     (command(offset=-0.001), r'\.offset is -0\.001 s; it is 0 to 60 s after the point; '),
     (command(offset=nan), r'\.offset is nan'),
-    (command(offset=LARGEST_OFFSET + 0.1), r'\.offset is 60\.1 s')]
+    (command(offset=LARGEST_OFFSET + 0.1), r'\.offset is 60\.1 s'),
+]
 
 
 @pytest.mark.parametrize(('wrong', 'text'), REFUSED)
@@ -211,13 +259,13 @@ def test_older_robot_programs_switch_nothing(cell):
 def test_too_many_between_two_motions_are_refused(cell):
     many = [command(0, value=float(k % 2)) for k in range(MOST_OUTPUTS)]
     assert len(records(planned(cell, square(cell, *many)))) == MOST_OUTPUTS
-    with pytest.raises(InvalidGoal, match='more than 64 outputs between two motions, behind '
-                                          'point 0'):
+    with pytest.raises(
+        InvalidGoal, match='more than 64 outputs between two motions, behind point 0'
+    ):
         planned(cell, square(cell, *many, command(0)))
 
 
 def test_a_point_where_the_robot_stands_switches_nothing(cell):
-    goal = Goal(waypoints=(cell.point(), cell.point(x=0.02, time=1.0)),
-                io_commands=(command(0),))
+    goal = Goal(waypoints=(cell.point(), cell.point(x=0.02, time=1.0)), io_commands=(command(0),))
     with pytest.raises(InvalidGoal, match=r'io_commands\[0\]\.point_index is 0, and no motion'):
         planned(cell, goal)

@@ -64,10 +64,13 @@ def test_a_plain_square_becomes_timed_straight_lines_to_its_poses(cell):
         assert cell.tool(segment.joints).distance_to(point.pose) < 1e-9
     assert made.duration == pytest.approx(10.0)
     assert made.reference.time[-1] == pytest.approx(10.0)
-    assert [segment.length for segment in made.segments] == pytest.approx([0.1, .2, .2, .2, .2])
+    assert [segment.length for segment in made.segments] == pytest.approx(
+        [0.1, 0.2, 0.2, 0.2, 0.2]
+    )
     assert made.segments[1].note == (
         'point 1: AUTO -> MOVEL 0.200 m in 2.000 s (0.100 m/s on average), because its '
-        'time_from_start says so; nearest: shoulder 0.369 m at 67 %')
+        'time_from_start says so; nearest: shoulder 0.369 m at 67 %'
+    )
     assert made.remarks[-1] == 'nearest of all: shoulder 0.369 m at 67 % of the way to point 1'
     assert len(made.remarks) == 2  # the other is about clearance
 
@@ -75,20 +78,31 @@ def test_a_plain_square_becomes_timed_straight_lines_to_its_poses(cell):
 def test_poses_are_taken_from_the_goals_frame_and_normalised(cell):
     T_base_frame = Pose((0.2, -0.1, 0.05), (0.0, 0.0, 1.0, 0.0))
     goal = square(cell)
-    moved = replace(goal, T_base_frame=T_base_frame, waypoints=tuple(
-        replace(p, pose=T_base_frame.inverse() @ p.pose) for p in goal.waypoints))
+    moved = replace(
+        goal,
+        T_base_frame=T_base_frame,
+        waypoints=tuple(replace(p, pose=T_base_frame.inverse() @ p.pose) for p in goal.waypoints),
+    )
     made = plan(moved, cell.state, cell.arm, OPTIONS)
     for segment, point in zip(made.segments, goal.waypoints, strict=True):
         assert segment.primitive.target.distance_to(point.pose) < 1e-9
         assert hypot(*segment.primitive.target.quaternion) == pytest.approx(1.0, abs=1e-12)
 
 
-@pytest.mark.parametrize(('kind', 'primitive', 'has_q_near'), [
-    (TYPE.AUTO, MoveL, False), (TYPE.LINEAR, MoveL, False), (TYPE.JOINT, MoveJ, True),
-    (TYPE.PROCESS, MoveP, False), (TYPE.OPTIMIZED_LINEAR, OptimoveL, False),
-    (TYPE.OPTIMIZED_JOINT, OptimoveJ, True)])
+@pytest.mark.parametrize(
+    ('kind', 'primitive', 'has_q_near'),
+    [
+        (TYPE.AUTO, MoveL, False),
+        (TYPE.LINEAR, MoveL, False),
+        (TYPE.JOINT, MoveJ, True),
+        (TYPE.PROCESS, MoveP, False),
+        (TYPE.OPTIMIZED_LINEAR, OptimoveL, False),
+        (TYPE.OPTIMIZED_JOINT, OptimoveJ, True),
+    ],
+)
 def test_each_segment_type_has_its_primitive_and_joint_moves_always_a_q_near(
-        cell, kind, primitive, has_q_near):
+    cell, kind, primitive, has_q_near
+):
     goal = Goal(waypoints=(cell.point(0.1, 0.05),), segments=(Segment(type=kind),))
     segment = plan(goal, cell.state, cell.arm, OPTIONS).segments[0]
     assert type(segment.primitive) is primitive
@@ -104,7 +118,8 @@ def test_each_segment_type_has_its_primitive_and_joint_moves_always_a_q_near(
 @pytest.mark.parametrize('of_target', [False, True])
 @pytest.mark.parametrize('of_via', [False, True])
 def test_arcs_carry_joints_exactly_where_a_posture_is_and_the_pose_always_wins(
-        cell, of_target, of_via):
+    cell, of_target, of_via
+):
     start, via, end = cell.point(0.1), cell.pose(0.05, 0.05, 0.02), cell.point(0.0, 0.1)
 
     def off(pose):
@@ -122,24 +137,38 @@ def test_arcs_carry_joints_exactly_where_a_posture_is_and_the_pose_always_wins(
         pose = cell.tool(field) if as_joints else field
         assert pose.distance_to(wanted) < 1e-9
         assert pose.angle_to(wanted) < 1e-8
-    name = {(False, False): 'MOVEC ', (True, True): 'MOVEC_JOINT ',
-            (True, False): 'MOVEC_JOINT_POSE ', (False, True): 'MOVEC_POSE_JOINT '}
+    name = {
+        (False, False): 'MOVEC ',
+        (True, True): 'MOVEC_JOINT ',
+        (True, False): 'MOVEC_JOINT_POSE ',
+        (False, True): 'MOVEC_POSE_JOINT ',
+    }
     assert f'-> {name[of_target, of_via]}' in made.segments[1].note
 
 
 def test_arcs_are_sent_as_poses_while_the_calibration_is_unknown(cell):
     q = nearest(cell.arm, cell.pose(0.1, 0.1) @ cell.T_flange_tcp.inverse(), cell.state.actual_q)
-    goal = Goal(waypoints=(cell.point(0.1, 0.1, posture=posture(q, 2)),), segments=(
-        Segment(type=TYPE.CIRCULAR, via=cell.pose(0.07, 0.03)),))
+    goal = Goal(
+        waypoints=(cell.point(0.1, 0.1, posture=posture(q, 2)),),
+        segments=(Segment(type=TYPE.CIRCULAR, via=cell.pose(0.07, 0.03)),),
+    )
     made = plan(goal, cell.state, cell.arm, PlanningOptions(calibration_known=False))
     assert isinstance(made.segments[0].primitive.target, Pose)
     assert 'calibration of the robot is not known' in made.remarks[0]
 
 
 def test_an_arc_that_keeps_to_its_tangent_ends_in_the_turned_orientation_and_says_so(cell):
-    goal = Goal(waypoints=(cell.point(0.1, 0.1), cell.point(0.1, 0.15)), segments=(
-        Segment(type=TYPE.CIRCULAR, via=cell.pose(0.1 - 0.1 * 0.5**0.5 + 0.0, 0.1 * 0.5**0.5),
-                arc_mode=ArcMode.FIXED), Segment()))
+    goal = Goal(
+        waypoints=(cell.point(0.1, 0.1), cell.point(0.1, 0.15)),
+        segments=(
+            Segment(
+                type=TYPE.CIRCULAR,
+                via=cell.pose(0.1 - 0.1 * 0.5**0.5 + 0.0, 0.1 * 0.5**0.5),
+                arc_mode=ArcMode.FIXED,
+            ),
+            Segment(),
+        ),
+    )
     made = plan(goal, cell.state, cell.arm, OPTIONS)
     assert 'the orientation of the point is ignored' in made.remarks[0]
     # The next line turns the tool back to the orientation of its point.
@@ -148,16 +177,20 @@ def test_an_arc_that_keeps_to_its_tangent_ends_in_the_turned_orientation_and_say
 
 def test_a_full_posture_is_sent_verbatim_where_it_leads_to_the_same_solution(cell):
     wanted = tuple(value + 0.05 for value in cell.state.actual_q)
-    goal = Goal(waypoints=(cell.point(0.05, posture=posture(wanted)),) * 1,
-                segments=(Segment(type=TYPE.JOINT),))
+    goal = Goal(
+        waypoints=(cell.point(0.05, posture=posture(wanted)),) * 1,
+        segments=(Segment(type=TYPE.JOINT),),
+    )
     assert plan(goal, cell.state, cell.arm, OPTIONS).segments[0].primitive.q_near == wanted
     straight = replace(goal, segments=(Segment(),))
     assert plan(straight, cell.state, cell.arm, OPTIONS).segments[0].primitive.q_near == wanted
 
 
 def test_a_partial_posture_flips_the_elbow_to_the_solution_nearest_in_it(cell):
-    goal = Goal(waypoints=(cell.point(0.05, posture=posture((0, 0, -1.2, 0, 0, 0), 2)),),
-                segments=(Segment(type=TYPE.JOINT),))
+    goal = Goal(
+        waypoints=(cell.point(0.05, posture=posture((0, 0, -1.2, 0, 0, 0), 2)),),
+        segments=(Segment(type=TYPE.JOINT),),
+    )
     segment = plan(goal, cell.state, cell.arm, OPTIONS).segments[0]
     assert segment.joints[2] < 0.0 < cell.state.actual_q[2]
     assert segment.primitive.q_near == segment.joints
@@ -169,8 +202,10 @@ def test_a_partial_posture_flips_the_elbow_to_the_solution_nearest_in_it(cell):
 @pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.CIRCULAR, TYPE.PROCESS])
 def test_a_straight_move_cannot_flip_the_elbow(cell, kind):
     via = cell.pose(0.03, 0.03) if kind == TYPE.CIRCULAR else None
-    goal = Goal(waypoints=(cell.point(0.05, posture=posture((0, 0, -1.2, 0, 0, 0), 2)),),
-                segments=(Segment(type=kind, via=via),))
+    goal = Goal(
+        waypoints=(cell.point(0.05, posture=posture((0, 0, -1.2, 0, 0, 0), 2)),),
+        segments=(Segment(type=kind, via=via),),
+    )
     with pytest.raises(InvalidPosture, match=r'points\[0\]\.posture .* elbow_joint arrives at'):
         plan(goal, cell.state, cell.arm, OPTIONS)
     made = plan(goal, cell.state, cell.arm, PlanningOptions(on_posture_change='movej'))
@@ -190,8 +225,11 @@ def test_a_turn_of_wrist_3_counts_in_a_posture(cell):
 
 
 def test_a_via_posture_of_another_branch_is_refused(cell):
-    arc = Segment(type=TYPE.CIRCULAR, via=cell.pose(0.03, 0.03),
-                  via_posture=posture((0, 0, -1.2, 0, 0, 0), 2))
+    arc = Segment(
+        type=TYPE.CIRCULAR,
+        via=cell.pose(0.03, 0.03),
+        via_posture=posture((0, 0, -1.2, 0, 0, 0), 2),
+    )
     goal = Goal(waypoints=(cell.point(0.05),), segments=(arc,))
     with pytest.raises(InvalidPosture, match=r'segments\[0\]\.via_posture'):
         plan(goal, cell.state, cell.arm, OPTIONS)
@@ -201,8 +239,14 @@ def test_a_via_posture_of_another_branch_is_refused(cell):
 @given(change=st.tuples(*[st.floats(-0.5, 0.5)] * 6), off=st.tuples(*[st.floats(-0.1, 0.1)] * 6))
 def test_a_joint_move_arrives_in_the_configuration_asked_for(cell, change, off):
     q = tuple(a + b for a, b in zip(cell.state.actual_q, change, strict=True))
-    goal = Goal(waypoints=(Waypoint(pose=cell.tool(q), posture=posture(
-        [a + b for a, b in zip(q, off, strict=True)])),), segments=(Segment(type=TYPE.JOINT),))
+    goal = Goal(
+        waypoints=(
+            Waypoint(
+                pose=cell.tool(q), posture=posture([a + b for a, b in zip(q, off, strict=True)])
+            ),
+        ),
+        segments=(Segment(type=TYPE.JOINT),),
+    )
     made = plan(goal, cell.state, cell.arm, PlanningOptions(max_approach_distance=0.0))
     arrived = made.segments[0].joints
     assert cell.tool(arrived).distance_to(goal.waypoints[0].pose) < 1e-8
@@ -230,13 +274,14 @@ def test_a_point_out_of_reach_is_named_with_distance_and_bound(cell):
 @pytest.mark.parametrize('angle', [pi, -pi, pi - 5e-4])
 def test_half_a_turn_is_refused_because_either_way_is_as_short(cell, kind, angle):
     via = cell.pose(0.05, 0.02) if kind == TYPE.CIRCULAR else None
-    goal = Goal(waypoints=(cell.point(0.1, turn=(0.0, 0.0, angle)),),
-                segments=(Segment(type=kind, via=via),))
+    goal = Goal(
+        waypoints=(cell.point(0.1, turn=(0.0, 0.0, angle)),),
+        segments=(Segment(type=kind, via=via),),
+    )
     text = refusal(InvalidGoal, cell, goal)
     assert text.startswith('trajectory.points[0].pose.orientation turns the tool by 1')
     assert 'a point in between' in text
-    way = (Segment(type=kind, via=via, arc_mode=ArcMode.FIXED) if via
-           else Segment(type=TYPE.JOINT))
+    way = Segment(type=kind, via=via, arc_mode=ArcMode.FIXED) if via else Segment(type=TYPE.JOINT)
     plan(replace(goal, segments=(way,)), cell.state, cell.arm, OPTIONS)
 
 
@@ -256,8 +301,7 @@ def test_a_line_that_leaves_the_reach_half_way_names_the_place(make_cell):
     cell = make_cell((0.0, -1.9, 2.2, -1.9, -pi / 2, 0.0))
     x, y, _ = cell.home.position
     goal = Goal(waypoints=(cell.point(-2.0 * x, -2.0 * y),))
-    text = refusal(Unreachable, cell, goal,
-                   PlanningOptions(max_approach_distance=0.0))
+    text = refusal(Unreachable, cell, goal, PlanningOptions(max_approach_distance=0.0))
     assert '% of the way to it' in text
 
 
@@ -265,8 +309,10 @@ def test_a_point_beyond_the_joint_range_is_a_joint_limit(make_cell):
     cell = make_cell((2 * pi - 0.05, -1.6, 1.6, -1.6, -1.57, 0.0))
     end = cell.tool((2 * pi + 0.2, -1.6, 1.6, -1.6, -1.57, 0.0))
     text = refusal(JointLimitExceeded, cell, Goal(waypoints=(Waypoint(pose=end),)))
-    assert ('takes shoulder_pan_joint out of its range of -6.2832 to 6.2832 rad, as far as 6.4832 '
-            'rad; start with this joint turned back, or go there with a JOINT segment.') in text
+    assert (
+        'takes shoulder_pan_joint out of its range of -6.2832 to 6.2832 rad, as far as 6.4832 '
+        'rad; start with this joint turned back, or go there with a JOINT segment.'
+    ) in text
 
 
 def wrist_crossing(make_cell, q_middle):
@@ -313,8 +359,9 @@ def test_a_first_point_at_time_0_is_where_the_robot_stands_and_gets_no_primitive
     text = refusal(InvalidGoal, cell, Goal(waypoints=(cell.point(0.002), points[1])))
     assert text.startswith('trajectory.points[0].time_from_start is 0')
     assert '0.0020 m' in text
-    text = refusal(InvalidGoal, cell, Goal(waypoints=(
-        cell.point(turn=(0.02, 0.0, 0.0)), points[1])))
+    text = refusal(
+        InvalidGoal, cell, Goal(waypoints=(cell.point(turn=(0.02, 0.0, 0.0)), points[1]))
+    )
     assert '0.0200 rad' in text
 
 
@@ -334,8 +381,10 @@ def test_the_same_goal_can_be_sent_again_where_it_ended(cell):
 
 
 def test_a_joint_move_to_where_the_arm_is_is_refused(cell):
-    goal = Goal(waypoints=(cell.point(0.1), cell.point(0.1)),
-                segments=(Segment(), Segment(type=TYPE.JOINT)))
+    goal = Goal(
+        waypoints=(cell.point(0.1), cell.point(0.1)),
+        segments=(Segment(), Segment(type=TYPE.JOINT)),
+    )
     assert 'is the same as points[0]' in refusal(InvalidGoal, cell, goal)
 
 
@@ -347,8 +396,10 @@ def test_a_robot_that_is_not_where_its_kinematics_puts_it_gets_no_plan(cell):
 
 
 def test_the_first_blend_must_fit_into_the_way_from_where_the_robot_stands(cell):
-    goal = Goal(waypoints=(cell.point(0.02), cell.point(0.02, 0.1)),
-                segments=(Segment(blend_radius=0.03), Segment()))
+    goal = Goal(
+        waypoints=(cell.point(0.02), cell.point(0.02, 0.1)),
+        segments=(Segment(blend_radius=0.03), Segment()),
+    )
     assert 'segment of 20.000 mm' in refusal(InvalidGoal, cell, goal)
 
 
@@ -361,21 +412,32 @@ def test_everything_that_is_ignored_is_said(cell):
     points = tuple(replace(p, jerk=some) for p in goal.waypoints[:-1])
     last = replace(goal.waypoints[-1], twist=some, acceleration=some)
     remarks = plan(replace(goal, waypoints=(*points, last)), cell.state, cell.arm, OPTIONS).remarks
-    for text in ('point 4: twist is ignored', 'point 4: acceleration is ignored',
-                 'points 0, 1, 2, 3: jerk is ignored', 'points 0, 1, 2, 3: the acceleration of',
-                 'point 4: the blend is ignored: the last'):
+    for text in (
+        'point 4: twist is ignored',
+        'point 4: acceleration is ignored',
+        'points 0, 1, 2, 3: jerk is ignored',
+        'points 0, 1, 2, 3: the acceleration of',
+        'point 4: the blend is ignored: the last',
+    ):
         assert any(remark.startswith(text) for remark in remarks), text
 
 
 def test_blends_that_the_robot_cannot_do_become_stops_and_are_said(cell):
     points = (cell.point(0.05), cell.point(0.05, 0.1), cell.point(0.0, 0.1))
-    goal = Goal(waypoints=points, segments=(
-        Segment(), Segment(type=TYPE.CIRCULAR, via=cell.pose(0.08, 0.05), blend_radius=0.01),
-        Segment(type=TYPE.JOINT)))
+    goal = Goal(
+        waypoints=points,
+        segments=(
+            Segment(),
+            Segment(type=TYPE.CIRCULAR, via=cell.pose(0.08, 0.05), blend_radius=0.01),
+            Segment(type=TYPE.JOINT),
+        ),
+    )
     made = plan(goal, cell.state, cell.arm, OPTIONS)
     assert made.segments[1].primitive.blend_radius == 0.0
-    assert made.remarks[0] == ('point 1: stops instead of blending, because the robot cannot '
-                               'blend from CIRCULAR into JOINT')
+    assert made.remarks[0] == (
+        'point 1: stops instead of blending, because the robot cannot '
+        'blend from CIRCULAR into JOINT'
+    )
 
 
 # -- the reference path ---------------------------------------------------------------------------
@@ -401,7 +463,8 @@ ways = st.tuples(st.sampled_from(straight), st.floats(0.0, 0.03))
 def test_a_plan_ends_at_its_points_and_its_reference_path_is_sound(cell, route):
     goal = Goal(
         waypoints=tuple(cell.point(*spot[:3], turn=spot[3:]) for spot, _ in route),
-        segments=tuple(Segment(type=kind, blend_radius=radius) for _, (kind, radius) in route))
+        segments=tuple(Segment(type=kind, blend_radius=radius) for _, (kind, radius) in route),
+    )
     try:
         made = plan(goal, cell.state, cell.arm, OPTIONS)
     except GoalRefused:
@@ -419,8 +482,12 @@ def test_a_plan_ends_at_its_points_and_its_reference_path_is_sound(cell, route):
 @given(spots=st.lists(spots, min_size=2, max_size=4), gap=st.floats(0.05, 4.0))
 def test_timed_goals_keep_their_sum_or_are_too_fast(cell, spots, gap):
     assume(any(spots[0]))  # the time to where the robot stands already is not waited
-    goal = Goal(waypoints=tuple(
-        cell.point(*spot[:3], turn=spot[3:], time=gap * (i + 1)) for i, spot in enumerate(spots)))
+    goal = Goal(
+        waypoints=tuple(
+            cell.point(*spot[:3], turn=spot[3:], time=gap * (i + 1))
+            for i, spot in enumerate(spots)
+        )
+    )
     try:
         made = plan(goal, cell.state, cell.arm, OPTIONS)
     except TooFast:

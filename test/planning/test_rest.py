@@ -17,14 +17,22 @@ T_FLANGE_TCP = Pose((0.01, 0.02, 0.12))
 
 
 def state(qd, **changes):
-    return RobotState(**{
-        'timestamp': 1.0, 'actual_q': Q, 'target_q': Q, 'target_qd': qd, 'actual_qd': qd,
-        'actual_tcp_pose': ARM.forward(Q) @ T_FLANGE_TCP, 'T_flange_tcp': T_FLANGE_TCP} | changes)
+    return RobotState(
+        **{
+            'timestamp': 1.0,
+            'actual_q': Q,
+            'target_q': Q,
+            'target_qd': qd,
+            'actual_qd': qd,
+            'actual_tcp_pose': ARM.forward(Q) @ T_FLANGE_TCP,
+            'T_flange_tcp': T_FLANGE_TCP,
+        }
+        | changes
+    )
 
 
 @pytest.mark.parametrize('deceleration', [0.5, 4.0])
-@pytest.mark.parametrize('qd', [
-    (0.5, 0.0, 0.0, 0.0, 0.0, 0.0), (0.1, -0.4, 0.9, -1.2, 0.3, 0.05)])
+@pytest.mark.parametrize('qd', [(0.5, 0.0, 0.0, 0.0, 0.0, 0.0), (0.1, -0.4, 0.9, -1.2, 0.3, 0.05)])
 def test_the_arm_rests_where_the_controller_brings_it_to_rest(qd, deceleration):
     brakes = JointStop(Q, qd, deceleration)
     while not brakes.over:
@@ -46,5 +54,4 @@ def test_what_an_unknown_calibration_adds_stays_where_it_is_on_the_arm():
     off = Pose((0.001, 0.002, 0.001))
     moving = state((0.5,) * 6, actual_tcp_pose=ARM.forward(Q) @ off @ T_FLANGE_TCP)
     rest = come_to_rest(moving, ARM, 4.0)
-    assert rest.actual_tcp_pose.distance_to(
-        ARM.forward(rest.actual_q) @ off @ T_FLANGE_TCP) < 1e-9
+    assert rest.actual_tcp_pose.distance_to(ARM.forward(rest.actual_q) @ off @ T_FLANGE_TCP) < 1e-9

@@ -24,8 +24,9 @@ def test_angular_rates_are_the_derivatives_of_the_orientation(size):
     before, after = (evaluated(coefficients, TIMES + k * h) for k in (-1, 1))
     moved = log_rows(multiply_rows(exp_rows(after.x), conjugate_rows(exp_rows(before.x))))
     np.testing.assert_allclose(moved / (2.0 * h), w, atol=2e-7 * (1.0 + size) ** 3)
-    np.testing.assert_allclose((angular(after)[0] - angular(before)[0]) / (2.0 * h), e,
-                               atol=1e-5 * size)
+    np.testing.assert_allclose(
+        (angular(after)[0] - angular(before)[0]) / (2.0 * h), e, atol=1e-5 * size
+    )
 
 
 @pytest.mark.parametrize('angle', [0.0, 1e-9, 1e-3, 1.0, 3.1, np.pi - 1e-9])

@@ -25,8 +25,13 @@ def planned(cell, name, *points, **options):
     waypoints = []
     for pose, _, time, has_posture in points:
         q = nearest(cell.arm, pose @ cell.T_flange_tcp.inverse(), cell.state.actual_q)
-        waypoints.append(Waypoint(pose=pose, time=time, posture=Posture(
-            names=JOINT_NAMES, values=q) if has_posture else Posture()))
+        waypoints.append(
+            Waypoint(
+                pose=pose,
+                time=time,
+                posture=Posture(names=JOINT_NAMES, values=q) if has_posture else Posture(),
+            )
+        )
     goal = Goal(waypoints=tuple(waypoints), segments=tuple(p[1] for p in points))
     made = plan(goal, cell.state, cell.arm, PlanningOptions(dialect=DIALECTS[name], **options))
     # Whatever was planned can be said.
@@ -62,9 +67,17 @@ def test_without_calibration_a_joint_move_is_refused_and_a_line_is_not(cell, nam
 
 @pytest.mark.parametrize('name', OLD)
 def test_lines_and_arcs_go_as_poses_and_without_hint(cell, name):
-    made = planned(cell, name, (cell.pose(y=0.05), Segment(), 0.0, True),
-                   (cell.pose(x=0.05, y=0.1), Segment(
-                       type=SegmentType.CIRCULAR, via=cell.pose(x=0.015, y=0.085)), 0.0, True))
+    made = planned(
+        cell,
+        name,
+        (cell.pose(y=0.05), Segment(), 0.0, True),
+        (
+            cell.pose(x=0.05, y=0.1),
+            Segment(type=SegmentType.CIRCULAR, via=cell.pose(x=0.015, y=0.085)),
+            0.0,
+            True,
+        ),
+    )
     line, arc = (s.primitive for s in made.segments)
     assert isinstance(line, MoveL)
     assert line.q_near is None
@@ -73,10 +86,15 @@ def test_lines_and_arcs_go_as_poses_and_without_hint(cell, name):
     assert any(f'wire dialect {name} has no arcs with joint positions' in r for r in made.remarks)
 
 
-@pytest.mark.parametrize(('name', 'kind', 'primitive'), [
-    ('2.0', SegmentType.OPTIMIZED_JOINT, None), ('2.0', SegmentType.OPTIMIZED_LINEAR, None),
-    ('2.10', SegmentType.OPTIMIZED_JOINT, OptimoveJ),
-    ('2.10', SegmentType.OPTIMIZED_LINEAR, OptimoveL)])
+@pytest.mark.parametrize(
+    ('name', 'kind', 'primitive'),
+    [
+        ('2.0', SegmentType.OPTIMIZED_JOINT, None),
+        ('2.0', SegmentType.OPTIMIZED_LINEAR, None),
+        ('2.10', SegmentType.OPTIMIZED_JOINT, OptimoveJ),
+        ('2.10', SegmentType.OPTIMIZED_LINEAR, OptimoveL),
+    ],
+)
 def test_optimized_moves_came_after_2_0(cell, name, kind, primitive):
     points = (cell.pose(y=0.05), Segment(type=kind), 0.0, True)
     if primitive is None:
@@ -88,9 +106,11 @@ def test_optimized_moves_came_after_2_0(cell, name, kind, primitive):
 
 
 def test_times_are_kept_by_speeds_where_programs_count_in_milliseconds(cell):
-    points = [(cell.pose(y=0.05), Segment(), 0.7504, False),
-              (cell.pose(y=0.05, z=0.05), JOINT, 1.9, False),
-              (cell.pose(z=0.05, turn=(0.0, 0.0, 0.6)), Segment(), 3.7, False)]
+    points = [
+        (cell.pose(y=0.05), Segment(), 0.7504, False),
+        (cell.pose(y=0.05, z=0.05), JOINT, 1.9, False),
+        (cell.pose(z=0.05, turn=(0.0, 0.0, 0.6)), Segment(), 3.7, False),
+    ]
     made = planned(cell, '2.0', *points)
     assert [s.primitive.duration for s in made.segments] == [0.0] * 3
     times = [0.0, *(p[2] for p in points)]
@@ -111,9 +131,11 @@ def test_no_time_is_sent_to_such_a_program_for_a_line_that_mostly_turns(cell):
 
 
 def test_blends_are_planned_as_the_wire_carries_them(cell):
-    points = [(cell.pose(y=0.05), Segment(blend_radius=0.0056), 0.0, False),
-              (cell.pose(y=0.05, x=0.05), Segment(blend_radius=0.0004), 0.0, False),
-              (cell.pose(y=0.1, x=0.05), Segment(), 0.0, False)]
+    points = [
+        (cell.pose(y=0.05), Segment(blend_radius=0.0056), 0.0, False),
+        (cell.pose(y=0.05, x=0.05), Segment(blend_radius=0.0004), 0.0, False),
+        (cell.pose(y=0.1, x=0.05), Segment(), 0.0, False),
+    ]
     made = planned(cell, '2.0', *points)
     assert [s.primitive.blend_radius for s in made.segments] == [0.005, 0.0, 0.0]
     assert [r for r in made.remarks if 'blend of 5 mm instead of 5.6 mm' in r]

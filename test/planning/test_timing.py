@@ -35,8 +35,11 @@ positive = st.floats(0.01, 10.0)
 @given(length=positive, velocity=positive, acceleration=positive)
 def test_a_trapezoid_takes_the_time_of_the_textbook(length, velocity, acceleration):
     long = length > velocity**2 / acceleration
-    expected = (length / velocity + velocity / acceleration if long
-                else 2.0 * (length / acceleration) ** 0.5)
+    expected = (
+        length / velocity + velocity / acceleration
+        if long
+        else 2.0 * (length / acceleration) ** 0.5
+    )
     assert trapezoid(length, velocity, acceleration).duration == pytest.approx(expected)
 
 
@@ -70,8 +73,12 @@ def test_speed_comes_from_the_segment_else_the_twist_else_the_default(cell):
     twist = (0.0, 0.12, 0.0, 0.0, 0.0, 0.5)
     assert one(cell, x=0.1)[0].primitive.velocity == OPTIONS.linear_velocity
     assert one(cell, x=0.1, twist=twist)[0].primitive.velocity == pytest.approx(0.12)
-    assert one(cell, x=0.1, twist=twist, segment=Segment(
-        velocity=0.15, acceleration=0.7))[0].primitive.velocity == 0.15
+    assert (
+        one(cell, x=0.1, twist=twist, segment=Segment(velocity=0.15, acceleration=0.7))[
+            0
+        ].primitive.velocity
+        == 0.15
+    )
     turn = one(cell, turn=(0.0, 0.0, 0.3), twist=twist)[0].primitive
     assert (turn.velocity, turn.duration) == (pytest.approx(0.5), 0.0)
     joint = one(cell, x=0.1, twist=twist, segment=Segment(type=TYPE.JOINT))
@@ -90,8 +97,9 @@ def test_speeds_are_slowed_to_the_largest_tool_speed_and_it_is_said(cell, kind):
     segment, remarks = one(cell, x=0.1, segment=Segment(type=kind, velocity=0.6))
     assert segment.primitive.velocity == pytest.approx(0.25)
     assert remarks[0] == 'point 0: slowed from 0.6 to 0.25 m/s by max_tool_speed = 0.25 m/s'
-    free = one(cell, PlanningOptions(max_tool_speed=0.0), x=0.1, segment=Segment(
-        type=kind, velocity=0.6))
+    free = one(
+        cell, PlanningOptions(max_tool_speed=0.0), x=0.1, segment=Segment(type=kind, velocity=0.6)
+    )
     assert free[0].primitive.velocity == 0.6
 
 
@@ -102,18 +110,23 @@ def test_joint_moves_keep_to_the_speed_of_the_joints(cell):
     assert '_joint, 3.142 rad/s' in remarks[0]
 
 
-@pytest.mark.parametrize(('kind', 'time', 'limit'), [
-    (TYPE.LINEAR, 0.5, 'max_tool_speed = 0.25 m/s'),
-    (TYPE.PROCESS, 0.3, 'max_tool_speed = 0.25 m/s'),
-    (TYPE.JOINT, 0.3, 'max_tool_speed = 0.25 m/s')])
+@pytest.mark.parametrize(
+    ('kind', 'time', 'limit'),
+    [
+        (TYPE.LINEAR, 0.5, 'max_tool_speed = 0.25 m/s'),
+        (TYPE.PROCESS, 0.3, 'max_tool_speed = 0.25 m/s'),
+        (TYPE.JOINT, 0.3, 'max_tool_speed = 0.25 m/s'),
+    ],
+)
 def test_times_that_are_too_short_are_refused_with_the_numbers_or_slowed(cell, kind, time, limit):
     with pytest.raises(TooFast) as caught:
         one(cell, x=0.1, time=time, segment=Segment(type=kind))
     text = str(caught.value)
     assert text.startswith('trajectory.points[0].time_from_start gives the segment')
     assert limit in text
-    segment, remarks = one(cell, PlanningOptions(on_too_fast='slow'), x=0.1, time=time,
-                           segment=Segment(type=kind))
+    segment, remarks = one(
+        cell, PlanningOptions(on_too_fast='slow'), x=0.1, time=time, segment=Segment(type=kind)
+    )
     assert segment.duration > time
     assert f'instead of {time:.3f} s' in remarks[0]
     at_least = float(text.split('at least ')[1].split(' s')[0])
@@ -153,8 +166,9 @@ def drive(made, cell):
 def step(robot, rows):
     robot.step(1.0)
     assert robot.fault is None
-    rows.append((CYCLE * (len(rows) + 1), *robot.T_base_tcp.position,
-                 np.linalg.norm(robot.tcp_twist[:3])))
+    rows.append(
+        (CYCLE * (len(rows) + 1), *robot.T_base_tcp.position, np.linalg.norm(robot.tcp_twist[:3]))
+    )
 
 
 def begin(robot, move, cell):
@@ -199,19 +213,27 @@ CORNERS = ((0.1, 0.0), (0.1, 0.2), (-0.1, 0.2), (-0.1, 0.0), (0.1, 0.0))
 def round_trip(cell, kind, radius, timed_by, turn=0.0):
     points = tuple(
         cell.point(x, y, 0.02 * i, time=timed_by * (i + 1), turn=(0.0, 0.0, turn * (i % 2)))
-        for i, (x, y) in enumerate(CORNERS))
+        for i, (x, y) in enumerate(CORNERS)
+    )
     vias = ((0.05, 0.05), (0.15, 0.1), (0.0, 0.25), (-0.15, 0.1), (0.0, -0.05))
-    return Goal(waypoints=points, segments=tuple(
-        Segment(type=kind, blend_radius=radius,
-                via=cell.pose(*via) if kind == TYPE.CIRCULAR else None) for via in vias))
+    return Goal(
+        waypoints=points,
+        segments=tuple(
+            Segment(
+                type=kind,
+                blend_radius=radius,
+                via=cell.pose(*via) if kind == TYPE.CIRCULAR else None,
+            )
+            for via in vias
+        ),
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize('turn', [0.0, 0.9])
 @pytest.mark.parametrize(('radius', 'within'), [(0.0, 0.01), (0.02, 0.05)])
 @pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.JOINT, TYPE.PROCESS, TYPE.CIRCULAR])
-def test_times_are_met_on_the_planned_path_within_the_tool_speed(
-        cell, kind, radius, within, turn):
+def test_times_are_met_on_the_planned_path_within_the_tool_speed(cell, kind, radius, within, turn):
     made = plan(round_trip(cell, kind, radius, 4.0, turn), cell.state, cell.arm, OPTIONS)
     rows = drive(made, cell)
     assert rows[-1, 0] == pytest.approx(20.0, rel=within)

@@ -36,11 +36,14 @@ def test_a_parameter_is_the_limit_of_its_quantity_and_of_no_other(kind, quantity
 def test_what_the_goal_says_stands():
     given = Tolerance(position=(0.1, -1.0, 0.0), twist=(0.0, 2.0, -3.0, 0.0, 0.0, 4.0))
     options = PlanningOptions(
-        path_tolerance_position=0.5, path_tolerance_linear_velocity=0.6,
-        path_tolerance_angular_velocity=0.7)
+        path_tolerance_position=0.5,
+        path_tolerance_linear_velocity=0.6,
+        path_tolerance_angular_velocity=0.7,
+    )
     filled = with_default_tolerances(Goal(waypoints=(), path_tolerance=given), options)
     assert filled.path_tolerance == Tolerance(
-        position=(0.1, -1.0, 0.5), twist=(0.6, 2.0, -3.0, 0.7, 0.7, 4.0))
+        position=(0.1, -1.0, 0.5), twist=(0.6, 2.0, -3.0, 0.7, 0.7, 4.0)
+    )
     assert filled.goal_tolerance == Tolerance()
 
 

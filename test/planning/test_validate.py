@@ -71,149 +71,312 @@ ARC = {'type': TYPE.CIRCULAR, 'via': VIA}
 REFUSALS = [
     # number of things
     (Goal(waypoints=()), InvalidGoal, 'trajectory.points is empty'),
-    (Goal(waypoints=tuple(at(0.01 * i) for i in range(11))), InvalidGoal,
-     'trajectory.points has 11 points, more than max_points = 10'),
-    (replace(PLAIN, T_base_frame=Pose((nan, 0.0, 0.0))), InvalidGoal,
-     'the pose of trajectory.header.frame_id contains nan'),
-    (replace(PLAIN, T_flange_controlled=turned(0.0, 0.0, 0.0, 2.0)), InvalidGoal,
-     'the orientation of trajectory.controlled_frame has length 2'),
-    (replace(PLAIN, segments=(Segment(), Segment())), InvalidGoal,
-     'segments has 2 entries for 3 points'),
+    (
+        Goal(waypoints=tuple(at(0.01 * i) for i in range(11))),
+        InvalidGoal,
+        'trajectory.points has 11 points, more than max_points = 10',
+    ),
+    (
+        replace(PLAIN, T_base_frame=Pose((nan, 0.0, 0.0))),
+        InvalidGoal,
+        'the pose of trajectory.header.frame_id contains nan',
+    ),
+    (
+        replace(PLAIN, T_flange_controlled=turned(0.0, 0.0, 0.0, 2.0)),
+        InvalidGoal,
+        'the orientation of trajectory.controlled_frame has length 2',
+    ),
+    (
+        replace(PLAIN, segments=(Segment(), Segment())),
+        InvalidGoal,
+        'segments has 2 entries for 3 points',
+    ),
     # unknown numbers
     (replace(PLAIN, execution=7), InvalidGoal, 'execution is 7, which is none of AUTO = 0'),
     (with_segment(PLAIN, 1, type=9), InvalidGoal, 'segments[1].type is 9'),
     (with_segment(PLAIN, 1, **ARC, arc_mode=2), InvalidGoal, 'segments[1].arc_mode is 2'),
     # not finite
     (with_point(PLAIN, 2, time=nan), InvalidGoal, 'trajectory.points[2].time_from_start contains'),
-    (with_point(PLAIN, 1, pose=Pose((0.0, nan, 0.0))), InvalidGoal,
-     'trajectory.points[1].pose.position contains nan'),
-    (with_point(PLAIN, 2, pose=turned(0.0, inf, 0.0, 1.0)), InvalidGoal,
-     'trajectory.points[2].pose.orientation contains inf'),
+    (
+        with_point(PLAIN, 1, pose=Pose((0.0, nan, 0.0))),
+        InvalidGoal,
+        'trajectory.points[1].pose.position contains nan',
+    ),
+    (
+        with_point(PLAIN, 2, pose=turned(0.0, inf, 0.0, 1.0)),
+        InvalidGoal,
+        'trajectory.points[2].pose.orientation contains inf',
+    ),
     (with_point(PLAIN, 0, twist=SIX_NAN), InvalidGoal, 'trajectory.points[0].twist contains nan'),
-    (with_point(PLAIN, 0, acceleration=SIX_NAN), InvalidGoal,
-     'trajectory.points[0].acceleration contains nan'),
+    (
+        with_point(PLAIN, 0, acceleration=SIX_NAN),
+        InvalidGoal,
+        'trajectory.points[0].acceleration contains nan',
+    ),
     (with_point(PLAIN, 0, jerk=SIX_NAN), InvalidGoal, 'trajectory.points[0].jerk contains nan'),
     (with_segment(PLAIN, 1, velocity=inf), InvalidGoal, 'segments[1].velocity contains inf'),
     (with_segment(PLAIN, 1, acceleration=nan), InvalidGoal, 'segments[1].acceleration contains'),
     (with_segment(PLAIN, 1, blend_radius=nan), InvalidGoal, 'segments[1].blend_radius contains'),
-    (with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((nan, 0.0, 0.0))), InvalidGoal,
-     'segments[1].via.position contains nan'),
-    (replace(PLAIN, path_tolerance=Tolerance(position=(0.0, nan, 0.0))), InvalidGoal,
-     'path_tolerance.position_error contains nan'),
-    (replace(PLAIN, goal_tolerance=Tolerance(orientation=(inf, 0.0, 0.0))), InvalidGoal,
-     'goal_tolerance.orientation_error contains inf'),
-    (replace(PLAIN, goal_tolerance=Tolerance(twist=SIX_NAN)), InvalidGoal,
-     'goal_tolerance.twist_error contains nan'),
-    (replace(PLAIN, path_tolerance=Tolerance(acceleration=SIX_NAN)), InvalidGoal,
-     'path_tolerance.acceleration_error contains nan'),
+    (
+        with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((nan, 0.0, 0.0))),
+        InvalidGoal,
+        'segments[1].via.position contains nan',
+    ),
+    (
+        replace(PLAIN, path_tolerance=Tolerance(position=(0.0, nan, 0.0))),
+        InvalidGoal,
+        'path_tolerance.position_error contains nan',
+    ),
+    (
+        replace(PLAIN, goal_tolerance=Tolerance(orientation=(inf, 0.0, 0.0))),
+        InvalidGoal,
+        'goal_tolerance.orientation_error contains inf',
+    ),
+    (
+        replace(PLAIN, goal_tolerance=Tolerance(twist=SIX_NAN)),
+        InvalidGoal,
+        'goal_tolerance.twist_error contains nan',
+    ),
+    (
+        replace(PLAIN, path_tolerance=Tolerance(acceleration=SIX_NAN)),
+        InvalidGoal,
+        'path_tolerance.acceleration_error contains nan',
+    ),
     (replace(PLAIN, goal_time_tolerance=nan), InvalidGoal, 'goal_time_tolerance contains nan'),
     (replace(PLAIN, age=nan), InvalidGoal, 'trajectory.header.stamp contains nan'),
     # quaternions
-    (with_point(PLAIN, 2, pose=turned(0.0, 0.0, 0.0, 0.0)), InvalidGoal,
-     'trajectory.points[2].pose.orientation is zero'),
-    (with_point(PLAIN, 2, pose=turned(0.0, 0.0, 0.0, 1.002)), InvalidGoal,
-     'trajectory.points[2].pose.orientation has length 1.002'),
-    (with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.1, 0.1, 0.0), (0.0, 0.0, 0.0, 0.0))),
-     InvalidGoal, 'segments[1].via.orientation is zero'),
+    (
+        with_point(PLAIN, 2, pose=turned(0.0, 0.0, 0.0, 0.0)),
+        InvalidGoal,
+        'trajectory.points[2].pose.orientation is zero',
+    ),
+    (
+        with_point(PLAIN, 2, pose=turned(0.0, 0.0, 0.0, 1.002)),
+        InvalidGoal,
+        'trajectory.points[2].pose.orientation has length 1.002',
+    ),
+    (
+        with_segment(
+            PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.1, 0.1, 0.0), (0.0, 0.0, 0.0, 0.0))
+        ),
+        InvalidGoal,
+        'segments[1].via.orientation is zero',
+    ),
     # negative
     (with_segment(PLAIN, 1, velocity=-0.1), InvalidGoal, 'segments[1].velocity is -0.1'),
     (with_segment(PLAIN, 1, acceleration=-1.0), InvalidGoal, 'segments[1].acceleration is -1'),
-    (with_segment(PLAIN, 1, blend_radius=-0.01), InvalidGoal,
-     'segments[1].blend_radius is -0.01'),
+    (with_segment(PLAIN, 1, blend_radius=-0.01), InvalidGoal, 'segments[1].blend_radius is -0.01'),
     # stamps
     (replace(PLAIN, age=1.5), OldHeaderTimestamp, 'header.stamp lies 1.500 s in the past'),
     (replace(PLAIN, age=-61.0), InvalidGoal, 'trajectory.header.stamp lies 61.0 s in the future'),
     # not there yet
-    (replace(TIMED, keep_open=True, execution=ExecutionMode.SERVO), NotAvailable,
-     'keep_open is set, but the points of a SERVO goal have to be known'),
-    (replace(TIMED, execution=ExecutionMode.SERVO, io_commands=(IOCommand(
-        waypoint=0, offset=0.0, output=OutputKind.TOOL_DIGITAL, pin=0, value=1.0),)),
-     NotAvailable, 'io_commands is not empty, and SERVO switches no outputs'),
-    (replace(PLAIN, controlled_frame='nozzle'), InvalidGoal,
-     "trajectory.controlled_frame is 'nozzle'"),
+    (
+        replace(TIMED, keep_open=True, execution=ExecutionMode.SERVO),
+        NotAvailable,
+        'keep_open is set, but the points of a SERVO goal have to be known',
+    ),
+    (
+        replace(
+            TIMED,
+            execution=ExecutionMode.SERVO,
+            io_commands=(
+                IOCommand(
+                    waypoint=0, offset=0.0, output=OutputKind.TOOL_DIGITAL, pin=0, value=1.0
+                ),
+            ),
+        ),
+        NotAvailable,
+        'io_commands is not empty, and SERVO switches no outputs',
+    ),
+    (
+        replace(PLAIN, controlled_frame='nozzle'),
+        InvalidGoal,
+        "trajectory.controlled_frame is 'nozzle'",
+    ),
     # splines
-    (replace(PLAIN, execution=ExecutionMode.SPLINE), InvalidGoal,
-     'execution is SPLINE, and the goal has no times'),
-    (replace(PLAIN, execution=ExecutionMode.SERVO), InvalidGoal,
-     'execution is SERVO, and the goal has no times'),
-    (with_point(with_point(TIMED, 0, twist=ONE), 2, twist=ONE), InvalidGoal,
-     'trajectory.points[2].twist is not zero, but the motion ends there'),
-    (with_point(SPLINE, 2, acceleration=ONE), InvalidGoal,
-     'trajectory.points[2].acceleration is not zero, but the motion ends there'),
-    (with_point(SPLINE, 0, time=0.0, twist=ONE), InvalidGoal,
-     'trajectory.points[0].twist is not zero, but the robot stands there'),
-    (with_segment(SPLINE, 1, type=TYPE.JOINT), InvalidGoal, 'segments[1].type is JOINT, but the '
-     'execution is SPLINE'),
+    (
+        replace(PLAIN, execution=ExecutionMode.SPLINE),
+        InvalidGoal,
+        'execution is SPLINE, and the goal has no times',
+    ),
+    (
+        replace(PLAIN, execution=ExecutionMode.SERVO),
+        InvalidGoal,
+        'execution is SERVO, and the goal has no times',
+    ),
+    (
+        with_point(with_point(TIMED, 0, twist=ONE), 2, twist=ONE),
+        InvalidGoal,
+        'trajectory.points[2].twist is not zero, but the motion ends there',
+    ),
+    (
+        with_point(SPLINE, 2, acceleration=ONE),
+        InvalidGoal,
+        'trajectory.points[2].acceleration is not zero, but the motion ends there',
+    ),
+    (
+        with_point(SPLINE, 0, time=0.0, twist=ONE),
+        InvalidGoal,
+        'trajectory.points[0].twist is not zero, but the robot stands there',
+    ),
+    (
+        with_segment(SPLINE, 1, type=TYPE.JOINT),
+        InvalidGoal,
+        'segments[1].type is JOINT, but the execution is SPLINE',
+    ),
     (with_segment(SPLINE, 1, **ARC), InvalidGoal, 'segments[1].type is CIRCULAR, but'),
-    (with_segment(SPLINE, 1, blend_radius=0.01), InvalidGoal,
-     'segments[1].blend_radius is 0.01, but the execution is SPLINE'),
+    (
+        with_segment(SPLINE, 1, blend_radius=0.01),
+        InvalidGoal,
+        'segments[1].blend_radius is 0.01, but the execution is SPLINE',
+    ),
     (with_segment(SPLINE, 1, velocity=0.1), InvalidGoal, 'segments[1].velocity is 0.1 in a goal'),
-    (with_point(SPLINE, 1, time=1.0005), InvalidGoal,
-     'points[1].time_from_start gives the segment 0.0005 s'),
-    (with_point(SPLINE, 1, twist=(inf, *ONE[1:])), InvalidGoal,
-     'trajectory.points[1].twist contains inf'),
+    (
+        with_point(SPLINE, 1, time=1.0005),
+        InvalidGoal,
+        'points[1].time_from_start gives the segment 0.0005 s',
+    ),
+    (
+        with_point(SPLINE, 1, twist=(inf, *ONE[1:])),
+        InvalidGoal,
+        'trajectory.points[1].twist contains inf',
+    ),
     (with_point(SPLINE, 1, jerk=SIX_NAN), InvalidGoal, 'trajectory.points[1].jerk contains nan'),
     (with_point(TIMED, 2, twist=SIX_NAN), InvalidGoal, 'trajectory.points[2].twist contains nan'),
-    (with_point(replace(TIMED, execution=ExecutionMode.PRIMITIVES), 1, acceleration=SIX_NAN),
-     InvalidGoal, 'trajectory.points[1].acceleration contains nan'),
+    (
+        with_point(replace(TIMED, execution=ExecutionMode.PRIMITIVES), 1, acceleration=SIX_NAN),
+        InvalidGoal,
+        'trajectory.points[1].acceleration contains nan',
+    ),
     # times
     (with_point(TIMED, 2, time=2.0), InvalidGoal, 'trajectory.points[2].time_from_start is 2 s'),
-    (replace(with_point(TIMED, 2, time=2.0), execution=ExecutionMode.SPLINE), InvalidGoal,
-     'must increase from point to point; correct it'),
+    (
+        replace(with_point(TIMED, 2, time=2.0), execution=ExecutionMode.SPLINE),
+        InvalidGoal,
+        'must increase from point to point; correct it',
+    ),
     (with_point(TIMED, 1, time=0.5), InvalidGoal, 'trajectory.points[1].time_from_start is 0.5 s'),
     (with_point(TIMED, 2, time=0.0), InvalidGoal, 'trajectory.points[2].time_from_start is 0 s'),
     (with_point(PLAIN, 2, time=1.0), InvalidGoal, 'trajectory.points[1].time_from_start is 0 s'),
     (with_point(TIMED, 0, time=-1.0), InvalidGoal, 'trajectory.points[0].time_from_start is -1 s'),
-    (with_point(TIMED, 2, time=2150.0), InvalidGoal,
-     'trajectory.points[2].time_from_start gives the segment 2148 s'),
+    (
+        with_point(TIMED, 2, time=2150.0),
+        InvalidGoal,
+        'trajectory.points[2].time_from_start gives the segment 2148 s',
+    ),
     # speeds
-    (with_segment(TIMED, 1, velocity=0.1), InvalidGoal,
-     'segments[1].velocity is 0.1 in a goal with times'),
-    (with_segment(TIMED, 1, type=TYPE.OPTIMIZED_LINEAR), InvalidGoal,
-     'segments[1].type is OPTIMIZED_LINEAR, which cannot keep the time'),
-    (with_segment(TIMED, 1, type=TYPE.OPTIMIZED_JOINT), InvalidGoal,
-     'segments[1].type is OPTIMIZED_JOINT, which cannot keep the time'),
-    (with_segment(PLAIN, 1, type=TYPE.OPTIMIZED_JOINT, velocity=1.1), InvalidGoal,
-     'segments[1].velocity is 1.1'),
-    (with_segment(PLAIN, 1, type=TYPE.OPTIMIZED_LINEAR, acceleration=2.0), InvalidGoal,
-     'segments[1].acceleration is 2'),
+    (
+        with_segment(TIMED, 1, velocity=0.1),
+        InvalidGoal,
+        'segments[1].velocity is 0.1 in a goal with times',
+    ),
+    (
+        with_segment(TIMED, 1, type=TYPE.OPTIMIZED_LINEAR),
+        InvalidGoal,
+        'segments[1].type is OPTIMIZED_LINEAR, which cannot keep the time',
+    ),
+    (
+        with_segment(TIMED, 1, type=TYPE.OPTIMIZED_JOINT),
+        InvalidGoal,
+        'segments[1].type is OPTIMIZED_JOINT, which cannot keep the time',
+    ),
+    (
+        with_segment(PLAIN, 1, type=TYPE.OPTIMIZED_JOINT, velocity=1.1),
+        InvalidGoal,
+        'segments[1].velocity is 1.1',
+    ),
+    (
+        with_segment(PLAIN, 1, type=TYPE.OPTIMIZED_LINEAR, acceleration=2.0),
+        InvalidGoal,
+        'segments[1].acceleration is 2',
+    ),
     # arcs
     (with_segment(PLAIN, 1, type=TYPE.CIRCULAR), InvalidGoal, 'segments[1].via is missing'),
     (with_segment(PLAIN, 1, via=VIA), InvalidGoal, 'segments[1].via is set, but the type is AUTO'),
-    (with_segment(PLAIN, 1, via_posture=Posture(names=('elbow_joint',), values=(0.0,))),
-     InvalidGoal, 'segments[1].via_posture is set, but'),
-    (with_segment(PLAIN, 1, type=TYPE.JOINT, arc_mode=ArcMode.FIXED), InvalidGoal,
-     'segments[1].arc_mode is set, but'),
-    (with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.15, 0.0, 0.0))), InvalidGoal,
-     'segments[1].via gives no arc to point 1: the start, the via and the end of the arc lie on'),
-    (with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.1, 0.0, 0.0))), InvalidGoal,
-     'the start and the via of the arc coincide'),
-    (with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.2, 0.0, 0.0))), InvalidGoal,
-     'the via and the end of the arc coincide'),
-    (with_segment(with_point(PLAIN, 1, pose=Pose((0.1, 0.0, 0.0))), 1, **ARC), InvalidGoal,
-     'the start and the end of the arc coincide'),
+    (
+        with_segment(PLAIN, 1, via_posture=Posture(names=('elbow_joint',), values=(0.0,))),
+        InvalidGoal,
+        'segments[1].via_posture is set, but',
+    ),
+    (
+        with_segment(PLAIN, 1, type=TYPE.JOINT, arc_mode=ArcMode.FIXED),
+        InvalidGoal,
+        'segments[1].arc_mode is set, but',
+    ),
+    (
+        with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.15, 0.0, 0.0))),
+        InvalidGoal,
+        'segments[1].via gives no arc to point 1: the start, the via and the end of the arc lie on',
+    ),
+    (
+        with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.1, 0.0, 0.0))),
+        InvalidGoal,
+        'the start and the via of the arc coincide',
+    ),
+    (
+        with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.2, 0.0, 0.0))),
+        InvalidGoal,
+        'the via and the end of the arc coincide',
+    ),
+    (
+        with_segment(with_point(PLAIN, 1, pose=Pose((0.1, 0.0, 0.0))), 1, **ARC),
+        InvalidGoal,
+        'the start and the end of the arc coincide',
+    ),
     # postures
-    (with_point(PLAIN, 1, posture=Posture(names=('elbow',), values=(0.0,))), InvalidJoints,
-     "trajectory.points[1].posture.posture_joint_names[0] is 'elbow', which is no joint"),
-    (with_point(PLAIN, 1, posture=Posture(names=('elbow_joint',) * 2, values=(0.0, 0.0))),
-     InvalidJoints, "posture_joint_names[1] names 'elbow_joint' for the second time"),
-    (with_point(PLAIN, 1, posture=Posture(names=('elbow_joint',), values=())), InvalidJoints,
-     'trajectory.points[1].posture has 1 joint names and 0 values'),
-    (with_point(PLAIN, 1, posture=Posture(values=(0.0,))), InvalidJoints,
-     'trajectory.points[1].posture has 0 joint names and 1 values'),
-    (with_point(PLAIN, 1, posture=Posture(names=('elbow_joint',), values=(inf,))), InvalidJoints,
-     "posture_joint_values[0] ('elbow_joint') is inf"),
-    (with_segment(PLAIN, 1, **ARC, via_posture=Posture(names=('knee',), values=(0.0,))),
-     InvalidJoints, "segments[1].via_posture.posture_joint_names[0] is 'knee'"),
+    (
+        with_point(PLAIN, 1, posture=Posture(names=('elbow',), values=(0.0,))),
+        InvalidJoints,
+        "trajectory.points[1].posture.posture_joint_names[0] is 'elbow', which is no joint",
+    ),
+    (
+        with_point(PLAIN, 1, posture=Posture(names=('elbow_joint',) * 2, values=(0.0, 0.0))),
+        InvalidJoints,
+        "posture_joint_names[1] names 'elbow_joint' for the second time",
+    ),
+    (
+        with_point(PLAIN, 1, posture=Posture(names=('elbow_joint',), values=())),
+        InvalidJoints,
+        'trajectory.points[1].posture has 1 joint names and 0 values',
+    ),
+    (
+        with_point(PLAIN, 1, posture=Posture(values=(0.0,))),
+        InvalidJoints,
+        'trajectory.points[1].posture has 0 joint names and 1 values',
+    ),
+    (
+        with_point(PLAIN, 1, posture=Posture(names=('elbow_joint',), values=(inf,))),
+        InvalidJoints,
+        "posture_joint_values[0] ('elbow_joint') is inf",
+    ),
+    (
+        with_segment(PLAIN, 1, **ARC, via_posture=Posture(names=('knee',), values=(0.0,))),
+        InvalidJoints,
+        "segments[1].via_posture.posture_joint_names[0] is 'knee'",
+    ),
     # ways
-    (with_segment(PLAIN, 1, blend_radius=0.11), InvalidGoal,
-     'segments[1].blend_radius is too large: the blends around points 0 and 1 reach 0 mm and 110'),
-    (replace(PLAIN, segments=(Segment(blend_radius=0.06), Segment(blend_radius=0.05), Segment())),
-     InvalidGoal, 'reach 60 mm and 50 mm into a segment of 100.000 mm'),
-    (with_point(TIMED, 1, pose=Pose((0.1, 0.0, 0.0))), InvalidGoal,
-     'trajectory.points[1] is the same as points[0] for 1 s'),
-    (with_point(PLAIN, 1, pose=Pose((0.1, 0.0, 0.0))), InvalidGoal,
-     'trajectory.points[1] is the same as points[0]: there is no way to go'),
+    (
+        with_segment(PLAIN, 1, blend_radius=0.11),
+        InvalidGoal,
+        'segments[1].blend_radius is too large: the blends around points 0 and 1 reach 0 mm and 110',
+    ),
+    (
+        replace(
+            PLAIN, segments=(Segment(blend_radius=0.06), Segment(blend_radius=0.05), Segment())
+        ),
+        InvalidGoal,
+        'reach 60 mm and 50 mm into a segment of 100.000 mm',
+    ),
+    (
+        with_point(TIMED, 1, pose=Pose((0.1, 0.0, 0.0))),
+        InvalidGoal,
+        'trajectory.points[1] is the same as points[0] for 1 s',
+    ),
+    (
+        with_point(PLAIN, 1, pose=Pose((0.1, 0.0, 0.0))),
+        InvalidGoal,
+        'trajectory.points[1] is the same as points[0]: there is no way to go',
+    ),
 ]
 
 
@@ -232,31 +395,41 @@ ACCEPTED = {
     'first point at time 0': with_point(TIMED, 0, time=0.0),
     'single point at time 0': Goal(waypoints=(at(0.1),)),
     'quaternion off by less than the bound': with_point(
-        PLAIN, 1, pose=Pose((0.2, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0009))),
+        PLAIN, 1, pose=Pose((0.2, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0009))
+    ),
     'negative quaternion': with_point(PLAIN, 1, pose=Pose((0.2, 0, 0), (0.0, 0.0, 0.0, -1.0))),
     'young stamp': replace(PLAIN, age=0.9),
     'stamp ahead': replace(PLAIN, age=-59.0),
     'primitives ignore a twist': replace(
-        with_point(TIMED, 1, twist=ONE), execution=ExecutionMode.PRIMITIVES),
+        with_point(TIMED, 1, twist=ONE), execution=ExecutionMode.PRIMITIVES
+    ),
     'twist at the last point': with_point(TIMED, 2, twist=ONE),
     'a twist at an inner point means a spline': with_point(TIMED, 1, twist=ONE),
-    'a spline with NaN': with_point(with_point(
-        with_point(TIMED, 0, twist=SIX_NAN), 1, acceleration=SIX_NAN), 2, twist=SIX_NAN),
+    'a spline with NaN': with_point(
+        with_point(with_point(TIMED, 0, twist=SIX_NAN), 1, acceleration=SIX_NAN), 2, twist=SIX_NAN
+    ),
     'a spline that waits': with_point(SPLINE, 1, pose=SPLINE.waypoints[0].pose),
     'a spline with lines': with_segment(SPLINE, 1, type=TYPE.LINEAR, acceleration=1.0),
     'servo': replace(TIMED, execution=ExecutionMode.SERVO),
     'twist as a speed': with_point(PLAIN, 1, twist=ONE),
     'arc': with_segment(PLAIN, 1, **ARC),
     'unset via': with_segment(PLAIN, 1, via=Pose()),
-    'blends that touch': replace(PLAIN, segments=(
-        Segment(blend_radius=0.05), Segment(blend_radius=0.05), Segment())),
+    'blends that touch': replace(
+        PLAIN, segments=(Segment(blend_radius=0.05), Segment(blend_radius=0.05), Segment())
+    ),
     'blend on the last point is dropped': with_segment(PLAIN, 2, blend_radius=5.0),
-    'tolerances': replace(PLAIN, path_tolerance=Tolerance(
-        position=(0.01, -1.0, 0.0), orientation=(0.1, 0.0, 0.0), twist=(-1.0,) * 6)),
+    'tolerances': replace(
+        PLAIN,
+        path_tolerance=Tolerance(
+            position=(0.01, -1.0, 0.0), orientation=(0.1, 0.0, 0.0), twist=(-1.0,) * 6
+        ),
+    ),
     'tolerances of twist and acceleration': replace(
-        PLAIN, path_tolerance=Tolerance(twist=ONE, acceleration=ONE)),
+        PLAIN, path_tolerance=Tolerance(twist=ONE, acceleration=ONE)
+    ),
     'joint move in place': with_segment(
-        with_point(PLAIN, 1, pose=Pose((0.1, 0.0, 0.0))), 1, type=TYPE.JOINT),
+        with_point(PLAIN, 1, pose=Pose((0.1, 0.0, 0.0))), 1, type=TYPE.JOINT
+    ),
 }
 
 
@@ -265,10 +438,14 @@ def test_a_right_goal_passes(goal):
     check(goal, OPTIONS)
 
 
-@pytest.mark.parametrize(('mode', 'options', 'text'), [
-    (ExecutionMode.SPLINE, PlanningOptions(calibration_known=False), 'SPLINE.*calibration'),
-    (ExecutionMode.SPLINE, PlanningOptions(dialect=DIALECTS['2.0']), 'SPLINE.*milliseconds'),
-    (ExecutionMode.SERVO, PlanningOptions(dialect=DIALECTS['2.12']), 'SERVO.*dialect 2.12')])
+@pytest.mark.parametrize(
+    ('mode', 'options', 'text'),
+    [
+        (ExecutionMode.SPLINE, PlanningOptions(calibration_known=False), 'SPLINE.*calibration'),
+        (ExecutionMode.SPLINE, PlanningOptions(dialect=DIALECTS['2.0']), 'SPLINE.*milliseconds'),
+        (ExecutionMode.SERVO, PlanningOptions(dialect=DIALECTS['2.12']), 'SERVO.*dialect 2.12'),
+    ],
+)
 def test_a_spline_needs_a_robot_that_takes_joints_exactly(mode, options, text):
     goal = replace(TIMED, execution=mode)
     check(goal, PlanningOptions())
@@ -291,11 +468,15 @@ def test_optimized_moves_need_a_software_that_knows_them(kind):
         check(goal, PlanningOptions(optimove_known=False))
 
 
-@pytest.mark.parametrize(('goal', 'options'), [
-    (replace(PLAIN, path_tolerance=Tolerance(acceleration=ONE)), {}),
-    (replace(PLAIN, goal_tolerance=Tolerance(acceleration=ONE)), {}),
-    (PLAIN, {'path_tolerance_linear_acceleration': 1.0}),
-    (PLAIN, {'goal_tolerance_angular_acceleration': 1.0})])
+@pytest.mark.parametrize(
+    ('goal', 'options'),
+    [
+        (replace(PLAIN, path_tolerance=Tolerance(acceleration=ONE)), {}),
+        (replace(PLAIN, goal_tolerance=Tolerance(acceleration=ONE)), {}),
+        (PLAIN, {'path_tolerance_linear_acceleration': 1.0}),
+        (PLAIN, {'goal_tolerance_angular_acceleration': 1.0}),
+    ],
+)
 def test_a_robot_that_reports_no_acceleration_cannot_be_held_to_it(goal, options):
     check(goal, PlanningOptions(**options))
     with pytest.raises(InvalidGoal, match=r'acceleration_error is positive.*does not report'):
@@ -325,8 +506,10 @@ def test_every_rule_refuses_some_goal_of_the_table():
                 return rule
         return None
 
-    without = refusing(replace(PLAIN, path_tolerance=Tolerance(acceleration=ONE)),
-                       PlanningOptions(acceleration_known=False))
+    without = refusing(
+        replace(PLAIN, path_tolerance=Tolerance(acceleration=ONE)),
+        PlanningOptions(acceleration_known=False),
+    )
     assert {refusing(goal) for goal, _, _ in REFUSALS} | {without} == set(RULES)
 
 
@@ -334,15 +517,27 @@ numbers = st.floats(allow_nan=True, allow_infinity=True, width=64)
 waypoints = st.builds(
     Waypoint,
     time=numbers,
-    pose=st.builds(Pose, st.tuples(numbers, numbers, numbers),
-                   st.tuples(numbers, numbers, numbers, numbers) | st.just((0.0, 0.0, 0.0, 1.0))),
+    pose=st.builds(
+        Pose,
+        st.tuples(numbers, numbers, numbers),
+        st.tuples(numbers, numbers, numbers, numbers) | st.just((0.0, 0.0, 0.0, 1.0)),
+    ),
     twist=st.tuples(*[numbers] * 6),
-    posture=st.builds(Posture, names=st.lists(
-        st.sampled_from(['elbow_joint', 'wrist_1_joint', 'x']), max_size=3).map(tuple),
-        values=st.lists(numbers, max_size=3).map(tuple)))
+    posture=st.builds(
+        Posture,
+        names=st.lists(st.sampled_from(['elbow_joint', 'wrist_1_joint', 'x']), max_size=3).map(
+            tuple
+        ),
+        values=st.lists(numbers, max_size=3).map(tuple),
+    ),
+)
 segments = st.builds(
-    Segment, type=st.sampled_from(SegmentType), blend_radius=numbers, velocity=numbers,
-    via=st.none() | st.builds(Pose, st.tuples(numbers, numbers, numbers)))
+    Segment,
+    type=st.sampled_from(SegmentType),
+    blend_radius=numbers,
+    velocity=numbers,
+    via=st.none() | st.builds(Pose, st.tuples(numbers, numbers, numbers)),
+)
 
 
 @settings(max_examples=150, deadline=None)
@@ -355,11 +550,21 @@ def test_nonsense_of_any_kind_ends_in_a_refusal_or_passes_but_never_in_another_e
     assert len(points) >= 1
 
 
-@pytest.mark.parametrize(('field', 'value'), [
-    ('linear_velocity', 0.0), ('optimized_velocity', 1.5), ('max_tool_speed', -1.0),
-    ('max_segment_time', 2148.0), ('on_too_fast', 'ignore'), ('on_posture_change', 'maybe'),
-    ('max_points', 0), ('stamp_tolerance', nan), ('spline_tolerance', 0.0),
-    ('closing_deceleration', 0.0)])
+@pytest.mark.parametrize(
+    ('field', 'value'),
+    [
+        ('linear_velocity', 0.0),
+        ('optimized_velocity', 1.5),
+        ('max_tool_speed', -1.0),
+        ('max_segment_time', 2148.0),
+        ('on_too_fast', 'ignore'),
+        ('on_posture_change', 'maybe'),
+        ('max_points', 0),
+        ('stamp_tolerance', nan),
+        ('spline_tolerance', 0.0),
+        ('closing_deceleration', 0.0),
+    ],
+)
 def test_options_out_of_their_range_are_named(field, value):
     with pytest.raises(ValueError, match=field):
         PlanningOptions(**{field: value})

@@ -7,7 +7,6 @@ What is measured are the outputs and the tool of the simulated controller, cycle
 places come from the test.
 """
 
-
 from math import hypot
 
 import pytest
@@ -84,8 +83,17 @@ def apart(a, b):
 
 def test_at_once_after_a_stop_and_in_order(robot):
     watched = Watched(robot)
-    run = robot.run([line(watched.at(x=0.02)), switch(2), switch(7), switch(2, 0.0),
-                     switch(3), line(watched.at())], on_cycle=watched)
+    run = robot.run(
+        [
+            line(watched.at(x=0.02)),
+            switch(2),
+            switch(7),
+            switch(2, 0.0),
+            switch(3),
+            line(watched.at()),
+        ],
+        on_cycle=watched,
+    )
     assert not run.trouble
     # Two of them changed the same output in one cycle.
     assert [change[:2] for change in watched.changes] == [(3, True), (7, True)]
@@ -97,10 +105,17 @@ def test_at_a_place_on_a_straight_line(robot):
     watched = Watched(robot)
     places = [watched.at(x=0.01 + 0.0071 * k) for k in range(9)]
     run = robot.run(
-        [line(watched.at(y=-0.01)), line(watched.at()),
-         *(switch(k % 8, float(k < 8), place=place, heading=heading(place, 1, 0))
-           for k, place in enumerate(places)),
-         line(watched.at(x=0.1))], on_cycle=watched)
+        [
+            line(watched.at(y=-0.01)),
+            line(watched.at()),
+            *(
+                switch(k % 8, float(k < 8), place=place, heading=heading(place, 1, 0))
+                for k, place in enumerate(places)
+            ),
+            line(watched.at(x=0.1)),
+        ],
+        on_cycle=watched,
+    )
     assert not run.trouble
     assert [change[0] for change in watched.changes] == [0, 1, 2, 3, 4, 5, 6, 7, 0]
     for change, place in zip(watched.changes, places, strict=True):
@@ -112,11 +127,15 @@ def test_in_the_middle_of_a_corner_without_stopping(robot):
     watched = Watched(robot)
     corner = watched.at(x=0.06)
     run = robot.run(
-        [line(corner, 0.02),
-         switch(1, place=corner, heading=heading(corner, 0.5**0.5, 0.5**0.5)),
-         line(watched.at(x=0.06, y=0.06))], on_cycle=watched)
+        [
+            line(corner, 0.02),
+            switch(1, place=corner, heading=heading(corner, 0.5**0.5, 0.5**0.5)),
+            line(watched.at(x=0.06, y=0.06)),
+        ],
+        on_cycle=watched,
+    )
     assert not run.trouble
-    (_, _, position, _), = watched.changes
+    ((_, _, position, _),) = watched.changes
     middle = min((pose.position for pose in run.poses), key=lambda p: apart(p, corner.position))
     assert 0.001 < apart(middle, corner.position) < 0.02
     assert apart(position, middle) < 0.6 * SPEED * STEP
@@ -127,8 +146,9 @@ def test_a_place_that_is_come_round_to_waits_for_the_second_time(robot):
     """Three quarters around a circle: the tool begins beyond the plane of a place on it."""
     watched = Watched(robot)
     moves = [line(watched.at(y=0.01)), line(watched.at())]
-    arc = MoveC(via=watched.at(x=0.08), target=watched.at(x=0.04, y=-0.04), velocity=0.1,
-                acceleration=1.0)
+    arc = MoveC(
+        via=watched.at(x=0.08), target=watched.at(x=0.04, y=-0.04), velocity=0.1, acceleration=1.0
+    )
     # Counterclockwise seen along +z the tool comes to (0.04, -0.04) from +x.
     place = watched.at(x=0.04 + 0.04 * 0.8, y=-0.04 * 0.6)
     way = heading(place, -0.6, -0.8)
@@ -136,8 +156,9 @@ def test_a_place_that_is_come_round_to_waits_for_the_second_time(robot):
     assert not early.trouble
     assert apart(watched.changes[0][2], place.position) > 0.03
     watched = Watched(robot)
-    run = robot.run([*moves, switch(0, place=place, heading=way, comes_round=True), arc],
-                    on_cycle=watched)
+    run = robot.run(
+        [*moves, switch(0, place=place, heading=way, comes_round=True), arc], on_cycle=watched
+    )
     assert not run.trouble
     assert apart(watched.changes[0][2], place.position) < 0.1 * STEP
 
@@ -154,9 +175,14 @@ def test_a_turn_in_place_has_a_heading_too(robot):
         seen.append(controller.motion.T_base_tcp.angle_to(place))
 
     run = robot.run(
-        [line(watched.at(x=0.01)), line(watched.at()),
-         switch(4, place=place, heading=(0.0, 0.0, 0.0, 0.0, 0.0, 1.0)),
-         MoveL(target=watched.start @ axis, velocity=0.5, acceleration=2.0)], on_cycle=look)
+        [
+            line(watched.at(x=0.01)),
+            line(watched.at()),
+            switch(4, place=place, heading=(0.0, 0.0, 0.0, 0.0, 0.0, 1.0)),
+            MoveL(target=watched.start @ axis, velocity=0.5, acceleration=2.0),
+        ],
+        on_cycle=look,
+    )
     assert not run.trouble
     assert seen[watched.changes[0][3] - 1] < 0.5 * STEP
 
@@ -167,13 +193,19 @@ def test_on_a_spline_between_two_of_its_pieces(robot):
     middle = tuple(a + b for a, b in zip(HOME, (0.1, 0.05, 0, 0, 0, 0), strict=True))
     end = tuple(a + b for a, b in zip(HOME, (0.2, 0.1, 0, 0, 0, 0), strict=True))
     speed = tuple(2.0 * (b - a) for a, b in zip(HOME, middle, strict=True))
-    place, beyond = arm.forward(middle), arm.forward(
-        tuple(a + 0.001 * v for a, v in zip(middle, speed, strict=True)))
+    place, beyond = (
+        arm.forward(middle),
+        arm.forward(tuple(a + 0.001 * v for a, v in zip(middle, speed, strict=True))),
+    )
     way = [b - a for a, b in zip(place.position, beyond.position, strict=True)]
     run = robot.run(
-        [Spline(target=middle, velocities=speed, duration=0.7),
-         switch(5, place=place, heading=heading(place, *(x / hypot(*way) for x in way))),
-         Spline(target=end, velocities=(0.0,) * 6, duration=0.7)], on_cycle=watched)
+        [
+            Spline(target=middle, velocities=speed, duration=0.7),
+            switch(5, place=place, heading=heading(place, *(x / hypot(*way) for x in way))),
+            Spline(target=end, velocities=(0.0,) * 6, duration=0.7),
+        ],
+        on_cycle=watched,
+    )
     assert not run.trouble
     # The first one of a trajectory also wakes the thread that looks for it.
     assert apart(watched.changes[0][2], place.position) < 1.2 * hypot(*way) / 0.001 * STEP
@@ -183,17 +215,30 @@ def test_on_a_spline_between_two_of_its_pieces(robot):
 def test_a_place_that_the_tool_never_gets_to_is_not_forgotten(robot):
     watched = Watched(robot)
     nowhere = watched.at(x=0.5)
-    run = robot.run([line(watched.at(x=0.02)),
-                     switch(1, place=nowhere, heading=heading(nowhere, 1, 0)),
-                     line(watched.at(x=0.04)), line(watched.at(x=0.06))], on_cycle=watched)
+    run = robot.run(
+        [
+            line(watched.at(x=0.02)),
+            switch(1, place=nowhere, heading=heading(nowhere, 1, 0)),
+            line(watched.at(x=0.04)),
+            line(watched.at(x=0.06)),
+        ],
+        on_cycle=watched,
+    )
     assert not run.trouble
     assert apart(watched.changes[0][2], watched.at(x=0.04).position) < 1e-4
 
 
 def test_delays_count_from_the_end_of_the_motion_and_success_waits_for_them(robot):
     watched = Watched(robot)
-    run = robot.run([line(watched.at(x=0.02)), switch(0, delay=0.1), switch(1, delay=0.1),
-                     switch(2, delay=0.25)], on_cycle=watched)
+    run = robot.run(
+        [
+            line(watched.at(x=0.02)),
+            switch(0, delay=0.1),
+            switch(1, delay=0.1),
+            switch(2, delay=0.25),
+        ],
+        on_cycle=watched,
+    )
     assert not run.trouble
     moving = sum(a != b for a, b in zip(run.poses, run.poses[1:], strict=False))
     assert [change[0] for change in watched.changes] == [0, 1, 2]
@@ -202,11 +247,16 @@ def test_delays_count_from_the_end_of_the_motion_and_success_waits_for_them(robo
     assert run.duration > watched.changes[-1][3] * STEP
 
 
-@pytest.mark.parametrize(('text', 'changed', 'far'), [
-    ('OUTPUT_LEAD = 1.5', 'OUTPUT_LEAD = 21.5', 20.0),
-    ('looking = outputs_done < outputs_due', 'looking = True', 25.0)])
+@pytest.mark.parametrize(
+    ('text', 'changed', 'far'),
+    [
+        ('OUTPUT_LEAD = 1.5', 'OUTPUT_LEAD = 21.5', 20.0),
+        ('looking = outputs_done < outputs_due', 'looking = True', 25.0),
+    ],
+)
 def test_a_changed_text_changes_the_place(text, changed, far):
     """So the tests above would find it: in steps of the tool along the line."""
+
     def edit(program):
         assert program.count(text) == 1
         return as_program(program.replace(text, changed))
@@ -214,30 +264,48 @@ def test_a_changed_text_changes_the_place(text, changed, far):
     robot = RobotInMemory('ur5e', edit=edit)
     watched = Watched(robot)
     place = watched.at(x=0.06)
-    robot.run([line(watched.at(y=-0.01)), line(watched.at()),
-               switch(1, place=place, heading=heading(place, 1, 0)), line(watched.at(x=0.1))],
-              on_cycle=watched)
+    robot.run(
+        [
+            line(watched.at(y=-0.01)),
+            line(watched.at()),
+            switch(1, place=place, heading=heading(place, 1, 0)),
+            line(watched.at(x=0.1)),
+        ],
+        on_cycle=watched,
+    )
     assert apart(watched.changes[0][2], place.position) >= 0.9 * far * SPEED * STEP
 
 
-@pytest.mark.parametrize(('output', 'first', 'pins'), [
-    (OutputKind.STANDARD_DIGITAL, 0, 8), (OutputKind.CONFIGURABLE_DIGITAL, 8, 8),
-    (OutputKind.TOOL_DIGITAL, 16, 2)])
+@pytest.mark.parametrize(
+    ('output', 'first', 'pins'),
+    [
+        (OutputKind.STANDARD_DIGITAL, 0, 8),
+        (OutputKind.CONFIGURABLE_DIGITAL, 8, 8),
+        (OutputKind.TOOL_DIGITAL, 16, 2),
+    ],
+)
 def test_each_output_is_the_one_that_was_meant(robot, output, first, pins):
     watched = Watched(robot)
-    run = robot.run([line(watched.at(x=0.01)), *(
-        switch(pin, output=output) for pin in range(pins))], on_cycle=watched)
+    run = robot.run(
+        [line(watched.at(x=0.01)), *(switch(pin, output=output) for pin in range(pins))],
+        on_cycle=watched,
+    )
     assert not run.trouble
     assert sorted(change[:2] for change in watched.changes) == [
-        (first + pin, True) for pin in range(pins)]
+        (first + pin, True) for pin in range(pins)
+    ]
 
 
-@pytest.mark.parametrize(('domain', 'expected'), [
-    (AnalogDomain.CURRENT, 0.004 + 0.016 * 0.3), (AnalogDomain.VOLTAGE, 3.0)])
+@pytest.mark.parametrize(
+    ('domain', 'expected'),
+    [(AnalogDomain.CURRENT, 0.004 + 0.016 * 0.3), (AnalogDomain.VOLTAGE, 3.0)],
+)
 def test_analog_outputs_in_both_domains(robot, domain, expected):
     watched = Watched(robot)
-    run = robot.run([line(watched.at(x=0.01)), switch(
-        1, 0.3, OutputKind.STANDARD_ANALOG, domain=domain)], on_cycle=watched)
+    run = robot.run(
+        [line(watched.at(x=0.01)), switch(1, 0.3, OutputKind.STANDARD_ANALOG, domain=domain)],
+        on_cycle=watched,
+    )
     assert not run.trouble
     assert robot.controller.signals.analog_out[1] == pytest.approx(expected)
     assert robot.controller.signals.analog_out_voltage[1] == (domain is AnalogDomain.VOLTAGE)
@@ -246,8 +314,10 @@ def test_analog_outputs_in_both_domains(robot, domain, expected):
 def test_too_many_at_one_time_are_a_failure_and_the_arm_stands(robot):
     watched = Watched(robot)
     place = watched.at(x=0.05)
-    many = [switch(0, k % 2, place=place, heading=heading(place, 1, 0))
-            for k in range(MOST_OUTPUTS + 1)]
+    many = [
+        switch(0, k % 2, place=place, heading=heading(place, 1, 0))
+        for k in range(MOST_OUTPUTS + 1)
+    ]
     moves = [line(watched.at(x=0.02)), *many, line(watched.at(x=0.1))]
     run = robot.run(moves, on_cycle=watched)
     assert run.result is TrajectoryResult.FAILURE
@@ -262,6 +332,7 @@ def test_what_ends_a_trajectory_forgets_what_waits(robot):
     bad = Spline(target=HOME, velocities=(0.0,) * 6, duration=0.0)
     run = robot.run([line(watched.at(x=0.02)), late, bad, MoveJ(target=HOME)], on_cycle=watched)
     assert run.result is TrajectoryResult.CANCELED
-    assert not robot.run([line(watched.at(x=0.03)), line(watched.at(x=0.1))],
-                         on_cycle=watched).trouble
+    assert not robot.run(
+        [line(watched.at(x=0.03)), line(watched.at(x=0.1))], on_cycle=watched
+    ).trouble
     assert watched.changes == []

@@ -25,8 +25,12 @@ from ur_cartesian_driver.protocol.script_command import ScriptCommand, TcpHold
 from ur_cartesian_driver.protocol.trajectory import MotionType, SplineKind
 from ur_cartesian_driver.urscript import parse
 
-SETTINGS = {'host': '192.168.56.1', 'reverse_port': 50001, 'trajectory_port': 50003,
-            'script_command_port': 50004}
+SETTINGS = {
+    'host': '192.168.56.1',
+    'reverse_port': 50001,
+    'trajectory_port': 50003,
+    'script_command_port': 50004,
+}
 
 
 def text(**changes):
@@ -40,15 +44,27 @@ def test_the_program_can_be_parsed_for_every_software(version):
 
 def test_addresses_are_those_of_the_settings():
     lines = text(host='10.0.0.7', reverse_port=1, trajectory_port=2, script_command_port=3)
-    for line in ('DRIVER_HOST = "10.0.0.7"', 'REVERSE_PORT = 1', 'TRAJECTORY_PORT = 2',
-                 'COMMAND_PORT = 3'):
+    for line in (
+        'DRIVER_HOST = "10.0.0.7"',
+        'REVERSE_PORT = 1',
+        'TRAJECTORY_PORT = 2',
+        'COMMAND_PORT = 3',
+    ):
         assert line in lines.splitlines()
 
 
-@pytest.mark.parametrize(('prefix', 'members'), [
-    ('MODE', ControlMode), ('TRAJECTORY', TrajectoryAction), ('MOTION', MotionType),
-    ('SPLINE', SplineKind), ('RESULT', TrajectoryResult), ('COMMAND', ScriptCommand),
-    ('TCP', TcpHold)])
+@pytest.mark.parametrize(
+    ('prefix', 'members'),
+    [
+        ('MODE', ControlMode),
+        ('TRAJECTORY', TrajectoryAction),
+        ('MOTION', MotionType),
+        ('SPLINE', SplineKind),
+        ('RESULT', TrajectoryResult),
+        ('COMMAND', ScriptCommand),
+        ('TCP', TcpHold),
+    ],
+)
 def test_every_wire_constant_comes_from_its_enum(prefix, members):
     lines = text().splitlines()
     for member in members:
@@ -61,18 +77,26 @@ def test_the_register_of_the_progress_is_the_one_that_the_driver_reads():
 
 def test_there_are_no_numbers_of_the_protocol_in_the_statements():
     """Small ones index, count or are units; everything else has a name."""
-    statements = [line for line in text().splitlines()
-                  if not re.match(r'\s*#|[A-Z_]+ = ', line)]
-    numbers = {number for line in statements
-               for number in re.findall(r'(?<![\w.])\d+(?:\.\d+)?(?![\w.])',
-                                        re.sub(r'"[^"]*"', '', line))}
+    statements = [line for line in text().splitlines() if not re.match(r'\s*#|[A-Z_]+ = ', line)]
+    numbers = {
+        number
+        for line in statements
+        for number in re.findall(r'(?<![\w.])\d+(?:\.\d+)?(?![\w.])', re.sub(r'"[^"]*"', '', line))
+    }
     assert numbers <= {*map(str, range(13)), '15', '0.2', '1000'}
 
 
-@pytest.mark.parametrize(('feature', 'version', 'known'), [
-    ('optimove', (5, 20, 9), False), ('optimove', (5, 21, 0), True),
-    ('optimove', (10, 7, 9), False), ('optimove', (10, 8, 0), True),
-    ('target_payload', (3, 15, 8), False), ('target_payload', (5, 10, 0), True)])
+@pytest.mark.parametrize(
+    ('feature', 'version', 'known'),
+    [
+        ('optimove', (5, 20, 9), False),
+        ('optimove', (5, 21, 0), True),
+        ('optimove', (10, 7, 9), False),
+        ('optimove', (10, 8, 0), True),
+        ('target_payload', (3, 15, 8), False),
+        ('target_payload', (5, 10, 0), True),
+    ],
+)
 def test_functions_are_named_only_where_the_controller_knows_them(feature, version, known):
     assert has_feature(feature, version) == known
     name = {'optimove': 'optimovej(', 'target_payload': 'set_target_payload('}[feature]
@@ -102,8 +126,9 @@ def test_nothing_inside_a_function_has_the_name_of_a_global():
             elif name[1]:
                 inside.append((function, name[2]))
             else:
-                assert name[2] in everywhere | {local for where, local in inside
-                                                if where == function}, (function, name[2])
+                assert name[2] in everywhere | {
+                    local for where, local in inside if where == function
+                }, (function, name[2])
     assert len(inside) > 50
     assert not [place for place in inside if place[1] in everywhere]
 
@@ -125,8 +150,12 @@ def test_a_host_cannot_smuggle_text_into_the_program(host):
 
 def test_the_urcap_finds_its_markers():
     lines = [line.strip() for line in text().splitlines()]
-    markers = ['# HEADER_BEGIN', '# HEADER_END', '# NODE_CONTROL_LOOP_BEGINS',
-               '# NODE_CONTROL_LOOP_ENDS']
+    markers = [
+        '# HEADER_BEGIN',
+        '# HEADER_END',
+        '# NODE_CONTROL_LOOP_BEGINS',
+        '# NODE_CONTROL_LOOP_ENDS',
+    ]
     places = [lines.index(marker) for marker in markers]
     assert places == sorted(places)
 
@@ -142,15 +171,27 @@ def test_an_include_stands_in_its_place_and_takes_its_settings():
     lines = text(servoj_gain=300.0, servo_buffer_depth=3, allow_teach=True).splitlines()
     assert lines.count('thread servo_control():') == 1
     assert not [line for line in lines if line.startswith('#!')]
-    for line in ('SERVOJ_GAIN = 300.0', 'SERVO_DEPTH = 3', 'SERVO_ONES = [1.0, 1.0, 1.0]',
-                 'SERVO_ALLOW_TEACH = True'):
+    for line in (
+        'SERVOJ_GAIN = 300.0',
+        'SERVO_DEPTH = 3',
+        'SERVO_ONES = [1.0, 1.0, 1.0]',
+        'SERVO_ALLOW_TEACH = True',
+    ):
         assert line in lines
 
 
-@pytest.mark.parametrize(('prefix', 'members'), [
-    ('SERVO_IN', InputInteger), ('SERVO_IN', InputDouble), ('SERVO_OUT', OutputInteger),
-    ('SERVO_OUT', OutputDouble), ('SERVO_MODE', ServoMode), ('SERVO_SYNC', SyncState),
-    ('SERVO_ERROR', ExternalError)])
+@pytest.mark.parametrize(
+    ('prefix', 'members'),
+    [
+        ('SERVO_IN', InputInteger),
+        ('SERVO_IN', InputDouble),
+        ('SERVO_OUT', OutputInteger),
+        ('SERVO_OUT', OutputDouble),
+        ('SERVO_MODE', ServoMode),
+        ('SERVO_SYNC', SyncState),
+        ('SERVO_ERROR', ExternalError),
+    ],
+)
 def test_registers_of_the_servo_come_from_their_enums(prefix, members):
     lines = text().splitlines()
     for member in members:

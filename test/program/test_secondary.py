@@ -15,5 +15,6 @@ def test_the_tcp_is_set_without_a_thread_or_a_motion():
     assert parse(text).kind == 'sec'
     (numbers,) = re.findall(r'set_tcp\(p\[(.*)\]\)', text)
     assert [float(n) for n in numbers.split(', ')] == pytest.approx(
-        [0.1, -1e-7, 3.0, 1 / 3, 0.0, -2.5], abs=1e-12)
+        [0.1, -1e-7, 3.0, 1 / 3, 0.0, -2.5], abs=1e-12
+    )
     assert 'e' not in numbers

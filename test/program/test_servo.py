@@ -39,9 +39,15 @@ class Servo:
     def __init__(self, **settings):
         self.robot = RobotInMemory('ur5e')
         if settings:
-            program = render(ProgramSettings(
-                host='driver', reverse_port=1, trajectory_port=2, script_command_port=3,
-                **settings))
+            program = render(
+                ProgramSettings(
+                    host='driver',
+                    reverse_port=1,
+                    trajectory_port=2,
+                    script_command_port=3,
+                    **settings,
+                )
+            )
             assert not self.robot.controller.programs.load('driver', as_program(program))
         self.robot._ready()
         self.controller = self.robot.controller
@@ -62,9 +68,9 @@ class Servo:
         ints[InputInteger.EXTERNAL_ERROR] = self.error
         ints[InputInteger.EXTERNAL_SYNC_STATE] = int(SyncState.EXTERNAL_TO_ROBOT)
         first = InputDouble.DESIRED_JOINT_POSITIONS
-        floats[first:first + 6] = self.q
+        floats[first : first + 6] = self.q
         first = InputDouble.MAX_JOINT_DIVERGENCE_THRESHOLDS
-        floats[first:first + 6] = [self.threshold] * 6
+        floats[first : first + 6] = [self.threshold] * 6
         floats[InputDouble.STATE_TIME] = self.state_time
 
     def cycle(self, count=1, steps=0):
@@ -186,10 +192,15 @@ def unknown_mode(servo):
     servo.cycle(2)
 
 
-@pytest.mark.parametrize(('cause', 'text'), [
-    (stale, 'no new sequence number in time'), (too_far, 'divergence thresholds'),
-    (error, 'reports the error 1'),
-    pytest.param(unknown_mode, 'a mode that there is not', marks=pytest.mark.exhaustive)])
+@pytest.mark.parametrize(
+    ('cause', 'text'),
+    [
+        (stale, 'no new sequence number in time'),
+        (too_far, 'divergence thresholds'),
+        (error, 'reports the error 1'),
+        pytest.param(unknown_mode, 'a mode that there is not', marks=pytest.mark.exhaustive),
+    ],
+)
 def test_the_arm_brakes_before_the_program_halts(cause, text):
     servo = Servo().enter()
     servo.swing(200)
@@ -207,9 +218,13 @@ def test_the_arm_brakes_before_the_program_halts(cause, text):
     assert servo[OutputInteger.ACTUAL_MODE] == ServoMode.IDLE
 
 
-@pytest.mark.parametrize('leave', [
-    lambda servo: servo.leave(),
-    pytest.param(lambda servo: servo.enter(ServoMode.IDLE), marks=pytest.mark.exhaustive)])
+@pytest.mark.parametrize(
+    'leave',
+    [
+        lambda servo: servo.leave(),
+        pytest.param(lambda servo: servo.enter(ServoMode.IDLE), marks=pytest.mark.exhaustive),
+    ],
+)
 def test_leaving_brakes_and_the_program_goes_on(leave):
     servo = Servo().enter()
     servo.swing(200)
@@ -237,8 +252,7 @@ def test_a_driver_that_hangs_up_brakes_the_arm_too():
     assert servo.speed == 0.0
 
 
-@pytest.mark.parametrize('allowed', [
-    pytest.param(False, marks=pytest.mark.exhaustive), True])
+@pytest.mark.parametrize('allowed', [pytest.param(False, marks=pytest.mark.exhaustive), True])
 def test_teaching_is_possible_where_it_is_allowed_and_from_idle(allowed):
     servo = Servo(allow_teach=allowed)
     servo.enter(ServoMode.TEACH)
@@ -294,9 +308,9 @@ def test_the_servo_waits_for_an_arm_that_another_thread_brakes():
     for sequence in range(1, 400):
         inputs.integers[InputInteger.SEQUENCE_ID] = sequence
         first = InputDouble.DESIRED_JOINT_POSITIONS
-        inputs.floats[first:first + 6] = controller.motion.q
+        inputs.floats[first : first + 6] = controller.motion.q
         first = InputDouble.MAX_JOINT_DIVERGENCE_THRESHOLDS
-        inputs.floats[first:first + 6] = [FAR] * 6
+        inputs.floats[first : first + 6] = [FAR] * 6
         sockets[0].feed(buffered_servo(timeout).encode())
         controller.step()
     out = controller.signals.outputs

@@ -36,10 +36,13 @@ def state(time, end):
     """Position, velocity, acceleration of a swing from rest at 0 to rest at ``end`` [s]."""
     x = time / end
     u = end * x**3 * (10 - 15 * x + 6 * x**2)
-    v, a = 30 * x**2 * (1 - x)**2, 60 * x * (1 - x) * (1 - 2 * x) / end
+    v, a = 30 * x**2 * (1 - x) ** 2, 60 * x * (1 - x) * (1 - 2 * x) / end
     s, c = np.sin(PULSE * u), np.cos(PULSE * u)
-    return (START + SIZE * (1 - c), SIZE * PULSE * s * v,
-            SIZE * PULSE * (PULSE * c * v**2 + s * a))
+    return (
+        START + SIZE * (1 - c),
+        SIZE * PULSE * s * v,
+        SIZE * PULSE * (PULSE * c * v**2 + s * a),
+    )
 
 
 def pieces(durations, quintic=True):
@@ -48,8 +51,11 @@ def pieces(durations, quintic=True):
     result = []
     for time, duration in zip(times, durations, strict=True):
         q, qd, qdd = (tuple(map(float, row)) for row in state(time, times[-1]))
-        result.append(Spline(target=q, velocities=qd, accelerations=qdd if quintic else None,
-                             duration=duration))
+        result.append(
+            Spline(
+                target=q, velocities=qd, accelerations=qdd if quintic else None, duration=duration
+            )
+        )
     return result
 
 
@@ -61,8 +67,14 @@ def polynomial(splines, times):
         n, t = (4 if piece.accelerations is None else 6), piece.duration
         end = [piece.target, piece.velocities, piece.accelerations or STILL]
         half = n // 2
-        lines = [[np.prod(np.arange(k, k - d, -1)) * x**max(k - d, 0) if k >= d else 0.0
-                  for k in range(n)] for x in (0.0, t) for d in range(half)]
+        lines = [
+            [
+                np.prod(np.arange(k, k - d, -1)) * x ** max(k - d, 0) if k >= d else 0.0
+                for k in range(n)
+            ]
+            for x in (0.0, t)
+            for d in range(half)
+        ]
         c = np.linalg.solve(np.array(lines), np.array(boundary[:half] + end[:half]))
         here = times >= begin
         rows[here] = np.vander(times[here] - begin, n, increasing=True) @ c
@@ -76,10 +88,16 @@ ODD = 0.0606
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('splines', [
-    pieces([ODD] * 50), pieces([ODD] * 50, quintic=False), pieces([0.5, 0.7, 1.1, 0.301]),
-    pieces([0.0011] * 7 + [0.8] + [0.0031] * 40 + [1.2])],
-    ids=['quintic', 'cubic', 'long', 'some shorter than a step'])
+@pytest.mark.parametrize(
+    'splines',
+    [
+        pieces([ODD] * 50),
+        pieces([ODD] * 50, quintic=False),
+        pieces([0.5, 0.7, 1.1, 0.301]),
+        pieces([0.0011] * 7 + [0.8] + [0.0031] * 40 + [1.2]),
+    ],
+    ids=['quintic', 'cubic', 'long', 'some shorter than a step'],
+)
 def test_the_arm_is_on_the_polynomial_in_every_cycle(robot, splines):
     robot.place(HOME, IDENTITY)
     run = robot.run(splines)
@@ -92,8 +110,13 @@ def test_the_arm_is_on_the_polynomial_in_every_cycle(robot, splines):
 
 
 SLIDERS = {
-    'half': [0.5], 'slow': [0.11], 'nearly full': [0.99], 'odd': [0.7],
-    'changing': [1.0] * 90 + [0.3] * 200 + [0.75] * 100, 'paused': [1.0] * 150 + [0.0] * 100}
+    'half': [0.5],
+    'slow': [0.11],
+    'nearly full': [0.99],
+    'odd': [0.7],
+    'changing': [1.0] * 90 + [0.3] * 200 + [0.75] * 100,
+    'paused': [1.0] * 150 + [0.0] * 100,
+}
 
 
 @pytest.mark.slow
@@ -111,7 +134,7 @@ def test_in_scaled_time_path_and_time_are_the_same(robot, slider):
     assert not run.trouble
     fine = np.arange(0.0, sum(piece.duration for piece in splines), 5e-5)
     path = polynomial(splines, fine)
-    for now, q in list(zip(scaled, run.joints, strict=True))[::len(scaled) // 60]:
+    for now, q in list(zip(scaled, run.joints, strict=True))[:: len(scaled) // 60]:
         distance = np.abs(path - q).max(axis=1)
         at = int(distance.argmin())
         assert distance[at] < 2e-4
@@ -125,8 +148,15 @@ def test_nothing_drifts_within_minutes(robot):
     """A place that is passed every second is passed at the second, to the end."""
     there, back = tuple(START + 0.05), tuple(START - 0.05)
     fast = (0.15,) * 6
-    splines = [Spline(target=there if k % 2 else back, velocities=STILL, accelerations=STILL,
-                      duration=0.50031) for k in range(239)]
+    splines = [
+        Spline(
+            target=there if k % 2 else back,
+            velocities=STILL,
+            accelerations=STILL,
+            duration=0.50031,
+        )
+        for k in range(239)
+    ]
     splines.append(Spline(target=tuple(START), velocities=STILL, duration=0.50031))
     slow = robot.slow
     slow.place(HOME, IDENTITY)
@@ -135,7 +165,7 @@ def test_nothing_drifts_within_minutes(robot):
     step = slow.controller.cycle
     times = step * (np.arange(len(run.joints)) + 1)
     late = np.abs(run.joints - polynomial(splines, times)).max(axis=1)
-    assert late[-int(10.0 / step):].max() < 2 * step * max(fast)
+    assert late[-int(10.0 / step) :].max() < 2 * step * max(fast)
 
 
 # ---- the rules of the contract -----------------------------------------------------------------
@@ -145,8 +175,9 @@ def spline(offset, duration, qd=0.0, **changes):
     return Spline(target=tuple(START + offset), velocities=(qd,) * 6, duration=duration, **changes)
 
 
-@pytest.mark.parametrize(('offset', 'result'), [
-    (0.003, TrajectoryResult.SUCCESS), (0.006, TrajectoryResult.CANCELED)])
+@pytest.mark.parametrize(
+    ('offset', 'result'), [(0.003, TrajectoryResult.SUCCESS), (0.006, TrajectoryResult.CANCELED)]
+)
 def test_a_first_point_without_time_is_where_the_arm_is(robot, offset, result):
     robot.place(HOME, IDENTITY)
     assert robot.run([spline(offset, 0.0), spline(0.1, 0.5)]).result is result
@@ -159,8 +190,9 @@ def test_a_later_point_without_time_is_canceled_and_nothing_moves_on(robot):
     assert run.q == pytest.approx(START + 0.1, abs=1e-5)
 
 
-@pytest.mark.parametrize(('duration', 'result'), [
-    (0.049, TrajectoryResult.CANCELED), (0.051, TrajectoryResult.SUCCESS)])
+@pytest.mark.parametrize(
+    ('duration', 'result'), [(0.049, TrajectoryResult.CANCELED), (0.051, TrajectoryResult.SUCCESS)]
+)
 def test_more_than_20_rad_per_second_is_canceled(robot, duration, result):
     """What is slower is gone in the time that the joints need."""
     robot.place(HOME, IDENTITY)
@@ -171,7 +203,7 @@ def test_more_than_20_rad_per_second_is_canceled(robot, duration, result):
 def test_a_kind_that_nobody_knows_is_a_failure(robot):
     robot.place(HOME, IDENTITY)
     data = bytearray(encode_points([spline(0.1, 0.5)]))
-    data[19 * 4:20 * 4] = (3).to_bytes(4, 'big')
+    data[19 * 4 : 20 * 4] = (3).to_bytes(4, 'big')
     run = robot.run([], data=bytes(data), announced=1)
     assert run.result is TrajectoryResult.FAILURE
     assert run.q == pytest.approx(START)
@@ -190,10 +222,16 @@ def test_another_motion_forgets_speed_and_acceleration(robot):
 
 def test_a_cubic_forgets_the_acceleration(robot):
     robot.place(HOME, IDENTITY)
-    moves = [Spline(target=tuple(START + 0.1), velocities=(0.3,) * 6, accelerations=(0.8,) * 6,
-                    duration=0.5), spline(0.2, 0.5, 0.1),
-             Spline(target=tuple(START + 0.25), velocities=STILL, accelerations=STILL,
-                    duration=0.6)]
+    moves = [
+        Spline(
+            target=tuple(START + 0.1),
+            velocities=(0.3,) * 6,
+            accelerations=(0.8,) * 6,
+            duration=0.5,
+        ),
+        spline(0.2, 0.5, 0.1),
+        Spline(target=tuple(START + 0.25), velocities=STILL, accelerations=STILL, duration=0.6),
+    ]
     run = robot.run(moves)
     times = STEP * (np.arange(len(run.joints)) + 1)
     assert np.abs(run.joints - polynomial(moves, times)).max() < 4e-5
@@ -246,18 +284,25 @@ def test_a_pause_on_the_way_is_waited_for_as_between_moves(robot):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(('line', 'replacement', 'size'), [
-    ('SPLINE_CORRECTION', '0.0 * SPLINE_CORRECTION', 1e-5),
-    ('10 * x - 4 * y', '9 * x - 4 * y', 1e-3),
-    ('spline_time = spline_time - duration', 'spline_time = 0', 1e-3),
-    ('spline_qdd = qdd', 'spline_qdd = 0 * qdd', 1e-4)])
+@pytest.mark.parametrize(
+    ('line', 'replacement', 'size'),
+    [
+        ('SPLINE_CORRECTION', '0.0 * SPLINE_CORRECTION', 1e-5),
+        ('10 * x - 4 * y', '9 * x - 4 * y', 1e-3),
+        ('spline_time = spline_time - duration', 'spline_time = 0', 1e-3),
+        ('spline_qdd = qdd', 'spline_qdd = 0 * qdd', 1e-4),
+    ],
+)
 def test_a_changed_law_changes_the_motion(line, replacement, size):
     """So the tests above would find it."""
+
     def edit(text):
         head, statements = text.split('# HEADER_BEGIN')[0], text
         assert statements.count(line) >= 1
-        changed = [row if row.startswith('SPLINE_') else row.replace(line, replacement)
-                   for row in statements.splitlines()]
+        changed = [
+            row if row.startswith('SPLINE_') else row.replace(line, replacement)
+            for row in statements.splitlines()
+        ]
         return as_program(head + '\n'.join(changed))
 
     splines = pieces([0.0603] * 20)

@@ -63,16 +63,33 @@ def test_success_is_recognised_by_the_shape_of_the_answer(name, argument, answer
     assert reply.request == Request(name=name, argument=argument)
 
 
-TEXTS = {'load': 'x.urp', 'popup': 'Hi', 'addToLog': 'Hi', 'setUserRole': 'operator',
-         'load installation': 'default.installation', 'set operational mode': 'automatic',
-         'generate flight report': 'system', 'generate support file': '/tmp'}
-VALUES = {'robotmode': 'IDLE', 'safetymode': 'NORMAL', 'safetystatus': 'NORMAL',
-          'get loaded program': '/programs/a.urp', 'PolyscopeVersion': '5.21.0.0 (Jan 01 2026)',
-          'clear operational mode': 'Selectable again', 'running': 'true',
-          'isProgramSaved': 'true a.urp', 'programState': 'PAUSED a.urp',
-          'version': '5.6.0.0', 'getUserRole': 'NONE', 'get operational mode': 'MANUAL',
-          'is in remote control': 'false', 'get serial number': '20195500001',
-          'get robot model': 'UR5'}
+TEXTS = {
+    'load': 'x.urp',
+    'popup': 'Hi',
+    'addToLog': 'Hi',
+    'setUserRole': 'operator',
+    'load installation': 'default.installation',
+    'set operational mode': 'automatic',
+    'generate flight report': 'system',
+    'generate support file': '/tmp',
+}
+VALUES = {
+    'robotmode': 'IDLE',
+    'safetymode': 'NORMAL',
+    'safetystatus': 'NORMAL',
+    'get loaded program': '/programs/a.urp',
+    'PolyscopeVersion': '5.21.0.0 (Jan 01 2026)',
+    'clear operational mode': 'Selectable again',
+    'running': 'true',
+    'isProgramSaved': 'true a.urp',
+    'programState': 'PAUSED a.urp',
+    'version': '5.6.0.0',
+    'getUserRole': 'NONE',
+    'get operational mode': 'MANUAL',
+    'is in remote control': 'false',
+    'get serial number': '20195500001',
+    'get robot model': 'UR5',
+}
 
 
 @pytest.mark.parametrize('name', SHAPES)
@@ -97,17 +114,28 @@ def test_a_line_that_is_no_command_is_returned_and_answered(line):
     assert not parse_reply(Request(name='play'), answer).ok
 
 
-@pytest.mark.parametrize(('name', 'argument'), [
-    ('fly', ''), ('load', ''), ('play', 'now'), ('popup', 'two\nplay'), ('addToLog', 'a\rb')])
+@pytest.mark.parametrize(
+    ('name', 'argument'),
+    [('fly', ''), ('load', ''), ('play', 'now'), ('popup', 'two\nplay'), ('addToLog', 'a\rb')],
+)
 def test_what_is_no_command_cannot_be_sent(name, argument):
     with pytest.raises(LocalProtocolError):
         DashboardClient().send(name, argument)
 
 
-@pytest.mark.parametrize(('name', 'version', 'available'), [
-    ('safetystatus', (3, 15), False), ('safetystatus', (5, 3), False),
-    ('safetystatus', (5, 4), True), ('setUserRole', (3, 15), True), ('setUserRole', (5, 9), False),
-    ('restart safety', (5, 0), False), ('restart safety', (3, 7), True), ('play', (5, 0), True)])
+@pytest.mark.parametrize(
+    ('name', 'version', 'available'),
+    [
+        ('safetystatus', (3, 15), False),
+        ('safetystatus', (5, 3), False),
+        ('safetystatus', (5, 4), True),
+        ('setUserRole', (3, 15), True),
+        ('setUserRole', (5, 9), False),
+        ('restart safety', (5, 0), False),
+        ('restart safety', (3, 7), True),
+        ('play', (5, 0), True),
+    ],
+)
 def test_commands_have_a_first_version(name, version, available):
     assert SHAPES[name].available(version) is available
 
@@ -117,7 +145,7 @@ def test_answers_belong_to_commands_in_order_also_in_pieces():
     client.send('robotmode')
     client.send('play')
     stream = encode_line(BANNER) + b'Robotmode: IDLE\r\n' + b'Starting program\n'
-    events = [e for i in range(len(stream)) for e in client.feed(stream[i:i + 1])]
+    events = [e for i in range(len(stream)) for e in client.feed(stream[i : i + 1])]
     assert [event.text for event in events] == [BANNER, 'Robotmode: IDLE', 'Starting program']
     assert [event.ok for event in events[1:]] == [True, True]
     assert client.feed(b'') == []

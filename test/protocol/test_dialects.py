@@ -41,8 +41,12 @@ from ur_cartesian_driver.protocol.trajectory import (
 GOLDEN = json.loads((Path(__file__).parent / 'golden' / 'trajectory_points.json').read_text())
 SENT = [case for case in GOLDEN['cases'] if case['hex'] and case['type'] is not None]
 #: A primitive can be read from these: an unknown arc mode, or nothing of an optimove, is none.
-READABLE = [case for case in SENT if case.get('mode', 0) in (0, 1)
-            and not case['note'].startswith('fraction above zero that encodes as 0')]
+READABLE = [
+    case
+    for case in SENT
+    if case.get('mode', 0) in (0, 1)
+    and not case['note'].startswith('fraction above zero that encodes as 0')
+]
 UNCHANGED = [case for case in SENT if case['type'] in (3, 51)]
 Q = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 POSE = Pose((0.1, 0.2, 0.3))
@@ -55,10 +59,27 @@ def words(primitive, dialect):
 
 def fields_of(case):
     if case['type'] == 51:
-        return (*case['target'], *case['target_velocities'],
-                *(case['target_accelerations'] or ZERO6), case['duration'], case['ints'][19], 51)
-    return (*case['target'], *case['via'], case['velocity'], case['acceleration'], case['mode'],
-            0, 0, 0, 0, case['blend_radius'], 3)
+        return (
+            *case['target'],
+            *case['target_velocities'],
+            *(case['target_accelerations'] or ZERO6),
+            case['duration'],
+            case['ints'][19],
+            51,
+        )
+    return (
+        *case['target'],
+        *case['via'],
+        case['velocity'],
+        case['acceleration'],
+        case['mode'],
+        0,
+        0,
+        0,
+        0,
+        case['blend_radius'],
+        3,
+    )
 
 
 def test_the_newest_is_the_last():
@@ -79,16 +100,21 @@ def test_arcs_and_splines_have_the_bytes_of_the_library_since_2_10(case, name):
     assert encode_fields(fields_of(case), DIALECTS[name]).hex() == case['hex']
 
 
-@pytest.mark.parametrize('case', [
-    case for case in UNCHANGED if not 0.0 < case.get('duration', 0.0) < 0.0005
-], ids=lambda case: f'{case["name"]} {case["note"]}')
+@pytest.mark.parametrize(
+    'case',
+    [case for case in UNCHANGED if not 0.0 < case.get('duration', 0.0) < 0.0005],
+    ids=lambda case: f'{case["name"]} {case["note"]}',
+)
 def test_before_2_10_only_duration_and_blend_differ(case):
     fields = fields_of(case)
     old = struct.unpack('>21i', encode_fields(fields, DIALECTS['2.0']))
     assert list(old[:18]) == case['ints'][:18]
     assert abs(old[18] - 1000.0 * fields[18]) <= 0.5
-    assert old[19] == case['ints'][19] if case['type'] == 51 else (
-        abs(old[19] - 1000.0 * fields[19]) <= 0.5)
+    assert (
+        old[19] == case['ints'][19]
+        if case['type'] == 51
+        else (abs(old[19] - 1000.0 * fields[19]) <= 0.5)
+    )
 
 
 #: Primitive, words 6-17, duration and blend as they were meant.
@@ -101,9 +127,15 @@ MOVES = [
 ]
 
 
-@pytest.mark.parametrize(('name', 'scale', 'move', 'kind', 'duration'), [
-    (name, scale, *move) for name, scale, kinds in (('2.0', 1000, 3), ('2.10', MICRO, 5))
-    for move in MOVES[:kinds]], ids=lambda x: x if isinstance(x, str) else type(x).__name__)
+@pytest.mark.parametrize(
+    ('name', 'scale', 'move', 'kind', 'duration'),
+    [
+        (name, scale, *move)
+        for name, scale, kinds in (('2.0', 1000, 3), ('2.10', MICRO, 5))
+        for move in MOVES[:kinds]
+    ],
+    ids=lambda x: x if isinstance(x, str) else type(x).__name__,
+)
 def test_moves_repeat_velocity_and_acceleration_before_2_12(name, scale, move, kind, duration):
     sent = words(move, name)
     assert sent[6:12] == (700_000,) * 6
@@ -113,11 +145,17 @@ def test_moves_repeat_velocity_and_acceleration_before_2_12(name, scale, move, k
     assert (back.velocity, back.acceleration, back.blend_radius) == (0.7, 0.9, 0.02)
 
 
-@pytest.mark.parametrize(('name', 'primitive', 'what'), [
-    ('2.0', OptimoveJ(target=Q), r'OPTIMOVEJ \(motion type 4\)'),
-    ('2.0', MoveJ(target=POSE), 'MOVEJ_POSE'), ('2.10', MoveJ(target=POSE), 'MOVEJ_POSE'),
-    ('2.10', MoveL(target=Q), 'MOVEL_JOINT'), ('2.10', MoveC(target=Q, via=Q), 'MOVEC_JOINT'),
-    ('2.10', MoveL(target=POSE, q_near=Q), 'q_near')])
+@pytest.mark.parametrize(
+    ('name', 'primitive', 'what'),
+    [
+        ('2.0', OptimoveJ(target=Q), r'OPTIMOVEJ \(motion type 4\)'),
+        ('2.0', MoveJ(target=POSE), 'MOVEJ_POSE'),
+        ('2.10', MoveJ(target=POSE), 'MOVEJ_POSE'),
+        ('2.10', MoveL(target=Q), 'MOVEL_JOINT'),
+        ('2.10', MoveC(target=Q, via=Q), 'MOVEC_JOINT'),
+        ('2.10', MoveL(target=POSE, q_near=Q), 'q_near'),
+    ],
+)
 def test_what_a_dialect_does_not_have_is_refused_with_its_name(name, primitive, what):
     for encode in (encode_point, lambda p, d: encode_points([p], d)):
         with pytest.raises(LocalProtocolError, match=f'{what} .*wire dialect {name}'):
@@ -156,14 +194,15 @@ def test_the_error_names_field_value_bound_and_dialect(name, values, field, boun
 
 def test_the_longest_durations_fit():
     for name, longest in (('2.0', 2_147_483.647), ('2.10', 2147.483647)):
-        assert words(MoveL(target=POSE, duration=longest), name)[18] == 2 ** 31 - 1
+        assert words(MoveL(target=POSE, duration=longest), name)[18] == 2**31 - 1
 
 
 @pytest.mark.parametrize('name', DIALECTS)
 @given(st.floats(0.001, 2000.0), st.floats(0.0, 2.0), st.floats(0.0, 10.0))
 def test_reading_what_was_written_is_the_same_within_half_a_unit(name, duration, blend, v):
-    line = MoveL(target=POSE, velocity=v, acceleration=2.0 * v, duration=duration,
-                 blend_radius=blend)
+    line = MoveL(
+        target=POSE, velocity=v, acceleration=2.0 * v, duration=duration, blend_radius=blend
+    )
     dialect = DIALECTS[name]
     data = encode_point(line, dialect)
     assert encode_points([line], dialect) == data

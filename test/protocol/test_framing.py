@@ -22,16 +22,27 @@ from ur_cartesian_driver.protocol.framing import (
 )
 
 
-@pytest.mark.parametrize(('value', 'raw'), [
-    (0.0, 0), (-0.0, 0), (1.0, 1_000_000), (0.0000005, 1), (-0.0000005, -1), (0.0000025, 3),
-    (math.nextafter(0.0000005, 0.0), 0), (-2147.483648, -2147483648), (2147.483647, 2147483647),
-])
+@pytest.mark.parametrize(
+    ('value', 'raw'),
+    [
+        (0.0, 0),
+        (-0.0, 0),
+        (1.0, 1_000_000),
+        (0.0000005, 1),
+        (-0.0000005, -1),
+        (0.0000025, 3),
+        (math.nextafter(0.0000005, 0.0), 0),
+        (-2147.483648, -2147483648),
+        (2147.483647, 2147483647),
+    ],
+)
 def test_ties_go_away_from_zero(value, raw):
     assert to_fixed(value, 'x') == raw
 
 
-@pytest.mark.parametrize('value', [
-    math.nan, math.inf, -math.inf, 2147.4836475, -2147.4836486, 1e300])
+@pytest.mark.parametrize(
+    'value', [math.nan, math.inf, -math.inf, 2147.4836475, -2147.4836486, 1e300]
+)
 def test_what_does_not_fit_is_refused_with_field_value_and_bound(value):
     with pytest.raises(LocalProtocolError) as error:
         to_fixed(value, 'target[3]')
@@ -44,12 +55,12 @@ def test_a_fixed_point_number_is_within_half_a_unit(value):
     assert abs(from_fixed(to_fixed(value, 'x')) - value) <= 0.5 / FIXED_POINT + 1e-12
 
 
-@given(st.integers(-2 ** 31, 2 ** 31 - 1))
+@given(st.integers(-(2**31), 2**31 - 1))
 def test_every_word_survives_the_way_to_a_value_and_back(raw):
     assert to_fixed(from_fixed(raw), 'x') == raw
 
 
-@pytest.mark.parametrize('value', [2 ** 31, -2 ** 31 - 1])
+@pytest.mark.parametrize('value', [2**31, -(2**31) - 1])
 def test_a_raw_word_beyond_int32_is_refused(value):
     with pytest.raises(LocalProtocolError, match='count'):
         checked_int32(value, 'count')
@@ -67,7 +78,7 @@ STREAMS = [b'abcdefgh', b'\x00\x03a\x00\x05abc\x00\x03z', b'one\r\ntwo\n\n']
 def test_byte_by_byte_gives_the_same_as_at_once(make, stream):
     at_once = make().feed(stream)
     buffer = make()
-    assert [unit for i in range(len(stream)) for unit in buffer.feed(stream[i:i + 1])] == at_once
+    assert [unit for i in range(len(stream)) for unit in buffer.feed(stream[i : i + 1])] == at_once
     assert len(at_once) >= 2
     assert buffer.feed(b'') == []
 

@@ -56,35 +56,78 @@ ORDER = [0, 1, 4, 5, 9, 3, 2, 6, 7, 8, 10, 11, 12]
 SIZES = [47, 251, 101, 225, 53, 75, 37, 445, 61, 9, 43, 26, 8]
 
 KINDS = {
-    'robot_mode_data': RobotModeData, 'kinematics_info': KinematicsInfo,
-    'masterboard_data': MasterboardData, 'configuration_data': ConfigurationData,
-    'raw_state': RawState, 'text_message': TextMessage, 'version_message': VersionMessage,
-    'safety_mode_message': SafetyModeMessage, 'error_code_message': ErrorCodeMessage,
-    'key_message': KeyMessage, 'runtime_exception_message': RuntimeExceptionMessage,
-    'raw_message': RawMessage}
+    'robot_mode_data': RobotModeData,
+    'kinematics_info': KinematicsInfo,
+    'masterboard_data': MasterboardData,
+    'configuration_data': ConfigurationData,
+    'raw_state': RawState,
+    'text_message': TextMessage,
+    'version_message': VersionMessage,
+    'safety_mode_message': SafetyModeMessage,
+    'error_code_message': ErrorCodeMessage,
+    'key_message': KeyMessage,
+    'runtime_exception_message': RuntimeExceptionMessage,
+    'raw_message': RawMessage,
+}
 #: Our names where they differ from the library's.
 NAMES = {
-    'is_real_robot_connected': 'real_robot_connected', 'robot_voltage_48v': 'robot_voltage_48v',
-    'is_real_robot_enabled': 'real_robot_enabled', 'is_robot_power_on': 'power_on',
-    'is_emergency_stopped': 'emergency_stopped', 'is_protective_stopped': 'protective_stopped',
-    'is_program_running': 'program_running', 'is_program_paused': 'program_paused',
-    'dh_theta': 'theta', 'dh_a': 'a', 'dh_d': 'd', 'dh_alpha': 'alpha',
-    'calibration_status': 'status', 'joint_position_limits_min_max': 'position_limits',
-    'joint_motion_limits_speed_acceleration': 'motion_limits', 'master_io_current': 'io_current',
-    'master_board_temperature': 'temperature', 'in_reduced_mode': 'reduced_mode',
+    'is_real_robot_connected': 'real_robot_connected',
+    'robot_voltage_48v': 'robot_voltage_48v',
+    'is_real_robot_enabled': 'real_robot_enabled',
+    'is_robot_power_on': 'power_on',
+    'is_emergency_stopped': 'emergency_stopped',
+    'is_protective_stopped': 'protective_stopped',
+    'is_program_running': 'program_running',
+    'is_program_paused': 'program_paused',
+    'dh_theta': 'theta',
+    'dh_a': 'a',
+    'dh_d': 'd',
+    'dh_alpha': 'alpha',
+    'calibration_status': 'status',
+    'joint_position_limits_min_max': 'position_limits',
+    'joint_motion_limits_speed_acceleration': 'motion_limits',
+    'master_io_current': 'io_current',
+    'master_board_temperature': 'temperature',
+    'in_reduced_mode': 'reduced_mode',
     'operational_mode_selector_input': 'operational_mode_selector',
     'three_position_enabling_device_input': 'three_position_enabling_device',
-    'project_name': 'project', 'major_version': 'major', 'minor_version': 'minor',
-    'svn_version': 'bugfix', 'build_number': 'build', 'build_date': 'date',
-    'message_code': 'code', 'message_argument': 'argument', 'safety_mode_type': 'safety_mode',
-    'report_data_type': 'data_type', 'report_data': 'data', 'report_level': 'level',
-    'line_number': 'line', 'column_number': 'column'}
+    'project_name': 'project',
+    'major_version': 'major',
+    'minor_version': 'minor',
+    'svn_version': 'bugfix',
+    'build_number': 'build',
+    'build_date': 'date',
+    'message_code': 'code',
+    'message_argument': 'argument',
+    'safety_mode_type': 'safety_mode',
+    'report_data_type': 'data_type',
+    'report_data': 'data',
+    'report_level': 'level',
+    'line_number': 'line',
+    'column_number': 'column',
+}
 #: Computed by the library, or lengths, or read in another form below.
-OTHERS = {'kind', 'reserved', 'calibration_hash', 'message_type', 'sub_type', 'title_length',
-          'project_name_length', 'report_level_name', 'immi_interface_installed',
-          'immi_input_bits', 'immi_output_bits', 'immi_voltage_24v', 'immi_current'}
-PAIRS = {'analog_input_range': 'analog_input_range', 'analog_input': 'analog_input',
-         'analog_output_domain': 'analog_output_domain', 'analog_output': 'analog_output'}
+OTHERS = {
+    'kind',
+    'reserved',
+    'calibration_hash',
+    'message_type',
+    'sub_type',
+    'title_length',
+    'project_name_length',
+    'report_level_name',
+    'immi_interface_installed',
+    'immi_input_bits',
+    'immi_output_bits',
+    'immi_voltage_24v',
+    'immi_current',
+}
+PAIRS = {
+    'analog_input_range': 'analog_input_range',
+    'analog_input': 'analog_input',
+    'analog_output_domain': 'analog_output_domain',
+    'analog_output': 'analog_output',
+}
 
 
 def expected(entry):
@@ -94,8 +137,9 @@ def expected(entry):
         stem, _, digit = name.rpartition('_')
         if stem in PAIRS and digit in '01':
             values.setdefault(stem, [0, 0])[int(digit)] = value
-        elif name not in OTHERS and not (name.startswith('reserved') and (
-                entry['kind'] == 'configuration_data')):
+        elif name not in OTHERS and not (
+            name.startswith('reserved') and (entry['kind'] == 'configuration_data')
+        ):
             values[NAMES.get(name, name)] = value
     return values
 
@@ -122,8 +166,11 @@ def test_frames_are_read_as_by_the_library(frame):
             mine = listed(getattr(package, name))
             if name == 'data' and isinstance(mine, float):
                 (mine,) = struct.unpack('<f', struct.pack('>f', mine))  # see the next test
-            assert mine == (pytest.approx(value, rel=1e-8, abs=0.0) if isinstance(
-                value, float | int) else value), name
+            assert mine == (
+                pytest.approx(value, rel=1e-8, abs=0.0)
+                if isinstance(value, float | int)
+                else value
+            ), name
 
 
 def test_a_float_datum_is_big_endian_as_all_else_though_the_library_swaps_it():
@@ -132,15 +179,23 @@ def test_a_float_datum_is_big_endian_as_all_else_though_the_library_swaps_it():
 
 
 @pytest.mark.parametrize(
-    'frame', [f for f in FRAMES if f['frame_type'] in (16, 20)], ids=lambda f: f['name'])
+    'frame', [f for f in FRAMES if f['frame_type'] in (16, 20)], ids=lambda f: f['name']
+)
 def test_frames_are_written_as_they_came(frame):
     data = bytes.fromhex(frame['hex'])
     content = decode_frame(data)
-    written = encode_state(content.packages) if isinstance(
-        content, RobotState) else encode_message(content)
+    written = (
+        encode_state(content.packages)
+        if isinstance(content, RobotState)
+        else encode_message(content)
+    )
     # What we do not keep: a surplus, or the reserved byte that older frames lack.
-    changed = {'configuration_payload_446_surplus', 'kinematics_oversized',
-               'robot_mode_without_reserved', 'robot_mode_nonzero_flag_bytes'}
+    changed = {
+        'configuration_payload_446_surplus',
+        'kinematics_oversized',
+        'robot_mode_without_reserved',
+        'robot_mode_nonzero_flag_bytes',
+    }
     assert (written == data) is (frame['name'] not in changed and frame['size_matches'])
     if frame['name'] not in changed:
         assert written[4:] == data[4:]
@@ -149,13 +204,20 @@ def test_frames_are_written_as_they_came(frame):
 def test_the_immi_interface_is_read():
     (frame,) = [f for f in FRAMES if f['name'] == 'masterboard_with_immi']
     (board,) = decode_frame(bytes.fromhex(frame['hex'])).packages
-    assert board.immi == Immi(input_bits=286335522, output_bits=858997828, voltage_24v=24.0,
-                              current=0.75)
+    assert board.immi == Immi(
+        input_bits=286335522, output_bits=858997828, voltage_24v=24.0, current=0.75
+    )
 
 
-@pytest.mark.parametrize(('name', 'reserved'), [
-    ('configuration_payload_440', 0), ('configuration_payload_442', 1),
-    ('configuration_payload_444', 2), ('configuration_payload_446_surplus', 2)])
+@pytest.mark.parametrize(
+    ('name', 'reserved'),
+    [
+        ('configuration_payload_440', 0),
+        ('configuration_payload_442', 1),
+        ('configuration_payload_444', 2),
+        ('configuration_payload_446_surplus', 2),
+    ],
+)
 def test_configuration_of_newer_software_is_longer(name, reserved):
     (frame,) = [f for f in FRAMES if f['name'] == name]
     (configuration,) = decode_frame(bytes.fromhex(frame['hex'])).packages
@@ -164,8 +226,16 @@ def test_configuration_of_newer_software_is_longer(name, reserved):
     assert list(configuration.reserved) == words
 
 
-CLASSES = {1: JointData, 2: ToolData, 4: CartesianInfo, 7: ForceModeData, 8: AdditionalInfo,
-           9: CalibrationData, 11: ToolCommunication, 12: ToolModeInfo}
+CLASSES = {
+    1: JointData,
+    2: ToolData,
+    4: CartesianInfo,
+    7: ForceModeData,
+    8: AdditionalInfo,
+    9: CalibrationData,
+    11: ToolCommunication,
+    12: ToolModeInfo,
+}
 
 
 def test_the_recorded_ur5e_is_read_and_written_to_the_byte():
@@ -182,7 +252,8 @@ def test_the_recorded_ur5e_is_read_and_written_to_the_byte():
     assert joints.temperature == (25.5, 25.0, 24.5, 24.0, 23.5, 23.5)
     assert tool.mode == 253
     assert found[CartesianInfo].tcp_pose[:3] == pytest.approx(
-        (-0.14397, -0.43562, 0.20203), abs=1e-4)
+        (-0.14397, -0.43562, 0.20203), abs=1e-4
+    )
     assert found[ToolCommunication].baud_rate == 115200
     assert found[ConfigurationData].robot_type == RobotType.UR5
 
@@ -191,11 +262,28 @@ def full_state():
     six = (0.0,) * 6
     pairs = ((-6.28, 6.28),) * 6
     return [
-        RobotModeData(), JointData(q_actual=six, q_target=six), CartesianInfo(tcp_pose=six),
-        KinematicsInfo(theta=six, a=six, d=six, alpha=six), CalibrationData(), MasterboardData(),
-        ToolData(), ConfigurationData(position_limits=pairs, motion_limits=pairs, a=six, d=six,
-                                      alpha=six, theta=six, robot_type=RobotType.UR5),
-        ForceModeData(), AdditionalInfo(), SAFETY_DATA, ToolCommunication(), ToolModeInfo()]
+        RobotModeData(),
+        JointData(q_actual=six, q_target=six),
+        CartesianInfo(tcp_pose=six),
+        KinematicsInfo(theta=six, a=six, d=six, alpha=six),
+        CalibrationData(),
+        MasterboardData(),
+        ToolData(),
+        ConfigurationData(
+            position_limits=pairs,
+            motion_limits=pairs,
+            a=six,
+            d=six,
+            alpha=six,
+            theta=six,
+            robot_type=RobotType.UR5,
+        ),
+        ForceModeData(),
+        AdditionalInfo(),
+        SAFETY_DATA,
+        ToolCommunication(),
+        ToolModeInfo(),
+    ]
 
 
 def test_a_simulated_state_has_the_sizes_and_the_order_of_a_ur5e():
@@ -224,7 +312,7 @@ def test_a_sub_package_that_is_too_short_is_refused_with_its_bytes(package):
     if isinstance(package, RawState):
         return
     optional = {RobotModeData: 1, MasterboardData: 3}.get(type(package), 0)
-    body = package.encode()[:-1 - optional]
+    body = package.encode()[: -1 - optional]
     with pytest.raises(RemoteProtocolError, match=body[:20].hex()):
         type(package).decode(body)
 
@@ -239,7 +327,7 @@ def test_frames_are_read_from_a_stream_in_pieces():
     stream = b''.join(bytes.fromhex(f['hex']) for f in whole)
     at_once = PrimaryDecoder().feed(stream)
     decoder = PrimaryDecoder()
-    pieces = [f for i in range(len(stream)) for f in decoder.feed(stream[i:i + 1])]
+    pieces = [f for i in range(len(stream)) for f in decoder.feed(stream[i : i + 1])]
     assert pieces == at_once
     assert len(at_once) == len(whole) > 60
     assert decoder.feed(b'') == []
@@ -255,12 +343,28 @@ def message(kind, content):
     return struct.pack('>iB', 5 + len(body), 20) + body
 
 
-@pytest.mark.parametrize('data', [
-    struct.pack('>iB', 4, 16), struct.pack('>iB', -1, 16), struct.pack('>iB', 1 << 21, 16),
-    state(b'\0\0\0\4\0'), state(b'\0\0\0\6\0'), state(b'\0\0'), state(b'\0\0\0\5\0'),
-    state(b'\0\0\0\5\5'), struct.pack('>iB', 5, 20), message(3, b''), message(3, b'\x09URC'),
-    message(3, b'\xffURControl' + bytes(10)), message(5, bytes(16)), message(6, bytes(19)),
-    message(7, bytes(8) + b'\x05abcd'), message(10, bytes(7))], ids=bytes.hex)
+@pytest.mark.parametrize(
+    'data',
+    [
+        struct.pack('>iB', 4, 16),
+        struct.pack('>iB', -1, 16),
+        struct.pack('>iB', 1 << 21, 16),
+        state(b'\0\0\0\4\0'),
+        state(b'\0\0\0\6\0'),
+        state(b'\0\0'),
+        state(b'\0\0\0\5\0'),
+        state(b'\0\0\0\5\5'),
+        struct.pack('>iB', 5, 20),
+        message(3, b''),
+        message(3, b'\x09URC'),
+        message(3, b'\xffURControl' + bytes(10)),
+        message(5, bytes(16)),
+        message(6, bytes(19)),
+        message(7, bytes(8) + b'\x05abcd'),
+        message(10, bytes(7)),
+    ],
+    ids=bytes.hex,
+)
 def test_a_frame_without_sense_is_refused(data):
     with pytest.raises(RemoteProtocolError):
         PrimaryDecoder().feed(data)
@@ -273,14 +377,18 @@ def test_an_end_inside_a_frame_is_an_error():
         decoder.feed(b'')
 
 
-@pytest.mark.parametrize('make', [
-    lambda: encode_message(TextMessage(text='x' * 4091)),
-    lambda: encode_message(KeyMessage(title='x' * 256)),
-    lambda: encode_message(VersionMessage(major=256, minor=0)),
-    lambda: encode_message(VersionMessage(major=5, minor=0, project='x' * 128)),
-    lambda: encode_state([RobotModeData(robot_mode=200)]),
-    lambda: encode_state([MasterboardData(temperature=1e300)]),
-    lambda: encode_state([RawState(sub_type=99, body=bytes(4091))])])
+@pytest.mark.parametrize(
+    'make',
+    [
+        lambda: encode_message(TextMessage(text='x' * 4091)),
+        lambda: encode_message(KeyMessage(title='x' * 256)),
+        lambda: encode_message(VersionMessage(major=256, minor=0)),
+        lambda: encode_message(VersionMessage(major=5, minor=0, project='x' * 128)),
+        lambda: encode_state([RobotModeData(robot_mode=200)]),
+        lambda: encode_state([MasterboardData(temperature=1e300)]),
+        lambda: encode_state([RawState(sub_type=99, body=bytes(4091))]),
+    ],
+)
 def test_what_clients_cannot_read_is_not_sent(make):
     with pytest.raises(LocalProtocolError):
         make()
@@ -294,20 +402,40 @@ def test_an_error_has_the_label_of_the_manuals():
 
 
 TEXT = st.text(max_size=40)
-INT32 = st.integers(-2 ** 31, 2 ** 31 - 1)
-HEAD = {'timestamp': st.integers(0, 2 ** 64 - 1), 'source': st.integers(-128, 127)}
+INT32 = st.integers(-(2**31), 2**31 - 1)
+HEAD = {'timestamp': st.integers(0, 2**64 - 1), 'source': st.integers(-128, 127)}
 BYTE = st.integers(0, 255)
 MESSAGES = st.one_of(
     st.builds(TextMessage, **HEAD, text=TEXT),
-    st.builds(VersionMessage, **HEAD, project=st.text(max_size=30), major=BYTE, minor=BYTE,
-              bugfix=INT32, build=INT32, date=TEXT),
-    st.builds(SafetyModeMessage, **HEAD, code=INT32, argument=INT32, safety_mode=BYTE,
-              data_type=st.just(2), data=INT32),
+    st.builds(
+        VersionMessage,
+        **HEAD,
+        project=st.text(max_size=30),
+        major=BYTE,
+        minor=BYTE,
+        bugfix=INT32,
+        build=INT32,
+        date=TEXT,
+    ),
+    st.builds(
+        SafetyModeMessage,
+        **HEAD,
+        code=INT32,
+        argument=INT32,
+        safety_mode=BYTE,
+        data_type=st.just(2),
+        data=INT32,
+    ),
     st.builds(ErrorCodeMessage, **HEAD, code=INT32, argument=INT32, level=INT32, text=TEXT),
     st.builds(KeyMessage, **HEAD, code=INT32, argument=INT32, title=TEXT, text=TEXT),
     st.builds(RuntimeExceptionMessage, **HEAD, line=BYTE, column=BYTE, text=TEXT),
-    st.builds(RawMessage, **HEAD, message_type=st.sampled_from([1, 2, 9, 200]),
-              content=st.binary(max_size=20)))
+    st.builds(
+        RawMessage,
+        **HEAD,
+        message_type=st.sampled_from([1, 2, 9, 200]),
+        content=st.binary(max_size=20),
+    ),
+)
 
 
 @given(st.lists(MESSAGES, max_size=5))
@@ -315,9 +443,13 @@ def test_messages_come_back_as_they_were(messages):
     assert PrimaryDecoder().feed(b''.join(map(encode_message, messages)) or b'') == messages
 
 
-@given(st.lists(st.binary(min_size=1, max_size=60) | st.builds(
-    message, st.sampled_from([0, 3, 5, 6, 7, 10]), st.binary(max_size=40)) | st.builds(
-    state, st.binary(max_size=100))))
+@given(
+    st.lists(
+        st.binary(min_size=1, max_size=60)
+        | st.builds(message, st.sampled_from([0, 3, 5, 6, 7, 10]), st.binary(max_size=40))
+        | st.builds(state, st.binary(max_size=100))
+    )
+)
 def test_random_bytes_raise_nothing_but_a_remote_error(chunks):
     decoder = PrimaryDecoder()
     with suppress(RemoteProtocolError):
@@ -349,14 +481,23 @@ FLAT = 'def f():\nif True:\nend\nend\n'
 @pytest.mark.parametrize('in_pieces', [False, True])
 @pytest.mark.parametrize('end', [b'\n', b'\r\n'])
 def test_commands_and_programs_are_told_apart(end, in_pieces):
-    stream = (command(Command.STOP_PROGRAM) + upload(PROGRAM) + b'movej([0,0,0,0,0,0])\n'
-              + upload(FLAT) + upload('sec s():\n  set_digital_out(1, True)\nend'))
+    stream = (
+        command(Command.STOP_PROGRAM)
+        + upload(PROGRAM)
+        + b'movej([0,0,0,0,0,0])\n'
+        + upload(FLAT)
+        + upload('sec s():\n  set_digital_out(1, True)\nend')
+    )
     stream = stream.replace(b'\n', end)
     decoder = ScriptDecoder()
-    pieces = [stream[i:i + 1] for i in range(len(stream))] if in_pieces else [stream]
+    pieces = [stream[i : i + 1] for i in range(len(stream))] if in_pieces else [stream]
     assert [text for piece in pieces for text in decoder.feed(piece)] == [
-        'stop program', PROGRAM, 'movej([0,0,0,0,0,0])', FLAT,
-        'sec s():\n  set_digital_out(1, True)\nend\n']
+        'stop program',
+        PROGRAM,
+        'movej([0,0,0,0,0,0])',
+        FLAT,
+        'sec s():\n  set_digital_out(1, True)\nend\n',
+    ]
     assert decoder.feed(b'') == []
 
 

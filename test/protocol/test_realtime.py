@@ -20,18 +20,48 @@ from ur_cartesian_driver.protocol.realtime import (
 
 #: First byte of a field, from the manufacturer's tables.
 PLACES = {
-    'time': 4, 'q_target': 12, 'qd_target': 60, 'qdd_target': 108, 'current_target': 156,
-    'moment_target': 204, 'q_actual': 252, 'qd_actual': 300, 'current_actual': 348,
-    'current_control': 396, 'tcp_pose_actual': 444, 'tcp_speed_actual': 492, 'tcp_force': 540,
-    'tcp_pose_target': 588, 'tcp_speed_target': 636, 'digital_input_bits': 684,
-    'joint_temperatures': 692, 'controller_timer': 740, 'robot_mode': 756, 'joint_modes': 764,
-    'safety_mode': 812, 'tool_accelerometer': 868, 'speed_scaling': 940, 'momentum': 948,
-    'main_voltage': 972, 'robot_voltage': 980, 'robot_current': 988, 'joint_voltages': 996,
-    'digital_output_bits': 1044, 'program_state': 1052, 'elbow_position': 1060,
-    'elbow_velocity': 1084, 'safety_status': 1108, 'payload_mass': 1140, 'payload_cog': 1148,
-    'payload_inertia': 1172}
-VECTORS = {name: len(getattr(RealtimeData(time=0.0), name)) for name in PLACES
-           if isinstance(getattr(RealtimeData(time=0.0), name), tuple)}
+    'time': 4,
+    'q_target': 12,
+    'qd_target': 60,
+    'qdd_target': 108,
+    'current_target': 156,
+    'moment_target': 204,
+    'q_actual': 252,
+    'qd_actual': 300,
+    'current_actual': 348,
+    'current_control': 396,
+    'tcp_pose_actual': 444,
+    'tcp_speed_actual': 492,
+    'tcp_force': 540,
+    'tcp_pose_target': 588,
+    'tcp_speed_target': 636,
+    'digital_input_bits': 684,
+    'joint_temperatures': 692,
+    'controller_timer': 740,
+    'robot_mode': 756,
+    'joint_modes': 764,
+    'safety_mode': 812,
+    'tool_accelerometer': 868,
+    'speed_scaling': 940,
+    'momentum': 948,
+    'main_voltage': 972,
+    'robot_voltage': 980,
+    'robot_current': 988,
+    'joint_voltages': 996,
+    'digital_output_bits': 1044,
+    'program_state': 1052,
+    'elbow_position': 1060,
+    'elbow_velocity': 1084,
+    'safety_status': 1108,
+    'payload_mass': 1140,
+    'payload_cog': 1148,
+    'payload_inertia': 1172,
+}
+VECTORS = {
+    name: len(getattr(RealtimeData(time=0.0), name))
+    for name in PLACES
+    if isinstance(getattr(RealtimeData(time=0.0), name), tuple)
+}
 
 
 def numbered() -> RealtimeData:
@@ -56,10 +86,23 @@ def test_each_field_stands_where_the_tables_say(name):
     assert packet.count(b'\xbf\xf0' + bytes(6)) == 1  # -1.0, once
 
 
-@pytest.mark.parametrize(('version', 'size'), [
-    ((3, 2, 0, 0), 1060), ((3, 4), 1060), ((3, 5), 1108), ((3, 12), 1116), ((3, 15, 8, 0), 1140),
-    ((5, 0), 1108), ((5, 3), 1108), ((5, 4), 1116), ((5, 9), 1140), ((5, 10), 1220),
-    ((5, 21, 0, 0), 1220), ((10, 8), 1220)])
+@pytest.mark.parametrize(
+    ('version', 'size'),
+    [
+        ((3, 2, 0, 0), 1060),
+        ((3, 4), 1060),
+        ((3, 5), 1108),
+        ((3, 12), 1116),
+        ((3, 15, 8, 0), 1140),
+        ((5, 0), 1108),
+        ((5, 3), 1108),
+        ((5, 4), 1116),
+        ((5, 9), 1140),
+        ((5, 10), 1220),
+        ((5, 21, 0, 0), 1220),
+        ((10, 8), 1220),
+    ],
+)
 def test_the_size_follows_from_the_version_of_the_software(version, size):
     packet = numbered().encode(packet_size(version))
     assert len(packet) == size

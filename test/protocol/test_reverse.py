@@ -51,8 +51,9 @@ def message_of(case):
     """Call the builder that does what the library's call did."""
     timeout, step = requested(case), case['step_time_ms']
     if case['call'] == 'trajectory_control':
-        return trajectory(TrajectoryAction(case['action']), case.get('point_number', 0), timeout,
-                          step)
+        return trajectory(
+            TrajectoryAction(case['action']), case.get('point_number', 0), timeout, step
+        )
     if case['call'] == 'freedrive':
         return freedrive(FreedriveAction(case['action']), timeout, step)
     mode = ControlMode(case['control_mode'])
@@ -64,8 +65,10 @@ def message_of(case):
     if mode in REALTIME_MODES and case['values'] is not None:
         return setpoint(mode, case['values'], timeout, step)
     return ReverseMessage(
-        read_timeout=read_timeout_for(mode, timeout, step), mode=mode,
-        payload=tuple(to_fixed(value, 'value') for value in case['values'] or (0.0,) * 6))
+        read_timeout=read_timeout_for(mode, timeout, step),
+        mode=mode,
+        payload=tuple(to_fixed(value, 'value') for value in case['values'] or (0.0,) * 6),
+    )
 
 
 @pytest.mark.parametrize('case', SENT, ids=case_id)
@@ -73,8 +76,9 @@ def test_bytes_are_those_of_the_library(case):
     message = message_of(case)
     if case.get('keepalive_count') is not None:
         # The library's deprecated setting overrides word 0; we do not have it.
-        message = ReverseMessage(read_timeout=20 * case['keepalive_count'], mode=message.mode,
-                                 payload=message.payload)
+        message = ReverseMessage(
+            read_timeout=20 * case['keepalive_count'], mode=message.mode, payload=message.payload
+        )
     pattern = case['hex'] or case['hex_pattern']
     text = message.encode().hex()
     assert len(text) == len(pattern)
@@ -86,9 +90,13 @@ def test_reading_gives_the_words(case):
     data = bytes.fromhex((case['hex'] or case['hex_pattern']).replace('x', '7'))
     message = ReverseMessage.decode(data)
     assert message.encode() == data
-    defined = [(a, b) for a, b in zip(
-        (message.read_timeout, *message.payload, message.mode), case['ints'], strict=True)
-        if b is not None]
+    defined = [
+        (a, b)
+        for a, b in zip(
+            (message.read_timeout, *message.payload, message.mode), case['ints'], strict=True
+        )
+        if b is not None
+    ]
     assert all(a == b for a, b in defined)
     assert len(defined) >= 2
 
@@ -103,28 +111,41 @@ def test_all_messages_of_the_library_are_read_from_one_stream_in_pieces():
     stream = b''.join(bytes.fromhex(case['hex']) for case in SENT if case['hex'])
     at_once = ReverseDecoder().feed(stream)
     decoder = ReverseDecoder()
-    assert [m for i in range(len(stream)) for m in decoder.feed(stream[i:i + 1])] == at_once
+    assert [m for i in range(len(stream)) for m in decoder.feed(stream[i : i + 1])] == at_once
     assert b''.join(message.encode() for message in at_once) == stream
     assert decoder.feed(b'') == []
 
 
-@pytest.mark.parametrize(('mode', 'wish', 'step', 'word'), [
-    (ControlMode.SERVOJ, 0, 2, 2), (ControlMode.SERVOJ, 1, 8, 8),
-    (ControlMode.TORQUE, 5000, 2, 200), (ControlMode.SPEEDL, 20, 2, 20),
-    (ControlMode.IDLE, 0, 2, 0), (ControlMode.IDLE, 1, 8, 8),
-    (ControlMode.FORWARD, 100_000, 2, 100_000), (ControlMode.STOPPED, 5000, 2, 100)])
+@pytest.mark.parametrize(
+    ('mode', 'wish', 'step', 'word'),
+    [
+        (ControlMode.SERVOJ, 0, 2, 2),
+        (ControlMode.SERVOJ, 1, 8, 8),
+        (ControlMode.TORQUE, 5000, 2, 200),
+        (ControlMode.SPEEDL, 20, 2, 20),
+        (ControlMode.IDLE, 0, 2, 0),
+        (ControlMode.IDLE, 1, 8, 8),
+        (ControlMode.FORWARD, 100_000, 2, 100_000),
+        (ControlMode.STOPPED, 5000, 2, 100),
+    ],
+)
 def test_the_arm_never_moves_on_for_more_than_200_ms_unasked(mode, wish, step, word):
     assert read_timeout_for(mode, wish, step) == word
 
 
-@pytest.mark.parametrize('make', [
-    lambda: keepalive(-1), lambda: setpoint(ControlMode.IDLE, (0.0,) * 6),
-    lambda: setpoint(ControlMode.SERVOJ, (0.0,) * 5),
-    lambda: setpoint(ControlMode.SERVOJ, (0.0, float('nan'), 0.0, 0.0, 0.0, 0.0)),
-    lambda: setpoint(ControlMode.TORQUE, (0.0, 0.0, 2200.0, 0.0, 0.0, 0.0)),
-    lambda: trajectory(TrajectoryAction.START, 2 ** 31),
-    lambda: ReverseMessage(read_timeout=-1, mode=ControlMode.IDLE),
-    lambda: ReverseMessage(read_timeout=2 ** 31, mode=ControlMode.IDLE)])
+@pytest.mark.parametrize(
+    'make',
+    [
+        lambda: keepalive(-1),
+        lambda: setpoint(ControlMode.IDLE, (0.0,) * 6),
+        lambda: setpoint(ControlMode.SERVOJ, (0.0,) * 5),
+        lambda: setpoint(ControlMode.SERVOJ, (0.0, float('nan'), 0.0, 0.0, 0.0, 0.0)),
+        lambda: setpoint(ControlMode.TORQUE, (0.0, 0.0, 2200.0, 0.0, 0.0, 0.0)),
+        lambda: trajectory(TrajectoryAction.START, 2**31),
+        lambda: ReverseMessage(read_timeout=-1, mode=ControlMode.IDLE),
+        lambda: ReverseMessage(read_timeout=2**31, mode=ControlMode.IDLE),
+    ],
+)
 def test_no_invalid_message_can_be_made(make):
     with pytest.raises(LocalProtocolError):
         make()
@@ -135,16 +156,27 @@ def test_the_error_names_the_value():
         setpoint(ControlMode.SERVOJ, (0.0, float('nan'), 0.0, 0.0, 0.0, 0.0))
 
 
-@pytest.mark.parametrize('text', [
-    '00' * 31, '00' * 33, '00' * 28 + '00000009', '00' * 28 + '00000007', '00' * 28 + 'ffffffff',
-    'ffffffff' + '00' * 28])
+@pytest.mark.parametrize(
+    'text',
+    [
+        '00' * 31,
+        '00' * 33,
+        '00' * 28 + '00000009',
+        '00' * 28 + '00000007',
+        '00' * 28 + 'ffffffff',
+        'ffffffff' + '00' * 28,
+    ],
+)
 def test_a_message_without_sense_is_refused_with_its_bytes(text):
     with pytest.raises(RemoteProtocolError, match=text):
         ReverseMessage.decode(bytes.fromhex(text))
 
 
-@given(st.sampled_from(sorted(REALTIME_MODES)),
-       st.tuples(*[st.floats(-2147.0, 2147.0)] * 6), st.integers(0, 10_000))
+@given(
+    st.sampled_from(sorted(REALTIME_MODES)),
+    st.tuples(*[st.floats(-2147.0, 2147.0)] * 6),
+    st.integers(0, 10_000),
+)
 def test_a_set_point_comes_back_within_half_a_unit(mode, values, timeout):
     message = setpoint(mode, values, timeout)
     back = ReverseMessage.decode(message.encode())

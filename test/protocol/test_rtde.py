@@ -47,7 +47,8 @@ def test_the_tables_hold_all_names():
 def test_the_registers_of_the_servo_exist():
     assert registers.field(registers.POINTS_BEGUN) == 'output_int_register_26'
     assert registers.six_fields(registers.InputDouble.DESIRED_JOINT_POSITIONS) == tuple(
-        f'input_double_register_{i}' for i in range(24, 30))
+        f'input_double_register_{i}' for i in range(24, 30)
+    )
     assert all(name in INPUT_TYPES for name in registers.SERVO_INPUTS)
     assert len(set(registers.SERVO_INPUTS)) == 4 + 6 + 6 + 1
     assert all(name in OUTPUT_TYPES for name in registers.SERVO_OUTPUTS)
@@ -75,8 +76,14 @@ class Link:
 
 
 def test_a_whole_connection():
-    link = Link(RtdeClient(['timestamp', 'actual_q'], ['input_int_register_24'], frequency=125.0,
-                           input_groups=[['speed_slider_mask', 'speed_slider_fraction']]))
+    link = Link(
+        RtdeClient(
+            ['timestamp', 'actual_q'],
+            ['input_int_register_24'],
+            frequency=125.0,
+            input_groups=[['speed_slider_mask', 'speed_slider_fraction']],
+        )
+    )
     (ready,) = link.events
     assert isinstance(ready, Ready)
     assert (ready.protocol_version, ready.controller_version) == (2, VERSION)
@@ -90,8 +97,10 @@ def test_a_whole_connection():
     registers_recipe, slider = ready.inputs
     link.to_server(slider.pack((1, 0.25)))
     link.to_server(registers_recipe.pack((-7,)))
-    assert link.received == [InputReceived(recipe=slider, values=(1, 0.25)),
-                             InputReceived(recipe=registers_recipe, values=(-7,))]
+    assert link.received == [
+        InputReceived(recipe=slider, values=(1, 0.25)),
+        InputReceived(recipe=registers_recipe, values=(-7,)),
+    ]
 
 
 def test_all_names_can_be_streamed_at_once():
@@ -105,11 +114,18 @@ def test_all_names_can_be_streamed_at_once():
 
 
 def test_optional_outputs_that_are_unknown_are_left_out():
-    known = {name: t for name, t in OUTPUT_TYPES.items()
-             if name not in ('payload', 'actual_current_as_torque')}
-    link = Link(RtdeClient(['timestamp', 'payload', 'actual_q', 'actual_current_as_torque'],
-                           optional_outputs=['payload', 'actual_current_as_torque', 'actual_q']),
-                output_types=known)
+    known = {
+        name: t
+        for name, t in OUTPUT_TYPES.items()
+        if name not in ('payload', 'actual_current_as_torque')
+    }
+    link = Link(
+        RtdeClient(
+            ['timestamp', 'payload', 'actual_q', 'actual_current_as_torque'],
+            optional_outputs=['payload', 'actual_current_as_torque', 'actual_q'],
+        ),
+        output_types=known,
+    )
     (ready,) = link.events
     assert ready.outputs.names == ('timestamp', 'actual_q')
     assert ready.missing == ('payload', 'actual_current_as_torque')
@@ -136,12 +152,14 @@ def test_inputs_of_another_client_are_named_and_free_again_after_its_end():
     taken = set()
     first = Link(RtdeClient(['timestamp'], ['speed_slider_mask']), taken=taken)
     with pytest.raises(InputsInUse, match='speed_slider_mask') as error:
-        Link(RtdeClient(['timestamp'], ['input_int_register_24', 'speed_slider_mask']),
-             taken=taken)
+        Link(
+            RtdeClient(['timestamp'], ['input_int_register_24', 'speed_slider_mask']), taken=taken
+        )
     assert error.value.names == ('speed_slider_mask',)
     first.server.close()
-    again = Link(RtdeClient(['timestamp'], ['input_int_register_24', 'speed_slider_mask']),
-                 taken=taken)
+    again = Link(
+        RtdeClient(['timestamp'], ['input_int_register_24', 'speed_slider_mask']), taken=taken
+    )
     assert again.client.state is RtdeState.READY
     assert not first.server.streaming
 
@@ -153,11 +171,17 @@ def test_an_old_controller_is_asked_for_125_hz():
         Link(RtdeClient(['timestamp'], frequency=500.0), version=old)
 
 
-@pytest.mark.parametrize('options', [
-    {'outputs': []}, {'outputs': ['timestamp', 'timestamp']},
-    {'outputs': ['timestamp'], 'frequency': 501.0}, {'outputs': ['timestamp'], 'frequency': -1.0},
-    {'outputs': ['timestamp'], 'frequency': math.nan},
-    {'outputs': ['timestamp'], 'inputs': ['a'], 'input_groups': [['a']]}])
+@pytest.mark.parametrize(
+    'options',
+    [
+        {'outputs': []},
+        {'outputs': ['timestamp', 'timestamp']},
+        {'outputs': ['timestamp'], 'frequency': 501.0},
+        {'outputs': ['timestamp'], 'frequency': -1.0},
+        {'outputs': ['timestamp'], 'frequency': math.nan},
+        {'outputs': ['timestamp'], 'inputs': ['a'], 'input_groups': [['a']]},
+    ],
+)
 def test_an_impossible_wish_is_refused_at_once(options):
     with pytest.raises(LocalProtocolError):
         RtdeClient(**options)
@@ -171,8 +195,10 @@ def test_a_client_serves_one_connection():
 
 
 TEXT = TextMessage(text='Fieldbus', source='PROFINET', level=2)
-ACCEPTED = {k: Acknowledgement(type=k, accepted=True) for k in (
-    PackageType.REQUEST_PROTOCOL_VERSION, PackageType.CONTROL_PACKAGE_START)}
+ACCEPTED = {
+    k: Acknowledgement(type=k, accepted=True)
+    for k in (PackageType.REQUEST_PROTOCOL_VERSION, PackageType.CONTROL_PACKAGE_START)
+}
 REFUSED = Acknowledgement(type=PackageType.REQUEST_PROTOCOL_VERSION, accepted=False)
 V, S = PackageType.REQUEST_PROTOCOL_VERSION, PackageType.CONTROL_PACKAGE_START
 OUTPUTS = OutputsReply(types=('DOUBLE',))
@@ -224,13 +250,16 @@ def test_the_end_of_the_data_is_no_error_between_packages():
     assert client.feed(b'') == []
 
 
-@pytest.mark.parametrize(('steps', 'text'), [
-    ([REFUSED, REFUSED], 'neither version 2 nor version 1'),
-    ([*STEPS[:2], OutputsReply(types=('DOUBLE', 'DOUBLE'))], '2 types to 1'),
-    ([*STEPS[:3], Acknowledgement(type=S, accepted=False)], 'refused to start'),
-    ([*STEPS, Data(payload=b'\1' + bytes(9))], '01000000000000000000'),
-    ([*STEPS, Data(payload=b'\1' + bytes(7))], 'has 9 bytes, but 8'),
-])
+@pytest.mark.parametrize(
+    ('steps', 'text'),
+    [
+        ([REFUSED, REFUSED], 'neither version 2 nor version 1'),
+        ([*STEPS[:2], OutputsReply(types=('DOUBLE', 'DOUBLE'))], '2 types to 1'),
+        ([*STEPS[:3], Acknowledgement(type=S, accepted=False)], 'refused to start'),
+        ([*STEPS, Data(payload=b'\1' + bytes(9))], '01000000000000000000'),
+        ([*STEPS, Data(payload=b'\1' + bytes(7))], 'has 9 bytes, but 8'),
+    ],
+)
 def test_what_a_controller_must_not_say(steps, text):
     with pytest.raises(RemoteProtocolError, match=text):
         started(steps)
@@ -250,8 +279,9 @@ def test_a_field_unknown_to_us_can_be_streamed_if_its_type_is_stated():
 
 def test_a_package_that_comes_alone_needs_no_feeding():
     names = ('timestamp', 'speed_scaling')
-    client, _ = started([STEPS[0], VERSION, OutputsReply(types=('DOUBLE', 'DOUBLE')), STEPS[3]],
-                        names)
+    client, _ = started(
+        [STEPS[0], VERSION, OutputsReply(types=('DOUBLE', 'DOUBLE')), STEPS[3]], names
+    )
     data = Recipe(names, [DataType.DOUBLE] * 2).pack((1.0, 2.0))
     assert client.values_in(data) == (1.0, 2.0)
     assert client.values_in(data + data) is None

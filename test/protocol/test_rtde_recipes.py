@@ -31,31 +31,46 @@ def test_text_messages_of_both_versions(version):
     assert decode_request(text.encode(version), version) == text
     if version == 2:
         assert text.encode().hex() == '00164d' + '08' + b'Fieldbus'.hex() + '08' + (
-            b'PROFINET'.hex() + '02')
+            b'PROFINET'.hex() + '02'
+        )
 
 
-@pytest.mark.parametrize('make', [
-    lambda: TextMessage(text='x' * 256).encode(), lambda: SetupInputs(names=('a,b',)).encode(),
-    lambda: SetupInputs(names=('',)).encode(),
-    lambda: SetupInputs(names=('x' * 100,) * 700).encode(),
-    lambda: RequestProtocolVersion(version=65536).encode(),
-    lambda: TextMessage(text='', level=256).encode(),
-    lambda: ControllerVersion(major=-1, minor=0, bugfix=0).encode(),
-    lambda: InputsReply(types=('BOOL',), recipe_id=256).encode()])
+@pytest.mark.parametrize(
+    'make',
+    [
+        lambda: TextMessage(text='x' * 256).encode(),
+        lambda: SetupInputs(names=('a,b',)).encode(),
+        lambda: SetupInputs(names=('',)).encode(),
+        lambda: SetupInputs(names=('x' * 100,) * 700).encode(),
+        lambda: RequestProtocolVersion(version=65536).encode(),
+        lambda: TextMessage(text='', level=256).encode(),
+        lambda: ControllerVersion(major=-1, minor=0, bugfix=0).encode(),
+        lambda: InputsReply(types=('BOOL',), recipe_id=256).encode(),
+    ],
+)
 def test_what_does_not_fit_a_package_is_refused(make):
     with pytest.raises(LocalProtocolError):
         make()
 
 
-MIXED = Recipe(['speed_slider_mask', 'external_force_torque', 'input_bit_register_64'],
-               [DataType.UINT32, DataType.VECTOR6D, DataType.BOOL])
+MIXED = Recipe(
+    ['speed_slider_mask', 'external_force_torque', 'input_bit_register_64'],
+    [DataType.UINT32, DataType.VECTOR6D, DataType.BOOL],
+)
 SIX = (0.0,) * 6
 
 
-@pytest.mark.parametrize(('values', 'text'), [
-    ((-1, SIX, True), 'speed_slider_mask is -1'), ((1.5, SIX, True), 'speed_slider_mask is 1.5'),
-    ((1, SIX[1:], True), 'external_force_torque'), ((1, 1.0, True), 'external_force_torque'),
-    ((1, SIX), '2 values do not fill'), ((10 ** 400, SIX, True), 'UINT32')])
+@pytest.mark.parametrize(
+    ('values', 'text'),
+    [
+        ((-1, SIX, True), 'speed_slider_mask is -1'),
+        ((1.5, SIX, True), 'speed_slider_mask is 1.5'),
+        ((1, SIX[1:], True), 'external_force_torque'),
+        ((1, 1.0, True), 'external_force_torque'),
+        ((1, SIX), '2 values do not fill'),
+        ((10**400, SIX, True), 'UINT32'),
+    ],
+)
 def test_a_value_that_cannot_be_packed_is_named(values, text):
     with pytest.raises(LocalProtocolError, match=text):
         MIXED.pack(values)
@@ -81,20 +96,27 @@ def test_a_recipe_of_one_field_gives_one_value(data_type):
     assert recipe.unpack(recipe.pack(values)[3:]) == values
 
 
-INTEGERS = {'B': (0, 255), 'I': (0, 2 ** 32 - 1), 'Q': (0, 2 ** 64 - 1),
-            'i': (-2 ** 31, 2 ** 31 - 1)}
+INTEGERS = {'B': (0, 255), 'I': (0, 2**32 - 1), 'Q': (0, 2**64 - 1), 'i': (-(2**31), 2**31 - 1)}
 
 
 def values_of(data_type):
     code = data_type.codes[0]
-    single = (st.booleans() if code == '?' else st.floats(allow_nan=False) if code == 'd'
-              else st.integers(*INTEGERS[code]))
+    single = (
+        st.booleans()
+        if code == '?'
+        else st.floats(allow_nan=False)
+        if code == 'd'
+        else st.integers(*INTEGERS[code])
+    )
     return single if data_type.length == 1 else st.tuples(*[single] * data_type.length)
 
 
-@given(st.lists(st.sampled_from(DataType), min_size=1, max_size=8).flatmap(
-    lambda types: st.tuples(st.just(types), st.tuples(*map(values_of, types)))),
-    st.none() | st.integers(0, 255))
+@given(
+    st.lists(st.sampled_from(DataType), min_size=1, max_size=8).flatmap(
+        lambda types: st.tuples(st.just(types), st.tuples(*map(values_of, types)))
+    ),
+    st.none() | st.integers(0, 255),
+)
 def test_values_come_back_as_they_were(types_and_values, recipe_id):
     types, values = types_and_values
     recipe = Recipe([f'x{i}' for i in range(len(types))], types, recipe_id)

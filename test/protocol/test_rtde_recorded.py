@@ -28,16 +28,20 @@ PACKAGES = GOLDEN['data_packages']['packages']
 def frames(direction):
     return [
         pytest.param(frame, GOLDEN[name]['protocol_version'] if i > 3 else 2, id=f'{name} {i}')
-        for name in CONNECTIONS for i, frame in enumerate(GOLDEN[name]['frames'])
-        if frame['direction'] == direction]
+        for name in CONNECTIONS
+        for i, frame in enumerate(GOLDEN[name]['frames'])
+        if frame['direction'] == direction
+    ]
 
 
 def meaning(package):
     """Return a package as the fields that the recording names."""
     names = {'names': list, 'types': list}
-    return {name: names.get(name, lambda x: x)(value)
-            for name in type(package).__slots__
-            if (value := getattr(package, name)) is not None and name != 'type'}
+    return {
+        name: names.get(name, lambda x: x)(value)
+        for name in type(package).__slots__
+        if (value := getattr(package, name)) is not None and name != 'type'
+    }
 
 
 @pytest.mark.parametrize(('frame', 'version'), frames('client_to_controller'))
@@ -69,8 +73,11 @@ def tuples(values):
 @pytest.mark.parametrize('package', PACKAGES, ids=lambda p: p['name'])
 def test_data_packages_have_the_bytes_of_the_library(package):
     data = bytes.fromhex(package['hex'])
-    recipe = Recipe(package['recipe'], [DataType[name] for name in package['types']],
-                    package['fields']['recipe_id'])
+    recipe = Recipe(
+        package['recipe'],
+        [DataType[name] for name in package['types']],
+        package['fields']['recipe_id'],
+    )
     assert recipe.named(recipe.unpack(data[3:])) == tuples(package['fields']['values'])
     assert recipe.pack_named(tuples(package['fields']['values'])) == data
 
@@ -111,8 +118,12 @@ def test_every_package_of_the_librarys_writer_is_read():
 def run_recording(name, in_pieces, **options):
     """Play the controller of a recording to our client; return the events and what it sent."""
     connection = GOLDEN[name]
-    client = RtdeClient(connection['output_recipe'], connection['input_recipe'],
-                        frequency=connection['frequency'], **options)
+    client = RtdeClient(
+        connection['output_recipe'],
+        connection['input_recipe'],
+        frequency=connection['frequency'],
+        **options,
+    )
     replies = {}
     data = []
     for frame in connection['frames']:
@@ -123,7 +134,7 @@ def run_recording(name, in_pieces, **options):
     events = []
     while client.state is not RtdeState.READY:
         reply = replies[sent[-1][2]].pop(0)
-        for piece in [reply[i:i + 1] for i in range(len(reply))] if in_pieces else [reply]:
+        for piece in [reply[i : i + 1] for i in range(len(reply))] if in_pieces else [reply]:
             events += client.feed(piece)
             if out := client.data_to_send():
                 sent.append(out)
@@ -142,13 +153,21 @@ def test_the_client_understands_the_recorded_controllers(name, in_pieces):
     assert ready.outputs.names == tuple(connection['output_recipe'])
     assert ready.outputs.types == tuple(OUTPUT_TYPES[n] for n in connection['output_recipe'])
     assert [recipe.names for recipe in ready.inputs] == [tuple(connection['input_recipe'])]
-    values = [frame['fields']['values'] for frame in connection['frames']
-              if frame['type_char'] == 'U' and frame['direction'] == 'controller_to_client']
+    values = [
+        frame['fields']['values']
+        for frame in connection['frames']
+        if frame['type_char'] == 'U' and frame['direction'] == 'controller_to_client'
+    ]
     assert [ready.outputs.named(e.values) for e in events[1:]] == [tuples(v) for v in values]
     # Each request has the bytes that the library sent; it pauses between, we do not.
-    library = [frame['hex'] for frame in connection['frames']
-               if frame['direction'] == 'client_to_controller']
+    library = [
+        frame['hex']
+        for frame in connection['frames']
+        if frame['direction'] == 'client_to_controller'
+    ]
     assert set(request.hex() for request in sent) <= set(library)
     assert [chr(request[2]) for request in sent] == (
-        ['V', 'V', 'v', 'O', 'I', 'S'] if ready.protocol_version == 1
-        else ['V', 'v', 'O', 'I', 'S'])
+        ['V', 'V', 'v', 'O', 'I', 'S']
+        if ready.protocol_version == 1
+        else ['V', 'v', 'O', 'I', 'S']
+    )

@@ -31,12 +31,17 @@ def server(**options):
 
 def test_a_client_may_have_several_output_recipes_with_frequencies_of_their_own():
     controller = server()
-    controller.feed(SetupOutputs(names=('timestamp',), frequency=10.0).encode()
-                    + SetupOutputs(names=('nonsense',), frequency=10.0).encode()
-                    + SetupOutputs(names=('actual_q',), frequency=9999.0).encode()
-                    + SetupOutputs(names=('robot_mode',), frequency=math.nan).encode())
+    controller.feed(
+        SetupOutputs(names=('timestamp',), frequency=10.0).encode()
+        + SetupOutputs(names=('nonsense',), frequency=10.0).encode()
+        + SetupOutputs(names=('actual_q',), frequency=9999.0).encode()
+        + SetupOutputs(names=('robot_mode',), frequency=math.nan).encode()
+    )
     assert [(o.recipe.recipe_id, o.recipe.names, o.frequency) for o in controller.outputs] == [
-        (1, ('timestamp',), 10.0), (2, ('actual_q',), 500.0), (3, ('robot_mode',), 500.0)]
+        (1, ('timestamp',), 10.0),
+        (2, ('actual_q',), 500.0),
+        (3, ('robot_mode',), 500.0),
+    ]
     replies = [decode_reply(f) for f in RtdeFrameBuffer().feed(controller.data_to_send())]
     assert [reply.recipe_id for reply in replies] == [1, 0, 2, 3]
     assert replies[1].types == ('NOT_FOUND',)
@@ -44,9 +49,11 @@ def test_a_client_may_have_several_output_recipes_with_frequencies_of_their_own(
 
 def test_in_version_1_there_is_one_output_recipe_without_id():
     controller = server()
-    controller.feed(RequestProtocolVersion(version=1).encode()
-                    + SetupOutputs(names=('timestamp',)).encode()
-                    + SetupOutputs(names=('actual_q',)).encode())
+    controller.feed(
+        RequestProtocolVersion(version=1).encode()
+        + SetupOutputs(names=('timestamp',)).encode()
+        + SetupOutputs(names=('actual_q',)).encode()
+    )
     (output,) = controller.outputs
     assert len(output.recipe.pack(((0.0,) * 6,))) == 3 + 48
     assert controller.data_to_send().endswith(b'OVECTOR6D')
@@ -105,10 +112,14 @@ def test_a_client_may_write_an_input_through_several_recipes_but_two_clients_may
     for names in (both[:1], both):
         one.feed(SetupInputs(names=names).encode())
     two.feed(SetupInputs(names=both).encode())
-    replies = [decode_reply(f) for f in RtdeFrameBuffer().feed(
-        one.data_to_send() + two.data_to_send())]
+    replies = [
+        decode_reply(f) for f in RtdeFrameBuffer().feed(one.data_to_send() + two.data_to_send())
+    ]
     assert [(reply.recipe_id, reply.types) for reply in replies] == [
-        (1, ('INT32',)), (2, ('INT32', 'INT32')), (0, ('IN_USE', 'IN_USE'))]
+        (1, ('INT32',)),
+        (2, ('INT32', 'INT32')),
+        (0, ('IN_USE', 'IN_USE')),
+    ]
     (event,) = one.feed(struct.pack('>HBBii', 12, ord('U'), 2, 5, 6))
     assert event.recipe.named(event.values) == dict(zip(both, (5, 6), strict=True))
     one.close()
@@ -117,8 +128,10 @@ def test_a_client_may_write_an_input_through_several_recipes_but_two_clients_may
 
 def test_a_list_of_names_may_end_with_a_comma_as_some_clients_write_it():
     controller = server()
-    for kind, head, names in ((b'O', struct.pack('>d', 125.0), b'timestamp,actual_q,'),
-                              (b'I', b'', b'input_int_register_1,')):
+    for kind, head, names in (
+        (b'O', struct.pack('>d', 125.0), b'timestamp,actual_q,'),
+        (b'I', b'', b'input_int_register_1,'),
+    ):
         controller.feed(struct.pack('>H', 3 + len(head + names)) + kind + head + names)
     replies = [decode_reply(f) for f in RtdeFrameBuffer().feed(controller.data_to_send())]
     assert [reply.types for reply in replies] == [('DOUBLE', 'VECTOR6D'), ('INT32',)]

@@ -41,17 +41,29 @@ GOLDEN = json.loads((Path(__file__).parent / 'golden' / 'script_commands.json').
 SENT = [case for case in GOLDEN['cases'] if not case['refused']]
 REFUSED = [case for case in GOLDEN['cases'] if case['refused']]
 CLASSES = {
-    'zero_ftsensor': ZeroFtSensor, 'set_payload': SetPayload, 'set_tool_voltage': SetToolVoltage,
-    'start_force_mode': StartForceMode, 'end_force_mode': EndForceMode,
-    'start_tool_contact': StartToolContact, 'end_tool_contact': EndToolContact,
+    'zero_ftsensor': ZeroFtSensor,
+    'set_payload': SetPayload,
+    'set_tool_voltage': SetToolVoltage,
+    'start_force_mode': StartForceMode,
+    'end_force_mode': EndForceMode,
+    'start_tool_contact': StartToolContact,
+    'end_tool_contact': EndToolContact,
     'set_friction_compensation': SetFrictionCompensation,
-    'ft_rtde_input_enable': FtRtdeInputEnable, 'set_gravity': SetGravity,
-    'set_tcp_offset': SetTcpOffset, 'set_friction_scales': SetFrictionScales,
-    'set_target_payload': SetTargetPayload}
+    'ft_rtde_input_enable': FtRtdeInputEnable,
+    'set_gravity': SetGravity,
+    'set_tcp_offset': SetTcpOffset,
+    'set_friction_scales': SetFrictionScales,
+    'set_target_payload': SetTargetPayload,
+}
 #: Our names where they differ from the recorded ones.
-NAMES = {'selection_vector': 'selection', 'damping_factor': 'damping',
-         'gain_scaling_factor': 'gain_scaling', 'sensor_measuring_offset': 'sensor_offset',
-         'viscous_scale': 'viscous', 'coulomb_scale': 'coulomb'}
+NAMES = {
+    'selection_vector': 'selection',
+    'damping_factor': 'damping',
+    'gain_scaling_factor': 'gain_scaling',
+    'sensor_measuring_offset': 'sensor_offset',
+    'viscous_scale': 'viscous',
+    'coulomb_scale': 'coulomb',
+}
 
 
 def case_id(case):
@@ -59,9 +71,12 @@ def case_id(case):
 
 
 def command_of(case):
-    return CLASSES[case['command']](**{
-        NAMES.get(name, name): tuple(value) if isinstance(value, list) else value
-        for name, value in case['args'].items()})
+    return CLASSES[case['command']](
+        **{
+            NAMES.get(name, name): tuple(value) if isinstance(value, list) else value
+            for name, value in case['args'].items()
+        }
+    )
 
 
 def version_of(case):
@@ -97,23 +112,37 @@ SIX = (0.0,) * 6
 FORCE = {'task_frame': SIX, 'selection': (False,) * 6, 'wrench': SIX, 'type': 2, 'limits': SIX}
 
 
-@pytest.mark.parametrize(('make', 'text'), [
-    (lambda: SetToolVoltage(voltage=5), 'voltage is 5'),
-    (lambda: StartForceMode(**{**FORCE, 'type': 4}), 'type is 4'),
-    (lambda: StartForceMode(**FORCE, damping=1.1), 'damping is 1.1'),
-    (lambda: StartForceMode(**FORCE, gain_scaling=-0.1), 'gain_scaling is -0.1'),
-    (lambda: encode(SetPayload(mass=float('nan'))), 'mass is nan'),
-    (lambda: encode(SetPayload(mass=1.0, cog=(0.0, 3000.0, 0.0))), r'cog\[1\] is 3000'),
-    (lambda: encode(SetFrictionScales(viscous=SIX, coulomb=(float('nan'),) * 6)),
-     r'coulomb\[0\] is nan')])
+@pytest.mark.parametrize(
+    ('make', 'text'),
+    [
+        (lambda: SetToolVoltage(voltage=5), 'voltage is 5'),
+        (lambda: StartForceMode(**{**FORCE, 'type': 4}), 'type is 4'),
+        (lambda: StartForceMode(**FORCE, damping=1.1), 'damping is 1.1'),
+        (lambda: StartForceMode(**FORCE, gain_scaling=-0.1), 'gain_scaling is -0.1'),
+        (lambda: encode(SetPayload(mass=float('nan'))), 'mass is nan'),
+        (lambda: encode(SetPayload(mass=1.0, cog=(0.0, 3000.0, 0.0))), r'cog\[1\] is 3000'),
+        (
+            lambda: encode(SetFrictionScales(viscous=SIX, coulomb=(float('nan'),) * 6)),
+            r'coulomb\[0\] is nan',
+        ),
+    ],
+)
 def test_a_value_out_of_range_is_refused_with_its_name(make, text):
     with pytest.raises(LocalProtocolError, match=text):
         make()
 
 
-@pytest.mark.parametrize('words', [
-    [13], [-1], [2, 5_000_000], [2, 500_000], [3, *[0] * 18, 4_000_000],
-    [3, *[0] * 18, 1_500_000]])
+@pytest.mark.parametrize(
+    'words',
+    [
+        [13],
+        [-1],
+        [2, 5_000_000],
+        [2, 500_000],
+        [3, *[0] * 18, 4_000_000],
+        [3, *[0] * 18, 1_500_000],
+    ],
+)
 def test_a_command_without_sense_is_refused_with_its_bytes(words):
     data = struct.pack('>28i', *words, *[0] * (28 - len(words)))
     with pytest.raises(RemoteProtocolError, match=data[:40].hex()):
@@ -130,7 +159,7 @@ def test_commands_are_read_from_a_stream_in_pieces():
     stream = b''.join(bytes.fromhex(case['hex']) for case in SENT)
     at_once = CommandDecoder().feed(stream)
     decoder = CommandDecoder()
-    assert [c for i in range(len(stream)) for c in decoder.feed(stream[i:i + 1])] == at_once
+    assert [c for i in range(len(stream)) for c in decoder.feed(stream[i : i + 1])] == at_once
     assert len(at_once) == len(SENT)
 
 
@@ -139,7 +168,8 @@ def test_values_come_back_within_half_a_unit(six, mass, time):
     command = SetTargetPayload(mass=mass, cog=six[:3], inertia=six, transition_time=time)
     back = decode(encode(command))
     assert (back.mass, *back.cog, *back.inertia, back.transition_time) == pytest.approx(
-        (mass, *six[:3], *six, time), abs=0.5e-6 + 1e-9, rel=0.0)
+        (mass, *six[:3], *six, time), abs=0.5e-6 + 1e-9, rel=0.0
+    )
 
 
 @given(st.binary(min_size=COMMAND_SIZE, max_size=COMMAND_SIZE), st.sampled_from(ScriptCommand))
@@ -150,8 +180,10 @@ def test_random_bytes_raise_nothing_but_a_remote_error(data, command):
         CommandDecoder().feed(data)
 
 
-@pytest.mark.parametrize(('result', 'text'), [
-    (ToolContactResult.SUCCESS, '00000000'), (ToolContactResult.CANCELED, '00000001')])
+@pytest.mark.parametrize(
+    ('result', 'text'),
+    [(ToolContactResult.SUCCESS, '00000000'), (ToolContactResult.CANCELED, '00000001')],
+)
 def test_results_of_a_tool_contact(result, text):
     assert encode_result(result).hex() == text
     assert ResultDecoder().feed(bytes.fromhex(text) * 2) == [result, result]

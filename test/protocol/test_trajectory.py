@@ -61,28 +61,62 @@ def fields_of(case):
     if case['type'] == 51:
         quintic = case['target_accelerations'] is not None
         third = case['target_accelerations'] or ZERO6
-        return (*case['target'], *case['target_velocities'], *third, case['duration'],
-                2 if quintic else 1, 51)
+        return (
+            *case['target'],
+            *case['target_velocities'],
+            *third,
+            case['duration'],
+            2 if quintic else 1,
+            51,
+        )
     near = case.get('q_near')
     arc = 'via' in case
     second = case['via'] if arc else near or ZERO6
     flag = case['mode'] if arc else float(near is not None)
-    return (*case['target'], *second, case['velocity'], case['acceleration'], flag, 0, 0, 0,
-            case['duration'], case['blend_radius'], case['type'])
+    return (
+        *case['target'],
+        *second,
+        case['velocity'],
+        case['acceleration'],
+        flag,
+        0,
+        0,
+        0,
+        case['duration'],
+        case['blend_radius'],
+        case['type'],
+    )
 
 
-CLASSES = {0: MoveJ, 6: MoveJ, 1: MoveL, 7: MoveL, 2: MoveP, 8: MoveP, 4: OptimoveJ, 12: OptimoveJ,
-           5: OptimoveL, 13: OptimoveL}
+CLASSES = {
+    0: MoveJ,
+    6: MoveJ,
+    1: MoveL,
+    7: MoveL,
+    2: MoveP,
+    8: MoveP,
+    4: OptimoveJ,
+    12: OptimoveJ,
+    5: OptimoveL,
+    13: OptimoveL,
+}
 
 
 def primitive_of(case):
     """Build the primitive of a case."""
     if case['type'] == 51:
-        return Spline(target=tuple(case['target']), velocities=tuple(case['target_velocities']),
-                      accelerations=case['target_accelerations'] and
-                      tuple(case['target_accelerations']), duration=case['duration'])
-    common = {'target': position(case, 'target'), 'velocity': case['velocity'],
-              'acceleration': case['acceleration'], 'blend_radius': case['blend_radius']}
+        return Spline(
+            target=tuple(case['target']),
+            velocities=tuple(case['target_velocities']),
+            accelerations=case['target_accelerations'] and tuple(case['target_accelerations']),
+            duration=case['duration'],
+        )
+    common = {
+        'target': position(case, 'target'),
+        'velocity': case['velocity'],
+        'acceleration': case['acceleration'],
+        'blend_radius': case['blend_radius'],
+    }
     if 'via' in case:
         return MoveC(via=position(case, 'via'), mode=case['mode'], **common)
     cls = CLASSES[case['type']]
@@ -109,7 +143,8 @@ def test_reading_gives_back_the_words(case):
         assert encode_fields(fields).hex() == case['hex']
     assert fields == pytest.approx(
         [w / 1e6 for w in case['ints'][:19]]
-        + [case['ints'][19] / (1 if case['type'] == 51 else 1e6), case['type']])
+        + [case['ints'][19] / (1 if case['type'] == 51 else 1e6), case['type']]
+    )
 
 
 @pytest.mark.parametrize('case', SENT, ids=case_id)
@@ -118,14 +153,18 @@ def test_primitives_give_the_same_words_as_the_library(case):
     primitive = primitive_of(case)
     assert motion_type(primitive) == case['type']
     words = struct.unpack('>21i', encode_point(primitive))
-    rotations = [range(start + 3, start + 6) for start, what in ((0, 'target'), (6, 'via'))
-                 if case.get(f'{what}_kind') == 'pose']
+    rotations = [
+        range(start + 3, start + 6)
+        for start, what in ((0, 'target'), (6, 'via'))
+        if case.get(f'{what}_kind') == 'pose'
+    ]
     loose = {index for block in rotations for index in block}
     for index in set(range(21)) - loose:
         assert words[index] == case['ints'][index]
     for block in rotations:
-        mine, theirs = ((0.0, 0.0, 0.0, *(w[i] * 1e-6 for i in block))
-                        for w in (words, case['ints']))
+        mine, theirs = (
+            (0.0, 0.0, 0.0, *(w[i] * 1e-6 for i in block)) for w in (words, case['ints'])
+        )
         angle = Pose.from_rotation_vector(mine).angle_to(Pose.from_rotation_vector(theirs))
         assert angle < 2e-6
 
@@ -188,12 +227,18 @@ FIELD_ERRORS = [
     (MoveL(target=Pose(), duration=2147.4836471), 'duration is 2147.4836471'),
     (MoveL(target=ZERO6, q_near=ZERO6), 'a q_near goes with a pose only'),
     (OptimoveL(target=Pose(), velocity=1.5), 'velocity is 1.5'),
-    (Spline(target=ZERO6, velocities=(0.0, 3e3, 0.0, 0.0, 0.0, 0.0), duration=1.0),
-     'velocities[1] is 3000.0'),
-    (Spline(target=ZERO6, velocities=ZERO6, accelerations=(float('nan'),) * 6, duration=1.0),
-     'accelerations[0] is nan'),
-    (SwitchOutput(output=OutputKind.STANDARD_DIGITAL, pin=0, value=1.0, delay=-0.1),
-     'delay is -0.1'),
+    (
+        Spline(target=ZERO6, velocities=(0.0, 3e3, 0.0, 0.0, 0.0, 0.0), duration=1.0),
+        'velocities[1] is 3000.0',
+    ),
+    (
+        Spline(target=ZERO6, velocities=ZERO6, accelerations=(float('nan'),) * 6, duration=1.0),
+        'accelerations[0] is nan',
+    ),
+    (
+        SwitchOutput(output=OutputKind.STANDARD_DIGITAL, pin=0, value=1.0, delay=-0.1),
+        'delay is -0.1',
+    ),
     (SwitchOutput(output=OutputKind.STANDARD_ANALOG, pin=0, value=float('nan')), 'value is nan'),
 ]
 
@@ -217,28 +262,63 @@ def test_the_spline_kind_follows_from_the_accelerations():
 
 def test_the_fields_have_the_places_that_the_robot_program_reads():
     near = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
-    line = struct.unpack('>21i', encode_point(MoveL(
-        target=Pose((7.0, 0.0, 0.0)), q_near=near, velocity=1.0, acceleration=2.0, duration=3.0,
-        blend_radius=4.0)))
-    places = {PointField.TARGET: 7.0, PointField.SECOND: 0.1, PointField.VELOCITY: 1.0,
-              PointField.ACCELERATION: 2.0, PointField.HAS_Q_NEAR: 1.0,
-              PointField.DURATION: 3.0, PointField.BLEND: 4.0}
+    line = struct.unpack(
+        '>21i',
+        encode_point(
+            MoveL(
+                target=Pose((7.0, 0.0, 0.0)),
+                q_near=near,
+                velocity=1.0,
+                acceleration=2.0,
+                duration=3.0,
+                blend_radius=4.0,
+            )
+        ),
+    )
+    places = {
+        PointField.TARGET: 7.0,
+        PointField.SECOND: 0.1,
+        PointField.VELOCITY: 1.0,
+        PointField.ACCELERATION: 2.0,
+        PointField.HAS_Q_NEAR: 1.0,
+        PointField.DURATION: 3.0,
+        PointField.BLEND: 4.0,
+    }
     assert {place: line[place] / 1e6 for place in places} == places
     assert line[PointField.TYPE] == MotionType.MOVEL
-    arc = struct.unpack('>21i', encode_point(MoveC(
-        target=Pose(), via=Pose((8.0, 0.0, 0.0)), mode=ArcMode.FIXED)))
+    arc = struct.unpack(
+        '>21i', encode_point(MoveC(target=Pose(), via=Pose((8.0, 0.0, 0.0)), mode=ArcMode.FIXED))
+    )
     assert (arc[PointField.ARC_MODE], arc[PointField.SECOND]) == (1_000_000, 8_000_000)
 
 
 def test_the_fields_of_an_output_have_the_places_that_the_robot_program_reads():
-    words = struct.unpack('>21i', encode_point(SwitchOutput(
-        output=OutputKind.STANDARD_ANALOG, pin=1, value=0.25, domain=AnalogDomain.VOLTAGE,
-        place=Pose((7.0, 0.0, 0.0)), heading=(0.0, 0.6, 0.8, 0.0, 0.0, 0.0), comes_round=True,
-        delay=4.0)))
-    places = {PointField.TARGET: 7.0, PointField.SECOND + 1: 0.6, PointField.OUTPUT_KIND: 3.0,
-              PointField.OUTPUT_PIN: 1.0, PointField.OUTPUT_VALUE: 0.25,
-              PointField.OUTPUT_DOMAIN: 1.0, PointField.HAS_PLACE: 1.0,
-              PointField.COMES_ROUND: 1.0, PointField.DURATION: 4.0}
+    words = struct.unpack(
+        '>21i',
+        encode_point(
+            SwitchOutput(
+                output=OutputKind.STANDARD_ANALOG,
+                pin=1,
+                value=0.25,
+                domain=AnalogDomain.VOLTAGE,
+                place=Pose((7.0, 0.0, 0.0)),
+                heading=(0.0, 0.6, 0.8, 0.0, 0.0, 0.0),
+                comes_round=True,
+                delay=4.0,
+            )
+        ),
+    )
+    places = {
+        PointField.TARGET: 7.0,
+        PointField.SECOND + 1: 0.6,
+        PointField.OUTPUT_KIND: 3.0,
+        PointField.OUTPUT_PIN: 1.0,
+        PointField.OUTPUT_VALUE: 0.25,
+        PointField.OUTPUT_DOMAIN: 1.0,
+        PointField.HAS_PLACE: 1.0,
+        PointField.COMES_ROUND: 1.0,
+        PointField.DURATION: 4.0,
+    }
     assert {place: words[place] / 1e6 for place in places} == places
     assert words[PointField.TYPE] == MotionType.SWITCH_OUTPUT == 200
 
@@ -250,11 +330,22 @@ def words_with(**changes):
     return struct.pack('>21i', *words)
 
 
-@pytest.mark.parametrize('data', [
-    b'', bytes(POINT_SIZE - 1), bytes(POINT_SIZE + 1), words_with(w20=14), words_with(w20=255),
-    words_with(w20=-1), words_with(w20=51), words_with(w20=51, w19=3),
-    words_with(w20=200, w12=4_000_000),
-    words_with(w20=3, w14=2_000_000), words_with(w20=3, w14=500_000)])
+@pytest.mark.parametrize(
+    'data',
+    [
+        b'',
+        bytes(POINT_SIZE - 1),
+        bytes(POINT_SIZE + 1),
+        words_with(w20=14),
+        words_with(w20=255),
+        words_with(w20=-1),
+        words_with(w20=51),
+        words_with(w20=51, w19=3),
+        words_with(w20=200, w12=4_000_000),
+        words_with(w20=3, w14=2_000_000),
+        words_with(w20=3, w14=500_000),
+    ],
+)
 def test_a_point_without_sense_is_refused_with_its_bytes(data):
     with pytest.raises(RemoteProtocolError) as error:
         decode_point(data)
@@ -266,8 +357,9 @@ def vector(limit):
 
 
 JOINTS = vector(6.3)
-POSES = st.builds(lambda v: Pose.from_rotation_vector((*v[:3], *(x * 0.28 for x in v[3:]))),
-                  vector(6.3))
+POSES = st.builds(
+    lambda v: Pose.from_rotation_vector((*v[:3], *(x * 0.28 for x in v[3:]))), vector(6.3)
+)
 POSITIVE = st.floats(0.0, 2000.0)
 DURATION = st.just(0.0) | st.floats(1e-6, 2000.0)
 FRACTION = st.floats(1e-6, 1.0)
@@ -281,15 +373,33 @@ def kinds(cls, **values):
 
 
 PRIMITIVES = st.one_of(
-    kinds(MoveJ, **SPEEDS, duration=DURATION), kinds(MoveL, **SPEEDS, duration=DURATION),
-    kinds(MoveP, **SPEEDS), kinds(OptimoveJ, **FRACTIONS), kinds(OptimoveL, **FRACTIONS),
-    st.builds(MoveC, target=POSES | JOINTS, via=POSES | JOINTS, **SPEEDS,
-              mode=st.sampled_from(ArcMode)),
-    st.builds(Spline, target=JOINTS, velocities=JOINTS, accelerations=st.none() | JOINTS,
-              duration=DURATION),
-    st.builds(SwitchOutput, output=st.sampled_from(OutputKind), pin=st.integers(0, 7),
-              value=FRACTION, domain=st.sampled_from(AnalogDomain), place=st.none() | POSES,
-              heading=vector(1.0), comes_round=st.booleans(), delay=DURATION))
+    kinds(MoveJ, **SPEEDS, duration=DURATION),
+    kinds(MoveL, **SPEEDS, duration=DURATION),
+    kinds(MoveP, **SPEEDS),
+    kinds(OptimoveJ, **FRACTIONS),
+    kinds(OptimoveL, **FRACTIONS),
+    st.builds(
+        MoveC, target=POSES | JOINTS, via=POSES | JOINTS, **SPEEDS, mode=st.sampled_from(ArcMode)
+    ),
+    st.builds(
+        Spline,
+        target=JOINTS,
+        velocities=JOINTS,
+        accelerations=st.none() | JOINTS,
+        duration=DURATION,
+    ),
+    st.builds(
+        SwitchOutput,
+        output=st.sampled_from(OutputKind),
+        pin=st.integers(0, 7),
+        value=FRACTION,
+        domain=st.sampled_from(AnalogDomain),
+        place=st.none() | POSES,
+        heading=vector(1.0),
+        comes_round=st.booleans(),
+        delay=DURATION,
+    ),
+)
 
 
 @given(PRIMITIVES)
@@ -313,8 +423,11 @@ def test_random_points_raise_nothing_but_a_remote_error(data, kind):
             decode_point(point)
 
 
-RESULTS = [(TrajectoryResult.SUCCESS, '00000000'), (TrajectoryResult.CANCELED, '00000001'),
-           (TrajectoryResult.FAILURE, '00000002')]
+RESULTS = [
+    (TrajectoryResult.SUCCESS, '00000000'),
+    (TrajectoryResult.CANCELED, '00000001'),
+    (TrajectoryResult.FAILURE, '00000002'),
+]
 
 
 @pytest.mark.parametrize(('result', 'text'), RESULTS)
@@ -328,8 +441,9 @@ def test_results_glued_together_or_in_pieces_are_all_read():
     stream = b''.join(bytes.fromhex(text) for _, text in RESULTS)
     assert ResultDecoder().feed(stream) == [result for result, _ in RESULTS]
     decoder = ResultDecoder()
-    assert [r for i in range(len(stream)) for r in decoder.feed(stream[i:i + 1])] == [
-        result for result, _ in RESULTS]
+    assert [r for i in range(len(stream)) for r in decoder.feed(stream[i : i + 1])] == [
+        result for result, _ in RESULTS
+    ]
     assert decoder.feed(b'') == []
 
 

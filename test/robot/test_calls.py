@@ -46,8 +46,12 @@ def test_a_payload_can_be_sent_or_is_refused(mass, cog):
         script_command.encode(script_command.SetPayload(mass=call.mass, cog=call.cog))
 
 
-@given(st.sampled_from(OutputKind), st.integers(-3, 300), any_number | st.sampled_from((0.0, 1.0)),
-       st.sampled_from(AnalogDomain))
+@given(
+    st.sampled_from(OutputKind),
+    st.integers(-3, 300),
+    any_number | st.sampled_from((0.0, 1.0)),
+    st.sampled_from(AnalogDomain),
+)
 def test_an_output_can_be_sent_or_is_refused(kind, pin, value, domain):
     call = made(calls.SetOutput, kind=kind, pin=pin, value=value, domain=domain)
     if call is not None:
@@ -64,8 +68,10 @@ def test_a_slider_can_be_sent_or_is_refused(fraction):
 
 @given(st.text() | st.just('x' * 2000))
 def test_a_text_stays_one_line_or_is_refused(text):
-    for call in (made(calls.Dashboard, command='load', argument=text),
-                 made(calls.DashboardLine, line=text)):
+    for call in (
+        made(calls.Dashboard, command='load', argument=text),
+        made(calls.DashboardLine, line=text),
+    ):
         if isinstance(call, calls.Dashboard):
             sent = dashboard.Request(name=call.command, argument=call.argument).encode()
             assert sent.count(b'\n') == 1

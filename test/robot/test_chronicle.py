@@ -11,8 +11,14 @@ ZERO = (0.0,) * 6
 
 
 def state(**fields):
-    return RobotState(timestamp=0.0, actual_q=ZERO, target_q=ZERO, actual_tcp_pose=IDENTITY,
-                      target_tcp_pose=IDENTITY, **fields)
+    return RobotState(
+        timestamp=0.0,
+        actual_q=ZERO,
+        target_q=ZERO,
+        actual_tcp_pose=IDENTITY,
+        target_tcp_pose=IDENTITY,
+        **fields,
+    )
 
 
 def test_notes_stand_in_order_with_their_distance_in_time():
@@ -43,16 +49,22 @@ def test_a_flood_of_notes_is_bounded():
     for i in range(1000):
         chronicle.add(f'{i}', 1.0)
     assert [line.rpartition(' ')[2] for line in chronicle.lines(1.0)] == [
-        f'{i}' for i in range(1000 - KEPT, 1000)]
+        f'{i}' for i in range(1000 - KEPT, 1000)
+    ]
 
 
 def test_changes_are_named_by_their_modes():
     before = state(runtime_state=RuntimeState.PLAYING)
-    after = state(runtime_state=RuntimeState.STOPPED, safety_mode=SafetyMode.FAULT,
-                  robot_mode=RobotMode.POWER_OFF)
+    after = state(
+        runtime_state=RuntimeState.STOPPED,
+        safety_mode=SafetyMode.FAULT,
+        robot_mode=RobotMode.POWER_OFF,
+    )
     assert changes(before, after) == (
         f'safety mode {before.safety_mode.name} -> FAULT',
-        f'robot mode {before.robot_mode.name} -> POWER_OFF', 'program PLAYING -> STOPPED')
+        f'robot mode {before.robot_mode.name} -> POWER_OFF',
+        'program PLAYING -> STOPPED',
+    )
     assert changes(after, after) == ()
 
 
@@ -60,10 +72,13 @@ def test_what_holds_at_the_end():
     pulse = Pulse(report=0.002, sign=0.013, longest=0.031, timeout=0.2)
     modes, beat = standing(state(), pulse)
     assert modes.endswith('as the robot reported 0.002 s before')
-    assert beat == ('the last sign of life for the robot program was sent 0.013 s before (it '
-                    'waits 0.2 s for one, the longest pause between two was 0.031 s)')
+    assert beat == (
+        'the last sign of life for the robot program was sent 0.013 s before (it '
+        'waits 0.2 s for one, the longest pause between two was 0.031 s)'
+    )
     assert standing(None, Pulse(report=inf, sign=inf, longest=0.0, timeout=0.2)) == (
-        'the robot has reported nothing',)
+        'the robot has reported nothing',
+    )
 
 
 def test_the_same_error_keeps_its_time():

@@ -127,17 +127,20 @@ def version(text):
     return ControllerVersion(major=major, minor=minor, bugfix=bugfix)
 
 
-@pytest.mark.parametrize(('command', 'software', 'reason'), [
-    ('power on', '5.21.0', ''),
-    ('power on', '3.15.0', ''),
-    ('power on', '10.11.0', 'PolyScope X has no dashboard server'),
-    ('power on', '10.8.0', 'with software 10.8.0.0; call recover, or do it on the pendant.'),
-    ('robotmode', '10.8.0', '; the topic robot_mode tells it.'),
-    ('load', '10.8.0', '; do it on the pendant.'),
-    ('is in remote control', '5.5.0', 'needs software 5.6 or newer'),
-    ('is in remote control', '3.15.0', 'has no command'),
-    ('restart safety', '3.6.0', 'needs software 3.7 or newer'),
-])
+@pytest.mark.parametrize(
+    ('command', 'software', 'reason'),
+    [
+        ('power on', '5.21.0', ''),
+        ('power on', '3.15.0', ''),
+        ('power on', '10.11.0', 'PolyScope X has no dashboard server'),
+        ('power on', '10.8.0', 'with software 10.8.0.0; call recover, or do it on the pendant.'),
+        ('robotmode', '10.8.0', '; the topic robot_mode tells it.'),
+        ('load', '10.8.0', '; do it on the pendant.'),
+        ('is in remote control', '5.5.0', 'needs software 5.6 or newer'),
+        ('is in remote control', '3.15.0', 'has no command'),
+        ('restart safety', '3.6.0', 'needs software 3.7 or newer'),
+    ],
+)
 def test_software_without_a_command_is_explained(command, software, reason):
     why = why_not_available(command, version(software))
     assert bool(why) == bool(reason)
@@ -155,18 +158,21 @@ def robot(**fields):
 STOPPED = robot(safety_mode=SafetyMode.ROBOT_EMERGENCY_STOP)
 
 
-@pytest.mark.parametrize(('command', 'answer', 'state', 'remote', 'hint'), [
-    ('play', 'Failed to execute: play', robot(), False, 'switch it to remote control'),
-    ('play', 'Failed to execute: play', None, None, 'no RTDE connection'),
-    ('power on', 'Failed to execute: power on', STOPPED, True, 'ROBOT_EMERGENCY_STOP'),
-    ('play', 'Failed to execute: play', robot(robot_mode=RobotMode.IDLE), True, 'brakes'),
-    ('play', 'Failed to execute: play', robot(), True, 'load_program'),
-    ('pause', 'Failed to execute: pause', robot(), True, 'No program is running'),
-    ('load', 'File not found: x', robot(), True, 'folder of programs'),
-    ('get loaded program', 'No program loaded', robot(), None, 'Load one'),
-    ('load', 'Error', robot(runtime_state=RuntimeState.PLAYING), True, 'stop it first'),
-    ('unlock protective stop', TOO_EARLY + ' until 5s', robot(), None, 'Wait until 5 s'),
-])
+@pytest.mark.parametrize(
+    ('command', 'answer', 'state', 'remote', 'hint'),
+    [
+        ('play', 'Failed to execute: play', robot(), False, 'switch it to remote control'),
+        ('play', 'Failed to execute: play', None, None, 'no RTDE connection'),
+        ('power on', 'Failed to execute: power on', STOPPED, True, 'ROBOT_EMERGENCY_STOP'),
+        ('play', 'Failed to execute: play', robot(robot_mode=RobotMode.IDLE), True, 'brakes'),
+        ('play', 'Failed to execute: play', robot(), True, 'load_program'),
+        ('pause', 'Failed to execute: pause', robot(), True, 'No program is running'),
+        ('load', 'File not found: x', robot(), True, 'folder of programs'),
+        ('get loaded program', 'No program loaded', robot(), None, 'Load one'),
+        ('load', 'Error', robot(runtime_state=RuntimeState.PLAYING), True, 'stop it first'),
+        ('unlock protective stop', TOO_EARLY + ' until 5s', robot(), None, 'Wait until 5 s'),
+    ],
+)
 def test_a_refusal_is_explained(command, answer, state, remote, hint):
     text = explain(command, answer, state, remote)
     assert answer in text

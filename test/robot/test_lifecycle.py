@@ -6,11 +6,13 @@ import pytest
 
 from ur_cartesian_driver.robot.lifecycle import after, Change, ConnectionState, TRANSITIONS
 
-WAY = [(Change.ROBOT_ANSWERED, ConnectionState.CONNECTING),
-       (Change.ROBOT_ACCEPTED, ConnectionState.CONNECTED),
-       (Change.PROGRAM_CONNECTED, ConnectionState.READY),
-       (Change.GOAL_STARTED, ConnectionState.EXECUTING),
-       (Change.GOAL_ENDED, ConnectionState.READY)]
+WAY = [
+    (Change.ROBOT_ANSWERED, ConnectionState.CONNECTING),
+    (Change.ROBOT_ACCEPTED, ConnectionState.CONNECTED),
+    (Change.PROGRAM_CONNECTED, ConnectionState.READY),
+    (Change.GOAL_STARTED, ConnectionState.EXECUTING),
+    (Change.GOAL_ENDED, ConnectionState.READY),
+]
 
 
 def test_the_way_to_a_goal_and_back():
@@ -43,7 +45,10 @@ def test_every_state_can_come_about_and_has_a_way_to_a_goal(state):
 @pytest.mark.parametrize('change', list(Change))
 def test_a_stopped_robot_takes_goals_only_when_it_is_free_and_its_program_reads(change):
     assert after(ConnectionState.STOPPED, change) in (
-        ConnectionState.STOPPED, ConnectionState.CONNECTED, ConnectionState.DISCONNECTED)
+        ConnectionState.STOPPED,
+        ConnectionState.CONNECTED,
+        ConnectionState.DISCONNECTED,
+    )
 
 
 @pytest.mark.parametrize('state', list(ConnectionState))

@@ -24,12 +24,21 @@ class Ear:
         self.log = []
         self._ready = asyncio.Event()
         self.link = RobotLink(
-            LinkSettings(rtde_port=ports.rtde, primary_port=ports.primary, reverse_port=0,
-                         trajectory_port=0, script_command_port=0, script_sender_port=0,
-                         headless_mode=headless),
-            on_state=self.heard.append, on_event=lambda event: None, on_status=self._status,
+            LinkSettings(
+                rtde_port=ports.rtde,
+                primary_port=ports.primary,
+                reverse_port=0,
+                trajectory_port=0,
+                script_command_port=0,
+                script_sender_port=0,
+                headless_mode=headless,
+            ),
+            on_state=self.heard.append,
+            on_event=lambda event: None,
+            on_status=self._status,
             on_geometry=lambda geometry: None,
-            on_log=lambda level, text: self.log.append((level, text)))
+            on_log=lambda level, text: self.log.append((level, text)),
+        )
 
     def _status(self, status):
         self.heard.append(status)
@@ -40,8 +49,11 @@ class Ear:
         await asyncio.wait_for(self._ready.wait(), 5.0)
 
     def statuses(self, state):
-        return [index for index, told in enumerate(self.heard)
-                if isinstance(told, DriverStatus) and told.state is state]
+        return [
+            index
+            for index, told in enumerate(self.heard)
+            if isinstance(told, DriverStatus) and told.state is state
+        ]
 
 
 @contextlib.asynccontextmanager
@@ -69,6 +81,7 @@ def test_who_hears_that_the_robot_is_ready_knows_where_it_stands(ur_sim):
 
 def test_a_state_is_told_before_what_follows_from_it(ur_sim):
     """A program that outlived the connection makes the driver ready with the first state."""
+
     async def run():
         async with listening(ur_sim) as ear:
             await ear.ready()
@@ -109,7 +122,10 @@ def test_the_log_asks_for_a_program_that_does_not_come(ur_sim):
     async def run():
         async with listening(ur_sim, headless=False) as ear:
             await asyncio.sleep(NOTEWORTHY + 1.0)
-        assert (logging.INFO, 'The robot program does not run; play a program with the External '
-                              'Control node on the pendant.') in ear.log
+        assert (
+            logging.INFO,
+            'The robot program does not run; play a program with the External '
+            'Control node on the pendant.',
+        ) in ear.log
 
     asyncio.run(run())

@@ -23,9 +23,14 @@ def told_by(*frames):
         def note(kind):
             return lambda value: news.append((kind, value))
 
-        client = PrimaryClient(PrimaryListener(**{
-            kind: note(kind)
-            for kind in ('configuration', 'geometry', 'error', 'trouble', 'text')}))
+        client = PrimaryClient(
+            PrimaryListener(
+                **{
+                    kind: note(kind)
+                    for kind in ('configuration', 'geometry', 'error', 'trouble', 'text')
+                }
+            )
+        )
         hung_up = asyncio.Event()
 
         async def serve(reader, writer):
@@ -49,8 +54,9 @@ def told_by(*frames):
 
 
 def test_kinematics_that_cannot_be_are_refused_with_the_numbers():
-    frame = primary.encode_state([primary.KinematicsInfo(
-        theta=SIX, a=(nan, *SIX[1:]), d=SIX, alpha=SIX)])
+    frame = primary.encode_state(
+        [primary.KinematicsInfo(theta=SIX, a=(nan, *SIX[1:]), d=SIX, alpha=SIX)]
+    )
     (kind, text), *_ = told_by(frame)
     assert kind == 'trouble'
     assert 'impossible kinematics: The column a of a DH table' in text

@@ -32,11 +32,16 @@ class Cell:
         self.news = asyncio.Queue()
         tell = self.news.put_nowait
         self.sockets = ProgramSockets(
-            LinkSettings(reverse_port=0, trajectory_port=0, script_command_port=0,
-                         script_sender_port=0),
-            ProgramListener(connected=lambda: tell('connected'),
-                            lost=lambda reason: tell(f'lost, {reason}'), result=tell,
-                            warning=lambda text: tell(f'warning, {text}')))
+            LinkSettings(
+                reverse_port=0, trajectory_port=0, script_command_port=0, script_sender_port=0
+            ),
+            ProgramListener(
+                connected=lambda: tell('connected'),
+                lost=lambda reason: tell(f'lost, {reason}'),
+                result=tell,
+                warning=lambda text: tell(f'warning, {text}'),
+            ),
+        )
         self._writers = []
 
     async def dial(self, name):
@@ -71,6 +76,7 @@ async def cell(allowed=frozenset()):
 
 def test_the_ports_move_with_our_address():
     """A computer that is plugged in elsewhere gets another one, and the program is told that."""
+
     async def scene():
         async with cell() as here:
             await here.connect()
@@ -100,9 +106,15 @@ def test_a_program_is_connected_when_it_has_all_sockets():
     asyncio.run(scene())
 
 
-@pytest.mark.parametrize('stale', [
-    names for n in (1, 2) for names in itertools.permutations(PROGRAM_PORTS, n)
-    if names != PROGRAM_PORTS[:2]])
+@pytest.mark.parametrize(
+    'stale',
+    [
+        names
+        for n in (1, 2)
+        for names in itertools.permutations(PROGRAM_PORTS, n)
+        if names != PROGRAM_PORTS[:2]
+    ],
+)
 def test_what_a_stranger_holds_makes_way_for_a_program(stale):
     async def scene():
         async with cell() as here:
@@ -188,9 +200,16 @@ def test_lines_that_were_left_out_are_counted():
     assert told[-1] == 'one more (5 more lines like this were left out)'
 
 
-@pytest.mark.parametrize(('written', 'plain'), [
-    ('192.0.2.1', '192.0.2.1'), ('::ffff:192.0.2.1', '192.0.2.1'),
-    ('2001:db8:0::1', '2001:db8::1'), ('robot.local', 'robot.local'), ('', '')])
+@pytest.mark.parametrize(
+    ('written', 'plain'),
+    [
+        ('192.0.2.1', '192.0.2.1'),
+        ('::ffff:192.0.2.1', '192.0.2.1'),
+        ('2001:db8:0::1', '2001:db8::1'),
+        ('robot.local', 'robot.local'),
+        ('', ''),
+    ],
+)
 def test_an_address_is_the_same_in_each_way_of_writing_it(written, plain):
     assert plain_address(written) == plain
 
@@ -203,6 +222,7 @@ def test_a_peer_that_is_no_address_is_refused(peer):
 
 def test_a_caller_that_asks_and_does_not_read_is_hung_up_on():
     """Else each request would be a copy of the program in memory."""
+
     async def scene():
         async with cell() as here:
             here.sockets.text = 'x' * 100_000
@@ -279,16 +299,19 @@ def test_a_number_that_is_no_result_ends_the_connection_with_the_number():
     asyncio.run(scene())
 
 
-@pytest.mark.parametrize(('busy', 'mode'), [
-    (False, reverse.ControlMode.IDLE), (True, reverse.ControlMode.FORWARD)])
+@pytest.mark.parametrize(
+    ('busy', 'mode'), [(False, reverse.ControlMode.IDLE), (True, reverse.ControlMode.FORWARD)]
+)
 def test_keepalives_are_those_of_what_the_program_does(busy, mode):
     async def scene():
         async with cell() as here:
             reader, _ = (await here.connect())['reverse_port']
             here.sockets.busy = busy
             keeping = asyncio.create_task(here.sockets.keep_alive())
-            messages = [reverse.ReverseMessage.decode(
-                await reader.readexactly(reverse.MESSAGE_SIZE)) for _ in range(3)]
+            messages = [
+                reverse.ReverseMessage.decode(await reader.readexactly(reverse.MESSAGE_SIZE))
+                for _ in range(3)
+            ]
             keeping.cancel()
             assert {message.mode for message in messages} == {mode}
             assert {message.read_timeout for message in messages} == {200}
@@ -351,9 +374,14 @@ def test_a_port_that_is_taken_is_named_with_its_parameter():
         async with cell() as here:
             port = here.sockets.ports['reverse_port']
             other = ProgramSockets(
-                LinkSettings(reverse_port=port, trajectory_port=0, script_command_port=0,
-                             script_sender_port=0),
-                ProgramListener(connected=list, lost=list, result=list, warning=list))
+                LinkSettings(
+                    reverse_port=port,
+                    trajectory_port=0,
+                    script_command_port=0,
+                    script_sender_port=0,
+                ),
+                ProgramListener(connected=list, lost=list, result=list, warning=list),
+            )
             with pytest.raises(OSError, match='set reverse_port to a free port or to 0'):
                 await other.open(HOST, frozenset())
             other.close()

@@ -16,23 +16,48 @@ ACTIONS = set(WORDS)
 EMERGENCY = [mode for mode in SafetyMode if 'EMERGENCY' in mode.name]
 
 
-def situation(connection=ConnectionState.STOPPED, *, safety=SafetyMode.NORMAL,
-              power=RobotMode.RUNNING, runtime=RuntimeState.STOPPED, **fields):
-    return Situation(connection=connection, message='what is needed', robot=RobotState(
-        timestamp=1.0, actual_q=(0.0,) * 6, safety_mode=safety, robot_mode=power,
-        runtime_state=runtime), **fields)
+def situation(
+    connection=ConnectionState.STOPPED,
+    *,
+    safety=SafetyMode.NORMAL,
+    power=RobotMode.RUNNING,
+    runtime=RuntimeState.STOPPED,
+    **fields,
+):
+    return Situation(
+        connection=connection,
+        message='what is needed',
+        robot=RobotState(
+            timestamp=1.0,
+            actual_q=(0.0,) * 6,
+            safety_mode=safety,
+            robot_mode=power,
+            runtime_state=runtime,
+        ),
+        **fields,
+    )
 
 
 @pytest.fixture(scope='module')
 def everything():
     """Every situation of a robot that there can be, with what is done then."""
-    robots = [situation(safety=safety, power=power, runtime=runtime).robot
-              for safety, power, runtime in product(SafetyMode, RobotMode, RuntimeState)]
+    robots = [
+        situation(safety=safety, power=power, runtime=runtime).robot
+        for safety, power, runtime in product(SafetyMode, RobotMode, RuntimeState)
+    ]
     situations = (
-        Situation(connection=connection, message='what is needed', robot=robot,
-                  program_connected=connected, headless=headless, remote_control=remote)
+        Situation(
+            connection=connection,
+            message='what is needed',
+            robot=robot,
+            program_connected=connected,
+            headless=headless,
+            remote_control=remote,
+        )
         for connection, robot, connected, headless, remote in product(
-            ConnectionState, robots, (False, True), (False, True), (None, False, True)))
+            ConnectionState, robots, (False, True), (False, True), (None, False, True)
+        )
+    )
     return [(at, next_step(at)) for at in situations]
 
 
@@ -52,8 +77,11 @@ def test_nothing_is_done_to_a_robot_that_is_not_ours_not_there_busy_or_ready(eve
 
 @pytest.mark.slow
 def test_in_local_control_everything_is_left_to_a_person(everything):
-    assert not [at for at, following in everything
-                if at.remote_control is False and following.step in ACTIONS]
+    assert not [
+        at
+        for at, following in everything
+        if at.remote_control is False and following.step in ACTIONS
+    ]
 
 
 @pytest.mark.slow
@@ -93,10 +121,14 @@ CASES = {
     'our program': ({'runtime': RuntimeState.PLAYING, 'program_connected': True}, Step.WAIT),
     'no program': ({}, Step.SEND_PROGRAM),
     'no program, not headless': ({'headless': False}, Step.PLAY),
-    'a paused goal': ({'connection': ConnectionState.EXECUTING,
-                       'runtime': RuntimeState.PAUSED}, Step.PERSON),
-    'a goal': ({'connection': ConnectionState.EXECUTING,
-                'runtime': RuntimeState.PLAYING}, Step.DONE),
+    'a paused goal': (
+        {'connection': ConnectionState.EXECUTING, 'runtime': RuntimeState.PAUSED},
+        Step.PERSON,
+    ),
+    'a goal': (
+        {'connection': ConnectionState.EXECUTING, 'runtime': RuntimeState.PLAYING},
+        Step.DONE,
+    ),
     'ready': ({'connection': ConnectionState.READY}, Step.DONE),
     'a wrong robot': ({'connection': ConnectionState.REFUSED}, Step.PERSON),
 }
@@ -112,11 +144,15 @@ def test_a_robot_that_is_away_is_waited_for(connection):
     assert next_step(Situation(connection=connection)).step is Step.WAIT
 
 
-@pytest.mark.parametrize('start', [
-    {'safety': SafetyMode.PROTECTIVE_STOP, 'runtime': RuntimeState.PAUSED},
-    {'safety': SafetyMode.FAULT, 'power': RobotMode.POWER_OFF},
-    {'power': RobotMode.POWER_OFF},
-], ids=['protective stop', 'fault', 'power off'])
+@pytest.mark.parametrize(
+    'start',
+    [
+        {'safety': SafetyMode.PROTECTIVE_STOP, 'runtime': RuntimeState.PAUSED},
+        {'safety': SafetyMode.FAULT, 'power': RobotMode.POWER_OFF},
+        {'power': RobotMode.POWER_OFF},
+    ],
+    ids=['protective stop', 'fault', 'power off'],
+)
 def test_a_robot_that_obeys_gets_there(start):
     """What each step leads to; the way is no longer than the list of all steps."""
     effects = {

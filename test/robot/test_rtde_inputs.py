@@ -12,16 +12,25 @@ from ur_cartesian_driver.protocol.rtde import INPUT_TYPES, OUTPUT_TYPES
 from ur_cartesian_driver.robot import rtde_inputs
 from ur_cartesian_driver.robot.calls import PINS, SetOutput, SetSpeedSlider
 
-DIGITAL = [SetOutput(kind=kind, pin=pin, value=value)
-           for kind, value in product(list(OutputKind)[:3], (0.0, 1.0))
-           for pin in range(PINS[kind])]
-ANALOG = [SetOutput(kind=OutputKind.STANDARD_ANALOG, pin=pin, value=0.5, domain=domain)
-          for pin, domain in product((0, 1), AnalogDomain)]
+DIGITAL = [
+    SetOutput(kind=kind, pin=pin, value=value)
+    for kind, value in product(list(OutputKind)[:3], (0.0, 1.0))
+    for pin in range(PINS[kind])
+]
+ANALOG = [
+    SetOutput(kind=OutputKind.STANDARD_ANALOG, pin=pin, value=0.5, domain=domain)
+    for pin, domain in product((0, 1), AnalogDomain)
+]
 
 
-@pytest.mark.parametrize('writing', [
-    rtde_inputs.speed_slider(SetSpeedSlider(fraction=0.5)),
-    *map(rtde_inputs.output, (*DIGITAL[:1], *ANALOG[:1]))], ids=lambda w: w.outputs[0])
+@pytest.mark.parametrize(
+    'writing',
+    [
+        rtde_inputs.speed_slider(SetSpeedSlider(fraction=0.5)),
+        *map(rtde_inputs.output, (*DIGITAL[:1], *ANALOG[:1])),
+    ],
+    ids=lambda w: w.outputs[0],
+)
 def test_the_names_exist(writing):
     assert set(writing.inputs) <= set(INPUT_TYPES)
     assert set(writing.outputs) <= set(OUTPUT_TYPES)
@@ -41,10 +50,16 @@ def test_each_digital_output_has_a_mask_and_a_bit_of_its_own():
 def test_the_effect_is_that_very_bit():
     for call in DIGITAL:
         writing = rtde_inputs.output(call)
-        (bit,) = [i for i in range(18) if writing.done(
-            {'actual_digital_output_bits': 1 << i if call.value else ~(1 << i)})]
-        first = {OutputKind.STANDARD_DIGITAL: 0, OutputKind.CONFIGURABLE_DIGITAL: 8,
-                 OutputKind.TOOL_DIGITAL: 16}[call.kind]
+        (bit,) = [
+            i
+            for i in range(18)
+            if writing.done({'actual_digital_output_bits': 1 << i if call.value else ~(1 << i)})
+        ]
+        first = {
+            OutputKind.STANDARD_DIGITAL: 0,
+            OutputKind.CONFIGURABLE_DIGITAL: 8,
+            OutputKind.TOOL_DIGITAL: 16,
+        }[call.kind]
         assert bit == first + call.pin
 
 

@@ -40,16 +40,25 @@ def no_thread_left():
 
 def ours(before):
     """Return the threads that came since, without the pool that a MultiThreadedExecutor keeps."""
-    return {thread for thread in set(threading.enumerate()) - before
-            if not thread.name.startswith('ThreadPoolExecutor')}
+    return {
+        thread
+        for thread in set(threading.enumerate()) - before
+        if not thread.name.startswith('ThreadPoolExecutor')
+    }
 
 
 def sim_parameters(sim, **more):
     """Return parameters for a driver of a simulated robot."""
     own = ('reverse_port', 'script_sender_port', 'trajectory_port', 'script_command_port')
-    return {'rtde_port': sim.ports.rtde, 'primary_port': sim.ports.primary,
-            'dashboard_port': sim.ports.dashboard, **dict.fromkeys(own, 0),
-            'headless_mode': True, 'robot_loop': 'thread', **more}
+    return {
+        'rtde_port': sim.ports.rtde,
+        'primary_port': sim.ports.primary,
+        'dashboard_port': sim.ports.dashboard,
+        **dict.fromkeys(own, 0),
+        'headless_mode': True,
+        'robot_loop': 'thread',
+        **more,
+    }
 
 
 class Cell:
@@ -60,10 +69,14 @@ class Cell:
         self.context = Context()
         rclpy.init(args=[], context=self.context)
         self.node = CartesianDriverNode(
-            parameter_overrides=sim_parameters(sim, **parameters), context=self.context)
+            parameter_overrides=sim_parameters(sim, **parameters), context=self.context
+        )
         self.client_node = rclpy.create_node('client', context=self.context)
-        self.client = ActionClient(self.client_node, FollowCartesianTrajectory,
-                                   '/ur_cartesian_driver/follow_cartesian_trajectory')
+        self.client = ActionClient(
+            self.client_node,
+            FollowCartesianTrajectory,
+            '/ur_cartesian_driver/follow_cartesian_trajectory',
+        )
         self.executor = EXECUTORS[executor](context=self.context)
         self.executor.add_node(self.node)
         self.executor.add_node(self.client_node)
@@ -95,8 +108,11 @@ class Cell:
 
     def send(self, goal):
         """Send a goal, return the handle when it is accepted."""
-        handle = self.await_(self.client.send_goal_async(
-            goal, feedback_callback=lambda message: self.feedback.append(message.feedback)))
+        handle = self.await_(
+            self.client.send_goal_async(
+                goal, feedback_callback=lambda message: self.feedback.append(message.feedback)
+            )
+        )
         assert handle.accepted
         return handle
 
@@ -117,9 +133,12 @@ class Cell:
         message = FollowCartesianTrajectory.Goal(**fields)
         for time, *offset in steps:
             position = tuple(a + b for a, b in zip(start.position, offset, strict=True))
-            message.trajectory.points.append(CartesianTrajectoryPoint(
-                time_from_start=duration_message(time),
-                pose=pose_message(Pose(position, start.quaternion))))
+            message.trajectory.points.append(
+                CartesianTrajectoryPoint(
+                    time_from_start=duration_message(time),
+                    pose=pose_message(Pose(position, start.quaternion)),
+                )
+            )
         return message
 
 

@@ -14,7 +14,10 @@ from ur_cartesian_driver.ros import action_server
 
 pytestmark = pytest.mark.slow
 SUCCEEDED, ABORTED, CANCELED = (
-    GoalStatus.STATUS_SUCCEEDED, GoalStatus.STATUS_ABORTED, GoalStatus.STATUS_CANCELED)
+    GoalStatus.STATUS_SUCCEEDED,
+    GoalStatus.STATUS_ABORTED,
+    GoalStatus.STATUS_CANCELED,
+)
 
 
 def moving(cell):
@@ -30,7 +33,8 @@ def later(cell, seconds):
     """Return a goal that is to start some time from now."""
     goal = cell.goal((0.5, 0.0, 0.02, 0.0))
     goal.trajectory.header.stamp = (
-        cell.node.get_clock().now() + Duration(seconds=seconds)).to_msg()
+        cell.node.get_clock().now() + Duration(seconds=seconds)
+    ).to_msg()
     return goal
 
 
@@ -62,7 +66,8 @@ def test_a_cancelled_goal_stops_the_arm_and_the_next_one_runs(cell):
 
 
 def test_where_new_goals_are_rejected_a_second_one_disturbs_nothing(
-        no_thread_left, sim, make_cell):
+    no_thread_left, sim, make_cell
+):
     cell = make_cell(sim, on_new_goal='reject')
     cell.wait_ready()
     first = cell.send(cell.goal((1.5, 0.05, 0.0, 0.0)))
@@ -103,11 +108,12 @@ def test_refused_goals_end_aborted_with_code_and_sentence_and_nothing_moves(sing
     cell = single_cell
     q = cell.sim.state().q
     for spoil, codes, text in (
-            (_not_a_number, (ErrorCode.INVALID_GOAL,), 'trajectory.points[0].pose.position'),
-            (_unreachable, (ErrorCode.UNREACHABLE, ErrorCode.INVALID_GOAL), ''),
-            (_unknown_frame, (ErrorCode.INVALID_GOAL,), '"moon"'),
-            (_two_segments, (ErrorCode.INVALID_GOAL,), 'segments has 2 entries for 1 points'),
-            (_unknown_execution, (ErrorCode.INVALID_GOAL,), 'execution is 77')):
+        (_not_a_number, (ErrorCode.INVALID_GOAL,), 'trajectory.points[0].pose.position'),
+        (_unreachable, (ErrorCode.UNREACHABLE, ErrorCode.INVALID_GOAL), ''),
+        (_unknown_frame, (ErrorCode.INVALID_GOAL,), '"moon"'),
+        (_two_segments, (ErrorCode.INVALID_GOAL,), 'segments has 2 entries for 1 points'),
+        (_unknown_execution, (ErrorCode.INVALID_GOAL,), 'execution is 77'),
+    ):
         goal = cell.goal((1.0, 0.02, 0.0, 0.0))
         spoil(goal)
         status, result = cell.run(goal)
@@ -119,8 +125,7 @@ def test_refused_goals_end_aborted_with_code_and_sentence_and_nothing_moves(sing
 
 def test_validate_only_plans_and_moves_nothing(single_cell):
     q = single_cell.sim.state().q
-    status, result = single_cell.run(
-        single_cell.goal((0.5, 0.02, 0.0, 0.0), validate_only=True))
+    status, result = single_cell.run(single_cell.goal((0.5, 0.02, 0.0, 0.0), validate_only=True))
     assert (status, result.error_code) == (SUCCEEDED, 0)
     assert [line[:8] for line in result.report[:2]] == ['point 0:', 'clearanc']
     assert single_cell.sim.state().q == q
@@ -185,8 +190,7 @@ def test_callbacks_go_on_while_a_goal_runs(single_cell):
     cell = single_cell
     handle = cell.send(cell.goal((1.5, 0.05, 0.0, 0.0)))
     cell.spin_until(lambda: moving(cell))
-    asked = cell.client_node.create_client(
-        GetParameters, '/ur_cartesian_driver/get_parameters')
+    asked = cell.client_node.create_client(GetParameters, '/ur_cartesian_driver/get_parameters')
     cell.spin_until(asked.service_is_ready)
     answer = cell.await_(asked.call_async(GetParameters.Request(names=['ur_type'])))
     assert answer.values[0].string_value == 'ur5e'

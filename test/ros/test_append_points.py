@@ -18,13 +18,19 @@ class Producer:
     def __init__(self, cell):
         self.cell = cell
         self._client = cell.client_node.create_client(
-            AppendPoints, '/ur_cartesian_driver/append_points')
+            AppendPoints, '/ur_cartesian_driver/append_points'
+        )
         cell.spin_until(self._client.service_is_ready)
 
     def __call__(self, handle, first_index, *steps, goal_id=None, **fields):
-        return self.ask(AppendPoints.Request(
-            goal_id=goal_id or handle.goal_id, first_index=first_index,
-            points=self.cell.goal(*steps).trajectory.points, **fields))
+        return self.ask(
+            AppendPoints.Request(
+                goal_id=goal_id or handle.goal_id,
+                first_index=first_index,
+                points=self.cell.goal(*steps).trajectory.points,
+                **fields,
+            )
+        )
 
     def ask(self, request):
         return self.cell.await_(self._client.call_async(request), timeout=8.0)
@@ -34,8 +40,11 @@ def test_a_goal_is_continued_once_for_each_request_and_ends_with_the_last(single
     cell = single_cell
     append = Producer(cell)
     handle = cell.send(cell.goal((1.0, 0.03, 0.0, 0.0), keep_open=True))
-    request = AppendPoints.Request(goal_id=handle.goal_id, first_index=1, points=cell.goal(
-        (2.0, 0.03, 0.03, 0.0), (3.0, 0.0, 0.03, 0.0)).trajectory.points)
+    request = AppendPoints.Request(
+        goal_id=handle.goal_id,
+        first_index=1,
+        points=cell.goal((2.0, 0.03, 0.03, 0.0), (3.0, 0.0, 0.03, 0.0)).trajectory.points,
+    )
     said = append.ask(request)
     assert said.accepted, said.message
     assert (said.points_received, said.message) == (3, '2 points appended, the goal has 3.')
@@ -45,9 +54,10 @@ def test_a_goal_is_continued_once_for_each_request_and_ends_with_the_last(single
     assert (others.accepted, others.points_received) == (False, 3), 'others in the same place'
     assert 'go on with point 3' in others.message
     for index, step, text in (
-            (5, (4.0, 0.0, 0.0, 0.0), 'first_index is 5, but the goal has 3 points; append'),
-            (2, (4.0, 0.0, 0.0, 0.0), 'first_index is 2, but the goal has 3 points; go on with'),
-            (3, (4.0, 3.0, 0.0, 0.0), 'points[3]')):
+        (5, (4.0, 0.0, 0.0, 0.0), 'first_index is 5, but the goal has 3 points; append'),
+        (2, (4.0, 0.0, 0.0, 0.0), 'first_index is 2, but the goal has 3 points; go on with'),
+        (3, (4.0, 3.0, 0.0, 0.0), 'points[3]'),
+    ):
         refused = append(handle, index, step)
         assert (refused.accepted, refused.points_received) == (False, 3), refused.message
         assert text in refused.message
@@ -77,7 +87,8 @@ def test_nobody_waits_for_a_goal_whose_time_is_to_come(single_cell):
     append = Producer(cell)
     goal = cell.goal((1.0, 0.02, 0.0, 0.0), keep_open=True)
     goal.trajectory.header.stamp = (
-        cell.client_node.get_clock().now() + Duration(seconds=30)).to_msg()
+        cell.client_node.get_clock().now() + Duration(seconds=30)
+    ).to_msg()
     handle = cell.send(goal)
     said = append(handle, 1, (2.0, 0.0, 0.0, 0.0))
     assert said.message == 'The goal does not move yet; append its points when it does.'

@@ -52,12 +52,12 @@ def test_every_field_of_a_point_arrives():
     message = point(
         time_from_start=Duration(sec=3, nanosec=250_000_000),
         twist=Twist(linear=Vector3(x=1.0, y=2.0, z=3.0), angular=Vector3(x=4.0, y=5.0, z=6.0)),
-        posture=CartesianPosture(posture_joint_names=['elbow_joint'],
-                                 posture_joint_values=[1.5]))
+        posture=CartesianPosture(posture_joint_names=['elbow_joint'], posture_joint_values=[1.5]),
+    )
     message.pose.orientation = Quaternion(x=0.1, y=0.2, z=0.3, w=0.4)
     message.acceleration.angular.z = 7.0
     message.jerk.linear.x = 8.0
-    waypoint, = converted(goal(message)).waypoints
+    (waypoint,) = converted(goal(message)).waypoints
     assert waypoint.time == 3.25
     assert waypoint.pose == Pose((-0.4, -0.1, 0.4), (0.1, 0.2, 0.3, 0.4))
     assert waypoint.twist == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
@@ -72,7 +72,7 @@ def test_every_field_of_a_segment_arrives():
     message.via.position.x = 0.5
     message.via_posture.posture_joint_names = ['wrist_1_joint']
     message.via_posture.posture_joint_values = [0.25]
-    segment, = converted(goal(point(), segments=[message])).segments
+    (segment,) = converted(goal(point(), segments=[message])).segments
     assert segment.type is SegmentType.CIRCULAR
     assert (segment.blend_radius, segment.velocity, segment.acceleration) == (0.01, 0.2, 0.3)
     assert segment.via == Pose((0.5, 0.0, 0.0))
@@ -81,11 +81,16 @@ def test_every_field_of_a_segment_arrives():
 
 
 def test_every_other_field_of_a_goal_arrives():
-    message = goal(point(), execution=1, keep_open=True,
-                   goal_time_tolerance=Duration(sec=-1, nanosec=500_000_000),
-                   io_commands=[IOCommand(point_index=0, output=2, pin=1, value=1.0,
-                                          offset=Duration(nanosec=1)),
-                                IOCommand(output=3, analog_domain=1)])
+    message = goal(
+        point(),
+        execution=1,
+        keep_open=True,
+        goal_time_tolerance=Duration(sec=-1, nanosec=500_000_000),
+        io_commands=[
+            IOCommand(point_index=0, output=2, pin=1, value=1.0, offset=Duration(nanosec=1)),
+            IOCommand(output=3, analog_domain=1),
+        ],
+    )
     message.path_tolerance.position_error.x = 0.1
     message.goal_tolerance.orientation_error.z = -1.0
     message.goal_tolerance.twist_error.angular.y = 0.2
@@ -120,12 +125,15 @@ def test_times_keep_their_nanoseconds(sec, nanosec):
     assert round(seconds(Duration(sec=sec, nanosec=nanosec)) * 10**9) == sec * 10**9 + nanosec
 
 
-@pytest.mark.parametrize(('stamp', 'age'), [
-    (Time(), None),
-    (Time(sec=1_800_000_000, nanosec=123_456_789), 0.0),
-    (Time(sec=1_799_999_999, nanosec=123_456_788), 1.000000001),
-    (Time(sec=1_800_000_010, nanosec=123_456_789), -10.0),
-])
+@pytest.mark.parametrize(
+    ('stamp', 'age'),
+    [
+        (Time(), None),
+        (Time(sec=1_800_000_000, nanosec=123_456_789), 0.0),
+        (Time(sec=1_799_999_999, nanosec=123_456_788), 1.000000001),
+        (Time(sec=1_800_000_010, nanosec=123_456_789), -10.0),
+    ],
+)
 def test_the_age_of_a_stamp_is_exact(stamp, age):
     message = goal(point())
     message.trajectory.header.stamp = stamp
@@ -136,13 +144,22 @@ def test_a_time_tolerance_of_zero_is_the_default():
     assert converted(goal(point()), time_tolerance=2.5).goal_time_tolerance == 2.5
 
 
-@pytest.mark.parametrize(('fields', 'sentence'), [
-    ({'execution': 4}, r'^execution is 4; it is one of AUTO \(0\), PRIMITIVES \(1\)'),
-    ({'segments': [MotionSegment(), MotionSegment(type=9)]}, r'^segments\[1\]\.type is 9; .*AUTO'),
-    ({'segments': [MotionSegment(arc_mode=2)]}, r'^segments\[0\]\.arc_mode is 2; '),
-    ({'io_commands': [IOCommand(output=4)]}, r'^io_commands\[0\]\.output is 4; '),
-    ({'io_commands': [IOCommand(analog_domain=2)]}, r'^io_commands\[0\]\.analog_domain is 2; '),
-])
+@pytest.mark.parametrize(
+    ('fields', 'sentence'),
+    [
+        ({'execution': 4}, r'^execution is 4; it is one of AUTO \(0\), PRIMITIVES \(1\)'),
+        (
+            {'segments': [MotionSegment(), MotionSegment(type=9)]},
+            r'^segments\[1\]\.type is 9; .*AUTO',
+        ),
+        ({'segments': [MotionSegment(arc_mode=2)]}, r'^segments\[0\]\.arc_mode is 2; '),
+        ({'io_commands': [IOCommand(output=4)]}, r'^io_commands\[0\]\.output is 4; '),
+        (
+            {'io_commands': [IOCommand(analog_domain=2)]},
+            r'^io_commands\[0\]\.analog_domain is 2; ',
+        ),
+    ],
+)
 def test_numbers_that_stand_for_nothing_are_refused_by_field(fields, sentence):
     with pytest.raises(InvalidGoal, match=sentence):
         converted(goal(point(), **fields))
@@ -182,8 +199,9 @@ def test_a_goal_on_the_arm_goes_with_it_until_it_is_planned():
     assert after == replace(before, T_base_frame=then.T_base_flange)
 
 
-@pytest.mark.parametrize(('sec', 'asked'), [
-    (0, 0), (1_799_999_999, 1_799_999_999 * 10**9), (1_800_000_009, 0)])
+@pytest.mark.parametrize(
+    ('sec', 'asked'), [(0, 0), (1_799_999_999, 1_799_999_999 * 10**9), (1_800_000_009, 0)]
+)
 def test_frames_of_tf_are_looked_up_at_the_stamp_once_it_has_come(sec, asked):
     class Recorder:
         def T_target_source(self, field, target, source, at):
@@ -241,18 +259,25 @@ def _via_without_arc(message):
     message.segments[1].via.position.x = 0.1
 
 
-@pytest.mark.parametrize(('spoil', 'code', 'sentence'), [
-    (_nan_position, ErrorCode.INVALID_GOAL, r'points\[1\]\.pose\.position'),
-    (_infinite_twist, ErrorCode.INVALID_GOAL, r'points\[0\]\.twist'),
-    (_zero_quaternion, ErrorCode.INVALID_GOAL, r'points\[1\]\.pose\.orientation is zero'),
-    (_times_go_back, ErrorCode.INVALID_GOAL, r'points\[1\]\.time_from_start'),
-    (_no_points, ErrorCode.INVALID_GOAL, r'trajectory\.points is empty'),
-    (_one_segment, ErrorCode.INVALID_GOAL, 'segments has 1 entries for 2 points'),
-    (_unequal_posture, ErrorCode.INVALID_JOINTS, r'points\[1\]\.posture has 2 joint names and 1'),
-    (_unknown_joint, ErrorCode.INVALID_JOINTS, 'knee_joint'),
-    (_old_stamp, ErrorCode.OLD_HEADER_TIMESTAMP, 'header.stamp lies 10.123 s in the past'),
-    (_via_without_arc, ErrorCode.INVALID_GOAL, r'segments\[1\]\.via'),
-])
+@pytest.mark.parametrize(
+    ('spoil', 'code', 'sentence'),
+    [
+        (_nan_position, ErrorCode.INVALID_GOAL, r'points\[1\]\.pose\.position'),
+        (_infinite_twist, ErrorCode.INVALID_GOAL, r'points\[0\]\.twist'),
+        (_zero_quaternion, ErrorCode.INVALID_GOAL, r'points\[1\]\.pose\.orientation is zero'),
+        (_times_go_back, ErrorCode.INVALID_GOAL, r'points\[1\]\.time_from_start'),
+        (_no_points, ErrorCode.INVALID_GOAL, r'trajectory\.points is empty'),
+        (_one_segment, ErrorCode.INVALID_GOAL, 'segments has 1 entries for 2 points'),
+        (
+            _unequal_posture,
+            ErrorCode.INVALID_JOINTS,
+            r'points\[1\]\.posture has 2 joint names and 1',
+        ),
+        (_unknown_joint, ErrorCode.INVALID_JOINTS, 'knee_joint'),
+        (_old_stamp, ErrorCode.OLD_HEADER_TIMESTAMP, 'header.stamp lies 10.123 s in the past'),
+        (_via_without_arc, ErrorCode.INVALID_GOAL, r'segments\[1\]\.via'),
+    ],
+)
 def test_malformed_messages_end_with_the_code_and_the_field(spoil, code, sentence):
     message = goal(point(), point())
     message.trajectory.points[1].pose.position.x = -0.5

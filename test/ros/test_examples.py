@@ -23,13 +23,19 @@ ELBOW = 2
 
 
 ARM = Arm(robot_model('ur5e'))
-STATE = RobotState(timestamp=0.0, actual_q=HOME, target_q=HOME,
-                   actual_tcp_pose=ARM.forward(HOME), target_tcp_pose=ARM.forward(HOME))
+STATE = RobotState(
+    timestamp=0.0,
+    actual_q=HOME,
+    target_q=HOME,
+    actual_tcp_pose=ARM.forward(HOME),
+    target_tcp_pose=ARM.forward(HOME),
+)
 
 
 def goal_of(name):
     return goal_from_message(
-        load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0, stand=Stand.of(STATE))
+        load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0, stand=Stand.of(STATE)
+    )
 
 
 def planned(name):
@@ -41,8 +47,18 @@ def kinds(name):
 
 
 def test_there_are_examples():
-    assert set(NAMES) >= {'square', 'seam', 'postures', 'relative', 'tilt', 'tolerances', 'circle',
-                          'figure_eight', 'seam_timed', 'glue'}
+    assert set(NAMES) >= {
+        'square',
+        'seam',
+        'postures',
+        'relative',
+        'tilt',
+        'tolerances',
+        'circle',
+        'figure_eight',
+        'seam_timed',
+        'glue',
+    }
 
 
 @pytest.mark.parametrize('name', NAMES)
@@ -93,22 +109,32 @@ def test_the_circle_is_round_and_even_between_its_points():
 
 def test_the_timed_seam_stops_only_above_it_behind_it_and_at_home():
     assert [line for line in planned('seam_timed').report if 'stops' in line][-1] == (
-        'points 0, 6: the arm stops there, because the twist is 0 (NaN lets the driver choose)')
+        'points 0, 6: the arm stops there, because the twist is 0 (NaN lets the driver choose)'
+    )
 
 
 def test_the_valve_is_open_along_the_bead_and_the_light_comes_at_the_end():
     result = planned('glue')
-    outputs = [(segment.waypoint, output.pin, output.value, output.place is not None, output.delay)
-               for segment in result.segments for output in segment.outputs]
-    assert outputs == [(1, 2, 1.0, True, 0.0), (2, 0, 0.6, True, 0.0), (3, 0, 1.0, True, 0.0),
-                       (4, 2, 0.0, True, 0.0), (6, 3, 1.0, False, pytest.approx(0.5))]
+    outputs = [
+        (segment.waypoint, output.pin, output.value, output.place is not None, output.delay)
+        for segment in result.segments
+        for output in segment.outputs
+    ]
+    assert outputs == [
+        (1, 2, 1.0, True, 0.0),
+        (2, 0, 0.6, True, 0.0),
+        (3, 0, 1.0, True, 0.0),
+        (4, 2, 0.0, True, 0.0),
+        (6, 3, 1.0, False, pytest.approx(0.5)),
+    ]
     assert all(segment.primitive.blend_radius > 0.0 for segment in result.segments[:-1])
 
 
 def test_the_posture_of_the_seam_is_the_one_of_its_pose():
     result = planned('seam')
     assert result.goal.waypoints[0].posture.values == pytest.approx(
-        result.segments[0].joints, abs=1e-3)
+        result.segments[0].joints, abs=1e-3
+    )
 
 
 def test_the_postures_bend_the_elbow_as_asked():

@@ -12,10 +12,12 @@ from ur_cartesian_driver.ros.frames import Frames, Stand, StaticFrame, T_TOOL0_F
 T_BASE_FLANGE = Pose((0.4, 0.1, 0.5), quaternion_from_rotation_vector((1.0, 2.0, 0.5)))
 T_FLANGE_TCP = Pose((0.0, 0.02, 0.1), quaternion_from_rotation_vector((0.0, 0.3, 0.0)))
 STAND = Stand(T_BASE_FLANGE, T_FLANGE_TCP)
-TOOLS = [StaticFrame.parse('tip nozzle 0 0 0.02 0 0 0 1'),
-         StaticFrame.parse('nozzle flange 0.1 0 0 0 0 0 1'),
-         StaticFrame.parse('drop tool0_controller 0 0 0.005 0 0 0 1'),
-         StaticFrame.parse('table base_link 1 0 0 0 0 0 1')]
+TOOLS = [
+    StaticFrame.parse('tip nozzle 0 0 0.02 0 0 0 1'),
+    StaticFrame.parse('nozzle flange 0.1 0 0 0 0 0 1'),
+    StaticFrame.parse('drop tool0_controller 0 0 0.005 0 0 0 1'),
+    StaticFrame.parse('table base_link 1 0 0 0 0 0 1'),
+]
 T_FLANGE_TIP = T_TOOL0_FLANGE @ Pose((0.1, 0.0, 0.02))
 
 
@@ -37,10 +39,13 @@ def test_base_link_is_the_base_turned_by_pi_about_z(prefix):
 
 
 def test_static_frames_chain_in_any_order():
-    frames = Frames('', [
-        StaticFrame.parse('part table 0 0 0.5 0 0 0 1'),
-        StaticFrame.parse('table base_link 1 0 0 0 0 0 1'),
-    ])
+    frames = Frames(
+        '',
+        [
+            StaticFrame.parse('part table 0 0 0.5 0 0 0 1'),
+            StaticFrame.parse('table base_link 1 0 0 0 0 0 1'),
+        ],
+    )
     assert frames.T_base_frame('part').position == pytest.approx((-1.0, 0.0, 0.5))
 
 
@@ -59,27 +64,34 @@ def test_a_frame_without_the_prefix_is_unknown():
         Frames('left_').T_base_frame('base')
 
 
-@pytest.mark.parametrize(('texts', 'sentence'), [
-    (['table base 1 2 3'], 'has 5 words instead of 9'),
-    (['table base 1 2 three 0 0 0 1'], 'three'),
-    (['table base 1 2 nan 0 0 0 1'], 'not finite'),
-    (['table base 1 2 3 0 0 0 2'], r'has length 2 instead of 1'),
-    (['table world 1 2 3 0 0 0 1'], 'the parent "world" of "table" does not lead to base'),
-    (['a b 0 0 0 0 0 0 1', 'b a 0 0 0 0 0 0 1'], 'does not lead to base'),
-    (['base base_link 0 0 0 0 0 0 1'], '"base" is there twice'),
-    (['a base 0 0 0 0 0 0 1', 'a base 0 0 1 0 0 0 1'], '"a" is there twice'),
-])
+@pytest.mark.parametrize(
+    ('texts', 'sentence'),
+    [
+        (['table base 1 2 3'], 'has 5 words instead of 9'),
+        (['table base 1 2 three 0 0 0 1'], 'three'),
+        (['table base 1 2 nan 0 0 0 1'], 'not finite'),
+        (['table base 1 2 3 0 0 0 2'], r'has length 2 instead of 1'),
+        (['table world 1 2 3 0 0 0 1'], 'the parent "world" of "table" does not lead to base'),
+        (['a b 0 0 0 0 0 0 1', 'b a 0 0 0 0 0 0 1'], 'does not lead to base'),
+        (['base base_link 0 0 0 0 0 0 1'], '"base" is there twice'),
+        (['a base 0 0 0 0 0 0 1', 'a base 0 0 1 0 0 0 1'], '"a" is there twice'),
+    ],
+)
 def test_malformed_static_frames_say_what_is_wrong(texts, sentence):
     with pytest.raises(ValueError, match=sentence):
         Frames('', [StaticFrame.parse(text) for text in texts])
 
 
-@pytest.mark.parametrize(('name', 'expected'), [
-    ('tool0', T_BASE_FLANGE),
-    ('flange', T_BASE_FLANGE @ T_TOOL0_FLANGE),
-    ('tool0_controller', T_BASE_FLANGE @ T_FLANGE_TCP),
-    ('tip', T_BASE_FLANGE @ T_FLANGE_TIP),
-    ('drop', T_BASE_FLANGE @ T_FLANGE_TCP @ Pose((0.0, 0.0, 0.005)))])
+@pytest.mark.parametrize(
+    ('name', 'expected'),
+    [
+        ('tool0', T_BASE_FLANGE),
+        ('flange', T_BASE_FLANGE @ T_TOOL0_FLANGE),
+        ('tool0_controller', T_BASE_FLANGE @ T_FLANGE_TCP),
+        ('tip', T_BASE_FLANGE @ T_FLANGE_TIP),
+        ('drop', T_BASE_FLANGE @ T_FLANGE_TCP @ Pose((0.0, 0.0, 0.005))),
+    ],
+)
 def test_frames_on_the_arm_are_where_it_stands(name, expected):
     assert_same(Frames('', TOOLS).T_base_frame(name, STAND), expected)
 
@@ -91,20 +103,31 @@ def test_frames_on_an_arm_that_nobody_knows_are_waited_for(name):
 
 
 def test_the_stand_is_the_robot_s_own_report():
-    state = RobotState(timestamp=0.0, actual_q=(0.0,) * 6, T_flange_tcp=T_FLANGE_TCP,
-                       actual_tcp_pose=T_BASE_FLANGE @ T_FLANGE_TCP)
+    state = RobotState(
+        timestamp=0.0,
+        actual_q=(0.0,) * 6,
+        T_flange_tcp=T_FLANGE_TCP,
+        actual_tcp_pose=T_BASE_FLANGE @ T_FLANGE_TCP,
+    )
     assert_same(Stand.of(state).T_base_flange, T_BASE_FLANGE)
 
 
-@pytest.mark.parametrize(('prefix', 'name'), [
-    ('', ''), ('', 'tool0_controller'), ('left_', 'left_tool0_controller')])
+@pytest.mark.parametrize(
+    ('prefix', 'name'), [('', ''), ('', 'tool0_controller'), ('left_', 'left_tool0_controller')]
+)
 def test_the_active_tcp_is_a_controlled_frame_whatever_it_is(prefix, name):
     assert Frames(prefix).T_flange_frame(name) is None
 
 
-@pytest.mark.parametrize(('name', 'expected'), [
-    ('tool0', IDENTITY), ('flange', T_TOOL0_FLANGE), ('tip', T_FLANGE_TIP),
-    ('drop', T_FLANGE_TCP @ Pose((0.0, 0.0, 0.005)))])
+@pytest.mark.parametrize(
+    ('name', 'expected'),
+    [
+        ('tool0', IDENTITY),
+        ('flange', T_TOOL0_FLANGE),
+        ('tip', T_FLANGE_TIP),
+        ('drop', T_FLANGE_TCP @ Pose((0.0, 0.0, 0.005))),
+    ],
+)
 def test_what_is_fixed_behind_the_flange_can_be_controlled(name, expected):
     T = Frames('', TOOLS).T_flange_frame(name, STAND)
     assert T is not None
@@ -116,11 +139,18 @@ def test_what_is_behind_a_tcp_that_nobody_knows_is_waited_for():
         Frames('', TOOLS).T_flange_frame('drop')
 
 
-@pytest.mark.parametrize(('name', 'sentence'), [
-    ('nozle', r'controlled_frame is "nozle", which is not a known frame; .*tool0_controller, '
-              r'tool0, flange, nozzle, tip, drop;.*static_frames'),
-    ('table', r'is "table", which does not move with the arm.*tool0'),
-    ('base', r'is "base", which does not move with the arm')])
+@pytest.mark.parametrize(
+    ('name', 'sentence'),
+    [
+        (
+            'nozle',
+            r'controlled_frame is "nozle", which is not a known frame; .*tool0_controller, '
+            r'tool0, flange, nozzle, tip, drop;.*static_frames',
+        ),
+        ('table', r'is "table", which does not move with the arm.*tool0'),
+        ('base', r'is "base", which does not move with the arm'),
+    ],
+)
 def test_what_is_not_behind_the_flange_is_refused_with_the_known_frames(name, sentence):
     with pytest.raises(InvalidGoal, match=sentence):
         Frames('', TOOLS).T_flange_frame(name, STAND)

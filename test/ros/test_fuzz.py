@@ -34,8 +34,9 @@ from ur_cartesian_driver.sim.config import HOME
 
 ARM = Arm(robot_model('ur5e'))
 HERE = ARM.forward(HOME)
-STATE = RobotState(timestamp=0.0, actual_q=HOME, target_q=HOME, actual_tcp_pose=HERE,
-                   target_tcp_pose=HERE)
+STATE = RobotState(
+    timestamp=0.0, actual_q=HOME, target_q=HOME, actual_tcp_pose=HERE, target_tcp_pose=HERE
+)
 NOW = 1_800_000_000_000_000_000
 #: Two points, a segment each, an arc and an output: something of everything.
 GOAL = """
@@ -54,8 +55,9 @@ segments:
      orientation: {x: 0.7071068, y: 0.7071068, w: 0.0}}}
 """
 FLOATS = st.sampled_from([nan, inf, -inf, 0.0, -0.0, -1.0, 1.0, 1e-320, 1e-9, 1e3, 1e300, -1e300])
-TEXTS = st.sampled_from(['', 'base', 'tool0', 'no such frame', 'elbow_joint', 'x' * 5000,
-                         'ä\n\x1b'])
+TEXTS = st.sampled_from(
+    ['', 'base', 'tool0', 'no such frame', 'elbow_joint', 'x' * 5000, 'ä\n\x1b']
+)
 
 
 def leaves(message, path=''):
@@ -65,8 +67,9 @@ def leaves(message, path=''):
         where = f'{path}.{name}'
         if isinstance(kind, NamespacedType):
             yield from leaves(value, where)
-        elif isinstance(kind, AbstractSequence | Array) \
-                and isinstance(kind.value_type, NamespacedType):
+        elif isinstance(kind, AbstractSequence | Array) and isinstance(
+            kind.value_type, NamespacedType
+        ):
             for i, item in enumerate(value):
                 yield from leaves(item, f'{where}[{i}]')
         else:
@@ -86,7 +89,7 @@ def anything(kind):
     if kind.typename == 'boolean':
         return st.booleans()
     bits = int(kind.typename.lstrip('uint'))
-    low = 0 if kind.typename[0] == 'u' else -2**(bits - 1)
+    low = 0 if kind.typename[0] == 'u' else -(2 ** (bits - 1))
     high = low + 2**bits - 1
     return st.sampled_from([low, high, 0, 1, 2, 3, 5])
 
@@ -119,8 +122,9 @@ def test_the_goal_that_is_spoiled_is_sound():
     assert len(plan(goal, STATE, ARM, PlanningOptions()).segments) == 2
 
 
-@settings(max_examples=80, deadline=None, derandomize=True,
-          suppress_health_check=[HealthCheck.too_slow])
+@settings(
+    max_examples=80, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
 @given(st.data())
 def test_any_goal_is_planned_and_can_be_sent_or_is_refused_with_a_sentence(data):
     message = load_goal(GOAL)
@@ -155,8 +159,13 @@ def test_any_parameter_is_taken_or_refused_with_its_name(data):
     standard = defaults()
     declaration = data.draw(st.sampled_from(DECLARATIONS))
     kind = type(standard[declaration.name])
-    right = {bool: st.booleans(), int: st.integers(-2, 70_000), float: FLOATS, str: TEXTS,
-             list: st.lists(TEXTS, max_size=2)}
+    right = {
+        bool: st.booleans(),
+        int: st.integers(-2, 70_000),
+        float: FLOATS,
+        str: TEXTS,
+        list: st.lists(TEXTS, max_size=2),
+    }
     value = data.draw(right[kind] | st.one_of(*right.values()))
     with refusal() as refused:
         checked({declaration.name: value})

@@ -34,7 +34,8 @@ class StandInBuffer:
         message = TransformStamped()
         message.transform.translation = Vector3(**dict(zip('xyz', CAMERA.position, strict=True)))
         message.transform.rotation = Quaternion(
-            **dict(zip('xyzw', CAMERA.quaternion, strict=True)))
+            **dict(zip('xyzw', CAMERA.quaternion, strict=True))
+        )
         return message
 
 
@@ -48,8 +49,9 @@ class Cell:
         driver = cell.node.driver
         wait_for(lambda: driver.state.T_flange_tcp.distance_to(TCP) < 1e-9)
         server = cell.node.action_server
-        server._frames = server._frames.with_transforms(Transforms(
-            StandInBuffer(), LookupError, now=lambda: 0, max_age=1.0))
+        server._frames = server._frames.with_transforms(
+            Transforms(StandInBuffer(), LookupError, now=lambda: 0, max_age=1.0)
+        )
 
     def stand(self, T_flange_frame):
         """Return where a frame behind the flange is in base."""
@@ -62,9 +64,13 @@ class Cell:
         trajectory.header.frame_id, trajectory.controlled_frame = frame_id, controlled_frame
         if delay is not None:
             trajectory.header.stamp = (
-                self.cell.node.get_clock().now() + Duration(seconds=delay)).to_msg()
-        trajectory.points.append(CartesianTrajectoryPoint(
-            time_from_start=duration_message(0.4), pose=pose_message(pose)))
+                self.cell.node.get_clock().now() + Duration(seconds=delay)
+            ).to_msg()
+        trajectory.points.append(
+            CartesianTrajectoryPoint(
+                time_from_start=duration_message(0.4), pose=pose_message(pose)
+            )
+        )
         return message
 
     def run(self, *goal):
@@ -78,7 +84,8 @@ class Cell:
 def named(no_thread_left, make_cell):
     config = SimulatorConfig(rtde_port=0, primary_port=0, dashboard_port=0, frequency=125.0)
     table = 'table base_link 0.3 0.2 0.1 {} {} {} {}'.format(
-        *quaternion_from_rotation_vector((0.0, 0.0, 0.5)))
+        *quaternion_from_rotation_vector((0.0, 0.0, 0.5))
+    )
     with SimulatedRobot(config) as robot:
         cell = make_cell(robot, static_frames=[table, 'nozzle tool0 0.02 0 0.15 0 0 1 0'])
         cell.wait_ready()
@@ -93,7 +100,10 @@ def same(a, b):
 def test_goals_go_to_where_their_frames_say(named):
     frames = {'base_link': BASE_LINK, 'table': TABLE, 'camera': CAMERA}
     for frame_id, controlled, T_flange_frame in (
-            ('base_link', 'nozzle', NOZZLE), ('table', 'tool0', IDENTITY), ('camera', '', TCP)):
+        ('base_link', 'nozzle', NOZZLE),
+        ('table', 'tool0', IDENTITY),
+        ('camera', '', TCP),
+    ):
         start, T_base_frame = named.stand(T_flange_frame), frames[frame_id]
         x, y, z = start.position
         target = Pose((x, y + 0.02, z), start.quaternion)
@@ -105,20 +115,26 @@ def test_goals_go_to_where_their_frames_say(named):
         assert last.controlled_frame == (controlled or 'tool0_controller')
         p = last.actual.pose.position
         assert T_base_frame.apply((p.x, p.y, p.z)) == pytest.approx(target.position, abs=1e-4)
-        moving = max(named.cell.feedback, key=lambda f: abs(f.actual.twist.linear.x) + abs(
-            f.actual.twist.linear.y))
+        moving = max(
+            named.cell.feedback,
+            key=lambda f: abs(f.actual.twist.linear.x) + abs(f.actual.twist.linear.y),
+        )
         v = moving.actual.twist.linear
         along_base = Pose((0.0, 0.0, 0.0), T_base_frame.quaternion).apply((v.x, v.y, v.z))
         assert along_base[1] > 0.02
         assert along_base[::2] == pytest.approx((0.0, 0.0), abs=2e-3)
-        assert all(f.actual.acceleration.linear.x == f.actual.acceleration.linear.x
-                   for f in named.cell.feedback)  # not NaN
+        assert all(
+            f.actual.acceleration.linear.x == f.actual.acceleration.linear.x
+            for f in named.cell.feedback
+        )  # not NaN
 
 
 def test_a_goal_in_a_frame_of_the_arm_is_a_relative_motion_from_where_it_starts(named):
     step = Pose((0.0, 0.0, 0.01), quaternion_from_rotation_vector((0.0, 0.0, 0.2)))
     for frame_id, controlled, T_flange_frame in (
-            ('tool0', 'tool0', IDENTITY), ('tool0_controller', '', TCP)):
+        ('tool0', 'tool0', IDENTITY),
+        ('tool0_controller', '', TCP),
+    ):
         start = named.stand(T_flange_frame)
         named.run(frame_id, controlled, step)
         assert same(named.stand(T_flange_frame), start @ step)
@@ -135,11 +151,11 @@ def test_a_goal_in_a_frame_of_the_arm_is_a_relative_motion_from_where_it_starts(
 def test_frames_that_nobody_knows_refuse_and_move_nothing(named):
     q = named.cell.sim.state().q
     for frame_id, controlled, text in (
-            ('moon', '', 'trajectory.header.frame_id is "moon"'),
-            ('', 'moon', 'trajectory.controlled_frame is "moon"'),
-            ('', 'table', 'does not move with the arm')):
+        ('moon', '', 'trajectory.header.frame_id is "moon"'),
+        ('', 'moon', 'trajectory.controlled_frame is "moon"'),
+        ('', 'table', 'does not move with the arm'),
+    ):
         status, result = named.cell.run(named.goal(frame_id, controlled, IDENTITY))
-        assert (status, result.error_code) == (
-            GoalStatus.STATUS_ABORTED, ErrorCode.INVALID_GOAL)
+        assert (status, result.error_code) == (GoalStatus.STATUS_ABORTED, ErrorCode.INVALID_GOAL)
         assert text in result.error_string
     assert named.cell.sim.state().q == q

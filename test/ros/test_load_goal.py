@@ -9,11 +9,13 @@ from ur_cartesian_driver.ros.client import GoalFileError, load_goal
 
 
 def test_a_goal_reads_as_in_ros2_action_send_goal():
-    goal = load_goal('{trajectory: {header: {frame_id: base}, points: [{time_from_start: '
-                     '{sec: 2}, pose: {position: {x: -0.4, y: 1, z: 1e-3}}, posture: '
-                     '{posture_joint_names: [elbow_joint], posture_joint_values: [1.5]}}]}, '
-                     'segments: [{type: 2}], validate_only: true}')
-    point, = goal.trajectory.points
+    goal = load_goal(
+        '{trajectory: {header: {frame_id: base}, points: [{time_from_start: '
+        '{sec: 2}, pose: {position: {x: -0.4, y: 1, z: 1e-3}}, posture: '
+        '{posture_joint_names: [elbow_joint], posture_joint_values: [1.5]}}]}, '
+        'segments: [{type: 2}], validate_only: true}'
+    )
+    (point,) = goal.trajectory.points
     assert goal.trajectory.header.frame_id == 'base'
     assert point.time_from_start.sec == 2
     assert (point.pose.position.x, point.pose.position.y, point.pose.position.z) == (-0.4, 1, 1e-3)
@@ -23,7 +25,7 @@ def test_a_goal_reads_as_in_ros2_action_send_goal():
 
 
 def test_fields_that_are_not_named_keep_their_defaults():
-    point, = load_goal('trajectory: {points: [{}]}').trajectory.points
+    (point,) = load_goal('trajectory: {points: [{}]}').trajectory.points
     assert point.pose.orientation.w == 1.0
 
 
@@ -32,26 +34,42 @@ def test_an_empty_text_is_an_empty_goal(text):
     assert load_goal(text) == FollowCartesianTrajectory.Goal()
 
 
-@pytest.mark.parametrize(('text', 'sentence'), [
-    ('trajectory: {points: [{}, {pose: {positon: {}}}]}',
-     'trajectory.points[1].pose.positon: there is no such field; trajectory.points[1].pose has '
-     'position, orientation.'),
-    ('trajectry: {}', 'trajectry: there is no such field; a goal has trajectory, path_tolerance,'),
-    ('trajectory: {points: {}}', 'trajectory.points is {}, but it is a list.'),
-    ('trajectory: {points: [1]}', 'trajectory.points[0] is 1, but it is a mapping of fields.'),
-    ('trajectory: {header: {frame_id: 1}}',
-     'trajectory.header.frame_id is 1, but it is a text; put it in quotes.'),
-    ('trajectory: {points: [{pose: {position: {x: left}}}]}',
-     "trajectory.points[0].pose.position.x is 'left', but it is a number."),
-    ('trajectory: {points: [{pose: {position: {x: true}}}]}',
-     'trajectory.points[0].pose.position.x is True, but it is a number.'),
-    ('execution: 300', 'execution is 300, but it is a whole number from 0 to 255.'),
-    ('goal_time_tolerance: {sec: 0.5}',
-     'goal_time_tolerance.sec is 0.5, but it is a whole number from -2147483648 to 2147483647.'),
-    ('validate_only: 1', 'validate_only is 1, but it is true or false.'),
-    ('[1, 2]', 'the goal is [1, 2], but it is a mapping of fields.'),
-    ('{trajectory: ', 'this is not YAML: '),
-])
+@pytest.mark.parametrize(
+    ('text', 'sentence'),
+    [
+        (
+            'trajectory: {points: [{}, {pose: {positon: {}}}]}',
+            'trajectory.points[1].pose.positon: there is no such field; trajectory.points[1].pose has '
+            'position, orientation.',
+        ),
+        (
+            'trajectry: {}',
+            'trajectry: there is no such field; a goal has trajectory, path_tolerance,',
+        ),
+        ('trajectory: {points: {}}', 'trajectory.points is {}, but it is a list.'),
+        ('trajectory: {points: [1]}', 'trajectory.points[0] is 1, but it is a mapping of fields.'),
+        (
+            'trajectory: {header: {frame_id: 1}}',
+            'trajectory.header.frame_id is 1, but it is a text; put it in quotes.',
+        ),
+        (
+            'trajectory: {points: [{pose: {position: {x: left}}}]}',
+            "trajectory.points[0].pose.position.x is 'left', but it is a number.",
+        ),
+        (
+            'trajectory: {points: [{pose: {position: {x: true}}}]}',
+            'trajectory.points[0].pose.position.x is True, but it is a number.',
+        ),
+        ('execution: 300', 'execution is 300, but it is a whole number from 0 to 255.'),
+        (
+            'goal_time_tolerance: {sec: 0.5}',
+            'goal_time_tolerance.sec is 0.5, but it is a whole number from -2147483648 to 2147483647.',
+        ),
+        ('validate_only: 1', 'validate_only is 1, but it is true or false.'),
+        ('[1, 2]', 'the goal is [1, 2], but it is a mapping of fields.'),
+        ('{trajectory: ', 'this is not YAML: '),
+    ],
+)
 def test_what_does_not_fit_is_named_by_its_key(text, sentence):
     with pytest.raises(GoalFileError, match='^' + re.escape(sentence)):
         load_goal(text)

@@ -55,7 +55,8 @@ def subscribe(cell, names):
     for name in names:
         kind, qos = TOPICS[name]
         cell.client_node.create_subscription(
-            kind, f'/{name}', lambda message, name=name: newest.update({name: message}), qos)
+            kind, f'/{name}', lambda message, name=name: newest.update({name: message}), qos
+        )
     return newest
 
 
@@ -119,8 +120,10 @@ def test_destroying_the_node_stops_a_running_goal(no_thread_left, sim, executor,
     cell.spin_until(lambda: any(abs(qd) > 0.02 for qd in sim.state().qd))
     cell.node.destroy_node()
     assert max(map(abs, sim.state().qd)) < 1e-3
-    assert not any(thread.name.startswith(('goal', 'driver', 'state publisher', 'robot loop'))
-                   for thread in threading.enumerate())
+    assert not any(
+        thread.name.startswith(('goal', 'driver', 'state publisher', 'robot loop'))
+        for thread in threading.enumerate()
+    )
 
 
 def test_a_node_can_be_made_and_destroyed_again(no_thread_left, sim, make_cell):
@@ -143,7 +146,8 @@ def test_prefix_and_namespace_are_in_all_names(no_thread_left, sim, make_cell):
     cell = make_cell(sim, tf_prefix='left_')
     names = []
     cell.client_node.create_subscription(
-        JointState, '/joint_states', lambda message: names.append(list(message.name)), STATE)
+        JointState, '/joint_states', lambda message: names.append(list(message.name)), STATE
+    )
     cell.spin_until(lambda: names)
     assert names[0] == [f'left_{name}' for name in JOINT_NAMES]
 
@@ -175,8 +179,10 @@ def test_ctrl_c_at_the_client_cancels_the_goal(single_cell):
 
 
 def test_a_client_without_a_driver_says_so(no_thread_left):
-    with GoalClient('nobody') as client, \
-            pytest.raises(TimeoutError, match='Nobody serves /nobody/follow_cartesian_trajectory'):
+    with (
+        GoalClient('nobody') as client,
+        pytest.raises(TimeoutError, match='Nobody serves /nobody/follow_cartesian_trajectory'),
+    ):
         client.send(None, timeout=0.1)
 
 
@@ -185,9 +191,13 @@ def command(*arguments):
 
 
 def test_a_signal_ends_the_goal_with_a_result_and_the_command_with_0(
-        sim, parameters_for, tmp_path):
-    arguments = [word for name, value in parameters_for(sim, robot_loop='process').items()
-                 for word in ('-p', f'{name}:={str(value).lower()}')]
+    sim, parameters_for, tmp_path
+):
+    arguments = [
+        word
+        for name, value in parameters_for(sim, robot_loop='process').items()
+        for word in ('-p', f'{name}:={str(value).lower()}')
+    ]
     errors = tmp_path / 'stderr'
     with errors.open('w') as stderr, subprocess.Popen(command(*arguments), stderr=stderr) as node:
         try:
@@ -195,8 +205,8 @@ def test_a_signal_ends_the_goal_with_a_result_and_the_command_with_0(
                 goal = load_goal(share_path() / 'config' / 'examples' / 'square.yaml')
                 signals = iter([signal.SIGINT])  # a second one would not wait for the result
                 result = run_when_ready(
-                    client, goal,
-                    lambda feedback: [node.send_signal(number) for number in signals])
+                    client, goal, lambda feedback: [node.send_signal(number) for number in signals]
+                )
             assert result.error_code == ErrorCode.CANCELLED, result.error_string
             assert result.error_string.startswith('The driver node is shutting down')
             assert node.wait(10.0) == 0
@@ -215,16 +225,23 @@ def run_when_ready(client, goal, on_feedback):
             return result
 
 
-@pytest.mark.parametrize(('arguments', 'sentence'), [
-    (['-p', 'ur_type:=ur4'], "Parameter ur_type is 'ur4'; it is one of ur3,"),
-    (['-p', 'max_tool_speed:=fast'], "Parameter max_tool_speed is 'fast', but it is a number."),
-    (['-p', 'max_tool_sped:=0.5'], 'There is no parameter max_tool_sped; did you mean'),
-    (['-p', 'ur_type'], "failed to initialize rcl: Couldn't parse parameter override rule"),
-    (['--params-file', '/nowhere'], "failed to initialize rcl: Couldn't parse params file"),
-])
+@pytest.mark.parametrize(
+    ('arguments', 'sentence'),
+    [
+        (['-p', 'ur_type:=ur4'], "Parameter ur_type is 'ur4'; it is one of ur3,"),
+        (
+            ['-p', 'max_tool_speed:=fast'],
+            "Parameter max_tool_speed is 'fast', but it is a number.",
+        ),
+        (['-p', 'max_tool_sped:=0.5'], 'There is no parameter max_tool_sped; did you mean'),
+        (['-p', 'ur_type'], "failed to initialize rcl: Couldn't parse parameter override rule"),
+        (['--params-file', '/nowhere'], "failed to initialize rcl: Couldn't parse params file"),
+    ],
+)
 def test_the_command_ends_with_a_sentence_for_bad_arguments(arguments, sentence):
-    done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=30.0,
-                          check=False)
+    done = subprocess.run(
+        command(*arguments), capture_output=True, text=True, timeout=30.0, check=False
+    )
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].startswith(f'ur_cartesian_driver: {sentence}')
     assert 'Traceback' not in done.stderr
@@ -236,6 +253,5 @@ def test_an_empty_list_in_a_file_is_explained(no_thread_left, tmp_path):
     context = Context()
     rclpy.init(args=[], context=context)
     with pytest.raises(ParameterError, match='for an empty list'):
-        CartesianDriverNode(context=context,
-                            cli_args=['--ros-args', '--params-file', str(path)])
+        CartesianDriverNode(context=context, cli_args=['--ros-args', '--params-file', str(path)])
     rclpy.shutdown(context=context)

@@ -32,9 +32,13 @@ def declared():
     rclpy.init(args=[], context=context)
 
     def declared(values=None, arguments=()):
-        node = Node('parameters', context=context, cli_args=list(arguments),
-                    parameter_overrides=overrides(values),
-                    automatically_declare_parameters_from_overrides=True)
+        node = Node(
+            'parameters',
+            context=context,
+            cli_args=list(arguments),
+            parameter_overrides=overrides(values),
+            automatically_declare_parameters_from_overrides=True,
+        )
         try:
             return declare(node), {name: node.describe_parameter(name) for name in defaults()}
         finally:
@@ -65,10 +69,15 @@ def test_every_parameter_is_declared_once():
 
 
 def test_every_option_is_a_parameter_but_for_what_is_found_out():
-    options = {f.name for kind in (DriverConfig, PlanningOptions, NodeSettings)
-               for f in fields(kind)}
+    options = {
+        f.name for kind in (DriverConfig, PlanningOptions, NodeSettings) for f in fields(kind)
+    }
     assert options - set(defaults()) == {
-        'calibration_known', 'optimove_known', 'acceleration_known', 'dialect'}
+        'calibration_known',
+        'optimove_known',
+        'acceleration_known',
+        'dialect',
+    }
 
 
 def test_every_default_is_in_its_range():
@@ -91,10 +100,18 @@ def test_the_file_means_the_defaults(declared):
 
 
 def test_values_arrive_where_they_are_used(declared):
-    settings, _ = declared({
-        'robot_ip': '10.0.0.1', 'reverse_port': 0, 'headless_mode': True, 'max_points': 5,
-        'tf_prefix': 'left_', 'state_publish_rate': 125.0, 'allowed_peers': ['10.0.0.1', ''],
-        'static_frames': ['table left_base 1 0 0 0 0 0 1']})
+    settings, _ = declared(
+        {
+            'robot_ip': '10.0.0.1',
+            'reverse_port': 0,
+            'headless_mode': True,
+            'max_points': 5,
+            'tf_prefix': 'left_',
+            'state_publish_rate': 125.0,
+            'allowed_peers': ['10.0.0.1', ''],
+            'static_frames': ['table left_base 1 0 0 0 0 0 1'],
+        }
+    )
     assert settings.driver.robot_ip == '10.0.0.1'
     assert settings.driver.reverse_port == 0
     assert settings.driver.headless_mode
@@ -130,23 +147,41 @@ def test_every_number_has_a_range(declared):
             assert descriptors[name].floating_point_range, name
 
 
-@pytest.mark.parametrize(('values', 'sentence'), [
-    ({'ur_typo': 'ur5e'}, 'There is no parameter ur_typo; did you mean ur_type?'),
-    ({'zzz': 1}, 'There is no parameter zzz; config/driver.yaml lists all there are.'),
-    ({'ur_type': 'ur4'}, "Parameter ur_type is 'ur4'; it is one of ur3, ur5,"),
-    ({'ur_type': 5}, 'Parameter ur_type is 5, but it is a text; put it in quotes'),
-    ({'max_tool_speed': 1}, 'Parameter max_tool_speed is 1, but it is a number; write 1.0.'),
-    ({'max_tool_speed': -0.1}, 'Parameter max_tool_speed is -0.1; it must lie between 0 and 10.'),
-    ({'max_tool_speed': float('nan')}, 'Parameter max_tool_speed is nan; it must lie between'),
-    ({'max_points': 2.0}, 'Parameter max_points is 2.0, but it is a whole number.'),
-    ({'headless_mode': 1}, 'Parameter headless_mode is 1, but it is true or false.'),
-    ({'reverse_port': 65536}, 'Parameter reverse_port is 65536; it must lie between 0 and 65535.'),
-    ({'robot_loop': 'fork'}, "Parameter robot_loop is 'fork'; it is one of process, thread."),
-    ({'on_new_goal': 'queue'}, "Parameter on_new_goal is 'queue'; it is one of preempt, reject"),
-    ({'static_frames': ['table']}, 'Parameter static_frames: "table" has 1 words instead of 9'),
-    ({'keepalive_period': 0.15}, 'Parameter robot_receive_timeout is 0.2 s, it has to be at least '
-                                 'twice the keepalive_period'),
-])
+@pytest.mark.parametrize(
+    ('values', 'sentence'),
+    [
+        ({'ur_typo': 'ur5e'}, 'There is no parameter ur_typo; did you mean ur_type?'),
+        ({'zzz': 1}, 'There is no parameter zzz; config/driver.yaml lists all there are.'),
+        ({'ur_type': 'ur4'}, "Parameter ur_type is 'ur4'; it is one of ur3, ur5,"),
+        ({'ur_type': 5}, 'Parameter ur_type is 5, but it is a text; put it in quotes'),
+        ({'max_tool_speed': 1}, 'Parameter max_tool_speed is 1, but it is a number; write 1.0.'),
+        (
+            {'max_tool_speed': -0.1},
+            'Parameter max_tool_speed is -0.1; it must lie between 0 and 10.',
+        ),
+        ({'max_tool_speed': float('nan')}, 'Parameter max_tool_speed is nan; it must lie between'),
+        ({'max_points': 2.0}, 'Parameter max_points is 2.0, but it is a whole number.'),
+        ({'headless_mode': 1}, 'Parameter headless_mode is 1, but it is true or false.'),
+        (
+            {'reverse_port': 65536},
+            'Parameter reverse_port is 65536; it must lie between 0 and 65535.',
+        ),
+        ({'robot_loop': 'fork'}, "Parameter robot_loop is 'fork'; it is one of process, thread."),
+        (
+            {'on_new_goal': 'queue'},
+            "Parameter on_new_goal is 'queue'; it is one of preempt, reject",
+        ),
+        (
+            {'static_frames': ['table']},
+            'Parameter static_frames: "table" has 1 words instead of 9',
+        ),
+        (
+            {'keepalive_period': 0.15},
+            'Parameter robot_receive_timeout is 0.2 s, it has to be at least '
+            'twice the keepalive_period',
+        ),
+    ],
+)
 def test_bad_values_give_one_sentence(declared, values, sentence):
     with pytest.raises(ParameterError, match='^' + re.escape(sentence)) as error:
         declared(values)

@@ -16,7 +16,10 @@ from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 pytestmark = pytest.mark.slow
 SUCCEEDED, ABORTED, CANCELED = (
-    GoalStatus.STATUS_SUCCEEDED, GoalStatus.STATUS_ABORTED, GoalStatus.STATUS_CANCELED)
+    GoalStatus.STATUS_SUCCEEDED,
+    GoalStatus.STATUS_ABORTED,
+    GoalStatus.STATUS_CANCELED,
+)
 #: Behind the flange of the simulated arm.
 NOZZLE = 'nozzle tool0 0.0 0.0 0.1 0 0 0 1'
 #: A stop that takes seconds, so that things can happen in it [rad/s^2].
@@ -26,8 +29,9 @@ GENTLY = 0.12
 @pytest.fixture
 def sim():
     """Return a robot with the cycle of a CB3, which costs less."""
-    with SimulatedRobot(SimulatorConfig(rtde_port=0, primary_port=0, dashboard_port=0,
-                                        frequency=125.0)) as robot:
+    with SimulatedRobot(
+        SimulatorConfig(rtde_port=0, primary_port=0, dashboard_port=0, frequency=125.0)
+    ) as robot:
         yield robot
 
 
@@ -42,9 +46,12 @@ class Place:
         message = self.cell.goal(**fields)
         for time, *offset in steps:
             x, y, z = (a + b for a, b in zip(self.T_base_tcp.position, offset, strict=True))
-            message.trajectory.points.append(CartesianTrajectoryPoint(
-                time_from_start=duration_message(time),
-                pose=pose_message(Pose((x, y, z), self.T_base_tcp.quaternion))))
+            message.trajectory.points.append(
+                CartesianTrajectoryPoint(
+                    time_from_start=duration_message(time),
+                    pose=pose_message(Pose((x, y, z), self.T_base_tcp.quaternion)),
+                )
+            )
         return message
 
     def far(self):
@@ -53,8 +60,12 @@ class Place:
 
     def is_near(self, *offset):
         """Tell whether the tool is beside this place by so much."""
-        return all(abs(there - here - d) < 5e-4 for there, here, d in zip(
-            self.cell.T_base_tcp.position, self.T_base_tcp.position, offset, strict=True))
+        return all(
+            abs(there - here - d) < 5e-4
+            for there, here, d in zip(
+                self.cell.T_base_tcp.position, self.T_base_tcp.position, offset, strict=True
+            )
+        )
 
 
 def leading_speed(cell):
@@ -88,7 +99,8 @@ def test_a_newer_goal_takes_the_place_of_the_running_one(cell):
     status, result = cell.result(old)
     assert (status, result.error_code) == (ABORTED, ErrorCode.PREEMPTED)
     assert result.error_string == (
-        f'{name(new).capitalize()} took the place of this one (on the way to point 0).')
+        f'{name(new).capitalize()} took the place of this one (on the way to point 0).'
+    )
     status, result = cell.result(new)
     assert (status, result.error_code) == (SUCCEEDED, 0), result.error_string
     assert place.is_near(0.02, 0.0, 0.0)
@@ -101,9 +113,15 @@ def test_goals_that_do_not_pass_leave_the_running_one_alone(single_cell):
     cell.spin_until(lambda: moving(cell))
     strange = place.goal((1.0, 0.02, 0.0, 0.0))
     strange.trajectory.header.frame_id = 'moon'
-    refused = [cell.send(goal) for goal in (
-        place.goal(), place.goal((0.05, 0.3, 0.0, 0.0)), place.goal((60.0, -5.0, 0.0, 0.0)),
-        strange)]
+    refused = [
+        cell.send(goal)
+        for goal in (
+            place.goal(),
+            place.goal((0.05, 0.3, 0.0, 0.0)),
+            place.goal((60.0, -5.0, 0.0, 0.0)),
+            strange,
+        )
+    ]
     checked = cell.send(place.goal((1.0, 0.0, 0.02, 0.0), validate_only=True))
     assert {status for status, _ in outcomes(cell, refused)} == {ABORTED}
     assert outcomes(cell, [checked]) == [(SUCCEEDED, 0)]
@@ -113,7 +131,7 @@ def test_goals_that_do_not_pass_leave_the_running_one_alone(single_cell):
     speeds = [feedback.desired.twist.linear.y for feedback in cell.feedback]
     top = max(speeds)
     held = [i for i, speed in enumerate(speeds) if speed > 0.9 * top]
-    assert min(speeds[held[0]:held[-1]]) > 0.9 * top
+    assert min(speeds[held[0] : held[-1]]) > 0.9 * top
 
 
 def test_a_paused_robot_is_not_made_ready_by_a_newer_goal(single_cell):
@@ -133,8 +151,10 @@ def test_of_ten_goals_at_once_the_newest_runs(single_cell):
     cell, place = single_cell, Place(single_cell)
     first = cell.send(place.far())
     cell.spin_until(lambda: moving(cell))
-    sent = [cell.client.send_goal_async(place.goal((0.8, 0.0, 0.0, 0.002 * (i + 1))))
-            for i in range(10)]
+    sent = [
+        cell.client.send_goal_async(place.goal((0.8, 0.0, 0.0, 0.002 * (i + 1))))
+        for i in range(10)
+    ]
     cell.spin_until(lambda: all(future.done() for future in sent))
     *old, newest = outcomes(cell, [first, *(future.result() for future in sent)])
     assert old == [(ABORTED, ErrorCode.PREEMPTED)] * 10
@@ -145,33 +165,34 @@ def test_of_ten_goals_at_once_the_newest_runs(single_cell):
 def test_a_goal_that_is_still_planned_makes_way_too(single_cell):
     cell, place = single_cell, Place(single_cell)
     count = 1_500
-    long = cell.send(place.goal(*(
-        (0.05 * (i + 1), 0.0, 0.1 * (i + 1) / count, 0.0) for i in range(count))))
+    long = cell.send(
+        place.goal(*((0.05 * (i + 1), 0.0, 0.1 * (i + 1) / count, 0.0) for i in range(count)))
+    )
     short = cell.send(place.goal((0.5, 0.0, 0.0, 0.01)))
     assert cell.result(short)[0] == SUCCEEDED
     status, result = cell.result(long)
     assert (status, result.error_code) == (ABORTED, ErrorCode.PREEMPTED)
     assert result.error_string == (
-        f'{name(short).capitalize()} took the place of this one before anything moved.')
+        f'{name(short).capitalize()} took the place of this one before anything moved.'
+    )
     assert place.is_near(0.0, 0.0, 0.01)
 
 
 def test_a_goal_takes_the_place_of_another_one_when_its_time_has_come(single_cell):
     cell, place = single_cell, Place(single_cell)
     later = place.goal((0.5, 0.0, 0.0, 0.0))
-    later.trajectory.header.stamp = (
-        cell.node.get_clock().now() + Duration(seconds=1.5)).to_msg()
+    later.trajectory.header.stamp = (cell.node.get_clock().now() + Duration(seconds=1.5)).to_msg()
     new = cell.send(later)
     old = cell.send(place.far())
     cell.spin_until(lambda: moving(cell))
     assert outcomes(cell, [old, new]) == [(ABORTED, ErrorCode.PREEMPTED), (SUCCEEDED, 0)]
     assert place.is_near(0.0, 0.0, 0.0)
     assert cell.node.get_clock().now().nanoseconds / 1e9 > (
-        later.trajectory.header.stamp.sec + 1e-9 * later.trajectory.header.stamp.nanosec)
+        later.trajectory.header.stamp.sec + 1e-9 * later.trajectory.header.stamp.nanosec
+    )
 
 
-def test_the_tcp_of_the_old_goal_is_back_before_the_new_one_begins(no_thread_left, sim,
-                                                                   make_cell):
+def test_the_tcp_of_the_old_goal_is_back_before_the_new_one_begins(no_thread_left, sim, make_cell):
     cell = make_cell(sim, static_frames=[NOZZLE])
     cell.wait_ready()
     before = cell.node.driver.state
@@ -224,7 +245,10 @@ def test_whatever_happens_while_the_arm_stops_each_goal_ends_with_its_code(gentl
     old, new = preempting(cell, place)
     newest = cell.send(place.goal((0.6, 0.0, 0.01, 0.0)))
     assert outcomes(cell, [old, new, newest]) == [
-        (ABORTED, ErrorCode.PREEMPTED), (ABORTED, ErrorCode.PREEMPTED), (SUCCEEDED, 0)]
+        (ABORTED, ErrorCode.PREEMPTED),
+        (ABORTED, ErrorCode.PREEMPTED),
+        (SUCCEEDED, 0),
+    ]
 
     cell.feedback.clear()
     old, new = preempting(cell, place)
@@ -281,7 +305,10 @@ def test_a_storm_of_goals_and_cancels_leaves_no_goal_without_its_end(cell):
     assert place.is_near(0.0, 0.0, 0.01)
     assert not moving(cell)
     assert set(ended) <= {
-        (SUCCEEDED, 0), (CANCELED, ErrorCode.CANCELLED), (ABORTED, ErrorCode.PREEMPTED),
-        (ABORTED, ErrorCode.INVALID_GOAL)}
+        (SUCCEEDED, 0),
+        (CANCELED, ErrorCode.CANCELLED),
+        (ABORTED, ErrorCode.PREEMPTED),
+        (ABORTED, ErrorCode.INVALID_GOAL),
+    }
     assert 'ignored' not in log(cell)
     assert cell.node.action_server.idle

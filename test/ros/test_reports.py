@@ -28,13 +28,23 @@ from ur_cartesian_driver.ros.state_publisher import status_message
 
 STAMP = Time(sec=5, nanosec=6)
 NAMES = tuple('abcdef')
-FRAME = FeedbackFrame(frame_id='base', controlled_frame='tool0_controller', T_frame_base=IDENTITY,
-                      joint_names=NAMES)
+FRAME = FeedbackFrame(
+    frame_id='base', controlled_frame='tool0_controller', T_frame_base=IDENTITY, joint_names=NAMES
+)
 PROGRESS = Progress(
-    waypoint=3, fraction=0.25, desired_pose=Pose((0.5, 0.2, 0.3)),
-    desired_twist=(0.1, 0.0, 0.0, 0.0, 0.0, 0.2), actual_pose=Pose((0.4, 0.2, 0.3)),
-    actual_twist=(0.05, 0.0, 0.0, 0.0, 0.0, 0.0), actual_q=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0),
-    time=1.5, time_remaining=6.0, speed_scaling=0.5, points_received=7, buffered=0.125)
+    waypoint=3,
+    fraction=0.25,
+    desired_pose=Pose((0.5, 0.2, 0.3)),
+    desired_twist=(0.1, 0.0, 0.0, 0.0, 0.0, 0.2),
+    actual_pose=Pose((0.4, 0.2, 0.3)),
+    actual_twist=(0.05, 0.0, 0.0, 0.0, 0.0, 0.0),
+    actual_q=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0),
+    time=1.5,
+    time_remaining=6.0,
+    speed_scaling=0.5,
+    points_received=7,
+    buffered=0.125,
+)
 angles = st.floats(-pi, pi)
 
 
@@ -79,10 +89,14 @@ def test_what_nobody_knows_is_nan():
 
 
 def test_accelerations_are_reported_where_the_robot_does():
-    progress = replace(PROGRESS, desired_acceleration=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0),
-                       actual_acceleration=(0.5,) * 6)
-    frame = replace(FRAME, frame_id='base_link',
-                    T_frame_base=Frames().T_base_frame('base_link').inverse())
+    progress = replace(
+        PROGRESS,
+        desired_acceleration=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0),
+        actual_acceleration=(0.5,) * 6,
+    )
+    frame = replace(
+        FRAME, frame_id='base_link', T_frame_base=Frames().T_base_frame('base_link').inverse()
+    )
     message = feedback_message(progress, frame, STAMP)
     assert vector(message.desired.acceleration.linear) == pytest.approx((-1.0, -2.0, 3.0))
     assert vector(message.desired.acceleration.angular) == pytest.approx((-4.0, -5.0, 6.0))
@@ -94,8 +108,9 @@ def test_accelerations_are_reported_where_the_robot_does():
 
 
 def test_feedback_comes_in_the_frame_of_the_goal():
-    frame = replace(FRAME, frame_id='base_link',
-                    T_frame_base=Frames().T_base_frame('base_link').inverse())
+    frame = replace(
+        FRAME, frame_id='base_link', T_frame_base=Frames().T_base_frame('base_link').inverse()
+    )
     message = feedback_message(PROGRESS, frame, STAMP)
     assert vector(message.actual.pose.position) == pytest.approx((-0.4, -0.2, 0.3))
     assert vector(message.actual.twist.linear) == pytest.approx((-0.05, 0.0, 0.0))
@@ -129,16 +144,22 @@ def test_an_endless_duration_is_the_longest_there_is():
 
 
 def test_a_result_carries_code_sentence_and_report():
-    message = result_message(Outcome(
-        code=ErrorCode.UNREACHABLE, text='Too far.', report=('one', 'two')))
+    message = result_message(
+        Outcome(code=ErrorCode.UNREACHABLE, text='Too far.', report=('one', 'two'))
+    )
     assert (message.error_code, message.error_string) == (-7, 'Too far.')
     assert message.report == ['one', 'two']
 
 
-STATE = RobotState(timestamp=1.0, actual_q=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0),
-                   actual_qd=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6), actual_tcp_pose=Pose((1.0, 2.0, 3.0)),
-                   robot_mode=RobotMode.IDLE, safety_mode=SafetyMode.PROTECTIVE_STOP,
-                   speed_scaling=0.75)
+STATE = RobotState(
+    timestamp=1.0,
+    actual_q=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0),
+    actual_qd=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6),
+    actual_tcp_pose=Pose((1.0, 2.0, 3.0)),
+    robot_mode=RobotMode.IDLE,
+    safety_mode=SafetyMode.PROTECTIVE_STOP,
+    speed_scaling=0.75,
+)
 
 
 def test_the_robot_state_becomes_joint_states_and_a_pose():
@@ -154,7 +175,9 @@ def test_the_robot_state_becomes_joint_states_and_a_pose():
 def test_the_status_joins_connection_and_modes():
     message = status_message(
         DriverStatus(state=ConnectionState.STOPPED, message='Unlock it.', robot_model='ur5e'),
-        STATE, STAMP)
+        STATE,
+        STAMP,
+    )
     assert message.state == DriverStatusMessage.STOPPED
     assert message.message == 'Unlock it.'
     assert message.robot_model == 'ur5e'

@@ -31,8 +31,15 @@ UNIT = Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)
 
 @pytest.fixture
 def sim():
-    config = SimulatorConfig(rtde_port=0, primary_port=0, dashboard_port=0, frequency=125.0,
-                             unlock_delay=0.2, power_on_time=0.3, brake_release_time=0.1)
+    config = SimulatorConfig(
+        rtde_port=0,
+        primary_port=0,
+        dashboard_port=0,
+        frequency=125.0,
+        unlock_delay=0.2,
+        power_on_time=0.3,
+        brake_release_time=0.1,
+    )
     with SimulatedRobot(config) as robot:
         yield robot
 
@@ -46,9 +53,20 @@ class Desk:
 
     def send(self, name, request=None):
         request = request or Trigger.Request()
-        kind = next(kind for kind in (Trigger, Load, Popup, RawRequest, SetIO, SetPayload,
-                                      SetSpeedSliderFraction, SetTCP)
-                    if isinstance(request, kind.Request))
+        kind = next(
+            kind
+            for kind in (
+                Trigger,
+                Load,
+                Popup,
+                RawRequest,
+                SetIO,
+                SetPayload,
+                SetSpeedSliderFraction,
+                SetTCP,
+            )
+            if isinstance(request, kind.Request)
+        )
         if name not in self._clients:
             client = self.cell.client_node.create_client(kind, f'/ur_cartesian_driver/{name}')
             self.cell.spin_until(client.service_is_ready)
@@ -61,15 +79,18 @@ class Desk:
 
 def test_every_service_does_what_it_says(cell):
     call, sim = Desk(cell), cell.sim
-    assert call('set_tcp', SetTCP.Request(tcp=Pose(
-        position=Point(z=0.1), orientation=UNIT))).success
+    assert call(
+        'set_tcp', SetTCP.Request(tcp=Pose(position=Point(z=0.1), orientation=UNIT))
+    ).success
     assert sim.state().T_flange_tcp.position == pytest.approx((0.0, 0.0, 0.1))
     assert call('set_payload', SetPayload.Request(mass=0.7)).success
-    assert call('set_io', SetIO.Request(
-        output=SetIO.Request.STANDARD_DIGITAL, pin=1, value=1.0)).success
+    assert call(
+        'set_io', SetIO.Request(output=SetIO.Request.STANDARD_DIGITAL, pin=1, value=1.0)
+    ).success
     assert sim.state().digital_outputs == 2
-    assert call('set_speed_slider', SetSpeedSliderFraction.Request(
-        speed_slider_fraction=0.5)).success
+    assert call(
+        'set_speed_slider', SetSpeedSliderFraction.Request(speed_slider_fraction=0.5)
+    ).success
     assert sim.state().speed_slider == 0.5
     refused = call('set_io', SetIO.Request(output=SetIO.Request.TOOL_DIGITAL, pin=2))
     assert (refused.success, 'pins 0 to 1' in refused.message) == (False, True)
@@ -77,7 +98,8 @@ def test_every_service_does_what_it_says(cell):
     assert call('dashboard/popup', Popup.Request(message='Hello')).success
     assert sim.state().popups == ('Hello',)
     assert call('dashboard/raw_request', RawRequest.Request(query='robotmode')).message == (
-        'Robotmode: RUNNING')
+        'Robotmode: RUNNING'
+    )
     assert not call('dashboard/load_program', Load.Request(filename='nothing.urp')).success
     assert call('dashboard/program_state').message.startswith('PLAYING')
     assert call('dashboard/stop').success
@@ -112,23 +134,34 @@ def test_recover_says_what_it_did_or_what_a_person_must_do(single_cell):
     assert 'release the button' in answer.message
 
 
-@pytest.mark.parametrize(('name', 'request_', 'sentence'), [
-    ('set_tcp', SetTCP.Request(tcp=Pose(position=Point(z=100.0), orientation=UNIT)), 'metres'),
-    ('set_tcp', SetTCP.Request(tcp=Pose(position=Point(z=nan), orientation=UNIT)), 'metres'),
-    ('set_tcp', SetTCP.Request(tcp=Pose(orientation=Quaternion(w=0.0))), 'unit quaternion'),
-    ('set_payload', SetPayload.Request(mass=-1.0), '0 to 100 kg'),
-    ('set_payload', SetPayload.Request(mass=nan), '0 to 100 kg'),
-    ('set_speed_slider', SetSpeedSliderFraction.Request(speed_slider_fraction=50.0), '0 (the arm'),
-    ('set_speed_slider', SetSpeedSliderFraction.Request(speed_slider_fraction=nan), '0 (the arm'),
-    ('set_io', SetIO.Request(output=9), 'output'),
-    ('set_io', SetIO.Request(output=2, pin=2), 'pins 0 to 1'),
-    ('set_io', SetIO.Request(value=0.5), '0 or 1'),
-    ('set_io', SetIO.Request(output=3, value=nan), 'fraction'),
-    ('dashboard/load_program', Load.Request(filename='a\nshutdown'), 'one line'),
-    ('dashboard/popup', Popup.Request(), 'takes a text'),
-    ('dashboard/raw_request', RawRequest.Request(query='a\nb'), 'one line'),
-    ('dashboard/raw_request', RawRequest.Request(query='x' * 100000), 'at most'),
-])
+@pytest.mark.parametrize(
+    ('name', 'request_', 'sentence'),
+    [
+        ('set_tcp', SetTCP.Request(tcp=Pose(position=Point(z=100.0), orientation=UNIT)), 'metres'),
+        ('set_tcp', SetTCP.Request(tcp=Pose(position=Point(z=nan), orientation=UNIT)), 'metres'),
+        ('set_tcp', SetTCP.Request(tcp=Pose(orientation=Quaternion(w=0.0))), 'unit quaternion'),
+        ('set_payload', SetPayload.Request(mass=-1.0), '0 to 100 kg'),
+        ('set_payload', SetPayload.Request(mass=nan), '0 to 100 kg'),
+        (
+            'set_speed_slider',
+            SetSpeedSliderFraction.Request(speed_slider_fraction=50.0),
+            '0 (the arm',
+        ),
+        (
+            'set_speed_slider',
+            SetSpeedSliderFraction.Request(speed_slider_fraction=nan),
+            '0 (the arm',
+        ),
+        ('set_io', SetIO.Request(output=9), 'output'),
+        ('set_io', SetIO.Request(output=2, pin=2), 'pins 0 to 1'),
+        ('set_io', SetIO.Request(value=0.5), '0 or 1'),
+        ('set_io', SetIO.Request(output=3, value=nan), 'fraction'),
+        ('dashboard/load_program', Load.Request(filename='a\nshutdown'), 'one line'),
+        ('dashboard/popup', Popup.Request(), 'takes a text'),
+        ('dashboard/raw_request', RawRequest.Request(query='a\nb'), 'one line'),
+        ('dashboard/raw_request', RawRequest.Request(query='x' * 100000), 'at most'),
+    ],
+)
 def test_nonsense_is_refused_by_a_sentence(name, request_, sentence):
     _, call_of = OTHERS[name]
     with pytest.raises(LocalProtocolError, match=re.escape(sentence)):
@@ -140,7 +173,8 @@ def test_a_goal_that_waits_for_its_time_keeps_its_tcp(single_cell):
     goal = cell.goal((0.4, 0.0, 0.01, 0.0))
     later = cell.client_node.get_clock().now().nanoseconds + 30_000_000_000
     goal.trajectory.header.stamp.sec, goal.trajectory.header.stamp.nanosec = divmod(
-        later, 1_000_000_000)
+        later, 1_000_000_000
+    )
     handle = cell.send(goal)
     answer = call('set_tcp', SetTCP.Request(tcp=Pose(orientation=UNIT)))
     assert not answer.success
@@ -160,7 +194,8 @@ def test_services_of_a_driver_without_a_robot_answer(no_thread_left, sim, make_c
 
 
 def test_a_node_that_is_destroyed_answers_nobody_and_does_not_hang(
-        no_thread_left, sim, executor, make_cell):
+    no_thread_left, sim, executor, make_cell
+):
     cell = make_cell(sim, executor)
     cell.wait_ready()
     call = Desk(cell)

@@ -28,8 +28,9 @@ from ur_cartesian_driver.ros.servo_topics import (
 from ur_cartesian_driver.sim.config import HOME
 
 HERE = Arm(robot_model('ur5e')).forward(HOME)
-STATE = RobotState(timestamp=0.0, actual_q=HOME, target_q=HOME, actual_tcp_pose=HERE,
-                   target_tcp_pose=HERE)
+STATE = RobotState(
+    timestamp=0.0, actual_q=HOME, target_q=HOME, actual_tcp_pose=HERE, target_tcp_pose=HERE
+)
 STAND = Stand.of(STATE)
 NOW = 1_800_000_000_000_000_000
 FRAMES = Frames('', [StaticFrame.parse('camera tool0 0 0 0.1 0 0 0 1')])
@@ -61,8 +62,10 @@ def test_its_age_is_that_of_its_stamp(age, told):
     assert target(message(age=age))[1] == pytest.approx(told, abs=1e-6)
 
 
-@pytest.mark.parametrize(('frame', 'expected'), [
-    ('', IDENTITY), ('camera', HERE @ Pose((0.0, 0.0, 0.1))), ('tool0_controller', HERE)])
+@pytest.mark.parametrize(
+    ('frame', 'expected'),
+    [('', IDENTITY), ('camera', HERE @ Pose((0.0, 0.0, 0.1))), ('tool0_controller', HERE)],
+)
 def test_frames_are_those_of_goals(frame, expected):
     found, _ = target(message(IDENTITY, frame))
     assert found.distance_to(expected) < 1e-12
@@ -114,10 +117,12 @@ FLOATS = st.sampled_from([nan, inf, -inf, 0.0, -0.0, 1.0, -1.0, 1e-320, 1e-9, 0.
 
 
 @settings(max_examples=150, deadline=None, derandomize=True)
-@given(numbers=st.lists(FLOATS, min_size=7, max_size=7),
-       frame=st.sampled_from(['', 'base', 'camera', 'no such frame', 'ä\n\x1b']),
-       sec=st.sampled_from([0, -2**31, 2**31 - 1, NOW // 10**9]),
-       nanosec=st.sampled_from([0, 2**32 - 1, NOW % 10**9]))
+@given(
+    numbers=st.lists(FLOATS, min_size=7, max_size=7),
+    frame=st.sampled_from(['', 'base', 'camera', 'no such frame', 'ä\n\x1b']),
+    sec=st.sampled_from([0, -(2**31), 2**31 - 1, NOW // 10**9]),
+    nanosec=st.sampled_from([0, 2**32 - 1, NOW % 10**9]),
+)
 def test_anything_is_a_pose_within_reach_or_refused_with_a_sentence(numbers, frame, sec, nanosec):
     made = message(Pose(tuple(numbers[:3]), tuple(numbers[3:])), frame)
     made.header.stamp.sec, made.header.stamp.nanosec = sec, nanosec
@@ -136,11 +141,21 @@ def test_anything_is_a_pose_within_reach_or_refused_with_a_sentence(numbers, fra
 
 
 def test_every_figure_of_a_report_has_its_field_in_the_message():
-    numbers = {field.name: k for k, field in enumerate(fields(ServoReport))
-               if field.name not in ('activity', 'timestamp', 'joint_error', 'buffered')}
+    numbers = {
+        field.name: k
+        for k, field in enumerate(fields(ServoReport))
+        if field.name not in ('activity', 'timestamp', 'joint_error', 'buffered')
+    }
     message = servo_state_message(
-        ServoReport(timestamp=1.0, activity=ServoActivity.SERVOING, buffered=0.25,
-                    joint_error=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6), **numbers), Time(sec=7))
+        ServoReport(
+            timestamp=1.0,
+            activity=ServoActivity.SERVOING,
+            buffered=0.25,
+            joint_error=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6),
+            **numbers,
+        ),
+        Time(sec=7),
+    )
     assert {name: getattr(message, name) for name in numbers} == numbers
     assert message.state == message.SERVOING
     assert message.buffered == Duration(nanosec=250_000_000)

@@ -42,7 +42,9 @@ def three(vector):
 def test_a_push_from_below_is_felt_along_the_tool():
     message = wrench_message(
         state(actual_tcp_pose=DOWN, actual_tcp_wrench=(0.0, 0.0, 10.0, 0.0, 2.0, 0.0)),
-        'tool0_controller', STAMP)
+        'tool0_controller',
+        STAMP,
+    )
     assert message.header.frame_id == 'tool0_controller'
     assert message.header.stamp == STAMP
     assert three(message.wrench.force) == pytest.approx((0.0, 0.0, -10.0))
@@ -53,8 +55,10 @@ def test_a_push_from_below_is_felt_along_the_tool():
 def test_a_wrench_turned_back_is_what_the_robot_reported(rotation, wrench):
     pose = Pose((0.0, 0.0, 0.0), quaternion_from_rotation_vector(rotation))
     message = wrench_message(state(actual_tcp_pose=pose, actual_tcp_wrench=wrench), 'tcp', STAMP)
-    back = (*rotate(pose.quaternion, three(message.wrench.force)),
-            *rotate(pose.quaternion, three(message.wrench.torque)))
+    back = (
+        *rotate(pose.quaternion, three(message.wrench.force)),
+        *rotate(pose.quaternion, three(message.wrench.torque)),
+    )
     assert back == pytest.approx(wrench, abs=1e-9)
 
 
@@ -87,22 +91,43 @@ def test_old_software_reports_what_it_has():
 
 @pytest.mark.parametrize('bit', range(18))
 def test_every_digital_channel_has_its_place(bit):
-    message = io_states_message(signals(values(
-        actual_digital_input_bits=1 << bit, actual_digital_output_bits=(1 << 18) - 1 - (1 << bit),
-    )), STAMP)
-    inputs = [*message.standard_digital_inputs, *message.configurable_digital_inputs,
-              *message.tool_digital_inputs]
-    outputs = [*message.standard_digital_outputs, *message.configurable_digital_outputs,
-               *message.tool_digital_outputs]
+    message = io_states_message(
+        signals(
+            values(
+                actual_digital_input_bits=1 << bit,
+                actual_digital_output_bits=(1 << 18) - 1 - (1 << bit),
+            )
+        ),
+        STAMP,
+    )
+    inputs = [
+        *message.standard_digital_inputs,
+        *message.configurable_digital_inputs,
+        *message.tool_digital_inputs,
+    ]
+    outputs = [
+        *message.standard_digital_outputs,
+        *message.configurable_digital_outputs,
+        *message.tool_digital_outputs,
+    ]
     assert inputs == [i == bit for i in range(18)]
     assert outputs == [i != bit for i in range(18)]
 
 
 @pytest.mark.parametrize('types', range(16))
 def test_every_analog_channel_has_its_domain(types):
-    message = io_states_message(signals(values(
-        analog_io_types=types, standard_analog_input0=1.0, standard_analog_input1=2.0,
-        standard_analog_output0=3.0, standard_analog_output1=4.0)), STAMP)
+    message = io_states_message(
+        signals(
+            values(
+                analog_io_types=types,
+                standard_analog_input0=1.0,
+                standard_analog_input1=2.0,
+                standard_analog_output0=3.0,
+                standard_analog_output1=4.0,
+            )
+        ),
+        STAMP,
+    )
     domains = [*message.analog_input_domains, *message.analog_output_domains]
     assert domains == [types >> i & 1 for i in range(4)]
     assert [*message.analog_inputs, *message.analog_outputs] == [1.0, 2.0, 3.0, 4.0]
@@ -110,16 +135,24 @@ def test_every_analog_channel_has_its_domain(types):
 
 
 def test_tool_data_say_what_is_not_known():
-    message = tool_data_message(signals(values(
-        tool_analog_input_types=2, tool_output_voltage=24, tool_output_current=0.3,
-        tool_temperature=31.5, tool_mode=253)), STAMP)
+    message = tool_data_message(
+        signals(
+            values(
+                tool_analog_input_types=2,
+                tool_output_voltage=24,
+                tool_output_current=0.3,
+                tool_temperature=31.5,
+                tool_mode=253,
+            )
+        ),
+        STAMP,
+    )
     assert list(message.analog_input_domains) == [ToolData.CURRENT, ToolData.VOLTAGE]
     assert (message.output_voltage, message.output_current) == (24, 0.3)
     assert (message.temperature, message.mode) == (31.5, 253)
     assert isnan(message.payload)
     assert isnan(message.payload_center_of_gravity.x)
-    known = tool_data_message(
-        signals(values(payload=1.5, payload_cog=(0.0, 0.0, 0.1))), STAMP)
+    known = tool_data_message(signals(values(payload=1.5, payload_cog=(0.0, 0.0, 0.1))), STAMP)
     assert (known.payload, known.payload_center_of_gravity.z) == (1.5, 0.1)
 
 

@@ -58,7 +58,7 @@ def test_an_unknown_frame_is_looked_up_from_the_base(prefix, base):
     T = made.T_base_frame('camera')
     assert T.apply((1.0, 0.0, 0.0)) == pytest.approx((0.1, 1.2, 0.3), abs=1e-6)
     assert sum(x * x for x in T.quaternion) == pytest.approx(1.0, abs=1e-12)
-    (target, source, at, timeout), = buffer.asked
+    ((target, source, at, timeout),) = buffer.asked
     assert (target, source, at) == (base, 'camera', 0)
     assert timeout == Duration(seconds=transforms.PATIENCE)
 
@@ -80,9 +80,13 @@ def test_frames_that_the_driver_knows_are_not_asked_for():
 
 def test_a_missing_transform_refuses_with_name_reason_and_remedy():
     made, _ = frames()
-    with pytest.raises(InvalidGoal, match=(
+    with pytest.raises(
+        InvalidGoal,
+        match=(
             r'header\.frame_id is "moon", and tf2 has no transform from it to "base" '
-            r'\("moon" passed .* does not exist\); .*static_frames')):
+            r'\("moon" passed .* does not exist\); .*static_frames'
+        ),
+    ):
         made.T_base_frame('moon')
     with pytest.raises(InvalidGoal, match=r'controlled_frame is "moon", and tf2 has no transform'):
         made.T_flange_frame('moon', STAND)
@@ -98,9 +102,13 @@ def test_a_stamp_beyond_what_was_published_refuses():
 def test_the_newest_transform_may_not_be_too_old(age, stale):
     made, _ = frames(camera=NOW - round(age * 1e9))
     if stale:
-        with pytest.raises(InvalidGoal, match=(
+        with pytest.raises(
+            InvalidGoal,
+            match=(
                 r'"camera", and its newest transform to "base" is 1\.100 s old, tf_max_age is '
-                r'1 s')):
+                r'1 s'
+            ),
+        ):
             made.T_base_frame('camera')
     else:
         made.T_base_frame('camera')
@@ -120,8 +128,9 @@ def test_a_tool_is_fixed_to_the_flange_by_static_transforms():
 
 def test_a_frame_that_moves_against_the_flange_cannot_be_controlled():
     made, _ = frames(camera=NOW)
-    with pytest.raises(InvalidGoal, match=(
-            r'controlled_frame is "camera", which is not fixed to "tool0".*static')):
+    with pytest.raises(
+        InvalidGoal, match=(r'controlled_frame is "camera", which is not fixed to "tool0".*static')
+    ):
         made.T_flange_frame('camera', STAND)
 
 

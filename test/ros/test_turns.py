@@ -135,8 +135,9 @@ def test_one_goal_at_a_time_has_the_arm_and_the_newest_the_last(turns, seed):
         asked[goal] = event
         turns.line_up(goal.turn)
         goals.append(goal)
-    threads = [threading.Thread(target=run, args=(goal,))
-               for goal in random.sample(goals, len(goals))]
+    threads = [
+        threading.Thread(target=run, args=(goal,)) for goal in random.sample(goals, len(goals))
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:

@@ -38,15 +38,26 @@ class Cell:
         rclpy.init(args=[], context=self.context)
         stack.callback(rclpy.shutdown, context=self.context)
         self.executor = SingleThreadedExecutor(context=self.context)
-        self.sims = {name: stack.enter_context(SimulatedRobot(SimulatorConfig(
-            model=model, frequency=125.0, rtde_port=0, primary_port=0, dashboard_port=0)))
-            for name, model in zip(names, models, strict=True)}
+        self.sims = {
+            name: stack.enter_context(
+                SimulatedRobot(
+                    SimulatorConfig(
+                        model=model, frequency=125.0, rtde_port=0, primary_port=0, dashboard_port=0
+                    )
+                )
+            )
+            for name, model in zip(names, models, strict=True)
+        }
         self.nodes = {
             name: CartesianDriverNode(
-                namespace=name, context=self.context, parameter_overrides=parameters_for(
-                    sim, ur_type=sim.config.model, tf_prefix=f'{name}_',
-                    robot_receive_timeout=1.0))
-            for name, sim in self.sims.items()}
+                namespace=name,
+                context=self.context,
+                parameter_overrides=parameters_for(
+                    sim, ur_type=sim.config.model, tf_prefix=f'{name}_', robot_receive_timeout=1.0
+                ),
+            )
+            for name, sim in self.sims.items()
+        }
         self.client = rclpy.create_node('client', context=self.context)
         for node in (*self.nodes.values(), self.client):
             stack.callback(node.destroy_node)
@@ -77,33 +88,45 @@ def goal_along_y(sim, name, distance):
     x, y, z = state.T_base_tcp.position
     goal = FollowCartesianTrajectory.Goal()
     goal.trajectory.header.frame_id = f'{name}_base'
-    goal.trajectory.points.append(CartesianTrajectoryPoint(
-        time_from_start=duration_message(1.0),
-        pose=pose_message(Pose((x, y + distance, z), state.T_base_tcp.quaternion))))
+    goal.trajectory.points.append(
+        CartesianTrajectoryPoint(
+            time_from_start=duration_message(1.0),
+            pose=pose_message(Pose((x, y + distance, z), state.T_base_tcp.quaternion)),
+        )
+    )
     return goal
 
 
 @pytest.mark.slow
 def test_two_arms_follow_their_own_goals_at_the_same_time(cell):
-    clients = {name: ActionClient(
-        cell.client, FollowCartesianTrajectory,
-        f'/{name}/ur_cartesian_driver/follow_cartesian_trajectory') for name in WAYS}
+    clients = {
+        name: ActionClient(
+            cell.client,
+            FollowCartesianTrajectory,
+            f'/{name}/ur_cartesian_driver/follow_cartesian_trajectory',
+        )
+        for name in WAYS
+    }
     before = {name: sim.state().T_base_tcp.position for name, sim in cell.sims.items()}
     for client in clients.values():
         cell.spin_until(client.server_is_ready)
-    requests = {name: clients[name].send_goal_async(goal_along_y(cell.sims[name], name, way))
-                for name, way in WAYS.items()}
+    requests = {
+        name: clients[name].send_goal_async(goal_along_y(cell.sims[name], name, way))
+        for name, way in WAYS.items()
+    }
     cell.spin_until(lambda: all(request.done() for request in requests.values()))
     results = {name: request.result().get_result_async() for name, request in requests.items()}
-    cell.spin_until(lambda: all(max(map(abs, sim.state().qd)) > 0.01
-                                for sim in cell.sims.values()))
+    cell.spin_until(
+        lambda: all(max(map(abs, sim.state().qd)) > 0.01 for sim in cell.sims.values())
+    )
     cell.spin_until(lambda: all(result.done() for result in results.values()))
     for name, way in WAYS.items():
         response = results[name].result()
         assert response.status == GoalStatus.STATUS_SUCCEEDED, response.result.error_string
         x, y, z = before[name]
         assert cell.sims[name].state().T_base_tcp.position == pytest.approx(
-            (x, y + way, z), abs=1e-4)
+            (x, y + way, z), abs=1e-4
+        )
     for client in clients.values():
         client.destroy()
     check_names(cell)
@@ -111,10 +134,24 @@ def test_two_arms_follow_their_own_goals_at_the_same_time(cell):
 
 def check_names(cell):
     """No name of one driver is a name of the other, and a service reaches one robot only."""
-    topics = {name: {topic for topic, _ in cell.client.get_publisher_names_and_types_by_node(
-        'ur_cartesian_driver', f'/{name}')} for name in WAYS}
-    services = {name: {service for service, _ in cell.client.get_service_names_and_types_by_node(
-        'ur_cartesian_driver', f'/{name}')} for name in WAYS}
+    topics = {
+        name: {
+            topic
+            for topic, _ in cell.client.get_publisher_names_and_types_by_node(
+                'ur_cartesian_driver', f'/{name}'
+            )
+        }
+        for name in WAYS
+    }
+    services = {
+        name: {
+            service
+            for service, _ in cell.client.get_service_names_and_types_by_node(
+                'ur_cartesian_driver', f'/{name}'
+            )
+        }
+        for name in WAYS
+    }
     assert topics['left'] & topics['right'] <= SHARED
     assert not services['left'] & services['right']
     for name in WAYS:
@@ -122,12 +159,17 @@ def check_names(cell):
     joints = {}
     for name in WAYS:
         cell.client.create_subscription(
-            JointState, f'/{name}/joint_states',
-            lambda message, name=name: joints.update({name: message.name}), STATE)
+            JointState,
+            f'/{name}/joint_states',
+            lambda message, name=name: joints.update({name: message.name}),
+            STATE,
+        )
     cell.spin_until(lambda: len(joints) == 2)
     assert not set(joints['left']) & set(joints['right'])
-    frames = [{node.action_server._frames.base, node.action_server._frames.tcp}
-              for node in cell.nodes.values()]
+    frames = [
+        {node.action_server._frames.base, node.action_server._frames.tcp}
+        for node in cell.nodes.values()
+    ]
     assert not frames[0] & frames[1]
     ports = [set(node.driver.status.ports.values()) for node in cell.nodes.values()]
     assert not ports[0] & ports[1]
@@ -163,9 +205,11 @@ def test_a_second_driver_of_the_same_name_is_told(no_thread_left, capfd):
 
 
 def test_a_goal_file_is_used_for_an_arm_with_a_prefix():
-    text = '{trajectory: {header: {frame_id: base}, controlled_frame: tool0, points: [{posture: ' \
-           '{posture_joint_names: [elbow_joint]}}]}, segments: [{via_posture: ' \
-           '{posture_joint_names: [elbow_joint]}}]}'
+    text = (
+        '{trajectory: {header: {frame_id: base}, controlled_frame: tool0, points: [{posture: '
+        '{posture_joint_names: [elbow_joint]}}]}, segments: [{via_posture: '
+        '{posture_joint_names: [elbow_joint]}}]}'
+    )
     goal = with_prefix(load_goal(text), 'left_')
     assert goal.trajectory.header.frame_id == 'left_base'
     assert goal.trajectory.controlled_frame == 'left_tool0'

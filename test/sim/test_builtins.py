@@ -131,12 +131,14 @@ def rotation(function, numbers):
     """Return what a result turns by, however it is written."""
     if function == 'rotvec2rpy':
         from ur_cartesian_driver.sim.builtins.poses import PoseBuiltins
+
         numbers = PoseBuiltins().rpy2rotvec(list(numbers))
     return Pose((0.0, 0.0, 0.0), quaternion_from_rotation_vector(tuple(numbers[-3:])))
 
 
-@pytest.mark.parametrize('case', GOLDEN['random_cases'] + GOLDEN['manual_cases'],
-                         ids=lambda case: case['function'])
+@pytest.mark.parametrize(
+    'case', GOLDEN['random_cases'] + GOLDEN['manual_cases'], ids=lambda case: case['function']
+)
 def test_pose_arithmetic_agrees_with_independent_values(bench, case):
     function, expected = case['function'], case['expected']
     arguments = [value(function, i, item) for i, item in enumerate(case['args'])]

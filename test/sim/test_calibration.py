@@ -27,20 +27,27 @@ MEASURED = (
     (-0.42517, 0.0, 0.0, 1.4e-3, -4.3e-4, 4.6e-6),
     (-0.39265, -4e-4, 0.13311, 3e-3, -1.2e-3, -2.6e-6),
     (-7e-6, -0.0996, -3e-7, 1.5708, 0.0, 1.3e-6),
-    (1.4e-5, 0.09958, 9.5e-5, 1.57175, pi, 3.1415925))
+    (1.4e-5, 0.09958, 9.5e-5, 1.57175, pi, 3.1415925),
+)
 NOMINAL = (
     (0.0, 0.0, 0.1625, 0.0, 0.0, 0.0),
     (0.0, 0.0, 0.0, 1.570796327, 0.0, 0.0),
     (-0.425, 0.0, 0.0, 0.0, 0.0, 0.0),
     (-0.3922, 0.0, 0.1333, 0.0, 0.0, 0.0),
     (0.0, -0.0997, -2e-11, 1.570796327, 0.0, 0.0),
-    (0.0, 0.0996, -2e-11, 1.570796327, pi, pi))
+    (0.0, 0.0996, -2e-11, 1.570796327, pi, pi),
+)
 JOINTS = np.random.default_rng(0).uniform(-3.0, 3.0, (50, 6))
 
 
 def content(rows):
-    return {'kinematics': {name: dict(zip(FIELDS, row, strict=True))
-                           for name, row in zip(NAMES, rows, strict=True)} | {'hash': 'calib_1'}}
+    return {
+        'kinematics': {
+            name: dict(zip(FIELDS, row, strict=True))
+            for name, row in zip(NAMES, rows, strict=True)
+        }
+        | {'hash': 'calib_1'}
+    }
 
 
 @pytest.fixture
@@ -49,14 +56,19 @@ def file(tmp_path):
         path = tmp_path / 'calibration.yaml'
         path.write_text(yaml.safe_dump(content(rows)))
         return path
+
     return write
 
 
 def turn(axis, angle):
     c, s = np.cos(angle), np.sin(angle)
-    return np.array({'x': [[1, 0, 0], [0, c, -s], [0, s, c]],
-                     'y': [[c, 0, s], [0, 1, 0], [-s, 0, c]],
-                     'z': [[c, -s, 0], [s, c, 0], [0, 0, 1]]}[axis])
+    return np.array(
+        {
+            'x': [[1, 0, 0], [0, c, -s], [0, s, c]],
+            'y': [[c, 0, s], [0, 1, 0], [-s, 0, c]],
+            'z': [[c, -s, 0], [s, c, 0], [0, 0, 1]],
+        }[axis]
+    )
 
 
 def chain(rows, q):
@@ -105,29 +117,46 @@ def test_the_robot_moves_and_reports_by_its_calibration(make_bench):
         textmsg(point_dist(get_forward_kin(get_inverse_kin(target)), target) < 1e-7)
         textmsg(point_dist(get_target_tcp_pose(), target) < 1e-7)""")
     assert [line for line in log if line in ('True', 'False')] == ['True', 'True']
-    assert Arm(UR5E, geometry).forward(bench.controller.motion.q).distance_to(
-        bench.controller.motion.T_base_tcp) < 1e-9
-    assert Arm(UR5E).forward(bench.controller.motion.q).distance_to(
-        bench.controller.motion.T_base_tcp) > 1e-4
+    assert (
+        Arm(UR5E, geometry)
+        .forward(bench.controller.motion.q)
+        .distance_to(bench.controller.motion.T_base_tcp)
+        < 1e-9
+    )
+    assert (
+        Arm(UR5E)
+        .forward(bench.controller.motion.q)
+        .distance_to(bench.controller.motion.T_base_tcp)
+        > 1e-4
+    )
 
 
 def test_the_primary_interface_reports_the_table():
     geometry = random_calibration(UR5E, 4)
     stream = PrimaryStream(Controller(SimulatorConfig(geometry=geometry)))
-    state, = PrimaryDecoder().feed(stream.state())
-    info, = (package for package in state.packages if isinstance(package, KinematicsInfo))
+    (state,) = PrimaryDecoder().feed(stream.state())
+    (info,) = (package for package in state.packages if isinstance(package, KinematicsInfo))
     assert (info.theta, info.a, info.d, info.alpha) == (
-        geometry.theta, geometry.a, geometry.d, geometry.alpha)
+        geometry.theta,
+        geometry.a,
+        geometry.d,
+        geometry.alpha,
+    )
 
 
-@pytest.mark.parametrize(('text', 'words'), [
-    ('kinematics: [', 'is not YAML'),
-    ('shoulder: 1', 'no mapping `kinematics`'),
-    ('kinematics: {shoulder: {x: 0}}', 'kinematics.shoulder.y'),
-    (yaml.safe_dump(content(((0.0, 0.0, 0.1, 0.0, 0.0, 'much'), *MEASURED[1:]))),
-     "'much' as kinematics.shoulder.yaw"),
-    (yaml.safe_dump(content(((0.01, *MEASURED[0][1:]), *MEASURED[1:]))), 'off the axis'),
-])
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('kinematics: [', 'is not YAML'),
+        ('shoulder: 1', 'no mapping `kinematics`'),
+        ('kinematics: {shoulder: {x: 0}}', 'kinematics.shoulder.y'),
+        (
+            yaml.safe_dump(content(((0.0, 0.0, 0.1, 0.0, 0.0, 'much'), *MEASURED[1:]))),
+            "'much' as kinematics.shoulder.yaw",
+        ),
+        (yaml.safe_dump(content(((0.01, *MEASURED[0][1:]), *MEASURED[1:]))), 'off the axis'),
+    ],
+)
 def test_what_is_wrong_with_a_file_is_named(tmp_path, text, words):
     path = tmp_path / 'bad.yaml'
     path.write_text(text)

@@ -52,8 +52,10 @@ def until(happened: Callable[[], bool]) -> None:
 
 
 def test_real_time_packets_come_once_per_cycle_and_say_what_the_robot_does(robot):
-    robot.run_script('def p():\n  set_standard_digital_out(3, True)\n'
-                     '  speedj([0.2, 0, 0, 0, 0, 0], 5, 10)\nend\n')
+    robot.run_script(
+        'def p():\n  set_standard_digital_out(3, True)\n'
+        '  speedj([0.2, 0, 0, 0, 0, 0], 5, 10)\nend\n'
+    )
     until(lambda: robot.state().qd[0] > 0.19)
     read = packets(robot, 40)
     assert [b.time - a.time for a, b in itertools.pairwise(read)] == pytest.approx([0.002] * 39)
@@ -70,15 +72,19 @@ def test_real_time_packets_come_once_per_cycle_and_say_what_the_robot_does(robot
     assert last.joint_modes == (253.0,) * 6
 
 
-@pytest.mark.parametrize(('settings', 'size'), [
-    ({}, 1220), ({'polyscope': '5.4'}, 1116), ({'model': 'ur5', 'polyscope': '3.5'}, 1108)])
+@pytest.mark.parametrize(
+    ('settings', 'size'),
+    [({}, 1220), ({'polyscope': '5.4'}, 1116), ({'model': 'ur5', 'polyscope': '3.5'}, 1108)],
+)
 def test_a_real_time_packet_is_as_long_as_the_software_makes_it(settings, size):
-    with SimulatedRobot(SimulatorConfig(**FREE, **settings)) as robot, \
-            client(robot, 'realtime') as connection:
+    with (
+        SimulatedRobot(SimulatorConfig(**FREE, **settings)) as robot,
+        client(robot, 'realtime') as connection,
+    ):
         data = b''
         while len(data) < 2 * size:
             data += connection.recv(2 * size - len(data))
-    assert data[:4] == data[size:size + 4] == size.to_bytes(4, 'big')
+    assert data[:4] == data[size : size + 4] == size.to_bytes(4, 'big')
 
 
 def test_the_secondary_interface_sends_version_and_states_but_no_messages(robot):
@@ -96,8 +102,12 @@ def test_the_secondary_interface_sends_version_and_states_but_no_messages(robot)
 def test_programs_and_control_lines_are_taken(robot, interface):
     with client(robot, interface) as connection:
         connection.sendall(b'def spin():\n  while True:\n    sync()\n  end\nend\n')
-        until(lambda: robot.state().program == 'spin'
-              and robot.state().runtime_state is RuntimeState.PLAYING)
+        until(
+            lambda: (
+                robot.state().program == 'spin'
+                and robot.state().runtime_state is RuntimeState.PLAYING
+            )
+        )
         connection.sendall(b'set speed 0.5\n')
         until(lambda: robot.state().speed_slider == 0.5)
         connection.sendall(b'stop program\n')
@@ -112,8 +122,10 @@ def test_programs_and_control_lines_are_taken(robot, interface):
 
 @pytest.mark.parametrize('interface', INTERFACES)
 def test_local_control_makes_the_interface_read_only(interface):
-    with SimulatedRobot(SimulatorConfig(**FREE, remote_control=False, rate=20.0)) as robot, \
-            client(robot, interface) as connection:
+    with (
+        SimulatedRobot(SimulatorConfig(**FREE, remote_control=False, rate=20.0)) as robot,
+        client(robot, interface) as connection,
+    ):
         connection.sendall(b'set speed 0.5\n')
         until(lambda: any('C210' in line for line in robot.state().messages))
         assert robot.state().speed_slider == 1.0
@@ -122,8 +134,10 @@ def test_local_control_makes_the_interface_read_only(interface):
 @pytest.mark.slow
 def test_a_client_that_sends_scripts_and_never_reads_is_not_dropped():
     # As many do who only have something to say.
-    with SimulatedRobot(SimulatorConfig(**FREE, rate=0.0)) as robot, \
-            client(robot, 'realtime') as connection:
+    with (
+        SimulatedRobot(SimulatorConfig(**FREE, rate=0.0)) as robot,
+        client(robot, 'realtime') as connection,
+    ):
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         start = robot.state().timestamp
         until(lambda: robot.state().timestamp > start + 30.0)  # 18 MB
@@ -131,9 +145,16 @@ def test_a_client_that_sends_scripts_and_never_reads_is_not_dropped():
         until(lambda: robot.state().speed_slider == 0.5)
 
 
-@pytest.mark.parametrize(('settings', 'secondary', 'realtime'), [
-    ({}, 30002, 30003), ({'primary_port': 0}, 0, 0), ({'primary_port': 40001}, 0, 0),
-    ({'primary_port': 0, 'secondary_port': 40002}, 40002, 0), ({'realtime_port': 0}, 30002, 0)])
+@pytest.mark.parametrize(
+    ('settings', 'secondary', 'realtime'),
+    [
+        ({}, 30002, 30003),
+        ({'primary_port': 0}, 0, 0),
+        ({'primary_port': 40001}, 0, 0),
+        ({'primary_port': 0, 'secondary_port': 40002}, 40002, 0),
+        ({'realtime_port': 0}, 30002, 0),
+    ],
+)
 def test_a_robot_on_other_ports_does_not_take_the_standard_ones(settings, secondary, realtime):
     config = SimulatorConfig(**settings)
     assert config.listening_secondary_port == secondary

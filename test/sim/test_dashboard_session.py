@@ -63,9 +63,14 @@ class Desk:
 
     def __init__(self, major: int, minor: int, **settings: object) -> None:
         # The fields have types of their own; SimulatorConfig checks the values that tests give.
-        self.controller = Controller(SimulatorConfig(
-            model='ur5' if major < 5 else 'ur5e', polyscope=f'{major}.{minor}',
-            programs={'a.urp': PROGRAM}, **settings))  # type: ignore[arg-type]
+        self.controller = Controller(
+            SimulatorConfig(
+                model='ur5' if major < 5 else 'ur5e',
+                polyscope=f'{major}.{minor}',
+                programs={'a.urp': PROGRAM},
+                **settings,
+            )
+        )  # type: ignore[arg-type]
         self.session = DashboardSession(self.controller)
         self.ask('load a.urp')
 
@@ -86,8 +91,10 @@ def minors(column):
     return [(row[0], row[1], row[column]) for row in TABLE if row[column] is not None]
 
 
-@pytest.mark.parametrize(('major', 'command', 'answer', 'minor'), [
-    *[(3, *row) for row in minors(2)], *[(5, *row) for row in minors(3)]])
+@pytest.mark.parametrize(
+    ('major', 'command', 'answer', 'minor'),
+    [*[(3, *row) for row in minors(2)], *[(5, *row) for row in minors(3)]],
+)
 def test_a_command_is_answered_from_its_version_on(major, command, answer, minor):
     desk = Desk(major, minor)
     if command == 'pause':
@@ -100,9 +107,13 @@ def test_a_command_is_answered_from_its_version_on(major, command, answer, minor
         assert before.startswith(('could not understand: ', 'File not found: installation '))
 
 
-@pytest.mark.parametrize(('major', 'command'), [
-    *[(3, row[0]) for row in TABLE if row[2] is None],
-    *[(5, row[0]) for row in TABLE if row[3] is None]])
+@pytest.mark.parametrize(
+    ('major', 'command'),
+    [
+        *[(3, row[0]) for row in TABLE if row[2] is None],
+        *[(5, row[0]) for row in TABLE if row[3] is None],
+    ],
+)
 def test_a_series_that_never_had_a_command_does_not_understand_it(major, command):
     assert 'could not understand' in Desk(major, 15).ask(command)
 
@@ -113,15 +124,18 @@ def test_the_table_is_complete():
         assert any(command.argument_in(row[0]) is not None for row in TABLE), command.words
 
 
-@pytest.mark.parametrize(('command', 'answer'), [
-    ('load b.urp', 'File not found: b.urp'),
-    ('load installation other.installation', 'File not found: other.installation'),
-    ('pause', 'Failed to execute: pause'),
-    ('set operational mode dancing', 'could not understand: "set operational mode dancing"'),
-    ('Play', 'could not understand: "Play"'),
-    ('play now', 'could not understand: "play now"'),
-    ('', 'could not understand: ""'),
-])
+@pytest.mark.parametrize(
+    ('command', 'answer'),
+    [
+        ('load b.urp', 'File not found: b.urp'),
+        ('load installation other.installation', 'File not found: other.installation'),
+        ('pause', 'Failed to execute: pause'),
+        ('set operational mode dancing', 'could not understand: "set operational mode dancing"'),
+        ('Play', 'could not understand: "Play"'),
+        ('play now', 'could not understand: "play now"'),
+        ('', 'could not understand: ""'),
+    ],
+)
 def test_what_cannot_be_done_is_said(command, answer):
     assert Desk(5, 21).ask(command) == answer
 
@@ -144,8 +158,12 @@ def test_what_clients_poll_for_comes_true():
     desk.ask('brake release')
     desk.wait(1.0)
     assert desk.ask('robotmode') == 'Robotmode: RUNNING'
-    for command, state in [('play', 'PLAYING'), ('pause', 'PAUSED'), ('play', 'PLAYING'),
-                           ('stop', 'STOPPED')]:
+    for command, state in [
+        ('play', 'PLAYING'),
+        ('pause', 'PAUSED'),
+        ('play', 'PLAYING'),
+        ('stop', 'STOPPED'),
+    ]:
         desk.ask(command)
         desk.wait(0.1)
         assert desk.ask('programState') == f'{state} a.urp'

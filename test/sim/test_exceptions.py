@@ -9,45 +9,76 @@ from ur_cartesian_driver.protocol.primary import (
     RuntimeExceptionMessage,
 )
 
-TOO_MUCH = ('The program used too much time without instructing the robot what to do. Consider '
-            'using a Wait or sync() in the loop.')
-UNREACHABLE = ('The robot cannot reach the requested pose. Script function movej is unable to '
-               'find an inverse kinematics solution.')
+TOO_MUCH = (
+    'The program used too much time without instructing the robot what to do. Consider '
+    'using a Wait or sync() in the loop.'
+)
+UNREACHABLE = (
+    'The robot cannot reach the requested pose. Script function movej is unable to '
+    'find an inverse kinematics solution.'
+)
 OWNED = 'Another thread is already controlling the robot.'
 
 COMPILE_ERRORS = {
     'an unknown function': (
         'def illegal_fun():\n  calldoesntexist()\nend\n',
-        2, 3, 'compile_error_name_not_found:calldoesntexist:'),
+        2,
+        3,
+        'compile_error_name_not_found:calldoesntexist:',
+    ),
     'an unknown variable': (
         'def f():\n  a = 1\n  textmsg(a + missing)\nend\n',
-        3, 15, 'compile_error_name_not_found:missing:'),
-    'a syntax error': (
-        'def f():\n  a = = 1\nend\n', 2, 7, 'syntax_error_on_line:2:  a = = 1:'),
+        3,
+        15,
+        'compile_error_name_not_found:missing:',
+    ),
+    'a syntax error': ('def f():\n  a = = 1\nend\n', 2, 7, 'syntax_error_on_line:2:  a = = 1:'),
     'a missing colon': (
         'def f():\n  while True\n    sync()\n  end\nend\n',
-        3, 5, 'syntax_error_on_line:3:    sync():'),
+        3,
+        5,
+        'syntax_error_on_line:3:    sync():',
+    ),
     'a secondary program': (
-        'sec f():\n  nothing()\nend\n', 2, 3, 'compile_error_name_not_found:nothing:'),
+        'sec f():\n  nothing()\nend\n',
+        2,
+        3,
+        'compile_error_name_not_found:nothing:',
+    ),
 }
 
 RUNTIME_EXCEPTIONS = {
     'an unreachable pose': (
         'def f():\n  movej(p[10, 0, 0, 0, 0, 0])\nend\n',
-        2, 3, f'Runtime error (2:3): {UNREACHABLE}'),
+        2,
+        3,
+        f'Runtime error (2:3): {UNREACHABLE}',
+    ),
     'a second thread that moves': (
         'def f():\n  thread t():\n    stopj(2)\n  end\n  thread m():\n'
         '    movej([1, -1, 1, 0, 0, 0])\n  end\n  run m()\n  sync()\n  run t()\n  sync()\nend\n',
-        3, 5, f'Runtime error (3:5): {OWNED}'),
+        3,
+        5,
+        f'Runtime error (3:5): {OWNED}',
+    ),
     'a loop that never waits': (
         'def f():\n  while True:\n    a = 1\n  end\nend\n',
-        3, 5, f'Runtime error (3:5): {TOO_MUCH}'),
+        3,
+        5,
+        f'Runtime error (3:5): {TOO_MUCH}',
+    ),
     'a domain error inside an expression': (
         'def f():\n  a = 1 + sqrt(-4)\nend\n',
-        2, 11, 'Runtime error (2:11): Domain error: sqrt is defined from 0 on, got -4'),
+        2,
+        11,
+        'Runtime error (2:11): Domain error: sqrt is defined from 0 on, got -4',
+    ),
     'an index inside a function': (
         'def f():\n  def g(l):\n    return l[3]\n  end\n  g([1])\nend\n',
-        3, 13, 'Runtime error (3:13): Index out of range: 3 is not within 0..0'),
+        3,
+        13,
+        'Runtime error (3:13): Index out of range: 3 is not within 0..0',
+    ),
 }
 
 

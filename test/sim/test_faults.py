@@ -28,6 +28,7 @@ DOWN = UP.replace('0.2', '-0.2')
 
 # --- When ------------------------------------------------------------------------------------
 
+
 def add(bench, *texts):
     for text in texts:
         bench.controller.faults.add(parse_fault(text))
@@ -92,14 +93,18 @@ def test_cleared_faults_do_not_happen_and_no_longer_last(bench):
 
 # --- Events ----------------------------------------------------------------------------------
 
-@pytest.mark.parametrize(('text', 'safety', 'mode'), [
-    ('protective_stop', SafetyMode.PROTECTIVE_STOP, RobotMode.RUNNING),
-    ('safeguard_stop', SafetyMode.SAFEGUARD_STOP, RobotMode.RUNNING),
-    ('emergency_stop', SafetyMode.ROBOT_EMERGENCY_STOP, RobotMode.POWER_OFF),
-    ('violation', SafetyMode.VIOLATION, RobotMode.POWER_OFF),
-    ('fault', SafetyMode.FAULT, RobotMode.POWER_OFF),
-    ('power_off', SafetyMode.NORMAL, RobotMode.POWER_OFF),
-])
+
+@pytest.mark.parametrize(
+    ('text', 'safety', 'mode'),
+    [
+        ('protective_stop', SafetyMode.PROTECTIVE_STOP, RobotMode.RUNNING),
+        ('safeguard_stop', SafetyMode.SAFEGUARD_STOP, RobotMode.RUNNING),
+        ('emergency_stop', SafetyMode.ROBOT_EMERGENCY_STOP, RobotMode.POWER_OFF),
+        ('violation', SafetyMode.VIOLATION, RobotMode.POWER_OFF),
+        ('fault', SafetyMode.FAULT, RobotMode.POWER_OFF),
+        ('power_off', SafetyMode.NORMAL, RobotMode.POWER_OFF),
+    ],
+)
 def test_a_stop_is_reported(bench, text, safety, mode):
     add(bench, text)
     bench.wait(0.1)
@@ -110,8 +115,11 @@ def test_a_stop_is_reported(bench, text, safety, mode):
 def test_another_client_stops_and_pauses_and_plays(bench):
     bench.start('while True:\nsync()\nend')
     bench.wait(0.1)
-    for text, state in (('pause', RuntimeState.PAUSED), ('play', RuntimeState.PLAYING),
-                        ('stop', RuntimeState.STOPPED)):
+    for text, state in (
+        ('pause', RuntimeState.PAUSED),
+        ('play', RuntimeState.PLAYING),
+        ('stop', RuntimeState.STOPPED),
+    ):
         add(bench, text)
         bench.wait(0.1)
         assert read(bench, 'runtime_state') == state
@@ -154,6 +162,7 @@ def test_a_foreign_motion_takes_the_arm_away_and_replaces_the_program(bench, axi
 
 # --- Actual values ---------------------------------------------------------------------------
 
+
 def read(bench, output):
     return getter(output, 0)(bench.controller)
 
@@ -171,8 +180,10 @@ def error_of(bench, quantity):
     if quantity == 'pose':
         return error_of_pose(bench)
     name = {'twist': 'TCP_speed', 'acceleration': 'TCP_acceleration'}[quantity]
-    return [a - b for a, b in zip(read(bench, f'actual_{name}'), read(bench, f'target_{name}'),
-                                  strict=True)]
+    return [
+        a - b
+        for a, b in zip(read(bench, f'actual_{name}'), read(bench, f'target_{name}'), strict=True)
+    ]
 
 
 @pytest.mark.parametrize('axis', AXES)
@@ -184,7 +195,8 @@ def test_an_offset_shows_on_its_axis_alone_while_the_arm_moves(bench, quantity, 
     assert error_of(bench, quantity) == pytest.approx([0.0] * 6, abs=1e-12)
     bench.wait(0.2)
     assert error_of(bench, quantity) == pytest.approx(
-        [0.003 if other == axis else 0.0 for other in AXES], abs=1e-9)
+        [0.003 if other == axis else 0.0 for other in AXES], abs=1e-9
+    )
     bench.wait(0.2)
     assert error_of(bench, quantity) == pytest.approx([0.0] * 6, abs=1e-12)
 
@@ -201,15 +213,13 @@ def test_the_measured_joints_lead_to_the_measured_pose(make_bench, calibrated):
     from ur_cartesian_driver.kinematics.robots import robot_model
     from ur_cartesian_driver.sim.calibration import random_calibration
 
-    bench = make_bench(
-        geometry=random_calibration(robot_model('ur5e'), 3) if calibrated else None)
+    bench = make_bench(geometry=random_calibration(robot_model('ur5e'), 3) if calibrated else None)
     bench.controller.motion.T_flange_tcp = Pose((0.0, 0.02, 0.1))
     add(bench, 'offset pose x 0.01', 'offset pose rz 0.02')
     bench.step(2)
     motion, q = bench.controller.motion, read(bench, 'actual_q')
     T_base_tcp = bench.controller.arm.forward(q) @ motion.T_flange_tcp
-    assert T_base_tcp.distance_to(
-        Pose.from_rotation_vector(read(bench, 'actual_TCP_pose'))) < 1e-9
+    assert T_base_tcp.distance_to(Pose.from_rotation_vector(read(bench, 'actual_TCP_pose'))) < 1e-9
     assert 0.0 < dist(q, read(bench, 'target_q')) < 0.1
 
 
@@ -239,14 +249,16 @@ def test_programs_measure_the_same(bench):
         q = get_actual_joint_positions()
         textmsg(get_forward_kin(q)[0] - get_target_tcp_pose()[0])""")
     assert [float(line.split()[-1]) for line in log[:4] if line[0].isdigit()] == pytest.approx(
-        [0.01, 0.02, 0.01])
+        [0.01, 0.02, 0.01]
+    )
 
 
 def noisy_packages(seed=0, cycles=200):
     """The bytes that an RTDE client gets from a robot with noise."""
     controller = Controller(SimulatorConfig())
-    controller.faults.add(Deviation(
-        quantity='pose', axis='x', shape='noise', amount=1e-3, seed=seed))
+    controller.faults.add(
+        Deviation(quantity='pose', axis='x', shape='noise', amount=1e-3, seed=seed)
+    )
     session = RtdeSession(controller, set())
     for request in (VERSION_2, setup_outputs('actual_TCP_pose', 'actual_q'), START):
         session.feed(request)
@@ -273,6 +285,7 @@ def test_noise_has_the_deviation_that_was_asked_for(bench):
 
 
 # --- Lines -----------------------------------------------------------------------------------
+
 
 def test_a_line_lets_a_piece_go_when_it_is_due_and_keeps_the_order():
     line = Line(0.0)
@@ -340,8 +353,9 @@ def test_a_program_finds_a_dropped_socket_closed(talk):
     assert peer.state.name == 'CLOSED'
 
 
-@pytest.mark.parametrize(('text', 'answered'), [('half_open sockets', False),
-                                                ('silence sockets', True)])
+@pytest.mark.parametrize(
+    ('text', 'answered'), [('half_open sockets', False), ('silence sockets', True)]
+)
 def test_a_silent_program_says_nothing_and_a_half_open_socket_hears_nothing(talk, text, answered):
     bench, peer = talk
     add(bench, text)

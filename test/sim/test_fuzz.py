@@ -35,18 +35,43 @@ HUNG = 2.0
 HANDSHAKE = [
     bytes.fromhex(frame['hex'])
     for frame in json.loads((HERE / 'golden' / 'rtde_handshake.json').read_text())[
-        'handshake_with_types']['frames'] if frame['direction'] == 'client_to_controller']
-LINES = [line + b'\n' for line in (
-    b'load a.urp', b'play', b'pause', b'stop', b'robotmode', b'programState', b'popup careful',
-    b'power on', b'brake release', b'unlock protective stop', b'version', b'addToLog x', b'quit')]
+        'handshake_with_types'
+    ]['frames']
+    if frame['direction'] == 'client_to_controller'
+]
+LINES = [
+    line + b'\n'
+    for line in (
+        b'load a.urp',
+        b'play',
+        b'pause',
+        b'stop',
+        b'robotmode',
+        b'programState',
+        b'popup careful',
+        b'power on',
+        b'brake release',
+        b'unlock protective stop',
+        b'version',
+        b'addToLog x',
+        b'quit',
+    )
+]
 SCRIPTS = [
-    b'set speed 0.5\n', b'stop program\n', b'power on\n', b'set robotmode run\n',
-    b'set_standard_digital_out(2, True)\n', b'textmsg("hello", [1, 2])\n',
+    b'set speed 0.5\n',
+    b'stop program\n',
+    b'power on\n',
+    b'set robotmode run\n',
+    b'set_standard_digital_out(2, True)\n',
+    b'textmsg("hello", [1, 2])\n',
     b'def a():\n  i = 0\n  while i < 50:\n    i = i + 1\n    sync()\n  end\nend\n',
     b'sec b():\n  set_tool_voltage(24)\nend\n',
     b'def c():\n  movej([0.1, -1.5, 1.5, -1.5, -1.5, 0.0])\n  speedl([0, 0, 0.1, 0, 0, 0])\nend\n',
-    *(text for path in sorted((HERE / 'programs').glob('*.script'))
-      if b'socket_' not in (text := path.read_bytes())),
+    *(
+        text
+        for path in sorted((HERE / 'programs').glob('*.script'))
+        if b'socket_' not in (text := path.read_bytes())
+    ),
 ]
 VALID = {'rtde': HANDSHAKE, 'dashboard': LINES}
 
@@ -57,7 +82,7 @@ def random_bytes(random, _):
 
 def truncated(random, valid):
     data = b''.join(valid)
-    return [data[:random.randint(1, len(data))]]
+    return [data[: random.randint(1, len(data))]]
 
 
 def mutated(random, valid):
@@ -78,7 +103,7 @@ def oversized(random, valid):
 
 def slow(random, valid):
     data = random.choice(valid)[:150]
-    return [data[i:i + 1] for i in range(len(data))]
+    return [data[i : i + 1] for i in range(len(data))]
 
 
 ATTACKS = (random_bytes, truncated, mutated, in_any_order, oversized, slow)
@@ -92,9 +117,12 @@ class Watcher:
         self._socket = socket.create_connection((HOST, robot.ports.rtde), timeout=10.0)
         self._stream = self._socket.makefile('rb')
         recipe = struct.pack('>d', 500.0) + b'timestamp'
-        self._socket.sendall(struct.pack('>HBH', 5, ord('V'), 2)
-                             + struct.pack('>HB', 3 + len(recipe), ord('O')) + recipe
-                             + struct.pack('>HB', 3, ord('S')))
+        self._socket.sendall(
+            struct.pack('>HBH', 5, ord('V'), 2)
+            + struct.pack('>HB', 3 + len(recipe), ord('O'))
+            + recipe
+            + struct.pack('>HB', 3, ord('S'))
+        )
         self.last = self._stamp()
 
     def close(self) -> None:
@@ -175,8 +203,10 @@ def test_nonsense_ends_nothing_but_its_own_connection(robot, watcher, port, atta
 @pytest.mark.parametrize('seed', SEEDS[:5])
 def test_each_line_of_the_dashboard_is_answered_by_one_line(robot, watcher, seed):
     random = Random(seed)
-    lines = [bytes(random.choices(b'abc powerlnt\t"\\%\xc3\x00', k=random.randrange(40)))
-             for _ in range(50)]
+    lines = [
+        bytes(random.choices(b'abc powerlnt\t"\\%\xc3\x00', k=random.randrange(40)))
+        for _ in range(50)
+    ]
     with connect(robot, 'dashboard') as wire:
         wire.sendall(b'\n'.join(lines) + b'\n')
         assert until_hung_up(wire).count(b'\n') == 1 + len(lines)
@@ -188,9 +218,12 @@ def test_each_line_of_the_dashboard_is_answered_by_one_line(robot, watcher, seed
 def test_clients_that_never_read_stall_nobody(robot, watcher, port):
     everything = struct.pack('>d', 0.0) + ','.join(OUTPUT_TYPES).encode()
     questions = {
-        'rtde': HANDSHAKE[0] + struct.pack('>HB', 3 + len(everything), ord('O')) + everything
+        'rtde': HANDSHAKE[0]
+        + struct.pack('>HB', 3 + len(everything), ord('O'))
+        + everything
         + struct.pack('>HB', 3, ord('S')),
-        'dashboard': b'PolyscopeVersion\n' * 200}
+        'dashboard': b'PolyscopeVersion\n' * 200,
+    }
     with ExitStack() as wires:
         for _ in range(3):
             wire = wires.enter_context(connect(robot, port))

@@ -23,8 +23,9 @@ from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.sim.builtins import builtins_of
 
 HERE = Path(__file__).parent
-REAL = sorted([*(HERE / 'programs').glob('*.script'),
-               *(HERE.parent / 'urscript').rglob('*.script')])
+REAL = sorted(
+    [*(HERE / 'programs').glob('*.script'), *(HERE.parent / 'urscript').rglob('*.script')]
+)
 WORDS = re.compile(r'"[^"\n]*"|[A-Za-z_]\w*|\d+\.?\d*|\s+|.')
 DIGITS_AND_QUOTE = tuple('0123456789"')
 COMMENT = re.compile('#.*')
@@ -33,10 +34,30 @@ SEEDS = range(40)
 HUNG = 2.0
 
 NAMES = ('a', 'b', 'c', 'q', 'f', 'g')
-CONSTANTS = ('0', '1', '-1', '2147483647', '-2147483648', '1e308', '1e-300', '0.1', '3.14', 'True',
-             'False', '""', '"text"', '"%f"', '[]', '[1,2,3]', '[0,-1.5,1.5,-1.5,-1.5,0]',
-             '[[1,2],[3,4]]', 'p[0.4,0.1,0.4,0,3.1,0]', 'p[0,0,0,0,0,0]', 'p[9,9,9,1,2,3]',
-             'struct(x=1,y=[1,2])')
+CONSTANTS = (
+    '0',
+    '1',
+    '-1',
+    '2147483647',
+    '-2147483648',
+    '1e308',
+    '1e-300',
+    '0.1',
+    '3.14',
+    'True',
+    'False',
+    '""',
+    '"text"',
+    '"%f"',
+    '[]',
+    '[1,2,3]',
+    '[0,-1.5,1.5,-1.5,-1.5,0]',
+    '[[1,2],[3,4]]',
+    'p[0.4,0.1,0.4,0,3.1,0]',
+    'p[0,0,0,0,0,0]',
+    'p[9,9,9,1,2,3]',
+    'struct(x=1,y=[1,2])',
+)
 OPERATORS = ('+', '-', '*', '/', '%', '==', '!=', '<', '<=', '>', '>=', ' and ', ' or ', ' xor ')
 #: They would end the whole case, or do nothing but wait for somebody.
 NOT_CALLED = {'interpreter_mode', 'halt', 'powerdown', 'sleep'}
@@ -56,8 +77,10 @@ class Grammar:
         if depth == 0 or choice < 0.35:
             return self.random.choice(CONSTANTS + NAMES)
         if choice < 0.6:
-            return (f'({self.expression(depth - 1)}{self.random.choice(OPERATORS)}'
-                    f'{self.expression(depth - 1)})')
+            return (
+                f'({self.expression(depth - 1)}{self.random.choice(OPERATORS)}'
+                f'{self.expression(depth - 1)})'
+            )
         if choice < 0.7:
             return f'{self.random.choice(NAMES)}[{self.expression(depth - 1)}]'
         if choice < 0.75:
@@ -80,23 +103,39 @@ class Grammar:
                 endings = ('break', 'continue') if self.loops else ()
                 return [indent + self.random.choice(('sync()', 'stopj(2)', 'return 1', *endings))]
             case 5:
-                return [f'{indent}if {self.expression(2)}:', *self.block(inner, depth - 1),
-                        f'{indent}else:', *self.block(inner, depth - 1), f'{indent}end']
+                return [
+                    f'{indent}if {self.expression(2)}:',
+                    *self.block(inner, depth - 1),
+                    f'{indent}else:',
+                    *self.block(inner, depth - 1),
+                    f'{indent}end',
+                ]
             case 6:
                 self.loops += 1
                 block = self.block(inner, depth - 1)
                 self.loops -= 1
                 return [f'{indent}while {self.expression(1)}:', *block, f'{indent}end']
             case 7:
-                return [f'{indent}thread t():', *self.function(inner, depth), f'{indent}end',
-                        f'{indent}h = run t()']
+                return [
+                    f'{indent}thread t():',
+                    *self.function(inner, depth),
+                    f'{indent}end',
+                    f'{indent}h = run t()',
+                ]
             case _:
-                return [f'{indent}def f(a=1):', *self.function(inner, depth), f'{indent}end',
-                        f'{indent}a = f({self.expression(1)})']
+                return [
+                    f'{indent}def f(a=1):',
+                    *self.function(inner, depth),
+                    f'{indent}end',
+                    f'{indent}a = f({self.expression(1)})',
+                ]
 
     def block(self, indent: str, depth: int) -> list[str]:
-        return [line for _ in range(self.random.randint(1, 4))
-                for line in self.statement(indent, depth)]
+        return [
+            line
+            for _ in range(self.random.randint(1, 4))
+            for line in self.statement(indent, depth)
+        ]
 
     def function(self, indent: str, depth: int) -> list[str]:
         loops, self.loops = self.loops, 0

@@ -46,26 +46,38 @@ def client(bench):
 
 def test_statements_are_acknowledged_with_numbers_from_one_and_executed_in_order(bench, client):
     assert client.say('textmsg(n)', 'n = double(21)', 'textmsg(n)') == [
-        'ack: 1: textmsg(n)', 'ack: 2: n = double(21)', 'ack: 3: textmsg(n)']
+        'ack: 1: textmsg(n)',
+        'ack: 2: n = double(21)',
+        'ack: 3: textmsg(n)',
+    ]
     assert bench.log == ['1', '42']
 
 
-@pytest.mark.parametrize(('statement', 'reason'), [
-    ('unknown()', 'compile_error_name_not_found:unknown'),
-    ('x = y', 'compile_error_name_not_found:y'),
-    ('x = ', 'syntax_error_on_line:1:x = '),
-    ('textmsg()', 'compile_error_wrong_arguments:textmsg'),
-    ('end', 'syntax_error_on_line:1:end'),
-])
+@pytest.mark.parametrize(
+    ('statement', 'reason'),
+    [
+        ('unknown()', 'compile_error_name_not_found:unknown'),
+        ('x = y', 'compile_error_name_not_found:y'),
+        ('x = ', 'syntax_error_on_line:1:x = '),
+        ('textmsg()', 'compile_error_wrong_arguments:textmsg'),
+        ('end', 'syntax_error_on_line:1:end'),
+    ],
+)
 def test_what_does_not_compile_is_discarded_with_the_reason(bench, client, statement, reason):
     assert client.say(statement) == [f'discard: {reason}: {statement}']
     assert client.say('n = 2') == ['ack: 1: n = 2']
     assert bench.programs.running
 
 
-@pytest.mark.parametrize('statement', [
-    'x = ' + '(' * 3000, 'x = ' + '1 + ' * 3000 + '1', 'if 1: ' * 500,
-    'x = ' + 'not ' * 3000 + '1'])
+@pytest.mark.parametrize(
+    'statement',
+    [
+        'x = ' + '(' * 3000,
+        'x = ' + '1 + ' * 3000 + '1',
+        'if 1: ' * 500,
+        'x = ' + 'not ' * 3000 + '1',
+    ],
+)
 def test_a_statement_nested_too_deeply_is_discarded_and_the_next_one_is_not(client, statement):
     (answer,) = client.say(statement)
     assert answer.startswith('discard: syntax_error_on_line:1:')
@@ -152,7 +164,9 @@ def test_clearing_forgets_functions_variables_and_threads_of_statements(bench, c
     assert client.say('g()', 'textmsg(x)', 'h = 0', 'n = double(2)') == [
         'discard: compile_error_name_not_found:g: g()',
         'discard: compile_error_name_not_found:x: textmsg(x)',
-        'ack: 6: h = 0', 'ack: 7: n = double(2)']
+        'ack: 6: h = 0',
+        'ack: 7: n = double(2)',
+    ]
 
 
 def test_statements_behind_a_clear_are_answered_when_it_has_been_executed(bench, client):
@@ -186,7 +200,9 @@ def test_states_count_statements(bench, client):
 def test_skipbuffer_drops_what_has_not_begun(bench, client):
     client.say('sleep(0.1)', 'textmsg("skipped")')
     assert client.say('skipbuffer', 'textmsg("new")') == [
-        'ack: 2: skipbuffer', 'ack: 3: textmsg("new")']
+        'ack: 2: skipbuffer',
+        'ack: 3: textmsg("new")',
+    ]
     bench.wait(0.2)
     assert bench.log == ['new']
 
@@ -196,8 +212,13 @@ def test_skipbuffer_lets_statements_behind_a_skipped_clear_go_on(client):
     assert client.say('skipbuffer') == ['ack: 3: n = 5', 'ack: 3: skipbuffer']
 
 
-@pytest.mark.parametrize('move', ['movej([1, -1.5, 1.5, -1.5, -1.5, 0])',
-                                  'movel(pose_trans(get_target_tcp_pose(), p[0,0,-0.2,0,0,0]))'])
+@pytest.mark.parametrize(
+    'move',
+    [
+        'movej([1, -1.5, 1.5, -1.5, -1.5, 0])',
+        'movel(pose_trans(get_target_tcp_pose(), p[0,0,-0.2,0,0,0]))',
+    ],
+)
 def test_abort_brakes_a_move_and_the_next_statement_follows(bench, client, move):
     client.say(move, 'textmsg(get_target_joint_speeds())')
     bench.wait(0.4)
@@ -245,8 +266,10 @@ def test_empty_lines_are_no_statements(client):
 
 
 def test_a_thread_of_the_program_can_end_the_mode(bench):
-    bench.start('thread t():\nsleep(0.01)\nend_interpreter()\nend\nrun t()\ninterpreter_mode()\n'
-                'textmsg("on")')
+    bench.start(
+        'thread t():\nsleep(0.01)\nend_interpreter()\nend\nrun t()\ninterpreter_mode()\n'
+        'textmsg("on")'
+    )
     bench.until(lambda: bool(bench.log))
     assert bench.log == ['on']
 

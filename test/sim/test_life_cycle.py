@@ -14,8 +14,9 @@ LONG_LINE = 'movel(pose_trans(get_actual_tcp_pose(), p[0, 0, 0.1, 0, 0, 0]), a=0
 
 
 def keys(bench):
-    return [(m.title, m.text) for m in bench.controller.announcements.pending
-            if hasattr(m, 'title')]
+    return [
+        (m.title, m.text) for m in bench.controller.announcements.pending if hasattr(m, 'title')
+    ]
 
 
 def test_a_program_announces_its_start_and_its_end_by_name(bench):
@@ -43,7 +44,8 @@ def test_a_refused_program_leaves_the_running_one_alone(bench):
 
 def test_a_runtime_exception_ends_the_program_and_says_where(bench):
     assert bench.run('x = 1\ny = sqrt(-x)\ntextmsg("not reached")') == [
-        entry for entry in bench.log if entry.startswith('3:7: Runtime error (3:7): ')]
+        entry for entry in bench.log if entry.startswith('3:7: Runtime error (3:7): ')
+    ]
     assert len(bench.log) == 1
 
 
@@ -56,8 +58,7 @@ def test_a_new_program_replaces_the_running_one_once_the_arm_stands(bench):
     assert taken > 0.02
     bench.step(2)
     assert bench.log == ['0']
-    assert keys(bench)[1:] == [('PROGRAM_XXX_STOPPED', 'first'),
-                               ('PROGRAM_XXX_STARTED', 'second')]
+    assert keys(bench)[1:] == [('PROGRAM_XXX_STOPPED', 'first'), ('PROGRAM_XXX_STARTED', 'second')]
 
 
 def test_a_program_that_ends_while_the_arm_moves_makes_it_brake(bench):
@@ -328,6 +329,7 @@ def test_the_same_inputs_give_the_same_states(make_bench):
             bench.step()
             states.append(bench.controller.motion.q)
         return states
+
     assert trace() == trace()
 
 

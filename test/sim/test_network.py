@@ -55,23 +55,30 @@ def test_the_dashboard_answers_in_the_robots_words():
 
 
 def test_polyscope_x_has_no_dashboard():
-    with SimulatedRobot(SimulatorConfig(**FREE, polyscope='10.8')) as robot, \
-            Wire(robot.ports.rtde) as wire:
+    with (
+        SimulatedRobot(SimulatorConfig(**FREE, polyscope='10.8')) as robot,
+        Wire(robot.ports.rtde) as wire,
+    ):
         assert robot.ports.dashboard == 0
         wire.send(struct.pack('>HB', 3, ord('v')))
         assert struct.unpack('>4I', wire.rtde()[1][3:]) == (10, 8, 0, 0)
 
 
-@pytest.mark.parametrize(('settings', 'command', 'known'), [
-    ({}, 'safetystatus', True),
-    ({'polyscope': '5.3'}, 'safetystatus', False),
-    ({'model': 'ur5'}, 'safetystatus', False),
-    ({'model': 'ur5'}, 'getUserRole', True),
-    ({}, 'getUserRole', False),
-])
+@pytest.mark.parametrize(
+    ('settings', 'command', 'known'),
+    [
+        ({}, 'safetystatus', True),
+        ({'polyscope': '5.3'}, 'safetystatus', False),
+        ({'model': 'ur5'}, 'safetystatus', False),
+        ({'model': 'ur5'}, 'getUserRole', True),
+        ({}, 'getUserRole', False),
+    ],
+)
 def test_the_dashboard_knows_what_its_software_knew(settings, command, known):
-    with SimulatedRobot(SimulatorConfig(**FREE, **settings)) as robot, \
-            Wire(robot.ports.dashboard) as wire:
+    with (
+        SimulatedRobot(SimulatorConfig(**FREE, **settings)) as robot,
+        Wire(robot.ports.dashboard) as wire,
+    ):
         wire.line()
         assert ('could not understand' not in wire.ask(command)) is known
 
@@ -81,7 +88,8 @@ def test_a_script_reads_and_sends_integers_and_notices_a_closed_peer(robot):
     robot.on_socket_data = lambda port, data: received.append((port, data))
     with socket.create_server((HOST, 0)) as server, Primary(robot.ports.primary) as wire:
         port = server.getsockname()[1]
-        wire.send(f"""def echo():
+        wire.send(
+            f"""def echo():
   textmsg(socket_open("{HOST}", {port}, "s"))
   got = socket_read_binary_integer(3, "s", 0)
   textmsg(got)
@@ -89,7 +97,8 @@ def test_a_script_reads_and_sends_integers_and_notices_a_closed_peer(robot):
   textmsg(socket_read_binary_integer(2, "s", 0))
   textmsg(socket_send_int(1, "s"))
 end
-""".encode())
+""".encode()
+        )
         peer, _ = server.accept()
         with peer:
             peer.settimeout(5.0)

@@ -38,17 +38,20 @@ movej([0.5, -1.0, 1.2, -0.8, -1.2, 0.6], a=2.0, v=1.0)""")
     return bench
 
 
-@pytest.mark.parametrize(('rate', 'of'), [
-    ('elbow_velocity', lambda b: read(b, 'elbow_position')),
-    ('target_TCP_speed', lambda b: read(b, 'target_TCP_pose')[:3]),
-    ('actual_TCP_acceleration', lambda b: read(b, 'actual_TCP_speed')),
-    ('target_TCP_acceleration', lambda b: read(b, 'target_TCP_speed')),
-])
+@pytest.mark.parametrize(
+    ('rate', 'of'),
+    [
+        ('elbow_velocity', lambda b: read(b, 'elbow_position')),
+        ('target_TCP_speed', lambda b: read(b, 'target_TCP_pose')[:3]),
+        ('actual_TCP_acceleration', lambda b: read(b, 'actual_TCP_speed')),
+        ('target_TCP_acceleration', lambda b: read(b, 'target_TCP_speed')),
+    ],
+)
 def test_a_rate_is_the_difference_of_what_it_is_the_rate_of(moving, rate, of):
     cycle = moving.controller.cycle
     before = of(moving)
     moving.step()
-    middle, rate_then = of(moving), read(moving, rate)[:len(before)]
+    middle, rate_then = of(moving), read(moving, rate)[: len(before)]
     moving.step()
     # The speeds are those over the cycle before, so the middle of two differences fits them best.
     assert rate_then == pytest.approx((middle - before) / cycle, abs=0.02)
@@ -71,7 +74,8 @@ def test_moments_do_the_work_that_the_load_takes(moving):
     speeds = np.diff(places, axis=0) / cycle
     acceleration = (speeds[1] - speeds[0]) / cycle
     assert power == pytest.approx(
-        mass * (acceleration + np.array((0.0, 0.0, 9.82))) @ speeds[1], rel=0.02, abs=0.02)
+        mass * (acceleration + np.array((0.0, 0.0, 9.82))) @ speeds[1], rel=0.02, abs=0.02
+    )
     assert abs(power) > 1.0
 
 
@@ -80,27 +84,39 @@ def test_an_arm_at_rest_carries_the_weight_of_its_load(bench):
     q = bench.controller.motion.q
     jacobian = bench.controller.arm.jacobian(q)
     assert read(bench, 'target_moment') == pytest.approx(
-        jacobian[:3].T @ [0.0, 0.0, 2.0 * 9.82], abs=1e-9)
+        jacobian[:3].T @ [0.0, 0.0, 2.0 * 9.82], abs=1e-9
+    )
     bench.run('powerdown()')
     assert read(bench, 'target_moment') == pytest.approx(np.zeros(6))
 
 
-@pytest.mark.parametrize('q', [
-    (0.0, -1.5, 1.5, -1.5, -1.5, 0.0), (1.0, -1.0, 0.5, 0.3, 0.7, -2.0)])
+@pytest.mark.parametrize(
+    'q', [(0.0, -1.5, 1.5, -1.5, -1.5, 0.0), (1.0, -1.0, 0.5, 0.3, 0.7, -2.0)]
+)
 def test_the_accelerometer_of_an_arm_at_rest_feels_the_weight_in_the_axes_of_the_flange(
-        make_bench, q):
+    make_bench, q
+):
     bench = make_bench(q=q)
     rotation = bench.controller.arm.forward(q).matrix()[:3, :3]
     assert read(bench, 'actual_tool_accelerometer') == pytest.approx(
-        rotation.T @ [0.0, 0.0, 9.82], abs=1e-9)
+        rotation.T @ [0.0, 0.0, 9.82], abs=1e-9
+    )
 
 
-@pytest.mark.parametrize(('command', 'joints', 'tool', 'volts'), [
-    (lambda c: None, 239, 239, 0.0),
-    (lambda c: c.power_on(), 255, 253, 48.0),
-    (lambda c: c.release_brakes(), 253, 253, 48.0),
-    (lambda c: (c.release_brakes(), c.safety_event(SafetyEvent.EMERGENCY_STOP)), 239, 239, 0.0),
-])
+@pytest.mark.parametrize(
+    ('command', 'joints', 'tool', 'volts'),
+    [
+        (lambda c: None, 239, 239, 0.0),
+        (lambda c: c.power_on(), 255, 253, 48.0),
+        (lambda c: c.release_brakes(), 253, 253, 48.0),
+        (
+            lambda c: (c.release_brakes(), c.safety_event(SafetyEvent.EMERGENCY_STOP)),
+            239,
+            239,
+            0.0,
+        ),
+    ],
+)
 def test_modes_and_voltages_follow_the_power(make_bench, command, joints, tool, volts):
     bench = make_bench(power='off')
     command(bench.controller)
@@ -125,11 +141,17 @@ write_output_boolean_register(33, True)""")
     bench.controller.set_slider(0.3)
     bench.step()
     for name, value in {
-            'payload': 1.5, 'payload_cog': [0.1, 0.2, 0.3], 'tcp_offset': [0, 0, 0.2, 0, 0, 0],
-            'target_gravity': [0, 9.82, 0],
-            'actual_digital_output_bits': 1 << 3 | 1 << 9 | 1 << 17,
-            'actual_configurable_digital_output_bits': 0b10, 'standard_analog_output1': 2.5,
-            'tool_output_voltage': 24, 'output_double_register_7': 0.5,
-            'output_bit_registers32_to_63': 0b10, 'target_speed_fraction': 0.3,
-            'speed_scaling': 0.3}.items():
+        'payload': 1.5,
+        'payload_cog': [0.1, 0.2, 0.3],
+        'tcp_offset': [0, 0, 0.2, 0, 0, 0],
+        'target_gravity': [0, 9.82, 0],
+        'actual_digital_output_bits': 1 << 3 | 1 << 9 | 1 << 17,
+        'actual_configurable_digital_output_bits': 0b10,
+        'standard_analog_output1': 2.5,
+        'tool_output_voltage': 24,
+        'output_double_register_7': 0.5,
+        'output_bit_registers32_to_63': 0b10,
+        'target_speed_fraction': 0.3,
+        'speed_scaling': 0.3,
+    }.items():
         assert read(bench, name) == pytest.approx(value), name

@@ -18,11 +18,16 @@ from ur_cartesian_driver.sim.script_commands import execute
 from ur_cartesian_driver.sim.uploads import Line, ProgramText, TooLong, Uploads
 from ur_cartesian_driver.sim.watchdog import Watchdogs
 
-STREAM = (b'power on\r\n\n# nothing\ndef a():\n\tif True:\n\t\tb = "end"\n\tend\n# c\nend\n\n'
-          b'sec s():\n  sync()\nend\nset speed 0.5\n')
-ITEMS = [Line('power on'),
-         ProgramText('def a():\n\tif True:\n\t\tb = "end"\n\tend\n# c\nend\n'),
-         ProgramText('sec s():\n  sync()\nend\n'), Line('set speed 0.5')]
+STREAM = (
+    b'power on\r\n\n# nothing\ndef a():\n\tif True:\n\t\tb = "end"\n\tend\n# c\nend\n\n'
+    b'sec s():\n  sync()\nend\nset speed 0.5\n'
+)
+ITEMS = [
+    Line('power on'),
+    ProgramText('def a():\n\tif True:\n\t\tb = "end"\n\tend\n# c\nend\n'),
+    ProgramText('sec s():\n  sync()\nend\n'),
+    Line('set speed 0.5'),
+]
 
 
 @given(st.lists(st.integers(0, len(STREAM)), max_size=8))
@@ -68,13 +73,16 @@ def test_unlocking_is_refused_for_the_delay_exactly():
     assert safety.step(SafetyEvent.UNLOCK, now=15.0) == ''
 
 
-@pytest.mark.parametrize(('command', 'before', 'after'), [
-    ('on', RobotMode.POWER_OFF, RobotMode.IDLE),
-    ('on', RobotMode.IDLE, RobotMode.IDLE),
-    ('on', RobotMode.RUNNING, RobotMode.RUNNING),
-    ('release_brakes', RobotMode.POWER_OFF, RobotMode.RUNNING),
-    ('release_brakes', RobotMode.IDLE, RobotMode.RUNNING),
-])
+@pytest.mark.parametrize(
+    ('command', 'before', 'after'),
+    [
+        ('on', RobotMode.POWER_OFF, RobotMode.IDLE),
+        ('on', RobotMode.IDLE, RobotMode.IDLE),
+        ('on', RobotMode.RUNNING, RobotMode.RUNNING),
+        ('release_brakes', RobotMode.POWER_OFF, RobotMode.RUNNING),
+        ('release_brakes', RobotMode.IDLE, RobotMode.RUNNING),
+    ],
+)
 def test_power_goes_as_far_as_the_command_says_and_no_farther(command, before, after):
     power = Power(before, power_on_time=1.0, brake_release_time=1.0)
     getattr(power, command)(now=100.0)
@@ -103,33 +111,45 @@ def test_a_watchdog_reports_once_until_it_is_fed_again():
     assert dogs.expired(9.0) == []
 
 
-@pytest.mark.parametrize(('settings', 'names'), [
-    ({'model': 'ur6'}, 'ur6'),
-    ({'polyscope': 'five'}, 'five'),
-    ({'polyscope': '3.15'}, '3.15'),
-    ({'model': 'ur5', 'polyscope': '5.21'}, '5.21'),
-    ({'power': 'half'}, 'half'),
-    ({'frequency': 0.0}, '0.0 Hz'),
-    ({'rate': -1.0}, '-1.0'),
-    ({'q': (0.0,) * 5}, '5 values'),
-])
+@pytest.mark.parametrize(
+    ('settings', 'names'),
+    [
+        ({'model': 'ur6'}, 'ur6'),
+        ({'polyscope': 'five'}, 'five'),
+        ({'polyscope': '3.15'}, '3.15'),
+        ({'model': 'ur5', 'polyscope': '5.21'}, '5.21'),
+        ({'power': 'half'}, 'half'),
+        ({'frequency': 0.0}, '0.0 Hz'),
+        ({'rate': -1.0}, '-1.0'),
+        ({'q': (0.0,) * 5}, '5 values'),
+    ],
+)
 def test_a_configuration_that_cannot_be_is_refused_by_name(settings, names):
     with pytest.raises(ValueError, match=names):
         SimulatorConfig(**settings)
 
 
-@pytest.mark.parametrize(('model', 'cycle', 'version'), [
-    ('ur5e', 0.002, (5, 21, 0, 0)), ('ur10', 0.008, (3, 15, 8, 0)), ('ur20', 0.002, (5, 21, 0, 0)),
-])
+@pytest.mark.parametrize(
+    ('model', 'cycle', 'version'),
+    [
+        ('ur5e', 0.002, (5, 21, 0, 0)),
+        ('ur10', 0.008, (3, 15, 8, 0)),
+        ('ur20', 0.002, (5, 21, 0, 0)),
+    ],
+)
 def test_the_generation_decides_the_cycle_and_the_software(model, cycle, version):
     config = SimulatorConfig(model=model)
     assert (config.cycle, config.version) == (cycle, version)
 
 
-@pytest.mark.parametrize(('line', 'mode'), [
-    ('power off', RobotMode.POWER_OFF), ('set robotmode run', RobotMode.RUNNING),
-    ('power on', RobotMode.RUNNING),
-])
+@pytest.mark.parametrize(
+    ('line', 'mode'),
+    [
+        ('power off', RobotMode.POWER_OFF),
+        ('set robotmode run', RobotMode.RUNNING),
+        ('power on', RobotMode.RUNNING),
+    ],
+)
 def test_the_script_port_takes_commands(bench, line, mode):
     execute(bench.controller, Line(line))
     bench.wait(2.0)
@@ -157,6 +177,7 @@ def test_the_real_clock_does_not_drift():
         for _ in range(count):
             await clock.next_cycle()
         return time.monotonic() - start, clock
+
     taken, clock = asyncio.run(cycles(50))
     assert taken >= 50 * 0.002 - 1e-4
     if not clock.slips:  # late, but never by more than the last cycle's own lateness

@@ -43,8 +43,21 @@ def test_a_state_has_the_size_and_order_of_a_recorded_one(robot):
         wire.exactly(wire_size(wire))
         data = wire.exactly(wire_size(wire))
     # A recorded UR5e: its sub-packages in this order with these sizes.
-    expected = {0: 47, 1: 251, 4: 101, 5: 225, 9: 53, 3: 75, 2: 37, 6: 445, 7: 61, 8: 9, 10: 43,
-                11: 26, 12: 8}
+    expected = {
+        0: 47,
+        1: 251,
+        4: 101,
+        5: 225,
+        9: 53,
+        3: 75,
+        2: 37,
+        6: 445,
+        7: 61,
+        8: 9,
+        10: 43,
+        11: 26,
+        12: 8,
+    }
     found = {}
     start = 1
     while start < len(data):
@@ -60,12 +73,14 @@ def wire_size(wire: Wire) -> int:
 
 
 def test_a_program_that_comes_in_pieces_runs_and_all_clients_hear_of_it(robot):
-    program = (b'stop program\ndef hello():\n\t# a comment\n\n\tif True:\n\t\ttextmsg("hi ", 1)\n'
-               b'\tend\nend\n\n')
+    program = (
+        b'stop program\ndef hello():\n\t# a comment\n\n\tif True:\n\t\ttextmsg("hi ", 1)\n'
+        b'\tend\nend\n\n'
+    )
     with Primary(robot.ports.primary) as sender, Primary(robot.ports.primary) as listener:
         listener.next()
         for i in range(0, len(program), 7):
-            sender.send(program[i:i + 7])
+            sender.send(program[i : i + 7])
         for wire in (sender, listener):
             wire.await_(KeyMessage, title='PROGRAM_XXX_STARTED', text='hello')
             wire.await_(TextMessage, text='hi 1')
@@ -107,8 +122,10 @@ def test_the_speed_can_be_set_by_a_line(robot):
 
 
 def test_in_local_control_the_script_port_is_read_only():
-    with SimulatedRobot(SimulatorConfig(**FREE, remote_control=False)) as robot, \
-            Primary(robot.ports.primary) as wire:
+    with (
+        SimulatedRobot(SimulatorConfig(**FREE, remote_control=False)) as robot,
+        Primary(robot.ports.primary) as wire,
+    ):
         wire.send(b'def a():\n  sync()\nend\n')
         assert wire.await_(ErrorCodeMessage).label == 'C210A0'
         assert robot.state().runtime_state is RuntimeState.STOPPED

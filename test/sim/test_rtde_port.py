@@ -19,15 +19,26 @@ from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 GOLDEN = json.loads((Path(__file__).parent / 'golden' / 'rtde_handshake.json').read_text())
 #: The names and types in the tables of the manufacturer's client library, and sizes in bytes.
 OUTPUTS = json.loads((Path(__file__).parent / 'golden' / 'rtde_outputs.json').read_text())
-SIZES = {'BOOL': 1, 'UINT8': 1, 'UINT32': 4, 'INT32': 4, 'UINT64': 8, 'DOUBLE': 8,
-         'VECTOR3D': 24, 'VECTOR6D': 48, 'VECTOR6INT32': 24}
+SIZES = {
+    'BOOL': 1,
+    'UINT8': 1,
+    'UINT32': 4,
+    'INT32': 4,
+    'UINT64': 8,
+    'DOUBLE': 8,
+    'VECTOR3D': 24,
+    'VECTOR6D': 48,
+    'VECTOR6INT32': 24,
+}
 
 
 @pytest.mark.parametrize('name', ['handshake', 'handshake_with_types'])
 def test_the_handshake_of_the_manufacturers_library_is_answered(name):
     case = GOLDEN[name]
-    with (SimulatedRobot(SimulatorConfig(**FREE, polyscope='5.23.0')) as robot,
-          Wire(robot.ports.rtde) as wire):
+    with (
+        SimulatedRobot(SimulatorConfig(**FREE, polyscope='5.23.0')) as robot,
+        Wire(robot.ports.rtde) as wire,
+    ):
         seen = []
         for frame in case['frames']:
             if frame['direction'] == 'client_to_controller':
@@ -47,8 +58,10 @@ def test_the_handshake_of_the_manufacturers_library_is_answered(name):
 
 def test_the_older_protocol_is_spoken_too():
     frames = [f for f in GOLDEN['handshake_protocol_v1']['frames'][2:]]
-    with SimulatedRobot(SimulatorConfig(**FREE, model='ur5', polyscope='3.15')) as robot, \
-            Wire(robot.ports.rtde) as wire:
+    with (
+        SimulatedRobot(SimulatorConfig(**FREE, model='ur5', polyscope='3.15')) as robot,
+        Wire(robot.ports.rtde) as wire,
+    ):
         for frame in frames:
             if frame['direction'] == 'client_to_controller':
                 wire.send(bytes.fromhex(frame['hex']))
@@ -64,8 +77,11 @@ def test_the_older_protocol_is_spoken_too():
 def test_every_cycle_is_sent_once_and_the_clock_has_been_running_for_a_while(robot):
     with Wire(robot.ports.rtde) as wire:
         wire.send(VERSION_2 + setup_outputs('timestamp') + START)
-        times = [struct.unpack('>d', data[4:])[0]
-                 for kind, data in (wire.rtde() for _ in range(203)) if kind == ord('U')]
+        times = [
+            struct.unpack('>d', data[4:])[0]
+            for kind, data in (wire.rtde() for _ in range(203))
+            if kind == ord('U')
+        ]
     assert times[0] >= 40.0
     assert [b - a for a, b in itertools.pairwise(times)] == pytest.approx([0.002] * 199)
 
@@ -73,33 +89,49 @@ def test_every_cycle_is_sent_once_and_the_clock_has_been_running_for_a_while(rob
 def test_a_frequency_is_kept_by_spreading_packages_over_the_cycles(robot):
     with Wire(robot.ports.rtde) as wire:
         wire.send(VERSION_2 + setup_outputs('timestamp', frequency=125.0) + START)
-        times = [struct.unpack('>d', data[4:])[0]
-                 for kind, data in (wire.rtde() for _ in range(50)) if kind == ord('U')]
+        times = [
+            struct.unpack('>d', data[4:])[0]
+            for kind, data in (wire.rtde() for _ in range(50))
+            if kind == ord('U')
+        ]
     assert [b - a for a, b in itertools.pairwise(times)] == pytest.approx(
-        [0.008] * (len(times) - 1))
+        [0.008] * (len(times) - 1)
+    )
 
 
-@pytest.mark.parametrize(('settings', 'cycle'), [
-    ({'rate': 0.0}, 0.002), ({'rate': 1.0}, 0.002), ({'rate': 4.0, 'model': 'ur5'}, 0.008)],
-    ids=['virtual clock', 'real clock', 'CB3'])
+@pytest.mark.parametrize(
+    ('settings', 'cycle'),
+    [({'rate': 0.0}, 0.002), ({'rate': 1.0}, 0.002), ({'rate': 4.0, 'model': 'ur5'}, 0.008)],
+    ids=['virtual clock', 'real clock', 'CB3'],
+)
 def test_timestamps_advance_by_one_cycle_for_every_client(settings, cycle):
-    with SimulatedRobot(SimulatorConfig(**FREE, **settings)) as robot, \
-            Wire(robot.ports.rtde) as one, Wire(robot.ports.rtde) as two:
+    with (
+        SimulatedRobot(SimulatorConfig(**FREE, **settings)) as robot,
+        Wire(robot.ports.rtde) as one,
+        Wire(robot.ports.rtde) as two,
+    ):
         one.send(VERSION_2 + setup_outputs('timestamp', frequency=1.0 / cycle) + START)
         two.send(VERSION_2 + setup_outputs('timestamp', 'control_step', frequency=0.0) + START)
         for wire in (one, two):
-            stamps = [struct.unpack_from('>d', data, 4)[0]
-                      for kind, data in (wire.rtde() for _ in range(203)) if kind == ord('U')]
+            stamps = [
+                struct.unpack_from('>d', data, 4)[0]
+                for kind, data in (wire.rtde() for _ in range(203))
+                if kind == ord('U')
+            ]
             assert [b - a for a, b in itertools.pairwise(stamps)] == pytest.approx(
-                [cycle] * (len(stamps) - 1), abs=1e-9)
+                [cycle] * (len(stamps) - 1), abs=1e-9
+            )
 
 
 @pytest.mark.parametrize('frequency', [250.0, 200.0, 150.0, 333.3, 499.0, 60.0])
 def test_a_frequency_that_does_not_divide_is_kept_on_average(robot, frequency):
     with Wire(robot.ports.rtde) as wire:
         wire.send(VERSION_2 + setup_outputs('timestamp', frequency=frequency) + START)
-        stamps = [struct.unpack('>d', data[4:])[0]
-                  for kind, data in (wire.rtde() for _ in range(100)) if kind == ord('U')]
+        stamps = [
+            struct.unpack('>d', data[4:])[0]
+            for kind, data in (wire.rtde() for _ in range(100))
+            if kind == ord('U')
+        ]
     gaps = [round((b - a) / 0.002) for a, b in itertools.pairwise(stamps)]
     assert {int(500.0 / frequency), -int(-500.0 // frequency)} >= set(gaps)
     assert stamps[-1] - stamps[0] == pytest.approx(len(gaps) / frequency, abs=0.002)
@@ -112,7 +144,7 @@ def test_a_pause_ends_the_packages_until_the_next_start(robot):
         kinds = [wire.rtde()[0] for _ in range(50)]
     paused = kinds.index(ord('P'))
     assert kinds[paused + 1] == ord('S')
-    assert set(kinds[paused + 2:]) == {ord('U')}
+    assert set(kinds[paused + 2 :]) == {ord('U')}
 
 
 @pytest.fixture(scope='module')
@@ -169,6 +201,7 @@ def test_an_unknown_output_is_not_found(robot):
 
 def test_all_known_outputs_are_streamed(robot):
     from ur_cartesian_driver.protocol.rtde_fields import OUTPUT_TYPES
+
     with Wire(robot.ports.rtde) as wire:
         wire.send(VERSION_2 + setup_outputs(*OUTPUT_TYPES) + START)
         wire.rtde()
@@ -180,8 +213,14 @@ def test_all_known_outputs_are_streamed(robot):
 
 def test_the_slider_and_an_output_can_be_set_through_rtde(robot):
     with Wire(robot.ports.rtde) as wire:
-        wire.send(setup_inputs('speed_slider_mask', 'speed_slider_fraction',
-                               'standard_digital_output_mask', 'standard_digital_output'))
+        wire.send(
+            setup_inputs(
+                'speed_slider_mask',
+                'speed_slider_fraction',
+                'standard_digital_output_mask',
+                'standard_digital_output',
+            )
+        )
         wire.rtde()
         wire.send(struct.pack('>HBBIdBB', 18, ord('U'), 1, 1, 0.25, 0b110, 0b011))
         wait_for(lambda: robot.state().speed_slider == 0.25)
@@ -200,8 +239,12 @@ def test_a_client_that_talks_nonsense_is_disconnected_and_the_others_are_not(rob
 @pytest.mark.slow
 def test_a_client_that_does_not_read_is_dropped_and_stalls_nobody():
     from ur_cartesian_driver.protocol.rtde_fields import OUTPUT_TYPES
-    with SimulatedRobot(SimulatorConfig(**FREE, rate=0.0)) as robot, \
-            Wire(robot.ports.rtde) as lazy, Wire(robot.ports.rtde) as good:
+
+    with (
+        SimulatedRobot(SimulatorConfig(**FREE, rate=0.0)) as robot,
+        Wire(robot.ports.rtde) as lazy,
+        Wire(robot.ports.rtde) as good,
+    ):
         lazy.send(VERSION_2 + setup_outputs(*OUTPUT_TYPES) + START)
         good.send(VERSION_2 + setup_outputs('timestamp') + START)
         while 'RTDE 2' in robot.status_line():

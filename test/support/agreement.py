@@ -30,12 +30,22 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 
 #: What bounds speeds and distances is off, and what is left, geometry, has no margin.
 OPTIONS = PlanningOptions(
-    max_approach_distance=0.0, max_tool_speed=0.0, on_too_fast='slow', self_collision='off',
-    singularity_margin_wrist=0.0, singularity_margin_elbow=0.0, singularity_margin_shoulder=0.0)
+    max_approach_distance=0.0,
+    max_tool_speed=0.0,
+    on_too_fast='slow',
+    self_collision='off',
+    singularity_margin_wrist=0.0,
+    singularity_margin_elbow=0.0,
+    singularity_margin_shoulder=0.0,
+)
 
 #: Refusals by what of the arm they are about.
-KINDS = {Unreachable: 'reach', JointLimitExceeded: 'limit', NearSingularity: 'branch',
-         InvalidPosture: 'branch'}
+KINDS = {
+    Unreachable: 'reach',
+    JointLimitExceeded: 'limit',
+    NearSingularity: 'branch',
+    InvalidPosture: 'branch',
+}
 
 #: Motions that take longer are run in longer cycles [s], and those that take this long are not.
 LONG, TOO_LONG = 2.5, 10.0
@@ -69,8 +79,7 @@ class Verdict:
     @property
     def agreed(self):
         """Whether both say the same, or one of them was not asked."""
-        return self.planner in ('other', 'long') or (
-            self.passes == (not self.trouble))
+        return self.planner in ('other', 'long') or (self.passes == (not self.trouble))
 
 
 def judge(robot, case, options=OPTIONS, longest=inf) -> Verdict:
@@ -93,8 +102,14 @@ def judge(robot, case, options=OPTIONS, longest=inf) -> Verdict:
             trouble = run.trouble or _astray(made, run)
             if not trouble:
                 break
-        return Verdict(planner='passes', refusal='', trouble=trouble,
-                       point=len(case.goal.waypoints) - 1, run=run, plan=made)
+        return Verdict(
+            planner='passes',
+            refusal='',
+            trouble=trouble,
+            point=len(case.goal.waypoints) - 1,
+            run=run,
+            plan=made,
+        )
     kind = KINDS.get(type(refusal), 'other')
     if kind == 'other':
         return Verdict(planner=kind, refusal=str(refusal), trouble='', point=-1)
@@ -103,12 +118,18 @@ def judge(robot, case, options=OPTIONS, longest=inf) -> Verdict:
     q = case.q if before is None else before.segments[-1].joints
     if primitives:
         primitives[-1] = replace(
-            primitives[-1], blend_radius=case.goal.segments[point - 1].blend_radius)
+            primitives[-1], blend_radius=case.goal.segments[point - 1].blend_radius
+        )
     run = robot.run([*primitives, blind(case, point, q, arm)])
     trouble = run.trouble or _missed(case, point, q, arm, run)
     _check_place(refusal, case.goal.segments, point)
-    return Verdict(planner=kind, refusal=f'{type(refusal).__name__}: {refusal}', trouble=trouble,
-                   point=point, run=run)
+    return Verdict(
+        planner=kind,
+        refusal=f'{type(refusal).__name__}: {refusal}',
+        trouble=trouble,
+        point=point,
+        run=run,
+    )
 
 
 def _check_place(refusal, segments, point) -> None:
@@ -128,11 +149,13 @@ def at_the_border(robot, case, options=OPTIONS, longest=TOO_LONG) -> bool:
     was = judge(robot, case, options)
     rng = np.random.default_rng(1)
     neighbours = (_moved(robot.controller.arm, case, change, rng) for change in _changes(rng))
-    verdicts = (
-        judge(robot, moved, options, longest) for moved in neighbours if moved is not None)
-    return any(verdict.passes != was.passes
-               or (verdict.planner != 'long' and bool(verdict.trouble) != bool(was.trouble))
-               for verdict in verdicts if verdict.planner != 'other')
+    verdicts = (judge(robot, moved, options, longest) for moved in neighbours if moved is not None)
+    return any(
+        verdict.passes != was.passes
+        or (verdict.planner != 'long' and bool(verdict.trouble) != bool(was.trouble))
+        for verdict in verdicts
+        if verdict.planner != 'other'
+    )
 
 
 def _changes(rng):
@@ -147,6 +170,7 @@ def _changes(rng):
 
 def _moved(arm, case, step, rng):
     """Return the case with all poses moved by a step, or each by its own; None: nowhere."""
+
     def by(pose):
         change = step if step is not None else rng.uniform(-BORDER, BORDER, 6) / np.sqrt(3.0)
         turn = Pose((0.0, 0.0, 0.0), quaternion_from_rotation_vector(tuple(change[3:])))
@@ -158,9 +182,12 @@ def _moved(arm, case, step, rng):
     if q is None or max(abs(a - b) for a, b in zip(q, case.q, strict=True)) > 0.1:
         return None
     goal = replace(
-        case.goal, waypoints=tuple(replace(w, pose=by(w.pose)) for w in case.goal.waypoints),
-        segments=tuple(replace(s, via=None if s.via is None else by(s.via))
-                       for s in case.goal.segments))
+        case.goal,
+        waypoints=tuple(replace(w, pose=by(w.pose)) for w in case.goal.waypoints),
+        segments=tuple(
+            replace(s, via=None if s.via is None else by(s.via)) for s in case.goal.segments
+        ),
+    )
     return replace(case, q=q, goal=goal)
 
 
@@ -190,8 +217,10 @@ def blind(case, point, q, arm):
     speeds = {'velocity': segment.velocity or 0.5, 'acceleration': segment.acceleration or 4.0}
     time = waypoint.time - (goal.waypoints[point - 1].time if point else 0.0)
     # What a posture means is no question of looking ahead.
-    near = (waypoint.posture and nearest_in(
-        arm, waypoint.pose @ case.T_flange_tcp.inverse(), _named(waypoint), q)) or q
+    near = (
+        waypoint.posture
+        and nearest_in(arm, waypoint.pose @ case.T_flange_tcp.inverse(), _named(waypoint), q)
+    ) or q
     match segment.type:
         case SegmentType.JOINT:
             return MoveJ(target=waypoint.pose, q_near=near, duration=time, **speeds)
@@ -208,8 +237,10 @@ def blind(case, point, q, arm):
 
 
 def _named(waypoint):
-    return {JOINT_NAMES.index(name): value for name, value in zip(
-        waypoint.posture.names, waypoint.posture.values, strict=True)}
+    return {
+        JOINT_NAMES.index(name): value
+        for name, value in zip(waypoint.posture.names, waypoint.posture.values, strict=True)
+    }
 
 
 def _astray(made, run) -> str:
@@ -226,5 +257,8 @@ def _missed(case, point, q, arm, run) -> str:
     end = run.pose @ case.T_flange_tcp.inverse()
     chosen = nearest_in(arm, end, named, q)
     off = {JOINT_NAMES[i]: abs(run.q[i] - chosen[i]) for i in named}
-    return ''.join(f'arrives {value:.4f} rad beside the posture of {name}'
-                   for name, value in off.items() if value > 0.01)[:60]
+    return ''.join(
+        f'arrives {value:.4f} rad beside the posture of {name}'
+        for name, value in off.items()
+        if value > 0.01
+    )[:60]

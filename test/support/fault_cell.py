@@ -26,8 +26,11 @@ NEXT_BOUND = 2.0
 #: Of a program that can be played.
 STANDSTILL = (RuntimeState.PAUSED, RuntimeState.STOPPED)
 
-PORTS = {'reverse': robot_cell.REVERSE, 'trajectory': robot_cell.TRAJECTORY,
-         'script command': robot_cell.COMMANDS}
+PORTS = {
+    'reverse': robot_cell.REVERSE,
+    'trajectory': robot_cell.TRAJECTORY,
+    'script command': robot_cell.COMMANDS,
+}
 
 
 async def let_happen(cell: RobotCell, cause: str):
@@ -60,14 +63,18 @@ async def let_happen(cell: RobotCell, cause: str):
 
 def setpoint_connections(cell: RobotCell):
     """Return the connections on which set-points are written, the ends that dialled."""
-    return [end for end in cell.loop.open_ends(robot_cell.RTDE)
-            if SERVO_INPUTS[0].encode() in end.peer.received]
+    return [
+        end
+        for end in cell.loop.open_ends(robot_cell.RTDE)
+        if SERVO_INPUTS[0].encode() in end.peer.received
+    ]
 
 
 async def take_inputs():
     """Be another client that wants to write the inputs which set-points need."""
-    guest = RtdeConnection(RtdeClient(outputs=('timestamp',), inputs=SERVO_INPUTS),
-                           lambda *_: None)
+    guest = RtdeConnection(
+        RtdeClient(outputs=('timestamp',), inputs=SERVO_INPUTS), lambda *_: None
+    )
     await guest.open(HOST, robot_cell.RTDE)
     return guest
 
@@ -163,8 +170,11 @@ async def scenario(cell: RobotCell, row: Row, phase: str, kind=AroundCorners):
     outcome = goal.motion.outcome
     assert outcome.code is row.code, f'{here}: {outcome}'
     assert outcome.text, here
-    await cell.until(lambda: cell.at_rest() and goal.is_over(),
-                     max(STANDING, begin + row.rest - cell.loop.time()), here)
+    await cell.until(
+        lambda: cell.at_rest() and goal.is_over(),
+        max(STANDING, begin + row.rest - cell.loop.time()),
+        here,
+    )
     goal.note_end()
     if not row.waits:
         await cell.until(lambda: cell.status.state is row.then, row.then_within, here)
@@ -192,9 +202,16 @@ async def wait_on(cell, goal, row, here):
 
 async def go_home(cell, home, here):
     """Run the next goal, back to where the arm was."""
-    x, y, z = (a - b for a, b in zip(home, cell.memory.read().actual_tcp_pose.position,
-                                     strict=True))
-    following = cell.owner.start(planned(cell.memory.read(), (
-        (x, y, z) if max(map(abs, (x, y, z))) > 1e-3 else (0.0, 0.01, 0.0),), 0.8, 8.0))
+    x, y, z = (
+        a - b for a, b in zip(home, cell.memory.read().actual_tcp_pose.position, strict=True)
+    )
+    following = cell.owner.start(
+        planned(
+            cell.memory.read(),
+            ((x, y, z) if max(map(abs, (x, y, z))) > 1e-3 else (0.0, 0.01, 0.0),),
+            0.8,
+            8.0,
+        )
+    )
     await cell.until(lambda: following.outcome, NEXT_BOUND, here)
     assert following.outcome.code is ErrorCode.SUCCESSFUL, f'after {here}: {following.outcome}'

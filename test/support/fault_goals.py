@@ -52,13 +52,13 @@ OPTIONS = PlanningOptions(max_tool_speed=1.0)
 def planned(state, offsets, velocity, acceleration, **goal):
     """Return a plan through points beside where the tool stands, with blends between them."""
     (x, y, z), turned = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
-    points = tuple(Waypoint(pose=Pose((x + dx, y + dy, z + dz), turned))
-                   for dx, dy, dz in offsets)
+    points = tuple(Waypoint(pose=Pose((x + dx, y + dy, z + dz), turned)) for dx, dy, dz in offsets)
     blends = [BLEND] * (len(points) - 1) + [0.0]
-    segments = tuple(Segment(velocity=velocity, acceleration=acceleration, blend_radius=blend)
-                     for blend in blends)
-    return plan(Goal(waypoints=points, segments=segments, **goal), state, ARM,
-                OPTIONS)
+    segments = tuple(
+        Segment(velocity=velocity, acceleration=acceleration, blend_radius=blend)
+        for blend in blends
+    )
+    return plan(Goal(waypoints=points, segments=segments, **goal), state, ARM, OPTIONS)
 
 
 class StartingPoint:
@@ -143,13 +143,16 @@ class GoalInTrouble:
 
     def said(self, action):
         """Tell whether an action of this goal was sent."""
-        return any(message.mode is ControlMode.FORWARD and message.payload[0] == action
-                   for message in self.cell.control_messages(self._said_before))
+        return any(
+            message.mode is ControlMode.FORWARD and message.payload[0] == action
+            for message in self.cell.control_messages(self._said_before)
+        )
 
     def wanted(self, mode):
         """Tell whether a control mode was asked for by this goal."""
-        return any(message.mode is mode
-                   for message in self.cell.control_messages(self._said_before))
+        return any(
+            message.mode is mode for message in self.cell.control_messages(self._said_before)
+        )
 
     def has_result(self):
         """Tell whether the robot program has reported the end."""
@@ -159,11 +162,17 @@ class GoalInTrouble:
 def around_square(state, **goal):
     """Return a plan around three sides of a square."""
     return planned(
-        state, ((0.0, SIDE, 0.0), (SIDE, SIDE, 0.0), (SIDE, 0.0, 0.0)), 0.25, 2.0,
-        path_tolerance=Tolerance(position=(PATH_TOLERANCE,) * 3,
-                                 twist=(TWIST_TOLERANCE,) * 3 + (-1.0,) * 3),
-        goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3), goal_time_tolerance=SETTLING,
-        **goal)
+        state,
+        ((0.0, SIDE, 0.0), (SIDE, SIDE, 0.0), (SIDE, 0.0, 0.0)),
+        0.25,
+        2.0,
+        path_tolerance=Tolerance(
+            position=(PATH_TOLERANCE,) * 3, twist=(TWIST_TOLERANCE,) * 3 + (-1.0,) * 3
+        ),
+        goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3),
+        goal_time_tolerance=SETTLING,
+        **goal,
+    )
 
 
 @lru_cache
@@ -214,8 +223,9 @@ def on_half_circle(time):
     along, inwards = (cos(angle), sin(angle)), (-sin(angle), cos(angle))
     place = (RADIUS * sin(angle), RADIUS * (1.0 - cos(angle)))
     velocity = tuple(RADIUS * rate * u for u in along)
-    acceleration = tuple(RADIUS * (change * u + rate**2 * n)
-                         for u, n in zip(along, inwards, strict=True))
+    acceleration = tuple(
+        RADIUS * (change * u + rate**2 * n) for u, n in zip(along, inwards, strict=True)
+    )
     return place, velocity, acceleration
 
 
@@ -225,20 +235,27 @@ def half_circle_goal(state, execution):
     waypoints = []
     for time in PASSED:
         (dx, dy), (vx, vy), (ax, ay) = on_half_circle(time * HALF_CIRCLE)
-        waypoints.append(Waypoint(
-            time=time * HALF_CIRCLE, pose=Pose((x + dx, y + dy, z), turned),
-            twist=(vx, vy, 0.0, 0.0, 0.0, 0.0), acceleration=(ax, ay, 0.0, 0.0, 0.0, 0.0)))
-    return Goal(waypoints=tuple(waypoints), execution=execution,
-                path_tolerance=Tolerance(position=(PATH_TOLERANCE,) * 3),
-                goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3),
-                goal_time_tolerance=SETTLING)
+        waypoints.append(
+            Waypoint(
+                time=time * HALF_CIRCLE,
+                pose=Pose((x + dx, y + dy, z), turned),
+                twist=(vx, vy, 0.0, 0.0, 0.0, 0.0),
+                acceleration=(ax, ay, 0.0, 0.0, 0.0, 0.0),
+            )
+        )
+    return Goal(
+        waypoints=tuple(waypoints),
+        execution=execution,
+        path_tolerance=Tolerance(position=(PATH_TOLERANCE,) * 3),
+        goal_tolerance=Tolerance(position=(GOAL_TOLERANCE,) * 3),
+        goal_time_tolerance=SETTLING,
+    )
 
 
 @lru_cache
 def half_circle(start, execution):
     """Return the plan of a half circle."""
-    return plan(half_circle_goal(start.state, execution), start.state, ARM,
-                OPTIONS)
+    return plan(half_circle_goal(start.state, execution), start.state, ARM, OPTIONS)
 
 
 class AlongSpline(GoalInTrouble):
@@ -289,10 +306,17 @@ AT_ONCE = 0.3
 def around_corners_with_outputs(start, values):
     """Return the plan around three sides of a square, with two outputs that are switched."""
     commands = tuple(
-        IOCommand(waypoint=waypoint, offset=offset, output=OutputKind.STANDARD_DIGITAL, pin=pin,
-                  value=float(value))
+        IOCommand(
+            waypoint=waypoint,
+            offset=offset,
+            output=OutputKind.STANDARD_DIGITAL,
+            pin=pin,
+            value=float(value),
+        )
         for waypoint, offset, pin, value in zip(
-            (1, 2), (0.0, DELAY), (AT_CORNER, AFTER_END), values, strict=True))
+            (1, 2), (0.0, DELAY), (AT_CORNER, AFTER_END), values, strict=True
+        )
+    )
     return around_square(start.state, io_commands=commands)
 
 
@@ -415,5 +439,10 @@ class Guided(GoalInTrouble):
 
 
 #: The goals of the ways of execution.
-GOALS = {'SPLINE': AlongSpline, 'SERVO': Servoed, 'Open goals': Continued,
-         'Outputs': WithOutputs, 'Guided by hand': Guided}
+GOALS = {
+    'SPLINE': AlongSpline,
+    'SERVO': Servoed,
+    'Open goals': Continued,
+    'Outputs': WithOutputs,
+    'Guided by hand': Guided,
+}

@@ -39,31 +39,55 @@ class Mode:
 
 #: Faults that meet what every way of execution has of its own: program, points, packets, stops.
 FAULTS = (
-    'protective stop', 'emergency stop', 'somebody stops the program',
-    "another client's program replaces ours", 'somebody pauses the program',
-    'the speed slider is moved to 0', 'the controller crashes', 'the network cable is cut',
-    'protective stop that the driver does not see', 'RTDE is cut', 'RTDE is 0.1 s late',
-    "the program's sockets are cut", "the program's answers are lost",
-    'the reverse socket is half-open', 'the trajectory socket is half-open',
-    'the pose is measured 6 mm off', 'the node is silent')
+    'protective stop',
+    'emergency stop',
+    'somebody stops the program',
+    "another client's program replaces ours",
+    'somebody pauses the program',
+    'the speed slider is moved to 0',
+    'the controller crashes',
+    'the network cable is cut',
+    'protective stop that the driver does not see',
+    'RTDE is cut',
+    'RTDE is 0.1 s late',
+    "the program's sockets are cut",
+    "the program's answers are lost",
+    'the reverse socket is half-open',
+    'the trajectory socket is half-open',
+    'the pose is measured 6 mm off',
+    'the node is silent',
+)
 #: Where set-points come through RTDE, what else happens to that.
 FAULTS_OF_RTDE = (
-    'safeguard stop', 'somebody switches the arm off',
+    'safeguard stop',
+    'somebody switches the arm off',
     'all connections are cut for 0.1 s, RTDE first',
-    'all connections are cut for 0.1 s, the program first', 'RTDE is half-open',
-    'RTDE is silent for 1.5 s', 'garbage on RTDE',
-    'the reverse socket is cut', 'the trajectory socket is cut')
+    'all connections are cut for 0.1 s, the program first',
+    'RTDE is half-open',
+    'RTDE is silent for 1.5 s',
+    'garbage on RTDE',
+    'the reverse socket is cut',
+    'the trajectory socket is cut',
+)
 #: Where the program stands on the pendant.
 ON_THE_PENDANT = (
-    'protective stop', 'protective stop that the driver does not see',
-    'somebody pauses the program', 'the network cable is cut')
+    'protective stop',
+    'protective stop that the driver does not see',
+    'somebody pauses the program',
+    'the network cable is cut',
+)
 
 #: With after_robot_stop: continue.
 CONTINUES = ('protective stop',)
 
 
-def chosen(rows: Iterable[Row], names: Iterable[str], phases: Iterable[str], undisturbed: float,
-           changes: dict[str, dict[str, dict[str, object]]]) -> tuple[Row, ...]:
+def chosen(
+    rows: Iterable[Row],
+    names: Iterable[str],
+    phases: Iterable[str],
+    undisturbed: float,
+    changes: dict[str, dict[str, dict[str, object]]],
+) -> tuple[Row, ...]:
     """
     Return rows of a table for the phases of a way of execution.
 
@@ -72,19 +96,32 @@ def chosen(rows: Iterable[Row], names: Iterable[str], phases: Iterable[str], und
     :param changes: fault -> phase, or '' for all of them -> what is different.
     """
     by_name = {row.fault: row for row in rows}
-    return tuple(_adapted(by_name[name], tuple(phases), undisturbed, changes.get(name, {}))
-                 for name in names)
+    return tuple(
+        _adapted(by_name[name], tuple(phases), undisturbed, changes.get(name, {}))
+        for name in names
+    )
 
 
-def _adapted(row: Row, phases: tuple[str, ...], undisturbed: float,
-             changes: dict[str, dict[str, object]]) -> Row:
+def _adapted(
+    row: Row, phases: tuple[str, ...], undisturbed: float, changes: dict[str, dict[str, object]]
+) -> Row:
     """Return a row whose differences are those of other phases, and the changes."""
-    differs = {phase: row.differs.get(phase, {}) | changes.get(phase, {}) for phase in phases
-               if phase in row.differs or phase in changes}
+    differs = {
+        phase: row.differs.get(phase, {}) | changes.get(phase, {})
+        for phase in phases
+        if phase in row.differs or phase in changes
+    }
     usual = replace(row, **changes.get('', {}), differs={})
-    return _long_enough(replace(usual, differs={
-        phase: _times(replace(usual, **differing), undisturbed, differing)
-        for phase, differing in differs.items()}), undisturbed)
+    return _long_enough(
+        replace(
+            usual,
+            differs={
+                phase: _times(replace(usual, **differing), undisturbed, differing)
+                for phase, differing in differs.items()
+            },
+        ),
+        undisturbed,
+    )
 
 
 def _long_enough(row: Row, undisturbed: float) -> Row:
@@ -98,11 +135,20 @@ def _times(row: Row, undisturbed: float, differing: dict[str, object]) -> dict[s
     return differing | {'bound': undisturbed, 'rest': undisturbed}
 
 
-def _mode(name: str, about: str, phases: dict[str, str], undisturbed: float,
-          changes: dict[str, dict[str, dict[str, object]]], *, faults: Iterable[str] = FAULTS,
-          pendant: Iterable[str] = ON_THE_PENDANT, continued: Iterable[str] = CONTINUES,
-          once: tuple[str, Iterable[str]] = ('', ()), more: tuple[Row, ...] = (),
-          changes_there: dict[str, dict[str, dict[str, object]]] | None = None) -> Mode:
+def _mode(
+    name: str,
+    about: str,
+    phases: dict[str, str],
+    undisturbed: float,
+    changes: dict[str, dict[str, dict[str, object]]],
+    *,
+    faults: Iterable[str] = FAULTS,
+    pendant: Iterable[str] = ON_THE_PENDANT,
+    continued: Iterable[str] = CONTINUES,
+    once: tuple[str, Iterable[str]] = ('', ()),
+    more: tuple[Row, ...] = (),
+    changes_there: dict[str, dict[str, dict[str, object]]] | None = None,
+) -> Mode:
     """
     Return a way of execution.
 
@@ -110,37 +156,85 @@ def _mode(name: str, about: str, phases: dict[str, str], undisturbed: float,
     :param changes_there: those of the rows of the pendant, where they are others.
     """
     return Mode(
-        name=name, about=about, phases=phases, undisturbed=undisturbed,
-        headless=(*chosen(HEADLESS, faults, phases, undisturbed, changes), *more, *(
-            replace(row, phases=once[:1])
-            for row in chosen(HEADLESS, once[1], phases, undisturbed, changes))),
-        local=chosen(LOCAL, pendant, phases, undisturbed,
-                     changes if changes_there is None else changes_there),
-        continued=chosen(CONTINUED, continued, phases, undisturbed, changes))
+        name=name,
+        about=about,
+        phases=phases,
+        undisturbed=undisturbed,
+        headless=(
+            *chosen(HEADLESS, faults, phases, undisturbed, changes),
+            *more,
+            *(
+                replace(row, phases=once[:1])
+                for row in chosen(HEADLESS, once[1], phases, undisturbed, changes)
+            ),
+        ),
+        local=chosen(
+            LOCAL,
+            pendant,
+            phases,
+            undisturbed,
+            changes if changes_there is None else changes_there,
+        ),
+        continued=chosen(CONTINUED, continued, phases, undisturbed, changes),
+    )
 
 
 SPLINE = _mode(
-    'SPLINE', 'A half circle through four points, all but the last with twist and acceleration.',
-    {'between points': 'on the way from the second point to the third',
-     'slowing down': 'on the way to the last point, a tenth of a second before it',
-     'cancelling': 'CANCEL is on the wire, the arm still moves'},
-    1.6, {'the reverse socket is half-open': {'slowing down': {'code': E.SUCCESSFUL}},
-          'the node is silent': {'slowing down': {'code': E.SUCCESSFUL}}})
+    'SPLINE',
+    'A half circle through four points, all but the last with twist and acceleration.',
+    {
+        'between points': 'on the way from the second point to the third',
+        'slowing down': 'on the way to the last point, a tenth of a second before it',
+        'cancelling': 'CANCEL is on the wire, the arm still moves',
+    },
+    1.6,
+    {
+        'the reverse socket is half-open': {'slowing down': {'code': E.SUCCESSFUL}},
+        'the node is silent': {'slowing down': {'code': E.SUCCESSFUL}},
+    },
+)
 
 #: What is a matter of the set-points' own connection.
 SETPOINTS = (
-    Row(fault='the connection of the set-points is cut', cause=('cut set-points',),
-        code=E.CONNECTION_LOST, differs={'entering': {'code': E.ROBOT_NOT_READY}}),
-    Row(fault='the connection of the set-points is half-open', cause=('freeze set-points',),
-        code=E.PROGRAM_STOPPED, bound=0.7, rest=0.7, then=S.CONNECTED,
+    Row(
+        fault='the connection of the set-points is cut',
+        cause=('cut set-points',),
+        code=E.CONNECTION_LOST,
+        differs={'entering': {'code': E.ROBOT_NOT_READY}},
+    ),
+    Row(
+        fault='the connection of the set-points is half-open',
+        cause=('freeze set-points',),
+        code=E.PROGRAM_STOPPED,
+        bound=0.7,
+        rest=0.7,
+        then=S.CONNECTED,
         steps=('wait until it is over', 'resend'),
-        differs={'cancelling': {'code': E.CANCELLED, 'then': S.READY,
-                                'steps': ('wait until it is over',)}}),
-    Row(fault='RTDE is 0.05 s late', cause=('delay rtde 0.05 s',), code=E.SUCCESSFUL, bound=4.0,
-        rest=4.0, steps=('wait until it is over',),
-        differs={'cancelling': {'code': E.CANCELLED, 'bound': 0.7, 'rest': 0.7}}),
-    Row(fault='another client has taken the inputs that set-points need', phases=('idle',),
-        cause=('take the inputs',), code=E.ROBOT_NOT_READY, steps=('wait until it is over',)))
+        differs={
+            'cancelling': {
+                'code': E.CANCELLED,
+                'then': S.READY,
+                'steps': ('wait until it is over',),
+            }
+        },
+    ),
+    Row(
+        fault='RTDE is 0.05 s late',
+        cause=('delay rtde 0.05 s',),
+        code=E.SUCCESSFUL,
+        bound=4.0,
+        rest=4.0,
+        steps=('wait until it is over',),
+        differs={'cancelling': {'code': E.CANCELLED, 'bound': 0.7, 'rest': 0.7}},
+    ),
+    Row(
+        fault='another client has taken the inputs that set-points need',
+        phases=('idle',),
+        cause=('take the inputs',),
+        code=E.ROBOT_NOT_READY,
+        steps=('wait until it is over',),
+    ),
+)
 
 #: Nothing has moved yet, and the goal ends because the robot does not answer.
 _NOT_ENTERED = {'entering': {'code': E.ROBOT_NOT_READY}}
@@ -148,70 +242,131 @@ _NOT_ENTERED = {'entering': {'code': E.ROBOT_NOT_READY}}
 _LEFT_PAUSED = {'cancelling': {'bound': 0.7, 'steps': ('play',)}}
 #: Set-points stay away, so the robot program brakes and ends; then the driver finds that the
 #: robot is silent.
-_DEAF = {'': {'code': E.PROGRAM_STOPPED, 'bound': 0.7, 'rest': 0.7, 'then': S.DISCONNECTED,
-              'then_within': 1.5, 'steps': ('wait for the robot', 'resend'), 'back': 3.0}}
+_DEAF = {
+    '': {
+        'code': E.PROGRAM_STOPPED,
+        'bound': 0.7,
+        'rest': 0.7,
+        'then': S.DISCONNECTED,
+        'then_within': 1.5,
+        'steps': ('wait for the robot', 'resend'),
+        'back': 3.0,
+    }
+}
 
 SERVO = _mode(
-    'SERVO', 'The same half circle as set-points, which the robot program buffers.',
-    {'entering': 'the robot program is told to take set-points, nothing has moved',
-     'between points': 'on the way from the second point to the third',
-     'slowing down': 'on the way to the last point, a tenth of a second before it',
-     'cancelling': 'the driver has left the mode of set-points, the arm still moves'},
-    1.8, {
+    'SERVO',
+    'The same half circle as set-points, which the robot program buffers.',
+    {
+        'entering': 'the robot program is told to take set-points, nothing has moved',
+        'between points': 'on the way from the second point to the third',
+        'slowing down': 'on the way to the last point, a tenth of a second before it',
+        'cancelling': 'the driver has left the mode of set-points, the arm still moves',
+    },
+    1.8,
+    {
         'somebody pauses the program': _LEFT_PAUSED,
-        'the network cable is cut': _NOT_ENTERED | {
-            '': {'steps': ('wait until it is over', 'resend')}},
+        'the network cable is cut': _NOT_ENTERED
+        | {'': {'steps': ('wait until it is over', 'resend')}},
         'protective stop that the driver does not see': _NOT_ENTERED,
         'RTDE is cut': _NOT_ENTERED,
         'RTDE is half-open': _DEAF,
         'RTDE is silent for 1.5 s': _DEAF,
         'garbage on RTDE': _DEAF,
         "the program's answers are lost": {
-            '': {'code': E.SUCCESSFUL, 'then': S.READY, 'steps': ('wait until it is over',)}},
+            '': {'code': E.SUCCESSFUL, 'then': S.READY, 'steps': ('wait until it is over',)}
+        },
         'the reverse socket is half-open': {'slowing down': {'code': E.SUCCESSFUL}},
-        'the node is silent': {'slowing down': {'code': E.SUCCESSFUL}}},
-    faults=tuple(name for name in FAULTS if name not in (
-        'the trajectory socket is half-open', 'RTDE is 0.1 s late')),
-    once=('between points', FAULTS_OF_RTDE), more=SETPOINTS, changes_there={
+        'the node is silent': {'slowing down': {'code': E.SUCCESSFUL}},
+    },
+    faults=tuple(
+        name
+        for name in FAULTS
+        if name not in ('the trajectory socket is half-open', 'RTDE is 0.1 s late')
+    ),
+    once=('between points', FAULTS_OF_RTDE),
+    more=SETPOINTS,
+    changes_there={
         'somebody pauses the program': _LEFT_PAUSED,
-        'the network cable is cut': _NOT_ENTERED | {
-            '': {'steps': ('wait until it is over', 'play')}},
-        'protective stop that the driver does not see': _NOT_ENTERED})
+        'the network cable is cut': _NOT_ENTERED
+        | {'': {'steps': ('wait until it is over', 'play')}},
+        'protective stop that the driver does not see': _NOT_ENTERED,
+    },
+)
 
 OUTPUTS = _mode(
-    'Outputs', 'PRIMITIVES around two corners; one output is switched in the second corner, '
+    'Outputs',
+    'PRIMITIVES around two corners; one output is switched in the second corner, '
     'another one 0.6 s after the end. What still waits when a goal does not succeed is not '
     'switched any more.',
-    {'before the place': 'on the way to the corner',
-     'before the time': 'the arm stands at the last point, the last output is not yet switched',
-     'cancelling': 'CANCEL is on the wire, the arm still moves'},
-    2.0, {'the speed slider is moved to 0': {
-        'before the time': {'waits': False, 'steps': ('move the slider up',)}}},
-    faults=tuple(name for name in FAULTS if name not in (
-        "another client's program replaces ours", 'the controller crashes')),
-    pendant=('protective stop', 'somebody pauses the program'))
+    {
+        'before the place': 'on the way to the corner',
+        'before the time': 'the arm stands at the last point, the last output is not yet switched',
+        'cancelling': 'CANCEL is on the wire, the arm still moves',
+    },
+    2.0,
+    {
+        'the speed slider is moved to 0': {
+            'before the time': {'waits': False, 'steps': ('move the slider up',)}
+        }
+    },
+    faults=tuple(
+        name
+        for name in FAULTS
+        if name not in ("another client's program replaces ours", 'the controller crashes')
+    ),
+    pendant=('protective stop', 'somebody pauses the program'),
+)
 
 OPEN = _mode(
-    'Open goals', 'A goal that is continued while it runs (`keep_open`); the last points are '
+    'Open goals',
+    'A goal that is continued while it runs (`keep_open`); the last points are '
     'appended when the fault is there.',
-    {'moving': 'on the way, more points are expected',
-     'closing': 'none came in time, the arm is being brought to rest behind the last one',
-     'waiting': 'the arm is at rest, and waits for more points',
-     'cancelling': 'CANCEL is on the wire, the arm still moves'},
-    2.5, {}, faults=tuple(name for name in FAULTS if name not in (
-        'emergency stop', "another client's program replaces ours", 'the controller crashes',
-        "the program's sockets are cut")))
+    {
+        'moving': 'on the way, more points are expected',
+        'closing': 'none came in time, the arm is being brought to rest behind the last one',
+        'waiting': 'the arm is at rest, and waits for more points',
+        'cancelling': 'CANCEL is on the wire, the arm still moves',
+    },
+    2.5,
+    {},
+    faults=tuple(
+        name
+        for name in FAULTS
+        if name
+        not in (
+            'emergency stop',
+            "another client's program replaces ours",
+            'the controller crashes',
+            "the program's sockets are cut",
+        )
+    ),
+)
 
-GUIDED = replace(_mode(
-    'Guided by hand', 'No goal, but ended by the same things: `~/teach_mode` lets a person push '
-    'the arm. When it "stands" it cannot be pushed any more.',
-    {'guided': 'a person may push the arm'}, 0.0, {},
-    faults=('protective stop', 'emergency stop', 'somebody stops the program',
-            'the network cable is cut', 'protective stop that the driver does not see',
-            'RTDE is cut', "the program's sockets are cut", 'the reverse socket is half-open',
-            'the node is silent'),
-    pendant=('protective stop', 'the network cable is cut'), continued=(),
-    more=tuple(row for row in SETPOINTS if not row.phases and row.code is not E.SUCCESSFUL)),
-    settings={'allow_teach': True})
+GUIDED = replace(
+    _mode(
+        'Guided by hand',
+        'No goal, but ended by the same things: `~/teach_mode` lets a person push '
+        'the arm. When it "stands" it cannot be pushed any more.',
+        {'guided': 'a person may push the arm'},
+        0.0,
+        {},
+        faults=(
+            'protective stop',
+            'emergency stop',
+            'somebody stops the program',
+            'the network cable is cut',
+            'protective stop that the driver does not see',
+            'RTDE is cut',
+            "the program's sockets are cut",
+            'the reverse socket is half-open',
+            'the node is silent',
+        ),
+        pendant=('protective stop', 'the network cable is cut'),
+        continued=(),
+        more=tuple(row for row in SETPOINTS if not row.phases and row.code is not E.SUCCESSFUL),
+    ),
+    settings={'allow_teach': True},
+)
 
 MODES = (SPLINE, SERVO, OPEN, OUTPUTS, GUIDED)

@@ -81,138 +81,356 @@ POWER_UP = ('power on', 'release the brakes')
 def _safety(fault: str, cause: str, code: ErrorCode, *steps: str, play: bool = True) -> Row:
     """Return the row of a stop by the safety system; ``play``: the program is only paused."""
     before = {'code': E.ROBOT_NOT_READY} | ({'steps': (*steps, 'play')} if play else {})
-    return Row(fault=fault, cause=(cause,), code=code, then=S.STOPPED,
-               steps=(*steps, 'play', 'resend'), differs=_in(BEFORE, **before))
+    return Row(
+        fault=fault,
+        cause=(cause,),
+        code=code,
+        then=S.STOPPED,
+        steps=(*steps, 'play', 'resend'),
+        differs=_in(BEFORE, **before),
+    )
 
 
 def _harmless(fault: str, *cause: str, steps: tuple[str, ...] = ()) -> Row:
-    return Row(fault=fault, cause=cause, code=E.SUCCESSFUL, **UNDISTURBED, steps=steps,
-               differs=_in(('cancelling',), code=E.CANCELLED, bound=0.7, rest=0.7))
+    return Row(
+        fault=fault,
+        cause=cause,
+        code=E.SUCCESSFUL,
+        **UNDISTURBED,
+        steps=steps,
+        differs=_in(('cancelling',), code=E.CANCELLED, bound=0.7, rest=0.7),
+    )
 
 
 def _hangs_up(fault: str, cause: str) -> Row:
-    return Row(fault=fault, cause=(cause,), code=E.PROGRAM_STOPPED, then=S.CONNECTED,
-               steps=('resend',), differs=REFUSED)
+    return Row(
+        fault=fault,
+        cause=(cause,),
+        code=E.PROGRAM_STOPPED,
+        then=S.CONNECTED,
+        steps=('resend',),
+        differs=REFUSED,
+    )
 
 
 #: The messages that the program finds when it goes on tell it that its goal is over.
 UNSEEN_STOP = Row(
-    fault='protective stop that the driver does not see', cause=(
-        'drop rtde for 0.3 s', 'protective_stop'), code=E.CONNECTION_LOST, then=S.STOPPED,
-    then_within=1.5, steps=('unlock', 'play'), differs=REFUSED)
+    fault='protective stop that the driver does not see',
+    cause=('drop rtde for 0.3 s', 'protective_stop'),
+    code=E.CONNECTION_LOST,
+    then=S.STOPPED,
+    then_within=1.5,
+    steps=('unlock', 'play'),
+    differs=REFUSED,
+)
 
 #: The stopped program never runs again by itself, whoever unlocks or plays.
 HEADLESS = (
     _safety('protective stop', 'protective_stop', E.PROTECTIVE_STOP, 'unlock'),
     _safety('safeguard stop', 'safeguard_stop', E.PROTECTIVE_STOP, 'reset the safeguard'),
-    _safety('emergency stop', 'emergency_stop', E.EMERGENCY_STOP, 'release the button',
-            *POWER_UP),
-    _safety('violation of a safety limit', 'violation', E.PROTECTIVE_STOP, 'restart safety',
-            *POWER_UP, play=False),
-    _safety('fault of the safety system', 'fault', E.PROTECTIVE_STOP, 'restart safety',
-            *POWER_UP, play=False),
-    Row(fault='somebody stops the program', cause=('stop',), code=E.PROGRAM_STOPPED,
-        then=S.CONNECTED, steps=('play', 'resend'), differs=REFUSED),
-    Row(fault='somebody switches the arm off', cause=('power_off',), code=E.PROGRAM_STOPPED,
-        then=S.CONNECTED, steps=(*POWER_UP, 'play', 'resend'), differs=REFUSED),
-    Row(fault="another client's program replaces ours", cause=('foreign_motion z 0.02',),
-        code=E.PROGRAM_STOPPED, then=S.CONNECTED, rest=2.0, steps=('resend',), differs=REFUSED),
-    Row(fault='somebody pauses the program', cause=('pause',), code=E.SUCCESSFUL, waits=True,
-        steps=('play',), differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False,
-                                     then=S.CONNECTED) | {
-            'cancelling': {'code': E.CANCELLED, 'waits': False, 'bound': 3.3,
-                           'then': S.CONNECTED, 'steps': ('play', 'resend')}}),
-    Row(fault='the speed slider is moved to 0', cause=('slider 0',), code=E.SUCCESSFUL,
-        waits=True, steps=('move the slider up',),
-        differs={'cancelling': {'code': E.CANCELLED, 'waits': False}}),
-    _harmless('somebody plays or unlocks what is not stopped', 'play', 'unlock',
-              'reset_safeguard', 'release_emergency_stop'),
-    Row(fault='the controller crashes', cause=('crash',), code=E.CONNECTION_LOST,
-        then=S.DISCONNECTED, steps=('start the controller', *POWER_UP, 'resend'),
-        differs=REFUSED),
-    Row(fault='the network cable is cut', cause=('freeze all',), code=E.CONNECTION_LOST,
-        bound=1.3, rest=0.7, then=S.CONNECTED, steps=('resend',)),
-    *(Row(fault=f'all connections are cut for 0.1 s, {first} first',
-          cause=tuple(f'drop {name} for 0.1 s' for name in order), code=E.CONNECTION_LOST,
-          then=S.CONNECTED, then_within=1.0, steps=('resend',), differs=REFUSED)
-      for first, order in (('RTDE', ('rtde', 'primary', 'sockets')),
-                           ('the program', ('sockets', 'primary', 'rtde')))),
+    _safety('emergency stop', 'emergency_stop', E.EMERGENCY_STOP, 'release the button', *POWER_UP),
+    _safety(
+        'violation of a safety limit',
+        'violation',
+        E.PROTECTIVE_STOP,
+        'restart safety',
+        *POWER_UP,
+        play=False,
+    ),
+    _safety(
+        'fault of the safety system',
+        'fault',
+        E.PROTECTIVE_STOP,
+        'restart safety',
+        *POWER_UP,
+        play=False,
+    ),
+    Row(
+        fault='somebody stops the program',
+        cause=('stop',),
+        code=E.PROGRAM_STOPPED,
+        then=S.CONNECTED,
+        steps=('play', 'resend'),
+        differs=REFUSED,
+    ),
+    Row(
+        fault='somebody switches the arm off',
+        cause=('power_off',),
+        code=E.PROGRAM_STOPPED,
+        then=S.CONNECTED,
+        steps=(*POWER_UP, 'play', 'resend'),
+        differs=REFUSED,
+    ),
+    Row(
+        fault="another client's program replaces ours",
+        cause=('foreign_motion z 0.02',),
+        code=E.PROGRAM_STOPPED,
+        then=S.CONNECTED,
+        rest=2.0,
+        steps=('resend',),
+        differs=REFUSED,
+    ),
+    Row(
+        fault='somebody pauses the program',
+        cause=('pause',),
+        code=E.SUCCESSFUL,
+        waits=True,
+        steps=('play',),
+        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False, then=S.CONNECTED)
+        | {
+            'cancelling': {
+                'code': E.CANCELLED,
+                'waits': False,
+                'bound': 3.3,
+                'then': S.CONNECTED,
+                'steps': ('play', 'resend'),
+            }
+        },
+    ),
+    Row(
+        fault='the speed slider is moved to 0',
+        cause=('slider 0',),
+        code=E.SUCCESSFUL,
+        waits=True,
+        steps=('move the slider up',),
+        differs={'cancelling': {'code': E.CANCELLED, 'waits': False}},
+    ),
+    _harmless(
+        'somebody plays or unlocks what is not stopped',
+        'play',
+        'unlock',
+        'reset_safeguard',
+        'release_emergency_stop',
+    ),
+    Row(
+        fault='the controller crashes',
+        cause=('crash',),
+        code=E.CONNECTION_LOST,
+        then=S.DISCONNECTED,
+        steps=('start the controller', *POWER_UP, 'resend'),
+        differs=REFUSED,
+    ),
+    Row(
+        fault='the network cable is cut',
+        cause=('freeze all',),
+        code=E.CONNECTION_LOST,
+        bound=1.3,
+        rest=0.7,
+        then=S.CONNECTED,
+        steps=('resend',),
+    ),
+    *(
+        Row(
+            fault=f'all connections are cut for 0.1 s, {first} first',
+            cause=tuple(f'drop {name} for 0.1 s' for name in order),
+            code=E.CONNECTION_LOST,
+            then=S.CONNECTED,
+            then_within=1.0,
+            steps=('resend',),
+            differs=REFUSED,
+        )
+        for first, order in (
+            ('RTDE', ('rtde', 'primary', 'sockets')),
+            ('the program', ('sockets', 'primary', 'rtde')),
+        )
+    ),
     UNSEEN_STOP,
-    Row(fault='protective stop while the primary interface is down', cause=(
-        'drop primary for 0.5 s', 'protective_stop'), code=E.PROTECTIVE_STOP, then=S.STOPPED,
+    Row(
+        fault='protective stop while the primary interface is down',
+        cause=('drop primary for 0.5 s', 'protective_stop'),
+        code=E.PROTECTIVE_STOP,
+        then=S.STOPPED,
         steps=('unlock', 'play', 'wait until it is over', 'resend'),
-        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, steps=('unlock', 'play'))),
+        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, steps=('unlock', 'play')),
+    ),
     Row(fault='RTDE is cut', cause=('drop rtde',), code=E.CONNECTION_LOST, differs=REFUSED),
-    Row(fault='RTDE is half-open', cause=('half_open rtde',), code=E.CONNECTION_LOST, bound=1.3,
-        rest=1.7),
-    Row(fault='RTDE is silent for 1.5 s', cause=('silence rtde for 1.5 s',),
-        code=E.CONNECTION_LOST, bound=1.3, rest=1.7, then=S.DISCONNECTED, back=4.0),
+    Row(
+        fault='RTDE is half-open',
+        cause=('half_open rtde',),
+        code=E.CONNECTION_LOST,
+        bound=1.3,
+        rest=1.7,
+    ),
+    Row(
+        fault='RTDE is silent for 1.5 s',
+        cause=('silence rtde for 1.5 s',),
+        code=E.CONNECTION_LOST,
+        bound=1.3,
+        rest=1.7,
+        then=S.DISCONNECTED,
+        back=4.0,
+    ),
     _harmless('RTDE is 0.1 s late', 'delay rtde 0.1 s', steps=('wait until it is over',)),
-    _harmless('RTDE carries less than it should', 'throttle rtde 60000',
-              steps=('wait until it is over',)),
-    Row(fault='RTDE carries next to nothing', cause=('throttle rtde 300',),
-        code=E.CONNECTION_LOST, bound=2.3, rest=2.7, then=S.DISCONNECTED,
-        steps=('wait until it is over',), back=4.0),
-    Row(fault='garbage on RTDE', cause=('garbage rtde 64',), code=E.CONNECTION_LOST, bound=2.0,
-        rest=2.0),
+    _harmless(
+        'RTDE carries less than it should', 'throttle rtde 60000', steps=('wait until it is over',)
+    ),
+    Row(
+        fault='RTDE carries next to nothing',
+        cause=('throttle rtde 300',),
+        code=E.CONNECTION_LOST,
+        bound=2.3,
+        rest=2.7,
+        then=S.DISCONNECTED,
+        steps=('wait until it is over',),
+        back=4.0,
+    ),
+    Row(
+        fault='garbage on RTDE',
+        cause=('garbage rtde 64',),
+        code=E.CONNECTION_LOST,
+        bound=2.0,
+        rest=2.0,
+    ),
     _harmless('the primary interface is cut', 'drop primary'),
     _harmless('the primary interface is half-open', 'half_open primary'),
-    _harmless('the primary interface is silent', 'silence primary',
-              steps=('wait until it is over',)),
-    _harmless('the primary interface is late and slow', 'delay primary 0.1 s',
-              'throttle primary 1000', steps=('wait until it is over',)),
+    _harmless(
+        'the primary interface is silent', 'silence primary', steps=('wait until it is over',)
+    ),
+    _harmless(
+        'the primary interface is late and slow',
+        'delay primary 0.1 s',
+        'throttle primary 1000',
+        steps=('wait until it is over',),
+    ),
     _harmless('garbage on the primary interface', 'garbage primary 64'),
-    _harmless('all other interfaces are cut', 'drop secondary', 'drop realtime',
-              'drop dashboard', 'drop interpreter'),
+    _harmless(
+        'all other interfaces are cut',
+        'drop secondary',
+        'drop realtime',
+        'drop dashboard',
+        'drop interpreter',
+    ),
     _hangs_up("the program's sockets are cut", 'drop sockets'),
-    Row(fault="the program's sockets are half-open", cause=('half_open sockets',),
-        code=E.PROGRAM_STOPPED, bound=0.7, rest=0.7, then=S.CONNECTED, steps=('resend',)),
-    Row(fault="the program's answers are lost", cause=('silence sockets',),
-        code=E.EXECUTION_FAILED, bound=3.5, rest=1.2, then=S.CONNECTED,
-        steps=('wait until it is over', 'resend'), differs={
-            'settling': {'code': E.SUCCESSFUL, 'then': S.READY,
-                         'steps': ('wait until it is over',)},
-            'cancelling': {'code': E.CANCELLED}}),
-    _harmless("the program's sockets are 0.05 s late", 'delay sockets 0.05 s',
-              steps=('wait until it is over',)),
-    _harmless("the program's sockets carry 2500 bytes/s", 'throttle sockets 2500',
-              steps=('wait until it is over',)),
+    Row(
+        fault="the program's sockets are half-open",
+        cause=('half_open sockets',),
+        code=E.PROGRAM_STOPPED,
+        bound=0.7,
+        rest=0.7,
+        then=S.CONNECTED,
+        steps=('resend',),
+    ),
+    Row(
+        fault="the program's answers are lost",
+        cause=('silence sockets',),
+        code=E.EXECUTION_FAILED,
+        bound=3.5,
+        rest=1.2,
+        then=S.CONNECTED,
+        steps=('wait until it is over', 'resend'),
+        differs={
+            'settling': {
+                'code': E.SUCCESSFUL,
+                'then': S.READY,
+                'steps': ('wait until it is over',),
+            },
+            'cancelling': {'code': E.CANCELLED},
+        },
+    ),
+    _harmless(
+        "the program's sockets are 0.05 s late",
+        'delay sockets 0.05 s',
+        steps=('wait until it is over',),
+    ),
+    _harmless(
+        "the program's sockets carry 2500 bytes/s",
+        'throttle sockets 2500',
+        steps=('wait until it is over',),
+    ),
     _hangs_up("garbage on the program's sockets", 'garbage sockets 64'),
-    *(_hangs_up(f'the {name} socket is cut', f'cut {name}')
-      for name in ('reverse', 'trajectory', 'script command')),
-    Row(fault='the reverse socket is half-open', cause=('freeze reverse',),
-        code=E.PROGRAM_STOPPED, bound=0.7, rest=0.7, then=S.CONNECTED, steps=('resend',),
-        differs=CANCELLED | {'last point': {'code': E.SUCCESSFUL}}),
-    Row(fault='the trajectory socket is half-open', cause=('freeze trajectory',),
-        code=E.EXECUTION_FAILED, bound=3.5, rest=1.2, then=S.CONNECTED, steps=('resend',),
-        differs={'settling': {'code': E.SUCCESSFUL, 'then': S.READY},
-                 'cancelling': {'code': E.CANCELLED}}),
+    *(
+        _hangs_up(f'the {name} socket is cut', f'cut {name}')
+        for name in ('reverse', 'trajectory', 'script command')
+    ),
+    Row(
+        fault='the reverse socket is half-open',
+        cause=('freeze reverse',),
+        code=E.PROGRAM_STOPPED,
+        bound=0.7,
+        rest=0.7,
+        then=S.CONNECTED,
+        steps=('resend',),
+        differs=CANCELLED | {'last point': {'code': E.SUCCESSFUL}},
+    ),
+    Row(
+        fault='the trajectory socket is half-open',
+        cause=('freeze trajectory',),
+        code=E.EXECUTION_FAILED,
+        bound=3.5,
+        rest=1.2,
+        then=S.CONNECTED,
+        steps=('resend',),
+        differs={
+            'settling': {'code': E.SUCCESSFUL, 'then': S.READY},
+            'cancelling': {'code': E.CANCELLED},
+        },
+    ),
     _harmless('the script command socket is half-open', 'freeze script command'),
-    Row(fault='the pose is measured 6 mm off', cause=('offset pose z 0.006',),
-        code=E.PATH_TOLERANCE_VIOLATED, bound=0.7, steps=('wait until it is over',),
-        differs=CANCELLED | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'bound': 1.7}}),
-    Row(fault='the measured pose drifts off', cause=('ramp pose z 0.1',),
-        code=E.PATH_TOLERANCE_VIOLATED, bound=0.7, rest=0.7, steps=('wait until it is over',),
-        differs=CANCELLED | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'bound': 1.7}}),
-    _harmless('the pose is measured with noise of 0.1 mm', 'noise pose z 0.0001',
-              steps=('wait until it is over',)),
-    Row(fault='the twist is measured 0.5 m/s off for 0.3 s',
-        cause=('offset twist z 0.5 for 0.3 s',), code=E.PATH_TOLERANCE_VIOLATED, bound=0.7,
-        differs=CANCELLED | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'bound': 1.7}}),
-    Row(fault='the node is silent', cause=('silent owner',), code=E.CANCELLED, bound=0.9,
-        rest=1.0, steps=('wait until it is over',),
-        differs={'last point': {'code': E.SUCCESSFUL}}),
+    Row(
+        fault='the pose is measured 6 mm off',
+        cause=('offset pose z 0.006',),
+        code=E.PATH_TOLERANCE_VIOLATED,
+        bound=0.7,
+        steps=('wait until it is over',),
+        differs=CANCELLED | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'bound': 1.7}},
+    ),
+    Row(
+        fault='the measured pose drifts off',
+        cause=('ramp pose z 0.1',),
+        code=E.PATH_TOLERANCE_VIOLATED,
+        bound=0.7,
+        rest=0.7,
+        steps=('wait until it is over',),
+        differs=CANCELLED | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'bound': 1.7}},
+    ),
+    _harmless(
+        'the pose is measured with noise of 0.1 mm',
+        'noise pose z 0.0001',
+        steps=('wait until it is over',),
+    ),
+    Row(
+        fault='the twist is measured 0.5 m/s off for 0.3 s',
+        cause=('offset twist z 0.5 for 0.3 s',),
+        code=E.PATH_TOLERANCE_VIOLATED,
+        bound=0.7,
+        differs=CANCELLED | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'bound': 1.7}},
+    ),
+    Row(
+        fault='the node is silent',
+        cause=('silent owner',),
+        code=E.CANCELLED,
+        bound=0.9,
+        rest=1.0,
+        steps=('wait until it is over',),
+        differs={'last point': {'code': E.SUCCESSFUL}},
+    ),
 )
 
 
 #: With ``after_robot_stop: continue``, for those who want what the robot does by itself.
 CONTINUED = tuple(
-    Row(fault=fault, cause=(cause,), code=E.SUCCESSFUL, waits=True, steps=(step, 'play'),
-        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False, then=S.STOPPED) | {
-            'cancelling': {'code': E.CANCELLED, 'waits': False, 'bound': 3.3,
-                           'then': S.STOPPED, 'steps': (step, 'play', 'resend')}})
-    for fault, cause, step in (('protective stop', 'protective_stop', 'unlock'),
-                               ('safeguard stop', 'safeguard_stop', 'reset the safeguard')))
+    Row(
+        fault=fault,
+        cause=(cause,),
+        code=E.SUCCESSFUL,
+        waits=True,
+        steps=(step, 'play'),
+        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False, then=S.STOPPED)
+        | {
+            'cancelling': {
+                'code': E.CANCELLED,
+                'waits': False,
+                'bound': 3.3,
+                'then': S.STOPPED,
+                'steps': (step, 'play', 'resend'),
+            }
+        },
+    )
+    for fault, cause, step in (
+        ('protective stop', 'protective_stop', 'unlock'),
+        ('safeguard stop', 'safeguard_stop', 'reset the safeguard'),
+    )
+)
 
 
 def _paused_by(fault: str, cause: str, code: ErrorCode, *steps: str) -> Row:
@@ -222,27 +440,66 @@ def _paused_by(fault: str, cause: str, code: ErrorCode, *steps: str) -> Row:
     The interface takes no 'stop program', so the old motion goes on with the play until the
     program reads the message that ends it; after that it has to be played again.
     """
-    return Row(fault=fault, cause=(cause,), code=code, then=S.STOPPED, travel=0.001,
-               steps=(*steps, 'play', 'play'),
-               differs=_in(BEFORE, code=E.ROBOT_NOT_READY, steps=(*steps, 'play'), travel=0.0)
-               | {'settling': {'travel': 0.0}})
+    return Row(
+        fault=fault,
+        cause=(cause,),
+        code=code,
+        then=S.STOPPED,
+        travel=0.001,
+        steps=(*steps, 'play', 'play'),
+        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, steps=(*steps, 'play'), travel=0.0)
+        | {'settling': {'travel': 0.0}},
+    )
 
 
 LOCAL = (
     _paused_by('protective stop', 'protective_stop', E.PROTECTIVE_STOP, 'unlock'),
     _paused_by('safeguard stop', 'safeguard_stop', E.PROTECTIVE_STOP, 'reset the safeguard'),
-    _paused_by('emergency stop', 'emergency_stop', E.EMERGENCY_STOP, 'release the button',
-               *POWER_UP),
+    _paused_by(
+        'emergency stop', 'emergency_stop', E.EMERGENCY_STOP, 'release the button', *POWER_UP
+    ),
     UNSEEN_STOP,
-    Row(fault='somebody stops the program', cause=('stop',), code=E.PROGRAM_STOPPED,
-        then=S.CONNECTED, steps=('play',), differs=REFUSED),
-    Row(fault='somebody pauses the program', cause=('pause',), code=E.SUCCESSFUL, waits=True,
-        steps=('play',), differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False,
-                                     then=S.CONNECTED) | {
-            'cancelling': {'code': E.CANCELLED, 'waits': False, 'bound': 3.3, 'travel': 0.001,
-                           'then': S.CONNECTED, 'steps': ('play', 'play')}}),
-    Row(fault='the network cable is cut', cause=('freeze all',), code=E.CONNECTION_LOST,
-        bound=1.3, rest=0.7, then=S.CONNECTED, steps=('play',)),
-    Row(fault="the program's sockets are cut", cause=('drop sockets',), code=E.PROGRAM_STOPPED,
-        then=S.CONNECTED, steps=('play',), differs=REFUSED),
+    Row(
+        fault='somebody stops the program',
+        cause=('stop',),
+        code=E.PROGRAM_STOPPED,
+        then=S.CONNECTED,
+        steps=('play',),
+        differs=REFUSED,
+    ),
+    Row(
+        fault='somebody pauses the program',
+        cause=('pause',),
+        code=E.SUCCESSFUL,
+        waits=True,
+        steps=('play',),
+        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False, then=S.CONNECTED)
+        | {
+            'cancelling': {
+                'code': E.CANCELLED,
+                'waits': False,
+                'bound': 3.3,
+                'travel': 0.001,
+                'then': S.CONNECTED,
+                'steps': ('play', 'play'),
+            }
+        },
+    ),
+    Row(
+        fault='the network cable is cut',
+        cause=('freeze all',),
+        code=E.CONNECTION_LOST,
+        bound=1.3,
+        rest=0.7,
+        then=S.CONNECTED,
+        steps=('play',),
+    ),
+    Row(
+        fault="the program's sockets are cut",
+        cause=('drop sockets',),
+        code=E.PROGRAM_STOPPED,
+        then=S.CONNECTED,
+        steps=('play',),
+        differs=REFUSED,
+    ),
 )

@@ -27,20 +27,25 @@ class Ways:
 
     def fastest_and_strongest(self):
         """Return the largest speed and acceleration of a joint [rad/s], [rad/s^2]."""
-        speeds = [[(b - a) / CYCLE for a, b in zip(*pair, strict=True)]
-                  for pair in pairwise(self.rows)]
-        changes = [abs(b - a) / CYCLE for pair in pairwise(speeds)
-                   for a, b in zip(*pair, strict=True)]
+        speeds = [
+            [(b - a) / CYCLE for a, b in zip(*pair, strict=True)] for pair in pairwise(self.rows)
+        ]
+        changes = [
+            abs(b - a) / CYCLE for pair in pairwise(speeds) for a, b in zip(*pair, strict=True)
+        ]
         return max(abs(v) for row in speeds for v in row), max(changes)
 
     def farthest_off(self, goal):
         """Return how far the tool was off the planned paths of a goal [m]."""
         flange = ARM.forward_rows(np.array(self.rows))
-        tool = np.array([(pose_from_row(row) @ goal.plan.T_flange_active).position
-                         for row in flange])
+        tool = np.array(
+            [(pose_from_row(row) @ goal.plan.T_flange_active).position for row in flange]
+        )
         paths = [path.poses[:, :3] for path in goal.paths()]
-        begin, end = (np.concatenate([path[part] for path in paths])
-                      for part in (slice(None, -1), slice(1, None)))
+        begin, end = (
+            np.concatenate([path[part] for path in paths])
+            for part in (slice(None, -1), slice(1, None))
+        )
         way = end - begin
         square = np.maximum((way**2).sum(axis=1), 1e-18)
         at = np.clip(((tool[:, None] - begin) * way).sum(axis=2) / square, 0.0, 1.0)

@@ -10,18 +10,23 @@ import numpy as np
 def dh_matrix(theta, d, a, alpha):
     """The textbook matrix of one link in the distal convention."""
     ct, st, ca, sa = cos(theta), sin(theta), cos(alpha), sin(alpha)
-    return np.array([[ct, -st * ca, st * sa, a * ct],
-                     [st, ct * ca, -ct * sa, a * st],
-                     [0, sa, ca, d],
-                     [0, 0, 0, 1]])
+    return np.array(
+        [
+            [ct, -st * ca, st * sa, a * ct],
+            [st, ct * ca, -ct * sa, a * st],
+            [0, sa, ca, d],
+            [0, 0, 0, 1],
+        ]
+    )
 
 
 def dh_forward(geometry, q):
     """The product of the link matrices."""
     T = np.eye(4)
     for i in range(6):
-        T = T @ dh_matrix(geometry.theta[i] + q[i], geometry.d[i], geometry.a[i],
-                          geometry.alpha[i])
+        T = T @ dh_matrix(
+            geometry.theta[i] + q[i], geometry.d[i], geometry.a[i], geometry.alpha[i]
+        )
     return T
 
 
@@ -29,8 +34,10 @@ def pose_matrix(pose):
     """The matrix of a position and a unit quaternion x y z w."""
     x, y, z, w = pose.quaternion
     T = np.eye(4)
-    T[:3, :3] = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                 [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                 [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
+    T[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
     T[:3, 3] = pose.position
     return T

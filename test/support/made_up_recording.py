@@ -32,33 +32,58 @@ def path(first, last, point):
     """A straight piece of the plan along x at SPEED [m/s], from x [m] to x."""
     poses = np.zeros((2, 7))
     poses[:, 0], poses[:, 6] = (first, last), 1.0
-    return ReferencePath(poses=poses, point=np.array([point, point], dtype=np.int32),
-                         time=np.array([first, last]) / SPEED)
+    return ReferencePath(
+        poses=poses,
+        point=np.array([point, point], dtype=np.int32),
+        time=np.array([first, last]) / SPEED,
+    )
 
 
-ORDER = Order(points=2, duration=4.0, reference=ReferencePath(**{
-    name: np.concatenate([getattr(piece, name) for piece in (path(0.0, 0.2, 0),
-                                                             path(0.2, 0.4, 1))])
-    for name in ('poses', 'point', 'time')}))
-HEAD = head_of(ORDER, robot={'model': 'ur5e'}, parameters=DriverConfig(),
-               of_owner=json.dumps({'report': ['point 0: there'], 'planning': {'x': 1}}))
+ORDER = Order(
+    points=2,
+    duration=4.0,
+    reference=ReferencePath(
+        **{
+            name: np.concatenate(
+                [getattr(piece, name) for piece in (path(0.0, 0.2, 0), path(0.2, 0.4, 1))]
+            )
+            for name in ('poses', 'point', 'time')
+        }
+    ),
+)
+HEAD = head_of(
+    ORDER,
+    robot={'model': 'ur5e'},
+    parameters=DriverConfig(),
+    of_owner=json.dumps({'report': ['point 0: there'], 'planning': {'x': 1}}),
+)
 
 
 def packet(i, begun=0, **others):
     """The i-th packet on the plan; the arm is 1 mm beside its target."""
     x = SPEED * i * PERIOD
     return RobotState(
-        timestamp=START + i * PERIOD, actual_q=(0.1 * i, 0, 0, 0, 0, 1), target_q=(0.2 * i,) * 6,
-        actual_tcp_pose=Pose((x, 0.001, 0.0)), target_tcp_pose=Pose((x, 0.0, 0.0)),
-        actual_tcp_twist=(SPEED, 0, 0, 0, 0, 0), target_tcp_twist=(SPEED, 0, 0, 0, 0, 0),
-        points_begun=begun, **others)
+        timestamp=START + i * PERIOD,
+        actual_q=(0.1 * i, 0, 0, 0, 0, 1),
+        target_q=(0.2 * i,) * 6,
+        actual_tcp_pose=Pose((x, 0.001, 0.0)),
+        target_tcp_pose=Pose((x, 0.0, 0.0)),
+        actual_tcp_twist=(SPEED, 0, 0, 0, 0, 0),
+        target_tcp_twist=(SPEED, 0, 0, 0, 0, 0),
+        points_begun=begun,
+        **others,
+    )
 
 
 def outputs(bits):
     none = AnalogChannel(domain=AnalogDomain.CURRENT, value=0.004)
-    return Signals(inputs=DigitalChannels.from_bits(0), outputs=DigitalChannels.from_bits(bits),
-                   analog_inputs=(none, none), analog_outputs=(none, none),
-                   tool_analog_inputs=(none, none))
+    return Signals(
+        inputs=DigitalChannels.from_bits(0),
+        outputs=DigitalChannels.from_bits(bits),
+        analog_inputs=(none, none),
+        analog_outputs=(none, none),
+        tool_analog_inputs=(none, none),
+    )
 
 
 class Said(list):
@@ -74,8 +99,16 @@ def keep_pace(recorder):
         os.sched_yield()
 
 
-def record(directory, packets, *, head=HEAD, outcome=DONE, max_size=100.0,
-           between=lambda recorder, i: None, where=lambda i: (0, 0.0)):
+def record(
+    directory,
+    packets,
+    *,
+    head=HEAD,
+    outcome=DONE,
+    max_size=100.0,
+    between=lambda recorder, i: None,
+    where=lambda i: (0, 0.0),
+):
     """Record packets, and what is done between them; return the warnings."""
     said = Said()
     recorder = Recorder(str(directory), max_size, said)

@@ -24,8 +24,10 @@ def moved(pose, *offset):
 
 def corners(home, first, count):
     """Points on the corners of a square of 40 mm beside the tool, round and round."""
-    return [Waypoint(pose=moved(home, 0.04 * (k // 2 % 2), 0.04 * ((k + 1) // 2 % 2), 0.0))
-            for k in range(first, first + count)]
+    return [
+        Waypoint(pose=moved(home, 0.04 * (k // 2 % 2), 0.04 * ((k + 1) // 2 % 2), 0.0))
+        for k in range(first, first + count)
+    ]
 
 
 def circle(home, first, count, *, step=0.1, radius=0.05, round_in=4.0):
@@ -36,9 +38,20 @@ def circle(home, first, count, *, step=0.1, radius=0.05, round_in=4.0):
         # The first round begins with a ramp of a second, along which the angle grows as t^2.
         t = step * k
         angle, speed = (0.5 * rate * t * t, rate * t) if t < 1.0 else (rate * (t - 0.5), rate)
-        points.append(Waypoint(
-            time=t, pose=moved(home, radius * sin(angle), radius * (1.0 - cos(angle)), 0.0),
-            twist=(radius * speed * cos(angle), radius * speed * sin(angle), 0.0, 0.0, 0.0, 0.0)))
+        points.append(
+            Waypoint(
+                time=t,
+                pose=moved(home, radius * sin(angle), radius * (1.0 - cos(angle)), 0.0),
+                twist=(
+                    radius * speed * cos(angle),
+                    radius * speed * sin(angle),
+                    0.0,
+                    0.0,
+                    0.0,
+                    0.0,
+                ),
+            )
+        )
     return points
 
 
@@ -49,12 +62,18 @@ class OpenMotion:
         self._cell, self._owner = cell, cell.owner
         self._arm = Arm(robot_model(cell.robot.config.model))
         self._options = PlanningOptions(**{'max_tool_speed': 1.0, 'max_points': 5000} | options)
-        part = opened(plan(goal, cell.memory.read(), self._arm, self._options), self._arm,
-                      self._options)
+        part = opened(
+            plan(goal, cell.memory.read(), self._arm, self._options), self._arm, self._options
+        )
         self.home = cell.memory.read().actual_tcp_pose
         self.continuing = Continuing(
-            len(self._owner.motions) + 1, part, dialect=NEWEST, send=self._owner.send,
-            progress=self._newest, arm_and_options=lambda: (self._arm, self._options))
+            len(self._owner.motions) + 1,
+            part,
+            dialect=NEWEST,
+            send=self._owner.send,
+            progress=self._newest,
+            arm_and_options=lambda: (self._arm, self._options),
+        )
         points, order = encoded(part, NEWEST)
         self.motion = self._owner.run(points, order)
 
@@ -80,9 +99,14 @@ class OpenMotion:
 
     async def append(self, waypoints=(), segments=(), io_commands=(), *, last=False):
         """Append as the Python API does, but wait as a coroutine."""
-        offers = self.continuing.offers(Addition(
-            waypoints=tuple(waypoints), segments=tuple(segments),
-            io_commands=tuple(io_commands), last=last))
+        offers = self.continuing.offers(
+            Addition(
+                waypoints=tuple(waypoints),
+                segments=tuple(segments),
+                io_commands=tuple(io_commands),
+                last=last,
+            )
+        )
         try:
             offer = next(offers)
             while True:
@@ -113,5 +137,8 @@ def kept(cell):
     """Return what the robot loop keeps of the goal that runs: records, rows of path, messages."""
     loop = cell.loop_task.get_coro().cr_frame.f_locals['self']
     observer = loop._machine._observer
-    return {'records': observer._records.kept, 'rows': len(observer._tracker.path.time),
-            'unsent': len(loop._points)}
+    return {
+        'records': observer._records.kept,
+        'rows': len(observer._tracker.path.time),
+        'unsent': len(loop._points),
+    }

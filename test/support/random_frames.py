@@ -12,5 +12,7 @@ def framed(kind, payload):
 
 
 RANDOM_FRAMES = st.lists(
-    st.binary(max_size=40) | st.builds(framed, st.sampled_from(PackageType),
-                                       st.binary(max_size=40)), max_size=20)
+    st.binary(max_size=40)
+    | st.builds(framed, st.sampled_from(PackageType), st.binary(max_size=40)),
+    max_size=20,
+)

@@ -25,7 +25,11 @@ from ur_cartesian_driver.motion.pose import (
 )
 
 LINEAR, JOINT, CIRCULAR, PROCESS = (
-    SegmentType.LINEAR, SegmentType.JOINT, SegmentType.CIRCULAR, SegmentType.PROCESS)
+    SegmentType.LINEAR,
+    SegmentType.JOINT,
+    SegmentType.CIRCULAR,
+    SegmentType.PROCESS,
+)
 ANY = Posture()
 #: What straight moves are drawn from.
 STRAIGHT = (LINEAR, LINEAR, LINEAR, PROCESS, SegmentType.OPTIMIZED_LINEAR)
@@ -46,8 +50,9 @@ def random_case(arm: Arm, number: int) -> Case:
     family = FAMILIES[number % len(FAMILIES)]
     draw = _Draw(arm, np.random.default_rng([number, *arm.model.name.encode()]))
     family(draw)
-    return Case(family=family.__name__.strip('_'), q=draw.q, T_flange_tcp=draw.tool,
-                goal=draw.goal())
+    return Case(
+        family=family.__name__.strip('_'), q=draw.q, T_flange_tcp=draw.tool, goal=draw.goal()
+    )
 
 
 class _Draw:
@@ -56,8 +61,13 @@ class _Draw:
     def __init__(self, arm: Arm, rng: np.random.Generator) -> None:
         self.arm, self.rng = arm, rng
         self.size = arm.model.reach
-        self.tool = IDENTITY if rng.random() < 0.3 else Pose(
-            tuple(rng.uniform((-0.05, -0.05, 0.0), (0.05, 0.05, 0.2)).tolist()), self.turn(1.0))
+        self.tool = (
+            IDENTITY
+            if rng.random() < 0.3
+            else Pose(
+                tuple(rng.uniform((-0.05, -0.05, 0.0), (0.05, 0.05, 0.2)).tolist()), self.turn(1.0)
+            )
+        )
         self.stand(self.anywhere())
         self.waypoints: list[Waypoint] = []
         self.segments: list[Segment] = []
@@ -98,14 +108,21 @@ class _Draw:
     def add(self, pose: Pose, kind=None, posture=ANY, via=None) -> None:
         kind = STRAIGHT[self.rng.integers(len(STRAIGHT))] if kind is None else kind
         if self.arm.model.series == 'CB3':  # its software knows no optimove
-            kind = {SegmentType.OPTIMIZED_LINEAR: LINEAR,
-                    SegmentType.OPTIMIZED_JOINT: JOINT}.get(kind, kind)
+            kind = {SegmentType.OPTIMIZED_LINEAR: LINEAR, SegmentType.OPTIMIZED_JOINT: JOINT}.get(
+                kind, kind
+            )
         optimized = kind in (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
-        self.segments.append(Segment(
-            type=kind, via=via,
-            velocity=self.rng.uniform(0.2, 1.0) if optimized else self.rng.uniform(0.4, 1.5),
-            acceleration=self.rng.uniform(0.2, 1.0) if optimized else self.rng.uniform(3.0, 8.0),
-            arc_mode=ArcMode(int(self.rng.integers(2))) if via else ArcMode.UNCONSTRAINED))
+        self.segments.append(
+            Segment(
+                type=kind,
+                via=via,
+                velocity=self.rng.uniform(0.2, 1.0) if optimized else self.rng.uniform(0.4, 1.5),
+                acceleration=self.rng.uniform(0.2, 1.0)
+                if optimized
+                else self.rng.uniform(3.0, 8.0),
+                arc_mode=ArcMode(int(self.rng.integers(2))) if via else ArcMode.UNCONSTRAINED,
+            )
+        )
         self.waypoints.append(Waypoint(pose=pose, posture=posture))
 
     def add_at(self, q, kind=None, posture=ANY) -> None:
@@ -115,8 +132,10 @@ class _Draw:
 
     def shifted(self, size: float, turn: float = 0.3) -> Pose:
         """Return the last point moved that far [m] in any direction, and turned up to [rad]."""
-        return Pose(tuple(np.array(self.pose.position) + size * self.direction()),
-                    self.turn(turn, self.pose.quaternion))
+        return Pose(
+            tuple(np.array(self.pose.position) + size * self.direction()),
+            self.turn(turn, self.pose.quaternion),
+        )
 
     def direction(self) -> np.ndarray:
         v = self.rng.normal(size=3)
@@ -124,8 +143,10 @@ class _Draw:
 
     def turn(self, most: float, before=IDENTITY.quaternion):
         vector = self.direction() * self.rng.uniform(0.0, most)
-        return (Pose((0.0,) * 3, before)
-                @ Pose((0.0,) * 3, quaternion_from_rotation_vector(tuple(vector)))).quaternion
+        return (
+            Pose((0.0,) * 3, before)
+            @ Pose((0.0,) * 3, quaternion_from_rotation_vector(tuple(vector)))
+        ).quaternion
 
     def sign(self) -> float:
         return float(self.rng.choice((-1.0, 1.0)))
@@ -133,8 +154,9 @@ class _Draw:
     def posture(self, q, count=6) -> Posture:
         """Return the posture of some joints of a configuration."""
         chosen = sorted(self.rng.permutation(6)[:count])
-        return Posture(names=tuple(JOINT_NAMES[i] for i in chosen),
-                       values=tuple(float(q[i]) for i in chosen))
+        return Posture(
+            names=tuple(JOINT_NAMES[i] for i in chosen), values=tuple(float(q[i]) for i in chosen)
+        )
 
     # -- the goal
 
@@ -143,7 +165,8 @@ class _Draw:
         self._blend()
         timed = self.rng.random() < 0.3 and not any(
             s.type in (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
-            for s in self.segments)
+            for s in self.segments
+        )
         if timed:
             time, before = 0.0, self.at(self.q)
             for i, point in enumerate(self.waypoints):
@@ -152,8 +175,11 @@ class _Draw:
                 before = point.pose
                 self.waypoints[i] = Waypoint(pose=point.pose, posture=point.posture, time=time)
                 self.segments[i] = Segment(
-                    type=self.segments[i].type, via=self.segments[i].via,
-                    arc_mode=self.segments[i].arc_mode, blend_radius=self.segments[i].blend_radius)
+                    type=self.segments[i].type,
+                    via=self.segments[i].via,
+                    arc_mode=self.segments[i].arc_mode,
+                    blend_radius=self.segments[i].blend_radius,
+                )
         return Goal(waypoints=tuple(self.waypoints), segments=tuple(self.segments))
 
     def _blend(self) -> None:
@@ -162,8 +188,10 @@ class _Draw:
             room = min(poses[i].distance_to(poses[i + 1]), poses[i + 1].distance_to(poses[i + 2]))
             radius = self.rng.uniform(0.1, 0.45) * room
             if self.rng.random() < 0.6 and radius > 0.015:
-                fields = {name: getattr(self.segments[i], name) for name in (
-                    'type', 'velocity', 'acceleration', 'via', 'arc_mode')}
+                fields = {
+                    name: getattr(self.segments[i], name)
+                    for name in ('type', 'velocity', 'acceleration', 'via', 'arc_mode')
+                }
                 self.segments[i] = Segment(**fields, blend_radius=radius)
 
 
@@ -199,8 +227,10 @@ def _reach(draw: _Draw) -> None:
     out = np.array((x, y, z - draw.arm.geometry.d[0]))
     way = draw.rng.uniform(-0.02, 0.12) * draw.size * out / np.linalg.norm(out)
     side = 0.1 * draw.size * draw.direction()
-    draw.add(Pose(tuple(np.array((x, y, z)) + way + side),
-                  draw.turn(0.2, draw.pose.quaternion)), (*STRAIGHT, JOINT)[draw.rng.integers(6)])
+    draw.add(
+        Pose(tuple(np.array((x, y, z)) + way + side), draw.turn(0.2, draw.pose.quaternion)),
+        (*STRAIGHT, JOINT)[draw.rng.integers(6)],
+    )
     if draw.rng.random() < 0.3:
         draw.add(draw.shifted(0.1 * draw.size), LINEAR)
 
@@ -246,7 +276,8 @@ def _through_the_wrist(draw: _Draw) -> None:
     q[4] = 0.0
     middle = draw.at(q)
     tilt = quaternion_from_rotation_vector(
-        tuple(draw.direction() * 10.0 ** draw.rng.uniform(-5.0, -1.0)))
+        tuple(draw.direction() * 10.0 ** draw.rng.uniform(-5.0, -1.0))
+    )
     tilted = multiply(tilt, middle.quaternion)
     way = draw.rng.uniform(0.04, 0.15) * draw.size * draw.direction()
     draw.stand_at(Pose(tuple(np.array(middle.position) - way), tilted), q)
@@ -261,8 +292,10 @@ def _column(draw: _Draw) -> None:
     draw.tool = IDENTITY
     T_base_flange = arm.forward(tuple(q))
     angle = draw.rng.uniform(-pi, pi)
-    along, normal = np.array((np.cos(angle), np.sin(angle))), np.array(
-        (-np.sin(angle), np.cos(angle)))
+    along, normal = (
+        np.array((np.cos(angle), np.sin(angle))),
+        np.array((-np.sin(angle), np.cos(angle))),
+    )
     height = draw.rng.uniform(0.4, 0.9) * draw.size + arm.geometry.d[0]
     aside = radius * draw.rng.uniform(0.7, 1.5)
     half = draw.rng.uniform(0.05, 0.2) * draw.size
@@ -280,9 +313,13 @@ def _column_arc(draw: _Draw) -> None:
     _column(draw)
     end = draw.waypoints.pop().pose
     draw.segments.pop()
-    via = Pose(tuple(0.5 * (np.array(draw.at(draw.q).position) + end.position)
-                     + draw.rng.uniform(0.02, 0.08) * draw.size * draw.direction()),
-               end.quaternion)
+    via = Pose(
+        tuple(
+            0.5 * (np.array(draw.at(draw.q).position) + end.position)
+            + draw.rng.uniform(0.02, 0.08) * draw.size * draw.direction()
+        ),
+        end.quaternion,
+    )
     draw.add(end, CIRCULAR, via=via)
 
 
@@ -307,8 +344,9 @@ def _other_branch(draw: _Draw) -> None:
     q = draw.moved(0.3)
     found = solutions(draw.arm, draw.arm.forward(tuple(q)))
     other = found[draw.rng.integers(len(found))]
-    draw.add_at(q, (LINEAR, PROCESS)[draw.rng.integers(2)], draw.posture(
-        other, draw.rng.integers(2, 7)))
+    draw.add_at(
+        q, (LINEAR, PROCESS)[draw.rng.integers(2)], draw.posture(other, draw.rng.integers(2, 7))
+    )
 
 
 def _mixed(draw: _Draw) -> None:
@@ -331,5 +369,18 @@ def _long(draw: _Draw) -> None:
     draw.add_at(draw.anywhere(), (LINEAR, LINEAR, JOINT)[draw.rng.integers(3)])
 
 
-FAMILIES = (_free, _arcs, _reach, _range, _wrist, _through_the_wrist, _column, _column_arc, _joint,
-            _other_branch, _mixed, _corners, _long)
+FAMILIES = (
+    _free,
+    _arcs,
+    _reach,
+    _range,
+    _wrist,
+    _through_the_wrist,
+    _column,
+    _column_arc,
+    _joint,
+    _other_branch,
+    _mixed,
+    _corners,
+    _long,
+)

@@ -146,20 +146,34 @@ class RobotCell:
 
     async def start(self):
         """Start the robot, then the robot loop; return when a goal can run."""
-        await self.start_robot(SimulatorConfig(
-            frequency=1.0 / CYCLE, remote_control=self.headless, unlock_delay=0.05,
-            power_on_time=0.05, brake_release_time=0.05, secondary_port=30002,
-            realtime_port=30003, interpreter_port=30020))
+        await self.start_robot(
+            SimulatorConfig(
+                frequency=1.0 / CYCLE,
+                remote_control=self.headless,
+                unlock_delay=0.05,
+                power_on_time=0.05,
+                brake_release_time=0.05,
+                secondary_port=30002,
+                realtime_port=30003,
+                interpreter_port=30020,
+            )
+        )
         self.config = DriverConfig(
-            **{'headless_mode': self.headless, 'node_timeout': NODE_TIMEOUT,
-               'io_publish_rate': 5.0} | self._settings)
+            **{
+                'headless_mode': self.headless,
+                'node_timeout': NODE_TIMEOUT,
+                'io_publish_rate': 5.0,
+            }
+            | self._settings
+        )
         await asyncio.start_server(self.owner.serve, HOST, OWNER_PORT)
         reader, self._pipe = await asyncio.open_connection(HOST, OWNER_PORT)
         descriptor = snapshot.create()
         self.memory = snapshot.StateMemory(descriptor)
         os.close(descriptor)
-        self.loop_task = asyncio.create_task(RobotLoop(
-            Configure(config=self.config), self.memory, self._pipe).run(reader))
+        self.loop_task = asyncio.create_task(
+            RobotLoop(Configure(config=self.config), self.memory, self._pipe).run(reader)
+        )
         if not self.headless:
             await self.until(lambda: self.status.state is ConnectionState.CONNECTED)
             await self.load_pendant_program()
@@ -170,8 +184,9 @@ class RobotCell:
 
     async def start_robot(self, config):
         """Start the controller, or another one in the place of one that has crashed."""
-        self.robot = SimulatedRobot(config, sockets=ProgramNetwork(self.loop),
-                                    clock=LoopClock(self.loop, CYCLE))
+        self.robot = SimulatedRobot(
+            config, sockets=ProgramNetwork(self.loop), clock=LoopClock(self.loop, CYCLE)
+        )
         self.robot_task = asyncio.create_task(self.robot.run())
         await asyncio.sleep(0)
 
@@ -184,8 +199,9 @@ class RobotCell:
 
     async def reboot_robot(self):
         """Start the controller again: no power, no program, the arm where it was."""
-        await self.start_robot(replace(
-            self.robot.config, q=self.robot.controller.motion.q, power='off'))
+        await self.start_robot(
+            replace(self.robot.config, q=self.robot.controller.motion.q, power='off')
+        )
 
     async def load_pendant_program(self):
         """Let the External Control node fetch the program of the driver."""
@@ -194,7 +210,8 @@ class RobotCell:
         text = await reader.readuntil(b'# NODE_CONTROL_LOOP_ENDS\n')
         writer.close()
         assert not self.robot.controller.programs.load(
-            PENDANT_PROGRAM, f'def external_control():\n{text.decode()}\nend\n')
+            PENDANT_PROGRAM, f'def external_control():\n{text.decode()}\nend\n'
+        )
 
     async def close(self):
         self.owner.hang_up()
@@ -232,7 +249,8 @@ class RobotCell:
         while not condition():
             assert self.loop.time() - begin < bound, (
                 f'{purpose}: waited {bound} s in vain; {self.status}; {self.owner.log}; '
-                f'{list(self.robot.controller.announcements.log)}')
+                f'{list(self.robot.controller.announcements.log)}'
+            )
             await asyncio.sleep(0.5 * CYCLE)
         return self.loop.time() - begin
 
@@ -240,8 +258,10 @@ class RobotCell:
         """Return what the driver has said on the reverse socket, beginning with a message."""
         (end,) = self.loop.open_ends(REVERSE)
         data = end.received
-        return [ReverseMessage.decode(bytes(data[i:i + MESSAGE_SIZE]))
-                for i in range(first * MESSAGE_SIZE, len(data), MESSAGE_SIZE)]
+        return [
+            ReverseMessage.decode(bytes(data[i : i + MESSAGE_SIZE]))
+            for i in range(first * MESSAGE_SIZE, len(data), MESSAGE_SIZE)
+        ]
 
     async def sleep(self, seconds):
         """Let time pass [s]."""

@@ -59,15 +59,23 @@ class RobotInMemory:
         :param edit: makes a program of the text that the driver sends.
         """
         self.model, self.geometry = model, geometry
-        config = SimulatorConfig(model=model, frequency=frequency, geometry=geometry,
-                                 unlock_delay=0.0)
+        config = SimulatorConfig(
+            model=model, frequency=frequency, geometry=geometry, unlock_delay=0.0
+        )
         self._sockets = MemorySockets()
         self._accepted = {
-            port: self._sockets.listen(port) for port in (REVERSE, TRAJECTORY, COMMAND)}
+            port: self._sockets.listen(port) for port in (REVERSE, TRAJECTORY, COMMAND)
+        }
         self.controller = Controller(config, self._sockets)
-        program = render(ProgramSettings(
-            host='driver', reverse_port=REVERSE, trajectory_port=TRAJECTORY,
-            script_command_port=COMMAND, version=config.version[:3]))
+        program = render(
+            ProgramSettings(
+                host='driver',
+                reverse_port=REVERSE,
+                trajectory_port=TRAJECTORY,
+                script_command_port=COMMAND,
+                version=config.version[:3],
+            )
+        )
         refusal = self.controller.programs.load('driver', edit(program))
         assert refusal == '', refusal
 
@@ -82,8 +90,14 @@ class RobotInMemory:
         motion = self.controller.motion
         motion.T_flange_tcp = T_flange_tcp
         self.controller.teleport(q)
-        return RobotState(timestamp=0.0, actual_q=q, target_q=q, T_flange_tcp=T_flange_tcp,
-                          actual_tcp_pose=motion.T_base_tcp, target_tcp_pose=motion.T_base_tcp)
+        return RobotState(
+            timestamp=0.0,
+            actual_q=q,
+            target_q=q,
+            T_flange_tcp=T_flange_tcp,
+            actual_tcp_pose=motion.T_base_tcp,
+            target_tcp_pose=motion.T_base_tcp,
+        )
 
     def run(self, primitives, *, data=None, announced=None, on_cycle=lambda controller: None):
         """
@@ -93,9 +107,13 @@ class RobotInMemory:
         :param on_cycle: called after each cycle.
         """
         self._socket(TRAJECTORY).feed(encode_points(primitives) if data is None else data)
-        self._command(trajectory(
-            TrajectoryAction.START, len(primitives) if announced is None else announced,
-            read_timeout=0))
+        self._command(
+            trajectory(
+                TrajectoryAction.START,
+                len(primitives) if announced is None else announced,
+                read_timeout=0,
+            )
+        )
         results, motion = ResultDecoder(), self.controller.motion
         joints, poses = [], []
         self.controller.announcements.log.clear()
@@ -110,13 +128,17 @@ class RobotInMemory:
             if ended or motion.fault is not None or not self.controller.programs.running:
                 break
             assert self.controller.time - begun < PATIENCE, f'{primitives} do not end'
-        log = [line for line in self.controller.announcements.log
-               if not line.startswith(HARMLESS)]
+        log = [line for line in self.controller.announcements.log if not line.startswith(HARMLESS)]
         failed = ended != [TrajectoryResult.SUCCESS] or log
-        return Run(trouble='; '.join(log) or str(ended) if failed else '', q=motion.q,
-                   result=ended[0] if ended else None, pose=motion.T_base_tcp,
-                   joints=np.array(joints), poses=poses,
-                   duration=self.controller.time - begun)
+        return Run(
+            trouble='; '.join(log) or str(ended) if failed else '',
+            q=motion.q,
+            result=ended[0] if ended else None,
+            pose=motion.T_base_tcp,
+            joints=np.array(joints),
+            poses=poses,
+            duration=self.controller.time - begun,
+        )
 
     def feed(self, primitives):
         """Let more points come."""

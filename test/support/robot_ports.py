@@ -71,7 +71,8 @@ class Primary(Wire):
         while True:
             frame = self.next()
             if isinstance(frame, kind) and all(
-                    getattr(frame, name) == value for name, value in fields.items()):
+                getattr(frame, name) == value for name, value in fields.items()
+            ):
                 return frame
 
 

@@ -35,14 +35,17 @@ class GuideCell:
         self._client = RtdeClient(OUTPUTS, registers.SERVO_INPUTS)
         data, ready = self._client.start(), []
         while not ready:
-            ready = [event for event in self._client.feed(self._session.feed(data))
-                     if isinstance(event, Ready)]
+            ready = [
+                event
+                for event in self._client.feed(self._session.feed(data))
+                if isinstance(event, Ready)
+            ]
             data = self._client.data_to_send()
         self._inputs = ready[0].inputs[0]
         self._inbox, self._outbox = deque(), deque()
         #: Where the arm was in each cycle.
         self.joints = []
-        text, = Uploads().feed(program.read_bytes())
+        (text,) = Uploads().feed(program.read_bytes())
         self.controller.programs.submit(text.text)
 
     @property
@@ -79,6 +82,15 @@ def feedback_of(values):
     """Return a packet of :data:`OUTPUTS` as what it means."""
     timestamp, scaling, state, mode, sequence, lag, done, repeats, skipped, size, over = values
     return ServoFeedback(
-        timestamp=timestamp, speed_scaling=scaling, playing=state == RuntimeState.PLAYING,
-        mode=mode, last_sequence=sequence, lag=lag, setpoints_done=done, repeats=repeats,
-        skipped=skipped, buffer_size=size, overflows=over)
+        timestamp=timestamp,
+        speed_scaling=scaling,
+        playing=state == RuntimeState.PLAYING,
+        mode=mode,
+        last_sequence=sequence,
+        lag=lag,
+        setpoints_done=done,
+        repeats=repeats,
+        skipped=skipped,
+        buffer_size=size,
+        overflows=over,
+    )

@@ -79,7 +79,7 @@ class Result:
     @property
     def jerkiness(self):
         """Greatest change of a joint's acceleration from one cycle to the next [rad/s^2]."""
-        settled = self.actual[round(0.5 / CYCLE):]
+        settled = self.actual[round(0.5 / CYCLE) :]
         return float(np.abs(np.diff(settled, n=3, axis=0)).max() / CYCLE**2)
 
 
@@ -116,11 +116,17 @@ class Experiment:
         actual = np.array(self.cell.joints)
         skipped, at = 0, 0
         for row in map(tuple, self.written):  # what servoj was told is in this order too
-            found = row in self._told[at:at + AHEAD]
-            at += self._told[at:at + AHEAD].index(row) + 1 if found else 0
+            found = row in self._told[at : at + AHEAD]
+            at += self._told[at : at + AHEAD].index(row) + 1 if found else 0
             skipped += not found
-        return Result(CYCLE * np.arange(len(actual)), np.array(self.wanted), actual,
-                      np.array(self.lag), len(self.written), skipped)
+        return Result(
+            CYCLE * np.arange(len(actual)),
+            np.array(self.wanted),
+            actual,
+            np.array(self.lag),
+            len(self.written),
+            skipped,
+        )
 
 
 def unbuffered(slider, seconds, late=0):
@@ -133,8 +139,15 @@ def unbuffered(slider, seconds, late=0):
         q = experiment.rows[number % ROWS]
         experiment.written.append(q)
         experiment.now = q
-        return (ServoMode.SERVO, number, 0, SyncState.EXTERNAL_TO_ROBOT, *q, *(0.3,) * 6,
-                number * CYCLE)
+        return (
+            ServoMode.SERVO,
+            number,
+            0,
+            SyncState.EXTERNAL_TO_ROBOT,
+            *q,
+            *(0.3,) * 6,
+            number * CYCLE,
+        )
 
     experiment.run(take, seconds, late)
     return experiment.result()
@@ -144,9 +157,14 @@ def buffered(slider, seconds, late=0, *, closed_loop=True):
     """Let our side stream to the guide's sample program."""
     experiment = Experiment(GUIDE)
     source = UpAndDown(experiment.rows)
-    stream = ServoStream(source, ServoSettings(
-        closed_loop=closed_loop, lookahead_time=0.06,
-        **({} if closed_loop else {'most_lag': 10.0, 'buffer_depth': 5000})))
+    stream = ServoStream(
+        source,
+        ServoSettings(
+            closed_loop=closed_loop,
+            lookahead_time=0.06,
+            **({} if closed_loop else {'most_lag': 10.0, 'buffer_depth': 5000}),
+        ),
+    )
     experiment.cell.controller.set_slider(slider)
 
     def take(feedback):

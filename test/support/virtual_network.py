@@ -56,8 +56,9 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     # ---- what asyncio is asked for ---------------------------------------------------------
 
     async def create_server(self, protocol_factory, host=None, port=None, **_):
-        port = port or next(free for free in range(_FIRST_FREE_PORT, 65_536)
-                            if free not in self.servers)
+        port = port or next(
+            free for free in range(_FIRST_FREE_PORT, 65_536) if free not in self.servers
+        )
         if port in self.servers:
             raise OSError(errno.EADDRINUSE, 'Address already in use')
         self.servers[port] = _Server(self, protocol_factory, port)

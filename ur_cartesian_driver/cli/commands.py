@@ -36,10 +36,17 @@ def demo(arguments: argparse.Namespace) -> int:
     goal = goal_file(arguments.goal)
     if arguments.arms == 1:
         return run([Arm(goal=goal, model=arguments.model, drawing=picture)])
-    return run([
-        Arm(name=name, goal=its_goal, model=arguments.model,
-            drawing=picture.with_stem(f'{picture.stem}_{name}'))
-        for name, its_goal in (('left', goal), ('right', goal_file(arguments.second_goal)))])
+    return run(
+        [
+            Arm(
+                name=name,
+                goal=its_goal,
+                model=arguments.model,
+                drawing=picture.with_stem(f'{picture.stem}_{name}'),
+            )
+            for name, its_goal in (('left', goal), ('right', goal_file(arguments.second_goal)))
+        ]
+    )
 
 
 def sim(arguments: argparse.Namespace) -> int:
@@ -56,14 +63,22 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
     :raises ValueError: there is no such robot, or its calibration is not understood.
     """
     return SimulatorConfig(
-        model=arguments.model, host=arguments.host, polyscope=arguments.polyscope,
-        rtde_port=arguments.rtde_port, primary_port=arguments.primary_port,
-        dashboard_port=arguments.dashboard_port, secondary_port=arguments.secondary_port,
-        realtime_port=arguments.realtime_port, interpreter_port=arguments.interpreter_port,
+        model=arguments.model,
+        host=arguments.host,
+        polyscope=arguments.polyscope,
+        rtde_port=arguments.rtde_port,
+        primary_port=arguments.primary_port,
+        dashboard_port=arguments.dashboard_port,
+        secondary_port=arguments.secondary_port,
+        realtime_port=arguments.realtime_port,
+        interpreter_port=arguments.interpreter_port,
         power='off' if arguments.power_off else 'running',
-        remote_control=not arguments.local, rate=arguments.rate, faults=arguments.faults,
+        remote_control=not arguments.local,
+        rate=arguments.rate,
+        faults=arguments.faults,
         geometry=calibration(arguments, robot_model(arguments.model)),
-        **({'q': arguments.joints} if arguments.joints else {}))
+        **({'q': arguments.joints} if arguments.joints else {}),
+    )
 
 
 def calibration(arguments: argparse.Namespace, model: RobotModel) -> Geometry | None:
@@ -86,10 +101,13 @@ async def _simulate(robot: SimulatedRobot) -> None:
 
 def _show_ports(robot: SimulatedRobot) -> None:
     ports = robot.ports
-    print(f'simulated {robot.config.model} on {robot.config.host}: RTDE {ports.rtde}, '
-          f'primary {ports.primary}, dashboard {ports.dashboard}, '
-          f'secondary {ports.secondary}, real-time {ports.realtime}, '
-          f'interpreter {ports.interpreter}', flush=True)
+    print(
+        f'simulated {robot.config.model} on {robot.config.host}: RTDE {ports.rtde}, '
+        f'primary {ports.primary}, dashboard {ports.dashboard}, '
+        f'secondary {ports.secondary}, real-time {ports.realtime}, '
+        f'interpreter {ports.interpreter}',
+        flush=True,
+    )
 
 
 async def _show_status(robot: SimulatedRobot) -> None:
@@ -122,9 +140,10 @@ def read_goal(arguments: argparse.Namespace) -> Any:
     """Return the goal of a file, an example or standard input, as a message."""
     from ur_cartesian_driver.ros import client
 
-    return client.with_prefix(client.load_goal(
-        sys.stdin.read() if arguments.file == '-' else goal_file(arguments.file)),
-        arguments.tf_prefix)
+    return client.with_prefix(
+        client.load_goal(sys.stdin.read() if arguments.file == '-' else goal_file(arguments.file)),
+        arguments.tf_prefix,
+    )
 
 
 def code_text(number: int) -> str:
@@ -162,17 +181,26 @@ class Recorder:
     def take(self, feedback: Any) -> None:
         """Take one feedback message."""
         position = feedback.actual.pose.position
-        line = (f'{100.0 * feedback.progress:5.1f} %  to point {feedback.point_index}  '
-                f'x {position.x:7.3f}  y {position.y:7.3f}  z {position.z:7.3f} m  '
-                f'speed {100.0 * feedback.speed_scaling:3.0f} %')
+        line = (
+            f'{100.0 * feedback.progress:5.1f} %  to point {feedback.point_index}  '
+            f'x {position.x:7.3f}  y {position.y:7.3f}  z {position.z:7.3f} m  '
+            f'speed {100.0 * feedback.speed_scaling:3.0f} %'
+        )
         self._show(line)
         if self._file is not None:
-            self._file.write(json.dumps({
-                'stamp': feedback.header.stamp.sec + 1e-9 * feedback.header.stamp.nanosec,
-                'point': feedback.point_index, 'progress': feedback.progress,
-                'desired': _position(feedback.desired), 'actual': _position(feedback.actual),
-                'speed': _speed(feedback.actual),
-            }) + '\n')
+            self._file.write(
+                json.dumps(
+                    {
+                        'stamp': feedback.header.stamp.sec + 1e-9 * feedback.header.stamp.nanosec,
+                        'point': feedback.point_index,
+                        'progress': feedback.progress,
+                        'desired': _position(feedback.desired),
+                        'actual': _position(feedback.actual),
+                        'speed': _speed(feedback.actual),
+                    }
+                )
+                + '\n'
+            )
 
     def _show(self, line: str) -> None:
         """Rewrite one line on a terminal; elsewhere a line a second is enough to follow."""
@@ -200,7 +228,8 @@ def point_as_yaml(state: RobotState) -> str:
         f'- pose: {{position: {{x: {x:.6f}, y: {y:.6f}, z: {z:.6f}}}, '
         f'orientation: {{x: {qx:.9f}, y: {qy:.9f}, z: {qz:.9f}, w: {qw:.9f}}}}}\n'
         f'  posture: {{posture_joint_names: [{", ".join(JOINT_NAMES)}],\n'
-        f'            posture_joint_values: [{joints}]}}')
+        f'            posture_joint_values: [{joints}]}}'
+    )
 
 
 def goal_file(name: str) -> Path:

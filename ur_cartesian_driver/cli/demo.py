@@ -67,10 +67,14 @@ def run(arms: Sequence[Arm]) -> int:
     """
     environment = _environment()
     with ExitStack() as stack:
-        scratch = Path(stack.enter_context(
-            tempfile.TemporaryDirectory(prefix='ur_cartesian_demo_')))
-        print(f"simulated {' and '.join(arm.model for arm in arms)}, driver node and client are "
-              'starting ...', flush=True)
+        scratch = Path(
+            stack.enter_context(tempfile.TemporaryDirectory(prefix='ur_cartesian_demo_'))
+        )
+        print(
+            f'simulated {" and ".join(arm.model for arm in arms)}, driver node and client are '
+            'starting ...',
+            flush=True,
+        )
         for arm in arms:
             _start(arm, environment, stack)
         print('\nplan:', flush=True)
@@ -79,8 +83,9 @@ def run(arms: Sequence[Arm]) -> int:
             return planned
         print('\nmotion:', flush=True)
         records = {arm: scratch / f'{i}.jsonl' for i, arm in enumerate(arms)}
-        status = _clients({arm: ['--record', str(record)] for arm, record in records.items()},
-                          environment)
+        status = _clients(
+            {arm: ['--record', str(record)] for arm, record in records.items()}, environment
+        )
         for arm, record in records.items():
             _draw(arm, record)
         return status
@@ -88,23 +93,45 @@ def run(arms: Sequence[Arm]) -> int:
 
 def _start(arm: Arm, environment: dict[str, str], stack: ExitStack) -> None:
     """Start the simulated robot of an arm, and its driver."""
-    simulator = stack.enter_context(process(
-        'sim', '--model', arm.model, *_any_ports('rtde', 'primary', 'dashboard'),
-        environment=environment, stdout=subprocess.PIPE))
+    simulator = stack.enter_context(
+        process(
+            'sim',
+            '--model',
+            arm.model,
+            *_any_ports('rtde', 'primary', 'dashboard'),
+            environment=environment,
+            stdout=subprocess.PIPE,
+        )
+    )
     rtde, primary, dashboard = _ports(simulator)
     parameters = {
-        'robot_ip': '127.0.0.1', 'ur_type': arm.model, 'headless_mode': 'true',
-        'rtde_port': rtde, 'primary_port': primary, 'dashboard_port': dashboard,
-        'reverse_port': 0, 'script_sender_port': 0, 'trajectory_port': 0,
-        'script_command_port': 0}
+        'robot_ip': '127.0.0.1',
+        'ur_type': arm.model,
+        'headless_mode': 'true',
+        'rtde_port': rtde,
+        'primary_port': primary,
+        'dashboard_port': dashboard,
+        'reverse_port': 0,
+        'script_sender_port': 0,
+        'trajectory_port': 0,
+        'script_command_port': 0,
+    }
     if arm.name:  # without a value, a parameter has no type
         parameters['tf_prefix'] = arm.tf_prefix
     names = ['-r', f'__ns:=/{arm.name}'] if arm.name else []
-    settings = [word for name, value in parameters.items()
-                for word in ('-p', f'{name}:={value}')]
+    settings = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
     # The client says what happens; what the driver has to add then is a warning.
-    stack.enter_context(process('--ros-args', '--log-level', 'warn', *names, *settings,
-                                module='ur_cartesian_driver.ros.node', environment=environment))
+    stack.enter_context(
+        process(
+            '--ros-args',
+            '--log-level',
+            'warn',
+            *names,
+            *settings,
+            module='ur_cartesian_driver.ros.node',
+            environment=environment,
+        )
+    )
 
 
 def _clients(options: Mapping[Arm, Sequence[str]], environment: dict[str, str]) -> int:
@@ -112,11 +139,20 @@ def _clients(options: Mapping[Arm, Sequence[str]], environment: dict[str, str]) 
     with ExitStack() as stack:
         clients = []
         for arm, more in options.items():
-            client = stack.enter_context(process(
-                'send', str(arm.goal), '--driver', arm.driver, '--tf-prefix', arm.tf_prefix, *more,
-                environment=environment,
-                # A terminal shows the progress of one client in one line.
-                stdout=subprocess.PIPE if arm.label else None))
+            client = stack.enter_context(
+                process(
+                    'send',
+                    str(arm.goal),
+                    '--driver',
+                    arm.driver,
+                    '--tf-prefix',
+                    arm.tf_prefix,
+                    *more,
+                    environment=environment,
+                    # A terminal shows the progress of one client in one line.
+                    stdout=subprocess.PIPE if arm.label else None,
+                )
+            )
             clients.append(client)
             if arm.label:
                 threading.Thread(target=_pass_on, args=(client, arm.label), daemon=True).start()
@@ -137,14 +173,22 @@ def _draw(arm: Arm, record: Path) -> None:
 
 
 @contextmanager
-def process(*arguments: str, environment: dict[str, str], module: str = 'ur_cartesian_driver.cli',
-            stdout: int | None = None) -> Iterator[subprocess.Popen[str]]:
+def process(
+    *arguments: str,
+    environment: dict[str, str],
+    module: str = 'ur_cartesian_driver.cli',
+    stdout: int | None = None,
+) -> Iterator[subprocess.Popen[str]]:
     """Run one of our commands; it is gone when the block is left, whatever happens."""
     command = [sys.executable, '-m', module, *arguments]
     running = subprocess.Popen(
-        command, env=environment, stdout=stdout, text=True,
+        command,
+        env=environment,
+        stdout=stdout,
+        text=True,
         # Ctrl-C is for us: we end the processes in order.
-        start_new_session=True)
+        start_new_session=True,
+    )
     try:
         yield running
     finally:
@@ -181,5 +225,9 @@ def _any_ports(*names: str) -> Sequence[str]:
 
 def _environment() -> dict[str, str]:
     """Return an environment in which the three see each other and nobody else."""
-    return {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
-            'ROS_DOMAIN_ID': str(1 + os.getpid() % 100), **os.environ, 'PYTHONUNBUFFERED': '1'}
+    return {
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+        'ROS_DOMAIN_ID': str(1 + os.getpid() % 100),
+        **os.environ,
+        'PYTHONUNBUFFERED': '1',
+    }

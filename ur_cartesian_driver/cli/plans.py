@@ -37,19 +37,28 @@ def validate(arguments: argparse.Namespace) -> int:
     T_flange_tcp = Pose.from_rotation_vector(arguments.tcp) if arguments.tcp else IDENTITY
     state = standing_at(arm, arguments.joints or SimulatorConfig().q, T_flange_tcp)
     dialect = settings.driver.dialect
-    options = replace(settings.planning, dialect=dialect,
-                      allow_tcp_change=settings.planning.allow_tcp_change and dialect.sets_tcp)
+    options = replace(
+        settings.planning,
+        dialect=dialect,
+        allow_tcp_change=settings.planning.allow_tcp_change and dialect.sets_tcp,
+    )
     message = read_goal(arguments)
     try:
         goal = convert.goal_from_message(
-            message, settings.frames, now=time_ns(), stand=frames.Stand.of(state),
-            time_tolerance=settings.node.goal_time_tolerance)
+            message,
+            settings.frames,
+            now=time_ns(),
+            stand=frames.Stand.of(state),
+            time_tolerance=settings.node.goal_time_tolerance,
+        )
         found = plan(goal, state, arm, options)
     except GoalRefused as refusal:
         print(f'refused, {code_text(code_of(refusal))}: {refusal}', file=sys.stderr)
         return 1
-    print(f'{model.name}{" with its calibration" if arm.calibrated else ""}, joints '
-          f'{_numbers(state.actual_q)} rad, TCP {_numbers(T_flange_tcp.rotation_vector())}')
+    print(
+        f'{model.name}{" with its calibration" if arm.calibrated else ""}, joints '
+        f'{_numbers(state.actual_q)} rad, TCP {_numbers(T_flange_tcp.rotation_vector())}'
+    )
     print(table(found))
     if arguments.postures:
         print(postures(found))
@@ -62,8 +71,14 @@ def standing_at(arm: Arm, q: tuple[float, ...], T_flange_tcp: Pose = IDENTITY) -
     a, b, c, d, e, f = q
     joints = (a, b, c, d, e, f)
     pose = arm.forward(joints) @ T_flange_tcp
-    return RobotState(timestamp=0.0, actual_q=joints, target_q=joints, actual_tcp_pose=pose,
-                      target_tcp_pose=pose, T_flange_tcp=T_flange_tcp)
+    return RobotState(
+        timestamp=0.0,
+        actual_q=joints,
+        target_q=joints,
+        actual_tcp_pose=pose,
+        target_tcp_pose=pose,
+        T_flange_tcp=T_flange_tcp,
+    )
 
 
 def _numbers(values: Iterable[float]) -> str:

@@ -67,16 +67,37 @@ def write_table(recording: Recording, file: Path) -> None:
     """Write all packets as comma-separated values, and the deviation from the plan."""
     off = recording.deviation()
     columns: dict[str, NDArray[Any]] = {'time': recording.time}
-    for name, axes in (('actual_pose', _POSE), ('target_pose', _POSE), ('actual_twist', _TWIST),
-                       ('target_twist', _TWIST), ('actual_q', '012345'), ('target_q', '012345'),
-                       ('actual_qd', '012345'), ('target_qd', '012345'), ('analog_output', '01')):
+    for name, axes in (
+        ('actual_pose', _POSE),
+        ('target_pose', _POSE),
+        ('actual_twist', _TWIST),
+        ('target_twist', _TWIST),
+        ('actual_q', '012345'),
+        ('target_q', '012345'),
+        ('actual_qd', '012345'),
+        ('target_qd', '012345'),
+        ('analog_output', '01'),
+    ):
         values = getattr(recording, name)
         columns |= {f'{name}_{axis}': values[:, i] for i, axis in enumerate(axes)}
-    for name in ('lag', 'buffered', 'speed_scaling', 'slider', 'digital_output', 'points_begun',
-                 'waypoint', 'robot_mode', 'safety_mode', 'runtime_state'):
+    for name in (
+        'lag',
+        'buffered',
+        'speed_scaling',
+        'slider',
+        'digital_output',
+        'points_begun',
+        'waypoint',
+        'robot_mode',
+        'safety_mode',
+        'runtime_state',
+    ):
         columns[name] = getattr(recording, name)
-    columns |= {'deviation_position': off.position, 'deviation_angle': off.angle,
-                'planned_time': off.planned_time}
+    columns |= {
+        'deviation_position': off.position,
+        'deviation_angle': off.angle,
+        'planned_time': off.planned_time,
+    }
     with open(file, 'w', newline='', encoding='utf-8') as opened:
         writer = csv.writer(opened)
         writer.writerow(columns)
@@ -100,15 +121,25 @@ def draw(recording: Recording, picture: Path, title: str = '') -> None:
     try:
         import matplotlib
     except ImportError:
-        raise OSError('no picture without matplotlib; install it (extra `plot`), or take --csv'
-                      ) from None
+        raise OSError(
+            'no picture without matplotlib; install it (extra `plot`), or take --csv'
+        ) from None
     matplotlib.use('Agg')
     from matplotlib import pyplot
 
-    with matplotlib.rc_context({
-            'font.size': 9.0, 'axes.spines.top': False, 'axes.spines.right': False,
-            'axes.grid': True, 'grid.alpha': 0.25, 'legend.frameon': False,
-            'legend.fontsize': 8.0, 'axes.titlesize': 9.0, 'path.simplify_threshold': 0.5}):
+    with matplotlib.rc_context(
+        {
+            'font.size': 9.0,
+            'axes.spines.top': False,
+            'axes.spines.right': False,
+            'axes.grid': True,
+            'grid.alpha': 0.25,
+            'legend.frameon': False,
+            'legend.fontsize': 8.0,
+            'axes.titlesize': 9.0,
+            'path.simplify_threshold': 0.5,
+        }
+    ):
         figure = pyplot.figure(figsize=(12.0, 7.2), layout='constrained')
         figure.suptitle(title or _title(recording), fontsize=11.0)
         left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.0, 1.35))[0]
@@ -121,10 +152,12 @@ def draw(recording: Recording, picture: Path, title: str = '') -> None:
 def _title(recording: Recording) -> str:
     head = recording.metadata
     outcome = head['outcome']
-    ended = f"{outcome['name']}: {outcome['text']}" if outcome else 'the recording was cut off'
-    return (f"{head['robot'].get('model') or 'robot'}, {head['execution']}, "
-            f"{head['points']} point{'' if head['points'] == 1 else 's'}, "
-            f"{head['created'][:19].replace('T', ' ')} UTC\n{ended[:150]}")
+    ended = f'{outcome["name"]}: {outcome["text"]}' if outcome else 'the recording was cut off'
+    return (
+        f'{head["robot"].get("model") or "robot"}, {head["execution"]}, '
+        f'{head["points"]} point{"" if head["points"] == 1 else "s"}, '
+        f'{head["created"][:19].replace("T", " ")} UTC\n{ended[:150]}'
+    )
 
 
 def _draw_path(figure: Any, recording: Recording) -> None:
@@ -135,13 +168,26 @@ def _draw_path(figure: Any, recording: Recording) -> None:
     extent = high - low
     a, b = sorted(np.argsort(extent * _SHOWN)[1:].tolist())
     for axes, columns in ((space, [0, 1, 2]), (flat, [a, b])):
-        axes.plot(*planned[:, columns].T, color=_PLANNED, linewidth=4.0, alpha=0.6,
-                  solid_capstyle='round', label='planned')
+        axes.plot(
+            *planned[:, columns].T,
+            color=_PLANNED,
+            linewidth=4.0,
+            alpha=0.6,
+            solid_capstyle='round',
+            label='planned',
+        )
         axes.plot(*actual[:, columns].T, color=_ACTUAL, linewidth=1.0, label='executed')
-        axes.scatter(*recording.points[:, columns].T, s=12.0, color='#333333', zorder=3,
-                     label='points')
-    flat.scatter(*_switch_places(recording)[:, [a, b]].T, s=40.0, marker='d', color=_MARK,
-                 zorder=4, label='an output switched')
+        axes.scatter(
+            *recording.points[:, columns].T, s=12.0, color='#333333', zorder=3, label='points'
+        )
+    flat.scatter(
+        *_switch_places(recording)[:, [a, b]].T,
+        s=40.0,
+        marker='d',
+        color=_MARK,
+        zorder=4,
+        label='an output switched',
+    )
     if len(recording.points) <= MOST_NUMBERS:
         for number, point in enumerate(recording.points):
             flat.annotate(str(number), point[[a, b]], xytext=(4, 4), textcoords='offset points')
@@ -172,11 +218,18 @@ def _draw_time(figure: Any, recording: Recording) -> None:
     """Draw what there is over time."""
     rows = _timeline(recording)
     off, speed, scaling, line = figure.subplots(
-        4, 1, sharex=True, height_ratios=(1.0, 1.0, 0.8, 0.35 + 0.16 * len(rows)))
+        4, 1, sharex=True, height_ratios=(1.0, 1.0, 0.8, 0.35 + 0.16 * len(rows))
+    )
     time = recording.time
     _draw_deviation(off, recording)
-    speed.plot(time, np.linalg.norm(recording.target_twist[:, :3], axis=1), color=_TARGET,
-               linewidth=2.4, alpha=0.5, label="controller's target")
+    speed.plot(
+        time,
+        np.linalg.norm(recording.target_twist[:, :3], axis=1),
+        color=_TARGET,
+        linewidth=2.4,
+        alpha=0.5,
+        label="controller's target",
+    )
     speed.plot(time, recording.tool_speed, color=_ACTUAL, linewidth=0.9, label='tool')
     speed.set_ylabel('tool speed\n[m/s]')
     speed.set_ylim(bottom=0.0)
@@ -191,8 +244,14 @@ def _draw_time(figure: Any, recording: Recording) -> None:
 
 def _draw_deviation(axes: Any, recording: Recording) -> None:
     off = recording.deviation()
-    axes.plot(recording.time, 1e3 * off.target_position, color=_TARGET, linewidth=2.4, alpha=0.5,
-              label="controller's target")
+    axes.plot(
+        recording.time,
+        1e3 * off.target_position,
+        color=_TARGET,
+        linewidth=2.4,
+        alpha=0.5,
+        label="controller's target",
+    )
     axes.plot(recording.time, 1e3 * off.position, color=_ACTUAL, linewidth=0.9, label='tool')
     axes.set_ylabel('distance from\nthe plan [mm]')
     axes.set_ylim(0.0, 1.15 * max(0.05, 1e3 * np.nan_to_num(off.position).max()))
@@ -201,10 +260,16 @@ def _draw_deviation(axes: Any, recording: Recording) -> None:
 
 def _draw_scaling(axes: Any, recording: Recording) -> None:
     time = recording.time
-    axes.plot(time, 100.0 * recording.slider, color=_PLANNED, linewidth=3.0, alpha=0.6,
-              label='slider')
-    axes.plot(time, 100.0 * recording.speed_scaling, color='#333333', linewidth=1.0,
-              label='speed scaling')
+    axes.plot(
+        time, 100.0 * recording.slider, color=_PLANNED, linewidth=3.0, alpha=0.6, label='slider'
+    )
+    axes.plot(
+        time,
+        100.0 * recording.speed_scaling,
+        color='#333333',
+        linewidth=1.0,
+        label='speed scaling',
+    )
     axes.set_ylabel('speed\n[%]')
     axes.set_ylim(0.0, 108.0)
     lags = bool(np.isfinite(recording.lag).any())
@@ -235,24 +300,40 @@ def _timeline(recording: Recording) -> list[tuple[str, NDArray[np.float64]]]:
     return [*rows, ('paused', paused.astype(np.float64))] if paused.any() else rows
 
 
-def _draw_timeline(axes: Any, recording: Recording,
-                   rows: list[tuple[str, NDArray[np.float64]]]) -> None:
+def _draw_timeline(
+    axes: Any, recording: Recording, rows: list[tuple[str, NDArray[np.float64]]]
+) -> None:
     """Draw points, outputs and pauses as lines of one chart."""
-    time, points = recording.time, [(at, text.rsplit(' ', 1)[-1])
-                                    for at, kind, text in recording.events if kind == 'point']
+    time, points = (
+        recording.time,
+        [(at, text.rsplit(' ', 1)[-1]) for at, kind, text in recording.events if kind == 'point'],
+    )
     axes.plot([at for at, _ in points], [0.0] * len(points), '|', color='#333333', markersize=9.0)
     if len(points) <= MOST_NUMBERS:
         for at, number in points:
-            axes.annotate(number, (at, 0.0), xytext=(3, 2), textcoords='offset points',
-                          fontsize=7.0)
+            axes.annotate(
+                number, (at, 0.0), xytext=(3, 2), textcoords='offset points', fontsize=7.0
+            )
     for height, (name, share) in enumerate(rows, start=1):
-        axes.fill_between(time, height - 0.3, height - 0.3 + 0.6 * share, step='post',
-                          color='#e08a00' if name == 'paused' else _MARK, linewidth=0.0)
+        axes.fill_between(
+            time,
+            height - 0.3,
+            height - 0.3 + 0.6 * share,
+            step='post',
+            color='#e08a00' if name == 'paused' else _MARK,
+            linewidth=0.0,
+        )
     axes.set_yticks(range(len(rows) + 1), ['to point', *(name for name, _ in rows)])
     axes.set_ylim(-0.6, len(rows) + 0.6)
     for at, kind, text in recording.events:
         if kind in _STRIKING:
             axes.axvline(at, color=_STRIKING[kind], linewidth=0.8, linestyle=':')
             if kind != 'end':
-                axes.annotate(text[:60] or kind, (at, len(rows) + 0.2), xytext=(3, 0),
-                              textcoords='offset points', fontsize=7.0, color=_STRIKING[kind])
+                axes.annotate(
+                    text[:60] or kind,
+                    (at, len(rows) + 0.2),
+                    xytext=(3, 0),
+                    textcoords='offset points',
+                    fontsize=7.0,
+                    color=_STRIKING[kind],
+                )

@@ -91,8 +91,13 @@ class Driver(RobotServices, LiveMotions):
     Callbacks run on the driver's own reader thread: keep them short.
     """
 
-    def __init__(self, config: DriverConfig, options: PlanningOptions | None = None, *,
-                 auto_heartbeat: bool = True) -> None:
+    def __init__(
+        self,
+        config: DriverConfig,
+        options: PlanningOptions | None = None,
+        *,
+        auto_heartbeat: bool = True,
+    ) -> None:
         """
         Prepare a driver; nothing is connected before :meth:`open`.
 
@@ -126,8 +131,12 @@ class Driver(RobotServices, LiveMotions):
         self.open()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 traceback: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
         """Close."""
         self.close()
 
@@ -199,8 +208,10 @@ class Driver(RobotServices, LiveMotions):
         state = come_to_rest(state, self._arm, self.config.stop_deceleration)
         if loan is None or not same_tcp(state.T_flange_tcp, loan.T_flange_lent):
             return state
-        return replace(seen_at(state, state.T_flange_tcp.inverse() @ loan.T_flange_before),
-                       T_flange_tcp=loan.T_flange_before)
+        return replace(
+            seen_at(state, state.T_flange_tcp.inverse() @ loan.T_flange_before),
+            T_flange_tcp=loan.T_flange_before,
+        )
 
     @property
     def signals(self) -> Signals | None:
@@ -254,13 +265,15 @@ class Driver(RobotServices, LiveMotions):
         """Return the options for the robot that is connected."""
         status = self._status
         return replace(
-            self.options, calibration_known=status.calibration_known,
+            self.options,
+            calibration_known=status.calibration_known,
             dialect=self.config.dialect,
             # Another program may skip the command, and move the TCP that is there.
             allow_tcp_change=self.options.allow_tcp_change and self.config.dialect.sets_tcp,
             optimove_known=has_feature('optimove', status.software()),
             acceleration_known=state.actual_tcp_acceleration is not None
-            and state.target_tcp_acceleration is not None)
+            and state.target_tcp_acceleration is not None,
+        )
 
     def start(self, plan: Plan, on_progress: OnProgress | None = None) -> Motion:
         """
@@ -279,9 +292,16 @@ class Driver(RobotServices, LiveMotions):
         points = encode_points(plan.instructions, self.config.dialect)
         return self._launch(plan, points, order_of(plan, self.config.dialect), on_progress)
 
-    def _launch(self, plan: Plan, points: bytes, order: Order, on_progress: OnProgress | None,
-                live: LiveOrder | None = None, teach: bool = False,
-                part: Part | None = None) -> Motion:
+    def _launch(
+        self,
+        plan: Plan,
+        points: bytes,
+        order: Order,
+        on_progress: OnProgress | None,
+        live: LiveOrder | None = None,
+        teach: bool = False,
+        part: Part | None = None,
+    ) -> Motion:
         """Have the robot loop begin a motion, if nothing else moves."""
         with self._lock:
             if self._runs:
@@ -295,24 +315,44 @@ class Driver(RobotServices, LiveMotions):
             self._runs[motion.number] = run
             # Still under the lock: whoever finds the motion may cancel it, and that has to come
             # behind its start.
-            self._send(StartMotion(
-                motion=motion.number, points=points, order=order, live=live, teach=teach,
-                about=about(plan, self.options) if self.config.record_directory else ''))
+            self._send(
+                StartMotion(
+                    motion=motion.number,
+                    points=points,
+                    order=order,
+                    live=live,
+                    teach=teach,
+                    about=about(plan, self.options) if self.config.record_directory else '',
+                )
+            )
         return motion
 
     def _continuing(self, motion: Motion, part: Part) -> Continuing:
         """Return the owner's side of a goal with an open end."""
+
         def arm_and_options() -> tuple[Arm, PlanningOptions]:
             state = self.state
             if state is None:
                 raise RobotNotReady(self._status.message or NO_STATE)
             return self.arm, self._options(state)
 
-        return Continuing(motion.number, part, dialect=self.config.dialect, send=self._send,
-                          arm_and_options=arm_and_options, progress=lambda: motion.progress)
+        return Continuing(
+            motion.number,
+            part,
+            dialect=self.config.dialect,
+            send=self._send,
+            arm_and_options=arm_and_options,
+            progress=lambda: motion.progress,
+        )
 
-    def _launch_standing(self, plan: Plan, on_progress: OnProgress | None, *,
-                         live: LiveOrder | None = None, teach: bool = False) -> Motion:
+    def _launch_standing(
+        self,
+        plan: Plan,
+        on_progress: OnProgress | None,
+        *,
+        live: LiveOrder | None = None,
+        teach: bool = False,
+    ) -> Motion:
         return self._launch(plan, b'', standing_order(plan), on_progress, live=live, teach=teach)
 
     def _aim(self, number: int, T_base_tcp: Pose, age: float) -> None:
@@ -356,10 +396,17 @@ class Driver(RobotServices, LiveMotions):
         if is_paused(state) or is_stopped(state):
             raise RobotNotReady(
                 'A motion is running, and the robot program is held by a pause or a stop, so that '
-                'nothing else can take its place; let it go on, or cancel it.')
+                'nothing else can take its place; let it go on, or cancel it.'
+            )
 
-    def execute(self, goal: Goal, on_progress: OnProgress | None = None,
-                timeout: float | None = None, *, preempt: bool = False) -> Outcome:
+    def execute(
+        self,
+        goal: Goal,
+        on_progress: OnProgress | None = None,
+        timeout: float | None = None,
+        *,
+        preempt: bool = False,
+    ) -> Outcome:
         """
         Check, plan, run and wait; a refusal is an outcome too.
 
@@ -505,8 +552,11 @@ class Driver(RobotServices, LiveMotions):
             LOG.warning(
                 'the calibration of the robot moves the flange by up to %.1f mm from where the '
                 'model %s has it, max_calibration_difference is %.1f mm: check ur_type, and '
-                'whether the arm was repaired and calibrated since', 1e3 * apart, model.name,
-                1e3 * bound)
+                'whether the arm was repaired and calibrated since',
+                1e3 * apart,
+                model.name,
+                1e3 * bound,
+            )
 
     def _set_status(self, status: DriverStatus) -> None:
         self._status = status

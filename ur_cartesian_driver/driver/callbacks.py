@@ -18,5 +18,8 @@ def call_back(callback: Callable[[T], None], argument: T) -> None:
     try:
         callback(argument)
     except Exception as error:
-        LOG.exception('a callback of the driver failed with %s: %s; the driver goes on',
-                      type(error).__name__, error)
+        LOG.exception(
+            'a callback of the driver failed with %s: %s; the driver goes on',
+            type(error).__name__,
+            error,
+        )

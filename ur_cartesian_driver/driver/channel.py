@@ -211,11 +211,30 @@ class LogLine:
 
 
 Request: TypeAlias = (
-    Configure | StartMotion | ExtendMotion | AimMotion | CancelMotion | ResendProgram | CallRobot
-    | Heartbeat | Shutdown)
+    Configure
+    | StartMotion
+    | ExtendMotion
+    | AimMotion
+    | CancelMotion
+    | ResendProgram
+    | CallRobot
+    | Heartbeat
+    | Shutdown
+)
 Notice: TypeAlias = (
-    Alive | StatusChanged | SignalsChanged | GeometryKnown | MotionProgress | ServoChanged
-    | MotionExtended | MotionEnded | CallAnswered | TcpLent | TcpReturned | LogLine)
+    Alive
+    | StatusChanged
+    | SignalsChanged
+    | GeometryKnown
+    | MotionProgress
+    | ServoChanged
+    | MotionExtended
+    | MotionEnded
+    | CallAnswered
+    | TcpLent
+    | TcpReturned
+    | LogLine
+)
 
 
 def pack(message: Request | Notice) -> bytes:

@@ -54,20 +54,29 @@ class DriverConfig(LinkSettings):
         LinkSettings.__post_init__(self)  # super() does not work in a class with slots
         if self.robot_loop not in ('process', 'thread'):
             raise ValueError(
-                f"robot_loop is {self.robot_loop!r}, it has to be 'process' or 'thread'.")
+                f"robot_loop is {self.robot_loop!r}, it has to be 'process' or 'thread'."
+            )
         if self.after_robot_stop not in ('abort', 'continue'):
-            raise ValueError(f'after_robot_stop is {self.after_robot_stop!r}, it has to be '
-                             "'abort' or 'continue'.")
+            raise ValueError(
+                f'after_robot_stop is {self.after_robot_stop!r}, it has to be '
+                "'abort' or 'continue'."
+            )
         self._require_positive('feedback_rate', 'node_timeout', 'stream_margin', 'record_max_size')
         if not self.stream_horizon >= 2.0 * self.stream_margin:
-            raise ValueError(f'stream_horizon is {self.stream_horizon}, it has to be at least '
-                             f'twice stream_margin = {self.stream_margin}.')
+            raise ValueError(
+                f'stream_horizon is {self.stream_horizon}, it has to be at least '
+                f'twice stream_margin = {self.stream_margin}.'
+            )
         self._require_within('servo_target_lag', 0.008, 0.2)
         self._require_within('servo_max_divergence', 0.01, 3.0)
         if not self.keep_open_timeout >= 0.0:
             raise ValueError(
-                f'keep_open_timeout is {self.keep_open_timeout}, it must not be negative.')
-        for name in ('max_plan_deviation', 'max_plan_deviation_angle',
-                     'max_calibration_difference'):
+                f'keep_open_timeout is {self.keep_open_timeout}, it must not be negative.'
+            )
+        for name in (
+            'max_plan_deviation',
+            'max_plan_deviation_angle',
+            'max_calibration_difference',
+        ):
             if not getattr(self, name) >= 0.0:
                 raise ValueError(f'{name} is {getattr(self, name)}, it must not be negative.')

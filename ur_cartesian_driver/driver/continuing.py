@@ -51,18 +51,23 @@ def encoded(part: Part, dialect: Dialect) -> tuple[bytes, Order]:
     """Return the records of a part, and what the machine needs of it."""
     plan = part.plan
     order = order_of(plan, dialect, since=part.since, ending=part.ending)
-    return (encode_points(plan.instructions, dialect),
-            replace(order, due=part.due))
+    return (encode_points(plan.instructions, dialect), replace(order, due=part.due))
 
 
 class Continuing:
     """What the driver knows of a goal with an open end; thread-safe."""
 
-    def __init__(self, motion: int, opened: Part, *, dialect: Dialect,
-                 arm_and_options: Callable[[], tuple[Arm, PlanningOptions]],
-                 send: Callable[[ExtendMotion], None],
-                 progress: Callable[[], Progress | None],
-                 timeout: float = ANSWER_TIMEOUT) -> None:
+    def __init__(
+        self,
+        motion: int,
+        opened: Part,
+        *,
+        dialect: Dialect,
+        arm_and_options: Callable[[], tuple[Arm, PlanningOptions]],
+        send: Callable[[ExtendMotion], None],
+        progress: Callable[[], Progress | None],
+        timeout: float = ANSWER_TIMEOUT,
+    ) -> None:
         """
         Prepare.
 
@@ -115,8 +120,9 @@ class Continuing:
         """
         if not self._is_open:
             raise RobotNotReady('The last points of the goal were said to be the last.')
-        appended = yield from (self._append(addition) if addition.waypoints
-                               else self._close(addition))
+        appended = yield from (
+            self._append(addition) if addition.waypoints else self._close(addition)
+        )
         self._is_open = not addition.last
         return appended
 
@@ -126,8 +132,9 @@ class Continuing:
         answer = yield self._offer(None, b'', 0)
         if answer.refusal:
             raise RobotNotReady(answer.refusal)
-        return Appended(points=self.points, text=(
-            f'The goal ends with the {self.points} points that it has.'))
+        return Appended(
+            points=self.points, text=(f'The goal ends with the {self.points} points that it has.')
+        )
 
     def _append(self, addition: Addition) -> Offers:
         arm, options = self._arm_and_options()
@@ -139,8 +146,10 @@ class Continuing:
             answer = yield self._offer(order, points, part.behind)
             if not answer.refusal:
                 self._goal = part.then
-                return Appended(points=part.then.points, text=part.text + (
-                    _from_rest(part.then.told > 0.0) if from_rest else ''))
+                return Appended(
+                    points=part.then.points,
+                    text=part.text + (_from_rest(part.then.told > 0.0) if from_rest else ''),
+                )
             if not answer.from_rest:
                 break
         raise RobotNotReady(answer.refusal)
@@ -148,8 +157,7 @@ class Continuing:
     def _waits(self) -> bool:
         """Tell whether the arm surely rests behind all points that the goal has."""
         progress = self._progress()
-        return (progress is not None and progress.waits
-                and progress.points_received == self.points)
+        return progress is not None and progress.waits and progress.points_received == self.points
 
     def _check_ahead(self, count: int, options: PlanningOptions) -> None:
         progress = self._progress()
@@ -157,13 +165,18 @@ class Continuing:
         most = MESSAGES_AHEAD * options.max_points
         if ahead + count > most:
             raise InvalidGoal(
-                'points', f'would make {ahead + count} points that the arm has not reached, more '
-                f'than {most} = {MESSAGES_AHEAD} max_points', 'append them when it has come '
-                'further (feedback: point_index)')
+                'points',
+                f'would make {ahead + count} points that the arm has not reached, more '
+                f'than {most} = {MESSAGES_AHEAD} max_points',
+                'append them when it has come further (feedback: point_index)',
+            )
 
     def _offer(self, order: Order | None, points: bytes, behind: int) -> ExtendMotion:
-        return ExtendMotion(motion=self._motion, points=points, extension=Extension(
-            number=next(self._numbers), behind=behind, order=order))
+        return ExtendMotion(
+            motion=self._motion,
+            points=points,
+            extension=Extension(number=next(self._numbers), behind=behind, order=order),
+        )
 
     def _answered(self, offer: ExtendMotion) -> AnswerExtension:
         """Send an offer and wait for its answer."""

@@ -58,10 +58,12 @@ class ProcessHost:
         try:
             self._process = subprocess.Popen(
                 [sys.executable, '-m', MODULE, str(theirs.fileno()), str(descriptor)],
-                pass_fds=(theirs.fileno(), descriptor), env=_environment(),
+                pass_fds=(theirs.fileno(), descriptor),
+                env=_environment(),
                 stdin=subprocess.DEVNULL,
                 # Ctrl-C is for the owner, which then ends us in order.
-                start_new_session=True)
+                start_new_session=True,
+            )
             self.memory = snapshot.StateMemory(descriptor)
         finally:
             theirs.close()
@@ -93,7 +95,8 @@ class ThreadHost:
         descriptor = snapshot.create()
         self.memory = snapshot.StateMemory(descriptor)
         self._thread = threading.Thread(
-            target=self._run, args=(theirs, descriptor), name='robot loop', daemon=True)
+            target=self._run, args=(theirs, descriptor), name='robot loop', daemon=True
+        )
         self._thread.start()
 
     @staticmethod

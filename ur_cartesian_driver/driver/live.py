@@ -76,8 +76,14 @@ class LiveMotions(ABC):
         """The newest robot state."""
 
     @abstractmethod
-    def _launch_standing(self, plan: Plan, on_progress: OnProgress | None, *,
-                         live: LiveOrder | None = None, teach: bool = False) -> Motion:
+    def _launch_standing(
+        self,
+        plan: Plan,
+        on_progress: OnProgress | None,
+        *,
+        live: LiveOrder | None = None,
+        teach: bool = False,
+    ) -> Motion:
         """Begin a motion that goes nowhere by itself."""
 
     @abstractmethod
@@ -99,7 +105,8 @@ class LiveMotions(ABC):
         state = self._state_for('follow live targets')
         check_target(T_base_tcp, state, self.options)
         motion = self._launch_standing(
-            standing_plan(state), None, live=live_order(self.arm, state.target_q, self.options))
+            standing_plan(state), None, live=live_order(self.arm, state.target_q, self.options)
+        )
         self._live = LiveSession(motion, self._aim)
         self._live.aim(T_base_tcp, age=age)
         return self._live
@@ -127,10 +134,13 @@ class LiveMotions(ABC):
         """
         state = self._state_for('let the arm be guided')
         if not self.config.allow_teach:
-            raise RobotNotReady('Nobody may guide the arm: allow_teach is false; set it to true, '
-                                'and start the driver again.')
+            raise RobotNotReady(
+                'Nobody may guide the arm: allow_teach is false; set it to true, '
+                'and start the driver again.'
+            )
         self._guided = self._launch_standing(
-            standing_plan(state), lambda _: on_guided(), teach=True)
+            standing_plan(state), lambda _: on_guided(), teach=True
+        )
         return self._guided
 
     @property
@@ -145,8 +155,10 @@ class LiveMotions(ABC):
         :raises RobotNotReady: there is none, or the robot program cannot do this.
         """
         if self.config.dialect is not NEWEST:
-            raise RobotNotReady(f'Only the robot program of this driver can {what}; wire_dialect '
-                                f'says that another one, {self.config.wire_dialect}, runs.')
+            raise RobotNotReady(
+                f'Only the robot program of this driver can {what}; wire_dialect '
+                f'says that another one, {self.config.wire_dialect}, runs.'
+            )
         state = self.state
         if state is None:
             raise RobotNotReady('The robot does not report its state.')
@@ -165,8 +177,10 @@ def check_pose(pose: Pose) -> None:
     square = sum(v * v for v in pose.quaternion)
     if abs(square - 1.0) > UNIT_TOLERANCE:
         raise InvalidGoal(
-            'The orientation of the target', f'has length {sqrt(square):.6g}; a unit quaternion '
-            'is needed', 'divide it by its length')
+            'The orientation of the target',
+            f'has length {sqrt(square):.6g}; a unit quaternion is needed',
+            'divide it by its length',
+        )
 
 
 def check_target(T_base_tcp: Pose, state: RobotState, options: PlanningOptions) -> None:
@@ -179,8 +193,10 @@ def check_target(T_base_tcp: Pose, state: RobotState, options: PlanningOptions) 
     far, most = T_base_tcp.distance_to(state.actual_tcp_pose), options.max_approach_distance
     if 0.0 < most < far:
         raise InvalidGoal(
-            'The target', f'is {far:.4g} m away from the tool, max_approach_distance is '
-            f'{most:g} m', 'approach it by a goal, or raise the parameter')
+            'The target',
+            f'is {far:.4g} m away from the tool, max_approach_distance is {most:g} m',
+            'approach it by a goal, or raise the parameter',
+        )
 
 
 def live_order(arm: Arm, start: Joints, options: PlanningOptions) -> LiveOrder:
@@ -193,7 +209,8 @@ def live_order(arm: Arm, start: Joints, options: PlanningOptions) -> LiveOrder:
     if options.max_tool_speed > 0.0:
         fastest = min(fastest, options.max_tool_speed)
     a, b, c, d, e, f = (
-        min(speed, options.servo_target_joint_velocity) for speed in arm.model.max_joint_speed)
+        min(speed, options.servo_target_joint_velocity) for speed in arm.model.max_joint_speed
+    )
     limits = FollowLimits(
         linear_velocity=fastest,
         linear_acceleration=options.servo_target_linear_acceleration,
@@ -201,19 +218,32 @@ def live_order(arm: Arm, start: Joints, options: PlanningOptions) -> LiveOrder:
         angular_acceleration=options.servo_target_angular_acceleration,
         joint_velocity=(a, b, c, d, e, f),
         singularity_margins=(
-            options.singularity_margin_wrist, options.singularity_margin_elbow,
-            options.singularity_margin_shoulder),
+            options.singularity_margin_wrist,
+            options.singularity_margin_elbow,
+            options.singularity_margin_shoulder,
+        ),
         surroundings=Surroundings(
-            planes=tuple(KeepOut(name=plane.name, point=plane.point, normal=plane.normal,
-                                 margin=plane.margin)
-                         for plane in parse_planes(options.workspace_planes)),
+            planes=tuple(
+                KeepOut(
+                    name=plane.name, point=plane.point, normal=plane.normal, margin=plane.margin
+                )
+                for plane in parse_planes(options.workspace_planes)
+            ),
             # Capsules are thicker than the arm: they stop it only where they refuse goals.
             min_clearance=options.min_clearance if options.self_collision == 'refuse' else None,
-            tool_radius=options.tool_radius))
+            tool_radius=options.tool_radius,
+        ),
+    )
     return LiveOrder(
-        settings=LiveSettings(limits=limits, max_age=options.servo_target_max_age,
-                              timeout=options.servo_target_timeout),
-        ur_type=arm.model.name, geometry=arm.geometry, start=start)
+        settings=LiveSettings(
+            limits=limits,
+            max_age=options.servo_target_max_age,
+            timeout=options.servo_target_timeout,
+        ),
+        ur_type=arm.model.name,
+        geometry=arm.geometry,
+        start=start,
+    )
 
 
 def standing_plan(state: RobotState) -> Plan:
@@ -222,13 +252,21 @@ def standing_plan(state: RobotState) -> Plan:
     return Plan(
         goal=Goal(waypoints=(Waypoint(pose=here),), execution=ExecutionMode.SERVO),
         segments=(),
-        reference=ReferencePath(poses=pose_rows((here, here)), point=np.zeros(2, dtype=np.int32),
-                                time=np.zeros(2)),
-        start=state.target_q, T_flange_active=state.T_flange_tcp,
-        execution=ExecutionMode.SERVO)
+        reference=ReferencePath(
+            poses=pose_rows((here, here)), point=np.zeros(2, dtype=np.int32), time=np.zeros(2)
+        ),
+        start=state.target_q,
+        T_flange_active=state.T_flange_tcp,
+        execution=ExecutionMode.SERVO,
+    )
 
 
 def standing_order(plan: Plan) -> Order:
     """Return the order of such a plan: there is nothing on the wire."""
-    return Order(points=1, reference=plan.reference, duration=0.0,
-                 T_flange_active=plan.T_flange_active, execution=plan.execution)
+    return Order(
+        points=1,
+        reference=plan.reference,
+        duration=0.0,
+        T_flange_active=plan.T_flange_active,
+        execution=plan.execution,
+    )

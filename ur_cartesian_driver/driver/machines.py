@@ -28,16 +28,29 @@ def machine_of(request: StartMotion, config: DriverConfig) -> TrajectoryMachine:
     settings: dict[str, Any] = {
         'feedback_period': 1.0 / config.feedback_rate,
         'max_plan_deviation': (config.max_plan_deviation, config.max_plan_deviation_angle),
-        'continues': config.after_robot_stop == 'continue'}
+        'continues': config.after_robot_stop == 'continue',
+    }
     if request.order.open_end:
-        return StreamMachine(request.order, settings=StreamSettings(
-            horizon=config.stream_horizon, margin=config.stream_margin,
-            timeout=config.keep_open_timeout), **settings)
+        return StreamMachine(
+            request.order,
+            settings=StreamSettings(
+                horizon=config.stream_horizon,
+                margin=config.stream_margin,
+                timeout=config.keep_open_timeout,
+            ),
+            **settings,
+        )
     if request.order.execution is ExecutionMode.SERVO:
-        return _servo_machine(request, **settings, settings=ServoSettings(
-            target_lag=config.servo_target_lag, buffer_depth=config.servo_buffer_depth,
-            max_divergence=config.servo_max_divergence,
-            lookahead_time=config.servoj_lookahead_time))
+        return _servo_machine(
+            request,
+            **settings,
+            settings=ServoSettings(
+                target_lag=config.servo_target_lag,
+                buffer_depth=config.servo_buffer_depth,
+                max_divergence=config.servo_max_divergence,
+                lookahead_time=config.servoj_lookahead_time,
+            ),
+        )
     return TrajectoryMachine(request.order, **settings)
 
 
@@ -51,8 +64,8 @@ def _servo_machine(request: StartMotion, **settings: Any) -> ServoMachine:
     live = request.live
     if live is not None:
         return LiveMachine(
-            request.order, live.settings, _arm(live.ur_type, live.geometry), live.start,
-            **settings)
+            request.order, live.settings, _arm(live.ur_type, live.geometry), live.start, **settings
+        )
     kind = TeachMachine if request.teach else ServoMachine
     return kind(request.order, **settings)
 

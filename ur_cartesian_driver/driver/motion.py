@@ -23,8 +23,9 @@ OnProgress = Callable[[Progress], None]
 class Motion:
     """A running motion; its outcome comes whatever happens to the robot."""
 
-    def __init__(self, number: int, outcome: Future[Outcome],
-                 send: Callable[[Request], None]) -> None:
+    def __init__(
+        self, number: int, outcome: Future[Outcome], send: Callable[[Request], None]
+    ) -> None:
         """Be made by :meth:`~.api.Driver.start`."""
         self.number = number
         self._outcome, self._send = outcome, send
@@ -45,8 +46,14 @@ class Motion:
         """
         self._send(CancelMotion(motion=self.number, preempted_by=by))
 
-    def append(self, waypoints: Sequence[Waypoint], segments: Sequence[Segment] = (),
-               io_commands: Sequence[IOCommand] = (), *, last: bool = False) -> Appended:
+    def append(
+        self,
+        waypoints: Sequence[Waypoint],
+        segments: Sequence[Segment] = (),
+        io_commands: Sequence[IOCommand] = (),
+        *,
+        last: bool = False,
+    ) -> Appended:
         """
         Let points follow while the goal runs; it was started with ``keep_open``.
 
@@ -60,9 +67,14 @@ class Motion:
         """
         if self.continuing is None:
             raise RobotNotReady('The goal was sent without keep_open: nothing can be appended.')
-        return self.continuing.append(Addition(
-            waypoints=tuple(waypoints), segments=tuple(segments),
-            io_commands=tuple(io_commands), last=last))
+        return self.continuing.append(
+            Addition(
+                waypoints=tuple(waypoints),
+                segments=tuple(segments),
+                io_commands=tuple(io_commands),
+                last=last,
+            )
+        )
 
     def done(self) -> bool:
         """Tell whether the outcome is there."""
@@ -84,8 +96,13 @@ class Motion:
 class Run:
     """The driver's side of a motion: its progress, and its only end."""
 
-    def __init__(self, number: int, plan: Plan, on_progress: OnProgress | None,
-                 send: Callable[[Request], None]) -> None:
+    def __init__(
+        self,
+        number: int,
+        plan: Plan,
+        on_progress: OnProgress | None,
+        send: Callable[[Request], None],
+    ) -> None:
         """
         Prepare.
 
@@ -97,8 +114,11 @@ class Run:
         #: What the owner holds.
         self.motion = Motion(number, self._outcome, send)
         #: The TCP that the robot has as long as this motion runs.
-        self.loan = None if plan.T_flange_tcp is None else TcpLent(
-            T_flange_before=plan.T_flange_active, T_flange_lent=plan.T_flange_tcp)
+        self.loan = (
+            None
+            if plan.T_flange_tcp is None
+            else TcpLent(T_flange_before=plan.T_flange_active, T_flange_lent=plan.T_flange_tcp)
+        )
 
     def report(self, progress: Progress) -> None:
         """Take a report of the robot loop."""
@@ -111,5 +131,6 @@ class Run:
         if self.motion.continuing is not None:
             self.motion.continuing.end()
         if not self._outcome.done():
-            self._outcome.set_result(replace(
-                outcome, report=(*self._plan_report, *outcome.report)))
+            self._outcome.set_result(
+                replace(outcome, report=(*self._plan_report, *outcome.report))
+            )

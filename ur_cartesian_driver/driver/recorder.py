@@ -53,13 +53,25 @@ def about(plan: Plan, options: PlanningOptions) -> str:
     lines = plan.report
     if len(lines) > MOST_LINES:
         lines = (*lines[:MOST_LINES], f'... and {len(lines) - MOST_LINES} more lines')
-    return json.dumps({'report': lines, 'frame_id': plan.goal.frame_id,
-                       'controlled_frame': plan.goal.controlled_frame,
-                       'planning': _parameters(options)}, default=str)
+    return json.dumps(
+        {
+            'report': lines,
+            'frame_id': plan.goal.frame_id,
+            'controlled_frame': plan.goal.controlled_frame,
+            'planning': _parameters(options),
+        },
+        default=str,
+    )
 
 
-def head_of(order: Order, *, robot: Mapping[str, str], parameters: DriverConfig,
-            of_owner: str = '', led_by: str = '') -> dict[str, Any]:
+def head_of(
+    order: Order,
+    *,
+    robot: Mapping[str, str],
+    parameters: DriverConfig,
+    of_owner: str = '',
+    led_by: str = '',
+) -> dict[str, Any]:
     """
     Return the metadata of a motion that begins now.
 
@@ -71,17 +83,25 @@ def head_of(order: Order, *, robot: Mapping[str, str], parameters: DriverConfig,
     known = json.loads(of_owner) if of_owner else {}
     planning = known.pop('planning', {})
     return {
-        'format': disk.FORMAT, 'created': datetime.now(UTC).isoformat(timespec='milliseconds'),
-        'robot': dict(robot), 'execution': led_by or order.execution.name,
+        'format': disk.FORMAT,
+        'created': datetime.now(UTC).isoformat(timespec='milliseconds'),
+        'robot': dict(robot),
+        'execution': led_by or order.execution.name,
         'points': 0 if led_by else int(order.reference.point[-1]) + 1,
-        'duration': order.duration, 'due': order.due,
-        'keep_open': order.open_end, 'T_base_frame': order.T_base_frame.row(),
+        'duration': order.duration,
+        'due': order.due,
+        'keep_open': order.open_end,
+        'T_base_frame': order.T_base_frame.row(),
         'T_flange_tcp': (order.T_flange_tcp or order.T_flange_active).row(),
         'T_tcp_controlled': order.T_tcp_controlled.row(),
         'path_tolerance': asdict(order.path_tolerance),
         'goal_tolerance': asdict(order.goal_tolerance),
-        **known, 'parameters': {**_parameters(parameters), **planning},
-        'outcome': None, 'rows_left_out': 0, 'trouble': ''}
+        **known,
+        'parameters': {**_parameters(parameters), **planning},
+        'outcome': None,
+        'rows_left_out': 0,
+        'trouble': '',
+    }
 
 
 class Recorder:
@@ -132,14 +152,15 @@ class Recorder:
         if self._writer is None:
             self._begin_writing()
         self._folder = folder = Folder(
-            Path(self._directory).expanduser(), head, self._max_size, self._say)
+            Path(self._directory).expanduser(), head, self._max_size, self._say
+        )
         self._begin, self._time, self._due, self._at = state.timestamp, 0.0, PERIOD, 0
         self._stale_begun = state.points_begun
         self._do(folder, folder.open)
         if head['points']:
             self.extend(order.reference, -inf)
         count = head['points']
-        self.note('start', f"{head['execution']}, {count} point{'' if count == 1 else 's'}")
+        self.note('start', f'{head["execution"]}, {count} point{"" if count == 1 else "s"}')
         self.take(state)
 
     def extend(self, reference: ReferencePath, since: float) -> None:
@@ -155,8 +176,9 @@ class Recorder:
         rows['point'] = reference.point
         self._do(folder, lambda: folder.write_plan(rows, since))
 
-    def take(self, state: RobotState, waypoint: int = -1, buffered: float = nan,
-             lag: float = nan) -> None:
+    def take(
+        self, state: RobotState, waypoint: int = -1, buffered: float = nan, lag: float = nan
+    ) -> None:
         """
         Take a packet.
 
@@ -173,13 +195,29 @@ class Recorder:
             self._stale_begun = None
         self._time = time = state.timestamp - self._begin
         disk.ROW.pack_into(
-            self._piece, self._at, time,
-            *state.actual_tcp_pose.row(), *state.target_tcp_pose.row(),
-            *state.actual_tcp_twist, *state.target_tcp_twist,
-            *state.actual_q, *state.target_q, *state.actual_qd, *state.target_qd,
-            lag, buffered, state.speed_scaling, state.target_speed_fraction,
-            *self._analog, self._digital, begun, waypoint,
-            state.robot_mode, state.safety_mode, state.runtime_state)
+            self._piece,
+            self._at,
+            time,
+            *state.actual_tcp_pose.row(),
+            *state.target_tcp_pose.row(),
+            *state.actual_tcp_twist,
+            *state.target_tcp_twist,
+            *state.actual_q,
+            *state.target_q,
+            *state.actual_qd,
+            *state.target_qd,
+            lag,
+            buffered,
+            state.speed_scaling,
+            state.target_speed_fraction,
+            *self._analog,
+            self._digital,
+            begun,
+            waypoint,
+            state.robot_mode,
+            state.safety_mode,
+            state.runtime_state,
+        )
         self._at += disk.ROW.size
         if self._at == len(self._piece) or time >= self._due:
             self._hand_over(folder)
@@ -204,12 +242,15 @@ class Recorder:
         self._hand_over(folder)
         self.note('end', f'{outcome.code.name}: {outcome.text}')
         self._folder = None
-        known = {'code': outcome.code.value, 'name': outcome.code.name, 'text': outcome.text,
-                 'report': outcome.report}
+        known = {
+            'code': outcome.code.value,
+            'name': outcome.code.name,
+            'text': outcome.text,
+            'report': outcome.report,
+        }
         self._do(folder, lambda: folder.close(known), is_last=True)
         if (writer := self._writer) is not None and (finisher := self._finisher) is not None:
-            writer.do(lambda: finisher.do(
-                lambda: folder.do(lambda: folder.finish(self._breathe))))
+            writer.do(lambda: finisher.do(lambda: folder.do(lambda: folder.finish(self._breathe))))
 
     def close(self, timeout: float) -> None:
         """Wait until everything is written, so long [s]; what has not ended stays a folder."""
@@ -292,5 +333,8 @@ class _Worker:
 
 def _parameters(options: DriverConfig | PlanningOptions) -> dict[str, Any]:
     """Return the fields of a dataclass that JSON can hold."""
-    return {f.name: value for f in fields(options)
-            if isinstance(value := getattr(options, f.name), bool | int | float | str | tuple)}
+    return {
+        f.name: value
+        for f in fields(options)
+        if isinstance(value := getattr(options, f.name), bool | int | float | str | tuple)
+    }

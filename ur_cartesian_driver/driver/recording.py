@@ -116,8 +116,9 @@ class Recording:
     @property
     def reference(self) -> ReferencePath:
         """The planned path."""
-        return ReferencePath(poses=self.planned_pose, point=self.planned_point,
-                             time=self.planned_time)
+        return ReferencePath(
+            poses=self.planned_pose, point=self.planned_point, time=self.planned_time
+        )
 
     @property
     def points(self) -> Floats:
@@ -138,9 +139,14 @@ class Recording:
         if len(self.planned_time) > 1:
             self._compare(PathTracker(self.reference), rows)
         position, angle, target_position, target_angle, time, waypoint = rows.T
-        return Deviation(position=position, angle=angle, target_position=target_position,
-                         target_angle=target_angle, planned_time=time,
-                         waypoint=np.where(np.isnan(waypoint), -1.0, waypoint).astype(np.int32))
+        return Deviation(
+            position=position,
+            angle=angle,
+            target_position=target_position,
+            target_angle=target_angle,
+            planned_time=time,
+            waypoint=np.where(np.isnan(waypoint), -1.0, waypoint).astype(np.int32),
+        )
 
     def _compare(self, tracker: PathTracker, rows: Floats) -> None:
         """Fill in the columns of a deviation."""
@@ -150,14 +156,20 @@ class Recording:
             fastest = speed(twist)
             if i:
                 passed = float(self.time[i] - self.time[i - 1])
-            target, actual = (pose_from_row(poses[i]) for poses in (
-                self.target_pose, self.actual_pose))
+            target, actual = (
+                pose_from_row(poses[i]) for poses in (self.target_pose, self.actual_pose)
+            )
             tracker.update(target, 2.0 * passed * max(fastest, fastest_before))
             fastest_before = fastest
             desired, reached = tracker.desired(actual, twist), tracker.pose()
-            rows[i] = (desired.distance_to(actual), desired.angle_to(actual),
-                       reached.distance_to(target), reached.angle_to(target),
-                       tracker.time(), tracker.waypoint())
+            rows[i] = (
+                desired.distance_to(actual),
+                desired.angle_to(actual),
+                reached.distance_to(target),
+                reached.angle_to(target),
+                tracker.time(),
+                tracker.waypoint(),
+            )
 
 
 def _from_file(path: Path, most_rows: int) -> Recording:
@@ -165,15 +177,20 @@ def _from_file(path: Path, most_rows: int) -> Recording:
         raise ValueError(f'{path} is no recording: it is no file of NumPy arrays (.npz)')
     try:
         with np.load(path) as file:
-            head, times, kinds, texts = (file[name] for name in (
-                'metadata', 'event_time', 'event_kind', 'event_text'))
+            head, times, kinds, texts = (
+                file[name] for name in ('metadata', 'event_time', 'event_kind', 'event_text')
+            )
             step = _step(len(file['time']), most_rows)
-            columns = {name: file[name] if name.startswith('planned_') else file[name][::step]
-                       for name in _COLUMNS}
+            columns = {
+                name: file[name] if name.startswith('planned_') else file[name][::step]
+                for name in _COLUMNS
+            }
     except KeyError as error:
         raise ValueError(f'{path} is no recording: {error.args[0]}') from None
-    events = [(float(time), str(kind), str(text))
-              for time, kind, text in zip(times, kinds, texts, strict=True)]
+    events = [
+        (float(time), str(kind), str(text))
+        for time, kind, text in zip(times, kinds, texts, strict=True)
+    ]
     return Recording(metadata=json.loads(head.item()), events=events, **columns)
 
 
@@ -183,8 +200,7 @@ def _from_folder(path: Path, most_rows: int) -> Recording:
     step = _step(len(rows), most_rows)
     columns = {name: np.array(rows[name][::step]) for name in disk.EXECUTED.names or ()}
     columns |= {f'planned_{name}': np.array(plan[name]) for name in disk.PLANNED.names or ()}
-    return Recording(metadata=head, events=disk.all_events(disk.read_notes(path), rows),
-                     **columns)
+    return Recording(metadata=head, events=disk.all_events(disk.read_notes(path), rows), **columns)
 
 
 def _step(rows: int, most: int) -> int:

@@ -32,15 +32,18 @@ SAME_TIME = 5e-7
 def name_of(head: dict[str, Any]) -> str:
     """Return the name of a recording, from when and what it is: they sort by time."""
     begun = datetime.fromisoformat(head['created'])
-    return (f'{begun:%Y%m%d-%H%M%S}-{begun.microsecond // 1000:03d}_'
-            f"{head['execution'].lower()}_{head['points']}_points")
+    return (
+        f'{begun:%Y%m%d-%H%M%S}-{begun.microsecond // 1000:03d}_'
+        f'{head["execution"].lower()}_{head["points"]}_points'
+    )
 
 
 class Folder:
     """One motion on its way to the disk; once something failed it only forgets what it is told."""
 
-    def __init__(self, directory: Path, head: dict[str, Any], max_size: float,
-                 say: Callable[[str], None]) -> None:
+    def __init__(
+        self, directory: Path, head: dict[str, Any], max_size: float, say: Callable[[str], None]
+    ) -> None:
         """
         Prepare; nothing is written before :meth:`open`.
 
@@ -72,7 +75,8 @@ class Folder:
         if (self._rows.count + 1) * disk.ROW.size > self._max_size / 2.0:
             self._head['trouble'] = (
                 f'The recording of this motion ends after {self._rows.count} packets, half of '
-                f'record_max_size = {self._max_size / 1e6:g} MB.')
+                f'record_max_size = {self._max_size / 1e6:g} MB.'
+            )
             self._say(self._head['trouble'])
             return
         self._rows.append(rows, len(rows) // disk.ROW.size)
@@ -84,7 +88,7 @@ class Folder:
         These are among the samples that came last: a goal with an open end gives up its ending.
         """
         kept = int(np.searchsorted(self._last_times, since + SAME_TIME, side='right'))
-        rows = rows[np.searchsorted(rows['time'], since + SAME_TIME, side='right'):]
+        rows = rows[np.searchsorted(rows['time'], since + SAME_TIME, side='right') :]
         self._plan.count -= len(self._last_times) - kept
         self._plan.append(rows.tobytes(), len(rows))
         self._last_times = rows['time']
@@ -92,7 +96,7 @@ class Folder:
     def write_note(self, event: disk.Event) -> None:
         """Append a note."""
         time, kind, text = event
-        self._notes.write(json.dumps([time, kind, text[:disk.MOST_TEXT]]).encode() + b'\n')
+        self._notes.write(json.dumps([time, kind, text[: disk.MOST_TEXT]]).encode() + b'\n')
 
     def close(self, outcome: dict[str, Any]) -> None:
         """Write what is only known at the end."""
@@ -123,8 +127,10 @@ class Folder:
             self._is_broken = True
             self._close_files()
             reason = error.strerror if isinstance(error, OSError) else error
-            self._say(f'A motion is not recorded, or not to its end: {reason} '
-                      f'({self._directory}); see to record_directory.')
+            self._say(
+                f'A motion is not recorded, or not to its end: {reason} '
+                f'({self._directory}); see to record_directory.'
+            )
 
     def _write_head(self) -> None:
         (self._path / disk.HEAD).write_text(json.dumps(self._head), encoding='utf-8')
@@ -150,8 +156,7 @@ def _new(path: Path) -> Path:
 # ---- what is there already ------------------------------------------------------------------
 
 
-def keep_within(directory: Path, room: float,
-                breathe: Callable[[], None] = lambda: None) -> None:
+def keep_within(directory: Path, room: float, breathe: Callable[[], None] = lambda: None) -> None:
     """
     Finish what a process that was killed has left, then remove the oldest recordings.
 

@@ -30,16 +30,30 @@ FORMAT = 1
 
 #: One packet of the robot: names, shapes and order of the columns. Units and frames:
 #: doc/recordings.md.
-EXECUTED = np.dtype([
-    ('time', '<f8'),
-    ('actual_pose', '<f8', 7), ('target_pose', '<f8', 7),
-    ('actual_twist', '<f8', 6), ('target_twist', '<f8', 6),
-    ('actual_q', '<f8', 6), ('target_q', '<f8', 6),
-    ('actual_qd', '<f8', 6), ('target_qd', '<f8', 6),
-    ('lag', '<f8'), ('buffered', '<f8'), ('speed_scaling', '<f8'), ('slider', '<f8'),
-    ('analog_output', '<f8', 2),
-    ('digital_output', '<i4'), ('points_begun', '<i4'), ('waypoint', '<i4'),
-    ('robot_mode', '<i4'), ('safety_mode', '<i4'), ('runtime_state', '<i4')])
+EXECUTED = np.dtype(
+    [
+        ('time', '<f8'),
+        ('actual_pose', '<f8', 7),
+        ('target_pose', '<f8', 7),
+        ('actual_twist', '<f8', 6),
+        ('target_twist', '<f8', 6),
+        ('actual_q', '<f8', 6),
+        ('target_q', '<f8', 6),
+        ('actual_qd', '<f8', 6),
+        ('target_qd', '<f8', 6),
+        ('lag', '<f8'),
+        ('buffered', '<f8'),
+        ('speed_scaling', '<f8'),
+        ('slider', '<f8'),
+        ('analog_output', '<f8', 2),
+        ('digital_output', '<i4'),
+        ('points_begun', '<i4'),
+        ('waypoint', '<i4'),
+        ('robot_mode', '<i4'),
+        ('safety_mode', '<i4'),
+        ('runtime_state', '<i4'),
+    ]
+)
 #: The same for :mod:`struct`, which fills a row faster than numpy does.
 ROW = struct.Struct('<57d6i')
 #: One sample of the planned path.
@@ -60,9 +74,11 @@ MOST_TEXT = 120
 Event: TypeAlias = tuple[float, str, str]
 
 #: The digital outputs by bit.
-OUTPUT_NAMES = (*(f'standard digital output {i}' for i in range(8)),
-                *(f'configurable digital output {i}' for i in range(8)),
-                *(f'tool digital output {i}' for i in range(2)))
+OUTPUT_NAMES = (
+    *(f'standard digital output {i}' for i in range(8)),
+    *(f'configurable digital output {i}' for i in range(8)),
+    *(f'tool digital output {i}' for i in range(2)),
+)
 
 
 class GrowingArray:
@@ -102,7 +118,7 @@ class GrowingArray:
     def _write(self, data: bytes | memoryview) -> None:
         view = memoryview(data).cast('B')
         while len(view):
-            view = view[self.file.write(view):]
+            view = view[self.file.write(view) :]
 
 
 def _npy_header(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
@@ -118,8 +134,7 @@ def _npy_header(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
 # ---- events ---------------------------------------------------------------------------------
 
 
-def events_of(rows: NDArray[np.void],
-              breathe: Callable[[], None] = lambda: None) -> list[Event]:
+def events_of(rows: NDArray[np.void], breathe: Callable[[], None] = lambda: None) -> list[Event]:
     """
     Return what changed from packet to packet: points begun, outputs, slider, program, modes.
 
@@ -128,13 +143,15 @@ def events_of(rows: NDArray[np.void],
     """
     found: list[Event] = []
     for first in range(0, len(rows), CHUNK):
-        part = rows[max(0, first - 1):first + CHUNK]
+        part = rows[max(0, first - 1) : first + CHUNK]
         found += sorted(_changes(part), key=lambda event: event[0])
         breathe()
         if len(found) > MOST_EVENTS:
             last = found[MOST_EVENTS - 1][0]
-            return [*found[:MOST_EVENTS - 1],
-                    (last, 'more', 'more events follow, which the columns show')]
+            return [
+                *found[: MOST_EVENTS - 1],
+                (last, 'more', 'more events follow, which the columns show'),
+            ]
     return found
 
 
@@ -147,8 +164,11 @@ def _changes(part: NDArray[np.void]) -> Iterator[Event]:
     analog = part['analog_output']
     for i, channel in np.argwhere(analog[1:] != analog[:-1]):
         if not np.isnan(analog[i, channel]):
-            yield (float(part['time'][i + 1]), 'output',
-                   f'standard analog output {channel}: {analog[i + 1, channel]:.4g}')
+            yield (
+                float(part['time'][i + 1]),
+                'output',
+                f'standard analog output {channel}: {analog[i + 1, channel]:.4g}',
+            )
 
 
 def _outputs(before: int, now: int) -> Iterator[tuple[str, str]]:
@@ -156,7 +176,7 @@ def _outputs(before: int, now: int) -> Iterator[tuple[str, str]]:
         return
     for bit, name in enumerate(OUTPUT_NAMES):
         if (before ^ now) >> bit & 1:
-            yield 'output', f"{name}: {'on' if now >> bit & 1 else 'off'}"
+            yield 'output', f'{name}: {"on" if now >> bit & 1 else "off"}'
 
 
 def _waypoint(_: int, now: int) -> Iterator[tuple[str, str]]:
@@ -186,8 +206,9 @@ def read_notes(folder: Path) -> list[Event]:
     return notes
 
 
-def all_events(notes: Iterable[Event], rows: NDArray[np.void],
-               breathe: Callable[[], None] = lambda: None) -> list[Event]:
+def all_events(
+    notes: Iterable[Event], rows: NDArray[np.void], breathe: Callable[[], None] = lambda: None
+) -> list[Event]:
     """Return notes and changes in the order of time."""
     return sorted([*notes, *events_of(rows, breathe)], key=lambda event: event[0])
 
@@ -197,7 +218,8 @@ def event_arrays(events: list[Event]) -> dict[str, NDArray[Any]]:
     return {
         'event_time': np.array([time for time, _, _ in events], dtype='<f8'),
         'event_kind': np.array([kind for _, kind, _ in events], dtype='<U16'),
-        'event_text': np.array([text for _, _, text in events], dtype=f'<U{MOST_TEXT}')}
+        'event_text': np.array([text for _, _, text in events], dtype=f'<U{MOST_TEXT}'),
+    }
 
 
 def finish(folder: Path, breathe: Callable[[], None] = lambda: None) -> Path:
@@ -215,8 +237,10 @@ def finish(folder: Path, breathe: Callable[[], None] = lambda: None) -> Path:
     try:
         with zipfile.ZipFile(unfinished, 'w', zipfile.ZIP_STORED) as archive:
             head = (folder / HEAD).read_text(encoding='utf-8')
-            members = {'metadata': np.array(head), **event_arrays(
-                all_events(read_notes(folder), rows, breathe))}
+            members = {
+                'metadata': np.array(head),
+                **event_arrays(all_events(read_notes(folder), rows, breathe)),
+            }
             for name, values in members.items():
                 _write_member(archive, name, values.dtype, values.shape, [values])
             for prefix, table in (('', rows), ('planned_', plan)):
@@ -230,19 +254,26 @@ def finish(folder: Path, breathe: Callable[[], None] = lambda: None) -> Path:
     return file
 
 
-def _write_column(archive: zipfile.ZipFile, name: str, column: NDArray[Any],
-                  breathe: Callable[[], None]) -> None:
+def _write_column(
+    archive: zipfile.ZipFile, name: str, column: NDArray[Any], breathe: Callable[[], None]
+) -> None:
     """Write a column of a table, a part after the other."""
+
     def parts() -> Iterator[NDArray[Any]]:
         for first in range(0, len(column), CHUNK):
-            yield column[first:first + CHUNK]
+            yield column[first : first + CHUNK]
             breathe()
 
     _write_member(archive, name, column.dtype, column.shape, parts())
 
 
-def _write_member(archive: zipfile.ZipFile, name: str, dtype: np.dtype[Any],
-                  shape: tuple[int, ...], parts: Iterable[NDArray[Any]]) -> None:
+def _write_member(
+    archive: zipfile.ZipFile,
+    name: str,
+    dtype: np.dtype[Any],
+    shape: tuple[int, ...],
+    parts: Iterable[NDArray[Any]],
+) -> None:
     with archive.open(f'{name}.npy', 'w', force_zip64=True) as raw:
         raw.write(_npy_header(dtype, shape))
         for part in parts:

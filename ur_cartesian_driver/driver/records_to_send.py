@@ -21,7 +21,7 @@ class RecordsToSend:
 
     def put(self, behind: int, data: bytes) -> None:
         """Put records behind the first so many, in the place of what is there."""
-        del self._data[(behind - self._first) * POINT_SIZE:]
+        del self._data[(behind - self._first) * POINT_SIZE :]
         self._data += data
 
     def take(self, first: int, end: int) -> bytes:

@@ -109,9 +109,15 @@ SIGN_OF_LIFE = 0.5
 #: What takes longer than a few milliseconds to unpack or prepare [bytes].
 LARGE = 1 << 18
 #: How a goal can end that wants an explanation beyond its sentence.
-EXPLAINED = frozenset({
-    ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP, ErrorCode.PROGRAM_STOPPED,
-    ErrorCode.CONNECTION_LOST, ErrorCode.EXECUTION_FAILED})
+EXPLAINED = frozenset(
+    {
+        ErrorCode.PROTECTIVE_STOP,
+        ErrorCode.EMERGENCY_STOP,
+        ErrorCode.PROGRAM_STOPPED,
+        ErrorCode.CONNECTION_LOST,
+        ErrorCode.EXECUTION_FAILED,
+    }
+)
 #: Of these the robot tells the reason, on another connection, in the same cycle or the next ones;
 #: so long it is waited for [s].
 REASONED = frozenset({ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP})
@@ -130,8 +136,9 @@ T = TypeVar('T')
 class RobotLoop:
     """Joins the link to the robot, the machine of the running goal and the pipe to the owner."""
 
-    def __init__(self, configure: Configure, memory: StateMemory,
-                 notify: asyncio.StreamWriter) -> None:
+    def __init__(
+        self, configure: Configure, memory: StateMemory, notify: asyncio.StreamWriter
+    ) -> None:
         """Prepare; :meth:`run` does the work."""
         self._config = config = configure.config
         self._memory = memory
@@ -150,13 +157,20 @@ class RobotLoop:
         self._loan: TcpLoan | None = None
         self._last_heartbeat = 0.0
         self._link = RobotLink(
-            config, on_state=self._keep_state, on_event=self._handle_event,
-            on_status=self._status_changed, on_geometry=self._geometry_known,
+            config,
+            on_state=self._keep_state,
+            on_event=self._handle_event,
+            on_status=self._status_changed,
+            on_geometry=self._geometry_known,
             on_signals=self._signals_changed,
-            on_log=self._log, may_upload=configure.may_upload)
+            on_log=self._log,
+            may_upload=configure.may_upload,
+        )
         self._recorder = Recorder(
-            config.record_directory, config.record_max_size, partial(
-                _later, asyncio.get_running_loop(), self._log, logging.WARNING))
+            config.record_directory,
+            config.record_max_size,
+            partial(_later, asyncio.get_running_loop(), self._log, logging.WARNING),
+        )
         self._desk = CallDesk(config, config.dashboard_port, self._link)
         self._calls: set[asyncio.Task[None]] = set()
         self._connection = ConnectionState.DISCONNECTED
@@ -183,8 +197,11 @@ class RobotLoop:
         finally:
             self._end_motion('The driver was shut down.')
             self._tell_unexplained()
-            if self._loan is not None and self._latest is not None \
-                    and self._loan.is_due(self._latest, self._now()):
+            if (
+                self._loan is not None
+                and self._latest is not None
+                and self._loan.is_due(self._latest, self._now())
+            ):
                 # Ours does it by itself, but this may be another robot program.
                 self._link.return_tcp(self._loan.T_flange_before)
             self._link.close()
@@ -230,8 +247,9 @@ class RobotLoop:
 
     async def _start(self, request: StartMotion) -> None:
         """Start a motion, or refuse it with the reason."""
-        machine = await _apart(LARGE if is_slow(request) else len(request.points),
-                               machine_of, request, self._config)
+        machine = await _apart(
+            LARGE if is_slow(request) else len(request.points), machine_of, request, self._config
+        )
         reason = self._link.not_ready()
         if self._machine is not None or self._unexplained is not None:
             reason = 'Another motion is running; wait for its end or cancel it.'
@@ -240,8 +258,12 @@ class RobotLoop:
         elif not reason:
             reason = self._tcp_changed(request.order)
         if reason:
-            self._notify(MotionEnded(motion=request.motion, outcome=Outcome(
-                code=ErrorCode.ROBOT_NOT_READY, text=reason)))
+            self._notify(
+                MotionEnded(
+                    motion=request.motion,
+                    outcome=Outcome(code=ErrorCode.ROBOT_NOT_READY, text=reason),
+                )
+            )
             return
         self._motion, self._points = request.motion, RecordsToSend(request.points)
         self._machine = machine
@@ -256,8 +278,14 @@ class RobotLoop:
             self._offered = request
             self._carry_out(self._machine.step(request.extension, self._now()))
         else:
-            self._notify(MotionExtended(motion=request.motion, answer=AnswerExtension(
-                number=request.extension.number, refusal='The goal has ended.')))
+            self._notify(
+                MotionExtended(
+                    motion=request.motion,
+                    answer=AnswerExtension(
+                        number=request.extension.number, refusal='The goal has ended.'
+                    ),
+                )
+            )
 
     def _answer_extension(self, answer: AnswerExtension) -> None:
         """Keep the points that the machine has taken, and tell their owner."""
@@ -268,7 +296,8 @@ class RobotLoop:
             if offered.extension.order is not None and self._machine is not None:
                 self._recorder.extend(
                     offered.extension.order.reference,
-                    self._machine.time_behind(offered.extension.behind))
+                    self._machine.time_behind(offered.extension.behind),
+                )
         self._notify(MotionExtended(motion=self._motion, answer=answer))
 
     def _tcp_changed(self, order: Order) -> str:
@@ -276,8 +305,10 @@ class RobotLoop:
         state = self._latest
         if state is None or same_tcp(state.T_flange_tcp, order.T_flange_active):
             return ''
-        return ('The TCP of the robot was changed after the goal had been planned; send the goal '
-                'again.')
+        return (
+            'The TCP of the robot was changed after the goal had been planned; send the goal '
+            'again.'
+        )
 
     def _record(self, request: StartMotion) -> None:
         """Begin the recording of a motion, where motions are recorded."""
@@ -285,10 +316,21 @@ class RobotLoop:
             return
         status = self._link.status
         led_by = 'LIVE_TARGETS' if request.live is not None else 'TEACH' if request.teach else ''
-        self._recorder.start(request.order, head_of(
-            request.order, of_owner=request.about, parameters=self._config, led_by=led_by, robot={
-                'model': status.robot_model, 'polyscope_version': status.polyscope_version,
-                'serial_number': status.serial_number}), self._latest)
+        self._recorder.start(
+            request.order,
+            head_of(
+                request.order,
+                of_owner=request.about,
+                parameters=self._config,
+                led_by=led_by,
+                robot={
+                    'model': status.robot_model,
+                    'polyscope_version': status.polyscope_version,
+                    'serial_number': status.serial_number,
+                },
+            ),
+            self._latest,
+        )
 
     def _signals_changed(self, signals: Signals) -> None:
         self._recorder.take_signals(signals)
@@ -301,8 +343,14 @@ class RobotLoop:
         if len(self._calls) < MOST_CALLS:
             self._spawn(self._answer(request))
         else:
-            self._notify(CallAnswered(number=request.number, answer=Answer(
-                ok=False, text=f'{MOST_CALLS} calls are being carried out; wait for some.')))
+            self._notify(
+                CallAnswered(
+                    number=request.number,
+                    answer=Answer(
+                        ok=False, text=f'{MOST_CALLS} calls are being carried out; wait for some.'
+                    ),
+                )
+            )
 
     async def _answer(self, request: CallRobot) -> None:
         try:
@@ -389,10 +437,15 @@ class RobotLoop:
     def _open_servo(self) -> None:
         """Take the inputs of the servo for the motion that runs."""
         self._servo = ServoConnection(
-            lambda feedback: self._handle_event(ServoReceived(feedback=feedback)))
-        self._spawn(self._servo.run(
-            self._config.robot_ip, self._config.rtde_port,
-            lambda reason: self._handle_event(LinkLost(link=SERVO_LINK, reason=reason))))
+            lambda feedback: self._handle_event(ServoReceived(feedback=feedback))
+        )
+        self._spawn(
+            self._servo.run(
+                self._config.robot_ip,
+                self._config.rtde_port,
+                lambda reason: self._handle_event(LinkLost(link=SERVO_LINK, reason=reason)),
+            )
+        )
 
     def _leave_servo(self) -> None:
         """Have the robot program listen to the inputs no more, and give them back."""
@@ -429,10 +482,16 @@ class RobotLoop:
         outcome = ended.outcome
         if outcome.code in EXPLAINED:
             error = self._link.robot_error()
-            text = f"{outcome.text} {error[:1].upper()}{error[1:].rstrip('.')}." if error \
+            text = (
+                f'{outcome.text} {error[:1].upper()}{error[1:].rstrip(".")}.'
+                if error
                 else outcome.text
-            outcome = replace(outcome, text=text, report=(
-                *outcome.report, *(f'why: {line}' for line in self._link.chain())))
+            )
+            outcome = replace(
+                outcome,
+                text=text,
+                report=(*outcome.report, *(f'why: {line}' for line in self._link.chain())),
+            )
             self._link.explain(text)
         self._recorder.end(outcome)
         self._notify(replace(ended, outcome=outcome))
@@ -448,8 +507,9 @@ class RobotLoop:
         assert self._machine is not None
         assert self._machine.loan is not None
         loan = self._machine.loan
-        self._notify(TcpLent(T_flange_before=loan.T_flange_before,
-                             T_flange_lent=loan.T_flange_lent))
+        self._notify(
+            TcpLent(T_flange_before=loan.T_flange_before, T_flange_lent=loan.T_flange_lent)
+        )
         self._link.lend_tcp(T_flange_tcp)
 
     def _owe(self, loan: TcpLoan) -> None:
@@ -479,14 +539,19 @@ class RobotLoop:
                 last_sign = self._now()
                 if self._untold is not None:
                     self._notify(self._untold)
-                self._notify(Alive(gaps=Gaps(
-                    reports=self._longest_gap, keepalives=self._link.keepalive_gap())))
+                self._notify(
+                    Alive(
+                        gaps=Gaps(reports=self._longest_gap, keepalives=self._link.keepalive_gap())
+                    )
+                )
                 self._longest_gap = 0.0
             if self._now() - self._last_heartbeat > self._config.node_timeout:
                 self._last_heartbeat = self._now()
                 if self._machine is not None:
-                    reason = ('the owner of the driver was silent for longer than node_timeout = '
-                              f'{self._config.node_timeout:g} s')
+                    reason = (
+                        'the owner of the driver was silent for longer than node_timeout = '
+                        f'{self._config.node_timeout:g} s'
+                    )
                     self._log(logging.ERROR, f'{reason}: the arm is stopped')
                     self._handle_event(CancelRequested(reason=reason))
 
@@ -500,8 +565,10 @@ class RobotLoop:
             self._loan.hurry()
         self._program_running = status.program_running
         before, self._connection = self._connection, status.state
-        if (before, status.state) == (ConnectionState.CONNECTING, ConnectionState.CONNECTED) \
-                and not status.serial_number:
+        if (before, status.state) == (
+            ConnectionState.CONNECTING,
+            ConnectionState.CONNECTED,
+        ) and not status.serial_number:
             self._spawn(self._ask_serial_number())
         self._notify(StatusChanged(status=status))
 
@@ -515,8 +582,10 @@ class RobotLoop:
         self._share_state()
         if self._pipe.is_closing():
             return
-        left_out = isinstance(notice, PASSING) \
+        left_out = (
+            isinstance(notice, PASSING)
             and self._pipe.transport.get_write_buffer_size() > MOST_UNREAD
+        )
         if isinstance(notice, SignalsChanged):
             self._untold = notice if left_out else None
         if not left_out:
@@ -526,8 +595,9 @@ class RobotLoop:
         return asyncio.get_running_loop().time()
 
 
-def _later(loop: asyncio.AbstractEventLoop, function: Callable[..., None],
-           *arguments: object) -> None:
+def _later(
+    loop: asyncio.AbstractEventLoop, function: Callable[..., None], *arguments: object
+) -> None:
     """Have the loop call a function, from another thread; nothing, if the loop has ended."""
     with suppress(RuntimeError):
         loop.call_soon_threadsafe(function, *arguments)

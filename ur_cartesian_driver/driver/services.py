@@ -62,8 +62,9 @@ class RobotServices(ABC):
 
     def set_analog_output(self, pin: int, fraction: float, domain: AnalogDomain) -> Answer:
         """Set an analog output to a fraction of its range: 4-20 mA or 0-10 V."""
-        return self.call(SetOutput(kind=OutputKind.STANDARD_ANALOG, pin=pin, value=fraction,
-                                   domain=domain)).result()
+        return self.call(
+            SetOutput(kind=OutputKind.STANDARD_ANALOG, pin=pin, value=fraction, domain=domain)
+        ).result()
 
     def set_speed_slider(self, fraction: float) -> Answer:
         """Move the speed slider, 0 (the arm stands) to 1."""

@@ -65,21 +65,39 @@ class StateMemory:
 
     def write(self, state: RobotState) -> None:
         """Publish a state."""
-        self._write(_DATA.pack(
-            True, state.timestamp, *state.actual_q, *state.actual_qd, *state.target_q,
-            *state.target_qd, *state.actual_tcp_pose.row(), *state.actual_tcp_twist,
-            *state.target_tcp_pose.row(), *state.target_tcp_twist, *state.actual_tcp_wrench,
-            *state.T_flange_tcp.row(), state.speed_scaling, state.target_speed_fraction,
-            *(state.actual_tcp_acceleration or _UNKNOWN),
-            *(state.target_tcp_acceleration or _UNKNOWN), *(state.joint_torque or _UNKNOWN),
-            state.robot_mode, state.safety_mode, state.runtime_state,
-            state.robot_status, state.safety_status, state.points_begun))
+        self._write(
+            _DATA.pack(
+                True,
+                state.timestamp,
+                *state.actual_q,
+                *state.actual_qd,
+                *state.target_q,
+                *state.target_qd,
+                *state.actual_tcp_pose.row(),
+                *state.actual_tcp_twist,
+                *state.target_tcp_pose.row(),
+                *state.target_tcp_twist,
+                *state.actual_tcp_wrench,
+                *state.T_flange_tcp.row(),
+                state.speed_scaling,
+                state.target_speed_fraction,
+                *(state.actual_tcp_acceleration or _UNKNOWN),
+                *(state.target_tcp_acceleration or _UNKNOWN),
+                *(state.joint_torque or _UNKNOWN),
+                state.robot_mode,
+                state.safety_mode,
+                state.runtime_state,
+                state.robot_status,
+                state.safety_status,
+                state.points_begun,
+            )
+        )
 
     def read(self) -> RobotState | None:
         """Return the newest state, None when there is none."""
         while True:
             (before,) = _COUNTER.unpack_from(self._memory, 0)
-            data = self._memory[_COUNTER.size:_COUNTER.size + _DATA.size]
+            data = self._memory[_COUNTER.size : _COUNTER.size + _DATA.size]
             (after,) = _COUNTER.unpack_from(self._memory, 0)
             if before == after and not before & 1:
                 return _state(_DATA.unpack(data)) if before else None
@@ -89,7 +107,7 @@ class StateMemory:
             return
         self._count += 1
         _COUNTER.pack_into(self._memory, 0, 2 * self._count - 1)
-        self._memory[_COUNTER.size:_COUNTER.size + len(data)] = data
+        self._memory[_COUNTER.size : _COUNTER.size + len(data)] = data
         _COUNTER.pack_into(self._memory, 0, 2 * self._count)
 
 
@@ -101,7 +119,7 @@ def _state(values: tuple[float, ...]) -> RobotState | None:
     def take(n: int) -> tuple[float, ...]:
         nonlocal at
         at += n
-        return values[at - n:at]
+        return values[at - n : at]
 
     def vector() -> tuple[float, float, float, float, float, float]:
         a, b, c, d, e, f = take(6)
@@ -119,12 +137,26 @@ def _state(values: tuple[float, ...]) -> RobotState | None:
         return int(take(1)[0])
 
     return RobotState(
-        timestamp=take(1)[0], actual_q=vector(), actual_qd=vector(), target_q=vector(),
-        target_qd=vector(), actual_tcp_pose=pose(), actual_tcp_twist=vector(),
-        target_tcp_pose=pose(), target_tcp_twist=vector(), actual_tcp_wrench=vector(),
-        T_flange_tcp=pose(), speed_scaling=take(1)[0], target_speed_fraction=take(1)[0],
-        actual_tcp_acceleration=known(), target_tcp_acceleration=known(),
+        timestamp=take(1)[0],
+        actual_q=vector(),
+        actual_qd=vector(),
+        target_q=vector(),
+        target_qd=vector(),
+        actual_tcp_pose=pose(),
+        actual_tcp_twist=vector(),
+        target_tcp_pose=pose(),
+        target_tcp_twist=vector(),
+        actual_tcp_wrench=vector(),
+        T_flange_tcp=pose(),
+        speed_scaling=take(1)[0],
+        target_speed_fraction=take(1)[0],
+        actual_tcp_acceleration=known(),
+        target_tcp_acceleration=known(),
         joint_torque=known(),
-        robot_mode=RobotMode(number()), safety_mode=SafetyMode(number()),
-        runtime_state=RuntimeState(number()), robot_status=RobotStatus(number()),
-        safety_status=SafetyStatus(number()), points_begun=number())
+        robot_mode=RobotMode(number()),
+        safety_mode=SafetyMode(number()),
+        runtime_state=RuntimeState(number()),
+        robot_status=RobotStatus(number()),
+        safety_status=SafetyStatus(number()),
+        points_begun=number(),
+    )

@@ -112,5 +112,18 @@ class Finish:
 
 
 Command: TypeAlias = (
-    SendControl | SendPoints | LendTcp | ReturnTcp | StopProgram | Report | AnswerExtension
-    | OpenServo | EnterServo | WriteServo | LeaveServo | ReportServo | Remark | Finish)
+    SendControl
+    | SendPoints
+    | LendTcp
+    | ReturnTcp
+    | StopProgram
+    | Report
+    | AnswerExtension
+    | OpenServo
+    | EnterServo
+    | WriteServo
+    | LeaveServo
+    | ReportServo
+    | Remark
+    | Finish
+)

@@ -45,15 +45,24 @@ class LiveMachine(ServoMachine):
     :param start: where it stands [rad].
     """
 
-    def __init__(self, order: Order, live: LiveSettings, arm: Arm, start: Joints, *,
-                 settings: ServoSettings, **more: Any) -> None:
+    def __init__(
+        self,
+        order: Order,
+        live: LiveSettings,
+        arm: Arm,
+        start: Joints,
+        *,
+        settings: ServoSettings,
+        **more: Any,
+    ) -> None:
         """Take an order to stand; nothing happens before :meth:`start`."""
         self._follower = TargetFollower(arm, order.T_flange_active, start, live.limits)
         self._timeout = live.timeout
         self.live = LiveTargets(self._follower, live)
         self._blocked, self._next_remark = '', 0.0
-        super().__init__(order, settings=settings, source=self.live,
-                         **more | {'max_plan_deviation': ANY_WAY})
+        super().__init__(
+            order, settings=settings, source=self.live, **more | {'max_plan_deviation': ANY_WAY}
+        )
 
     def aim(self, T_base_tcp: Pose, age: float, now: float) -> None:
         """Take a target; see :meth:`LiveTargets.take`."""
@@ -100,8 +109,12 @@ class TeachMachine(ServoMachine):
 
     def __init__(self, order: Order, *, settings: ServoSettings, **more: Any) -> None:
         """Take an order to stand; nothing happens before :meth:`start`."""
-        super().__init__(order, settings=settings, source=_NoSetpoints(),
-                         **more | {'max_plan_deviation': ANY_WAY})
+        super().__init__(
+            order,
+            settings=settings,
+            source=_NoSetpoints(),
+            **more | {'max_plan_deviation': ANY_WAY},
+        )
         self.stream: TeachStream = TeachStream(settings)
 
     def _progress_of_stream(self) -> tuple[Signal | None, str]:
@@ -145,8 +158,10 @@ class TeachStream(ServoStream):
             if self.is_guided:
                 self.trouble = 'the robot program has ended the guiding by itself'
             elif now > self._asked_at + TEACH_BOUND:
-                self.trouble = ('the robot program does not let the arm be guided: it is paused, '
-                                'or was started without allow_teach')
+                self.trouble = (
+                    'the robot program does not let the arm be guided: it is paused, '
+                    'or was started without allow_teach'
+                )
         self.is_guided = self.is_guided or teaches
         return super().take(feedback, now)
 
@@ -154,4 +169,3 @@ class TeachStream(ServoStream):
         mode, *rest = super()._row()
         guided = self._begun and self.phase is Phase.READY
         return (ServoMode.TEACH if guided else mode, *rest)
-

@@ -105,15 +105,20 @@ class LiveTargets:
     @property
     def report(self) -> tuple[str, ...]:
         """What the session was, in lines for people."""
-        lines = ['1 target was followed' if self.taken == 1
-                 else f'{self.taken} targets were followed']
+        lines = [
+            '1 target was followed' if self.taken == 1 else f'{self.taken} targets were followed'
+        ]
         if self.left_out:
-            lines.append(f'{self.left_out} came after a newer one or were older than '
-                         f'{self._settings.max_age:g} s, and were left out')
+            lines.append(
+                f'{self.left_out} came after a newer one or were older than '
+                f'{self._settings.max_age:g} s, and were left out'
+            )
         if self.pauses:
             times = 'once' if self.pauses == 1 else f'{self.pauses} times'
-            lines.append(f'the arm was stopped {times} because the newest target was older than '
-                         f'{self._settings.max_age:g} s')
+            lines.append(
+                f'the arm was stopped {times} because the newest target was older than '
+                f'{self._settings.max_age:g} s'
+            )
         return (*lines, *(f'the arm was stopped: {reason}' for reason in self._reasons.values()))
 
 

@@ -80,9 +80,15 @@ class Edge:
             at = (x * ex + y * ey + z * ez + a * ea + b * eb + c * ec + d * ed) / self.square
             at = 0.0 if at < 0.0 else 1.0 if at > 1.0 else at
         at = max(lowest, min(at, highest))
-        return at, ((x - at * ex) ** 2 + (y - at * ey) ** 2 + (z - at * ez) ** 2
-                    + (a - at * ea) ** 2 + (b - at * eb) ** 2 + (c - at * ec) ** 2
-                    + (d - at * ed) ** 2)
+        return at, (
+            (x - at * ex) ** 2
+            + (y - at * ey) ** 2
+            + (z - at * ez) ** 2
+            + (a - at * ea) ** 2
+            + (b - at * eb) ** 2
+            + (c - at * ec) ** 2
+            + (d - at * ed) ** 2
+        )
 
 
 class PathTracker:
@@ -125,8 +131,7 @@ class PathTracker:
         """The row of the end of the path."""
         return len(self._rows) - 1
 
-    def update(self, target: Pose, reach: float,
-               running: tuple[int, int] | None = None) -> Place:
+    def update(self, target: Pose, reach: float, running: tuple[int, int] | None = None) -> Place:
         """
         Move on to the place nearest to the controller's target.
 
@@ -141,7 +146,8 @@ class PathTracker:
         if end > first:
             lowest = self.place.fraction if first == self.place.row else 0.0
             self.place, self.miss = self._nearest(
-                self._coordinates(target, first), first, end, lowest)
+                self._coordinates(target, first), first, end, lowest
+            )
         return self.place
 
     def desired(self, actual: Pose, twist: Vector6) -> Pose:
@@ -156,9 +162,13 @@ class PathTracker:
         end = min(bisect_left(self._arc, here + lag), self.last_row)
         if end <= first:
             return self.pose()
-        place, _ = self._nearest(self._coordinates(actual, first), first, end,
-                                 self._fraction(first, here - lag),
-                                 self._fraction(end - 1, here + lag))
+        place, _ = self._nearest(
+            self._coordinates(actual, first),
+            first,
+            end,
+            self._fraction(first, here - lag),
+            self._fraction(end - 1, here + lag),
+        )
         return self.pose(place)
 
     def deviation(self, target: Pose) -> tuple[float, float]:
@@ -172,7 +182,7 @@ class PathTracker:
         if not self._is_roomy:
             return way, angle
         row, fraction = self.place.row, self.place.fraction
-        room = self.path.room[row:row + (2 if fraction > 0.0 else 1)].max(axis=0)
+        room = self.path.room[row : row + (2 if fraction > 0.0 else 1)].max(axis=0)
         return max(0.0, way - float(room[0])), max(0.0, angle - float(room[1]))
 
     def is_within(self, way: float, angle: float) -> bool:
@@ -200,9 +210,16 @@ class PathTracker:
         first = max(0, min(bisect_left(self._time, self._time[row] - MEMORY), row))
         end = max(bisect_right(self._time, since + SAME_TIME), row + 1)
         new = bisect_right(path.time, since + SAME_TIME)
-        self._load(ReferencePath(**{
-            name: np.concatenate([getattr(old, name)[first:end], getattr(path, name)[new:]])
-            for name in ('poses', 'point', 'time', 'room')}))
+        self._load(
+            ReferencePath(
+                **{
+                    name: np.concatenate(
+                        [getattr(old, name)[first:end], getattr(path, name)[new:]]
+                    )
+                    for name in ('poses', 'point', 'time', 'room')
+                }
+            )
+        )
         self.place = Place(row - first, self.place.fraction if row + 1 < end else 0.0)
 
     def pose(self, place: Place | None = None) -> Pose:
@@ -257,11 +274,15 @@ class PathTracker:
         if edge is None:
             if len(self._edges) >= KEPT:
                 self._edges.clear()
-            start, end = self._rows[row:row + 2]
+            start, end = self._rows[row : row + 2]
             vector = end - start
             edge = self._edges[row] = Edge(
-                pose_from_row(self.path.poses[row]), pose_from_row(self.path.poses[row + 1]),
-                tuple(start.tolist()), tuple(vector.tolist()), float(vector @ vector))
+                pose_from_row(self.path.poses[row]),
+                pose_from_row(self.path.poses[row + 1]),
+                tuple(start.tolist()),
+                tuple(vector.tolist()),
+                float(vector @ vector),
+            )
         return edge
 
     def _coordinates(self, pose: Pose, row: int) -> Point:
@@ -271,8 +292,9 @@ class PathTracker:
         scale = 2.0 * RADIAN if a * ra + b * rb + c * rc + d * rd >= 0.0 else -2.0 * RADIAN
         return x, y, z, scale * a, scale * b, scale * c, scale * d
 
-    def _nearest(self, point: Point, first: int, end: int, lowest: float,
-                 highest: float = 1.0) -> tuple[Place, float]:
+    def _nearest(
+        self, point: Point, first: int, end: int, lowest: float, highest: float = 1.0
+    ) -> tuple[Place, float]:
         """
         Return the nearest place on the edges ``first`` to ``end``, and how far it is.
 
@@ -286,17 +308,19 @@ class PathTracker:
         nearest, best, fraction = inf, first, 0.0
         for row in range(first, end):
             at, miss = self._edge(row).nearest(
-                point, lowest if row == first else 0.0, highest if row == end - 1 else 1.0)
+                point, lowest if row == first else 0.0, highest if row == end - 1 else 1.0
+            )
             if miss < nearest:
                 nearest, best, fraction = miss, row, at
         place = Place(best + 1, 0.0) if fraction >= 1.0 else Place(best, fraction)
         return place, sqrt(nearest)
 
-    def _nearest_of_many(self, point: Point, first: int, end: int, lowest: float,
-                         highest: float) -> tuple[Place, float]:
+    def _nearest_of_many(
+        self, point: Point, first: int, end: int, lowest: float, highest: float
+    ) -> tuple[Place, float]:
         """Return the same by arrays, whose overhead is nothing beside so many edges."""
         start = self._rows[first:end]
-        edge = self._rows[first + 1:end + 1] - start
+        edge = self._rows[first + 1 : end + 1] - start
         away = np.array(point) - start
         square = np.einsum('ij,ij->i', edge, edge)
         along = np.einsum('ij,ij->i', away, edge)

@@ -39,8 +39,9 @@ MAX_PLAN_DEVIATION = (0.002, 0.02)
 class Observer:
     """The newest packet, the place on the path, and what is held against them."""
 
-    def __init__(self, order: Order, records: Records,
-                 max_plan_deviation: tuple[float, float]) -> None:
+    def __init__(
+        self, order: Order, records: Records, max_plan_deviation: tuple[float, float]
+    ) -> None:
         """
         Prepare for an order.
 
@@ -123,8 +124,9 @@ class Observer:
         self._under_way = self._under_way or begun > self._motions_before or fastest > 0.0
         if before is not None:  # it may have braked since
             fastest = max(fastest, speed(before.target_tcp_twist))
-        self._tracker.update(state.target_tcp_pose, 2.0 * passed * fastest,
-                             self._records.running(begun, self.trail))
+        self._tracker.update(
+            state.target_tcp_pose, 2.0 * passed * fastest, self._records.running(begun, self.trail)
+        )
 
     # ---- how far it is ------------------------------------------------------------------------
 
@@ -142,8 +144,9 @@ class Observer:
 
     def begun(self, state: RobotState) -> int:
         """Return how many records of this goal the robot has begun at least."""
-        return max(self._records.begun(self._motions_begun(state)),
-                   self._records.before(self.waypoint()))
+        return max(
+            self._records.begun(self._motions_begun(state)), self._records.before(self.waypoint())
+        )
 
     def _motions_begun(self, state: RobotState) -> int:
         """
@@ -189,7 +192,9 @@ class Observer:
             speed_scaling=state.speed_scaling,
             points_received=self._records.points,
             buffered=self.buffered(sent),
-            timestamp=state.timestamp, waits=waits)
+            timestamp=state.timestamp,
+            waits=waits,
+        )
 
     def _desired(self, state: RobotState) -> Pose:
         """Return where the tool should be on its way: around its progress."""
@@ -209,8 +214,10 @@ class Observer:
         apart, angle = start.distance_to(pose), start.angle_to(pose)
         if apart <= START_POSITION and angle <= START_ANGLE:
             return None
-        return (f'the arm is {apart:.4f} m and {angle:.4f} rad away from where the plan begins: '
-                'it moved meanwhile')
+        return (
+            f'the arm is {apart:.4f} m and {angle:.4f} rad away from where the plan begins: '
+            'it moved meanwhile'
+        )
 
     def fault(self, state: RobotState, *, may_stand: bool = False) -> tuple[Signal, str] | None:
         """
@@ -218,18 +225,33 @@ class Observer:
 
         :param may_stand: an arm that stands waits for nothing that was lost.
         """
-        return (self._plan_deviation(state) or self._wrong_pace(state)
-                or (None if may_stand else self._stall()) or self._path_violation(state))
+        return (
+            self._plan_deviation(state)
+            or self._wrong_pace(state)
+            or (None if may_stand else self._stall())
+            or self._path_violation(state)
+        )
 
     def missed_end(self, state: RobotState) -> str:
         """Return that the controller's target is not at the end, as a clause, or nothing."""
-        off = [value for value, limit in zip(
-            self._tracker.deviation(state.target_tcp_pose), self._max_plan_deviation, strict=True)
-            if 0.0 < limit < value]
-        return '' if not off else (
-            f'the robot program reports the end {off[0]:.4f} m or rad away from the last point: '
-            'it left out motions that it does not know; set wire_dialect to the version of that '
-            'program')
+        off = [
+            value
+            for value, limit in zip(
+                self._tracker.deviation(state.target_tcp_pose),
+                self._max_plan_deviation,
+                strict=True,
+            )
+            if 0.0 < limit < value
+        ]
+        return (
+            ''
+            if not off
+            else (
+                f'the robot program reports the end {off[0]:.4f} m or rad away from the last point: '
+                'it left out motions that it does not know; set wire_dialect to the version of that '
+                'program'
+            )
+        )
 
     def goal_error(self, state: RobotState) -> str | None:
         """Return a clause that says how far the arm is outside the goal tolerance, or None."""
@@ -240,14 +262,18 @@ class Observer:
         if not self._under_way or self._tracker.is_within(*self._surely_allowed):
             return None
         for name, unit, value, limit in zip(
-                ('max_plan_deviation', 'max_plan_deviation_angle'), ('m', 'rad'),
-                self._tracker.deviation(state.target_tcp_pose), self._max_plan_deviation,
-                strict=True):
+            ('max_plan_deviation', 'max_plan_deviation_angle'),
+            ('m', 'rad'),
+            self._tracker.deviation(state.target_tcp_pose),
+            self._max_plan_deviation,
+            strict=True,
+        ):
             if 0.0 < limit < value:
                 return Signal.DEVIATION, (
                     f'the controller itself left the plan by {value:.6f} {unit}, {name} is '
                     f'{limit:.6f} {unit}: the arm is on another branch, or something else than '
-                    'this goal moves it')
+                    'this goal moves it'
+                )
         return None
 
     def _wrong_pace(self, state: RobotState) -> tuple[Signal, str] | None:
@@ -255,7 +281,8 @@ class Observer:
         if self._pace is None or self._stale_begun is None:
             return None
         clause = self._pace.violation(
-            state.target_tcp_twist, self.scaled_time, self._tracker.time())
+            state.target_tcp_twist, self.scaled_time, self._tracker.time()
+        )
         return None if clause is None else (Signal.DEVIATION, clause)
 
     def _stall(self) -> tuple[Signal, str] | None:
@@ -265,7 +292,8 @@ class Observer:
         return Signal.STALLED, (
             f'the arm has stood still for {self._stalled_time:.3g} s, nothing holds it, and the '
             'robot program has not reported the end: a message to it or from it was lost, so it '
-            'was ended')
+            'was ended'
+        )
 
     def _path_violation(self, state: RobotState) -> tuple[Signal, str] | None:
         if not (self._path_watch and self._under_way):
@@ -285,10 +313,14 @@ class Observer:
 
 def _stands(before: RobotState | None, state: RobotState) -> bool:
     """Tell whether the target stands although neither slider nor pause holds it."""
-    return (before is not None and state.target_q == before.target_q
-            and state.target_tcp_pose == before.target_tcp_pose
-            and state.speed_scaling > 0.0 and state.target_speed_fraction > 0.0
-            and state.runtime_state is RuntimeState.PLAYING)
+    return (
+        before is not None
+        and state.target_q == before.target_q
+        and state.target_tcp_pose == before.target_tcp_pose
+        and state.speed_scaling > 0.0
+        and state.target_speed_fraction > 0.0
+        and state.runtime_state is RuntimeState.PLAYING
+    )
 
 
 def _patience(order: Order) -> float:

@@ -66,6 +66,7 @@ class Order:
 
     def __post_init__(self) -> None:
         """Fill in what is left empty."""
+
         def fill(name: str, value: NDArray[Any]) -> None:
             if not len(getattr(self, name)):
                 object.__setattr__(self, name, value)
@@ -90,8 +91,9 @@ class Extension:
     order: Order | None
 
 
-def order_of(plan: Plan, dialect: Dialect = NEWEST, *, since: float = 0.0,
-             ending: int = 0) -> Order:
+def order_of(
+    plan: Plan, dialect: Dialect = NEWEST, *, since: float = 0.0, ending: int = 0
+) -> Order:
     """
     Return what of a plan the machine needs, for a robot program of this dialect.
 
@@ -100,33 +102,50 @@ def order_of(plan: Plan, dialect: Dialect = NEWEST, *, since: float = 0.0,
     """
     goal = plan.goal
     times, switching = goal.waypoints[-1].time, _waits_for_outputs(plan)
-    waypoints = [segment.waypoint for segment in plan.segments
-                 for _ in range(1 + len(segment.outputs))]
+    waypoints = [
+        segment.waypoint for segment in plan.segments for _ in range(1 + len(segment.outputs))
+    ]
     duration = since + plan.duration
     ends = since + np.cumsum([segment.duration for segment in plan.segments])
     asks = ends - [_left_at_blend(segment) for segment in plan.segments]
     records = [1 + len(segment.outputs) for segment in plan.segments]
-    pieces = [segment.primitive for segment in plan.segments
-              if isinstance(segment.primitive, Spline)]
+    pieces = [
+        segment.primitive for segment in plan.segments if isinstance(segment.primitive, Spline)
+    ]
     return Order(
-        points=len(waypoints), reference=plan.reference, duration=duration,
+        points=len(waypoints),
+        reference=plan.reference,
+        duration=duration,
         # What was slowed as the owner wants it (on_too_fast) is not late by that.
-        due=max(times, duration) + switching if times > 0.0 else None, switching=switching,
+        due=max(times, duration) + switching if times > 0.0 else None,
+        switching=switching,
         T_base_frame=goal.T_base_frame,
-        T_flange_active=plan.T_flange_active, T_flange_tcp=plan.T_flange_tcp,
+        T_flange_active=plan.T_flange_active,
+        T_flange_tcp=plan.T_flange_tcp,
         T_tcp_controlled=plan.T_tcp_controlled,
-        path_tolerance=goal.path_tolerance, goal_tolerance=goal.goal_tolerance,
+        path_tolerance=goal.path_tolerance,
+        goal_tolerance=goal.goal_tolerance,
         goal_time_tolerance=goal.goal_time_tolerance,
         reports_begun=dialect is NEWEST,
-        open_end=goal.keep_open, ending=ending,
-        knows_pace=not (goal.keep_open or any(isinstance(segment.primitive, OptimoveJ | OptimoveL)
-                                              for segment in plan.segments)),
-        execution=plan.execution, waypoint=np.array(waypoints, dtype=np.int32),
-        is_motion=np.array([not isinstance(instruction, SwitchOutput)
-                            for instruction in plan.instructions]),
-        ends=np.repeat(ends, records), asks=np.repeat(asks, records),
+        open_end=goal.keep_open,
+        ending=ending,
+        knows_pace=not (
+            goal.keep_open
+            or any(
+                isinstance(segment.primitive, OptimoveJ | OptimoveL) for segment in plan.segments
+            )
+        ),
+        execution=plan.execution,
+        waypoint=np.array(waypoints, dtype=np.int32),
+        is_motion=np.array(
+            [not isinstance(instruction, SwitchOutput) for instruction in plan.instructions]
+        ),
+        ends=np.repeat(ends, records),
+        asks=np.repeat(asks, records),
         spline=JointSpline.of(plan.start, pieces)
-        if plan.execution is ExecutionMode.SERVO else None)
+        if plan.execution is ExecutionMode.SERVO
+        else None,
+    )
 
 
 def _waits_for_outputs(plan: Plan) -> float:

@@ -26,8 +26,10 @@ PEAK = 2.0
 HARMLESS = (0.02, 0.1)
 #: So many times longer than planned, beyond the time that a program may need to begin [s].
 SLOW, BEGIN = 20.0, 3.0
-_BLAME = ('the robot program reads the points in another way than they were meant; set '
-          'wire_dialect to the version of that program')
+_BLAME = (
+    'the robot program reads the points in another way than they were meant; set '
+    'wire_dialect to the version of that program'
+)
 
 
 class Pace:
@@ -43,7 +45,8 @@ class Pace:
         turns = 4.0 * np.arcsin(np.minimum(0.5 * chords, 1.0))
         self._limits = tuple(
             PEAK * _fastest(lengths, passed) + harmless
-            for lengths, harmless in zip((ways, turns), HARMLESS, strict=True))
+            for lengths, harmless in zip((ways, turns), HARMLESS, strict=True)
+        )
 
     def violation(self, twist: Vector6, elapsed: float, planned: float) -> str | None:
         """
@@ -56,11 +59,15 @@ class Pace:
         speeds = hypot(*twist[:3]), hypot(*twist[3:])
         for speed, limit, unit in zip(speeds, self._limits, ('m/s', 'rad/s'), strict=True):
             if speed > limit:
-                return (f'the controller moves the tool with {speed:.3f} {unit}, and the plan '
-                        f'with no more than {limit:.3f} {unit}: {_BLAME}')
+                return (
+                    f'the controller moves the tool with {speed:.3f} {unit}, and the plan '
+                    f'with no more than {limit:.3f} {unit}: {_BLAME}'
+                )
         if elapsed > BEGIN + SLOW * planned:
-            return (f'after {elapsed:.1f} s the controller is where the plan is after '
-                    f'{planned:.2f} s: {_BLAME}')
+            return (
+                f'after {elapsed:.1f} s the controller is where the plan is after '
+                f'{planned:.2f} s: {_BLAME}'
+            )
         return None
 
 

@@ -61,8 +61,10 @@ class Records:
             return None
         last = self._index(motions)
         before = last - 1 - trail
-        return (self._waypoints[self._motions[last] - self._first],
-                self._waypoints[self._motions[before] - self._first] if before >= 0 else -1)
+        return (
+            self._waypoints[self._motions[last] - self._first],
+            self._waypoints[self._motions[before] - self._first] if before >= 0 else -1,
+        )
 
     def before(self, waypoint: int) -> int:
         """Return how many records stand before those of a point."""
@@ -89,11 +91,14 @@ class Records:
     def extend(self, order: Order, behind: int) -> None:
         """Put those of an order behind the first so many, in the place of what is there."""
         kept = behind - self._first
-        for values, new in ((self._waypoints, order.waypoint), (self._ends, order.ends),
-                            (self._asks, order.asks)):
+        for values, new in (
+            (self._waypoints, order.waypoint),
+            (self._ends, order.ends),
+            (self._asks, order.asks),
+        ):
             del values[kept:]
             values.frombytes(new.tobytes())
-        del self._motions[bisect_left(self._motions, behind):]
+        del self._motions[bisect_left(self._motions, behind) :]
         self._motions.extend(_motions(order, behind))
 
     def forget(self, records: int) -> None:

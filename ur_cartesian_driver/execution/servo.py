@@ -67,10 +67,16 @@ TRAIL = 4.0
 class ServoMachine(TrajectoryMachine):
     """One goal on its way through the buffered servo; see the module's description."""
 
-    def __init__(self, order: Order, *, settings: ServoSettings,
-                 source: Setpoints | None = None, feedback_period: float = 0.04,
-                 max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION,
-                 continues: bool = False) -> None:
+    def __init__(
+        self,
+        order: Order,
+        *,
+        settings: ServoSettings,
+        source: Setpoints | None = None,
+        feedback_period: float = 0.04,
+        max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION,
+        continues: bool = False,
+    ) -> None:
         """
         Take an order; nothing happens before :meth:`start`.
 
@@ -78,9 +84,12 @@ class ServoMachine(TrajectoryMachine):
         :raises ValueError: there is neither a source nor a spline.
         """
         # How far it is, the set-points tell; how fast they go, nobody else does.
-        super().__init__(replace(order, knows_pace=False, reports_begun=order.spline is not None),
-                         feedback_period=feedback_period,
-                         max_plan_deviation=max_plan_deviation, continues=continues)
+        super().__init__(
+            replace(order, knows_pace=False, reports_begun=order.spline is not None),
+            feedback_period=feedback_period,
+            max_plan_deviation=max_plan_deviation,
+            continues=continues,
+        )
         if source is None:
             if order.spline is None:
                 raise ValueError('An order for the servo needs a spline or another source.')
@@ -145,8 +154,9 @@ class ServoMachine(TrajectoryMachine):
     def _put_off(self) -> None:
         """Let the time of the goal begin with its motion: not with the filling of the buffer."""
         if self.order.due is not None:
-            self.order = replace(self.order, due=(
-                self.order.due + self._observer.scaled_time + self.stream.lag))
+            self.order = replace(
+                self.order, due=(self.order.due + self._observer.scaled_time + self.stream.lag)
+            )
 
     # ---- from events to signals ---------------------------------------------------------------
 
@@ -157,9 +167,9 @@ class ServoMachine(TrajectoryMachine):
             case TrajectoryEnded():  # of a goal before this one
                 return None, ''
             case LinkLost(link=link, reason=reason) if (
-                    link == SERVO_LINK and self.state is State.ARMING):
-                return Signal.LATE, (
-                    f'the robot does not take set-points: {reason}'.rstrip('.'))
+                link == SERVO_LINK and self.state is State.ARMING
+            ):
+                return Signal.LATE, (f'the robot does not take set-points: {reason}'.rstrip('.'))
         return super()._signal(event, now)
 
     def _progress_of_stream(self) -> tuple[Signal | None, str]:
@@ -172,8 +182,9 @@ class ServoMachine(TrajectoryMachine):
             return Signal.CANCELED, ''
         if self.state in (State.MOVING, State.SETTLING):
             # It does so where it is about to end, for a reason that we may hear of in a moment.
-            return Signal.PROGRAM_STOPPED, ('the robot program left the servo by itself; its log '
-                                            'on the pendant says why')
+            return Signal.PROGRAM_STOPPED, (
+                'the robot program left the servo by itself; its log on the pendant says why'
+            )
         return None, ''
 
     def _judge(self, state: RobotState, now: float) -> tuple[Signal | None, str]:
@@ -183,8 +194,11 @@ class ServoMachine(TrajectoryMachine):
         return super()._judge(state, now)
 
     def _is_armed(self, state: RobotState) -> bool:
-        return (self.stream.phase is Phase.READY and self._off_start(state) <= START_ANGLE
-                and (self.loan is None or super()._is_armed(state)))
+        return (
+            self.stream.phase is Phase.READY
+            and self._off_start(state) <= START_ANGLE
+            and (self.loan is None or super()._is_armed(state))
+        )
 
     def _off_start(self, state: RobotState) -> float:
         """
@@ -201,14 +215,22 @@ class ServoMachine(TrajectoryMachine):
         if self.stream.phase is Phase.READY:
             state = self._observer.latest
             off = 0.0 if state is None else self._off_start(state)
-            return super()._why_not_armed() if off <= START_ANGLE else (
-                f'a joint is {off:.4f} rad away from where the set-points begin: the arm was '
-                'moved meanwhile')
+            return (
+                super()._why_not_armed()
+                if off <= START_ANGLE
+                else (
+                    f'a joint is {off:.4f} rad away from where the set-points begin: the arm was '
+                    'moved meanwhile'
+                )
+            )
         if self.stream.phase is Phase.OPENING:
-            return (f'the robot did not give its RTDE inputs within {TCP_BOUND:g} s; nothing was '
-                    'moved')
-        return (f'the robot program did not answer through its registers within {TCP_BOUND:g} s: '
-                'it is paused, or knows no buffered servo; nothing was moved')
+            return (
+                f'the robot did not give its RTDE inputs within {TCP_BOUND:g} s; nothing was moved'
+            )
+        return (
+            f'the robot program did not answer through its registers within {TCP_BOUND:g} s: '
+            'it is paused, or knows no buffered servo; nothing was moved'
+        )
 
     # ---- from signals to commands -------------------------------------------------------------
 
@@ -231,8 +253,12 @@ class ServoMachine(TrajectoryMachine):
         return [*self._stop_streaming(), *super()._enter_ending(signal, now)]
 
     def _enter_ended(self, signal: Signal, now: float) -> list[Command]:
-        return [*self._stop_streaming(), LeaveServo(), *self._about_stream(),
-                *super()._enter_ended(signal, now)]
+        return [
+            *self._stop_streaming(),
+            LeaveServo(),
+            *self._about_stream(),
+            *super()._enter_ended(signal, now),
+        ]
 
     def _stop_streaming(self) -> list[Command]:
         row = self.stream.stop()
@@ -259,11 +285,13 @@ class ServoMachine(TrajectoryMachine):
         state = self._observer.latest
         if state is None:
             return UNKNOWN6
-        a, b, c, d, e, f = (target - actual for target, actual in zip(
-            state.target_q, state.actual_q, strict=True))
+        a, b, c, d, e, f = (
+            target - actual for target, actual in zip(state.target_q, state.actual_q, strict=True)
+        )
         return a, b, c, d, e, f
 
     def _progress_report(self) -> Report:
         progress = super()._progress_report().progress
-        return Report(progress=replace(
-            progress, lag=self.stream.lag, buffered=self.stream.buffered))
+        return Report(
+            progress=replace(progress, lag=self.stream.lag, buffered=self.stream.buffered)
+        )

@@ -93,26 +93,34 @@ class Change(Enum):
 _STOPS = {Change.STOP: Phase.LEAVING, Change.PROGRAM_LEFT: Phase.LEFT}
 
 #: What is not named leaves the phase as it is.
-TRANSITIONS: Mapping[Phase, Mapping[Change, Phase]] = MappingProxyType({
-    Phase.OPENING: {Change.OPENED: Phase.ENTERING, Change.STOP: Phase.LEFT},
-    Phase.ENTERING: {Change.ANSWERED: Phase.READY, Change.STOP: Phase.LEAVING},
-    Phase.READY: {Change.BEGUN: Phase.FILLING, Change.STOP: Phase.LEAVING},
-    Phase.FILLING: {Change.FILLED: Phase.SERVOING, **_STOPS},
-    Phase.SERVOING: {Change.AT_END: Phase.DRAINING, Change.EMPTY: Phase.HOLDING, **_STOPS},
-    Phase.HOLDING: {Change.FILLED: Phase.SERVOING, **_STOPS},
-    Phase.DRAINING: {Change.DONE: Phase.ARRIVED, **_STOPS},
-    Phase.ARRIVED: {**_STOPS},
-    Phase.LEAVING: {Change.PROGRAM_LEFT: Phase.LEFT},
-    Phase.LEFT: {},
-})
+TRANSITIONS: Mapping[Phase, Mapping[Change, Phase]] = MappingProxyType(
+    {
+        Phase.OPENING: {Change.OPENED: Phase.ENTERING, Change.STOP: Phase.LEFT},
+        Phase.ENTERING: {Change.ANSWERED: Phase.READY, Change.STOP: Phase.LEAVING},
+        Phase.READY: {Change.BEGUN: Phase.FILLING, Change.STOP: Phase.LEAVING},
+        Phase.FILLING: {Change.FILLED: Phase.SERVOING, **_STOPS},
+        Phase.SERVOING: {Change.AT_END: Phase.DRAINING, Change.EMPTY: Phase.HOLDING, **_STOPS},
+        Phase.HOLDING: {Change.FILLED: Phase.SERVOING, **_STOPS},
+        Phase.DRAINING: {Change.DONE: Phase.ARRIVED, **_STOPS},
+        Phase.ARRIVED: {**_STOPS},
+        Phase.LEAVING: {Change.PROGRAM_LEFT: Phase.LEFT},
+        Phase.LEFT: {},
+    }
+)
 
 #: Phases in which the arm belongs to the set-points.
-STREAMING = frozenset({
-    Phase.FILLING, Phase.SERVOING, Phase.HOLDING, Phase.DRAINING, Phase.ARRIVED})
-_ACTIVITIES: Mapping[Phase, ServoActivity] = MappingProxyType({
-    Phase.FILLING: ServoActivity.FILLING, Phase.SERVOING: ServoActivity.SERVOING,
-    Phase.HOLDING: ServoActivity.HOLDING, Phase.DRAINING: ServoActivity.DRAINING,
-    Phase.ARRIVED: ServoActivity.DRAINING})
+STREAMING = frozenset(
+    {Phase.FILLING, Phase.SERVOING, Phase.HOLDING, Phase.DRAINING, Phase.ARRIVED}
+)
+_ACTIVITIES: Mapping[Phase, ServoActivity] = MappingProxyType(
+    {
+        Phase.FILLING: ServoActivity.FILLING,
+        Phase.SERVOING: ServoActivity.SERVOING,
+        Phase.HOLDING: ServoActivity.HOLDING,
+        Phase.DRAINING: ServoActivity.DRAINING,
+        Phase.ARRIVED: ServoActivity.DRAINING,
+    }
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,12 +149,14 @@ class ServoSettings:
         if not LONGEST_STEP <= self.target_lag <= self.most_lag:
             raise ValueError(
                 f'servo_target_lag is {self.target_lag:g} s, it has to be within '
-                f'{LONGEST_STEP:g} and {self.most_lag:g} s.')
+                f'{LONGEST_STEP:g} and {self.most_lag:g} s.'
+            )
         if self.target_lag > SHORTEST_STEP * self.buffer_depth:
             raise ValueError(
                 f'servo_buffer_depth is {self.buffer_depth}, but servo_target_lag of '
                 f'{self.target_lag:g} s needs room for '
-                f'{ceil(self.target_lag / SHORTEST_STEP)} set-points.')
+                f'{ceil(self.target_lag / SHORTEST_STEP)} set-points.'
+            )
 
 
 class ServoStream:
@@ -182,8 +192,11 @@ class ServoStream:
     def _clock_of(self, step: float) -> ServoClock:
         settings = self._settings
         return ServoClock(
-            step=step, target=settings.target_lag, closed=settings.closed_loop,
-            most=min(settings.most_lag, settings.buffer_depth * step))
+            step=step,
+            target=settings.target_lag,
+            closed=settings.closed_loop,
+            most=min(settings.most_lag, settings.buffer_depth * step),
+        )
 
     # ---- what is known ------------------------------------------------------------------------
 
@@ -215,11 +228,19 @@ class ServoStream:
         return ServoReport(
             timestamp=state.timestamp,
             activity=_ACTIVITIES.get(self.phase, ServoActivity.IDLE),
-            setpoints_sent=self._sent, setpoints_done=state.setpoints_done,
-            buffer_size=state.buffer_size, buffer_capacity=settings.buffer_depth,
-            buffered=state.lag, lag=self.lag, speed_scaling=state.speed_scaling,
-            joint_error=joint_error, underruns=self._underruns, overruns=state.overflows,
-            repeats=state.repeats, skipped=state.skipped)
+            setpoints_sent=self._sent,
+            setpoints_done=state.setpoints_done,
+            buffer_size=state.buffer_size,
+            buffer_capacity=settings.buffer_depth,
+            buffered=state.lag,
+            lag=self.lag,
+            speed_scaling=state.speed_scaling,
+            joint_error=joint_error,
+            underruns=self._underruns,
+            overruns=state.overflows,
+            repeats=state.repeats,
+            skipped=state.skipped,
+        )
 
     # ---- what happens -------------------------------------------------------------------------
 
@@ -293,11 +314,14 @@ class ServoStream:
             self._change(Change.ANSWERED)
         elif self._is_left(feedback):
             self._change(Change.PROGRAM_LEFT)
-        elif phase in (Phase.FILLING, Phase.HOLDING) \
-                and self.under_way >= self._enough:
+        elif phase in (Phase.FILLING, Phase.HOLDING) and self.under_way >= self._enough:
             self._change(Change.FILLED)
-        elif phase is Phase.SERVOING and feedback.lag <= 0.0 and feedback.playing \
-                and self.under_way <= 0.5 * self._clock.step:
+        elif (
+            phase is Phase.SERVOING
+            and feedback.lag <= 0.0
+            and feedback.playing
+            and self.under_way <= 0.5 * self._clock.step
+        ):
             self._underruns += 1
             self._pace = 0.0
             self._change(Change.EMPTY)
@@ -308,8 +332,11 @@ class ServoStream:
         """Tell whether the program is not in SERVO, after it was told to be or not to be."""
         if self.phase is Phase.LEAVING:
             return self._has_read(self._first_idle) and feedback.mode != ServoMode.SERVO
-        return (self.phase in STREAMING and self._has_read(self._first_servo)
-                and feedback.mode != ServoMode.SERVO)
+        return (
+            self.phase in STREAMING
+            and self._has_read(self._first_servo)
+            and feedback.mode != ServoMode.SERVO
+        )
 
     def _pass(self, passed: float, feedback: ServoFeedback) -> None:
         """Let the robot's time pass."""
@@ -351,6 +378,12 @@ class ServoStream:
     def _row(self) -> tuple[float, ...]:
         """Return the inputs in the order of ``registers.SERVO_INPUTS``."""
         moves = self.phase in STREAMING
-        return (ServoMode.SERVO if moves else ServoMode.IDLE, self._sequence, ExternalError.NONE,
-                SyncState.EXTERNAL_TO_ROBOT if moves else SyncState.NONE, *self._joints,
-                *(self._settings.max_divergence,) * 6, self._state_time)
+        return (
+            ServoMode.SERVO if moves else ServoMode.IDLE,
+            self._sequence,
+            ExternalError.NONE,
+            SyncState.EXTERNAL_TO_ROBOT if moves else SyncState.NONE,
+            *self._joints,
+            *(self._settings.max_divergence,) * 6,
+            self._state_time,
+        )

@@ -103,12 +103,14 @@ UNDER_WAY = frozenset({State.MOVING, State.CLOSING})
 
 #: What stops the arm in every state but ENDED, and the code that the goal ends with where none is
 #: decided yet.
-STOPS: Mapping[Signal, ErrorCode] = MappingProxyType({
-    Signal.PROTECTIVE_STOP: ErrorCode.PROTECTIVE_STOP,
-    Signal.EMERGENCY_STOP: ErrorCode.EMERGENCY_STOP,
-    Signal.PROGRAM_STOPPED: ErrorCode.PROGRAM_STOPPED,
-    Signal.CONNECTION_LOST: ErrorCode.CONNECTION_LOST,
-})
+STOPS: Mapping[Signal, ErrorCode] = MappingProxyType(
+    {
+        Signal.PROTECTIVE_STOP: ErrorCode.PROTECTIVE_STOP,
+        Signal.EMERGENCY_STOP: ErrorCode.EMERGENCY_STOP,
+        Signal.PROGRAM_STOPPED: ErrorCode.PROGRAM_STOPPED,
+        Signal.CONNECTION_LOST: ErrorCode.CONNECTION_LOST,
+    }
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,8 +122,9 @@ class Step:
 
 
 #: After these the robot program is paused or deaf, and not ended.
-PAUSES = frozenset({Signal.PROTECTIVE_STOP, Signal.EMERGENCY_STOP, Signal.UNANSWERED,
-                     Signal.STALLED})
+PAUSES = frozenset(
+    {Signal.PROTECTIVE_STOP, Signal.EMERGENCY_STOP, Signal.UNANSWERED, Signal.STALLED}
+)
 
 
 def _ends(code: ErrorCode) -> Step:
@@ -133,7 +136,8 @@ def _judged(code: ErrorCode) -> Step:
 
 
 _STOPS = {signal: _ends(code) for signal, code in STOPS.items()} | {
-    Signal.PROGRAM_STOPPED: Step(State.ENDING, ErrorCode.PROGRAM_STOPPED)}
+    Signal.PROGRAM_STOPPED: Step(State.ENDING, ErrorCode.PROGRAM_STOPPED)
+}
 
 
 def _stays(state: State, *signals: Signal) -> dict[Signal, Step]:
@@ -144,102 +148,124 @@ def _stays(state: State, *signals: Signal) -> dict[Signal, Step]:
 _WISHES = (Signal.CANCEL, Signal.PREEMPT)
 
 #: What a trajectory that runs is stopped by, or ends by itself with.
-_RUNS: Mapping[Signal, Step] = MappingProxyType({
-    **_STOPS,
-    Signal.CANCELED: _judged(ErrorCode.EXECUTION_FAILED),
-    Signal.FAILURE: _judged(ErrorCode.EXECUTION_FAILED),
-    Signal.CANCEL: Step(State.STOPPING, ErrorCode.CANCELLED),
-    Signal.PREEMPT: Step(State.STOPPING, ErrorCode.PREEMPTED),
-    Signal.VIOLATION: Step(State.STOPPING, ErrorCode.PATH_TOLERANCE_VIOLATED),
-    Signal.DEVIATION: Step(State.STOPPING, ErrorCode.EXECUTION_FAILED),
-    Signal.STALLED: _ends(ErrorCode.EXECUTION_FAILED),
-})
+_RUNS: Mapping[Signal, Step] = MappingProxyType(
+    {
+        **_STOPS,
+        Signal.CANCELED: _judged(ErrorCode.EXECUTION_FAILED),
+        Signal.FAILURE: _judged(ErrorCode.EXECUTION_FAILED),
+        Signal.CANCEL: Step(State.STOPPING, ErrorCode.CANCELLED),
+        Signal.PREEMPT: Step(State.STOPPING, ErrorCode.PREEMPTED),
+        Signal.VIOLATION: Step(State.STOPPING, ErrorCode.PATH_TOLERANCE_VIOLATED),
+        Signal.DEVIATION: Step(State.STOPPING, ErrorCode.EXECUTION_FAILED),
+        Signal.STALLED: _ends(ErrorCode.EXECUTION_FAILED),
+    }
+)
 
 #: What each signal means in each state. STARVING, EXTENDED, LAST, ARMED, SETTLED, RESTORED,
 #: AT_REST, LATE and UNANSWERED are about the state they are given for: not possible in the others.
-TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType({
-    State.ARMING: {
-        **_STOPS,
-        # Of a goal before this one.
-        **_stays(State.ARMING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
-        Signal.ARMED: Step(State.MOVING),
-        Signal.CANCEL: _judged(ErrorCode.CANCELLED),
-        Signal.PREEMPT: _judged(ErrorCode.PREEMPTED),
-        Signal.LATE: _judged(ErrorCode.ROBOT_NOT_READY),
-    },
-    State.MOVING: {
-        **_RUNS,
-        Signal.SUCCESS: Step(State.SETTLING),
-        Signal.STARVING: Step(State.CLOSING),
-    },
-    State.CLOSING: {
-        **_RUNS,
-        Signal.SUCCESS: Step(State.WAITING),
-    },
-    State.WAITING: {
-        **_STOPS,
-        **_stays(State.WAITING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
-        Signal.EXTENDED: Step(State.MOVING),
-        Signal.LAST: Step(State.SETTLING),
-        Signal.CANCEL: _judged(ErrorCode.CANCELLED),
-        Signal.PREEMPT: _judged(ErrorCode.PREEMPTED),
-        Signal.DEVIATION: _judged(ErrorCode.EXECUTION_FAILED),
-        Signal.LATE: _judged(ErrorCode.CANCELLED),
-    },
-    State.SETTLING: {
-        **_STOPS,
-        **_stays(State.SETTLING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
-        Signal.CANCEL: _judged(ErrorCode.CANCELLED),
-        Signal.PREEMPT: _judged(ErrorCode.PREEMPTED),
-        Signal.DEVIATION: _judged(ErrorCode.EXECUTION_FAILED),
-        Signal.SETTLED: _judged(ErrorCode.SUCCESSFUL),
-        Signal.LATE: _judged(ErrorCode.GOAL_TOLERANCE_VIOLATED),
-    },
-    State.STOPPING: {
-        **_STOPS,
-        **_stays(State.STOPPING, Signal.SUCCESS, Signal.FAILURE, *_WISHES),
-        Signal.CANCELED: Step(State.HALTING),
-        Signal.UNANSWERED: Step(State.ENDED),
-        Signal.LATE: _ends(ErrorCode.EXECUTION_FAILED),
-    },
-    State.HALTING: {
-        **_STOPS,
-        **_stays(State.HALTING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, *_WISHES),
-        Signal.AT_REST: Step(State.RESTORING),
-        Signal.LATE: _ends(ErrorCode.EXECUTION_FAILED),
-    },
-    State.RESTORING: {
-        **{signal: Step(State.ENDED) for signal in STOPS},
-        **_stays(State.RESTORING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, *_WISHES),
-        Signal.RESTORED: Step(State.ENDED),
-        Signal.LATE: Step(State.ENDED),
-    },
-    State.ENDING: {
-        **_STOPS,
-        **_stays(State.ENDING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, *_WISHES,
-                 Signal.PROGRAM_STOPPED),
-        Signal.LATE: Step(State.ENDED),
-    },
-    State.ENDED: {},
-})
+TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType(
+    {
+        State.ARMING: {
+            **_STOPS,
+            # Of a goal before this one.
+            **_stays(State.ARMING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
+            Signal.ARMED: Step(State.MOVING),
+            Signal.CANCEL: _judged(ErrorCode.CANCELLED),
+            Signal.PREEMPT: _judged(ErrorCode.PREEMPTED),
+            Signal.LATE: _judged(ErrorCode.ROBOT_NOT_READY),
+        },
+        State.MOVING: {
+            **_RUNS,
+            Signal.SUCCESS: Step(State.SETTLING),
+            Signal.STARVING: Step(State.CLOSING),
+        },
+        State.CLOSING: {
+            **_RUNS,
+            Signal.SUCCESS: Step(State.WAITING),
+        },
+        State.WAITING: {
+            **_STOPS,
+            **_stays(State.WAITING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
+            Signal.EXTENDED: Step(State.MOVING),
+            Signal.LAST: Step(State.SETTLING),
+            Signal.CANCEL: _judged(ErrorCode.CANCELLED),
+            Signal.PREEMPT: _judged(ErrorCode.PREEMPTED),
+            Signal.DEVIATION: _judged(ErrorCode.EXECUTION_FAILED),
+            Signal.LATE: _judged(ErrorCode.CANCELLED),
+        },
+        State.SETTLING: {
+            **_STOPS,
+            **_stays(State.SETTLING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
+            Signal.CANCEL: _judged(ErrorCode.CANCELLED),
+            Signal.PREEMPT: _judged(ErrorCode.PREEMPTED),
+            Signal.DEVIATION: _judged(ErrorCode.EXECUTION_FAILED),
+            Signal.SETTLED: _judged(ErrorCode.SUCCESSFUL),
+            Signal.LATE: _judged(ErrorCode.GOAL_TOLERANCE_VIOLATED),
+        },
+        State.STOPPING: {
+            **_STOPS,
+            **_stays(State.STOPPING, Signal.SUCCESS, Signal.FAILURE, *_WISHES),
+            Signal.CANCELED: Step(State.HALTING),
+            Signal.UNANSWERED: Step(State.ENDED),
+            Signal.LATE: _ends(ErrorCode.EXECUTION_FAILED),
+        },
+        State.HALTING: {
+            **_STOPS,
+            **_stays(State.HALTING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, *_WISHES),
+            Signal.AT_REST: Step(State.RESTORING),
+            Signal.LATE: _ends(ErrorCode.EXECUTION_FAILED),
+        },
+        State.RESTORING: {
+            **{signal: Step(State.ENDED) for signal in STOPS},
+            **_stays(State.RESTORING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, *_WISHES),
+            Signal.RESTORED: Step(State.ENDED),
+            Signal.LATE: Step(State.ENDED),
+        },
+        State.ENDING: {
+            **_STOPS,
+            **_stays(
+                State.ENDING,
+                Signal.SUCCESS,
+                Signal.CANCELED,
+                Signal.FAILURE,
+                *_WISHES,
+                Signal.PROGRAM_STOPPED,
+            ),
+            Signal.LATE: Step(State.ENDED),
+        },
+        State.ENDED: {},
+    }
+)
 
 
 #: What the robot program says of a trajectory, with a clause for the outcome's text.
-RESULTS: Mapping[TrajectoryResult, tuple[Signal, str]] = MappingProxyType({
-    TrajectoryResult.SUCCESS: (Signal.SUCCESS, ''),
-    TrajectoryResult.CANCELED: (
-        Signal.CANCELED, 'the robot program cancelled the trajectory by itself'),
-    TrajectoryResult.FAILURE: (
-        Signal.FAILURE, 'the robot program reported a failure; its log on the pendant says why'),
-})
+RESULTS: Mapping[TrajectoryResult, tuple[Signal, str]] = MappingProxyType(
+    {
+        TrajectoryResult.SUCCESS: (Signal.SUCCESS, ''),
+        TrajectoryResult.CANCELED: (
+            Signal.CANCELED,
+            'the robot program cancelled the trajectory by itself',
+        ),
+        TrajectoryResult.FAILURE: (
+            Signal.FAILURE,
+            'the robot program reported a failure; its log on the pendant says why',
+        ),
+    }
+)
 
 
-_EMERGENCY = int(SafetyStatus.EMERGENCY_STOPPED | SafetyStatus.ROBOT_EMERGENCY_STOPPED
-                 | SafetyStatus.SYSTEM_EMERGENCY_STOPPED)
+_EMERGENCY = int(
+    SafetyStatus.EMERGENCY_STOPPED
+    | SafetyStatus.ROBOT_EMERGENCY_STOPPED
+    | SafetyStatus.SYSTEM_EMERGENCY_STOPPED
+)
 #: In plain numbers, as this is looked at in every packet and operations on flags are slow.
 _STOPPED = _EMERGENCY | int(
-    SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED | SafetyStatus.VIOLATION
-    | SafetyStatus.FAULT)
+    SafetyStatus.PROTECTIVE_STOPPED
+    | SafetyStatus.SAFEGUARD_STOPPED
+    | SafetyStatus.VIOLATION
+    | SafetyStatus.FAULT
+)
 NO_STOP = SafetyStatus(0)
 #: Stops after which a robot goes on with its program, where somebody unlocks and plays it.
 HOLDS = SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED
@@ -256,7 +282,8 @@ def stop_in(state: RobotState, borne: SafetyStatus = NO_STOP) -> tuple[Signal, s
         return _safety_stop(safety, state)
     if state.robot_mode is not RobotMode.RUNNING:
         return Signal.PROGRAM_STOPPED, (
-            f'the arm left the mode RUNNING and is in {state.robot_mode.name}')
+            f'the arm left the mode RUNNING and is in {state.robot_mode.name}'
+        )
     if state.runtime_state in (RuntimeState.STOPPING, RuntimeState.STOPPED):
         return Signal.PROGRAM_STOPPED, 'the robot program was stopped'
     return None

@@ -64,13 +64,22 @@ class StreamSettings:
 class StreamMachine(TrajectoryMachine):
     """One goal with an open end; see the module's description."""
 
-    def __init__(self, order: Order, *, settings: StreamSettings | None = None,
-                 feedback_period: float = 0.04,
-                 max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION,
-                 continues: bool = False) -> None:
+    def __init__(
+        self,
+        order: Order,
+        *,
+        settings: StreamSettings | None = None,
+        feedback_period: float = 0.04,
+        max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION,
+        continues: bool = False,
+    ) -> None:
         """Take the order of what is known so far; nothing happens before :meth:`start`."""
-        super().__init__(order, feedback_period=feedback_period,
-                         max_plan_deviation=max_plan_deviation, continues=continues)
+        super().__init__(
+            order,
+            feedback_period=feedback_period,
+            max_plan_deviation=max_plan_deviation,
+            continues=continues,
+        )
         self._settings = settings if settings is not None else StreamSettings()
         #: Whether more points may come.
         self._is_open = True
@@ -102,13 +111,17 @@ class StreamMachine(TrajectoryMachine):
         """Return why points are not taken, or None."""
         number = extension.number
         if not self._is_open:
-            return AnswerExtension(number=number, refusal=(
-                'The last points of the goal were said to be the last.'))
+            return AnswerExtension(
+                number=number, refusal=('The last points of the goal were said to be the last.')
+            )
         if self.state not in _TAKES:
             return AnswerExtension(number=number, refusal='The goal is ending.')
         if extension.order is not None and extension.behind != self._firm:
-            return AnswerExtension(number=number, from_rest=True, refusal=(
-                'The motion was closed before these points came.'))
+            return AnswerExtension(
+                number=number,
+                from_rest=True,
+                refusal=('The motion was closed before these points came.'),
+            )
         return None
 
     def _take(self, extension: Extension) -> None:
@@ -166,8 +179,9 @@ class StreamMachine(TrajectoryMachine):
         closes = self.state is State.CLOSING or not self._is_open
         if closes and end == self._records.total and not self._is_counted:
             self._is_counted = True
-            commands.append(SendControl(
-                action=TrajectoryAction.STREAM_END, count=end - self._stream_from))
+            commands.append(
+                SendControl(action=TrajectoryAction.STREAM_END, count=end - self._stream_from)
+            )
         return commands
 
     def _sent(self) -> int:
@@ -196,8 +210,10 @@ class StreamMachine(TrajectoryMachine):
 
     def _late(self, now: float) -> tuple[Signal | None, str]:
         if self.state is State.WAITING and now >= self._deadline:
-            return Signal.LATE, ('no more points, and no word that there are none, came within '
-                                 f'keep_open_timeout = {self._settings.timeout:g} s')
+            return Signal.LATE, (
+                'no more points, and no word that there are none, came within '
+                f'keep_open_timeout = {self._settings.timeout:g} s'
+            )
         return super()._late(now)
 
     def _entered(self, state: State) -> Callable[[Signal, float], list[Command]]:
@@ -230,8 +246,11 @@ class StreamMachine(TrajectoryMachine):
 
     def _progress_report(self) -> Report:
         waits = self.state is State.WAITING
-        return Report(progress=self._observer.progress(
-            self._window.sent, at_end=waits or self.state is State.SETTLING, waits=waits))
+        return Report(
+            progress=self._observer.progress(
+                self._window.sent, at_end=waits or self.state is State.SETTLING, waits=waits
+            )
+        )
 
     def _where(self) -> str:
         if self._rests:
@@ -242,7 +261,11 @@ class StreamMachine(TrajectoryMachine):
         if not self._closed:
             return super()._report()
         times = 'once' if self._closed == 1 else f'{self._closed} times'
-        return (*super()._report(), (
-            f'the motion was brought to rest {times}, the last time behind point '
-            f'{self._closed_at}, because no more points came in time; what was appended later is '
-            'later by as much as that took'))
+        return (
+            *super()._report(),
+            (
+                f'the motion was brought to rest {times}, the last time behind point '
+                f'{self._closed_at}, because no more points came in time; what was appended later is '
+                'later by as much as that took'
+            ),
+        )

@@ -61,14 +61,22 @@ class Watch:
         self._bodies = bodies = Bodies(arm, T_flange_tcp, surroundings.tool_radius)
         planes = surroundings.planes
         self._normals = np.array([plane.normal for plane in planes]).reshape(-1, 3)
-        self._least = np.array([
-            sum(n * p for n, p in zip(plane.normal, plane.point, strict=True)) + plane.margin
-            for plane in planes])
+        self._least = np.array(
+            [
+                sum(n * p for n, p in zip(plane.normal, plane.point, strict=True)) + plane.margin
+                for plane in planes
+            ]
+        )
         self._moving = [k for k, link in enumerate(bodies.links) if link != Link.BASE]
         self._names = [str(bodies.links[k]) for k in self._moving] + ['the TCP']
         # Nothing is farther from an axis [m].
-        self._lever = arm.model.reach + sum(map(abs, arm.model.geometry.d[3:])) \
-            + hypot(*T_flange_tcp.position) + surroundings.tool_radius + _THICKNESS
+        self._lever = (
+            arm.model.reach
+            + sum(map(abs, arm.model.geometry.d[3:]))
+            + hypot(*T_flange_tcp.position)
+            + surroundings.tool_radius
+            + _THICKNESS
+        )
         self._seen: tuple[Joints, float] | None = None
 
     def why_not(self, q: Joints, q_now: Joints) -> str:
@@ -114,11 +122,17 @@ class Watch:
         if number < len(planes):
             plane, name = planes[number], self._names[which]
             height = plane.margin + room
-            near = f'come within {height:.4f} m of' if height >= 0.0 else (
-                f'go {-height:.4f} m beyond')
+            near = (
+                f'come within {height:.4f} m of'
+                if height >= 0.0
+                else (f'go {-height:.4f} m beyond')
+            )
             return f'{name} would {near} the workspace plane "{plane.name}"' + (
-                f', {plane.margin:.4f} m is asked for' if plane.margin else '')
+                f', {plane.margin:.4f} m is asked for' if plane.margin else ''
+            )
         clearance = self._where.min_clearance or 0.0
         a, b = self._bodies.pairs[index - len(planes) * len(self._names)]
-        return (f'{a} and {b} would come within {max(0.0, clearance + room):.4f} m of each other '
-                f'(measured between capsules), min_clearance is {clearance:.4f} m')
+        return (
+            f'{a} and {b} would come within {max(0.0, clearance + room):.4f} m of each other '
+            f'(measured between capsules), min_clearance is {clearance:.4f} m'
+        )

@@ -75,8 +75,12 @@ class FollowLimits:
 
     def __post_init__(self) -> None:
         """Check the bounds."""
-        for name in ('linear_velocity', 'linear_acceleration', 'angular_velocity',
-                     'angular_acceleration'):
+        for name in (
+            'linear_velocity',
+            'linear_acceleration',
+            'angular_velocity',
+            'angular_acceleration',
+        ):
             value = getattr(self, name)
             if not (isfinite(value) and value > 0.0):
                 raise ValueError(f'{name} is {value}; it must be positive and finite')
@@ -136,9 +140,12 @@ class TargetFollower:
     @property
     def arrived(self) -> bool:
         """Tell whether the tool rests at its target."""
-        return self.at_rest and self._target is not None \
-            and self.T_base_tcp.distance_to(self._target) < _THERE \
+        return (
+            self.at_rest
+            and self._target is not None
+            and self.T_base_tcp.distance_to(self._target) < _THERE
             and self.T_base_tcp.angle_to(self._target) < 2.0 * _THERE
+        )
 
     def aim(self, T_base_tcp: Pose) -> None:
         """Go to another target from now on; its quaternion is of length 1."""
@@ -186,17 +193,25 @@ class TargetFollower:
         if self._target is None or self.blocked:
             return self._braked(change)
         limits, (linear, angular) = self.limits, _way(self.T_base_tcp, self._target)
-        return (_changed(self.linear, _towards(
-                    linear, limits.linear_velocity, limits.linear_acceleration, dt),
-                    limits.linear_acceleration * change),
-                _changed(self.angular, _towards(
-                    angular, limits.angular_velocity, limits.angular_acceleration, dt),
-                    limits.angular_acceleration * change))
+        return (
+            _changed(
+                self.linear,
+                _towards(linear, limits.linear_velocity, limits.linear_acceleration, dt),
+                limits.linear_acceleration * change,
+            ),
+            _changed(
+                self.angular,
+                _towards(angular, limits.angular_velocity, limits.angular_acceleration, dt),
+                limits.angular_acceleration * change,
+            ),
+        )
 
     def _braked(self, change: float) -> tuple[Vector3, Vector3]:
         limits = self.limits
-        return (_changed(self.linear, ZERO, limits.linear_acceleration * change),
-                _changed(self.angular, ZERO, limits.angular_acceleration * change))
+        return (
+            _changed(self.linear, ZERO, limits.linear_acceleration * change),
+            _changed(self.angular, ZERO, limits.angular_acceleration * change),
+        )
 
     # ---- places -------------------------------------------------------------------------------
 
@@ -204,8 +219,11 @@ class TargetFollower:
         """Take a step, as much of it as the joints allow."""
         pose, q = self._after(linear, angular, dt)
         if q is None:  # next to what was looked at: it does not happen but by rounding
-            self.blocked = self.blocked or why_unreachable(self._arm, pose @ self._T_tcp_flange) \
+            self.blocked = (
+                self.blocked
+                or why_unreachable(self._arm, pose @ self._T_tcp_flange)
                 or 'the joint positions jump'
+            )
             self.linear = self.angular = ZERO
             return
         allowed = self.limits.joint_velocity
@@ -232,9 +250,12 @@ class TargetFollower:
         if linear == ZERO and angular == ZERO:
             return ''
         stop = _moved(
-            self.T_base_tcp, linear, angular,
+            self.T_base_tcp,
+            linear,
+            angular,
             dt + 0.5 * hypot(*linear) / limits.linear_acceleration,
-            dt + 0.5 * hypot(*angular) / limits.angular_acceleration)
+            dt + 0.5 * hypot(*angular) / limits.angular_acceleration,
+        )
         return self._why_not_there(stop)
 
     def _why_not_there(self, stop: Pose) -> str:
@@ -250,13 +271,16 @@ class TargetFollower:
         """Tell whether the way to the target is open again for a stretch that is worth it."""
         if self._target is None:
             return False
-        way = max(self.T_base_tcp.distance_to(self._target) / _WORTH_IT[0],
-                  self.T_base_tcp.angle_to(self._target) / _WORTH_IT[1])
+        way = max(
+            self.T_base_tcp.distance_to(self._target) / _WORTH_IT[0],
+            self.T_base_tcp.angle_to(self._target) / _WORTH_IT[1],
+        )
         if way < _THERE:
             return True
         self._q_stop = self.q
         return not self._why_not_there(
-            self.T_base_tcp.interpolate(self._target, min(1.0, 1.0 / way)))
+            self.T_base_tcp.interpolate(self._target, min(1.0, 1.0 / way))
+        )
 
 
 class _Bounds:
@@ -276,29 +300,38 @@ class _Bounds:
         What is too near to a bound already may get away from it.
         """
         for joint, (angle, now, (low, high)) in enumerate(
-                zip(q, q_now, self._ranges, strict=True)):
+            zip(q, q_now, self._ranges, strict=True)
+        ):
             room = min(angle - low, high - angle) - LIMIT_MARGIN
             if room < 0.0 and room < min(now - low, high - now) - LIMIT_MARGIN - _ROUNDING:
-                return (f'{JOINT_NAMES[joint]} would be at {angle:.4f} rad, and its limits are '
-                        f'{low:.4f} to {high:.4f} rad')
+                return (
+                    f'{JOINT_NAMES[joint]} would be at {angle:.4f} rad, and its limits are '
+                    f'{low:.4f} to {high:.4f} rad'
+                )
         distances = singularity_distances(self._arm, q)
         if not all(a >= b for a, b in zip(distances, self._margins, strict=True)):
             before = singularity_distances(self._arm, q_now)
             for distance, now, margin, (name, unit, meaning) in zip(
-                    distances, before, self._margins, _SINGULARITIES, strict=True):
+                distances, before, self._margins, _SINGULARITIES, strict=True
+            ):
                 if distance < min(margin, now - _ROUNDING):
-                    return (f'the {name} singularity is {margin:g} {unit} away '
-                            f'(singularity_margin_{name}: {meaning})')
+                    return (
+                        f'the {name} singularity is {margin:g} {unit} away '
+                        f'(singularity_margin_{name}: {meaning})'
+                    )
         return '' if self._watch is None else self._watch.why_not(q, q_now)
 
 
 # --- Vectors ---------------------------------------------------------------------------------
 
+
 def _way(here: Pose, there: Pose) -> tuple[Vector3, Vector3]:
     """Return translation and rotation vector from one pose to another, both in base axes."""
     (ax, ay, az), (bx, by, bz) = here.position, there.position
-    return ((bx - ax, by - ay, bz - az), rotation_vector_from_quaternion(
-        multiply(there.quaternion, conjugate(here.quaternion))))
+    return (
+        (bx - ax, by - ay, bz - az),
+        rotation_vector_from_quaternion(multiply(there.quaternion, conjugate(here.quaternion))),
+    )
 
 
 def _towards(way: Vector3, most: float, acceleration: float, dt: float) -> Vector3:
@@ -313,8 +346,9 @@ def _towards(way: Vector3, most: float, acceleration: float, dt: float) -> Vecto
     if distance < _THERE:
         return ZERO
     half = 0.5 * _RESERVE * acceleration * dt
-    fast = min(most, sqrt(half * half + 2.0 * _RESERVE * acceleration * distance) - half,
-               distance / dt)
+    fast = min(
+        most, sqrt(half * half + 2.0 * _RESERVE * acceleration * distance) - half, distance / dt
+    )
     return _scaled(way, fast / distance)
 
 
@@ -335,9 +369,10 @@ def _scaled(v: Vector3, factor: float) -> Vector3:
 def _moved(pose: Pose, linear: Vector3, angular: Vector3, seconds: float, turning: float) -> Pose:
     """Return a pose that moves and turns (base axes) for some time each."""
     (x, y, z), (vx, vy, vz) = pose.position, linear
-    return Pose((x + vx * seconds, y + vy * seconds, z + vz * seconds),
-                multiply(_turn(angular, turning), pose.quaternion)
-                if angular != ZERO else pose.quaternion)
+    return Pose(
+        (x + vx * seconds, y + vy * seconds, z + vz * seconds),
+        multiply(_turn(angular, turning), pose.quaternion) if angular != ZERO else pose.quaternion,
+    )
 
 
 def _turn(angular: Vector3, seconds: float) -> Quaternion:

@@ -72,8 +72,12 @@ class TcpLoan:
 
         :returns: True once for each try.
         """
-        if self.returned or not self.has_robot(state) or now < self._next_try \
-                or max(map(abs, state.actual_qd)) >= REST_SPEED:
+        if (
+            self.returned
+            or not self.has_robot(state)
+            or now < self._next_try
+            or max(map(abs, state.actual_qd)) >= REST_SPEED
+        ):
             return False
         self._next_try = now + self._pause
         self._pause = min(2.0 * self._pause, LONGEST_PAUSE)

@@ -55,8 +55,11 @@ class Watch:
             compared.
         """
         self._turn = conjugate(T_base_frame.quaternion)
-        self._watched = tuple((quantity, quantity.limits(tolerance)) for quantity in QUANTITIES
-                              if max(quantity.limits(tolerance)) > 0.0)
+        self._watched = tuple(
+            (quantity, quantity.limits(tolerance))
+            for quantity in QUANTITIES
+            if max(quantity.limits(tolerance)) > 0.0
+        )
 
     def __bool__(self) -> bool:
         """Tell whether there is any limit."""
@@ -81,8 +84,10 @@ class Watch:
 
 
 def _clause(quantity: Quantity, axis: str, error: float, limit: float) -> str:
-    return (f'{quantity.name} {axis} is off by {error:.6f} {quantity.unit}, the tolerance is '
-            f'{limit:.6f} {quantity.unit}')
+    return (
+        f'{quantity.name} {axis} is off by {error:.6f} {quantity.unit}, the tolerance is '
+        f'{limit:.6f} {quantity.unit}'
+    )
 
 
 def _position(desired: Pose, state: RobotState, turn: Quaternion) -> Vector3:
@@ -129,6 +134,7 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity('linear velocity', 'm/s', lambda t: t.twist[:3], _linear_velocity),
     Quantity('angular velocity', 'rad/s', lambda t: t.twist[3:], _angular_velocity),
     Quantity('linear acceleration', 'm/s^2', lambda t: t.acceleration[:3], _linear_acceleration),
-    Quantity('angular acceleration', 'rad/s^2', lambda t: t.acceleration[3:],
-             _angular_acceleration),
+    Quantity(
+        'angular acceleration', 'rad/s^2', lambda t: t.acceleration[3:], _angular_acceleration
+    ),
 )

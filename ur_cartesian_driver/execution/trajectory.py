@@ -72,9 +72,14 @@ GATHER = 0.1
 class TrajectoryMachine:
     """One goal on its way through the table of the states; see the module's description."""
 
-    def __init__(self, order: Order, *, feedback_period: float = 0.04,
-                 max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION,
-                 continues: bool = False) -> None:
+    def __init__(
+        self,
+        order: Order,
+        *,
+        feedback_period: float = 0.04,
+        max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION,
+        continues: bool = False,
+    ) -> None:
         """
         Take an order; nothing happens before :meth:`start`.
 
@@ -228,8 +233,9 @@ class TrajectoryMachine:
         state = self._observer.latest
         if self.state is State.STOPPING and state is not None and _rests(state):
             return Signal.UNANSWERED, ''
-        return Signal.LATE, (f'the robot did not confirm the stop within {STOP_BOUND:g} s, '
-                             'its program was ended')
+        return Signal.LATE, (
+            f'the robot did not confirm the stop within {STOP_BOUND:g} s, its program was ended'
+        )
 
     def _unsettled(self) -> tuple[Signal, str]:
         """Return what has kept the arm from arriving until now."""
@@ -244,8 +250,10 @@ class TrajectoryMachine:
         state = self._observer.latest
         if state is not None and self.loan is not None and self.loan.has_robot(state):
             return self._observer.off_start(state) or ''
-        return (f'the robot did not take the TCP of the goal within {TCP_BOUND:g} s: its program '
-                'is paused, or does not know that command; nothing was moved')
+        return (
+            f'the robot did not take the TCP of the goal within {TCP_BOUND:g} s: its program '
+            'is paused, or does not know that command; nothing was moved'
+        )
 
     # ---- from signals to commands -------------------------------------------------------------
 
@@ -280,8 +288,10 @@ class TrajectoryMachine:
         self._deadline = inf
         self._started = True
         self._observer.start(state)
-        return [SendControl(action=TrajectoryAction.START, count=self.order.points),
-                *self._release(0)]
+        return [
+            SendControl(action=TrajectoryAction.START, count=self.order.points),
+            *self._release(0),
+        ]
 
     def _enter_settling(self, signal: Signal, now: float) -> list[Command]:
         self._observer.finish()
@@ -290,9 +300,14 @@ class TrajectoryMachine:
         self._arrival_due = min(self._deadline, now + DEFAULT_GOAL_TIME_TOLERANCE)
         late = 0.0 if self.order.due is None else self._observer.scaled_time - self.order.due
         if 0.0 <= tolerance < late:
-            return self._apply(Signal.LATE, (
-                f'the last point was reached {late:.3f} s after its time '
-                f'{self.order.due:.3f} s, goal_time_tolerance is {tolerance:.3f} s'), now)
+            return self._apply(
+                Signal.LATE,
+                (
+                    f'the last point was reached {late:.3f} s after its time '
+                    f'{self.order.due:.3f} s, goal_time_tolerance is {tolerance:.3f} s'
+                ),
+                now,
+            )
         return []
 
     def _enter_stopping(self, signal: Signal, now: float) -> list[Command]:
@@ -332,8 +347,10 @@ class TrajectoryMachine:
 
     def _finish(self) -> list[Command]:
         code = self._code if self._code is not None else ErrorCode.EXECUTION_FAILED
-        return [*self._last_report(), Finish(outcome=Outcome(
-            code=code, text=self._sentence(code), report=self._report()))]
+        return [
+            *self._last_report(),
+            Finish(outcome=Outcome(code=code, text=self._sentence(code), report=self._report())),
+        ]
 
     def _report(self) -> tuple[str, ...]:
         """Return what is to be said beyond the sentence."""
@@ -354,10 +371,14 @@ class TrajectoryMachine:
             state = self._observer.latest
             if state is not None and same_tcp(state.T_flange_tcp, self.loan.T_flange_before):
                 return ('the TCP of the robot was set for the goal, and is what it was before',)
-            return ('the TCP of the robot was set for the goal; somebody else has set another one '
-                    'since, which is left alone',)
-        return ('the TCP of the robot was set for the goal, and is not back yet: no goal is taken '
-                'until it is',)
+            return (
+                'the TCP of the robot was set for the goal; somebody else has set another one '
+                'since, which is left alone',
+            )
+        return (
+            'the TCP of the robot was set for the goal, and is not back yet: no goal is taken '
+            'until it is',
+        )
 
     def _sentence(self, code: ErrorCode) -> str:
         if code is ErrorCode.SUCCESSFUL:
@@ -391,8 +412,11 @@ class TrajectoryMachine:
         return [SendPoints(first=first, end=end)] if end > first else []
 
     def _progress_report(self) -> Report:
-        return Report(progress=self._observer.progress(
-            self._window.sent, at_end=self.state is State.SETTLING))
+        return Report(
+            progress=self._observer.progress(
+                self._window.sent, at_end=self.state is State.SETTLING
+            )
+        )
 
     def _time_tolerance(self) -> float:
         return self.order.goal_time_tolerance or DEFAULT_GOAL_TIME_TOLERANCE

@@ -96,51 +96,108 @@ class Size:
 
     def scaled(self, factor: float) -> Size:
         """Return the housings of a larger or smaller arm."""
-        return Size(**{name: factor * value for name, value in zip(
-            self.__slots__, astuple(self), strict=True)})
+        return Size(
+            **{
+                name: factor * value
+                for name, value in zip(self.__slots__, astuple(self), strict=True)
+            }
+        )
 
 
 _UR3 = Size(
-    base_radius=0.0645, shoulder_radius=0.0468, shoulder_below=0.0665,
-    shoulder_above=0.0575, upper_shoulder_in=0.066, upper_shoulder_out=0.058,
-    upper_elbow_radius=0.0395, upper_elbow_in=0.051, upper_elbow_out=0.058, upper_tube=0.047,
-    elbow_radius=0.0395, elbow_in=0.051, elbow_out=0.047, fore_tube=0.0378, fore_wrist_in=0.0425,
-    fore_wrist_out=0.047, wrist_radius=0.0343, wrist_in=0.047, wrist_out=0.031, wrist_back=0.0484,
-    wrist_front=0.0425, tool_flange_radius=0.0385)
+    base_radius=0.0645,
+    shoulder_radius=0.0468,
+    shoulder_below=0.0665,
+    shoulder_above=0.0575,
+    upper_shoulder_in=0.066,
+    upper_shoulder_out=0.058,
+    upper_elbow_radius=0.0395,
+    upper_elbow_in=0.051,
+    upper_elbow_out=0.058,
+    upper_tube=0.047,
+    elbow_radius=0.0395,
+    elbow_in=0.051,
+    elbow_out=0.047,
+    fore_tube=0.0378,
+    fore_wrist_in=0.0425,
+    fore_wrist_out=0.047,
+    wrist_radius=0.0343,
+    wrist_in=0.047,
+    wrist_out=0.031,
+    wrist_back=0.0484,
+    wrist_front=0.0425,
+    tool_flange_radius=0.0385,
+)
 _UR5 = Size(
-    base_radius=0.0745, shoulder_radius=0.0608, shoulder_below=0.0655,
-    shoulder_above=0.069, upper_shoulder_in=0.0655, upper_shoulder_out=0.069,
-    upper_elbow_radius=0.0605, upper_elbow_in=0.0655, upper_elbow_out=0.069, upper_tube=0.059,
-    elbow_radius=0.059, elbow_in=0.055, elbow_out=0.0575, fore_tube=0.0448, fore_wrist_in=0.0453,
-    fore_wrist_out=0.0575, wrist_radius=0.0397, wrist_in=0.046, wrist_out=0.04, wrist_back=0.0575,
-    wrist_front=0.048, tool_flange_radius=0.0444)
+    base_radius=0.0745,
+    shoulder_radius=0.0608,
+    shoulder_below=0.0655,
+    shoulder_above=0.069,
+    upper_shoulder_in=0.0655,
+    upper_shoulder_out=0.069,
+    upper_elbow_radius=0.0605,
+    upper_elbow_in=0.0655,
+    upper_elbow_out=0.069,
+    upper_tube=0.059,
+    elbow_radius=0.059,
+    elbow_in=0.055,
+    elbow_out=0.0575,
+    fore_tube=0.0448,
+    fore_wrist_in=0.0453,
+    fore_wrist_out=0.0575,
+    wrist_radius=0.0397,
+    wrist_in=0.046,
+    wrist_out=0.04,
+    wrist_back=0.0575,
+    wrist_front=0.048,
+    tool_flange_radius=0.0444,
+)
 _UR10 = Size(
-    base_radius=0.0952, shoulder_radius=0.0772, shoulder_below=0.0895,
-    shoulder_above=0.0885, upper_shoulder_in=0.0904, upper_shoulder_out=0.0879,
-    upper_elbow_radius=0.0628, upper_elbow_in=0.0601, upper_elbow_out=0.0692, upper_tube=0.0763,
-    elbow_radius=0.0628, elbow_in=0.068, elbow_out=0.07, fore_tube=0.06, fore_wrist_in=0.0537,
-    fore_wrist_out=0.07, wrist_radius=0.0474, wrist_in=0.0545, wrist_out=0.0468, wrist_back=0.0578,
-    wrist_front=0.0625, tool_flange_radius=0.0475)
+    base_radius=0.0952,
+    shoulder_radius=0.0772,
+    shoulder_below=0.0895,
+    shoulder_above=0.0885,
+    upper_shoulder_in=0.0904,
+    upper_shoulder_out=0.0879,
+    upper_elbow_radius=0.0628,
+    upper_elbow_in=0.0601,
+    upper_elbow_out=0.0692,
+    upper_tube=0.0763,
+    elbow_radius=0.0628,
+    elbow_in=0.068,
+    elbow_out=0.07,
+    fore_tube=0.06,
+    fore_wrist_in=0.0537,
+    fore_wrist_out=0.07,
+    wrist_radius=0.0474,
+    wrist_in=0.0545,
+    wrist_out=0.0468,
+    wrist_back=0.0578,
+    wrist_front=0.0625,
+    tool_flange_radius=0.0475,
+)
 _UR15 = _UR10.scaled(204 / 190)
 _UR20 = _UR10.scaled(245 / 190)
 
 #: Of each model: its housings, shoulder offset and elbow offset [m].
-_SIZES: Mapping[str, tuple[Size, float, float]] = MappingProxyType({
-    'ur3': (_UR3, 0.1198, 0.0273),
-    'ur5': (_UR5, 0.13585, 0.01615),
-    'ur10': (_UR10, 0.1758, 0.0486),
-    'ur3e': (_UR3, 0.12, 0.027),
-    'ur5e': (_UR5, 0.138, 0.007),
-    'ur7e': (_UR5, 0.138, 0.007),
-    'ur10e': (_UR10, 0.1762, 0.0393),
-    'ur12e': (_UR10, 0.1762, 0.0393),
-    'ur16e': (_UR10, 0.176, 0.04),
-    'ur15': (_UR15, 0.202, 0.061),
-    'ur18': (_UR15, 0.202, 0.061),
-    'ur8long': (_UR15, 0.202, 0.061),
-    'ur20': (_UR20, 0.26, 0.043),
-    'ur30': (_UR20, 0.26, 0.043),
-})
+_SIZES: Mapping[str, tuple[Size, float, float]] = MappingProxyType(
+    {
+        'ur3': (_UR3, 0.1198, 0.0273),
+        'ur5': (_UR5, 0.13585, 0.01615),
+        'ur10': (_UR10, 0.1758, 0.0486),
+        'ur3e': (_UR3, 0.12, 0.027),
+        'ur5e': (_UR5, 0.138, 0.007),
+        'ur7e': (_UR5, 0.138, 0.007),
+        'ur10e': (_UR10, 0.1762, 0.0393),
+        'ur12e': (_UR10, 0.1762, 0.0393),
+        'ur16e': (_UR10, 0.176, 0.04),
+        'ur15': (_UR15, 0.202, 0.061),
+        'ur18': (_UR15, 0.202, 0.061),
+        'ur8long': (_UR15, 0.202, 0.061),
+        'ur20': (_UR20, 0.26, 0.043),
+        'ur30': (_UR20, 0.26, 0.043),
+    }
+)
 
 # The base of the UR5 goes a little below its frame [m].
 _BASE_BOTTOM = -0.0035
@@ -149,7 +206,7 @@ _OVERLAP = 0.002
 # A capsule with the axis of a cylinder sticks out by its radius at both ends. One that is 1.1
 # times as thick may be shorter, and sticks out by 0.64 of it.
 _WIDER = 1.1
-_SHORTER = (_WIDER ** 2 - 1.0) ** 0.5
+_SHORTER = (_WIDER**2 - 1.0) ** 0.5
 # Rows whose distances are computed together: their numbers stay in the cache.
 _BLOCK = 256
 # Squared sine of the angle below which segments count as parallel: an error of 1e-6 of a length.
@@ -162,10 +219,18 @@ _TINY = 1e-300
 #: wrist 1 and wrist 3 (which are d5 apart). Also wrist 2 and the tool, which stands on wrist 3 and
 #: only turns about its axis.
 PAIRS: tuple[tuple[Link, Link], ...] = tuple(
-    (a, b) for a in Link for b in Link
-    if b - a >= 2 and (a, b) not in (
-        (Link.BASE, Link.UPPER_ARM), (Link.FOREARM, Link.WRIST_2), (Link.WRIST_1, Link.WRIST_3),
-        (Link.WRIST_2, Link.TOOL)))
+    (a, b)
+    for a in Link
+    for b in Link
+    if b - a >= 2
+    and (a, b)
+    not in (
+        (Link.BASE, Link.UPPER_ARM),
+        (Link.FOREARM, Link.WRIST_2),
+        (Link.WRIST_1, Link.WRIST_3),
+        (Link.WRIST_2, Link.TOOL),
+    )
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,8 +295,12 @@ class Bodies:
         for begin in range(0, len(q), _BLOCK):
             rows = slice(begin, begin + _BLOCK)
             start, way = self._capsules(self._ends(self.arm.frames_rows(q[rows])))
-            apart = segment_distance(start[:, self._first], way[:, self._first],
-                                     start[:, self._second], way[:, self._second])
+            apart = segment_distance(
+                start[:, self._first],
+                way[:, self._first],
+                start[:, self._second],
+                way[:, self._second],
+            )
             result[rows] = np.minimum.reduceat(apart - sums, self._begins).T
         return result
 
@@ -252,9 +321,8 @@ class Bodies:
             for m, normal in enumerate(normals):
                 low, rise = (np.tensordot(normal, v, axes=1) for v in (start, way))
                 # A disc across the unit vector u reaches r sqrt(1 - (n u)^2) down.
-                disc = np.sqrt(np.maximum(0.0, 1.0 - rise ** 2 / square))
-                result[rows, m] = (
-                    low + np.minimum(rise, 0.0) - self.radii[:, None] * disc).T
+                disc = np.sqrt(np.maximum(0.0, 1.0 - rise**2 / square))
+                result[rows, m] = (low + np.minimum(rise, 0.0) - self.radii[:, None] * disc).T
         return result
 
     def _ends(self, frames: FramesOf[Floats]) -> Floats:
@@ -265,8 +333,9 @@ class Bodies:
         if self._has_tool:
             flange = np.array(frames.position)
             tcp = flange + sum(
-                length * np.array(axis) for length, axis in zip(
-                    self._tcp, (frames.x, frames.y, frames.z), strict=True))
+                length * np.array(axis)
+                for length, axis in zip(self._tcp, (frames.x, frames.y, frames.z), strict=True)
+            )
             ends = np.concatenate([ends, np.stack([flange, tcp])[:, None]], axis=1)
         ordered: Floats = ends.transpose(0, 2, 1, 3)
         return ordered
@@ -314,16 +383,22 @@ def _bodies(arm: Arm) -> list[_Body]:
     # The upper arm begins where the forearm ends.
     elbow = min(s - z.upper_elbow_in, e + z.elbow_in)
     return [
-        _Body(Link.BASE, (0, _BASE_BOTTOM), (0, d1 - z.shoulder_below + _OVERLAP),
-              z.base_radius),
-        _Body(Link.SHOULDER, (0, d1 - z.shoulder_below), (0, d1 + z.shoulder_above),
-              z.shoulder_radius),
+        _Body(Link.BASE, (0, _BASE_BOTTOM), (0, d1 - z.shoulder_below + _OVERLAP), z.base_radius),
+        _Body(
+            Link.SHOULDER,
+            (0, d1 - z.shoulder_below),
+            (0, d1 + z.shoulder_above),
+            z.shoulder_radius,
+        ),
         _Body(Link.SHOULDER, (1, 0.0), (1, s - z.upper_shoulder_in + _OVERLAP), z.shoulder_radius),
-        _Body(Link.UPPER_ARM, (1, s - z.upper_shoulder_in), (1, s + z.upper_shoulder_out),
-              z.shoulder_radius),
+        _Body(
+            Link.UPPER_ARM,
+            (1, s - z.upper_shoulder_in),
+            (1, s + z.upper_shoulder_out),
+            z.shoulder_radius,
+        ),
         _Body(Link.UPPER_ARM, (1, s), (2, s), z.upper_tube, tube=True),
-        _Body(Link.UPPER_ARM, (2, elbow), (2, s + z.upper_elbow_out),
-              z.upper_elbow_radius),
+        _Body(Link.UPPER_ARM, (2, elbow), (2, s + z.upper_elbow_out), z.upper_elbow_radius),
         _Body(Link.FOREARM, (2, e - z.elbow_out), (2, e + z.elbow_in), z.elbow_radius),
         _Body(Link.FOREARM, (2, e), (3, e), z.fore_tube, tube=True),
         _Body(Link.FOREARM, (3, e - z.fore_wrist_out), (3, d4 - z.fore_wrist_in), z.wrist_radius),
@@ -362,8 +437,9 @@ def _cover(arm: Arm, body: _Body) -> tuple[float, float]:
     return _SHORTER * body.radius / length, _WIDER * body.radius
 
 
-def _combined(links: tuple[Link, ...], pairs: tuple[tuple[Link, Link], ...]
-              ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+def _combined(
+    links: tuple[Link, ...], pairs: tuple[tuple[Link, Link], ...]
+) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
     """Return the bodies to compare, first and second, and where each pair of links begins."""
     first: list[int] = []
     second: list[int] = []
@@ -374,5 +450,8 @@ def _combined(links: tuple[Link, ...], pairs: tuple[tuple[Link, Link], ...]
             same = [j for j, other in enumerate(links) if of == a and other == b]
             first += [i] * len(same)
             second += same
-    return (np.array(first, dtype=np.intp), np.array(second, dtype=np.intp),
-            np.array(begins, dtype=np.intp))
+    return (
+        np.array(first, dtype=np.intp),
+        np.array(second, dtype=np.intp),
+        np.array(begins, dtype=np.intp),
+    )

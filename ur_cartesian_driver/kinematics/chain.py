@@ -93,8 +93,7 @@ class Arm:
         qw = 1.0
         for link, angle in zip(self._links_from_flange, reversed(q), strict=True):
             half = 0.5 * (angle + link.theta)
-            x, y, z, qx, qy, qz, qw = _before(
-                link, sin(half), cos(half), x, y, z, qx, qy, qz, qw)
+            x, y, z, qx, qy, qz, qw = _before(link, sin(half), cos(half), x, y, z, qx, qy, qz, qw)
         if qw < 0.0:
             return Pose((x, y, z), (-qx, -qy, -qz, -qw))
         return Pose((x, y, z), (qx, qy, qz, qw))
@@ -144,14 +143,23 @@ class Arm:
 
     def frames(self, q: Sequence[float]) -> Frames:
         """Return the places and directions of all joints and of the flange [m]."""
-        return self._frames([(cos(angle + link.theta), sin(angle + link.theta))
-                             for link, angle in zip(self._links, q, strict=True)], 0.0, 1.0)
+        return self._frames(
+            [
+                (cos(angle + link.theta), sin(angle + link.theta))
+                for link, angle in zip(self._links, q, strict=True)
+            ],
+            0.0,
+            1.0,
+        )
 
     def frames_rows(self, q: NDArray[np.float64]) -> FramesOf[NDArray[np.float64]]:
         """Return the same for many joint positions (n, 6); each number is an array (n,)."""
         angles = np.ascontiguousarray(q.T) + np.array(self.geometry.theta)[:, None]
-        return self._frames(list(zip(np.cos(angles), np.sin(angles), strict=True)),
-                            np.zeros(len(q)), np.ones(len(q)))
+        return self._frames(
+            list(zip(np.cos(angles), np.sin(angles), strict=True)),
+            np.zeros(len(q)),
+            np.ones(len(q)),
+        )
 
     def _frames(self, turns: list[tuple[N, N]], zero: N, one: N) -> FramesOf[N]:
         """Walk along the links, from the cosine and the sine of each joint."""
@@ -174,8 +182,9 @@ class Arm:
             ca, sa = link.cos_alpha, link.sin_alpha
             yx, yy, yz = ca * ux + sa * zx, ca * uy + sa * zy, ca * uz + sa * zz
             zx, zy, zz = ca * zx - sa * ux, ca * zy - sa * uy, ca * zz - sa * uz
-        return FramesOf(tuple(origins), tuple(axes), (px, py, pz),
-                      (xx, xy, xz), (yx, yy, yz), (zx, zy, zz))
+        return FramesOf(
+            tuple(origins), tuple(axes), (px, py, pz), (xx, xy, xz), (yx, yy, yz), (zx, zy, zz)
+        )
 
 
 def jacobian_at(frames: FramesOf[N], point: tuple[N, N, N]) -> NDArray[np.float64]:
@@ -188,8 +197,7 @@ def jacobian_at(frames: FramesOf[N], point: tuple[N, N, N]) -> NDArray[np.float6
     columns = []
     for (px, py, pz), (ax, ay, az) in zip(frames.origins, frames.axes, strict=True):
         rx, ry, rz = x - px, y - py, z - pz
-        columns.append(
-            (ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx, ax, ay, az))
+        columns.append((ay * rz - az * ry, az * rx - ax * rz, ax * ry - ay * rx, ax, ay, az))
     return np.array(columns).T
 
 
@@ -207,7 +215,8 @@ def pinocchio_model(arm: Arm) -> Any:
         raise ImportError(
             'Pinocchio is needed for this and is not installed; rosdep brings it on a ROS '
             'installation, the extra `collision` in a virtual environment.',
-            name='pinocchio') from error
+            name='pinocchio',
+        ) from error
     model = pinocchio.Model()
     model.name = arm.model.name
     geometry, limits = arm.geometry, arm.model.position_limits
@@ -215,12 +224,19 @@ def pinocchio_model(arm: Arm) -> Any:
     joint, link = 0, pinocchio.SE3.Identity()
     for i, name in enumerate(JOINT_NAMES):
         joint = model.addJoint(
-            joint, pinocchio.JointModelRZ(), link * _turn_z(pinocchio, geometry.theta[i]), name,
-            np.array([torque[i]]), np.array([arm.model.max_joint_speed[i]]),
-            np.array([limits[i][0]]), np.array([limits[i][1]]))
+            joint,
+            pinocchio.JointModelRZ(),
+            link * _turn_z(pinocchio, geometry.theta[i]),
+            name,
+            np.array([torque[i]]),
+            np.array([arm.model.max_joint_speed[i]]),
+            np.array([limits[i][0]]),
+            np.array([limits[i][1]]),
+        )
         link = pinocchio.SE3(
             pinocchio.utils.rotate('x', geometry.alpha[i]),
-            np.array([geometry.a[i], 0.0, geometry.d[i]]))
+            np.array([geometry.a[i], 0.0, geometry.d[i]]),
+        )
     model.addFrame(pinocchio.Frame('tool0', joint, 0, link, pinocchio.FrameType.OP_FRAME))
     return model
 
@@ -233,7 +249,9 @@ def _links(geometry: Geometry) -> tuple[_Link, ...]:
     return tuple(
         _Link(theta, d, a, sin(alpha), cos(alpha), sin(0.5 * alpha), cos(0.5 * alpha))
         for theta, d, a, alpha in zip(
-            geometry.theta, geometry.d, geometry.a, geometry.alpha, strict=True))
+            geometry.theta, geometry.d, geometry.a, geometry.alpha, strict=True
+        )
+    )
 
 
 _State: TypeAlias = tuple[N, N, N, N, N, N, N]
@@ -254,5 +272,12 @@ def _before(link: _Link, s: N, c: N, x: N, y: N, z: N, qx: N, qy: N, qz: N, qw: 
     x, z = x + link.a, z + link.d
     # Rz(theta + q): the same about z, with the double angle for the point.
     sin_theta, cos_theta = 2.0 * s * c, 1.0 - 2.0 * s * s
-    return (cos_theta * x - sin_theta * y, sin_theta * x + cos_theta * y, z,
-            c * qx - s * qy, c * qy + s * qx, c * qz + s * qw, c * qw - s * qz)
+    return (
+        cos_theta * x - sin_theta * y,
+        sin_theta * x + cos_theta * y,
+        z,
+        c * qx - s * qy,
+        c * qy + s * qx,
+        c * qz + s * qw,
+        c * qw - s * qz,
+    )

@@ -46,8 +46,9 @@ class Wrist(NamedTuple):
     up: float
 
 
-def closed_form(shape: Shape, T_base_flange: Pose, wrist_3: float = 0.0, doubt: float = 0.0
-                ) -> list[Joints]:
+def closed_form(
+    shape: Shape, T_base_flange: Pose, wrist_3: float = 0.0, doubt: float = 0.0
+) -> list[Joints]:
     """
     Return every joint solution [rad], each angle within (-pi, pi].
 
@@ -58,11 +59,17 @@ def closed_form(shape: Shape, T_base_flange: Pose, wrist_3: float = 0.0, doubt: 
     o1, o2, o3, o4, o5, o6 = shape.offsets
     slack = root_slack(shape, doubt)
     return [
-        (wrap(wrist.theta1 - o1), wrap(theta2 - o2), wrap(theta3 - o3),
-         wrap(wrist.theta234 - theta2 - theta3 - o4),
-         wrap(wrist.theta5 - o5), wrap(wrist.theta6 - o6))
+        (
+            wrap(wrist.theta1 - o1),
+            wrap(theta2 - o2),
+            wrap(theta3 - o3),
+            wrap(wrist.theta234 - theta2 - theta3 - o4),
+            wrap(wrist.theta5 - o5),
+            wrap(wrist.theta6 - o6),
+        )
         for wrist in wrists(shape, T_base_flange, wrist_3 + o6, slack)
-        for theta2, theta3 in _elbows(shape, wrist.outward, wrist.up, slack)]
+        for theta2, theta3 in _elbows(shape, wrist.outward, wrist.up, slack)
+    ]
 
 
 def root_slack(shape: Shape, doubt: float) -> float:
@@ -76,12 +83,16 @@ def wrist_centre(shape: Shape, T_base_flange: Pose) -> Vector3:
     x, y, z, w = T_base_flange.quaternion
     px, py, pz = T_base_flange.position
     d6 = shape.d6
-    return (px - d6 * 2.0 * (x * z + y * w), py - d6 * 2.0 * (y * z - x * w),
-            pz - shape.d1 - d6 * (1.0 - 2.0 * (x * x + y * y)))
+    return (
+        px - d6 * 2.0 * (x * z + y * w),
+        py - d6 * 2.0 * (y * z - x * w),
+        pz - shape.d1 - d6 * (1.0 - 2.0 * (x * x + y * y)),
+    )
 
 
-def wrists(shape: Shape, T_base_flange: Pose, theta6_if_singular: float = 0.0,
-           slack: float = 0.0) -> Iterator[Wrist]:
+def wrists(
+    shape: Shape, T_base_flange: Pose, theta6_if_singular: float = 0.0, slack: float = 0.0
+) -> Iterator[Wrist]:
     """Solve for all but the elbow: two shoulders, each with two wrists."""
     r11, r12, r13, r21, r22, r23, r31, r32, _ = rotation_from_quaternion(T_base_flange.quaternion)
     px, py, pz = wrist_centre(shape, T_base_flange)
@@ -98,12 +109,14 @@ def wrists(shape: Shape, T_base_flange: Pose, theta6_if_singular: float = 0.0,
             s6, c6 = sin(theta6), cos(theta6)
             s234 = -(c1 * (s6 * r11 + c6 * r12) + s1 * (s6 * r21 + c6 * r22))
             c234 = s6 * r31 + c6 * r32
-            yield Wrist(theta1, theta5, theta6, atan2(s234, c234),
-                        outward - d5 * s234, pz + d5 * c234)
+            yield Wrist(
+                theta1, theta5, theta6, atan2(s234, c234), outward - d5 * s234, pz + d5 * c234
+            )
 
 
-def _flips(shape: Shape, along_x: float, along_y: float, c5: float, theta6_if_singular: float
-           ) -> Iterator[tuple[float, float]]:
+def _flips(
+    shape: Shape, along_x: float, along_y: float, c5: float, theta6_if_singular: float
+) -> Iterator[tuple[float, float]]:
     """Solve the wrist, from the flange's axes along axis 2: theta5, theta6."""
     s5 = hypot(along_x, along_y)
     theta5, theta6 = atan2(s5, c5), atan2(-along_y, along_x)
@@ -117,8 +130,9 @@ def _flips(shape: Shape, along_x: float, along_y: float, c5: float, theta6_if_si
         yield theta5, theta6 - 0.5 * pi
 
 
-def _elbows(shape: Shape, outward: float, up: float, slack: float
-            ) -> Iterator[tuple[float, float]]:
+def _elbows(
+    shape: Shape, outward: float, up: float, slack: float
+) -> Iterator[tuple[float, float]]:
     """Solve the triangle of upper arm, forearm and the way to wrist 1: theta2, theta3."""
     a2, a3 = shape.a2, shape.a3
     square = outward * outward + up * up

@@ -29,8 +29,9 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 #: The signs of shoulder, elbow and wrist of the eight branches, in the order of their numbers.
-BRANCHES = tuple((shoulder, elbow, wrist)
-                 for shoulder in (1, -1) for elbow in (1, -1) for wrist in (1, -1))
+BRANCHES = tuple(
+    (shoulder, elbow, wrist) for shoulder in (1, -1) for elbow in (1, -1) for wrist in (1, -1)
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,10 +68,20 @@ class Targets:
     def of(cls, poses: Floats) -> Targets:
         """Take rows (n, 7): x y z [m], unit quaternion x y z w."""
         px, py, pz, x, y, z, w = np.ascontiguousarray(poses.T, dtype=np.float64)
-        return cls((px, py, pz), (
-            1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w),
-            2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w),
-            2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)))
+        return cls(
+            (px, py, pz),
+            (
+                1.0 - 2.0 * (y * y + z * z),
+                2.0 * (x * y - z * w),
+                2.0 * (x * z + y * w),
+                2.0 * (x * y + z * w),
+                1.0 - 2.0 * (x * x + z * z),
+                2.0 * (y * z - x * w),
+                2.0 * (x * z - y * w),
+                2.0 * (y * z + x * w),
+                1.0 - 2.0 * (x * x + y * y),
+            ),
+        )
 
     def rows(self, index: NDArray[np.int64]) -> Targets:
         """Return some of the rows."""
@@ -97,13 +108,23 @@ def posture(shape: Shape, q: Floats) -> Posture:
     theta = q.T + np.array(shape.offsets)[:, None]
     theta23 = theta[1] + theta[2]
     return Posture(
-        shoulder=(shape.a2 * np.cos(theta[1]) + shape.a3 * np.cos(theta23)
-                  + shape.d5 * np.sin(theta23 + theta[3])),
-        elbow=np.sin(theta[2]), wrist=np.sin(theta[4]))
+        shoulder=(
+            shape.a2 * np.cos(theta[1])
+            + shape.a3 * np.cos(theta23)
+            + shape.d5 * np.sin(theta23 + theta[3])
+        ),
+        elbow=np.sin(theta[2]),
+        wrist=np.sin(theta[4]),
+    )
 
 
-def branch_rows(shape: Shape, targets: Targets, signs: tuple[int, int, int],
-                wrist_3: float = 0.0, slack: float = 0.0) -> Branch:
+def branch_rows(
+    shape: Shape,
+    targets: Targets,
+    signs: tuple[int, int, int],
+    wrist_3: float = 0.0,
+    slack: float = 0.0,
+) -> Branch:
     """
     Solve all poses for one branch.
 
@@ -115,19 +136,29 @@ def branch_rows(shape: Shape, targets: Targets, signs: tuple[int, int, int],
     pan = _pan(shape, targets, shoulder, slack)
     flip = _flip(shape, targets, pan, wrist, wrist_3)
     lift = _lift(shape, flip, elbow, slack)
-    theta = np.stack([pan.theta1, lift.theta2, lift.theta3,
-                      flip.theta234 - lift.theta2 - lift.theta3, flip.theta5, flip.theta6])
+    theta = np.stack(
+        [
+            pan.theta1,
+            lift.theta2,
+            lift.theta3,
+            flip.theta234 - lift.theta2 - lift.theta3,
+            flip.theta5,
+            flip.theta6,
+        ]
+    )
     elbow_apart = 2.0 * np.abs(lift.theta3)
     return Branch(
         theta - np.array(shape.offsets)[:, None],
         pan.exists & lift.exists,
         _second(shoulder, pan.outward) | _second(elbow, lift.smaller) | flip.repeats,
         # The twin of the wrist has theta6 + pi, whatever its elbow and if its shoulder is this.
-        np.minimum(np.minimum(elbow_apart, tau - elbow_apart), pan.apart))
+        np.minimum(np.minimum(elbow_apart, tau - elbow_apart), pan.apart),
+    )
 
 
-def all_branch_rows(shape: Shape, targets: Targets, wrist_3: float = 0.0, slack: float = 0.0
-                    ) -> Iterator[Branch]:
+def all_branch_rows(
+    shape: Shape, targets: Targets, wrist_3: float = 0.0, slack: float = 0.0
+) -> Iterator[Branch]:
     """Solve for the eight branches in the order of :data:`BRANCHES`."""
     for signs in BRANCHES:
         yield branch_rows(shape, targets, signs, wrist_3, slack)
@@ -171,8 +202,15 @@ def _pan(shape: Shape, targets: Targets, sign: int, slack: float) -> _Pan:
     outward = sign * root
     s1, c1 = d4 * px + outward * py, outward * px - d4 * py
     length = np.maximum(np.sqrt(s1 * s1 + c1 * c1), 1e-300)  # 0 on the axis, out of reach
-    return _Pan(np.arctan2(s1, c1), s1 / length, c1 / length, outward, pz - shape.d1, exists,
-                2.0 * np.arctan2(root, abs(d4)))
+    return _Pan(
+        np.arctan2(s1, c1),
+        s1 / length,
+        c1 / length,
+        outward,
+        pz - shape.d1,
+        exists,
+        2.0 * np.arctan2(root, abs(d4)),
+    )
 
 
 def _flip(shape: Shape, targets: Targets, pan: _Pan, sign: int, wrist_3: float) -> _Flip:
@@ -188,8 +226,14 @@ def _flip(shape: Shape, targets: Targets, pan: _Pan, sign: int, wrist_3: float) 
     s234 = -(c1 * (s6 * r11 + c6 * r12) + s1 * (s6 * r21 + c6 * r22))
     c234 = s6 * r31 + c6 * r32
     theta6 = np.where(straight, theta6_straight, np.arctan2(s6, c6))
-    return _Flip(np.arctan2(sign * s5, c5), theta6, np.arctan2(s234, c234),
-                 pan.outward - shape.d5 * s234, pan.up + shape.d5 * c234, straight & (sign < 0))
+    return _Flip(
+        np.arctan2(sign * s5, c5),
+        theta6,
+        np.arctan2(s234, c234),
+        pan.outward - shape.d5 * s234,
+        pan.up + shape.d5 * c234,
+        straight & (sign < 0),
+    )
 
 
 def _lift(shape: Shape, flip: _Flip, sign: int, slack: float) -> _Lift:
@@ -202,10 +246,13 @@ def _lift(shape: Shape, flip: _Flip, sign: int, slack: float) -> _Lift:
     s3 = 2.0 * sign * folded * stretched / (f2 + s2)
     along, across = a2 + a3 * c3, a3 * s3
     return _Lift(
-        np.arctan2(flip.up * along - flip.outward * across,
-                   flip.outward * along + flip.up * across),
+        np.arctan2(
+            flip.up * along - flip.outward * across, flip.outward * along + flip.up * across
+        ),
         2.0 * np.arctan2(sign * stretched, folded),
-        not_too_near & not_too_far, np.minimum(folded, stretched))
+        not_too_near & not_too_far,
+        np.minimum(folded, stretched),
+    )
 
 
 def _root(square: Floats, slack: float) -> tuple[Floats, Flags]:

@@ -102,12 +102,14 @@ def nearest(arm: Arm, T_base_flange: Pose, q_near: Joints) -> Joints | None:
         if _is_near(arm.forward(q_near), T_base_flange):
             more.append(q_near)
         best = _closest(
-            [best, *(_settle(arm, T_base_flange, start, q_near) for start in more)], q_near)
+            [best, *(_settle(arm, T_base_flange, start, q_near) for start in more)], q_near
+        )
     return best
 
 
-def nearest_in(arm: Arm, T_base_flange: Pose, named: Mapping[int, float], q_before: Joints
-               ) -> Joints | None:
+def nearest_in(
+    arm: Arm, T_base_flange: Pose, named: Mapping[int, float], q_before: Joints
+) -> Joints | None:
     """
     Return the solution that a partial posture asks for, or None.
 
@@ -119,12 +121,15 @@ def nearest_in(arm: Arm, T_base_flange: Pose, named: Mapping[int, float], q_befo
     """
     wanted = _six(named.get(i, position) for i, position in enumerate(q_before))
     candidates = [
-        q for solution in solutions(arm, T_base_flange, wanted)
-        if (q := _turned(solution, wanted, arm.model.position_limits, q_before)) is not None]
+        q
+        for solution in solutions(arm, T_base_flange, wanted)
+        if (q := _turned(solution, wanted, arm.model.position_limits, q_before)) is not None
+    ]
     misses = [hypot(*(q[i] - named[i] for i in named)) for q in candidates]
     bound = min(misses, default=0.0) + _EQUALLY_NEAR
     return _closest(
-        [q for q, miss in zip(candidates, misses, strict=True) if miss <= bound], q_before)
+        [q for q, miss in zip(candidates, misses, strict=True) if miss <= bound], q_before
+    )
 
 
 def why_unreachable(arm: Arm, T_base_flange: Pose) -> str:
@@ -140,12 +145,15 @@ def why_unreachable(arm: Arm, T_base_flange: Pose) -> str:
     px, py, _ = wrist_centre(shape, T_base_flange)
     if hypot(px, py) < shape.d4:
         value, bound = told_apart(hypot(px, py), shape.d4)
-        return (f'the centre of the wrist would be {value} m from the axis of the base, and it '
-                f'cannot come nearer than {bound} m')
+        return (
+            f'the centre of the wrist would be {value} m from the axis of the base, and it '
+            f'cannot come nearer than {bound} m'
+        )
     return _why_no_elbow(shape, T_base_flange)
 
 
 # --- The calibrated arm ----------------------------------------------------------------------
+
 
 def _refined(arm: Arm, T_base_flange: Pose, starts: list[Joints]) -> list[Joints]:
     """Return the different solutions that the starts lead to."""
@@ -187,8 +195,9 @@ def _moved(q: Joints, direction: NDArray[np.float64], way: float) -> Joints:
     return _six(a + way * float(b) for a, b in zip(q, direction, strict=True))
 
 
-def _nearest_of(arm: Arm, T_base_flange: Pose, starts: list[Joints], q_near: Joints
-                ) -> Joints | None:
+def _nearest_of(
+    arm: Arm, T_base_flange: Pose, starts: list[Joints], q_near: Joints
+) -> Joints | None:
     """Return the nearest of the solutions that the starts lead to, refining only the promising."""
     # By the distance without limits, which is never longer than that within them.
     ranked = sorted((_distance_by_turns(q, q_near), q) for q in starts)
@@ -239,16 +248,17 @@ def _refine(arm: Arm, T_base_flange: Pose, start: Joints) -> Joints | None:
 
 def _columns(T_base_flange: Pose) -> tuple[Vector3, Vector3, Vector3]:
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_quaternion(
-        T_base_flange.quaternion)
+        T_base_flange.quaternion
+    )
     return (r11, r21, r31), (r12, r22, r32), (r13, r23, r33)
 
 
-def _error(frames: Frames, position: Vector3, target: tuple[Vector3, Vector3, Vector3]
-           ) -> list[float]:
+def _error(
+    frames: Frames, position: Vector3, target: tuple[Vector3, Vector3, Vector3]
+) -> list[float]:
     """Return what lacks to the target: translation [m], and half the sum of axis x target axis."""
     ex = ey = ez = 0.0
-    for (ax, ay, az), (bx, by, bz) in zip(
-            (frames.x, frames.y, frames.z), target, strict=True):
+    for (ax, ay, az), (bx, by, bz) in zip((frames.x, frames.y, frames.z), target, strict=True):
         ex += ay * bz - az * by
         ey += az * bx - ax * bz
         ez += ax * by - ay * bx
@@ -272,6 +282,7 @@ def _is_near(T_base_a: Pose, T_base_b: Pose) -> bool:
 
 # --- Angles, turns and distances -------------------------------------------------------------
 
+
 def _six(values: Iterator[float]) -> Joints:
     a, b, c, d, e, f = values
     return (a, b, c, d, e, f)
@@ -291,8 +302,9 @@ def _closest(candidates: Sequence[Joints | None], q_near: Joints) -> Joints | No
     return min(possible, key=lambda q: dist(q, q_near), default=None)
 
 
-def _turned(q: Joints, wanted: Joints, limits: Limits, q_before: Joints | None = None
-            ) -> Joints | None:
+def _turned(
+    q: Joints, wanted: Joints, limits: Limits, q_before: Joints | None = None
+) -> Joints | None:
     """
     Return q with each joint turned as near to ``wanted`` as its limits allow, or None.
 
@@ -328,6 +340,7 @@ def _turn(angle: float, target: float, low: float, high: float) -> float | None:
 
 # --- Reasons ---------------------------------------------------------------------------------
 
+
 def told_apart(value: float, bound: float) -> tuple[str, str]:
     """Return both numbers with as few digits, four at the least, as tell one from the other."""
     if abs(value) >= 1e4:
@@ -337,19 +350,22 @@ def told_apart(value: float, bound: float) -> tuple[str, str]:
 
 
 def _why_no_elbow(shape: Shape, T_base_flange: Pose) -> str:
-    distances = [hypot(wrist.outward, wrist.up)
-                 for wrist in wrists(shape, T_base_flange)]
+    distances = [hypot(wrist.outward, wrist.up) for wrist in wrists(shape, T_base_flange)]
     if not distances:  # a calibrated arm within its misfit of the inner cylinder
         return f'the centre of the wrist cannot come nearer than {shape.d4:.4f} m to the base axis'
     longest, shortest = abs(shape.a2 + shape.a3), abs(shape.a2 - shape.a3)
     nearest_to_reach = min(distances, key=lambda r: max(r - longest, shortest - r))
     if nearest_to_reach < 0.5 * (longest + shortest):
         value, bound = told_apart(nearest_to_reach, shortest)
-        return (f'wrist 1 would be {value} m from the shoulder, and the folded arm comes no '
-                f'nearer than {bound} m')
+        return (
+            f'wrist 1 would be {value} m from the shoulder, and the folded arm comes no '
+            f'nearer than {bound} m'
+        )
     value, bound = told_apart(nearest_to_reach, longest)
-    return (f'wrist 1 would be {value} m from the shoulder, and upper arm and forearm together '
-            f'reach {bound} m')
+    return (
+        f'wrist 1 would be {value} m from the shoulder, and upper arm and forearm together '
+        f'reach {bound} m'
+    )
 
 
 def _why_outside_limits(found: list[Joints], limits: Limits) -> str:
@@ -360,8 +376,10 @@ def _why_outside_limits(found: list[Joints], limits: Limits) -> str:
         return ''
     low, high = limits[joint]
     value, _ = told_apart(angle, low if angle < low else high)
-    return (f'{JOINT_NAMES[joint]} would be at {value} rad, and its limits are {low:.4f} to '
-            f'{high:.4f} rad')
+    return (
+        f'{JOINT_NAMES[joint]} would be at {value} rad, and its limits are {low:.4f} to '
+        f'{high:.4f} rad'
+    )
 
 
 def _outside(q: Joints, limits: Limits) -> Iterator[tuple[float, int, float]]:

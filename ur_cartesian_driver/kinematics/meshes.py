@@ -34,8 +34,15 @@ WITH_MESHES = ('ur3', 'ur5', 'ur10')
 
 _DESCRIPTION = Path('example-robot-data', 'robots', 'ur_description', 'urdf')
 #: In the robot description, by link.
-_FRAMES = ('base_link', 'shoulder_link', 'upper_arm_link', 'forearm_link', 'wrist_1_link',
-           'wrist_2_link', 'wrist_3_link')
+_FRAMES = (
+    'base_link',
+    'shoulder_link',
+    'upper_arm_link',
+    'forearm_link',
+    'wrist_1_link',
+    'wrist_2_link',
+    'wrist_3_link',
+)
 
 
 class Meshes:
@@ -53,14 +60,18 @@ class Meshes:
             raise ValueError(f'There are no meshes of a {arm.model.name}.')
         self._model = pinocchio_model(arm)
         import pinocchio
+
         self._pinocchio, self._data = pinocchio, self._model.createData()
         self._geometry = pinocchio.GeometryModel()
         zero = np.zeros(6)
         pinocchio.forwardKinematics(self._model, self._data, zero)
         for link, (shape, T_base_link) in enumerate(_described(arm.model.name)):
             T_base_joint = self._data.oMi[link]
-            self._geometry.addGeometryObject(pinocchio.GeometryObject(
-                Link(link).name, link, T_base_joint.inverse() * T_base_link, shape))
+            self._geometry.addGeometryObject(
+                pinocchio.GeometryObject(
+                    Link(link).name, link, T_base_joint.inverse() * T_base_link, shape
+                )
+            )
         self._pairs: dict[tuple[Link, Link], int] = {}
         for a in range(len(_FRAMES)):
             for b in range(a + 1, len(_FRAMES)):
@@ -94,8 +105,9 @@ class Meshes:
             result[row] = max(0.0, found.min_distance)
         return result
 
-    def nearer_than(self, bound: float, pair: tuple[Link, Link], q: Floats
-                    ) -> tuple[Flags, Floats]:
+    def nearer_than(
+        self, bound: float, pair: tuple[Link, Link], q: Floats
+    ) -> tuple[Flags, Floats]:
         """
         Return where two links are nearer than a bound [m]; several times faster than distances.
 
@@ -109,7 +121,8 @@ class Meshes:
             near[row] = self._pinocchio.computeCollision(self._geometry, self._placed, index)
             # It counts from the bound.
             least[row] = bound + max(
-                0.0, self._placed.collisionResults[index].distance_lower_bound)
+                0.0, self._placed.collisionResults[index].distance_lower_bound
+            )
         return near, least
 
     def T_base_meshes(self, q: Floats) -> Floats:
@@ -119,18 +132,21 @@ class Meshes:
 
     def _place(self, q: Floats) -> None:
         self._pinocchio.updateGeometryPlacements(
-            self._model, self._data, self._geometry, self._placed, q)
+            self._model, self._data, self._geometry, self._placed, q
+        )
 
 
 @lru_cache
 def _described(name: str) -> list[tuple[Any, Any]]:
     """Return shape and place (in base, all joints at 0) of each link's mesh."""
     import pinocchio
+
     share = _share()
     urdf = str(share / _DESCRIPTION / f'{name}_robot.urdf')
     model = pinocchio.buildModelFromUrdf(urdf)
     geometry = pinocchio.buildGeomFromUrdf(
-        model, urdf, pinocchio.GeometryType.COLLISION, package_dirs=[str(share)])
+        model, urdf, pinocchio.GeometryType.COLLISION, package_dirs=[str(share)]
+    )
     data, placed = model.createData(), pinocchio.GeometryData(geometry)
     pinocchio.updateGeometryPlacements(model, data, geometry, placed, np.zeros(6))
     pinocchio.updateFramePlacements(model, data)
@@ -138,8 +154,9 @@ def _described(name: str) -> list[tuple[Any, Any]]:
     found = []
     for frame in _FRAMES:
         index = geometry.getGeometryId(f'{frame}_0')
-        found.append((geometry.geometryObjects[index].geometry,
-                      T_world_base.inverse() * placed.oMg[index]))
+        found.append(
+            (geometry.geometryObjects[index].geometry, T_world_base.inverse() * placed.oMg[index])
+        )
     return found
 
 
@@ -153,12 +170,14 @@ def _share() -> Path:
         if (share / _DESCRIPTION).is_dir():
             return share
     raise FileNotFoundError(
-        'The meshes of the robots are not installed; the extra `collision` brings them.')
+        'The meshes of the robots are not installed; the extra `collision` brings them.'
+    )
 
 
 def _candidates() -> Iterator[Path]:
     """Return where wheels and ROS installations keep shared files."""
     import pinocchio
+
     for parent in Path(pinocchio.__file__).parents:
         yield parent / 'share'
     for prefix in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep):

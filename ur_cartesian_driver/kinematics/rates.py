@@ -31,8 +31,9 @@ class _Motion(NamedTuple):
     tcp: Floats
 
 
-def joint_rates(arm: Arm, T_flange_tcp: Pose, q: Floats, twist: Floats, acceleration: Floats
-                ) -> tuple[Floats, Floats]:
+def joint_rates(
+    arm: Arm, T_flange_tcp: Pose, q: Floats, twist: Floats, acceleration: Floats
+) -> tuple[Floats, Floats]:
     """
     Return joint velocities [rad/s] and accelerations [rad/s^2] (n, 6) that move the TCP so.
 
@@ -48,8 +49,9 @@ def joint_rates(arm: Arm, T_flange_tcp: Pose, q: Floats, twist: Floats, accelera
     return qd, (inverse @ rest[:, :, None])[:, :, 0]
 
 
-def tool_rates(arm: Arm, T_flange_tcp: Pose, q: Floats, qd: Floats, qdd: Floats
-               ) -> tuple[Floats, Floats]:
+def tool_rates(
+    arm: Arm, T_flange_tcp: Pose, q: Floats, qd: Floats, qdd: Floats
+) -> tuple[Floats, Floats]:
     """Return twist and acceleration (n, 6) of the TCP in base axes; as :func:`joint_rates`."""
     at = _motion(arm, T_flange_tcp, q)
     twist: Floats = (at.jacobian @ qd[:, :, None])[:, :, 0]
@@ -59,8 +61,12 @@ def tool_rates(arm: Arm, T_flange_tcp: Pose, q: Floats, qd: Floats, qdd: Floats
 def _motion(arm: Arm, T_flange_tcp: Pose, q: Floats) -> _Motion:
     frames = arm.frames_rows(q)
     x, y, z = T_flange_tcp.position
-    tcp = (np.array(frames.position) + x * np.array(frames.x) + y * np.array(frames.y)
-           + z * np.array(frames.z))
+    tcp = (
+        np.array(frames.position)
+        + x * np.array(frames.x)
+        + y * np.array(frames.y)
+        + z * np.array(frames.z)
+    )
     jacobian = jacobian_at(frames, (tcp[0], tcp[1], tcp[2]))
     return _Motion(frames, jacobian, tcp)
 
@@ -85,5 +91,6 @@ def _even(at: _Motion, qd: Floats) -> Floats:
 
 def _cross(a: Floats, b: Floats) -> Floats:
     """Return the products of vectors (3, n); numpy's own takes twenty times as long for few."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
-                     a[0] * b[1] - a[1] * b[0]])
+    return np.stack(
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    )

@@ -37,8 +37,13 @@ Limits: TypeAlias = tuple[tuple[float, float], ...]
 
 #: The joints in the order of the kinematic chain, named as the UR ROS 2 driver names them.
 JOINT_NAMES = (
-    'shoulder_pan_joint', 'shoulder_lift_joint', 'elbow_joint',
-    'wrist_1_joint', 'wrist_2_joint', 'wrist_3_joint')
+    'shoulder_pan_joint',
+    'shoulder_lift_joint',
+    'elbow_joint',
+    'wrist_1_joint',
+    'wrist_2_joint',
+    'wrist_3_joint',
+)
 
 _ZERO: Vector6 = (0.0,) * 6
 _ALPHA: Vector6 = (pi / 2, 0.0, 0.0, pi / 2, -pi / 2, 0.0)
@@ -63,7 +68,8 @@ class Geometry:
             if len(column) != 6 or not all(isfinite(value) for value in column):
                 raise ValueError(
                     f'The column {name} of a DH table must hold six finite numbers, '
-                    f'not {column!r}.')
+                    f'not {column!r}.'
+                )
 
     def columns(self) -> dict[str, Vector6]:
         """Return the four columns by name."""
@@ -71,9 +77,11 @@ class Geometry:
 
     def difference(self, other: Geometry) -> float:
         """Return the largest difference of any number of the two tables [m or rad]."""
-        return max(abs(mine - theirs)
-                   for name, column in self.columns().items()
-                   for mine, theirs in zip(column, other.columns()[name], strict=True))
+        return max(
+            abs(mine - theirs)
+            for name, column in self.columns().items()
+            for mine, theirs in zip(column, other.columns()[name], strict=True)
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,12 +180,22 @@ _TABLE = (
 # fmt: on
 
 #: Every model by its name, as the UR ROS 2 driver spells it in ``ur_type``.
-MODELS: Mapping[str, RobotModel] = MappingProxyType({
-    name: RobotModel(
-        name=name, series=series, geometry=geometry, position_limits=limits,
-        max_joint_speed=speed, max_joint_torque=torque, payload=payload, reach=reach,
-        wire_type=wire_type)
-    for name, series, geometry, limits, speed, torque, payload, reach, wire_type in _TABLE})
+MODELS: Mapping[str, RobotModel] = MappingProxyType(
+    {
+        name: RobotModel(
+            name=name,
+            series=series,
+            geometry=geometry,
+            position_limits=limits,
+            max_joint_speed=speed,
+            max_joint_torque=torque,
+            payload=payload,
+            reach=reach,
+            wire_type=wire_type,
+        )
+        for name, series, geometry, limits, speed, torque, payload, reach, wire_type in _TABLE
+    }
+)
 
 
 def robot_model(name: str) -> RobotModel:
@@ -190,4 +208,5 @@ def robot_model(name: str) -> RobotModel:
         return MODELS[name]
     except KeyError:
         raise ValueError(
-            f'There is no robot model {name!r}; use one of {", ".join(MODELS)}.') from None
+            f'There is no robot model {name!r}; use one of {", ".join(MODELS)}.'
+        ) from None

@@ -87,6 +87,7 @@ def postures(arm: Arm, q: Floats) -> Posture:
 
 # --- All branches ----------------------------------------------------------------------------
 
+
 def branches(arm: Arm, poses: Floats, wrist_3: float = 0.0) -> Branches:
     """
     Return all solutions of each pose, whatever the limits are: those of ``solutions``.
@@ -137,7 +138,7 @@ def _sound(arm: Arm, targets: Targets, q: Floats, found: list[Branch]) -> Flags:
 def _searched(arm: Arm, pose: Floats, wrist_3: float) -> tuple[Floats, Flags]:
     """Put the solutions of a single pose into the places of their branches, if these are free."""
     q, exists = np.full((len(BRANCHES), 6), np.nan), np.zeros(len(BRANCHES), dtype=np.bool_)
-    single = solutions(arm, pose_from_row(pose), (0.0,) * 5 + (wrist_3,))[:len(BRANCHES)]
+    single = solutions(arm, pose_from_row(pose), (0.0,) * 5 + (wrist_3,))[: len(BRANCHES)]
     found = np.array(single).reshape(-1, 6)
     for solution, branch in zip(found, postures(arm, found).branch, strict=True):
         place = int(branch) if not exists[branch] else int(np.flatnonzero(~exists)[0])
@@ -146,6 +147,7 @@ def _searched(arm: Arm, pose: Floats, wrist_3: float) -> tuple[Floats, Flags]:
 
 
 # --- Along a path ----------------------------------------------------------------------------
+
 
 def follow(arm: Arm, poses: Floats, q_start: Joints, *, over_gaps: bool = True) -> JointPath:
     """
@@ -162,9 +164,9 @@ def follow(arm: Arm, poses: Floats, q_start: Joints, *, over_gaps: bool = True) 
     q = np.full((len(poses), 6), np.nan)
     before, row, block, singly = q_start, 0, _BLOCK, 1
     while row < len(poses):
-        ahead = _ahead(arm, poses[row:row + block], before)
+        ahead = _ahead(arm, poses[row : row + block], before)
         if len(ahead):
-            q[row:row + len(ahead)] = ahead
+            q[row : row + len(ahead)] = ahead
             row, before, singly = row + len(ahead), _joints(ahead[-1]), 1
         if len(ahead) == block:
             block = min(2 * block, _BLOCK)
@@ -193,7 +195,7 @@ def _ahead(arm: Arm, poses: Floats, before: Joints) -> Floats:
     way = np.concatenate([start, q])
     way = way - tau * np.cumsum(np.rint(np.diff(way, axis=0, prepend=start) / tau), axis=0)
     q, certain = _certain(arm, way[1:], way[:-1], room)
-    return q if certain.all() else q[:int(np.argmin(certain))]
+    return q if certain.all() else q[: int(np.argmin(certain))]
 
 
 def nearest_rows(arm: Arm, poses: Floats, q_near: Floats) -> Floats:
@@ -220,8 +222,7 @@ def nearest_rows(arm: Arm, poses: Floats, q_near: Floats) -> Floats:
     return found
 
 
-def _on_branch(arm: Arm, targets: Targets, signs: tuple[int, int, int]
-               ) -> tuple[Floats, Floats]:
+def _on_branch(arm: Arm, targets: Targets, signs: tuple[int, int, int]) -> tuple[Floats, Floats]:
     """Return one branch (n, 6) and half its distance to the next (n,), negative if unsure."""
     branch = branch_rows(shape_of(arm), targets, signs)
     q, room = branch.q.T, 0.5 * branch.apart
@@ -263,6 +264,7 @@ def _joints(row: Floats) -> Joints:
 
 # --- The calibrated arm ----------------------------------------------------------------------
 
+
 def refine(arm: Arm, targets: Targets, q: Floats, steps: int = _STEPS) -> tuple[Floats, Flags]:
     """
     Return the joint positions that Newton's method finds from ``q``, and which are exact.
@@ -295,7 +297,8 @@ def _errors(frames: FramesOf[Floats], targets: Targets) -> tuple[Floats, Flags]:
     r = targets.rotation
     turn, cosines = np.zeros((3, len(r[0]))), np.zeros(len(r[0]))
     for (ax, ay, az), (bx, by, bz) in zip(
-            (frames.x, frames.y, frames.z), (r[0::3], r[1::3], r[2::3]), strict=True):
+        (frames.x, frames.y, frames.z), (r[0::3], r[1::3], r[2::3]), strict=True
+    ):
         turn += (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
         cosines += ax * bx + ay * by + az * bz
     shift = np.subtract(targets.position, frames.position)

@@ -67,8 +67,9 @@ def _nominal_lengths(arm: Arm) -> NDArray[np.float64]:
     return np.array([d[0], a[1], a[2], d[3], d[4], d[5]])
 
 
-def _fit(arm: Arm, lengths: NDArray[np.float64]
-         ) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+def _fit(
+    arm: Arm, lengths: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Gauss-Newton over samples spread through the joint space; linear but for the last digits."""
     samples = np.random.default_rng(1).uniform(-np.pi, np.pi, (_SAMPLES, 6))
     targets = [arm.forward(q) for q in samples]
@@ -78,12 +79,15 @@ def _fit(arm: Arm, lengths: NDArray[np.float64]
         ideal = _ideal_arm(arm, lengths)
         frames = [ideal.frames(q + offsets) for q in samples]
         rows = np.concatenate([_derivatives(f) for f in frames])
-        errors = np.concatenate([
-            _twist(ideal.forward(q + offsets), target)
-            for q, target in zip(samples, targets, strict=True)])
+        errors = np.concatenate(
+            [
+                _twist(ideal.forward(q + offsets), target)
+                for q, target in zip(samples, targets, strict=True)
+            ]
+        )
         step = np.linalg.lstsq(rows, errors, rcond=None)[0]
         left = (errors - rows @ step).reshape(_SAMPLES, 6)[:, :3]
-        misfit = sqrt(float(np.sum(left ** 2)) / _SAMPLES)
+        misfit = sqrt(float(np.sum(left**2)) / _SAMPLES)
         lengths, offsets = lengths + step[:6], offsets + step[6:]
     return lengths, offsets, misfit
 
@@ -116,5 +120,6 @@ def _derivatives(frames: Frames) -> NDArray[np.float64]:
 def _twist(T_base_from: Pose, T_base_to: Pose) -> NDArray[np.float64]:
     """Return the way from one pose to another: translation, rotation vector, both in base."""
     turn = rotation_vector_from_quaternion(
-        multiply(T_base_to.quaternion, conjugate(T_base_from.quaternion)))
+        multiply(T_base_to.quaternion, conjugate(T_base_from.quaternion))
+    )
     return np.concatenate([np.subtract(T_base_to.position, T_base_from.position), turn])

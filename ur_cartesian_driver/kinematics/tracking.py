@@ -38,7 +38,8 @@ def track(arm: Arm, T_base_flange: Pose, q_before: Joints) -> Joints | None:
     :returns: None where the iteration does not get there: out of reach, or nearly singular.
     """
     r11, r12, r13, r21, r22, r23, r31, r32, r33 = rotation_from_quaternion(
-        T_base_flange.quaternion)
+        T_base_flange.quaternion
+    )
     axes = ((r11, r21, r31), (r12, r22, r32), (r13, r23, r33))
     q = q_before
     for _ in range(_MOST_STEPS):
@@ -68,8 +69,9 @@ def singularity_distances(arm: Arm, q: Joints) -> Vector3:
     return (asin(min(1.0, abs(sin(t5)))), asin(min(1.0, abs(sin(t3)))), abs(shoulder))
 
 
-def _error(frames: Frames, position: Vector3, axes: tuple[Vector3, Vector3, Vector3]
-           ) -> tuple[list[float], float]:
+def _error(
+    frames: Frames, position: Vector3, axes: tuple[Vector3, Vector3, Vector3]
+) -> tuple[list[float], float]:
     """
     Return what lacks to a pose: translation [m], sine of the turn (base axes), and 1 + 2 cos.
 

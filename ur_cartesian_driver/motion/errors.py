@@ -185,28 +185,30 @@ class RemoteProtocolError(ProtocolError):
 
 
 #: The one table from error classes to the codes of the action.
-CODES: Mapping[type[DriverError], ErrorCode] = MappingProxyType({
-    InvalidGoal: ErrorCode.INVALID_GOAL,
-    NotAvailable: ErrorCode.INVALID_GOAL,
-    TooFast: ErrorCode.INVALID_GOAL,
-    InvalidJoints: ErrorCode.INVALID_JOINTS,
-    OldHeaderTimestamp: ErrorCode.OLD_HEADER_TIMESTAMP,
-    PathToleranceViolated: ErrorCode.PATH_TOLERANCE_VIOLATED,
-    GoalToleranceViolated: ErrorCode.GOAL_TOLERANCE_VIOLATED,
-    InvalidPosture: ErrorCode.INVALID_POSTURE,
-    Unreachable: ErrorCode.UNREACHABLE,
-    NearSingularity: ErrorCode.SINGULARITY,
-    JointLimitExceeded: ErrorCode.JOINT_LIMIT,
-    CollisionPredicted: ErrorCode.COLLISION,
-    ProtectiveStop: ErrorCode.PROTECTIVE_STOP,
-    EmergencyStop: ErrorCode.EMERGENCY_STOP,
-    ProgramStopped: ErrorCode.PROGRAM_STOPPED,
-    ConnectionLost: ErrorCode.CONNECTION_LOST,
-    Preempted: ErrorCode.PREEMPTED,
-    Cancelled: ErrorCode.CANCELLED,
-    ExecutionFailed: ErrorCode.EXECUTION_FAILED,
-    RobotNotReady: ErrorCode.ROBOT_NOT_READY,
-})
+CODES: Mapping[type[DriverError], ErrorCode] = MappingProxyType(
+    {
+        InvalidGoal: ErrorCode.INVALID_GOAL,
+        NotAvailable: ErrorCode.INVALID_GOAL,
+        TooFast: ErrorCode.INVALID_GOAL,
+        InvalidJoints: ErrorCode.INVALID_JOINTS,
+        OldHeaderTimestamp: ErrorCode.OLD_HEADER_TIMESTAMP,
+        PathToleranceViolated: ErrorCode.PATH_TOLERANCE_VIOLATED,
+        GoalToleranceViolated: ErrorCode.GOAL_TOLERANCE_VIOLATED,
+        InvalidPosture: ErrorCode.INVALID_POSTURE,
+        Unreachable: ErrorCode.UNREACHABLE,
+        NearSingularity: ErrorCode.SINGULARITY,
+        JointLimitExceeded: ErrorCode.JOINT_LIMIT,
+        CollisionPredicted: ErrorCode.COLLISION,
+        ProtectiveStop: ErrorCode.PROTECTIVE_STOP,
+        EmergencyStop: ErrorCode.EMERGENCY_STOP,
+        ProgramStopped: ErrorCode.PROGRAM_STOPPED,
+        ConnectionLost: ErrorCode.CONNECTION_LOST,
+        Preempted: ErrorCode.PREEMPTED,
+        Cancelled: ErrorCode.CANCELLED,
+        ExecutionFailed: ErrorCode.EXECUTION_FAILED,
+        RobotNotReady: ErrorCode.ROBOT_NOT_READY,
+    }
+)
 
 
 def code_of(error: DriverError) -> ErrorCode:

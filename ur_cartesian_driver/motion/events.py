@@ -74,8 +74,14 @@ class ServoReceived:
 
 
 Event: TypeAlias = (
-    StateReceived | ServoReceived | TrajectoryEnded | CancelRequested | PreemptRequested | LinkLost
-    | Tick)
+    StateReceived
+    | ServoReceived
+    | TrajectoryEnded
+    | CancelRequested
+    | PreemptRequested
+    | LinkLost
+    | Tick
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -35,23 +35,33 @@ class JointSpline:
     coefficients: Floats
 
     @classmethod
-    def of(cls, start: Joints, pieces: Iterable[Spline], *, velocities: Vector6 | None = None,
-           accelerations: Vector6 | None = None) -> JointSpline:
+    def of(
+        cls,
+        start: Joints,
+        pieces: Iterable[Spline],
+        *,
+        velocities: Vector6 | None = None,
+        accelerations: Vector6 | None = None,
+    ) -> JointSpline:
         """
         Return the curve through pieces, from joint positions [rad].
 
         :param velocities: those at the start [rad/s]; None = at rest. So ``accelerations``.
         """
         pieces = tuple(pieces)
-        ends = [(start, velocities or ZERO6, accelerations or ZERO6), *(
-            (piece.target, piece.velocities, piece.accelerations or ZERO6) for piece in pieces)]
+        ends = [
+            (start, velocities or ZERO6, accelerations or ZERO6),
+            *((piece.target, piece.velocities, piece.accelerations or ZERO6) for piece in pieces),
+        ]
         x, v, a = np.array(ends).transpose(1, 0, 2)
         before, after = (Rates(x[k], v[k], a[k]) for k in (slice(None, -1), slice(1, None)))
         durations = np.array([piece.duration for piece in pieces])
         is_cubic = np.array([piece.accelerations is None for piece in pieces], dtype=np.bool_)
         coefficients = np.where(
-            is_cubic[:, None, None], cubic_rows(durations, before, after),
-            quintic_rows(durations, before, after))
+            is_cubic[:, None, None],
+            cubic_rows(durations, before, after),
+            quintic_rows(durations, before, after),
+        )
         return cls(times=np.concatenate([[0.0], np.cumsum(durations)]), coefficients=coefficients)
 
     @property
@@ -67,8 +77,9 @@ class JointSpline:
     def rows(self, times: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the same (m, 6) for many times (m,); times outside count as the ends, at rest."""
         inside = np.clip(times, self.times[0], self.times[-1])
-        k = np.clip(np.searchsorted(self.times, inside, side='right') - 1,
-                    0, len(self.coefficients) - 1)
+        k = np.clip(
+            np.searchsorted(self.times, inside, side='right') - 1, 0, len(self.coefficients) - 1
+        )
         q, qd, qdd = evaluated(self.coefficients[k], inside - self.times[k])
         outside = ((times < self.times[0]) | (times > self.times[-1]))[:, None]
         return q, np.where(outside, 0.0, qd), np.where(outside, 0.0, qdd)

@@ -57,9 +57,12 @@ def seen_at(state: RobotState, T_tcp_frame: Pose) -> RobotState:
         actual_tcp_twist=twist_at(state.actual_tcp_twist, actual),
         target_tcp_twist=twist_at(state.target_tcp_twist, target),
         actual_tcp_acceleration=_known(
-            state.actual_tcp_acceleration, state.actual_tcp_twist, actual),
+            state.actual_tcp_acceleration, state.actual_tcp_twist, actual
+        ),
         target_tcp_acceleration=_known(
-            state.target_tcp_acceleration, state.target_tcp_twist, target))
+            state.target_tcp_acceleration, state.target_tcp_twist, target
+        ),
+    )
 
 
 def _known(acceleration: Vector6 | None, twist: Vector6, lever: Vector3) -> Vector6 | None:

@@ -45,8 +45,9 @@ class ReferencePath:
             object.__setattr__(self, 'room', np.zeros((m, 2)))
         arrays = (self.poses, self.point, self.time, self.room)
         if [array.shape for array in arrays] != [(m, 7), (m,), (m,), (m, 2)]:
-            raise ValueError('reference path shapes differ: '
-                             + ', '.join(str(array.shape) for array in arrays))
+            raise ValueError(
+                'reference path shapes differ: ' + ', '.join(str(array.shape) for array in arrays)
+            )
         for array in arrays:
             array.setflags(write=False)
 

@@ -33,20 +33,34 @@ def cubic_rows(duration: Floats, start: Rates, end: Rates) -> Floats:
     T = duration[:, None]
     d = end.x - start.x
     zero = np.zeros_like(d)
-    return np.stack([
-        start.x, start.v, 3.0 * d / T**2 - (2.0 * start.v + end.v) / T,
-        -2.0 * d / T**3 + (start.v + end.v) / T**2, zero, zero], axis=1)
+    return np.stack(
+        [
+            start.x,
+            start.v,
+            3.0 * d / T**2 - (2.0 * start.v + end.v) / T,
+            -2.0 * d / T**3 + (start.v + end.v) / T**2,
+            zero,
+            zero,
+        ],
+        axis=1,
+    )
 
 
 def quintic_rows(duration: Floats, start: Rates, end: Rates) -> Floats:
     """Return the quintics (n, 6, k) that have all three at both ends."""
     T = duration[:, None]
     d, v, w, a, b = end.x - start.x, start.v, end.v, start.a, end.a
-    return np.stack([
-        start.x, v, 0.5 * a,
-        (20.0 * d - (8.0 * w + 12.0 * v) * T - (3.0 * a - b) * T**2) / (2.0 * T**3),
-        (-30.0 * d + (14.0 * w + 16.0 * v) * T + (3.0 * a - 2.0 * b) * T**2) / (2.0 * T**4),
-        (12.0 * d - 6.0 * (w + v) * T - (a - b) * T**2) / (2.0 * T**5)], axis=1)
+    return np.stack(
+        [
+            start.x,
+            v,
+            0.5 * a,
+            (20.0 * d - (8.0 * w + 12.0 * v) * T - (3.0 * a - b) * T**2) / (2.0 * T**3),
+            (-30.0 * d + (14.0 * w + 16.0 * v) * T + (3.0 * a - 2.0 * b) * T**2) / (2.0 * T**4),
+            (12.0 * d - 6.0 * (w + v) * T - (a - b) * T**2) / (2.0 * T**5),
+        ],
+        axis=1,
+    )
 
 
 def evaluated(coefficients: Floats, t: Floats) -> Rates:

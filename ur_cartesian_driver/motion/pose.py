@@ -51,7 +51,8 @@ class Pose:
     def from_matrix(cls, matrix: NDArray[np.float64] | Sequence[Sequence[float]]) -> Pose:
         """Return the pose of a homogeneous (4, 4) or (3, 4) matrix with a proper rotation."""
         (a, b, c, x), (d, e, f, y), (g, h, i, z) = (
-            (float(v) for v in row) for row in list(matrix)[:3])
+            (float(v) for v in row) for row in list(matrix)[:3]
+        )
         return cls((x, y, z), quaternion_from_rotation((a, b, c, d, e, f, g, h, i)))
 
     def rotation_vector(self) -> Vector6:
@@ -98,7 +99,8 @@ class Pose:
         (ax, ay, az), (bx, by, bz) = self.position, other.position
         return Pose(
             (ax + fraction * (bx - ax), ay + fraction * (by - ay), az + fraction * (bz - az)),
-            slerp(self.quaternion, other.quaternion, fraction))
+            slerp(self.quaternion, other.quaternion, fraction),
+        )
 
 
 #: The identity.
@@ -114,11 +116,14 @@ def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
     """Return the rotation ``b`` followed by ``a``, normalised so that products do not drift."""
     ax, ay, az, aw = a
     bx, by, bz, bw = b
-    return normalize((
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz))
+    return normalize(
+        (
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        )
+    )
 
 
 def normalize(q: Quaternion) -> Quaternion:
@@ -145,9 +150,11 @@ def rotate(q: Quaternion, v: Vector3) -> Vector3:
     tx = 2.0 * (y * vz - z * vy)
     ty = 2.0 * (z * vx - x * vz)
     tz = 2.0 * (x * vy - y * vx)
-    return (vx + w * tx + y * tz - z * ty,
-            vy + w * ty + z * tx - x * tz,
-            vz + w * tz + x * ty - y * tx)
+    return (
+        vx + w * tx + y * tz - z * ty,
+        vy + w * ty + z * tx - x * tz,
+        vz + w * tz + x * ty - y * tx,
+    )
 
 
 def angle_between(a: Quaternion, b: Quaternion) -> float:
@@ -168,8 +175,14 @@ def slerp(a: Quaternion, b: Quaternion, fraction: float) -> Quaternion:
     else:
         s = sin(angle)
         wa, wb = sin((1.0 - fraction) * angle) / s, sign * sin(fraction * angle) / s
-    return normalize((wa * a[0] + wb * b[0], wa * a[1] + wb * b[1],
-                      wa * a[2] + wb * b[2], wa * a[3] + wb * b[3]))
+    return normalize(
+        (
+            wa * a[0] + wb * b[0],
+            wa * a[1] + wb * b[1],
+            wa * a[2] + wb * b[2],
+            wa * a[3] + wb * b[3],
+        )
+    )
 
 
 def pose_error(desired: Pose, actual: Pose) -> Pose:
@@ -208,9 +221,17 @@ def rotation_vector_from_quaternion(q: Quaternion) -> Vector3:
 def rotation_from_quaternion(q: Quaternion) -> tuple[float, ...]:
     """Return the rotation matrix of a unit quaternion, nine numbers row by row."""
     x, y, z, w = q
-    return (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w),
-            2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w),
-            2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y))
+    return (
+        1.0 - 2.0 * (y * y + z * z),
+        2.0 * (x * y - z * w),
+        2.0 * (x * z + y * w),
+        2.0 * (x * y + z * w),
+        1.0 - 2.0 * (x * x + z * z),
+        2.0 * (y * z - x * w),
+        2.0 * (x * z - y * w),
+        2.0 * (y * z + x * w),
+        1.0 - 2.0 * (x * x + y * y),
+    )
 
 
 def quaternion_from_rotation(r: Sequence[float]) -> Quaternion:

@@ -98,14 +98,15 @@ class Clearance:
         paces = [_Pace(watch, start) for watch in self._watches]
         for begin in range(0, len(q), _BLOCK):
             for watch, pace in zip(self._watches, paces, strict=True):
-                lower, distances = watch.measure(q[begin:begin + _BLOCK], pace.held)
+                lower, distances = watch.measure(q[begin : begin + _BLOCK], pace.held)
                 row, column = np.unravel_index(np.argmin(distances), distances.shape)
                 if distances[row, column] < margin:
                     margin, what = float(distances[row, column]), watch.what[column]
                 refused = pace.refused(lower, distances)
                 found, remark = (
                     _first(watch, refused & columns, distances, q[begin:], begin)
-                    for columns in (watch.refuses, ~watch.refuses))
+                    for columns in (watch.refuses, ~watch.refuses)
+                )
                 violation, warning = _earlier(violation, found), _earlier(warning, remark)
             if violation is not None:
                 break
@@ -124,12 +125,15 @@ def remarks(clear: Clear, segment: NDArray[np.int32], fraction: Floats) -> list[
         row = clear.violation.row
         raise CollisionPredicted(
             f'{point_field(int(segment[row]), "pose")}, {100.0 * fraction[row]:.1f} % of the way '
-            f'to it: {clear.violation.text}; {clear.violation.help}.')
+            f'to it: {clear.violation.text}; {clear.violation.help}.'
+        )
     said = []
     if clear.warning is not None:
         row = clear.warning.row
-        said.append(f'point {segment[row]}: {100.0 * fraction[row]:.1f} % of the way to it, '
-                    f'{clear.warning.text}')
+        said.append(
+            f'point {segment[row]}: {100.0 * fraction[row]:.1f} % of the way to it, '
+            f'{clear.warning.text}'
+        )
     if clear.what:
         least = f'at least {clear.margin:.3f} m' if clear.margin > 0.0 else 'none'
         said.append(f'clearance: {least} between {clear.what}')
@@ -181,8 +185,9 @@ class _Pairs:
         choice = options.self_collision
         #: By column: the distance asked for, whether less is refused, and its name.
         self.bounds = np.full(len(bodies.pairs), self._bound)
-        self.refuses: Flags = exact if choice == 'auto' else np.full(
-            len(exact), choice == 'refuse')
+        self.refuses: Flags = (
+            exact if choice == 'auto' else np.full(len(exact), choice == 'refuse')
+        )
         self.what = [f'{a} and {b}' for a, b in bodies.pairs]
 
     def _has_mesh(self, pair: tuple[Link, Link]) -> bool:
@@ -221,15 +226,18 @@ class _Pairs:
             advice = '; self_collision says what happens where capsules meet'
         near = f'come within {distance:.4f} m of each other' if distance > 0.0 else 'touch'
         return Violation(
-            row=row, text=f'{a} and {b} {near}{between}, {self._bound:.4f} m is asked for',
-            help=f'take another way or posture, or lower min_clearance{advice}')
+            row=row,
+            text=f'{a} and {b} {near}{between}, {self._bound:.4f} m is asked for',
+            help=f'take another way or posture, or lower min_clearance{advice}',
+        )
 
 
 class _Planes:
     """All of the arm beyond its base, the tool and the TCP against the workspace planes."""
 
-    def __init__(self, bodies: Bodies, arm: Arm, T_flange_tcp: Pose, planes: Sequence[Plane]
-                 ) -> None:
+    def __init__(
+        self, bodies: Bodies, arm: Arm, T_flange_tcp: Pose, planes: Sequence[Plane]
+    ) -> None:
         self._bodies, self._arm, self._planes = bodies, arm, planes
         self._tcp = T_flange_tcp.position
         self._normals = np.array([plane.normal for plane in planes])
@@ -240,8 +248,9 @@ class _Planes:
         # Bodies of one link follow each other.
         self._begins = [i for i, link in enumerate(links) if i == 0 or links[i - 1] != link]
         self._names = [str(links[i]) for i in self._begins] + ['TCP']
-        self.what = [f'{name} and the plane "{plane.name}"'
-                     for plane in planes for name in self._names]
+        self.what = [
+            f'{name} and the plane "{plane.name}"' for plane in planes for name in self._names
+        ]
         self.bounds = np.repeat([plane.margin - _ON_PLANE for plane in planes], len(self._names))
         self.refuses: Flags = np.ones(len(self.what), dtype=np.bool_)
 
@@ -251,8 +260,9 @@ class _Planes:
         links = np.minimum.reduceat(low, self._begins, axis=2)
         frames = self._arm.frames_rows(q)
         tcp = np.array(frames.position) + sum(
-            length * np.array(axis) for length, axis in zip(
-                self._tcp, (frames.x, frames.y, frames.z), strict=True))
+            length * np.array(axis)
+            for length, axis in zip(self._tcp, (frames.x, frames.y, frames.z), strict=True)
+        )
         heights = np.concatenate([links, (self._normals @ tcp).T[:, :, None]], axis=2)
         distances = (heights - self._offsets[:, None]).reshape(len(q), -1)
         return distances, distances
@@ -268,21 +278,26 @@ class _Planes:
             text = f'{name} comes within {distance:.4f} m of the workspace plane "{plane.name}"'
         if plane.margin > 0.0:
             text += f', {plane.margin:.4f} m is asked for'
-        return Violation(row=row, text=text, help=(
-            'stay on the side of the plane to which its normal points, or change '
-            'workspace_planes'))
+        return Violation(
+            row=row,
+            text=text,
+            help=(
+                'stay on the side of the plane to which its normal points, or change '
+                'workspace_planes'
+            ),
+        )
 
 
-def _first(watch: _Pairs | _Planes, refused: Flags, distances: Floats, q: Floats, begin: int
-           ) -> Violation | None:
+def _first(
+    watch: _Pairs | _Planes, refused: Flags, distances: Floats, q: Floats, begin: int
+) -> Violation | None:
     """Return the nearest thing in the first row that is refused."""
     rows = np.flatnonzero(refused.any(axis=1))
     if not len(rows):
         return None
     row = int(rows[0])
     column = int(np.argmin(np.where(refused[row], distances[row] - watch.bounds, inf)))
-    return watch.violation(
-        begin + row, column, float(distances[row, column]), q[row:row + 1])
+    return watch.violation(begin + row, column, float(distances[row, column]), q[row : row + 1])
 
 
 def _earlier(one: Violation | None, other: Violation | None) -> Violation | None:

@@ -85,20 +85,31 @@ def opened(plan: Plan, arm: Arm, options: PlanningOptions) -> Part:
     """Return the first part of a goal: its plan, and how it ends for now."""
     goal = plan.goal
     base = OpenGoal(
-        goal=replace(goal, waypoints=(), segments=(), io_commands=(), age=None,
-                     execution=plan.execution),
-        T_flange_active=plan.T_flange_active, T_flange_tcp=plan.T_flange_tcp,
-        points=0, records=0, firm=0, time=0.0, rest_time=0.0, shift=0.0, told=0.0,
-        q_rest=plan.start)
-    addition = Addition(waypoints=goal.waypoints, segments=goal.segments,
-                        io_commands=goal.io_commands)
+        goal=replace(
+            goal, waypoints=(), segments=(), io_commands=(), age=None, execution=plan.execution
+        ),
+        T_flange_active=plan.T_flange_active,
+        T_flange_tcp=plan.T_flange_tcp,
+        points=0,
+        records=0,
+        firm=0,
+        time=0.0,
+        rest_time=0.0,
+        shift=0.0,
+        told=0.0,
+        q_rest=plan.start,
+    )
+    addition = Addition(
+        waypoints=goal.waypoints, segments=goal.segments, io_commands=goal.io_commands
+    )
     if plan.execution is ExecutionMode.SPLINE:
         return _spline_part(base, addition, plan, end_state(plan), 0, 0.0, arm, options)
     return _moves_part(base, addition, plan, 0.0, 0)
 
 
-def following(open_goal: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptions, *,
-              from_rest: bool) -> Part:
+def following(
+    open_goal: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptions, *, from_rest: bool
+) -> Part:
     """
     Return the part of a goal that goes on with an addition.
 
@@ -106,8 +117,7 @@ def following(open_goal: OpenGoal, addition: Addition, arm: Arm, options: Planni
     :raises GoalRefused: with the reason; points are numbered from the start of the goal.
     """
     check_addition(open_goal, addition, options)
-    options = replace(options, max_approach_distance=0.0,
-                      max_points=options.max_points + CONTEXT)
+    options = replace(options, max_approach_distance=0.0, max_points=options.max_points + CONTEXT)
     if open_goal.goal.execution is ExecutionMode.SPLINE:
         return _spline_on(open_goal, addition, arm, options, from_rest)
     return _moves_on(open_goal, addition, arm, options, from_rest)
@@ -116,8 +126,9 @@ def following(open_goal: OpenGoal, addition: Addition, arm: Arm, options: Planni
 # ---- motions of the robot -----------------------------------------------------------------------
 
 
-def _moves_on(on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptions,
-              from_rest: bool) -> Part:
+def _moves_on(
+    on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptions, from_rest: bool
+) -> Part:
     if from_rest:
         on = replace(on, tail=(), outputs=())
     tail, since = on.tail, on.rest_time if from_rest else on.time
@@ -130,19 +141,28 @@ def _moves_on(on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptio
         waypoints = tuple(replace(point, time=point.time - told) for point in waypoints)
     pending = max(len(tail) - 1, 0)
     goal = replace(
-        on.goal, waypoints=waypoints, segments=(*(k.segment for k in tail), *segments),
+        on.goal,
+        waypoints=waypoints,
+        segments=(*(k.segment for k in tail), *segments),
         io_commands=_outputs_due(on, addition, first, pending, since),
-        keep_open=not addition.last)
+        keep_open=not addition.last,
+    )
     try:
         made = plan_goal(goal, _standing(on, q_start, arm), arm, options)
     except GoalRefused as refusal:
         raise _renumbered(refusal, first) from None
-    return _moves_part(on, addition, _moved(made, first, on.points - 1 if tail else on.points,
-                                            since), since, on.records if from_rest else on.firm)
+    return _moves_part(
+        on,
+        addition,
+        _moved(made, first, on.points - 1 if tail else on.points, since),
+        since,
+        on.records if from_rest else on.firm,
+    )
 
 
-def _outputs_due(on: OpenGoal, addition: Addition, first: int, pending: int, since: float
-                 ) -> tuple[IOCommand, ...]:
+def _outputs_due(
+    on: OpenGoal, addition: Addition, first: int, pending: int, since: float
+) -> tuple[IOCommand, ...]:
     """Return the commands of a part; those before it that are still due count from its start."""
     old = []
     for due, command in on.outputs:
@@ -161,11 +181,18 @@ def _moved(made: Plan, first: int, waypoint: int, since: float) -> Plan:
     time = path.time + (since - begin)
     row = max(int(np.searchsorted(time, since + 5e-7, side='right')) - 1, 0)
     return replace(
-        made, segments=tuple(replace(s, waypoint=s.waypoint + first, note=_shifted(s.note, first))
-                             for s in made.segments[len(left_out):]),
-        reference=ReferencePath(poses=path.poses[row:].copy(), time=time[row:].copy(),
-                                point=(path.point[row:] + first).astype(np.int32),
-                                room=path.room[row:].copy()))
+        made,
+        segments=tuple(
+            replace(s, waypoint=s.waypoint + first, note=_shifted(s.note, first))
+            for s in made.segments[len(left_out) :]
+        ),
+        reference=ReferencePath(
+            poses=path.poses[row:].copy(),
+            time=time[row:].copy(),
+            point=(path.point[row:] + first).astype(np.int32),
+            room=path.room[row:].copy(),
+        ),
+    )
 
 
 def _moves_part(on: OpenGoal, addition: Addition, made: Plan, since: float, behind: int) -> Part:
@@ -178,19 +205,36 @@ def _moves_part(on: OpenGoal, addition: Addition, made: Plan, since: float, behi
     points = on.points + len(addition.waypoints)
     known = list(on.tail) + [
         Known(waypoint=waypoint, segment=segment, q_before=on.q_rest, time_before=on.told)
-        for waypoint, segment in zip(addition.waypoints, segments, strict=True)]
+        for waypoint, segment in zip(addition.waypoints, segments, strict=True)
+    ]
     arrived = {segment.waypoint: segment.joints for segment in made.segments}
-    tail = [_seen(known, k - len(known), arrived, points) for k in range(
-        max(0, len(known) - CONTEXT), len(known))]
+    tail = [
+        _seen(known, k - len(known), arrived, points)
+        for k in range(max(0, len(known) - CONTEXT), len(known))
+    ]
     told = addition.waypoints[-1].time
     timed = any(known.waypoint.time != 0.0 for known in tail)
     then = replace(
-        on, points=points, records=behind + count, firm=behind + count - ending, time=time,
-        rest_time=end, told=told, q_rest=last.joints, tail=tuple(tail),
-        outputs=_still_due(on, addition, made, since))
-    return Part(plan=replace(made, goal=replace(made.goal, keep_open=not addition.last)),
-                behind=behind, since=since, ending=0 if addition.last else ending,
-                due=end + _waits(last) if timed else None, text=_text(on, addition), then=then)
+        on,
+        points=points,
+        records=behind + count,
+        firm=behind + count - ending,
+        time=time,
+        rest_time=end,
+        told=told,
+        q_rest=last.joints,
+        tail=tuple(tail),
+        outputs=_still_due(on, addition, made, since),
+    )
+    return Part(
+        plan=replace(made, goal=replace(made.goal, keep_open=not addition.last)),
+        behind=behind,
+        since=since,
+        ending=0 if addition.last else ending,
+        due=end + _waits(last) if timed else None,
+        text=_text(on, addition),
+        then=then,
+    )
 
 
 def _seen(known: Sequence[Known], k: int, arrived: dict[int, Joints], points: int) -> Known:
@@ -202,8 +246,9 @@ def _seen(known: Sequence[Known], k: int, arrived: dict[int, Joints], points: in
     return replace(here, q_before=q, time_before=known[k - 1].waypoint.time)
 
 
-def _still_due(on: OpenGoal, addition: Addition, made: Plan, since: float
-               ) -> tuple[tuple[float, IOCommand], ...]:
+def _still_due(
+    on: OpenGoal, addition: Addition, made: Plan, since: float
+) -> tuple[tuple[float, IOCommand], ...]:
     """
     Return the commands whose records belong to the ending: the next part looks at them again.
 
@@ -216,9 +261,12 @@ def _still_due(on: OpenGoal, addition: Addition, made: Plan, since: float
         now += segment.duration
         ends[segment.waypoint] = now
     commands = [
-        *((ends[c.waypoint] + c.offset if c.waypoint in ends else due, c)
-          for due, c in on.outputs),
-        *((ends.get(c.waypoint, since) + c.offset, c) for c in addition.io_commands)]
+        *(
+            (ends[c.waypoint] + c.offset if c.waypoint in ends else due, c)
+            for due, c in on.outputs
+        ),
+        *((ends.get(c.waypoint, since) + c.offset, c) for c in addition.io_commands),
+    ]
     firm = Counter(_kind(record) for segment in made.segments[:-1] for record in segment.outputs)
     still = []
     for due, command in sorted(commands, key=lambda one: one[0]):
@@ -237,8 +285,9 @@ def _kind(output: IOCommand | SwitchOutput) -> tuple[object, ...]:
 # ---- splines ------------------------------------------------------------------------------------
 
 
-def _spline_on(on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptions,
-               from_rest: bool) -> Part:
+def _spline_on(
+    on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptions, from_rest: bool
+) -> Part:
     """Return the part behind the end of a spline; from rest as soon as the limits allow."""
     assert on.state is not None
     if not from_rest:
@@ -248,44 +297,85 @@ def _spline_on(on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOpti
     refusals = []
     for lead in LEADS:
         try:
-            return _spline_behind(on, addition, start, on.records,
-                                  on.rest_time + lead - on.told, arm, options)
+            return _spline_behind(
+                on, addition, start, on.records, on.rest_time + lead - on.told, arm, options
+            )
         except GoalRefused as refusal:
             refusals.append(refusal)
     raise refusals[-1]
 
 
-def _spline_behind(on: OpenGoal, addition: Addition, start: SplineState, behind: int,
-                   shift: float, arm: Arm, options: PlanningOptions) -> Part:
+def _spline_behind(
+    on: OpenGoal,
+    addition: Addition,
+    start: SplineState,
+    behind: int,
+    shift: float,
+    arm: Arm,
+    options: PlanningOptions,
+) -> Part:
     # Times count from the last point, so that they say how long the first segment is.
-    waypoints = tuple(replace(point, time=round(point.time - on.told, _DIGITS))
-                      for point in addition.waypoints)
-    goal = replace(on.goal, waypoints=waypoints, segments=addition.segments,
-                   io_commands=numbered(addition, on.points), keep_open=not addition.last)
+    waypoints = tuple(
+        replace(point, time=round(point.time - on.told, _DIGITS)) for point in addition.waypoints
+    )
+    goal = replace(
+        on.goal,
+        waypoints=waypoints,
+        segments=addition.segments,
+        io_commands=numbered(addition, on.points),
+        keep_open=not addition.last,
+    )
     standing = _standing(on, start.q, arm)
     try:
         check(goal, options)
         about = carried(goal, standing, options).goal
-        later = replace(about, waypoints=tuple(
-            replace(point, time=point.time + on.told + shift) for point in about.waypoints))
+        later = replace(
+            about,
+            waypoints=tuple(
+                replace(point, time=point.time + on.told + shift) for point in about.waypoints
+            ),
+        )
     except GoalRefused as refusal:
         raise _renumbered(refusal, on.points) from None
-    found = plan_pieces(start, later, arm, on.T_flange_tcp or on.T_flange_active, options,
-                        first=on.points, tools=tools(goal, on.T_flange_active))
+    found = plan_pieces(
+        start,
+        later,
+        arm,
+        on.T_flange_tcp or on.T_flange_active,
+        options,
+        first=on.points,
+        tools=tools(goal, on.T_flange_active),
+    )
     segments, reference, since = found.segments, found.reference, start.time
     if on.again is not None:
         again, way = on.again
         segments, since = (again, *segments), start.time - again.duration
         reference = _joined(way, reference)
-    made = Plan(goal=later, segments=segments, reference=reference, start=start.q,
-                T_flange_active=on.T_flange_active, T_flange_tcp=on.T_flange_tcp,
-                execution=ExecutionMode.SPLINE, remarks=found.remarks)
-    return _spline_part(replace(on, shift=shift), addition, made, found.end, behind, since, arm,
-                        options)
+    made = Plan(
+        goal=later,
+        segments=segments,
+        reference=reference,
+        start=start.q,
+        T_flange_active=on.T_flange_active,
+        T_flange_tcp=on.T_flange_tcp,
+        execution=ExecutionMode.SPLINE,
+        remarks=found.remarks,
+    )
+    return _spline_part(
+        replace(on, shift=shift), addition, made, found.end, behind, since, arm, options
+    )
 
 
-def _spline_part(on: OpenGoal, addition: Addition, made: Plan, end: SplineState, behind: int,
-                 since: float, arm: Arm, options: PlanningOptions) -> Part:
+def _spline_part(
+    on: OpenGoal,
+    addition: Addition,
+    made: Plan,
+    end: SplineState,
+    behind: int,
+    since: float,
+    arm: Arm,
+    options: PlanningOptions,
+) -> Part:
     """
     Return a part whose ending is a piece to rest, where its last point moves.
 
@@ -298,25 +388,43 @@ def _spline_part(on: OpenGoal, addition: Addition, made: Plan, end: SplineState,
         made = _closed(made, end, point, arm, on, options)
         rest_time, q_rest = end.time + made.segments[-1].duration, made.segments[-1].joints
     made, due = _with_outputs(on, addition, made, since)
-    pending = tuple((time, command) for time, command in due
-                    if time >= end.time - SAME_TIME and not addition.last)
+    pending = tuple(
+        (time, command)
+        for time, command in due
+        if time >= end.time - SAME_TIME and not addition.last
+    )
     firm = len(known.segments) - (1 if pending else 0)
     count, ending = _records(made.segments), _records(made.segments[firm:])
     if addition.last:
         ending = 0
     again = (known.segments[-1], known.reference) if pending else None
     then = replace(
-        on, points=point + 1, records=behind + count, firm=behind + count - ending,
-        time=end.time - (again[0].duration if again else 0.0), rest_time=rest_time,
-        told=addition.waypoints[-1].time, q_rest=q_rest, state=end, outputs=pending,
-        again=again and (again[0], _tail_of(again[1], end.time - again[0].duration)))
-    return Part(plan=replace(made, goal=replace(made.goal, keep_open=not addition.last)),
-                behind=behind, since=since, ending=ending,
-                due=rest_time + _waits(made.segments[-1]), text=_text(on, addition), then=then)
+        on,
+        points=point + 1,
+        records=behind + count,
+        firm=behind + count - ending,
+        time=end.time - (again[0].duration if again else 0.0),
+        rest_time=rest_time,
+        told=addition.waypoints[-1].time,
+        q_rest=q_rest,
+        state=end,
+        outputs=pending,
+        again=again and (again[0], _tail_of(again[1], end.time - again[0].duration)),
+    )
+    return Part(
+        plan=replace(made, goal=replace(made.goal, keep_open=not addition.last)),
+        behind=behind,
+        since=since,
+        ending=ending,
+        due=rest_time + _waits(made.segments[-1]),
+        text=_text(on, addition),
+        then=then,
+    )
 
 
-def _with_outputs(on: OpenGoal, addition: Addition, made: Plan, since: float
-                  ) -> tuple[Plan, list[tuple[float, IOCommand]]]:
+def _with_outputs(
+    on: OpenGoal, addition: Addition, made: Plan, since: float
+) -> tuple[Plan, list[tuple[float, IOCommand]]]:
     """Return a plan of pieces with the outputs on its way, and when each command is due [s]."""
     ends, now = {}, since
     # A piece to rest leads to no point: what is due on it is due behind the last one.
@@ -329,49 +437,85 @@ def _with_outputs(on: OpenGoal, addition: Addition, made: Plan, since: float
         now += segment.duration
         ends[segment.waypoint] = now
     first = segments[0].waypoint
-    due = [*on.outputs, *((ends[command.waypoint] + command.offset, command)
-                          for command in addition.io_commands)]
-    found = with_outputs(segments, made.reference, [
-        replace(command, waypoint=max(command.waypoint, first),
-                offset=max(0.0, time - ends[max(command.waypoint, first)]))
-        for time, command in due], since=since)
-    return replace(made, segments=tuple(
-        replace(segment, waypoint=old.waypoint, note=old.note)
-        for segment, old in zip(found, made.segments, strict=True))), due
+    due = [
+        *on.outputs,
+        *((ends[command.waypoint] + command.offset, command) for command in addition.io_commands),
+    ]
+    found = with_outputs(
+        segments,
+        made.reference,
+        [
+            replace(
+                command,
+                waypoint=max(command.waypoint, first),
+                offset=max(0.0, time - ends[max(command.waypoint, first)]),
+            )
+            for time, command in due
+        ],
+        since=since,
+    )
+    return replace(
+        made,
+        segments=tuple(
+            replace(segment, waypoint=old.waypoint, note=old.note)
+            for segment, old in zip(found, made.segments, strict=True)
+        ),
+    ), due
 
 
 def _tail_of(path: ReferencePath, since: float) -> ReferencePath:
     """Return the rows of a path from a time on [s]."""
     row = max(int(np.searchsorted(path.time, since + SAME_TIME, side='right')) - 1, 0)
-    return ReferencePath(poses=path.poses[row:].copy(), time=path.time[row:].copy(),
-                         point=path.point[row:].copy(), room=path.room[row:].copy())
+    return ReferencePath(
+        poses=path.poses[row:].copy(),
+        time=path.time[row:].copy(),
+        point=path.point[row:].copy(),
+        room=path.room[row:].copy(),
+    )
 
 
 def _joined(first: ReferencePath, second: ReferencePath) -> ReferencePath:
     """Return two paths as one; the second begins where the first ends."""
     poses = np.concatenate([first.poses, second.poses[1:]])
     keep_hemisphere(poses)
-    return ReferencePath(poses=poses, time=np.concatenate([first.time, second.time[1:]]),
-                         point=np.concatenate([first.point, second.point[1:]]),
-                         room=np.concatenate([first.room, second.room[1:]]))
+    return ReferencePath(
+        poses=poses,
+        time=np.concatenate([first.time, second.time[1:]]),
+        point=np.concatenate([first.point, second.point[1:]]),
+        room=np.concatenate([first.room, second.room[1:]]),
+    )
 
 
-def _closed(made: Plan, end: SplineState, point: int, arm: Arm, on: OpenGoal,
-            options: PlanningOptions) -> Plan:
+def _closed(
+    made: Plan, end: SplineState, point: int, arm: Arm, on: OpenGoal, options: PlanningOptions
+) -> Plan:
     """Return a plan with the piece that brings it to rest."""
     piece = closing(end, arm, options.closing_deceleration)
     times = np.linspace(0.0, piece.duration, _CLOSING_ROWS + 1)[1:]
-    q, _, _ = JointSpline.of(end.q, [piece], velocities=end.qd,
-                             accelerations=end.qdd).rows(times)
+    q, _, _ = JointSpline.of(end.q, [piece], velocities=end.qd, accelerations=end.qdd).rows(times)
     path = made.reference
     poses = np.concatenate([path.poses, tcp_rows(arm, on.T_flange_tcp or on.T_flange_active, q)])
     keep_hemisphere(poses)
-    return replace(made, segments=(*made.segments, PlannedSegment(
-        primitive=piece, waypoint=point, length=0.0, angle=0.0, duration=piece.duration,
-        joints=piece.target if isinstance(piece.target, tuple) else end.q, note='')),
+    return replace(
+        made,
+        segments=(
+            *made.segments,
+            PlannedSegment(
+                primitive=piece,
+                waypoint=point,
+                length=0.0,
+                angle=0.0,
+                duration=piece.duration,
+                joints=piece.target if isinstance(piece.target, tuple) else end.q,
+                note='',
+            ),
+        ),
         reference=ReferencePath(
-            poses=poses, time=np.concatenate([path.time, end.time + times]),
-            point=np.concatenate([path.point, np.full(len(times), point, dtype=np.int32)])))
+            poses=poses,
+            time=np.concatenate([path.time, end.time + times]),
+            point=np.concatenate([path.point, np.full(len(times), point, dtype=np.int32)]),
+        ),
+    )
 
 
 # ---- both ---------------------------------------------------------------------------------------
@@ -380,8 +524,14 @@ def _closed(made: Plan, end: SplineState, point: int, arm: Arm, on: OpenGoal,
 def _standing(on: OpenGoal, q: Joints, arm: Arm) -> RobotState:
     """Return the state of a robot that rests somewhere on the way."""
     pose = arm.forward(q) @ on.T_flange_active
-    return RobotState(timestamp=0.0, actual_q=q, target_q=q, actual_tcp_pose=pose,
-                      target_tcp_pose=pose, T_flange_tcp=on.T_flange_active)
+    return RobotState(
+        timestamp=0.0,
+        actual_q=q,
+        target_q=q,
+        actual_tcp_pose=pose,
+        target_tcp_pose=pose,
+        T_flange_tcp=on.T_flange_active,
+    )
 
 
 def _waits(last: PlannedSegment) -> float:
@@ -408,12 +558,20 @@ def _text(on: OpenGoal, addition: Addition) -> str:
     count = len(addition.waypoints)
     points = 'point' if count == 1 else 'points'
     end = ', these are the last' if addition.last else ''
-    return ' '.join([f'{count} {points} appended, the goal has {on.points + count}{end}.',
-                     *(f'{remark[:1].upper()}{remark[1:]}.' for remark in _ignored(on, addition))])
+    return ' '.join(
+        [
+            f'{count} {points} appended, the goal has {on.points + count}{end}.',
+            *(f'{remark[:1].upper()}{remark[1:]}.' for remark in _ignored(on, addition)),
+        ]
+    )
 
 
 def _ignored(on: OpenGoal, addition: Addition) -> list[str]:
     """Return what is to be said of points that ask for what is not done."""
-    goal = replace(on.goal, waypoints=addition.waypoints, segments=addition.segments,
-                   keep_open=not addition.last)
+    goal = replace(
+        on.goal,
+        waypoints=addition.waypoints,
+        segments=addition.segments,
+        keep_open=not addition.last,
+    )
     return (point_remarks if goal.execution is ExecutionMode.SPLINE else ignored)(goal, on.points)

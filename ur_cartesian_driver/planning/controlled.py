@@ -64,15 +64,24 @@ def carried(goal: Goal, state: RobotState, options: PlanningOptions) -> Carried:
     if options.allow_tcp_change:
         x, y, z, rx, ry, rz = T_flange_controlled.rotation_vector()
         return Carried(
-            goal=goal, state=seen_at(state, T_tcp_controlled), T_flange_tcp=T_flange_controlled,
-            remarks=(f'the TCP of the robot is set to {_name(goal)}, p[{x:.6f}, {y:.6f}, {z:.6f}, '
-                     f'{rx:.6f}, {ry:.6f}, {rz:.6f}], for this goal, and put back at its end',))
+            goal=goal,
+            state=seen_at(state, T_tcp_controlled),
+            T_flange_tcp=T_flange_controlled,
+            remarks=(
+                f'the TCP of the robot is set to {_name(goal)}, p[{x:.6f}, {y:.6f}, {z:.6f}, '
+                f'{rx:.6f}, {ry:.6f}, {rz:.6f}], for this goal, and put back at its end',
+            ),
+        )
     _check_turns(goal, state.actual_tcp_pose @ T_tcp_controlled)
     return Carried(
-        goal=_about_tcp(goal, T_tcp_controlled.inverse()), state=state,
+        goal=_about_tcp(goal, T_tcp_controlled.inverse()),
+        state=state,
         T_tcp_controlled=T_tcp_controlled,
-        remarks=(f'the motion is carried over from {_name(goal)} to the TCP of the robot, which '
-                 'must not change (allow_tcp_change is false)',))
+        remarks=(
+            f'the motion is carried over from {_name(goal)} to the TCP of the robot, which '
+            'must not change (allow_tcp_change is false)',
+        ),
+    )
 
 
 def tools(goal: Goal, T_flange_active: Pose) -> tuple[Pose, ...]:
@@ -113,16 +122,21 @@ def _check_turns(goal: Goal, T_base_start: Pose) -> None:
         remedy = f'keep the orientation, {joint}or set allow_tcp_change to true'
         if angle > KEPT_ANGLE:
             raise InvalidGoal(
-                point_field(i, 'pose.orientation'), f'turns {_name(goal)} by {degrees(angle):.2f} '
+                point_field(i, 'pose.orientation'),
+                f'turns {_name(goal)} by {degrees(angle):.2f} '
                 'degrees on the way; a frame that is not the TCP of the robot keeps to a line or '
-                'an arc only if it does not turn, and the TCP must not change', remedy)
+                'an arc only if it does not turn, and the TCP must not change',
+                remedy,
+            )
         if is_spline(goal):
             _check_rates(goal, i, remedy)
         if segment.type == SegmentType.CIRCULAR and segment.arc_mode == ArcMode.FIXED:
             raise InvalidGoal(
-                segment_field(i, 'arc_mode'), f'is FIXED, which turns {_name(goal)} along with '
+                segment_field(i, 'arc_mode'),
+                f'is FIXED, which turns {_name(goal)} along with '
                 'the arc; that needs the TCP of the robot to be there, and it must not change',
-                'use UNCONSTRAINED, or set allow_tcp_change to true')
+                'use UNCONSTRAINED, or set allow_tcp_change to true',
+            )
 
 
 def _check_rates(goal: Goal, index: int, remedy: str) -> None:
@@ -131,18 +145,25 @@ def _check_rates(goal: Goal, index: int, remedy: str) -> None:
     for field, values in (('twist', point.twist), ('acceleration', point.acceleration)):
         if any(value != 0.0 and not isnan(value) for value in values[3:]):
             raise InvalidGoal(
-                f'{point_field(index, field)}.angular', f'turns {_name(goal)}; a frame that is '
+                f'{point_field(index, field)}.angular',
+                f'turns {_name(goal)}; a frame that is '
                 'not the TCP of the robot keeps to a spline only if it does not turn, and the TCP '
-                'must not change', remedy)
+                'must not change',
+                remedy,
+            )
 
 
 def _about_tcp(goal: Goal, T_controlled_tcp: Pose) -> Goal:
     return replace(
         goal,
         waypoints=tuple(_waypoint(point, T_controlled_tcp) for point in goal.waypoints),
-        segments=tuple(_segment(segment, point, T_controlled_tcp)
-                       for segment, point in zip(goal.segments, goal.waypoints, strict=True)
-                       ) if goal.segments else ())
+        segments=tuple(
+            _segment(segment, point, T_controlled_tcp)
+            for segment, point in zip(goal.segments, goal.waypoints, strict=True)
+        )
+        if goal.segments
+        else (),
+    )
 
 
 def _waypoint(point: Waypoint, T_controlled_tcp: Pose) -> Waypoint:
@@ -150,8 +171,11 @@ def _waypoint(point: Waypoint, T_controlled_tcp: Pose) -> Waypoint:
     lever = rotate(pose.quaternion, T_controlled_tcp.position)
     twist, acceleration = _steady(point.twist), _steady(point.acceleration)
     return replace(
-        point, pose=pose @ T_controlled_tcp, twist=twist_at(twist, lever),
-        acceleration=acceleration_at(acceleration, twist, lever))
+        point,
+        pose=pose @ T_controlled_tcp,
+        twist=twist_at(twist, lever),
+        acceleration=acceleration_at(acceleration, twist, lever),
+    )
 
 
 def _steady(rates: Vector6) -> Vector6:
@@ -167,6 +191,7 @@ def _segment(segment: Segment, point: Waypoint, T_controlled_tcp: Pose) -> Segme
         return segment
     lever = rotate(normalize(point.pose.quaternion), T_controlled_tcp.position)
     x, y, z = segment.via.position
-    via = Pose((x + lever[0], y + lever[1], z + lever[2]),
-               (segment.via @ T_controlled_tcp).quaternion)
+    via = Pose(
+        (x + lever[0], y + lever[1], z + lever[2]), (segment.via @ T_controlled_tcp).quaternion
+    )
     return replace(segment, via=via)

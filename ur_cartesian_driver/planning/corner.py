@@ -91,8 +91,9 @@ class Corner:
         assert isinstance(self.first, JointLine)
         assert isinstance(self.second, JointLine)
         a, b = crossing(self.leave, self.join, s)
-        rows: Floats = (self.first.joint_rows(a) + self.second.joint_rows(b)
-                        - np.array(self.second.q_start))
+        rows: Floats = (
+            self.first.joint_rows(a) + self.second.joint_rows(b) - np.array(self.second.q_start)
+        )
         return rows
 
     def rows(self, s: Floats) -> Floats:
@@ -115,24 +116,50 @@ def corners(meetings: Sequence[Meeting]) -> list[Corner]:
     start = _places((m.first for m in meetings), [leave for leave, _ in ends])
     end = _places((m.second for m in meetings), [join for _, join in ends])
     middle = _starts([m.second for m in meetings])
-    shapes = _Shapes(start, middle, end, np.array([m.radius for m in meetings]),
-                     np.array([m.fillet for m in meetings]))
+    shapes = _Shapes(
+        start,
+        middle,
+        end,
+        np.array([m.radius for m in meetings]),
+        np.array([m.fillet for m in meetings]),
+    )
     lengths, samples, rooms = shapes.lengths(), shapes.samples(), shapes.rooms()
     found = [
         Corner(m.first, m.second, m.radius, m.fillet, leave, join, length, angle, n, (near, turn))
         for m, (leave, join), length, angle, n, (near, turn) in zip(
-            meetings, ends, lengths.tolist(), shapes.turns.tolist(), samples.tolist(),
-            rooms.tolist(), strict=True)]
-    return [corner if isinstance(corner.first, Line) and isinstance(corner.second, Line)
-            else _measured(corner) for corner in found]
+            meetings,
+            ends,
+            lengths.tolist(),
+            shapes.turns.tolist(),
+            samples.tolist(),
+            rooms.tolist(),
+            strict=True,
+        )
+    ]
+    return [
+        corner
+        if isinstance(corner.first, Line) and isinstance(corner.second, Line)
+        else _measured(corner)
+        for corner in found
+    ]
 
 
 def _measured(corner: Corner) -> Corner:
     """Return a corner that is no parabola with its length measured along chords."""
     positions = corner.rows(np.linspace(0.0, 1.0, _CHORDS + 1))[:, :3]
     length = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
-    return Corner(corner.first, corner.second, corner.radius, corner.fillet, corner.leave,
-                  corner.join, length, corner.angle, corner.samples, corner.room)
+    return Corner(
+        corner.first,
+        corner.second,
+        corner.radius,
+        corner.fillet,
+        corner.leave,
+        corner.join,
+        length,
+        corner.angle,
+        corner.samples,
+        corner.room,
+    )
 
 
 def _places(paths: Iterable[Path], u: Sequence[float]) -> Floats:
@@ -142,8 +169,7 @@ def _places(paths: Iterable[Path], u: Sequence[float]) -> Floats:
     lines = [k for k, path in enumerate(every) if isinstance(path, Line)]
     if lines:
         ends = _ends([path for path in every if isinstance(path, Line)])
-        rows[lines] = interpolate_rows(
-            ends[:, 0], ends[:, 1], np.array([u[k] for k in lines]))
+        rows[lines] = interpolate_rows(ends[:, 0], ends[:, 1], np.array([u[k] for k in lines]))
     for k, path in enumerate(every):
         if not isinstance(path, Line):
             rows[k] = path.pose(u[k]).row()
@@ -152,8 +178,9 @@ def _places(paths: Iterable[Path], u: Sequence[float]) -> Floats:
 
 def _starts(paths: Sequence[Path]) -> Floats:
     """Return the poses (n, 7) at which paths begin."""
-    return np.array([path.ends[0] if isinstance(path, Line) else path.start.row()
-                     for path in paths])
+    return np.array(
+        [path.ends[0] if isinstance(path, Line) else path.start.row() for path in paths]
+    )
 
 
 def _ends(lines: Sequence[Line]) -> Floats:
@@ -169,8 +196,9 @@ class _Shapes:
         they end.
     """
 
-    def __init__(self, start: Floats, middle: Floats, end: Floats, radius: Floats,
-                 fillet: Floats) -> None:
+    def __init__(
+        self, start: Floats, middle: Floats, end: Floats, radius: Floats, fillet: Floats
+    ) -> None:
         """Keep the positions, and measure turns and openings."""
         self.start, self.middle, self.end = start[:, :3], middle[:, :3], end[:, :3]
         self.radius, self.fillet = radius, fillet
@@ -182,12 +210,15 @@ class _Shapes:
     def lengths(self) -> Floats:
         """Return the lengths [m], of parabolas and circles between straight lines."""
         arc = fillet_radius(self.radius, self.opening) * (np.pi - self.opening)
-        to_and_fro = (np.linalg.norm(self.start - self.middle, axis=1)
-                      + np.linalg.norm(self.end - self.middle, axis=1))
+        to_and_fro = np.linalg.norm(self.start - self.middle, axis=1) + np.linalg.norm(
+            self.end - self.middle, axis=1
+        )
         has_circle = (self.opening > _STRAIGHT) & (self.opening < np.pi - _STRAIGHT)
         lengths: Floats = np.where(
-            self.fillet, np.where(has_circle, arc, to_and_fro),
-            _parabola_lengths(self.start, self.middle, self.end))
+            self.fillet,
+            np.where(has_circle, arc, to_and_fro),
+            _parabola_lengths(self.start, self.middle, self.end),
+        )
         return lengths
 
     def samples(self) -> Floats:
@@ -236,8 +267,9 @@ def _crossing_rows(all_corners: Sequence[Corner], which: NDArray[np.intp], s: Fl
     second = path_rows([c.second for c in all_corners], which, b)
     middle = _starts([c.second for c in all_corners])[which]
     rows = first + second - middle
-    rows[:, 3:] = normalized_rows(multiply_rows(
-        multiply_rows(first[:, 3:], conjugate_rows(middle[:, 3:])), second[:, 3:]))
+    rows[:, 3:] = normalized_rows(
+        multiply_rows(multiply_rows(first[:, 3:], conjugate_rows(middle[:, 3:])), second[:, 3:])
+    )
     round_ones = np.array([c.fillet for c in all_corners])[which]
     if round_ones.any():
         of_them = which[round_ones]
@@ -245,7 +277,8 @@ def _crossing_rows(all_corners: Sequence[Corner], which: NDArray[np.intp], s: Fl
         end = _places((c.second for c in all_corners), [c.join for c in all_corners])[of_them]
         radius = np.array([c.radius for c in all_corners])[of_them]
         rows[round_ones, :3] = _on_fillets(
-            start[:, :3], middle[round_ones, :3], end[:, :3], radius, s[round_ones])
+            start[:, :3], middle[round_ones, :3], end[:, :3], radius, s[round_ones]
+        )
     return rows
 
 
@@ -275,7 +308,8 @@ def opening_rows(start: Floats, corner: Floats, end: Floats) -> Floats:
     a, b = _units(start - corner), _units(end - corner)
     # Better than the arc cosine where the legs are in line.
     opening: Floats = 2.0 * np.arctan2(
-        np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
+        np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1)
+    )
     return opening
 
 

@@ -90,8 +90,9 @@ class Drafts:
     :param remarks: what is ignored or changed is added to these.
     """
 
-    def __init__(self, goal: Goal, targets: Sequence[Pose], options: PlanningOptions,
-                 remarks: list[str]) -> None:
+    def __init__(
+        self, goal: Goal, targets: Sequence[Pose], options: PlanningOptions, remarks: list[str]
+    ) -> None:
         """Take what the legs are made of."""
         self._goal, self._targets, self._options = goal, targets, options
         self._remarks = remarks
@@ -107,8 +108,11 @@ class Drafts:
         for i in range(begin, last + 1):
             segment = segment_of(self._goal, i)
             kind = _LINEAR if segment.type == SegmentType.AUTO else SegmentType(segment.type)
-            radius = 0.0 if i == last else spoken_radius(
-                segment.blend_radius, i, self._options.dialect, self._remarks)
+            radius = (
+                0.0
+                if i == last
+                else spoken_radius(segment.blend_radius, i, self._options.dialect, self._remarks)
+            )
             draft = Draft(i, kind, segment, radius)
             if kind not in IN_JOINTS:
                 draft.path = self.straight(draft, before)
@@ -121,22 +125,27 @@ class Drafts:
         """Return the line or the arc of a segment from a pose."""
         i, segment = draft.index, draft.segment
         turn = start.angle_to(self._targets[i])
-        follows_arc = (draft.kind == SegmentType.CIRCULAR and segment.arc_mode == ArcMode.FIXED)
+        follows_arc = draft.kind == SegmentType.CIRCULAR and segment.arc_mode == ArcMode.FIXED
         if turn > pi - HALF_TURN and not follows_arc:
             raise InvalidGoal(
-                point_field(i, 'pose.orientation'), f'turns the tool by {degrees(turn):.2f} '
+                point_field(i, 'pose.orientation'),
+                f'turns the tool by {degrees(turn):.2f} '
                 'degrees on the way, and either way round is as short: nobody can tell which the '
-                'robot takes', 'add a point in between, or use a JOINT segment')
+                'robot takes',
+                'add a point in between, or use a JOINT segment',
+            )
         if draft.kind != SegmentType.CIRCULAR:
             return Line.between(start, self._targets[i])
         assert segment.via is not None
-        arc = arc_of(i, start, self._goal.T_base_frame @ segment.via, self._targets[i],
-                     segment.arc_mode)
+        arc = arc_of(
+            i, start, self._goal.T_base_frame @ segment.via, self._targets[i], segment.arc_mode
+        )
         off = arc.end.angle_to(self._targets[i])
         if off > self._options.start_tolerance_angle:
             self._remarks.append(
                 f'point {i}: the orientation of the point is ignored, because arc_mode FIXED '
-                f'keeps it to the tangent; it arrives {degrees(off):.1f} degrees off')
+                f'keeps it to the tangent; it arrives {degrees(off):.1f} degrees off'
+            )
         return arc
 
     def _check_first_blend(self, first: Draft, start: Pose) -> None:

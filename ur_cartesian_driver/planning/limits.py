@@ -69,8 +69,7 @@ def limits_of(leg: Leg, length: float, options: PlanningOptions, model: RobotMod
         least = leg.pace.time
         if least > 0.0 and length / least < speed:
             speed, name = length / least, _joint_limit(leg.pace)
-    bound = (options.max_linear_acceleration * length / leg.path.length
-             if moves(leg) else inf)
+    bound = options.max_linear_acceleration * length / leg.path.length if moves(leg) else inf
     if leg.path.angle > 0.0:
         bound = min(bound, options.max_angular_acceleration * length / leg.path.angle)
     return Limits(speed=speed, name=name, acceleration=bound)
@@ -85,8 +84,10 @@ def _in_blends(leg: Leg, length: float, speed: float, name: str) -> tuple[float,
 
 
 def _joint_limit(pace: Pace) -> str:
-    return (f'the speed limits of the joints, {JOINT_NAMES[pace.joint]} at '
-            f'{100.0 * pace.fraction:.0f} % of the way')
+    return (
+        f'the speed limits of the joints, {JOINT_NAMES[pace.joint]} at '
+        f'{100.0 * pace.fraction:.0f} % of the way'
+    )
 
 
 def _tool_per_unit(leg: Leg, length: float) -> float:

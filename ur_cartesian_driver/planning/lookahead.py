@@ -79,7 +79,10 @@ class _Rows:
             np.concatenate([np.empty(0, dtype=np.intp), *self.piece]),
             np.concatenate([np.empty(0), *self.t]),
             np.concatenate([np.empty((0, 7)), *self.poses]),
-            np.concatenate([np.empty((0, 6)), *self.q]), refusal, segment)
+            np.concatenate([np.empty((0, 6)), *self.q]),
+            refusal,
+            segment,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,14 +100,18 @@ class _Between:
 def in_joints(reach: Reach, pieces: Sequence[Piece]) -> Followed:
     """Return the places on pieces in joint space."""
     piece, t = along(pieces)
-    q = np.concatenate([
-        p.curve.joint_rows(t[piece == k])  # type: ignore[union-attr]  # no other comes here
-        for k, p in enumerate(pieces)])
+    q = np.concatenate(
+        [
+            p.curve.joint_rows(t[piece == k])  # type: ignore[union-attr]  # no other comes here
+            for k, p in enumerate(pieces)
+        ]
+    )
     return Followed(piece, t, tcp_rows(reach.arm, reach.T_flange_tcp, q), q)
 
 
-def followed(reach: Reach, pieces: Sequence[Piece], q_start: Joints,
-             places: Places | None = None) -> Followed:
+def followed(
+    reach: Reach, pieces: Sequence[Piece], q_start: Joints, places: Places | None = None
+) -> Followed:
     """
     Return the places on pieces in the tool's space, one piece after the other, with the joints.
 
@@ -115,12 +122,12 @@ def followed(reach: Reach, pieces: Sequence[Piece], q_start: Joints,
     found, q = _Rows(), q_start
     row, block = 0, len(places.t)
     while row < len(places.t):
-        solved, bad = _ahead(reach, places.poses[row:row + block], q)
+        solved, bad = _ahead(reach, places.poses[row : row + block], q)
         begin = row
         for index in (*bad, len(solved)):
             stop = begin + index
             if stop > row:
-                found.append(places, slice(row, stop), solved[row - begin:index])
+                found.append(places, slice(row, stop), solved[row - begin : index])
                 q, row = _joints(solved[index - 1]), stop
             if index == len(solved):
                 block *= _GROWTH
@@ -154,8 +161,9 @@ def _ahead(reach: Reach, poses: Floats, q: Joints) -> tuple[Floats, list[int]]:
     return path.q, np.flatnonzero(bad).tolist()
 
 
-def _between(reach: Reach, pieces: Sequence[Piece], places: Places, row: int, q: Joints
-             ) -> _Between:
+def _between(
+    reach: Reach, pieces: Sequence[Piece], places: Places, row: int, q: Joints
+) -> _Between:
     """Return the places from the one before a row to it, as near as the joints need them."""
     piece = pieces[int(places.piece[row])]
     is_first = row == 0 or places.piece[row - 1] != places.piece[row]
@@ -182,12 +190,14 @@ def _between(reach: Reach, pieces: Sequence[Piece], places: Places, row: int, q:
 
 
 def _as_places(piece: int, between: _Between) -> Places:
-    return Places(np.full(len(between.t), piece), np.array(between.t),
-                  np.array([pose.row() for pose in between.poses]))
+    return Places(
+        np.full(len(between.t), piece),
+        np.array(between.t),
+        np.array([pose.row() for pose in between.poses]),
+    )
 
 
-def _refusal(reach: Reach, piece: Piece, between: _Between, q: Joints
-             ) -> tuple[GoalRefused, int]:
+def _refusal(reach: Reach, piece: Piece, between: _Between, q: Joints) -> tuple[GoalRefused, int]:
     """Return why the arm does not go on from a configuration, and on which segment."""
     assert between.stop is not None
     index, fraction = piece.on_segment(between.stop)
@@ -208,8 +218,11 @@ def _refusal(reach: Reach, piece: Piece, between: _Between, q: Joints
 def place(index: int, fraction: float) -> str:
     """Return the words for a place on the way to a point."""
     field_name = point_field(index, 'pose')
-    return field_name if fraction >= 1.0 else (
-        f'{field_name}, {100.0 * fraction:.1f} % of the way to it,')
+    return (
+        field_name
+        if fraction >= 1.0
+        else (f'{field_name}, {100.0 * fraction:.1f} % of the way to it,')
+    )
 
 
 def _apart(reach: Reach, q: Joints, q_next: Joints) -> bool:

@@ -49,12 +49,27 @@ class Measure:
 
 
 MEASURES = (
-    Measure('wrist', 'rad', 'singularity_margin_wrist',
-            'wrist_2_joint from where the axes 4 and 6 are parallel', 1.0),
-    Measure('elbow', 'rad', 'singularity_margin_elbow',
-            'elbow_joint from the stretched or folded arm', 1.0),
-    Measure('shoulder', 'm', 'singularity_margin_shoulder',
-            'the centre of the wrist from above or below the shoulder', 0.3),
+    Measure(
+        'wrist',
+        'rad',
+        'singularity_margin_wrist',
+        'wrist_2_joint from where the axes 4 and 6 are parallel',
+        1.0,
+    ),
+    Measure(
+        'elbow',
+        'rad',
+        'singularity_margin_elbow',
+        'elbow_joint from the stretched or folded arm',
+        1.0,
+    ),
+    Measure(
+        'shoulder',
+        'm',
+        'singularity_margin_shoulder',
+        'the centre of the wrist from above or below the shoulder',
+        0.3,
+    ),
 )
 _SCALES = np.array([*(measure.scale for measure in MEASURES), 1.0])
 
@@ -78,8 +93,14 @@ class Nearest:
 def measured(arm: Arm, q: Floats) -> Floats:
     """Return the three measures (n, 3) of configurations (n, 6), all >= 0, as in MEASURES."""
     of = postures(arm, q)
-    return np.stack((np.arcsin(np.minimum(1.0, np.abs(of.wrist))),
-                     np.arcsin(np.minimum(1.0, np.abs(of.elbow))), np.abs(of.shoulder)), axis=1)
+    return np.stack(
+        (
+            np.arcsin(np.minimum(1.0, np.abs(of.wrist))),
+            np.arcsin(np.minimum(1.0, np.abs(of.elbow))),
+            np.abs(of.shoulder),
+        ),
+        axis=1,
+    )
 
 
 def to_limits(arm: Arm, q: Floats) -> tuple[Floats, NDArray[np.intp]]:
@@ -90,9 +111,14 @@ def to_limits(arm: Arm, q: Floats) -> tuple[Floats, NDArray[np.intp]]:
     return np.take_along_axis(room, joint[:, None], axis=1)[:, 0], joint
 
 
-def too_near(pieces: Sequence[Piece], found: Followed, measures: Floats,
-             segments: NDArray[np.int32], fractions: Floats, options: PlanningOptions
-             ) -> tuple[NearSingularity, int] | None:
+def too_near(
+    pieces: Sequence[Piece],
+    found: Followed,
+    measures: Floats,
+    segments: NDArray[np.int32],
+    fractions: Floats,
+    options: PlanningOptions,
+) -> tuple[NearSingularity, int] | None:
     """
     Return the refusal of the first segment that is too near to a singularity, and which it is.
 
@@ -108,15 +134,18 @@ def too_near(pieces: Sequence[Piece], found: Followed, measures: Floats,
         near[rows] &= ~_leaving(pieces, found, rows, measures)
         if not near[rows].any():
             continue
-        row, k = min(((int(r), int(c)) for r, c in np.argwhere(near[rows])),
-                     key=lambda at: measures[rows[at[0]], at[1]] / bounds[at[1]])
+        row, k = min(
+            ((int(r), int(c)) for r, c in np.argwhere(near[rows])),
+            key=lambda at: measures[rows[at[0]], at[1]] / bounds[at[1]],
+        )
         measure, bound = MEASURES[k], float(bounds[k])
         value = _spoken(float(measures[rows[row], k]), bound)
         where = place(int(segment), float(fractions[rows[row]]))
         return NearSingularity(
             f'{where} comes within {value} {measure.unit} of the {measure.name} singularity '
             f'({measure.meaning}), and {measure.option} asks for {bound:g} {measure.unit}; keep '
-            'away from it, use a JOINT segment, or lower the parameter.'), int(segment)
+            'away from it, use a JOINT segment, or lower the parameter.'
+        ), int(segment)
     return None
 
 
@@ -126,8 +155,9 @@ def _spoken(value: float, bound: float) -> str:
     return text if float(text) < bound else told_apart(value, bound)[0]
 
 
-def _leaving(pieces: Sequence[Piece], found: Followed, rows: NDArray[np.intp], measures: Floats
-             ) -> NDArray[np.bool_]:
+def _leaving(
+    pieces: Sequence[Piece], found: Followed, rows: NDArray[np.intp], measures: Floats
+) -> NDArray[np.bool_]:
     """
     Tell which places (n, 3) of a segment are on the way out of a singularity it starts in.
 
@@ -138,8 +168,11 @@ def _leaving(pieces: Sequence[Piece], found: Followed, rows: NDArray[np.intp], m
     excused = np.zeros((len(rows), len(MEASURES)), dtype=np.bool_)
     if isinstance(piece.curve, ToolCurve):
         return excused  # splines have one start, see leaving_rows
-    if piece.begin > 0.0 or _is_corner(piece) or (
-            int(found.piece[rows[0]]) != _first_of(pieces, piece.index)):
+    if (
+        piece.begin > 0.0
+        or _is_corner(piece)
+        or (int(found.piece[rows[0]]) != _first_of(pieces, piece.index))
+    ):
         return excused  # it comes out of a corner
     length, angle = piece.size
     on_it = found.piece[rows] == found.piece[rows[0]]
@@ -150,8 +183,9 @@ def _leaving(pieces: Sequence[Piece], found: Followed, rows: NDArray[np.intp], m
     return excused
 
 
-def leaving_rows(measures: Floats, length: Floats, angle: Floats, *, rests: bool
-                 ) -> NDArray[np.bool_]:
+def leaving_rows(
+    measures: Floats, length: Floats, angle: Floats, *, rests: bool
+) -> NDArray[np.bool_]:
     """
     Tell which places (n, 3) of a whole motion are on the way out of a singularity it starts in.
 
@@ -176,8 +210,9 @@ def _is_corner(piece: Piece) -> bool:
     return hasattr(piece.curve, 'leave')
 
 
-def nearest_of(arm: Arm, q: Floats, measures: Floats, segments: NDArray[np.int32],
-               fractions: Floats) -> dict[int, Nearest]:
+def nearest_of(
+    arm: Arm, q: Floats, measures: Floats, segments: NDArray[np.int32], fractions: Floats
+) -> dict[int, Nearest]:
     """
     Return what comes nearest to its bound, by segment.
 
@@ -190,11 +225,20 @@ def nearest_of(arm: Arm, q: Floats, measures: Floats, segments: NDArray[np.int32
     least = np.take_along_axis(shares, kind[:, None], axis=1)[:, 0]
     order = np.lexsort((least, segments))
     first = order[np.flatnonzero(np.diff(segments[order], prepend=segments[order[0]] - 1))]
-    columns = (segments[first], kind[first], joint[first], values[first, kind[first]],
-               fractions[first], least[first])
-    return {segment: Nearest(_name(k, j), value, _unit(k), fraction, share)
-            for segment, k, j, value, fraction, share in zip(
-                *(column.tolist() for column in columns), strict=True)}
+    columns = (
+        segments[first],
+        kind[first],
+        joint[first],
+        values[first, kind[first]],
+        fractions[first],
+        least[first],
+    )
+    return {
+        segment: Nearest(_name(k, j), value, _unit(k), fraction, share)
+        for segment, k, j, value, fraction, share in zip(
+            *(column.tolist() for column in columns), strict=True
+        )
+    }
 
 
 def _name(kind: int, joint: int) -> str:

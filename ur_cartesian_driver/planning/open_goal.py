@@ -79,27 +79,40 @@ def check_addition(open_goal: OpenGoal, addition: Addition, options: PlanningOpt
     if not count:
         raise InvalidGoal('points', 'is empty', 'give at least one point, or set last')
     if count > options.max_points:
-        raise InvalidGoal('points', f'has {count} points, more than max_points = '
-                          f'{options.max_points}', 'append them in several requests')
+        raise InvalidGoal(
+            'points',
+            f'has {count} points, more than max_points = {options.max_points}',
+            'append them in several requests',
+        )
     if addition.segments and len(addition.segments) != count:
-        raise InvalidGoal('segments', f'has {len(addition.segments)} entries for {count} points',
-                          'give none, or exactly one for each point')
+        raise InvalidGoal(
+            'segments',
+            f'has {len(addition.segments)} entries for {count} points',
+            'give none, or exactly one for each point',
+        )
     for i, command in enumerate(addition.io_commands):
         if not first <= command.waypoint < first + count:
             raise InvalidGoal(
-                f'io_commands[{i}].point_index', f'is {command.waypoint}, and the points of this '
-                f'request are {first} to {first + count - 1}', 'name one of these')
+                f'io_commands[{i}].point_index',
+                f'is {command.waypoint}, and the points of this '
+                f'request are {first} to {first + count - 1}',
+                'name one of these',
+            )
     # By themselves, too: what is planned has older ones in front of them.
-    check_outputs(replace(
-        open_goal.goal, waypoints=addition.waypoints, io_commands=numbered(addition, first)),
-        options)
+    check_outputs(
+        replace(
+            open_goal.goal, waypoints=addition.waypoints, io_commands=numbered(addition, first)
+        ),
+        options,
+    )
     _check_times(open_goal, addition)
 
 
 def numbered(addition: Addition, first: int) -> tuple[IOCommand, ...]:
     """Return the commands of an addition, with waypoints counted from a point."""
-    return tuple(replace(command, waypoint=command.waypoint - first)
-                 for command in addition.io_commands)
+    return tuple(
+        replace(command, waypoint=command.waypoint - first) for command in addition.io_commands
+    )
 
 
 def _check_times(open_goal: OpenGoal, addition: Addition) -> None:
@@ -110,11 +123,17 @@ def _check_times(open_goal: OpenGoal, addition: Addition) -> None:
     for i, point in enumerate(addition.waypoints, open_goal.points):
         if open_goal.told == 0.0 and open_goal.points > 1:
             raise InvalidGoal(
-                point_field(i, 'time_from_start'), f'is {point.time:g} s, and the points before '
-                'have no times: speeds count in this goal', 'leave it 0 in all points')
+                point_field(i, 'time_from_start'),
+                f'is {point.time:g} s, and the points before '
+                'have no times: speeds count in this goal',
+                'leave it 0 in all points',
+            )
         if point.time <= before:
             raise InvalidGoal(
-                point_field(i, 'time_from_start'), f'is {point.time:g} s, and the point before it '
+                point_field(i, 'time_from_start'),
+                f'is {point.time:g} s, and the point before it '
                 f'has {before:g} s; times must increase from point to point, also in what is '
-                'appended', 'count them from the start of the goal')
+                'appended',
+                'count them from the start of the goal',
+            )
         before = point.time

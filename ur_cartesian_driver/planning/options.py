@@ -128,10 +128,18 @@ class PlanningOptions:
             value = getattr(self, name)
             if isinstance(value, float) and (not isfinite(value) or value < 0.0):
                 raise ValueError(f'{name} is {value}; it must be finite and not negative')
-        for name in ('linear_velocity', 'linear_acceleration', 'angular_velocity',
-                     'angular_acceleration', 'joint_velocity', 'joint_acceleration',
-                     'optimized_velocity', 'optimized_acceleration', 'closing_deceleration',
-                     *(field for field in self.__slots__ if field.startswith('servo_target_'))):
+        for name in (
+            'linear_velocity',
+            'linear_acceleration',
+            'angular_velocity',
+            'angular_acceleration',
+            'joint_velocity',
+            'joint_acceleration',
+            'optimized_velocity',
+            'optimized_acceleration',
+            'closing_deceleration',
+            *(field for field in self.__slots__ if field.startswith('servo_target_')),
+        ):
             if getattr(self, name) == 0.0:
                 raise ValueError(f'{name} is 0; it must be positive')
         for name in ('optimized_velocity', 'optimized_acceleration'):
@@ -141,16 +149,23 @@ class PlanningOptions:
             raise ValueError(f"on_too_fast is {self.on_too_fast!r}; it must be 'refuse' or 'slow'")
         if self.on_posture_change not in ('refuse', 'movej'):
             raise ValueError(
-                f"on_posture_change is {self.on_posture_change!r}; it must be 'refuse' or 'movej'")
+                f"on_posture_change is {self.on_posture_change!r}; it must be 'refuse' or 'movej'"
+            )
         if self.self_collision not in ('off', 'warn', 'refuse', 'auto'):
-            raise ValueError(f"self_collision is {self.self_collision!r}; it must be 'off', "
-                             "'warn', 'refuse' or 'auto'")
+            raise ValueError(
+                f"self_collision is {self.self_collision!r}; it must be 'off', "
+                "'warn', 'refuse' or 'auto'"
+            )
         if self.spline_tolerance < LEAST_SPLINE_TOLERANCE:
-            raise ValueError(f'spline_tolerance is {self.spline_tolerance}; it must be at least '
-                             f'{LEAST_SPLINE_TOLERANCE:g} m')
+            raise ValueError(
+                f'spline_tolerance is {self.spline_tolerance}; it must be at least '
+                f'{LEAST_SPLINE_TOLERANCE:g} m'
+            )
         if self.max_segment_time > NEWEST.max_duration:
-            raise ValueError(f'max_segment_time is {self.max_segment_time}; at most '
-                             f'{NEWEST.max_duration} s can be sent')
+            raise ValueError(
+                f'max_segment_time is {self.max_segment_time}; at most '
+                f'{NEWEST.max_duration} s can be sent'
+            )
         parse_planes(self.workspace_planes)
         if self.max_points < 1:
             raise ValueError(f'max_points is {self.max_points}; it must be at least 1')

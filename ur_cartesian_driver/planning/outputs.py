@@ -34,7 +34,8 @@ _OUTPUTS = {
     OutputKind.STANDARD_DIGITAL: ('standard digital output', 8),
     OutputKind.CONFIGURABLE_DIGITAL: ('configurable digital output', 8),
     OutputKind.TOOL_DIGITAL: ('tool digital output', 2),
-    OutputKind.STANDARD_ANALOG: ('standard analog output', 2)}
+    OutputKind.STANDARD_ANALOG: ('standard analog output', 2),
+}
 # Two times nearer than this are one [s].
 _NOW = 1e-6
 # Half of the time over which a heading is looked for [s], and how long it may get.
@@ -56,9 +57,11 @@ def check_outputs(goal: Goal, options: PlanningOptions) -> None:
     """
     if goal.io_commands and options.dialect is not NEWEST:
         raise NotAvailable(
-            'io_commands', 'is not empty, and robot programs of wire dialect '
+            'io_commands',
+            'is not empty, and robot programs of wire dialect '
             f'{options.dialect.name} switch no outputs on the way',
-            'leave it empty, or let the driver send its own robot program')
+            'leave it empty, or let the driver send its own robot program',
+        )
     for i, command in enumerate(goal.io_commands):
         _check(command, f'io_commands[{i}]', len(goal.waypoints))
 
@@ -66,26 +69,45 @@ def check_outputs(goal: Goal, options: PlanningOptions) -> None:
 def _check(command: IOCommand, field: str, points: int) -> None:
     name, pins = _OUTPUTS[command.output]
     if not 0 <= command.waypoint < points:
-        raise InvalidGoal(f'{field}.point_index', f'is {command.waypoint}, and the points are 0 '
-                          f'to {points - 1}', 'name one of these')
-    if not 0.0 <= command.offset <= LARGEST_OFFSET:
-        raise InvalidGoal(f'{field}.offset', f'is {command.offset:g} s; it is 0 to '
-                          f'{LARGEST_OFFSET:g} s after the point', 'name a later point')
-    if not 0 <= command.pin < pins:
-        raise InvalidGoal(f'{field}.pin', f'is {command.pin}, and there are {name}s 0 to '
-                          f'{pins - 1}', 'name one of these')
-    is_analog = command.output is OutputKind.STANDARD_ANALOG
-    if not isfinite(command.value) or not 0.0 <= command.value <= 1.0 or (
-            not is_analog and command.value not in (0.0, 1.0)):
         raise InvalidGoal(
-            f'{field}.value', f'is {command.value:g}; a {name} takes ' + (
-                '0 to 1, the fraction of its range' if is_analog else '0 (off) or 1 (on)'),
-            'give one of these')
+            f'{field}.point_index',
+            f'is {command.waypoint}, and the points are 0 to {points - 1}',
+            'name one of these',
+        )
+    if not 0.0 <= command.offset <= LARGEST_OFFSET:
+        raise InvalidGoal(
+            f'{field}.offset',
+            f'is {command.offset:g} s; it is 0 to {LARGEST_OFFSET:g} s after the point',
+            'name a later point',
+        )
+    if not 0 <= command.pin < pins:
+        raise InvalidGoal(
+            f'{field}.pin',
+            f'is {command.pin}, and there are {name}s 0 to {pins - 1}',
+            'name one of these',
+        )
+    is_analog = command.output is OutputKind.STANDARD_ANALOG
+    if (
+        not isfinite(command.value)
+        or not 0.0 <= command.value <= 1.0
+        or (not is_analog and command.value not in (0.0, 1.0))
+    ):
+        raise InvalidGoal(
+            f'{field}.value',
+            f'is {command.value:g}; a {name} takes '
+            + ('0 to 1, the fraction of its range' if is_analog else '0 (off) or 1 (on)'),
+            'give one of these',
+        )
 
 
-def with_outputs(segments: Sequence[PlannedSegment], reference: ReferencePath,
-                 commands: Sequence[IOCommand], *, corners: Sequence[float] = (),
-                 since: float = 0.0) -> tuple[PlannedSegment, ...]:
+def with_outputs(
+    segments: Sequence[PlannedSegment],
+    reference: ReferencePath,
+    commands: Sequence[IOCommand],
+    *,
+    corners: Sequence[float] = (),
+    since: float = 0.0,
+) -> tuple[PlannedSegment, ...]:
     """
     Return the segments with the outputs that are switched on the way, in their order in time.
 
@@ -98,8 +120,10 @@ def with_outputs(segments: Sequence[PlannedSegment], reference: ReferencePath,
     if not commands:
         return tuple(segments)
     way = _Way(segments, reference, corners, since)
-    switches = sorted((way.switch(command, f'io_commands[{i}]')
-                       for i, command in enumerate(commands)), key=lambda found: found.time)
+    switches = sorted(
+        (way.switch(command, f'io_commands[{i}]') for i, command in enumerate(commands)),
+        key=lambda found: found.time,
+    )
     outputs: list[list[SwitchOutput]] = [[] for _ in segments]
     notes = [segment.note for segment in segments]
     for found in switches:
@@ -108,11 +132,15 @@ def with_outputs(segments: Sequence[PlannedSegment], reference: ReferencePath,
     for own, segment in zip(outputs, segments, strict=True):
         if sum(record.place is not None for record in own) > MOST_OUTPUTS:
             raise InvalidGoal(
-                'io_commands', f'switches more than {MOST_OUTPUTS} outputs between two motions, '
-                f'behind point {segment.waypoint}', 'add a point in between')
-    return tuple(replace(segment, outputs=tuple(own), note=note) if own or note != segment.note
-                 else segment
-                 for segment, own, note in zip(segments, outputs, notes, strict=True))
+                'io_commands',
+                f'switches more than {MOST_OUTPUTS} outputs between two motions, '
+                f'behind point {segment.waypoint}',
+                'add a point in between',
+            )
+    return tuple(
+        replace(segment, outputs=tuple(own), note=note) if own or note != segment.note else segment
+        for segment, own, note in zip(segments, outputs, notes, strict=True)
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,8 +157,13 @@ class _Switch:
 class _Way:
     """The motions in time, and the path."""
 
-    def __init__(self, segments: Sequence[PlannedSegment], reference: ReferencePath,
-                 corners: Sequence[float], since: float) -> None:
+    def __init__(
+        self,
+        segments: Sequence[PlannedSegment],
+        reference: ReferencePath,
+        corners: Sequence[float],
+        since: float,
+    ) -> None:
         """Note when each motion ends, and when it returns."""
         self.segments, self.reference = segments, reference
         self.ends: Floats = since + np.cumsum([segment.duration for segment in segments])
@@ -142,8 +175,11 @@ class _Way:
         """Return when and where a command is carried out."""
         told = self.index.get(command.waypoint)
         if told is None:
-            raise InvalidGoal(f'{field}.point_index', f'is {command.waypoint}, and no motion '
-                              'leads there: the robot stands there', 'set the output before')
+            raise InvalidGoal(
+                f'{field}.point_index',
+                f'is {command.waypoint}, and no motion leads there: the robot stands there',
+                'set the output before',
+            )
         time, last = float(self.ends[told]) + command.offset, len(self.segments) - 1
         late = time - float(self.ends[last])
         if command.offset <= _NOW:
@@ -154,12 +190,21 @@ class _Way:
         else:
             behind, place, where = self._behind(time), time, f'{command.offset:.3f} s after it'
         record = SwitchOutput(
-            output=command.output, pin=command.pin, value=command.value, domain=command.domain,
-            delay=max(late, 0.0) if place is None and command.offset > _NOW else 0.0)
+            output=command.output,
+            pin=command.pin,
+            value=command.value,
+            domain=command.domain,
+            delay=max(late, 0.0) if place is None and command.offset > _NOW else 0.0,
+        )
         if place is not None:
             record = self._at(record, place, float(self.returns[behind]))
-        return _Switch(time=time if place is None else place, behind=behind, told=told,
-                       record=record, text=f'switches {_spoken(command)} {where}')
+        return _Switch(
+            time=time if place is None else place,
+            behind=behind,
+            told=told,
+            record=record,
+            text=f'switches {_spoken(command)} {where}',
+        )
 
     def _behind(self, time: float) -> int:
         """Return the number of the last motion that has returned at a time [s]."""
@@ -188,8 +233,10 @@ class _Way:
     def _nearest(self, position: Floats, begin: float, end: float, middle: float) -> float:
         """Return when the path is nearest to a position within a time, the middle if always."""
         times, rows = self.reference.time, self.reference.poses
-        own = slice(max(int(np.searchsorted(times, begin, side='right')) - 1, 0),
-                    int(np.searchsorted(times, end)) + 1)
+        own = slice(
+            max(int(np.searchsorted(times, begin, side='right')) - 1, 0),
+            int(np.searchsorted(times, end)) + 1,
+        )
         points, t = rows[own, :3], times[own]
         way = np.diff(points, axis=0)
         square = (way * way).sum(axis=1)
@@ -223,9 +270,14 @@ class _Way:
             a, b = self._pose(time - half), self._pose(time + half)
             way, angle = a.distance_to(b), a.angle_to(b)
             if way > max(_NO_WAY, _TURNING * angle):
-                x, y, z = rotate(conjugate(place.quaternion), (
-                    b.position[0] - a.position[0], b.position[1] - a.position[1],
-                    b.position[2] - a.position[2]))
+                x, y, z = rotate(
+                    conjugate(place.quaternion),
+                    (
+                        b.position[0] - a.position[0],
+                        b.position[1] - a.position[1],
+                        b.position[2] - a.position[2],
+                    ),
+                )
                 return (x / way, y / way, z / way, 0.0, 0.0, 0.0)
             if angle > _NO_WAY:
                 *_, x, y, z = (a.inverse() @ b).rotation_vector()

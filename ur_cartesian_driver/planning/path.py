@@ -64,8 +64,13 @@ class Line:
     @classmethod
     def between(cls, start: Pose, end: Pose) -> Line:
         """Return the line from one pose to another."""
-        return cls(start, end, start.distance_to(end), start.angle_to(end),
-                   np.array((start.row(), end.row())))
+        return cls(
+            start,
+            end,
+            start.distance_to(end),
+            start.angle_to(end),
+            np.array((start.row(), end.row())),
+        )
 
     @property
     def samples(self) -> int:
@@ -154,8 +159,7 @@ class Arc:
         rows[:, :3] = self.center + np.cos(angle) * spoke + np.sin(angle) * across
         if self.mode is ArcMode.FIXED:
             turn = np.concatenate([np.sin(0.5 * angle) * self.axis, np.cos(0.5 * angle)], axis=1)
-            rows[:, 3:] = normalized_rows(
-                multiply_rows(turn, np.array([self.start.quaternion])))
+            rows[:, 3:] = normalized_rows(multiply_rows(turn, np.array([self.start.quaternion])))
         return rows
 
     def trim(self, radius: float) -> float:
@@ -196,8 +200,17 @@ class JointLine:
         chords = np.linalg.norm(np.diff(tcp_rows(arm, T_flange_tcp, q)[:, :3], axis=0), axis=1)
         length = float(chords.sum())
         unevenness = samples * float(chords.max()) / length if length > 0.0 else 1.0
-        return cls(arm, T_flange_tcp, q_start, q_end, arm.forward(q_start) @ T_flange_tcp,
-                   arm.forward(q_end) @ T_flange_tcp, length, samples, unevenness)
+        return cls(
+            arm,
+            T_flange_tcp,
+            q_start,
+            q_end,
+            arm.forward(q_start) @ T_flange_tcp,
+            arm.forward(q_end) @ T_flange_tcp,
+            length,
+            samples,
+            unevenness,
+        )
 
     @property
     def angle(self) -> float:
@@ -213,8 +226,14 @@ class JointLine:
     def joints(self, u: float) -> Joints:
         """Return the joint positions at ``u``."""
         a, b = self.q_start, self.q_end
-        return (a[0] + u * (b[0] - a[0]), a[1] + u * (b[1] - a[1]), a[2] + u * (b[2] - a[2]),
-                a[3] + u * (b[3] - a[3]), a[4] + u * (b[4] - a[4]), a[5] + u * (b[5] - a[5]))
+        return (
+            a[0] + u * (b[0] - a[0]),
+            a[1] + u * (b[1] - a[1]),
+            a[2] + u * (b[2] - a[2]),
+            a[3] + u * (b[3] - a[3]),
+            a[4] + u * (b[4] - a[4]),
+            a[5] + u * (b[5] - a[5]),
+        )
 
     def pose(self, u: float) -> Pose:
         """Return the pose at ``u``."""
@@ -245,8 +264,9 @@ class JointLine:
 
     def reversed(self) -> JointLine:
         """Return the same line from its end to its start."""
-        return replace(self, q_start=self.q_end, q_end=self.q_start, start=self.end,
-                       end=self.start)
+        return replace(
+            self, q_start=self.q_end, q_end=self.q_start, start=self.end, end=self.start
+        )
 
 
 Path: TypeAlias = Line | Arc | JointLine
@@ -273,8 +293,11 @@ def _circle(a: Vector3, b: Vector3, c: Vector3) -> tuple[Vector3, Vector3, float
     """Return center, axis (unit) and radius of the circle that goes a, b, c in this order."""
     ab, ac = _minus(b, a), _minus(c, a)
     chord = hypot(*ac)
-    for name, apart in (('the start and the end', chord), ('the start and the via', hypot(*ab)),
-                        ('the via and the end', distance(b, c))):
+    for name, apart in (
+        ('the start and the end', chord),
+        ('the start and the via', hypot(*ab)),
+        ('the via and the end', distance(b, c)),
+    ):
         if apart < LEAST_ARC_HEIGHT:
             raise ValueError(f'{name} of the arc coincide ({1e3 * apart:.3f} mm apart)')
     if max(chord, hypot(*ab)) > LARGEST_ARC:
@@ -284,9 +307,9 @@ def _circle(a: Vector3, b: Vector3, c: Vector3) -> tuple[Vector3, Vector3, float
     if area / max(chord, hypot(*ab), distance(b, c)) < LEAST_ARC_HEIGHT:
         raise ValueError('the start, the via and the end of the arc lie on one straight line')
     # Circumcenter seen from a: ((|ab|^2 ac - |ac|^2 ab) x (ab x ac)) / (2 |ab x ac|^2).
-    ab2, ac2 = hypot(*ab) ** 2, chord ** 2
+    ab2, ac2 = hypot(*ab) ** 2, chord**2
     mixed = _minus(_scale(ac, ab2), _scale(ab, ac2))
-    offset = _scale(_cross(mixed, normal), 0.5 / area ** 2)
+    offset = _scale(_cross(mixed, normal), 0.5 / area**2)
     center = (a[0] + offset[0], a[1] + offset[1], a[2] + offset[2])
     return center, _scale(normal, 1.0 / area), hypot(*offset)
 

@@ -112,38 +112,74 @@ def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> 
         return _spline_plan(planner, about, T_flange_active)
     legs = planner.legs()
     samples = planner.route.survey.samples()
-    said = list(dict.fromkeys(
-        line for T_flange_tcp in tools(goal, T_flange_active)
-        for line in clearance_remarks(
-            Clearance(arm, T_flange_tcp, options).check(samples.q, state.actual_q),
-            samples.segment, samples.fraction)))
+    said = list(
+        dict.fromkeys(
+            line
+            for T_flange_tcp in tools(goal, T_flange_active)
+            for line in clearance_remarks(
+                Clearance(arm, T_flange_tcp, options).check(samples.q, state.actual_q),
+                samples.segment,
+                samples.fraction,
+            )
+        )
+    )
     timings = schedule(legs, options, arm.model)
     reference = reference_path(state.actual_tcp_pose, legs, timings)
     segments = with_outputs(
         [planner.segment(leg, timing) for leg, timing in zip(legs, timings, strict=True)],
-        reference, goal.io_commands, corners=[timing.corner for timing in timings])
-    remarks = [*about.remarks, *planner.remarks, *ignored(goal),
-               *(timing.remark for timing in timings if timing.remark), *said, smallest(legs)]
-    return Plan(goal=goal, segments=segments, start=state.actual_q, remarks=tuple(remarks),
-                reference=reference, T_flange_active=T_flange_active,
-                T_flange_tcp=about.T_flange_tcp, T_tcp_controlled=about.T_tcp_controlled)
+        reference,
+        goal.io_commands,
+        corners=[timing.corner for timing in timings],
+    )
+    remarks = [
+        *about.remarks,
+        *planner.remarks,
+        *ignored(goal),
+        *(timing.remark for timing in timings if timing.remark),
+        *said,
+        smallest(legs),
+    ]
+    return Plan(
+        goal=goal,
+        segments=segments,
+        start=state.actual_q,
+        remarks=tuple(remarks),
+        reference=reference,
+        T_flange_active=T_flange_active,
+        T_flange_tcp=about.T_flange_tcp,
+        T_tcp_controlled=about.T_tcp_controlled,
+    )
 
 
 def _spline_plan(planner: _Planner, about: Carried, T_flange_active: Pose) -> Plan:
     """Return the plan of a goal whose points are joined by a spline."""
     goal, state, options = planner.goal, planner.state, planner.options
     begin = planner.begin()
-    part = goal if not begin else replace(
-        goal, waypoints=goal.waypoints[begin:], segments=goal.segments[begin:])
+    part = (
+        goal
+        if not begin
+        else replace(goal, waypoints=goal.waypoints[begin:], segments=goal.segments[begin:])
+    )
     found = plan_pieces(
-        SplineState(q=state.actual_q), part, planner.reach.arm, state.T_flange_tcp, options,
-        first=begin, tools=tools(goal, T_flange_active))
+        SplineState(q=state.actual_q),
+        part,
+        planner.reach.arm,
+        state.T_flange_tcp,
+        options,
+        first=begin,
+        tools=tools(goal, T_flange_active),
+    )
     return Plan(
-        goal=stretched(goal, found.stretch), start=state.actual_q,
+        goal=stretched(goal, found.stretch),
+        start=state.actual_q,
         segments=with_outputs(found.segments, found.reference, goal.io_commands),
-        reference=found.reference, remarks=(*about.remarks, *planner.remarks, *found.remarks),
-        T_flange_active=T_flange_active, T_flange_tcp=about.T_flange_tcp,
-        T_tcp_controlled=about.T_tcp_controlled, execution=way_of_execution(goal))
+        reference=found.reference,
+        remarks=(*about.remarks, *planner.remarks, *found.remarks),
+        T_flange_active=T_flange_active,
+        T_flange_tcp=about.T_flange_tcp,
+        T_tcp_controlled=about.T_tcp_controlled,
+        execution=way_of_execution(goal),
+    )
 
 
 class _Planner:
@@ -158,8 +194,10 @@ class _Planner:
         self.targets = [goal.T_base_frame @ point.pose for point in goal.waypoints]
         self.timed = is_timed(goal)
         if self.timed and options.dialect.is_coarse and not is_spline(goal):
-            self.remarks.append(f'all points: times are kept by speeds, because robot programs '
-                                f'of wire dialect {options.dialect.name} count in milliseconds')
+            self.remarks.append(
+                f'all points: times are kept by speeds, because robot programs '
+                f'of wire dialect {options.dialect.name} count in milliseconds'
+            )
         self.route = Route(goal, self.targets, self.reach, options, self.remarks, self.why)
         self._check_robot()
 
@@ -176,7 +214,8 @@ class _Planner:
                 f'The robot reports its TCP {1e3 * apart:.1f} mm and {angle:.3f} rad away from '
                 f'where the kinematics of a {self.reach.arm.model.name} puts it; check ur_type '
                 'and the TCP. Where the software of a robot does not report its TCP (RTDE field '
-                'tcp_offset), it has to be the flange.')
+                'tcp_offset), it has to be the flange.'
+            )
         self._check_approach()
 
     def _check_approach(self) -> None:
@@ -184,9 +223,12 @@ class _Planner:
         bound = self.options.max_approach_distance
         if 0.0 < bound < distance:
             raise InvalidGoal(
-                point_field(0, 'pose.position'), f'is {distance:.3f} m away from the tool, more '
-                f'than max_approach_distance = {bound:g} m', 'move nearer first, or begin the '
-                'goal with points in between, or raise the parameter')
+                point_field(0, 'pose.position'),
+                f'is {distance:.3f} m away from the tool, more '
+                f'than max_approach_distance = {bound:g} m',
+                'move nearer first, or begin the '
+                'goal with points in between, or raise the parameter',
+            )
 
     def _stands_at_first(self) -> bool:
         """
@@ -201,13 +243,17 @@ class _Planner:
         options = self.options
         if apart > options.start_tolerance_position or angle > options.start_tolerance_angle:
             raise InvalidGoal(
-                point_field(0, 'time_from_start'), f'is 0, but the tool is {apart:.4f} m and '
+                point_field(0, 'time_from_start'),
+                f'is 0, but the tool is {apart:.4f} m and '
                 f'{angle:.4f} rad away from the point (allowed are '
                 f'{options.start_tolerance_position:g} m and {options.start_tolerance_angle:g} '
-                'rad)', 'give the way to the first point a time')
+                'rad)',
+                'give the way to the first point a time',
+            )
         self._check_start_posture()
-        self.remarks.append('point 0: at time 0 and where the robot stands, so nothing is sent '
-                            'for it')
+        self.remarks.append(
+            'point 0: at time 0 and where the robot stands, so nothing is sent for it'
+        )
         return True
 
     def _check_start_posture(self) -> None:
@@ -219,8 +265,10 @@ class _Planner:
             # The robot stands within the start's tolerance, not exactly there.
             near = self.reach.nearest(self.targets[0], q, point_field(0, 'pose'))
             if clause := missed(near, chosen, named):
-                raise InvalidPosture(f'{point_field(0, "posture")} is not the one in which the '
-                                     f'robot stands: {clause}; give the first point a time.')
+                raise InvalidPosture(
+                    f'{point_field(0, "posture")} is not the one in which the '
+                    f'robot stands: {clause}; give the first point a time.'
+                )
 
     def begin(self) -> int:
         """Return the number of the first point to which there is a motion."""
@@ -243,31 +291,63 @@ class _Planner:
         if why:
             self.why.setdefault(leg.index, []).append(why)
         return PlannedSegment(
-            primitive=primitive, waypoint=leg.index, length=leg.path.length,
-            angle=leg.path.angle, duration=timing.duration, joints=leg.joints,
-            note=note(leg, timing, primitive, self.why.get(leg.index, ())))
+            primitive=primitive,
+            waypoint=leg.index,
+            length=leg.path.length,
+            angle=leg.path.angle,
+            duration=timing.duration,
+            joints=leg.joints,
+            note=note(leg, timing, primitive, self.why.get(leg.index, ())),
+        )
 
     def _primitive(self, leg: Leg, timing: Timing) -> Primitive:
         blend = leg.after.radius if leg.after else 0.0
         v, a, target = timing.velocity, timing.acceleration, self.targets[leg.index]
         match leg.kind:
             case SegmentType.JOINT:
-                return MoveJ(target=target, q_near=self._q_near(leg), velocity=v, acceleration=a,
-                             duration=timing.wire_time, blend_radius=blend)
+                return MoveJ(
+                    target=target,
+                    q_near=self._q_near(leg),
+                    velocity=v,
+                    acceleration=a,
+                    duration=timing.wire_time,
+                    blend_radius=blend,
+                )
             case SegmentType.PROCESS:
-                return MoveP(target=target, q_near=self._posture_near(leg), velocity=v,
-                             acceleration=a, blend_radius=blend)
+                return MoveP(
+                    target=target,
+                    q_near=self._posture_near(leg),
+                    velocity=v,
+                    acceleration=a,
+                    blend_radius=blend,
+                )
             case SegmentType.CIRCULAR:
                 return self._arc(leg, v, a, blend)
             case SegmentType.OPTIMIZED_JOINT:
-                return OptimoveJ(target=target, q_near=self._q_near(leg), velocity=v,
-                                 acceleration=a, blend_radius=blend)
+                return OptimoveJ(
+                    target=target,
+                    q_near=self._q_near(leg),
+                    velocity=v,
+                    acceleration=a,
+                    blend_radius=blend,
+                )
             case SegmentType.OPTIMIZED_LINEAR:
-                return OptimoveL(target=target, q_near=self._posture_near(leg), velocity=v,
-                                 acceleration=a, blend_radius=blend)
+                return OptimoveL(
+                    target=target,
+                    q_near=self._posture_near(leg),
+                    velocity=v,
+                    acceleration=a,
+                    blend_radius=blend,
+                )
             case _:
-                return MoveL(target=target, q_near=self._posture_near(leg), velocity=v,
-                             acceleration=a, duration=timing.wire_time, blend_radius=blend)
+                return MoveL(
+                    target=target,
+                    q_near=self._posture_near(leg),
+                    velocity=v,
+                    acceleration=a,
+                    duration=timing.wire_time,
+                    blend_radius=blend,
+                )
 
     def _posture_near(self, leg: Leg) -> Joints | None:
         return self._q_near(leg) if leg.waypoint.posture else None
@@ -290,19 +370,33 @@ class _Planner:
         T_base_via = self.goal.T_base_frame @ segment.via
         via: Target = T_base_via
         target: Target = self.targets[leg.index]
-        wanted = [name for name, posture in (
-            ('the point', leg.waypoint.posture), ('the via', segment.via_posture)) if posture]
+        wanted = [
+            name
+            for name, posture in (
+                ('the point', leg.waypoint.posture),
+                ('the via', segment.via_posture),
+            )
+            if posture
+        ]
         if wanted and (reason := poses_only(self.options)):
             self.remarks.append(
                 f'point {leg.index}: sent as poses in spite of the posture of '
-                f'{" and ".join(wanted)}, because {reason}')
+                f'{" and ".join(wanted)}, because {reason}'
+            )
         elif wanted:
             self.why.setdefault(leg.index, []).append(
-                f'{" and ".join(wanted)} {"has" if len(wanted) == 1 else "have"} a posture')
+                f'{" and ".join(wanted)} {"has" if len(wanted) == 1 else "have"} a posture'
+            )
             target = leg.joints if leg.waypoint.posture else target
             via = self._via_joints(leg, segment, T_base_via) if segment.via_posture else via
-        return MoveC(target=target, via=via, velocity=velocity, acceleration=acceleration,
-                     blend_radius=blend, mode=segment.arc_mode)
+        return MoveC(
+            target=target,
+            via=via,
+            velocity=velocity,
+            acceleration=acceleration,
+            blend_radius=blend,
+            mode=segment.arc_mode,
+        )
 
     def _via_joints(self, leg: Leg, segment: Segment, via: Pose) -> Joints:
         """
@@ -321,5 +415,6 @@ class _Planner:
             raise InvalidPosture(
                 f'{segment_field(leg.index, "via_posture")} is not the configuration in which '
                 f'the arm goes along the arc: {clause}; leave it empty, or go to the start of '
-                'the arc in that configuration.')
+                'the arc in that configuration.'
+            )
         return chosen

@@ -23,11 +23,15 @@ def multiply_rows(a: Floats, b: Floats) -> Floats:
     """Return the rotations ``b`` followed by ``a`` (n, 4), not normalised."""
     ax, ay, az, aw = a.T
     bx, by, bz, bw = b.T
-    return np.stack((
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-        aw * bw - ax * bx - ay * by - az * bz), axis=1)
+    return np.stack(
+        (
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        ),
+        axis=1,
+    )
 
 
 def cross_rows(a: Floats, b: Floats) -> Floats:

@@ -82,8 +82,9 @@ class Reach:
             raise self.no_solution(T_base_tcp, place)
         return q
 
-    def chosen(self, T_base_tcp: Pose, named: dict[int, float], q_before: Joints,
-               place: str) -> Joints:
+    def chosen(
+        self, T_base_tcp: Pose, named: dict[int, float], q_before: Joints, place: str
+    ) -> Joints:
         """
         Return the solution that a posture means.
 
@@ -110,12 +111,16 @@ class Reach:
         why = there + why_unreachable(self.arm, T_base_flange)
         if solutions(self.arm, T_base_flange):
             return JointLimitExceeded(
-                f'{place} cannot be reached: {why}; turn the tool in another way.')
-        return Unreachable(f'{place} cannot be reached: {why}; check the frame and the TCP, or '
-                           'move the point or the robot.')
+                f'{place} cannot be reached: {why}; turn the tool in another way.'
+            )
+        return Unreachable(
+            f'{place} cannot be reached: {why}; check the frame and the TCP, or '
+            'move the point or the robot.'
+        )
 
-    def jump(self, T_base_tcp: Pose, q: Joints, q_next: Joints, place: str,
-             onward: Iterable[Pose] = ()) -> GoalRefused:
+    def jump(
+        self, T_base_tcp: Pose, q: Joints, q_next: Joints, place: str, onward: Iterable[Pose] = ()
+    ) -> GoalRefused:
         """
         Tell why the configuration cannot be continued: end of a range, or a singularity.
 
@@ -130,29 +135,40 @@ class Reach:
                 return JointLimitExceeded(
                     f'{place} takes {JOINT_NAMES[k]} out of its range of {low:.4f} to {high:.4f} '
                     f'rad, as far as {value} rad; start with this joint turned back, or go there '
-                    'with a JOINT segment.')
+                    'with a JOINT segment.'
+                )
         joint = max(range(6), key=lambda k: abs(q_next[k] - q[k]))
         return NearSingularity(
             f'{place} lies behind the {self.nearest_singularity(q)} singularity: '
             f'{JOINT_NAMES[joint]} would have to turn '
             f'by {degrees(abs(q_next[joint] - q[joint])):.0f} degrees at once; keep away from '
-            'it, or use a JOINT segment.')
+            'it, or use a JOINT segment.'
+        )
 
     def nearest_singularity(self, q: Joints) -> str:
         """Return which singularity a configuration is nearest to: wrist, elbow or shoulder."""
         measures = postures(self.arm, np.array([q]))
-        distances = {'wrist': abs(float(measures.wrist[0])),
-                     'elbow': abs(float(measures.elbow[0])),
-                     'shoulder': abs(float(measures.shoulder[0])) / _ARM_LENGTH}
+        distances = {
+            'wrist': abs(float(measures.wrist[0])),
+            'elbow': abs(float(measures.elbow[0])),
+            'shoulder': abs(float(measures.shoulder[0])) / _ARM_LENGTH,
+        }
         return min(distances, key=lambda name: distances[name])
 
     def flips(self, q: Joints, q_other: Joints) -> str:
         """Return what has to flip from one configuration to another, '' if nothing does."""
         first, second = postures(self.arm, np.array([q, q_other])).branch
         a, b = BRANCHES[first], BRANCHES[second]
-        names = [name for name, x, y in zip(
-            ('a crossing of the shoulder', 'a flip of the elbow', 'a flip of the wrist'),
-            a, b, strict=True) if x != y]
+        names = [
+            name
+            for name, x, y in zip(
+                ('a crossing of the shoulder', 'a flip of the elbow', 'a flip of the wrist'),
+                a,
+                b,
+                strict=True,
+            )
+            if x != y
+        ]
         return ' and '.join(names)
 
     def _turns(self, k: int, q: Joints, onward: Iterable[Pose]) -> Iterator[float]:
@@ -167,10 +183,13 @@ class Reach:
 
     def _continued(self, T_base_tcp: Pose, q: Joints) -> Joints | None:
         """Return the solution next to a configuration, the limits of the joints aside."""
+
         def around(found: Joints) -> Joints:
-            a, b, c, d, e, f = (x + 2.0 * pi * round((y - x) / (2.0 * pi))
-                                for x, y in zip(found, q, strict=True))
+            a, b, c, d, e, f = (
+                x + 2.0 * pi * round((y - x) / (2.0 * pi)) for x, y in zip(found, q, strict=True)
+            )
             return (a, b, c, d, e, f)
+
         every = (around(found) for found in solutions(self.arm, self.flange(T_base_tcp), q))
         found = min(every, key=lambda found: dist(found, q), default=None)
         if found is None or max(abs(b - a) for a, b in zip(q, found, strict=True)) > _CONTINUED:
@@ -180,8 +199,10 @@ class Reach:
 
 def named_joints(posture: Posture, tf_prefix: str) -> dict[int, float]:
     """Return the values [rad] of a checked posture by joint number."""
-    return {JOINT_NAMES.index(name.removeprefix(tf_prefix)): value
-            for name, value in zip(posture.names, posture.values, strict=True)}
+    return {
+        JOINT_NAMES.index(name.removeprefix(tf_prefix)): value
+        for name, value in zip(posture.names, posture.values, strict=True)
+    }
 
 
 def full(named: dict[int, float]) -> Joints | None:
@@ -200,6 +221,8 @@ def missed(q: Joints, chosen: Joints, named: dict[int, float]) -> str:
     """
     for k in sorted(named):
         if abs(q[k] - chosen[k]) > ARRIVAL:
-            return (f'{JOINT_NAMES[k]} arrives at {q[k]:.3f} rad, and the solution for the '
-                    f'posture has it at {chosen[k]:.3f} rad')
+            return (
+                f'{JOINT_NAMES[k]} arrives at {q[k]:.3f} rad, and the solution for the '
+                f'posture has it at {chosen[k]:.3f} rad'
+            )
     return ''

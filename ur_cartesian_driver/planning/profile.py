@@ -36,8 +36,9 @@ class Profile:
         if self.length <= 0.0:
             return 0.0
         way_in, way_out = self._way(self.enter), self._way(self.leave)
-        return ((self.length - way_in - way_out) / self.cruise
-                + (2.0 * self.cruise - self.enter - self.leave) / self.acceleration)
+        return (self.length - way_in - way_out) / self.cruise + (
+            2.0 * self.cruise - self.enter - self.leave
+        ) / self.acceleration
 
     def time_at(self, way: float) -> float:
         """Return the time after which that much of the length is done [s]."""
@@ -70,15 +71,17 @@ class Profile:
         return (sqrt(speed * speed + 2.0 * a * way) - speed) / a
 
 
-def times_at(profiles: Sequence[Profile], which: NDArray[np.intp], way: NDArray[np.float64]
-             ) -> NDArray[np.float64]:
+def times_at(
+    profiles: Sequence[Profile], which: NDArray[np.intp], way: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """
     Return :meth:`Profile.time_at` of many ways (n,).
 
     :param which: (n,) the number of the profile of each.
     """
-    length, enter, cruise, leave, a = np.array([
-        (p.length, p.enter, p.cruise, p.leave, p.acceleration) for p in profiles]).T[:, which]
+    length, enter, cruise, leave, a = np.array(
+        [(p.length, p.enter, p.cruise, p.leave, p.acceleration) for p in profiles]
+    ).T[:, which]
     way, cruise = np.clip(way, 0.0, length), np.maximum(cruise, 1e-300)
     way_in, way_out = ((cruise + v) * (cruise - v) / (2.0 * a) for v in (enter, leave))
     left = length - way
@@ -91,8 +94,9 @@ def times_at(profiles: Sequence[Profile], which: NDArray[np.intp], way: NDArray[
     return times
 
 
-def trapezoid(length: float, velocity: float, acceleration: float, enter: float = 0.0,
-              tail: float = 0.0) -> Profile:
+def trapezoid(
+    length: float, velocity: float, acceleration: float, enter: float = 0.0, tail: float = 0.0
+) -> Profile:
     """
     Return the fastest profile within a speed and an acceleration.
 
@@ -112,8 +116,13 @@ def timed(length: float, duration: float, stands_before: bool, stands_after: boo
     """Return the profile of a motion for which the robot is told the time."""
     cruise = length / duration / (1.0 - 0.5 * RAMP_SHARE * (stands_before + stands_after))
     acceleration = max(cruise, 1e-12) / (RAMP_SHARE * duration)
-    return Profile(length, 0.0 if stands_before else cruise, cruise,
-                   0.0 if stands_after else cruise, acceleration)
+    return Profile(
+        length,
+        0.0 if stands_before else cruise,
+        cruise,
+        0.0 if stands_after else cruise,
+        acceleration,
+    )
 
 
 def peak_of(length: float, duration: float) -> tuple[float, float]:
@@ -129,12 +138,13 @@ def peak_of(length: float, duration: float) -> tuple[float, float]:
 
 def least_time(length: float, speed: float, acceleration: float) -> float:
     """Return the shortest time that keeps :func:`peak_of` within both bounds."""
-    return max(length / speed / (1.0 - RAMP_SHARE),
-               sqrt(length / acceleration / (RAMP_SHARE * (1.0 - RAMP_SHARE))))
+    return max(
+        length / speed / (1.0 - RAMP_SHARE),
+        sqrt(length / acceleration / (RAMP_SHARE * (1.0 - RAMP_SHARE))),
+    )
 
 
-def cruise_for(length: float, duration: float, acceleration: float,
-               ramps: int) -> float | None:
+def cruise_for(length: float, duration: float, acceleration: float, ramps: int) -> float | None:
     """
     Return the cruise speed that takes exactly a duration, None if the acceleration is too low.
 

@@ -37,14 +37,20 @@ def reference_path(start: Pose, legs: Sequence[Leg], timings: Sequence[Timing]) 
     at = np.fromiter(chain.from_iterable(section.at for section in sections), dtype=np.float64)
     is_corner = np.array([isinstance(section.curve, Corner) for section in sections])
     points = np.array([section.point for section in sections])[of] + (is_corner[of] & (at > 0.5))
-    room = np.array([section.curve.room if isinstance(section.curve, Corner) else (0.0, 0.0)
-                     for section in sections])[of]
+    room = np.array(
+        [
+            section.curve.room if isinstance(section.curve, Corner) else (0.0, 0.0)
+            for section in sections
+        ]
+    )[of]
     poses = np.concatenate([[start.row()], _poses(sections, is_corner, of, at)])
     keep_hemisphere(poses)
     return ReferencePath(
-        poses=poses, point=np.concatenate([[legs[0].index], points]).astype(np.int32),
+        poses=poses,
+        point=np.concatenate([[legs[0].index], points]).astype(np.int32),
         time=np.maximum.accumulate(np.concatenate([[0.0], _times(sections, of, at)])),
-        room=np.concatenate([[(0.0, 0.0)], room]))
+        room=np.concatenate([[(0.0, 0.0)], room]),
+    )
 
 
 class _Section(NamedTuple):
@@ -71,27 +77,43 @@ def _sections(legs: Sequence[Leg], timings: Sequence[Timing]) -> Iterator[_Secti
     now = 0.0
     for leg, timing in zip(legs, timings, strict=True):
         profile, span = timing.profile, leg.u_after - leg.u_before
-        yield _Section(leg.path, leg.index, _places(leg, timing), leg.u_before, now, profile,
-                       profile.length / span if span > 0.0 else 0.0)
+        yield _Section(
+            leg.path,
+            leg.index,
+            _places(leg, timing),
+            leg.u_before,
+            now,
+            profile,
+            profile.length / span if span > 0.0 else 0.0,
+        )
         now += profile.duration
         if leg.after is not None:
             n = leg.after.samples
-            yield _Section(leg.after, leg.index, [k / n for k in range(1, n + 1)], 0.0, now,
-                           _EVENLY, 1.0, timing.corner)
+            yield _Section(
+                leg.after,
+                leg.index,
+                [k / n for k in range(1, n + 1)],
+                0.0,
+                now,
+                _EVENLY,
+                1.0,
+                timing.corner,
+            )
             now += timing.corner
 
 
 def _times(sections: Sequence[_Section], of: NDArray[np.intp], at: Floats) -> Floats:
     """Return when each row is expected (n,) [s]."""
-    now, begin, rate, second = np.array([
-        (x.now, x.begin, x.rate, x.second) for x in sections])[of].T
-    times: Floats = now + second * times_at(
-        [x.profile for x in sections], of, rate * (at - begin))
+    now, begin, rate, second = np.array([(x.now, x.begin, x.rate, x.second) for x in sections])[
+        of
+    ].T
+    times: Floats = now + second * times_at([x.profile for x in sections], of, rate * (at - begin))
     return times
 
 
-def _poses(sections: Sequence[_Section], is_corner: NDArray[np.bool_], of: NDArray[np.intp],
-           at: Floats) -> Floats:
+def _poses(
+    sections: Sequence[_Section], is_corner: NDArray[np.bool_], of: NDArray[np.intp], at: Floats
+) -> Floats:
     """Return the poses (n, 7) of all rows."""
     number = np.where(is_corner, np.cumsum(is_corner), np.cumsum(~is_corner)) - 1
     rounds = is_corner[of]

@@ -25,8 +25,9 @@ def note(leg: Leg, timing: Timing, primitive: Primitive, why: Sequence[str]) -> 
     :param why: reasons for the choice of the primitive, before the reason for its speed.
     """
     asked = SegmentType(leg.segment.type).name
-    parts = [f'point {leg.index}: {asked} -> {_name(primitive)} {_way(leg)} '
-             f'in {_duration(leg, timing)}']
+    parts = [
+        f'point {leg.index}: {asked} -> {_name(primitive)} {_way(leg)} in {_duration(leg, timing)}'
+    ]
     if leg.after is not None:
         parts.append(f'blend {1e3 * leg.after.radius:g} mm')
     parts.append('because ' + ' and '.join([*why, timing.reason]))
@@ -45,30 +46,50 @@ def ignored(goal: Goal, first: int = 0) -> list[str]:
     timed = is_timed(goal)
     points = list(enumerate(goal.waypoints, first))
     if timed:
-        say(remarks, [i for i, p in points if any(p.twist)],
-            'twist is ignored: UR motion commands stop or blend at a point')
+        say(
+            remarks,
+            [i for i, p in points if any(p.twist)],
+            'twist is ignored: UR motion commands stop or blend at a point',
+        )
     else:
-        say(remarks, [i for i, p in points if any(p.twist) and not _takes_twist(goal, i - first)],
-            'twist is ignored: the segment has a velocity of its own, or no speed of the tool')
-    say(remarks, [i for i, p in points if any(p.acceleration)],
-        'acceleration is ignored: UR motion commands cannot meet it')
-    say(remarks, [i for i, p in points if any(p.jerk)],
-        'jerk is ignored: no robot motion takes it')
+        say(
+            remarks,
+            [i for i, p in points if any(p.twist) and not _takes_twist(goal, i - first)],
+            'twist is ignored: the segment has a velocity of its own, or no speed of the tool',
+        )
+    say(
+        remarks,
+        [i for i, p in points if any(p.acceleration)],
+        'acceleration is ignored: UR motion commands cannot meet it',
+    )
+    say(
+        remarks, [i for i, p in points if any(p.jerk)], 'jerk is ignored: no robot motion takes it'
+    )
     if timed:
-        say(remarks, [i for i, s in enumerate(goal.segments, first)
-                      if s.acceleration > 0.0 and s.type in (
-                          SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)],
-            'the acceleration of the segment is ignored: its time counts')
+        say(
+            remarks,
+            [
+                i
+                for i, s in enumerate(goal.segments, first)
+                if s.acceleration > 0.0
+                and s.type in (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)
+            ],
+            'the acceleration of the segment is ignored: its time counts',
+        )
     if goal.segments and goal.segments[-1].blend_radius > 0.0 and not goal.keep_open:
-        remarks.append(f'point {points[-1][0]}: the blend is ignored: the last point is '
-                       'never blended')
+        remarks.append(
+            f'point {points[-1][0]}: the blend is ignored: the last point is never blended'
+        )
     return remarks
 
 
 def _takes_twist(goal: Goal, index: int) -> bool:
     segment = segment_of(goal, index)
-    return (segment.velocity == 0.0 and segment.type != SegmentType.JOINT
-            and not is_optimized(segment.type))
+    return (
+        segment.velocity == 0.0
+        and segment.type != SegmentType.JOINT
+        and not is_optimized(segment.type)
+    )
 
 
 def say(remarks: list[str], points: list[int], what: str) -> None:
@@ -85,8 +106,9 @@ def _name(primitive: Primitive) -> str:
     """Return the robot's name of the motion, with the kinds of its targets."""
     name = type(primitive).__name__.upper()
     if isinstance(primitive, MoveC):
-        kinds = ['JOINT' if isinstance(x, tuple) else 'POSE'
-                 for x in (primitive.target, primitive.via)]
+        kinds = [
+            'JOINT' if isinstance(x, tuple) else 'POSE' for x in (primitive.target, primitive.via)
+        ]
         return name if kinds == ['POSE', 'POSE'] else f'{name}_{"_".join(dict.fromkeys(kinds))}'
     if isinstance(primitive, MoveJ | OptimoveJ) and isinstance(primitive.target, Pose):
         return f'{name}_POSE'
@@ -103,10 +125,10 @@ def _duration(leg: Leg, timing: Timing) -> str:
     if leg.path.length > 1e-6:
         speed = f'{leg.path.length / max(timing.duration, 1e-9):.3f} m/s on average'
     elif isinstance(leg.path, JointLine):  # another posture of the same pose
-        speed = (f'{max(leg.path.travel) / max(timing.duration, 1e-9):.3f} rad/s of the leading '
-                 'joint on average')
+        speed = (
+            f'{max(leg.path.travel) / max(timing.duration, 1e-9):.3f} rad/s of the leading '
+            'joint on average'
+        )
     else:
         speed = f'{leg.path.angle / max(timing.duration, 1e-9):.3f} rad/s on average'
     return f'{about}{timing.duration:.3f} s ({speed})'
-
-

@@ -34,9 +34,16 @@ def come_to_rest(state: RobotState, arm: Arm, deceleration: float) -> RobotState
     T_flange_tcp_now = arm.forward(state.actual_q).inverse() @ state.actual_tcp_pose
     T_base_tcp = arm.forward(q) @ T_flange_tcp_now
     return replace(
-        state, actual_q=q, target_q=q, actual_qd=ZERO6, target_qd=ZERO6,
-        actual_tcp_pose=T_base_tcp, target_tcp_pose=T_base_tcp,
-        actual_tcp_twist=ZERO6, target_tcp_twist=ZERO6)
+        state,
+        actual_q=q,
+        target_q=q,
+        actual_qd=ZERO6,
+        target_qd=ZERO6,
+        actual_tcp_pose=T_base_tcp,
+        target_tcp_pose=T_base_tcp,
+        actual_tcp_twist=ZERO6,
+        target_tcp_twist=ZERO6,
+    )
 
 
 def _moved(q: Vector6, qd: Vector6, time: float) -> Vector6:

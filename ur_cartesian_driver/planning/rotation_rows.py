@@ -39,8 +39,9 @@ def log_rows(quaternions: Floats) -> Floats:
     """Return the rotation vectors (n, 3) of unit quaternions (n, 4), their angles in [0, pi]."""
     upper = np.where(quaternions[:, 3:] < 0.0, -1.0, 1.0) * quaternions
     length = np.linalg.norm(upper[:, :3], axis=1)
-    scale = np.where(length < 1e-9, 2.0,
-                     2.0 * np.arctan2(length, upper[:, 3]) / np.maximum(length, _LEAST))
+    scale = np.where(
+        length < 1e-9, 2.0, 2.0 * np.arctan2(length, upper[:, 3]) / np.maximum(length, _LEAST)
+    )
     vectors: Floats = scale[:, None] * upper[:, :3]
     return vectors
 
@@ -53,8 +54,7 @@ def angular(turn: Rates) -> tuple[Floats, Floats]:
     rv, ra = cross_rows(r, v), cross_rows(r, a)
     rrv = cross_rows(r, rv)
     w = v + b * rv + c * rrv
-    e = (a + b * ra + c * (cross_rows(r, ra) + cross_rows(v, rv))
-         + s * (b_s * rv + c_s * rrv))
+    e = a + b * ra + c * (cross_rows(r, ra) + cross_rows(v, rv)) + s * (b_s * rv + c_s * rrv)
     return w, e
 
 

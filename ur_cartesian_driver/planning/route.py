@@ -73,8 +73,15 @@ class Route:
     :param why: and to these, by waypoint, why a primitive is not the plain one.
     """
 
-    def __init__(self, goal: Goal, targets: Sequence[Pose], reach: Reach,
-                 options: PlanningOptions, remarks: list[str], why: dict[int, list[str]]) -> None:
+    def __init__(
+        self,
+        goal: Goal,
+        targets: Sequence[Pose],
+        reach: Reach,
+        options: PlanningOptions,
+        remarks: list[str],
+        why: dict[int, list[str]],
+    ) -> None:
         """Take what the legs are made of."""
         self.goal, self.targets, self.reach, self.options = goal, targets, reach, options
         self.remarks, self.why = remarks, why
@@ -83,8 +90,9 @@ class Route:
         self._farthest = farthest_way(reach)
         self._replaces = options.on_posture_change == 'movej'
 
-    def legs(self, begin: int, T_base_tcp: Pose, q: Joints, times: Sequence[float | None]
-             ) -> list[Leg]:
+    def legs(
+        self, begin: int, T_base_tcp: Pose, q: Joints, times: Sequence[float | None]
+    ) -> list[Leg]:
         """
         Return the way of every segment, its corners and the configuration it arrives in.
 
@@ -111,8 +119,11 @@ class Route:
 
     def _end_of_run(self, k: int, limit: int) -> int:
         stop = k + 1
-        while (stop < len(self._drafts) and stop - k < limit
-               and self._drafts[stop].kind not in IN_JOINTS):
+        while (
+            stop < len(self._drafts)
+            and stop - k < limit
+            and self._drafts[stop].kind not in IN_JOINTS
+        ):
             stop += 1
         return stop
 
@@ -130,8 +141,11 @@ class Route:
         near = too_near(pieces, found, measures, segments, fractions, self.options)
         refusal, index = found.refusal, found.refused_segment
         # The end of a range behind a singularity is where the joints swing to beside it.
-        if near is not None and (refusal is None or near[1] < index or (
-                near[1] == index and isinstance(refusal, JointLimitExceeded))):
+        if near is not None and (
+            refusal is None
+            or near[1] < index
+            or (near[1] == index and isinstance(refusal, JointLimitExceeded))
+        ):
             refusal, index = near
         drafts = self._drafts[k:stop]
         arrived = self._arrivals(drafts, found, segments)
@@ -199,20 +213,25 @@ class Route:
             return draft.after.leave
         return trim_end(draft.way, draft.radius) if self._blends(n) else 1.0
 
-    def _arrivals(self, drafts: list[Draft], found: Followed, segments: np.ndarray
-                  ) -> list[Joints]:
+    def _arrivals(
+        self, drafts: list[Draft], found: Followed, segments: np.ndarray
+    ) -> list[Joints]:
         """Return the configuration of the waypoint at the end of each leg, as far as found."""
         last = np.searchsorted(segments, [draft.index for draft in drafts], side='right') - 1
         if not len(found.q):
             return [self._q for _ in drafts]
         q = found.q[np.maximum(last, 0)]
-        rounded = [n for n, draft in enumerate(drafts)
-                   if self._end(draft.index - self._drafts[0].index) < 1.0]
+        rounded = [
+            n
+            for n, draft in enumerate(drafts)
+            if self._end(draft.index - self._drafts[0].index) < 1.0
+        ]
         if rounded:
             # The arm does not come there; the report and joint moves from there want to know.
             ends = pose_rows(drafts[n].way.end for n in rounded)
             there = nearest_rows(
-                self.reach.arm, compose_rows(ends, self.reach.T_tcp_flange), q[rounded])
+                self.reach.arm, compose_rows(ends, self.reach.T_tcp_flange), q[rounded]
+            )
             q[rounded] = np.where(np.isnan(there), q[rounded], there)
         return [(a, b, c, d, e, f) for a, b, c, d, e, f in q.tolist()]
 
@@ -236,18 +255,23 @@ class Route:
         return InvalidPosture(
             f'{point_field(draft.index, "posture")} cannot be reached by a straight or circular '
             f'move: {clause}{f", which takes {flips}" if flips else ""}; use a JOINT segment, or '
-            'set on_posture_change to movej.')
+            'set on_posture_change to movej.'
+        )
 
     def _replace(self, n: int, refusal: GoalRefused) -> None:
         """Make a leg a joint move, or refuse the goal."""
         draft = self._drafts[n]
         if not self._replaces or not isinstance(refusal, _NO_STRAIGHT_WAY):
             raise refusal
-        self.remarks.append(f'point {draft.index}: JOINT instead of {draft.kind.name} '
-                            f'(on_posture_change = movej), because otherwise: {refusal}')
+        self.remarks.append(
+            f'point {draft.index}: JOINT instead of {draft.kind.name} '
+            f'(on_posture_change = movej), because otherwise: {refusal}'
+        )
         self.why.setdefault(draft.index, []).append(
-            'the posture needs a joint move' if isinstance(refusal, InvalidPosture)
-            else 'there is no straight way')
+            'the posture needs a joint move'
+            if isinstance(refusal, InvalidPosture)
+            else 'there is no straight way'
+        )
         draft.kind, draft.path, draft.before = _JOINT, None, None
         if n + 1 < len(self._drafts) and self._drafts[n + 1].path is not None:
             after = self._drafts[n + 1]
@@ -285,8 +309,9 @@ class Route:
             return before.arrives
         # A blended waypoint may lie out of reach, but not one at which a joint line begins: there
         # the robot has to know the joints to which the rest of the leg would bring it.
-        rest = followed(self.reach, [Piece.part(before.index, before.way, before.seen, 1.0)],
-                        self._q)
+        rest = followed(
+            self.reach, [Piece.part(before.index, before.way, before.seen, 1.0)], self._q
+        )
         if rest.refusal is not None:
             raise rest.refusal
         a, b, c, d, e, f = rest.q[-1].tolist()
@@ -306,8 +331,9 @@ class Route:
         if found.refusal is not None:
             raise found.refusal
         segments, fractions = segments_of(pieces, found.piece, found.t)
-        measures = np.where((segments == self._drafts[k].index)[:, None], np.inf,
-                            self.survey.measured(found.q))
+        measures = np.where(
+            (segments == self._drafts[k].index)[:, None], np.inf, self.survey.measured(found.q)
+        )
         near = too_near(pieces, found, measures, segments, fractions, self.options)
         if near is not None:
             raise near[0]
@@ -317,8 +343,12 @@ class Route:
         assert isinstance(line, JointLine)
         joins = line.joints(self._drafts[k].begin)
         if max(abs(x - y) for x, y in zip(self._q, joins, strict=True)) > _SAME_LINE:
-            raise self.reach.jump(line.pose(self._drafts[k].begin), self._q, joins,
-                                  f'{segment_field(self._drafts[k - 1].index, "blend_radius")}')
+            raise self.reach.jump(
+                line.pose(self._drafts[k].begin),
+                self._q,
+                joins,
+                f'{segment_field(self._drafts[k - 1].index, "blend_radius")}',
+            )
         self.survey.add(Surveyed(pieces, found, segments, fractions, measures, q_start))
 
     def _look_in_joints(self, pieces: list[Piece]) -> None:
@@ -340,9 +370,12 @@ class Route:
     def _check_overlap(self, n: int) -> None:
         draft = self._drafts[n]
         if draft.path is not None and draft.begin > self._end(n) + 1e-9:
-            raise InvalidGoal(segment_field(draft.index, 'blend_radius'),
-                              f'is too large: the blends at both ends of the segment to '
-                              f'point {draft.index} overlap', 'make them smaller')
+            raise InvalidGoal(
+                segment_field(draft.index, 'blend_radius'),
+                f'is too large: the blends at both ends of the segment to '
+                f'point {draft.index} overlap',
+                'make them smaller',
+            )
 
     def _say_what_stops(self) -> None:
         for n, draft in enumerate(self._drafts[:-1]):
@@ -350,7 +383,8 @@ class Route:
             if draft.radius > SAME_POSITION and not can_blend(draft, after):
                 self.remarks.append(
                     f'point {draft.index}: stops instead of blending, because the robot cannot '
-                    f'blend from {draft.kind.name} into {after.kind.name}')
+                    f'blend from {draft.kind.name} into {after.kind.name}'
+                )
 
     # -- legs ------------------------------------------------------------------------------------
 
@@ -358,11 +392,22 @@ class Route:
         paces, nearest = self.survey.paces(), self.survey.nearest()
         for draft, time in zip(self._drafts, times, strict=True):
             i = draft.index
-            leg = Leg(index=i, kind=draft.kind, waypoint=self.goal.waypoints[i],
-                      segment=draft.segment, path=draft.way, joints=draft.arrives, time=time,
-                      pace=paces[i], nearest=nearest[i], before=draft.before, after=draft.after,
-                      u_before=draft.begin, u_after=draft.leaves,
-                      share=max(draft.leaves - draft.begin, 1e-9))
+            leg = Leg(
+                index=i,
+                kind=draft.kind,
+                waypoint=self.goal.waypoints[i],
+                segment=draft.segment,
+                path=draft.way,
+                joints=draft.arrives,
+                time=time,
+                pace=paces[i],
+                nearest=nearest[i],
+                before=draft.before,
+                after=draft.after,
+                u_before=draft.begin,
+                u_after=draft.leaves,
+                share=max(draft.leaves - draft.begin, 1e-9),
+            )
             yield self._already_there(leg) if self._goes_nowhere(leg) else leg
 
     def _goes_nowhere(self, leg: Leg) -> bool:
@@ -381,5 +426,10 @@ class Route:
         self.remarks.append(f'point 0: the robot stands there already{waits}')
         self.why[0] = ['the robot stands there already']
         kind = leg.kind if leg.kind == _JOINT else SegmentType.LINEAR
-        return replace(leg, kind=kind, time=None, segment=replace(
-            PLAIN, type=leg.segment.type), waypoint=replace(leg.waypoint, twist=(0.0,) * 6))
+        return replace(
+            leg,
+            kind=kind,
+            time=None,
+            segment=replace(PLAIN, type=leg.segment.type),
+            waypoint=replace(leg.waypoint, twist=(0.0,) * 6),
+        )

@@ -150,12 +150,17 @@ def along(pieces: Sequence[Piece]) -> tuple[NDArray[np.intp], Floats]:
     return piece, t
 
 
-def segments_of(pieces: Sequence[Piece], piece: NDArray[np.intp], t: Floats
-                ) -> tuple[Ints, Floats]:
+def segments_of(
+    pieces: Sequence[Piece], piece: NDArray[np.intp], t: Floats
+) -> tuple[Ints, Floats]:
     """Return the segment (n,) and the fraction (n,) of it of each place: many ``on_segment``."""
     index = np.array([p.index for p in pieces], dtype=np.int32)[piece]
-    ends = np.array([(p.curve.leave, p.curve.join) if isinstance(p.curve, Corner) else (-1.0, 0.0)
-                     for p in pieces])[piece]
+    ends = np.array(
+        [
+            (p.curve.leave, p.curve.join) if isinstance(p.curve, Corner) else (-1.0, 0.0)
+            for p in pieces
+        ]
+    )[piece]
     leave, join = ends.T
     first, second = crossing(leave, join, t)
     rounds, behind = leave >= 0.0, t > 0.5

@@ -53,8 +53,14 @@ class JointTrack:
     angle: float
 
 
-def joint_track(reach: Reach, way: SplineWay, start: Rates, quintic: bool, tolerance: float,
-                angle_tolerance: float) -> JointTrack:
+def joint_track(
+    reach: Reach,
+    way: SplineWay,
+    start: Rates,
+    quintic: bool,
+    tolerance: float,
+    angle_tolerance: float,
+) -> JointTrack:
     """
     Return the pieces for a way.
 
@@ -93,17 +99,24 @@ class _Refining:
             self._halve(bad)
         distance, angle = self.off.max(axis=0).tolist()
         return JointTrack(
-            times=self.times, q=self.joints.x, qd=self.joints.v, qdd=self.joints.a,
-            piece=self.piece, quintic=self.quintic, distance=distance, angle=angle)
+            times=self.times,
+            q=self.joints.x,
+            qd=self.joints.v,
+            qdd=self.joints.a,
+            piece=self.piece,
+            quintic=self.quintic,
+            distance=distance,
+            angle=angle,
+        )
 
     def _joints(self, piece: NDArray[np.intp], t: Floats, times: Floats) -> Rates:
         """Return the joints at times ``t`` since pieces of the tool spline began."""
         tool = self.way.spline.rows(piece, t)
-        near = self.way.q[np.clip(np.searchsorted(self._places, times), 0,
-                                  len(self._places) - 1)]
+        near = self.way.q[np.clip(np.searchsorted(self._places, times), 0, len(self._places) - 1)]
         q = nearest_rows(self.reach.arm, compose_rows(tool.poses, self.reach.T_tcp_flange), near)
         qd, qdd = joint_rates(
-            self.reach.arm, self.reach.T_flange_tcp, q, tool.twists, tool.accelerations)
+            self.reach.arm, self.reach.T_flange_tcp, q, tool.twists, tool.accelerations
+        )
         # At rest is exactly at rest.
         return Rates(q, np.round(qd, _DIGITS) + 0.0, np.round(qdd, _DIGITS) + 0.0)
 
@@ -136,8 +149,9 @@ class _Refining:
             self._refuse(int(rows[short[0]]))
         piece = self.piece[rows]
         joints = self._joints(piece, middle - self.way.spline.times[piece], middle)
-        self.joints = Rates(*(np.insert(x, rows + 1, y, axis=0)
-                              for x, y in zip(self.joints, joints, strict=True)))
+        self.joints = Rates(
+            *(np.insert(x, rows + 1, y, axis=0) for x, y in zip(self.joints, joints, strict=True))
+        )
         self.times = np.insert(self.times, rows + 1, middle)
         self.piece = np.insert(self.piece, rows, piece)
         self.off = np.insert(self.off, rows, 0.0, axis=0)
@@ -150,8 +164,9 @@ class _Refining:
             point_field(self.way.first + int(self.piece[row])),
             f'cannot be approached along the spline: {self.times[row]:.3f} s from the start the '
             f'joints change so fast that the tool would be {1e3 * distance:.3f} mm and '
-            f'{angle:.4f} rad off it in one step of the controller', 'give it more time, or keep '
-            'away from the singularity there')
+            f'{angle:.4f} rad off it in one step of the controller',
+            'give it more time, or keep away from the singularity there',
+        )
 
 
 def _whole(times: Floats) -> Floats:

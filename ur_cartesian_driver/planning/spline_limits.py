@@ -56,7 +56,8 @@ class Excess:
             f'{self.needed:.3f} {self.unit}, and allowed are {self.allowed:.3f} {self.unit} '
             f'({self.name})',
             f'give all points {ceil(1e3 * self.factor) / 1e3:.3f} times the time (and twists and '
-            f'accelerations to match){", or set on_too_fast to slow" if may_slow else ""}')
+            f'accelerations to match){", or set on_too_fast to slow" if may_slow else ""}',
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,29 +80,59 @@ def excess(reach: Reach, way: SplineWay, options: PlanningOptions) -> Excess | N
         factor = (most / quantity.limit) ** (1.0 / quantity.power)
         if factor > max(1.0 + _ROUNDING, found.factor if found else 0.0):
             found = Excess(
-                factor=factor, point=int(way.points[row]), fraction=float(way.u[row]),
-                what=quantity.what, needed=most, allowed=quantity.limit, unit=quantity.unit,
-                name=quantity.name)
+                factor=factor,
+                point=int(way.points[row]),
+                fraction=float(way.u[row]),
+                what=quantity.what,
+                needed=most,
+                allowed=quantity.limit,
+                unit=quantity.unit,
+                name=quantity.name,
+            )
     return found
 
 
 def _quantities(reach: Reach, way: SplineWay, options: PlanningOptions) -> Iterator[_Quantity]:
     begin, end = way.spline.times[way.piece], way.spline.times[way.piece + 1]
     tool = way.spline.rows(way.piece, way.u * (end - begin))
-    qd, qdd = joint_rates(
-        reach.arm, reach.T_flange_tcp, way.q, tool.twists, tool.accelerations)
+    qd, qdd = joint_rates(reach.arm, reach.T_flange_tcp, way.q, tool.twists, tool.accelerations)
     if options.max_tool_speed > 0.0:
-        yield _Quantity('the tool', _norms(tool.twists[:, :3]), options.max_tool_speed, 1, 'm/s',
-                        'max_tool_speed')
-    yield _Quantity('the tool', _norms(tool.accelerations[:, :3]),
-                    options.max_linear_acceleration, 2, 'm/s^2', 'max_linear_acceleration')
-    yield _Quantity('the tool', _norms(tool.accelerations[:, 3:]),
-                    options.max_angular_acceleration, 2, 'rad/s^2', 'max_angular_acceleration')
-    for k, (name, limit) in enumerate(zip(
-            JOINT_NAMES, reach.arm.model.max_joint_speed, strict=True)):
+        yield _Quantity(
+            'the tool',
+            _norms(tool.twists[:, :3]),
+            options.max_tool_speed,
+            1,
+            'm/s',
+            'max_tool_speed',
+        )
+    yield _Quantity(
+        'the tool',
+        _norms(tool.accelerations[:, :3]),
+        options.max_linear_acceleration,
+        2,
+        'm/s^2',
+        'max_linear_acceleration',
+    )
+    yield _Quantity(
+        'the tool',
+        _norms(tool.accelerations[:, 3:]),
+        options.max_angular_acceleration,
+        2,
+        'rad/s^2',
+        'max_angular_acceleration',
+    )
+    for k, (name, limit) in enumerate(
+        zip(JOINT_NAMES, reach.arm.model.max_joint_speed, strict=True)
+    ):
         yield _Quantity(name, np.abs(qd[:, k]), limit, 1, 'rad/s', 'the limit of the joint')
-        yield _Quantity(name, np.abs(qdd[:, k]), options.max_joint_acceleration, 2, 'rad/s^2',
-                        'max_joint_acceleration')
+        yield _Quantity(
+            name,
+            np.abs(qdd[:, k]),
+            options.max_joint_acceleration,
+            2,
+            'rad/s^2',
+            'max_joint_acceleration',
+        )
 
 
 def _norms(vectors: Floats) -> Floats:

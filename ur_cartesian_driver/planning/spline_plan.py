@@ -64,8 +64,9 @@ class SplineState:
     @classmethod
     def after(cls, piece: Spline, time: float) -> SplineState:
         """Return the state at the end of a piece that ends at a time [s]."""
-        return cls(time=time, q=piece.target, qd=piece.velocities,
-                   qdd=piece.accelerations or ZERO6)
+        return cls(
+            time=time, q=piece.target, qd=piece.velocities, qdd=piece.accelerations or ZERO6
+        )
 
     @property
     def moves(self) -> bool:
@@ -80,8 +81,13 @@ class SplineState:
         """Return the TCP in base, one row."""
         q, qd, qdd = self.rows()
         twist, acceleration = tool_rates(arm, T_flange_tcp, q, qd, qdd)
-        return ToolPoints(times=np.array([self.time]), poses=tcp_rows(arm, T_flange_tcp, q),
-                          twists=twist, accelerations=acceleration, quintic=True)
+        return ToolPoints(
+            times=np.array([self.time]),
+            poses=tcp_rows(arm, T_flange_tcp, q),
+            twists=twist,
+            accelerations=acceleration,
+            quintic=True,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -99,9 +105,16 @@ class SplinePieces:
     stretch: float = 1.0
 
 
-def plan_pieces(start: SplineState, goal: Goal, arm: Arm, T_flange_tcp: Pose,
-                options: PlanningOptions, *, first: int = 0, tools: Sequence[Pose] = ()
-                ) -> SplinePieces:
+def plan_pieces(
+    start: SplineState,
+    goal: Goal,
+    arm: Arm,
+    T_flange_tcp: Pose,
+    options: PlanningOptions,
+    *,
+    first: int = 0,
+    tools: Sequence[Pose] = (),
+) -> SplinePieces:
     """
     Return the pieces from a state to points.
 
@@ -115,19 +128,36 @@ def plan_pieces(start: SplineState, goal: Goal, arm: Arm, T_flange_tcp: Pose,
     """
     reach = Reach(arm, T_flange_tcp)
     points = tool_points(goal, start.tool(arm, T_flange_tcp))
-    way = way_along(reach, ToolSpline.through(points), goal.waypoints, start.q, options,
-                    first=first, rests=not start.moves)
+    way = way_along(
+        reach,
+        ToolSpline.through(points),
+        goal.waypoints,
+        start.q,
+        options,
+        first=first,
+        rests=not start.moves,
+    )
     way, stretch, said = _in_time(reach, way, start, goal, options)
-    track = joint_track(reach, way, start.rows(), points.quintic, options.spline_tolerance,
-                        options.spline_tolerance / ANGLE_LEVER)
+    track = joint_track(
+        reach,
+        way,
+        start.rows(),
+        points.quintic,
+        options.spline_tolerance,
+        options.spline_tolerance / ANGLE_LEVER,
+    )
     segments = tuple(_segments(way, track, goal))
     piece = segments[-1].primitive
     assert isinstance(piece, Spline)
     end = SplineState.after(piece, float(track.times[-1]))
     said += _clearances(way, end, arm, tools or (T_flange_tcp,), start, options)
     return SplinePieces(
-        segments=segments, reference=_reference(way), end=end, stretch=stretch,
-        remarks=(*point_remarks(goal, first), *said, _precision(track), _smallest(way)))
+        segments=segments,
+        reference=_reference(way),
+        end=end,
+        stretch=stretch,
+        remarks=(*point_remarks(goal, first), *said, _precision(track), _smallest(way)),
+    )
 
 
 def end_state(plan: Plan) -> SplineState:
@@ -162,7 +192,8 @@ def closing(state: SplineState, arm: Arm, deceleration: float) -> Spline:
         T *= _SHORTER
     raise JointLimitExceeded(
         f'{JOINT_NAMES[beyond or 0]} is so near to the end of its range, and so fast, that it '
-        'cannot be stopped before it; end the motion earlier.')
+        'cannot be stopped before it; end the motion earlier.'
+    )
 
 
 def _rows_of(state: SplineState, piece: Spline) -> tuple[Floats, Floats, Floats]:
@@ -177,8 +208,9 @@ def _beyond(arm: Arm, q: Floats) -> int | None:
     return int(np.argmax(outside)) if outside.any() else None
 
 
-def _in_time(reach: Reach, way: SplineWay, start: SplineState, goal: Goal,
-             options: PlanningOptions) -> tuple[SplineWay, float, list[str]]:
+def _in_time(
+    reach: Reach, way: SplineWay, start: SplineState, goal: Goal, options: PlanningOptions
+) -> tuple[SplineWay, float, list[str]]:
     """Return the way in the time that the limits allow, the factor, and what is said of it."""
     found = excess(reach, way, options)
     if found is None:
@@ -193,51 +225,87 @@ def _in_time(reach: Reach, way: SplineWay, start: SplineState, goal: Goal,
         raise InvalidGoal(
             point_field(way.first + longest, 'time_from_start'),
             f'would take {time:.0f} s because of {found.name}, more than max_segment_time = '
-            f'{options.max_segment_time:.0f} s', 'go around the place where it has to be slow')
-    return way, found.factor, [
-        f'all times are stretched by {found.factor:.4g}, because of {found.name} = '
-        f'{found.allowed:.3f} {found.unit} of {found.what} on the way to point {found.point}: '
-        f'{way.spline.times[-1]:.3f} s in all']
+            f'{options.max_segment_time:.0f} s',
+            'go around the place where it has to be slow',
+        )
+    return (
+        way,
+        found.factor,
+        [
+            f'all times are stretched by {found.factor:.4g}, because of {found.name} = '
+            f'{found.allowed:.3f} {found.unit} of {found.what} on the way to point {found.point}: '
+            f'{way.spline.times[-1]:.3f} s in all'
+        ],
+    )
 
 
 def _segments(way: SplineWay, track: JointTrack, goal: Goal) -> Iterator[PlannedSegment]:
     length = np.interp(track.times, way.times, way.length)
     angle = np.interp(track.times, way.times, way.angle)
-    columns = (track.piece, np.diff(track.piece, append=-1) != 0, np.diff(length),
-               np.diff(angle), np.round(np.diff(track.times), 6), track.q[1:], track.qd[1:],
-               track.qdd[1:])
+    columns = (
+        track.piece,
+        np.diff(track.piece, append=-1) != 0,
+        np.diff(length),
+        np.diff(angle),
+        np.round(np.diff(track.times), 6),
+        track.q[1:],
+        track.qd[1:],
+        track.qdd[1:],
+    )
     since, far, turned, count = 0.0, 0.0, 0.0, 0
     for k, is_last, metres, radians, duration, q, qd, qdd in zip(
-            *(column.tolist() for column in columns), strict=True):
+        *(column.tolist() for column in columns), strict=True
+    ):
         since, far, turned, count = since + duration, far + metres, turned + radians, count + 1
         note = ''
         if is_last:
             note = _note(way, goal, k, count, (far, turned, since))
             since, far, turned, count = 0.0, 0.0, 0.0, 0
         yield PlannedSegment(
-            primitive=Spline(target=tuple(q), velocities=tuple(qd), duration=duration,
-                             accelerations=tuple(qdd) if track.quintic else None),
-            waypoint=way.first + k, length=metres, angle=radians, duration=duration,
-            joints=tuple(q), note=note)
+            primitive=Spline(
+                target=tuple(q),
+                velocities=tuple(qd),
+                duration=duration,
+                accelerations=tuple(qdd) if track.quintic else None,
+            ),
+            waypoint=way.first + k,
+            length=metres,
+            angle=radians,
+            duration=duration,
+            joints=tuple(q),
+            note=note,
+        )
 
 
-def _note(way: SplineWay, goal: Goal, k: int, count: int,
-          done: tuple[float, float, float]) -> str:
+def _note(way: SplineWay, goal: Goal, k: int, count: int, done: tuple[float, float, float]) -> str:
     """Return the line of the segment to a point: ``done`` are its length, turn and time."""
     length, angle, time = done
     turn = f' and {degrees(angle):.1f} degrees' if degrees(angle) >= 0.05 else ''
-    speed = (f'{length / time:.3f} m/s' if length > 1e-6 else f'{angle / time:.3f} rad/s'
-             ) + ' on average'
+    speed = (
+        f'{length / time:.3f} m/s' if length > 1e-6 else f'{angle / time:.3f} rad/s'
+    ) + ' on average'
     point = way.first + k
-    passes = 'stops there' if not any(goal.waypoints[k].twist) or (
-        k + 1 == len(goal.waypoints) and not goal.keep_open) else 'passes it'
+    passes = (
+        'stops there'
+        if not any(goal.waypoints[k].twist)
+        or (k + 1 == len(goal.waypoints) and not goal.keep_open)
+        else 'passes it'
+    )
     pieces = '1 piece' if count == 1 else f'{count} pieces'
-    return (f'point {point}: SPLINE in {pieces}, {length:.3f} m{turn} in {time:.3f} s ({speed}), '
-            f'{passes}; nearest: {way.nearest[point]}')
+    return (
+        f'point {point}: SPLINE in {pieces}, {length:.3f} m{turn} in {time:.3f} s ({speed}), '
+        f'{passes}; nearest: {way.nearest[point]}'
+    )
 
 
-def _clearances(way: SplineWay, end: SplineState, arm: Arm, tools: Sequence[Pose],
-                start: SplineState, options: PlanningOptions) -> list[str]:
+def _clearances(
+    way: SplineWay,
+    end: SplineState,
+    arm: Arm,
+    tools: Sequence[Pose],
+    start: SplineState,
+    options: PlanningOptions,
+) -> list[str]:
     """Return what is said of collisions; behind a moving end the way to rest counts as well."""
     q, points, u = way.q[1:], way.points[1:], way.u[1:]
     if end.moves:
@@ -245,8 +313,13 @@ def _clearances(way: SplineWay, end: SplineState, arm: Arm, tools: Sequence[Pose
         q = np.concatenate([q, on])
         points = np.concatenate([points, np.full(len(on), points[-1])])
         u = np.concatenate([u, np.ones(len(on))])
-    said = (line for T_flange_tcp in tools for line in clearance_remarks(
-        Clearance(arm, T_flange_tcp, options).check(q, start.q), points, u))
+    said = (
+        line
+        for T_flange_tcp in tools
+        for line in clearance_remarks(
+            Clearance(arm, T_flange_tcp, options).check(q, start.q), points, u
+        )
+    )
     return list(dict.fromkeys(said))
 
 
@@ -258,8 +331,10 @@ def _reference(way: SplineWay) -> ReferencePath:
 
 def _precision(track: JointTrack) -> str:
     kind = 'quintic' if track.quintic else 'cubic'
-    return (f'joints: {len(track.piece)} {kind} pieces, along which the tool stays within '
-            f'{1e3 * track.distance:.3f} mm and {track.angle:.5f} rad of its spline')
+    return (
+        f'joints: {len(track.piece)} {kind} pieces, along which the tool stays within '
+        f'{1e3 * track.distance:.3f} mm and {track.angle:.5f} rad of its spline'
+    )
 
 
 def _smallest(way: SplineWay) -> str:
@@ -274,5 +349,6 @@ def _six(values: Floats) -> Vector6:
 
 def stretched(goal: Goal, factor: float) -> Goal:
     """Return a goal with all its times stretched."""
-    return replace(goal, waypoints=tuple(
-        replace(point, time=factor * point.time) for point in goal.waypoints))
+    return replace(
+        goal, waypoints=tuple(replace(point, time=factor * point.time) for point in goal.waypoints)
+    )

@@ -46,7 +46,8 @@ def tool_points(goal: Goal, start: ToolPoints) -> ToolPoints:
         poses=np.concatenate([start.poses, given.poses]),
         twists=np.concatenate([start.twists, given.twists]),
         accelerations=np.concatenate([start.accelerations, given.accelerations]),
-        quintic=bool(np.any(given.accelerations)))
+        quintic=bool(np.any(given.accelerations)),
+    )
     return _seen_from(_chosen(points, ends_moving=goal.keep_open), goal.T_base_frame)
 
 
@@ -58,12 +59,21 @@ def remarks(goal: Goal, first: int) -> list[str]:
     stops = [i for i, point in inner if not any(point.twist)]
     say(said, stops, 'the arm stops there, because the twist is 0 (NaN lets the driver choose)')
     for field in ('twist', 'acceleration'):
-        say(said, [i for i, point in inner if isnan(sum(getattr(point, field)))],
-            f'{field} is NaN, so it is chosen, to fit the points around')
-    say(said, [i for i, point in points if any(point.jerk)],
-        'jerk is ignored: no robot motion takes it')
-    say(said, [i for i, segment in enumerate(goal.segments, first) if segment.acceleration > 0.0],
-        'the acceleration of the segment is ignored: its time counts')
+        say(
+            said,
+            [i for i, point in inner if isnan(sum(getattr(point, field)))],
+            f'{field} is NaN, so it is chosen, to fit the points around',
+        )
+    say(
+        said,
+        [i for i, point in points if any(point.jerk)],
+        'jerk is ignored: no robot motion takes it',
+    )
+    say(
+        said,
+        [i for i, segment in enumerate(goal.segments, first) if segment.acceleration > 0.0],
+        'the acceleration of the segment is ignored: its time counts',
+    )
     return said
 
 
@@ -71,9 +81,12 @@ def _given(waypoints: Sequence[Waypoint]) -> ToolPoints:
     poses = pose_rows(point.pose for point in waypoints)
     poses[:, 3:] = normalized_rows(poses[:, 3:])
     return ToolPoints(
-        times=np.array([point.time for point in waypoints]), poses=poses,
+        times=np.array([point.time for point in waypoints]),
+        poses=poses,
         twists=np.array([point.twist for point in waypoints]),
-        accelerations=np.array([point.acceleration for point in waypoints]), quintic=False)
+        accelerations=np.array([point.acceleration for point in waypoints]),
+        quintic=False,
+    )
 
 
 def _seen_from(points: ToolPoints, T_new_old: Pose) -> ToolPoints:
@@ -82,13 +95,18 @@ def _seen_from(points: ToolPoints, T_new_old: Pose) -> ToolPoints:
 
     def turned(vectors: Floats) -> Floats:
         return np.concatenate([vectors[:, :3] @ R.T, vectors[:, 3:] @ R.T], axis=1)
+
     positions = points.poses[:, :3] @ R.T + T_new_old.position
     orientations = normalized_rows(
-        multiply_rows(np.array([T_new_old.quaternion]), points.poses[:, 3:]))
+        multiply_rows(np.array([T_new_old.quaternion]), points.poses[:, 3:])
+    )
     return ToolPoints(
-        times=points.times, quintic=points.quintic, twists=turned(points.twists),
+        times=points.times,
+        quintic=points.quintic,
+        twists=turned(points.twists),
         accelerations=turned(points.accelerations),
-        poses=np.concatenate([positions, orientations], axis=1))
+        poses=np.concatenate([positions, orientations], axis=1),
+    )
 
 
 def _chosen(points: ToolPoints, *, ends_moving: bool) -> ToolPoints:
@@ -98,9 +116,15 @@ def _chosen(points: ToolPoints, *, ends_moving: bool) -> ToolPoints:
         twists = np.where(np.isnan(twists), _twists(points, ends_moving), twists)
     if np.isnan(accelerations).any():
         accelerations = np.where(
-            np.isnan(accelerations), _accelerations(points, twists), accelerations)
-    return ToolPoints(times=points.times, poses=points.poses, twists=twists,
-                      accelerations=accelerations, quintic=points.quintic)
+            np.isnan(accelerations), _accelerations(points, twists), accelerations
+        )
+    return ToolPoints(
+        times=points.times,
+        poses=points.poses,
+        twists=twists,
+        accelerations=accelerations,
+        quintic=points.quintic,
+    )
 
 
 def _twists(points: ToolPoints, ends_moving: bool) -> Floats:
@@ -111,8 +135,13 @@ def _twists(points: ToolPoints, ends_moving: bool) -> Floats:
     the angular velocity at the point is their derivative.
     """
     h = np.diff(points.times)[:, None]
-    way = np.concatenate([np.diff(points.poses[:, :3], axis=0),
-                          _turns(points.poses[1:, 3:], points.poses[:-1, 3:])], axis=1)
+    way = np.concatenate(
+        [
+            np.diff(points.poses[:, :3], axis=0),
+            _turns(points.poses[1:, 3:], points.poses[:-1, 3:]),
+        ],
+        axis=1,
+    )
     mean = way / h
     twists = np.zeros_like(points.twists)
     twists[1:-1] = (h[1:] * mean[:-1] + h[:-1] * mean[1:]) / (h[1:] + h[:-1])
@@ -134,15 +163,21 @@ def _accelerations(points: ToolPoints, twists: Floats) -> Floats:
     there = []
     for around in (slice(None, -2), slice(2, None)):
         turn = turn_of(_turns(poses[around, 3:], poses[inner, 3:]), twists[around, 3:], zero)
-        there.append((
-            np.concatenate([poses[around, :3] - poses[inner, :3], turn.x], axis=1),
-            np.concatenate([twists[around, :3], turn.v], axis=1)))
+        there.append(
+            (
+                np.concatenate([poses[around, :3] - poses[inner, :3], turn.x], axis=1),
+                np.concatenate([twists[around, :3], turn.v], axis=1),
+            )
+        )
     (x_before, v_before), (x_after, v_after) = there
     v, before, after = twists[inner], h[:-1], h[1:]
     accelerations = np.zeros_like(points.accelerations)
     accelerations[inner] = 0.5 * (
-        6.0 * x_before / before**2 + (2.0 * v_before + 4.0 * v) / before
-        + 6.0 * x_after / after**2 - (4.0 * v + 2.0 * v_after) / after)
+        6.0 * x_before / before**2
+        + (2.0 * v_before + 4.0 * v) / before
+        + 6.0 * x_after / after**2
+        - (4.0 * v + 2.0 * v_after) / after
+    )
     return accelerations
 
 

@@ -94,8 +94,16 @@ class SplineWay:
         return replace(self, spline=self.spline.stretched(factor))
 
 
-def way_along(reach: Reach, spline: ToolSpline, waypoints: Sequence[Waypoint], q_start: Joints,
-              options: PlanningOptions, *, first: int, rests: bool) -> SplineWay:
+def way_along(
+    reach: Reach,
+    spline: ToolSpline,
+    waypoints: Sequence[Waypoint],
+    q_start: Joints,
+    options: PlanningOptions,
+    *,
+    first: int,
+    rests: bool,
+) -> SplineWay:
     """
     Return the arm's way along a spline.
 
@@ -118,22 +126,39 @@ def way_along(reach: Reach, spline: ToolSpline, waypoints: Sequence[Waypoint], q
     leaving = leaving_rows(measures, length[1:], angle[1:], rests=rests)
     _check(reach, pieces, found, np.where(leaving, np.inf, measures), waypoints, options)
     return SplineWay(
-        spline=spline, first=first, poses=poses, q=np.concatenate([[q_start], found.q]),
-        piece=np.concatenate([[0], found.piece]), u=np.concatenate([[0.0], found.t]),
-        length=length, angle=angle, nearest=nearest_of(
-            reach.arm, found.q, measures, first + found.piece.astype(np.int32), found.t))
+        spline=spline,
+        first=first,
+        poses=poses,
+        q=np.concatenate([[q_start], found.q]),
+        piece=np.concatenate([[0], found.piece]),
+        u=np.concatenate([[0.0], found.t]),
+        length=length,
+        angle=angle,
+        nearest=nearest_of(
+            reach.arm, found.q, measures, first + found.piece.astype(np.int32), found.t
+        ),
+    )
 
 
-def _check(reach: Reach, pieces: Sequence[Piece], found: Followed, measures: Floats,
-           waypoints: Sequence[Waypoint], options: PlanningOptions) -> None:
+def _check(
+    reach: Reach,
+    pieces: Sequence[Piece],
+    found: Followed,
+    measures: Floats,
+    waypoints: Sequence[Waypoint],
+    options: PlanningOptions,
+) -> None:
     """Raise the first reason why the arm cannot go along."""
     first = pieces[0].index
     segments = first + found.piece.astype(np.int32)
     refusal, index = found.refusal, found.refused_segment
     near = too_near(pieces, found, measures, segments, found.t, options)
     # The end of a range behind a singularity is where the joints swing to beside it.
-    if near is not None and (refusal is None or near[1] < index or (
-            near[1] == index and isinstance(refusal, JointLimitExceeded))):
+    if near is not None and (
+        refusal is None
+        or near[1] < index
+        or (near[1] == index and isinstance(refusal, JointLimitExceeded))
+    ):
         refusal, index = near
     for k, point in enumerate(waypoints):
         if refusal is not None and first + k >= index:
@@ -155,8 +180,9 @@ def _said(refusal: GoalRefused) -> GoalRefused:
     return refusal
 
 
-def _check_posture(reach: Reach, piece: Piece, point: Waypoint, q: Floats,
-                   options: PlanningOptions) -> None:
+def _check_posture(
+    reach: Reach, piece: Piece, point: Waypoint, q: Floats, options: PlanningOptions
+) -> None:
     named = named_joints(point.posture, options.tf_prefix)
     a, b, c, d, e, f = q.tolist()
     arrives = (a, b, c, d, e, f)
@@ -166,7 +192,8 @@ def _check_posture(reach: Reach, piece: Piece, point: Waypoint, q: Floats,
         raise InvalidPosture(
             f'{point_field(piece.index, "posture")} cannot be reached along the spline: {clause}'
             f'{f", which takes {flips}" if flips else ""}; start in that configuration, or use '
-            'PRIMITIVES with a JOINT segment.')
+            'PRIMITIVES with a JOINT segment.'
+        )
 
 
 def _looked_at(spline: ToolSpline) -> tuple[NDArray[np.intp], Floats]:
@@ -176,30 +203,38 @@ def _looked_at(spline: ToolSpline) -> tuple[NDArray[np.intp], Floats]:
     return piece, np.tile(np.linspace(0.0, 1.0, _LOOKS), n) * np.diff(spline.times)[piece]
 
 
-def _check_sizes(reach: Reach, spline: ToolSpline, looks: tuple[NDArray[np.intp], Floats],
-                 first: int) -> None:
+def _check_sizes(
+    reach: Reach, spline: ToolSpline, looks: tuple[NDArray[np.intp], Floats], first: int
+) -> None:
     """Refuse pieces that turn either way round, or on which rates carry the tool far away."""
     n = len(spline.positions)
     x, turn = spline.vectors(*looks)
     x = x.reshape(n, _LOOKS, 3)
-    detour = (np.linalg.norm(np.diff(x, axis=1), axis=2).sum(axis=1)
-              - np.linalg.norm(x[:, -1] - x[:, 0], axis=1))
+    detour = np.linalg.norm(np.diff(x, axis=1), axis=2).sum(axis=1) - np.linalg.norm(
+        x[:, -1] - x[:, 0], axis=1
+    )
     angles = np.linalg.norm(turn, axis=1).reshape(n, _LOOKS)
     k = int(np.argmax(angles[:, -1]))
     if angles[k, -1] > pi - HALF_TURN:
         raise InvalidGoal(
-            point_field(first + k, 'pose.orientation'), f'turns the tool by '
+            point_field(first + k, 'pose.orientation'),
+            f'turns the tool by '
             f'{degrees(angles[k, -1]):.2f} degrees on the way, and either way round is as short',
-            'add a point in between')
+            'add a point in between',
+        )
     for sizes, most, what, unit in (
-            (detour, farthest_way(reach), 'a detour of', 'm'),
-            (angles.max(axis=1), _FARTHEST_TURN, 'a turn by up to', 'rad')):
+        (detour, farthest_way(reach), 'a detour of', 'm'),
+        (angles.max(axis=1), _FARTHEST_TURN, 'a turn by up to', 'rad'),
+    ):
         k = int(np.argmax(sizes > most))
         if sizes[k] > most:
             raise InvalidGoal(
-                point_field(first + k), f'and the point before it ask for {what} {sizes[k]:.3g} '
+                point_field(first + k),
+                f'and the point before it ask for {what} {sizes[k]:.3g} '
                 f'{unit} in between, by their twists and accelerations; more than {most:.3g} '
-                f'{unit} make no sense', 'check units, directions, and the time in between')
+                f'{unit} make no sense',
+                'check units, directions, and the time in between',
+            )
 
 
 def _places(spline: ToolSpline, looks: tuple[NDArray[np.intp], Floats], first: int) -> Places:
@@ -209,17 +244,25 @@ def _places(spline: ToolSpline, looks: tuple[NDArray[np.intp], Floats], first: i
     def largest(vectors: Floats) -> Floats:
         most: Floats = np.linalg.norm(vectors, axis=1).reshape(n, _LOOKS).max(axis=1)
         return most
-    steps = _FASTER * np.max([
-        h * largest(rows.twists[:, :3]) / STEP_LENGTH,
-        h * largest(rows.twists[:, 3:]) / STEP_ANGLE,
-        h * np.sqrt(largest(rows.accelerations[:, :3]) / (8.0 * ARC_CHORD_ERROR))], axis=0)
+
+    steps = _FASTER * np.max(
+        [
+            h * largest(rows.twists[:, :3]) / STEP_LENGTH,
+            h * largest(rows.twists[:, 3:]) / STEP_ANGLE,
+            h * np.sqrt(largest(rows.accelerations[:, :3]) / (8.0 * ARC_CHORD_ERROR)),
+        ],
+        axis=0,
+    )
     count = np.maximum(np.ceil(steps), np.minimum(LEAST_PLACES, np.ceil(1.25 * steps) + 1.0))
     if count.sum() > MOST_PLACES:
         k = int(np.argmax(count))
         raise InvalidGoal(
-            'trajectory.points', f'ask for a way so long, or so fast (most of all to points'
+            'trajectory.points',
+            f'ask for a way so long, or so fast (most of all to points'
             f'[{first + k}]), that it would have to be looked at in {count.sum():.3g} places, '
-            f'more than {MOST_PLACES:,}', 'check twists and accelerations, or split the goal')
+            f'more than {MOST_PLACES:,}',
+            'check twists and accelerations, or split the goal',
+        )
     count = count.astype(np.intp)
     piece = np.repeat(np.arange(n), count)
     number = np.arange(1, len(piece) + 1) - np.repeat(np.cumsum(count) - count, count)
@@ -234,13 +277,17 @@ def _pieces(spline: ToolSpline, places: Places, first: int) -> list[Piece]:
     begins = np.searchsorted(places.piece, np.arange(n))
     before = np.concatenate([places.poses[:1], places.poses[:-1]])
     before[begins] = starts
-    lengths = np.bincount(places.piece, np.linalg.norm(
-        places.poses[:, :3] - before[:, :3], axis=1))
+    lengths = np.bincount(
+        places.piece, np.linalg.norm(places.poses[:, :3] - before[:, :3], axis=1)
+    )
     angles = np.bincount(places.piece, angle_rows(before[:, 3:], places.poses[:, 3:]))
     counts = np.bincount(places.piece)
-    return [Piece(first + k, ToolCurve(spline, k, length, angle), 0.0, 1.0, count)
-            for k, (length, angle, count) in enumerate(zip(
-                lengths.tolist(), angles.tolist(), counts.tolist(), strict=True))]
+    return [
+        Piece(first + k, ToolCurve(spline, k, length, angle), 0.0, 1.0, count)
+        for k, (length, angle, count) in enumerate(
+            zip(lengths.tolist(), angles.tolist(), counts.tolist(), strict=True)
+        )
+    ]
 
 
 def _sum(steps: Floats) -> Floats:

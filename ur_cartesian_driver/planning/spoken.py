@@ -28,8 +28,9 @@ from ur_cartesian_driver.protocol.dialects import Dialect
 from ur_cartesian_driver.protocol.trajectory import motion_type, MotionType
 
 
-def spoken(primitive: Primitive, point: int, joints: Joints, options: PlanningOptions
-           ) -> tuple[Primitive, str]:
+def spoken(
+    primitive: Primitive, point: int, joints: Joints, options: PlanningOptions
+) -> tuple[Primitive, str]:
     """
     Return a primitive in the words of the dialect, and why they are others; '' where they are not.
 
@@ -47,19 +48,25 @@ def spoken(primitive: Primitive, point: int, joints: Joints, options: PlanningOp
         primitive = replace(primitive, q_near=None)  # the robot would not look at it
     if motion_type(primitive) not in dialect.motion_types:
         raise NotAvailable(
-            segment_field(point, 'type'), f'needs {motion_type(primitive).name}, which robot '
+            segment_field(point, 'type'),
+            f'needs {motion_type(primitive).name}, which robot '
             f'programs of wire dialect {dialect.name} do not know',
-            'use LINEAR or JOINT' if isinstance(primitive, OptimoveJ | OptimoveL)
-            else 'use a newer program and wire_dialect')
+            'use LINEAR or JOINT'
+            if isinstance(primitive, OptimoveJ | OptimoveL)
+            else 'use a newer program and wire_dialect',
+        )
     return primitive, why
 
 
 def _check_calibration(primitive: Primitive, point: int, options: PlanningOptions) -> None:
     if not options.calibration_known:
         raise NotAvailable(
-            segment_field(point, 'type'), f'is a joint motion ({type(primitive).__name__}), for '
+            segment_field(point, 'type'),
+            f'is a joint motion ({type(primitive).__name__}), for '
             f'which wire dialect {options.dialect.name} takes joint positions only, and the '
-            'calibration of the robot, from which they follow, is not known', 'use LINEAR')
+            'calibration of the robot, from which they follow, is not known',
+            'use LINEAR',
+        )
 
 
 def poses_only(options: PlanningOptions) -> str:
@@ -75,7 +82,9 @@ def spoken_radius(radius: float, point: int, dialect: Dialect, remarks: list[str
     """Return a blend radius that the wire carries [m]."""
     whole = dialect.whole_radius(radius)
     if whole < radius - 1e-6:
-        remarks.append(f'point {point}: blend of {1e3 * whole:g} mm instead of '
-                       f'{1e3 * radius:g} mm, because wire dialect {dialect.name} counts in '
-                       f'{1e3 / dialect.time_scale:g} mm')
+        remarks.append(
+            f'point {point}: blend of {1e3 * whole:g} mm instead of '
+            f'{1e3 * radius:g} mm, because wire dialect {dialect.name} counts in '
+            f'{1e3 / dialect.time_scale:g} mm'
+        )
     return whole

@@ -61,7 +61,8 @@ class Survey:
             segment=np.concatenate([seen.segments for seen in self._seen]),
             fraction=np.concatenate([seen.fractions for seen in self._seen]),
             q=np.concatenate([seen.found.q for seen in self._seen]),
-            poses=np.concatenate([seen.found.poses for seen in self._seen]))
+            poses=np.concatenate([seen.found.poses for seen in self._seen]),
+        )
 
     def nearest(self) -> dict[int, Nearest]:
         """Return what comes nearest to its bound, by segment."""
@@ -74,15 +75,25 @@ class Survey:
         limits = np.array(self._arm.model.max_joint_speed)
         parts = [_paces(seen, limits) for seen in self._seen]
         segment, time, joint, fraction, burden, quick = (
-            np.concatenate(column) for column in zip(*parts, strict=True))
+            np.concatenate(column) for column in zip(*parts, strict=True)
+        )
         order = np.lexsort((time, segment))
         bounds = np.flatnonzero(np.diff(segment[order], append=segment[order[-1]] + 1))
         last = order[bounds]
         quickest = np.minimum.reduceat(quick[order], np.concatenate([[0], bounds[:-1] + 1]))
-        columns = (time[last], joint[last], fraction[last], np.minimum(quickest, time[last]),
-                   np.bincount(segment, burden)[segment[last]])
-        return {index: Pace(*row) for index, *row in zip(
-            segment[last].tolist(), *(column.tolist() for column in columns), strict=True)}
+        columns = (
+            time[last],
+            joint[last],
+            fraction[last],
+            np.minimum(quickest, time[last]),
+            np.bincount(segment, burden)[segment[last]],
+        )
+        return {
+            index: Pace(*row)
+            for index, *row in zip(
+                segment[last].tolist(), *(column.tolist() for column in columns), strict=True
+            )
+        }
 
 
 class _Paces(NamedTuple):
@@ -117,12 +128,14 @@ def _paces(seen: Surveyed, limits: Floats) -> _Paces:
     rounds = np.flatnonzero(joining > 0.0)
     burden[rounds] *= 0.5
     quick[rounds] = np.inf
-    return _Paces(np.concatenate([index, index[rounds] + 1]),
-                  np.concatenate([pace / leaving, pace[rounds] / joining[rounds]]),
-                  np.concatenate([joint, joint[rounds]]),
-                  np.concatenate([seen.fractions, seen.fractions[rounds]]),
-                  np.concatenate([burden, burden[rounds]]),
-                  np.concatenate([quick, quick[rounds]]))
+    return _Paces(
+        np.concatenate([index, index[rounds] + 1]),
+        np.concatenate([pace / leaving, pace[rounds] / joining[rounds]]),
+        np.concatenate([joint, joint[rounds]]),
+        np.concatenate([seen.fractions, seen.fractions[rounds]]),
+        np.concatenate([burden, burden[rounds]]),
+        np.concatenate([quick, quick[rounds]]),
+    )
 
 
 def _rates(pieces: Sequence[Piece]) -> tuple[Floats, Floats]:

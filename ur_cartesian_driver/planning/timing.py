@@ -56,16 +56,20 @@ def schedule(legs: Sequence[Leg], options: PlanningOptions, model: RobotModel) -
     :raises InvalidGoal: a speed is too low for the wire.
     """
     measures = [measure(leg) for leg in legs]
-    timings = [_first_guess(leg, length, unit, options, model)
-               for leg, (length, unit) in zip(legs, measures, strict=True)]
-    derived = [k for k, leg in enumerate(legs)
-               if leg.time is not None and not _takes_time(leg.kind, options)]
+    timings = [
+        _first_guess(leg, length, unit, options, model)
+        for leg, (length, unit) in zip(legs, measures, strict=True)
+    ]
+    derived = [
+        k
+        for k, leg in enumerate(legs)
+        if leg.time is not None and not _takes_time(leg.kind, options)
+    ]
     # The time in a corner depends on the speeds on both of its sides, so go round a few times.
     for _ in range(_ROUNDS if any(is_blended(legs[k]) for k in derived) else 1):
         changed = 0.0
         for k in derived:
-            new = _for_time(legs[k], measures[k], _corner_time(legs, timings, k),
-                            options, model)
+            new = _for_time(legs[k], measures[k], _corner_time(legs, timings, k), options, model)
             changed = max(changed, abs(new.velocity / timings[k].velocity - 1.0))
             timings[k] = new
         if changed < 1e-6:
@@ -75,28 +79,40 @@ def schedule(legs: Sequence[Leg], options: PlanningOptions, model: RobotModel) -
     for k in range(1, len(legs)):
         if legs[k].before is not None and legs[k].time is None:
             timings[k] = _from_corner(legs, timings, k)
-    corners = [corner_duration(legs[k], timings[k], legs[k + 1], timings[k + 1])
-               if legs[k].after is not None else 0.0 for k in range(len(legs))]
-    return [_whole(leg, timing, before, after) for leg, timing, before, after in zip(
-        legs, timings, [0.0, *corners[:-1]], corners, strict=True)]
+    corners = [
+        corner_duration(legs[k], timings[k], legs[k + 1], timings[k + 1])
+        if legs[k].after is not None
+        else 0.0
+        for k in range(len(legs))
+    ]
+    return [
+        _whole(leg, timing, before, after)
+        for leg, timing, before, after in zip(
+            legs, timings, [0.0, *corners[:-1]], corners, strict=True
+        )
+    ]
 
 
 def _check_wire(leg: Leg, timing: Timing, options: PlanningOptions) -> None:
     """Refuse what would be zero on the wire, or next to it, and times that it does not carry."""
     if timing.wire_time > options.max_segment_time:
         raise InvalidGoal(
-            point_field(leg.index), f'would be approached in {timing.wire_time:.4g} s, more than '
+            point_field(leg.index),
+            f'would be approached in {timing.wire_time:.4g} s, more than '
             f'max_segment_time = {options.max_segment_time:.0f} s',
-            'raise velocity or acceleration')
+            'raise velocity or acceleration',
+        )
     if timing.wire_time > 0.0:
         return
     unit = speed_unit(timing.unit)
     for value, name in ((timing.velocity, unit), (timing.acceleration, f'{unit}^2')):
         if value < LEAST_SPEED:
             raise InvalidGoal(
-                point_field(leg.index), f'would be approached with {value:.2g} {name}, less than '
+                point_field(leg.index),
+                f'would be approached with {value:.2g} {name}, less than '
                 f'the {LEAST_SPEED:g} that the robot can be told',
-                'give it less time' if leg.time else 'raise velocity or acceleration')
+                'give it less time' if leg.time else 'raise velocity or acceleration',
+            )
 
 
 def _from_corner(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> Timing:
@@ -109,12 +125,21 @@ def _from_corner(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> Timi
     before, old = timings[k - 1].profile, timings[k].profile
     r1 = (1.0 - legs[k - 1].u_after) * before.length / legs[k - 1].share
     r2 = legs[k].u_before * old.length / legs[k].share
-    pace = max(before.leave / (2.0 * r1),
-               sqrt(min(before.acceleration / r1, old.acceleration / r2) / 2.0))
-    enter = min(timings[k].velocity, 2.0 * r2 * pace, sqrt(
-        2.0 * old.acceleration * old.length + old.leave ** 2))
-    profile = trapezoid(old.length, timings[k].velocity, old.acceleration, enter,
-                        0.5 * old.leave ** 2 / old.acceleration)
+    pace = max(
+        before.leave / (2.0 * r1), sqrt(min(before.acceleration / r1, old.acceleration / r2) / 2.0)
+    )
+    enter = min(
+        timings[k].velocity,
+        2.0 * r2 * pace,
+        sqrt(2.0 * old.acceleration * old.length + old.leave**2),
+    )
+    profile = trapezoid(
+        old.length,
+        timings[k].velocity,
+        old.acceleration,
+        enter,
+        0.5 * old.leave**2 / old.acceleration,
+    )
     return _with(timings[k], profile)
 
 
@@ -134,9 +159,17 @@ def _whole(leg: Leg, timing: Timing, before: float, after: float) -> Timing:
 
 def _with(timing: Timing, profile: Profile, duration: float = 0.0, corner: float = 0.0) -> Timing:
     """Return the timing with another profile; ``replace`` takes twice as long, for each leg."""
-    return Timing(velocity=timing.velocity, acceleration=timing.acceleration,
-                  wire_time=timing.wire_time, unit=timing.unit, profile=profile,
-                  duration=duration, corner=corner, reason=timing.reason, remark=timing.remark)
+    return Timing(
+        velocity=timing.velocity,
+        acceleration=timing.acceleration,
+        wire_time=timing.wire_time,
+        unit=timing.unit,
+        profile=profile,
+        duration=duration,
+        corner=corner,
+        reason=timing.reason,
+        remark=timing.remark,
+    )
 
 
 def _takes_time(kind: SegmentType, options: PlanningOptions) -> bool:
@@ -165,8 +198,9 @@ def _tail(leg: Leg, length: float) -> float:
     return length * (1.0 - leg.u_after)
 
 
-def _first_guess(leg: Leg, length: float, unit: str, options: PlanningOptions,
-                 model: RobotModel) -> Timing:
+def _first_guess(
+    leg: Leg, length: float, unit: str, options: PlanningOptions, model: RobotModel
+) -> Timing:
     if leg.time is None:
         return _by_speed(leg, length, unit, options, model)
     if _takes_time(leg.kind, options):
@@ -177,8 +211,9 @@ def _first_guess(leg: Leg, length: float, unit: str, options: PlanningOptions,
 # -- speeds ---------------------------------------------------------------------------------------
 
 
-def _by_speed(leg: Leg, length: float, unit: str, options: PlanningOptions,
-              model: RobotModel) -> Timing:
+def _by_speed(
+    leg: Leg, length: float, unit: str, options: PlanningOptions, model: RobotModel
+) -> Timing:
     """Return the timing of a leg without a time."""
     wanted, reason = _wanted_speed(leg, unit, options)
     acceleration = leg.segment.acceleration or _default_acceleration(leg, unit, options)
@@ -191,15 +226,26 @@ def _by_speed(leg: Leg, length: float, unit: str, options: PlanningOptions,
     velocity = min(wanted, limits.speed)
     remark = ''
     if velocity < wanted:
-        remark = (f'point {leg.index}: slowed from {wanted:.3g} to {velocity:.3g} '
-                  f'{speed_unit(unit)} by {limits.name}')
+        remark = (
+            f'point {leg.index}: slowed from {wanted:.3g} to {velocity:.3g} '
+            f'{speed_unit(unit)} by {limits.name}'
+        )
     rate = acceleration
     if is_optimized(leg.kind):
         rate *= _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed)
-    profile = trapezoid(length * leg.share, velocity, rate,
-                        inf if leg.before else 0.0, _tail(leg, length))
-    return Timing(velocity=velocity, acceleration=acceleration, wire_time=0.0, unit=unit,
-                  profile=profile, duration=profile.duration, reason=reason, remark=remark)
+    profile = trapezoid(
+        length * leg.share, velocity, rate, inf if leg.before else 0.0, _tail(leg, length)
+    )
+    return Timing(
+        velocity=velocity,
+        acceleration=acceleration,
+        wire_time=0.0,
+        unit=unit,
+        profile=profile,
+        duration=profile.duration,
+        reason=reason,
+        remark=remark,
+    )
 
 
 def _wanted_speed(leg: Leg, unit: str, options: PlanningOptions) -> tuple[float, str]:
@@ -219,8 +265,10 @@ def _wanted_speed(leg: Leg, unit: str, options: PlanningOptions) -> tuple[float,
     if unit == 'rad' and leg.kind != SegmentType.LINEAR:
         # One number for both: as rad/s the turn may have more, but never more than the tool may.
         fastest = options.max_tool_speed or options.angular_velocity
-        return (max(options.linear_velocity, min(options.angular_velocity, fastest)),
-                'it turns more than it moves')
+        return (
+            max(options.linear_velocity, min(options.angular_velocity, fastest)),
+            'it turns more than it moves',
+        )
     return options.linear_velocity, 'that is the default speed'
 
 
@@ -232,8 +280,14 @@ def _default_acceleration(leg: Leg, unit: str, options: PlanningOptions) -> floa
     return options.linear_acceleration if moves(leg) else options.angular_acceleration
 
 
-def _turning_line(leg: Leg, angle: float, velocity: float, acceleration: float, reason: str,
-                  options: PlanningOptions) -> Timing:
+def _turning_line(
+    leg: Leg,
+    angle: float,
+    velocity: float,
+    acceleration: float,
+    reason: str,
+    options: PlanningOptions,
+) -> Timing:
     """
     Return the timing of a line on which the turn leads.
 
@@ -242,26 +296,38 @@ def _turning_line(leg: Leg, angle: float, velocity: float, acceleration: float, 
     """
     remark = ''
     if 0.0 < options.max_tool_speed < velocity:
-        remark = (f'point {leg.index}: slowed from {velocity:.3g} to {options.max_tool_speed:.3g} '
-                  'm/s by max_tool_speed')
+        remark = (
+            f'point {leg.index}: slowed from {velocity:.3g} to {options.max_tool_speed:.3g} '
+            'm/s by max_tool_speed'
+        )
         velocity = options.max_tool_speed
-    time = max(least_time(leg.path.length, velocity, acceleration),
-               least_time(angle, options.angular_velocity, options.angular_acceleration))
+    time = max(
+        least_time(leg.path.length, velocity, acceleration),
+        least_time(angle, options.angular_velocity, options.angular_acceleration),
+    )
     profile = timed(angle * leg.share, time * leg.share, *_stands(leg))
     wire_time = time
     if not _takes_time(leg.kind, options):
         velocity, wire_time = profile.cruise, 0.0
         _, acceleration = peak_of(angle, time)
-    return Timing(velocity=velocity, acceleration=acceleration, wire_time=wire_time, unit='rad',
-                  profile=profile, duration=time, reason=f'{reason} and it turns on the way',
-                  remark=remark)
+    return Timing(
+        velocity=velocity,
+        acceleration=acceleration,
+        wire_time=wire_time,
+        unit='rad',
+        profile=profile,
+        duration=time,
+        reason=f'{reason} and it turns on the way',
+        remark=remark,
+    )
 
 
 # -- times ----------------------------------------------------------------------------------------
 
 
-def _by_time(leg: Leg, length: float, unit: str, options: PlanningOptions,
-             model: RobotModel) -> Timing:
+def _by_time(
+    leg: Leg, length: float, unit: str, options: PlanningOptions, model: RobotModel
+) -> Timing:
     """Return the timing of a leg for which the wire carries the time."""
     assert leg.time is not None
     limits = limits_of(leg, length, options, model)
@@ -272,12 +338,26 @@ def _by_time(leg: Leg, length: float, unit: str, options: PlanningOptions,
     profile = timed(length * leg.share, time * leg.share, *_stands(leg))
     # The robot ignores speed and acceleration when it has a time; they say what it will need.
     velocity, acceleration = peak_of(length, time)
-    return Timing(velocity=velocity, acceleration=acceleration, wire_time=time, unit=unit,
-                  profile=profile, duration=time, reason=_TIME_SAYS_SO, remark=remark)
+    return Timing(
+        velocity=velocity,
+        acceleration=acceleration,
+        wire_time=time,
+        unit=unit,
+        profile=profile,
+        duration=time,
+        reason=_TIME_SAYS_SO,
+        remark=remark,
+    )
 
 
-def _for_time(leg: Leg, measured: tuple[float, str], in_corners: float, options: PlanningOptions,
-              model: RobotModel, strict: bool = True) -> Timing:
+def _for_time(
+    leg: Leg,
+    measured: tuple[float, str],
+    in_corners: float,
+    options: PlanningOptions,
+    model: RobotModel,
+    strict: bool = True,
+) -> Timing:
     """
     Return the timing of a leg that has to meet a time by its speed.
 
@@ -297,18 +377,28 @@ def _for_time(leg: Leg, measured: tuple[float, str], in_corners: float, options:
     acceleration = _own_acceleration(leg) or max(
         _default_acceleration(leg, unit, options),
         # A third each of speeding up, cruising and braking; and no braking before a blend.
-        min(bound, 4.5 * way / between ** 2),
-        min(bound, (way / between) ** 2 / tail if 0.0 < tail < inf else 0.0))
+        min(bound, 4.5 * way / between**2),
+        min(bound, (way / between) ** 2 / tail if 0.0 < tail < inf else 0.0),
+    )
     velocity = cruise_for(way, between, acceleration, sum(_stands(leg)))
     if velocity is None:  # only before the corners are known, or within rounding
         velocity = 2.0 * way / between
     profile = trapezoid(way, velocity, acceleration, inf if leg.before else 0.0, tail)
-    return Timing(velocity=velocity, acceleration=acceleration, wire_time=0.0, unit=unit,
-                  profile=profile, duration=time, reason=_TIME_SAYS_SO, remark=remark)
+    return Timing(
+        velocity=velocity,
+        acceleration=acceleration,
+        wire_time=0.0,
+        unit=unit,
+        profile=profile,
+        duration=time,
+        reason=_TIME_SAYS_SO,
+        remark=remark,
+    )
 
 
-def _slowed(leg: Leg, length: float, unit: str, least: float, limits: Limits,
-            options: PlanningOptions) -> tuple[float, str]:
+def _slowed(
+    leg: Leg, length: float, unit: str, least: float, limits: Limits, options: PlanningOptions
+) -> tuple[float, str]:
     """Return the time that the limits allow and the remark, or refuse."""
     assert leg.time is not None
     if least > options.max_segment_time:
@@ -316,10 +406,13 @@ def _slowed(leg: Leg, length: float, unit: str, least: float, limits: Limits,
             point_field(leg.index, 'time_from_start'),
             f'gives the segment {leg.time:.3f} s, but because of {limits.name} it takes '
             f'{least:.0f} s, more than max_segment_time = {options.max_segment_time:.0f} s',
-            'go around the place where it has to be slow, or use a JOINT segment')
+            'go around the place where it has to be slow, or use a JOINT segment',
+        )
     if options.on_too_fast == 'slow':
-        return least, (f'point {leg.index}: takes {least:.3f} s instead of {leg.time:.3f} s, '
-                       f'because of {limits.name}')
+        return least, (
+            f'point {leg.index}: takes {least:.3f} s instead of {leg.time:.3f} s, '
+            f'because of {limits.name}'
+        )
     speed, acceleration = peak_of(length, leg.time)
     raise TooFast(
         point_field(leg.index, 'time_from_start'),
@@ -327,7 +420,8 @@ def _slowed(leg: Leg, length: float, unit: str, least: float, limits: Limits,
         f'{speed:.3f} {speed_unit(unit)} and {acceleration:.3f} {speed_unit(unit)}^2; '
         f'allowed are {limits.speed:.3f} {speed_unit(unit)} ({limits.name}) and '
         f'{_bound(leg, limits):.3f} {speed_unit(unit)}^2',
-        f'give it at least {ceil(1e3 * least) / 1e3:.3f} s, or set on_too_fast to slow')
+        f'give it at least {ceil(1e3 * least) / 1e3:.3f} s, or set on_too_fast to slow',
+    )
 
 
 def _least_by_speed(leg: Leg, way: float, speed: float, acceleration: float) -> float:
@@ -360,7 +454,11 @@ def _corner_time(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> floa
 def corner_duration(first: Leg, timing: Timing, second: Leg, next_timing: Timing) -> float:
     """Return the time in the corner between two legs [s]; the tool's speed changes evenly."""
     assert first.after is not None
-    speeds = (timing.profile.leave * first.path.length / timing.profile.length * first.share
-              + next_timing.profile.enter * second.path.length / next_timing.profile.length
-              * second.share)
+    speeds = (
+        timing.profile.leave * first.path.length / timing.profile.length * first.share
+        + next_timing.profile.enter
+        * second.path.length
+        / next_timing.profile.length
+        * second.share
+    )
     return 2.0 * first.after.length / max(speeds, 1e-9)

@@ -11,8 +11,14 @@ from ur_cartesian_driver.motion.pose import Vector3, Vector6
 from ur_cartesian_driver.planning.options import PlanningOptions
 
 #: What tolerances limit, as in the names of the parameters ``path_tolerance_...``.
-_QUANTITIES = ('position', 'orientation', 'linear_velocity', 'angular_velocity',
-               'linear_acceleration', 'angular_acceleration')
+_QUANTITIES = (
+    'position',
+    'orientation',
+    'linear_velocity',
+    'angular_velocity',
+    'linear_acceleration',
+    'angular_acceleration',
+)
 
 
 def tolerances_of(goal: Goal) -> tuple[tuple[str, Tolerance], tuple[str, Tolerance]]:
@@ -31,7 +37,8 @@ def with_default_tolerances(goal: Goal, options: PlanningOptions) -> Goal:
 def _filled(tolerance: Tolerance, name: str, options: PlanningOptions) -> Tolerance:
     """Return a tolerance with the parameters ``<name>_position`` ... in place of its zeros."""
     position, orientation, *rest = (
-        float(getattr(options, f'{name}_{quantity}')) for quantity in _QUANTITIES)
+        float(getattr(options, f'{name}_{quantity}')) for quantity in _QUANTITIES
+    )
     if not any((position, orientation, *rest)):
         return tolerance
 
@@ -47,4 +54,5 @@ def _filled(tolerance: Tolerance, name: str, options: PlanningOptions) -> Tolera
         position=three(tolerance.position, position),
         orientation=three(tolerance.orientation, orientation),
         twist=six(tolerance.twist, rest[0], rest[1]),
-        acceleration=six(tolerance.acceleration, rest[2], rest[3]))
+        acceleration=six(tolerance.acceleration, rest[2], rest[3]),
+    )

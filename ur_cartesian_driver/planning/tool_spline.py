@@ -77,12 +77,20 @@ class ToolSpline:
         between = quintic_rows if points.quintic else cubic_rows
         durations = np.diff(points.times)
         return cls(
-            times=points.times, orientations=orientations[begin],
-            positions=between(durations, Rates(x[begin], v[begin, :3], a[begin, :3]),
-                              Rates(x[end], v[end, :3], a[end, :3])),
+            times=points.times,
+            orientations=orientations[begin],
+            positions=between(
+                durations,
+                Rates(x[begin], v[begin, :3], a[begin, :3]),
+                Rates(x[end], v[end, :3], a[end, :3]),
+            ),
             # At the begin the vector is 0, and there its derivatives are the angular ones.
-            turns=between(durations, Rates(zero, v[begin, 3:], a[begin, 3:]),
-                          turn_of(turn, v[end, 3:], a[end, 3:])))
+            turns=between(
+                durations,
+                Rates(zero, v[begin, 3:], a[begin, 3:]),
+                turn_of(turn, v[end, 3:], a[end, 3:]),
+            ),
+        )
 
     def rows(self, piece: Ints, t: Floats) -> ToolRows:
         """
@@ -93,8 +101,11 @@ class ToolSpline:
         x, turn = evaluated(self.positions[piece], t), evaluated(self.turns[piece], t)
         w, e = angular(turn)
         turned = multiply_rows(exp_rows(turn.x), self.orientations[piece])
-        return ToolRows(np.concatenate([x.x, normalized_rows(turned)], axis=1),
-                        np.concatenate([x.v, w], axis=1), np.concatenate([x.a, e], axis=1))
+        return ToolRows(
+            np.concatenate([x.x, normalized_rows(turned)], axis=1),
+            np.concatenate([x.v, w], axis=1),
+            np.concatenate([x.a, e], axis=1),
+        )
 
     def vectors(self, piece: Ints, t: Floats) -> tuple[Floats, Floats]:
         """Return positions [m] and rotation vectors since the piece began [rad] (m, 3)."""
@@ -102,8 +113,9 @@ class ToolSpline:
 
     def at(self, times: Floats) -> ToolRows:
         """Return the tool at times (m,) [s]; where two pieces meet on the second one."""
-        piece = np.clip(np.searchsorted(self.times, times, side='right') - 1,
-                        0, len(self.positions) - 1)
+        piece = np.clip(
+            np.searchsorted(self.times, times, side='right') - 1, 0, len(self.positions) - 1
+        )
         return self.rows(piece, times - self.times[piece])
 
     def stretched(self, factor: float) -> ToolSpline:
@@ -111,8 +123,10 @@ class ToolSpline:
         powers = factor ** -np.arange(6.0)[:, None]
         return ToolSpline(
             times=self.times[0] + factor * (self.times - self.times[0]),
-            positions=self.positions * powers, turns=self.turns * powers,
-            orientations=self.orientations)
+            positions=self.positions * powers,
+            turns=self.turns * powers,
+            orientations=self.orientations,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +141,7 @@ class ToolCurve:
 
     def rows(self, u: Floats) -> Floats:
         """Return the poses (n, 7) at many ``u`` (n,)."""
-        begin, end = self.spline.times[self.piece:self.piece + 2]
+        begin, end = self.spline.times[self.piece : self.piece + 2]
         return self.spline.rows(np.full(len(u), self.piece), u * (end - begin)).poses
 
     def pose(self, u: float) -> Pose:

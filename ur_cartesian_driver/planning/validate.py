@@ -113,15 +113,20 @@ def _number_of_points(goal: Goal, options: PlanningOptions) -> None:
     if count == 0:
         raise InvalidGoal('trajectory.points', 'is empty', 'give at least one point')
     if count > options.max_points:
-        raise InvalidGoal('trajectory.points', f'has {count} points, more than max_points = '
-                          f'{options.max_points}', 'split the goal or raise the parameter')
+        raise InvalidGoal(
+            'trajectory.points',
+            f'has {count} points, more than max_points = {options.max_points}',
+            'split the goal or raise the parameter',
+        )
 
 
 def _number_of_segments(goal: Goal, options: PlanningOptions) -> None:
     if goal.segments and len(goal.segments) != len(goal.waypoints):
         raise InvalidGoal(
-            'segments', f'has {len(goal.segments)} entries for {len(goal.waypoints)} points',
-            'give none, or exactly one for each point')
+            'segments',
+            f'has {len(goal.segments)} entries for {len(goal.waypoints)} points',
+            'give none, or exactly one for each point',
+        )
 
 
 def _known_numbers(goal: Goal, options: PlanningOptions) -> None:
@@ -132,8 +137,10 @@ def _known_numbers(goal: Goal, options: PlanningOptions) -> None:
 
 
 def _numbers_of_frames(goal: Goal, options: PlanningOptions) -> None:
-    for name, pose in (('trajectory.header.frame_id', goal.T_base_frame),
-                       ('trajectory.controlled_frame', goal.T_flange_controlled)):
+    for name, pose in (
+        ('trajectory.header.frame_id', goal.T_base_frame),
+        ('trajectory.controlled_frame', goal.T_flange_controlled),
+    ):
         if pose is not None:
             _check_finite(f'the pose of {name}', (*pose.position, *pose.quaternion))
             _check_unit(f'the orientation of {name}', pose.quaternion)
@@ -154,8 +161,9 @@ def _numbers_of_segments(goal: Goal, options: PlanningOptions) -> None:
             value = getattr(segment, field)
             _check_finite(segment_field(i, field), (value,))
             if value < 0.0:
-                raise InvalidGoal(segment_field(i, field),
-                                  f'is {value:g}; it must not be negative')
+                raise InvalidGoal(
+                    segment_field(i, field), f'is {value:g}; it must not be negative'
+                )
         if segment.via is not None:
             _check_finite(segment_field(i, 'via.position'), segment.via.position)
             _check_finite(segment_field(i, 'via.orientation'), segment.via.quaternion)
@@ -177,9 +185,12 @@ def _tolerances_are_measurable(goal: Goal, options: PlanningOptions) -> None:
     for name, tolerance in tolerances_of(with_default_tolerances(goal, options)):
         if max(tolerance.acceleration) > 0.0:
             raise InvalidGoal(
-                f'{name}.acceleration_error', 'is positive (or 0, and the parameters '
+                f'{name}.acceleration_error',
+                'is positive (or 0, and the parameters '
                 f'{name}_linear_acceleration, {name}_angular_acceleration are), but the software '
-                'of this robot does not report accelerations of the TCP', 'set it to -1')
+                'of this robot does not report accelerations of the TCP',
+                'set it to -1',
+            )
 
 
 def _stamp(goal: Goal, options: PlanningOptions) -> None:
@@ -190,27 +201,39 @@ def _stamp(goal: Goal, options: PlanningOptions) -> None:
     if age > options.stamp_tolerance:
         raise OldHeaderTimestamp(
             f'trajectory.header.stamp lies {age:.3f} s in the past, more than stamp_tolerance = '
-            f'{options.stamp_tolerance:g} s; send 0 for "now", or compare the clocks.')
+            f'{options.stamp_tolerance:g} s; send 0 for "now", or compare the clocks.'
+        )
     if age < -LARGEST_DELAY:
-        raise InvalidGoal('trajectory.header.stamp', f'lies {-age:.1f} s in the future, more than '
-                          f'{LARGEST_DELAY:g} s', 'send the goal later')
+        raise InvalidGoal(
+            'trajectory.header.stamp',
+            f'lies {-age:.1f} s in the future, more than {LARGEST_DELAY:g} s',
+            'send the goal later',
+        )
 
 
 def _available(goal: Goal, options: PlanningOptions) -> None:
     if goal.keep_open and not options.dialect.streams:
         raise NotAvailable(
-            'keep_open', 'is set, but a robot program of wire dialect '
+            'keep_open',
+            'is set, but a robot program of wire dialect '
             f'{options.dialect.name} has to know at the start how many points there are',
-            'send all points at once, or use a robot program of wire dialect 2.14')
+            'send all points at once, or use a robot program of wire dialect 2.14',
+        )
     if goal.keep_open and goal.execution == ExecutionMode.SERVO:
-        raise NotAvailable('keep_open', 'is set, but the points of a SERVO goal have to be known '
-                           'at its start', 'set execution to SPLINE or PRIMITIVES')
+        raise NotAvailable(
+            'keep_open',
+            'is set, but the points of a SERVO goal have to be known at its start',
+            'set execution to SPLINE or PRIMITIVES',
+        )
     check_outputs(goal, options)
     known = ('', options.tf_prefix + 'tool0_controller')
     if goal.T_flange_controlled is None and goal.controlled_frame not in known:
         raise InvalidGoal(
-            'trajectory.controlled_frame', f"is '{goal.controlled_frame}', and the goal does not "
-            'say where that is behind the flange', 'set T_flange_controlled, or leave it empty')
+            'trajectory.controlled_frame',
+            f"is '{goal.controlled_frame}', and the goal does not "
+            'say where that is behind the flange',
+            'set T_flange_controlled, or leave it empty',
+        )
 
 
 def _times(goal: Goal, options: PlanningOptions) -> None:
@@ -220,13 +243,17 @@ def _times(goal: Goal, options: PlanningOptions) -> None:
     for i, point in enumerate(goal.waypoints):
         if point.time < 0.0 or (i > 0 and point.time <= before):
             raise InvalidGoal(
-                point_field(i, 'time_from_start'), f'is {point.time:g} s after {before:g} s; '
-                'times must increase from point to point',
-                'correct it' if is_spline(goal) else 'or set all to 0 for speeds')
+                point_field(i, 'time_from_start'),
+                f'is {point.time:g} s after {before:g} s; times must increase from point to point',
+                'correct it' if is_spline(goal) else 'or set all to 0 for speeds',
+            )
         if point.time - before > options.max_segment_time:
             raise InvalidGoal(
-                point_field(i, 'time_from_start'), f'gives the segment {point.time - before:g} s, '
-                f'more than {options.max_segment_time:.0f} s', 'add points in between')
+                point_field(i, 'time_from_start'),
+                f'gives the segment {point.time - before:g} s, '
+                f'more than {options.max_segment_time:.0f} s',
+                'add points in between',
+            )
         before = point.time
 
 
@@ -235,23 +262,33 @@ def _spline(goal: Goal, options: PlanningOptions) -> None:
         return
     name = way_of_execution(goal).name
     if not is_timed(goal):
-        raise InvalidGoal('execution', f'is {name}, and the goal has no times',
-                          'give every point a time_from_start, or set execution to PRIMITIVES')
+        raise InvalidGoal(
+            'execution',
+            f'is {name}, and the goal has no times',
+            'give every point a time_from_start, or set execution to PRIMITIVES',
+        )
     _spline_can_be_sent(goal, name, options)
     before = 0.0
     for i, point in enumerate(goal.waypoints):
         if 0.0 < point.time < before + LEAST_SPLINE_TIME:
             raise InvalidGoal(
-                point_field(i, 'time_from_start'), f'gives the segment {point.time - before:g} s; '
-                f'pieces of splines take at least {LEAST_SPLINE_TIME:g} s', 'leave points out')
+                point_field(i, 'time_from_start'),
+                f'gives the segment {point.time - before:g} s; '
+                f'pieces of splines take at least {LEAST_SPLINE_TIME:g} s',
+                'leave points out',
+            )
         before = point.time
-        for field, values, most in (('pose.position', point.pose.position, FARTHEST_POINT),
-                                    ('twist', point.twist, LARGEST_TWIST),
-                                    ('acceleration', point.acceleration, LARGEST_ACCELERATION)):
+        for field, values, most in (
+            ('pose.position', point.pose.position, FARTHEST_POINT),
+            ('twist', point.twist, LARGEST_TWIST),
+            ('acceleration', point.acceleration, LARGEST_ACCELERATION),
+        ):
             if any(abs(value) > most for value in values):
-                raise InvalidGoal(point_field(i, field), f'contains a number beyond {most:g}, far '
-                                  'more than any of these robots can do', 'check the units: '
-                                  'metres, radians, seconds')
+                raise InvalidGoal(
+                    point_field(i, field),
+                    f'contains a number beyond {most:g}, far more than any of these robots can do',
+                    'check the units: metres, radians, seconds',
+                )
     for i, segment in enumerate(goal.segments):
         if segment is not PLAIN:
             _spline_segment(i, segment, name)
@@ -265,42 +302,58 @@ def _spline_can_be_sent(goal: Goal, name: str, options: PlanningOptions) -> None
     remedy = 'set execution to PRIMITIVES'
     if not options.calibration_known:
         raise NotAvailable(
-            'execution', f'is {name}, for which joint positions are sent, and the calibration of '
-            'the robot, from which they follow, is not known', remedy)
+            'execution',
+            f'is {name}, for which joint positions are sent, and the calibration of '
+            'the robot, from which they follow, is not known',
+            remedy,
+        )
     if goal.execution == ExecutionMode.SERVO:
         if options.dialect is not NEWEST:
             raise NotAvailable(
-                'execution', f'is {name}, which robot programs of wire dialect '
-                f'{options.dialect.name} do not know', remedy)
+                'execution',
+                f'is {name}, which robot programs of wire dialect '
+                f'{options.dialect.name} do not know',
+                remedy,
+            )
         if goal.io_commands:
-            raise NotAvailable('io_commands', f'is not empty, and {name} switches no outputs',
-                               'set execution to SPLINE or PRIMITIVES')
+            raise NotAvailable(
+                'io_commands',
+                f'is not empty, and {name} switches no outputs',
+                'set execution to SPLINE or PRIMITIVES',
+            )
     elif options.dialect.is_coarse:
         raise NotAvailable(
-            'execution', f'is {name}, and robot programs of wire dialect {options.dialect.name} '
-            'count in milliseconds, too coarse for splines', remedy)
+            'execution',
+            f'is {name}, and robot programs of wire dialect {options.dialect.name} '
+            'count in milliseconds, too coarse for splines',
+            remedy,
+        )
 
 
 def _spline_segment(index: int, segment: Segment, name: str) -> None:
     kind = SegmentType(segment.type)
     if kind not in (SegmentType.AUTO, SegmentType.LINEAR):
         raise InvalidGoal(
-            segment_field(index, 'type'), f'is {kind.name}, but the execution is {name}, in which '
-            'a spline joins the points', 'set it to AUTO, or set execution to PRIMITIVES, which '
-            'ignores twists and accelerations at points')
+            segment_field(index, 'type'),
+            f'is {kind.name}, but the execution is {name}, in which a spline joins the points',
+            'set it to AUTO, or set execution to PRIMITIVES, which '
+            'ignores twists and accelerations at points',
+        )
     if segment.blend_radius > 0.0:
         raise InvalidGoal(
-            segment_field(index, 'blend_radius'), f'is {segment.blend_radius:g}, but the '
-            f'execution is {name}: the spline goes through the point', 'set it to 0, or set '
-            'execution to PRIMITIVES, which ignores twists and accelerations at points')
+            segment_field(index, 'blend_radius'),
+            f'is {segment.blend_radius:g}, but the '
+            f'execution is {name}: the spline goes through the point',
+            'set it to 0, or set '
+            'execution to PRIMITIVES, which ignores twists and accelerations at points',
+        )
 
 
 def _check_rests(goal: Goal, index: int, why: str) -> None:
     point = goal.waypoints[index]
     for field, values in (('twist', point.twist), ('acceleration', point.acceleration)):
         if any(value != 0.0 and not isnan(value) for value in values):
-            raise InvalidGoal(point_field(index, field), f'is not zero, but {why}',
-                              'set it to 0')
+            raise InvalidGoal(point_field(index, field), f'is not zero, but {why}', 'set it to 0')
 
 
 def _segment_rules(goal: Goal, options: PlanningOptions) -> None:
@@ -309,9 +362,12 @@ def _segment_rules(goal: Goal, options: PlanningOptions) -> None:
         if segment is not PLAIN:
             if is_optimized(SegmentType(segment.type)) and not options.optimove_known:
                 raise NotAvailable(
-                    segment_field(i, 'type'), f'is {SegmentType(segment.type).name}, which the '
+                    segment_field(i, 'type'),
+                    f'is {SegmentType(segment.type).name}, which the '
                     'software of this robot does not know; it came with PolyScope 5.21 and '
-                    'PolyScope X 10.8', 'use LINEAR or JOINT')
+                    'PolyScope X 10.8',
+                    'use LINEAR or JOINT',
+                )
             _speeds(i, segment, timed)
             _via(i, segment)
 
@@ -330,9 +386,13 @@ def _blends(goal: Goal, options: PlanningOptions) -> None:
         return
     last = len(goal.waypoints) - 1
     for i in range(1, len(goal.segments)):
-        check_blends_fit(goal, i, goal.waypoints[i - 1].pose.distance_to(goal.waypoints[i].pose),
-                         goal.segments[i - 1].blend_radius,
-                         0.0 if i == last else goal.segments[i].blend_radius)
+        check_blends_fit(
+            goal,
+            i,
+            goal.waypoints[i - 1].pose.distance_to(goal.waypoints[i].pose),
+            goal.segments[i - 1].blend_radius,
+            0.0 if i == last else goal.segments[i].blend_radius,
+        )
 
 
 def _ways(goal: Goal, options: PlanningOptions) -> None:
@@ -377,8 +437,12 @@ RULES: tuple[Rule, ...] = (
 
 def is_straight(kind: SegmentType) -> bool:
     """Tell whether the tool goes on a straight line."""
-    return kind in (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.PROCESS,
-                    SegmentType.OPTIMIZED_LINEAR)
+    return kind in (
+        SegmentType.AUTO,
+        SegmentType.LINEAR,
+        SegmentType.PROCESS,
+        SegmentType.OPTIMIZED_LINEAR,
+    )
 
 
 def is_optimized(kind: SegmentType) -> bool:
@@ -395,23 +459,31 @@ def check_posture(field: str, posture: Posture, tf_prefix: str) -> None:
     """
     names, values = posture.names, posture.values
     if len(names) != len(values):
-        raise InvalidJoints(f'{field} has {len(names)} joint names and {len(values)} values; '
-                            'give one value for each name.')
+        raise InvalidJoints(
+            f'{field} has {len(names)} joint names and {len(values)} values; '
+            'give one value for each name.'
+        )
     known = [tf_prefix + name for name in JOINT_NAMES]
     for k, (name, value) in enumerate(zip(names, values, strict=True)):
         if name not in known:
-            raise InvalidJoints(f"{field}.posture_joint_names[{k}] is '{name}', which is no joint "
-                                f'of this robot; its joints are {", ".join(known)}.')
+            raise InvalidJoints(
+                f"{field}.posture_joint_names[{k}] is '{name}', which is no joint "
+                f'of this robot; its joints are {", ".join(known)}.'
+            )
         if name in names[:k]:
-            raise InvalidJoints(f"{field}.posture_joint_names[{k}] names '{name}' for the second "
-                                'time; name each joint once.')
+            raise InvalidJoints(
+                f"{field}.posture_joint_names[{k}] names '{name}' for the second "
+                'time; name each joint once.'
+            )
         if not isfinite(value):
-            raise InvalidJoints(f"{field}.posture_joint_values[{k}] ('{name}') is {value}; "
-                                'it must be finite.')
+            raise InvalidJoints(
+                f"{field}.posture_joint_values[{k}] ('{name}') is {value}; it must be finite."
+            )
         if abs(value) > LARGEST_JOINT_VALUE:
             raise InvalidJoints(
                 f"{field}.posture_joint_values[{k}] ('{name}') is {value:g} rad, more than any "
-                'joint can turn; joint values are radians, not degrees.')
+                'joint can turn; joint values are radians, not degrees.'
+            )
 
 
 def check_blends_fit(goal: Goal, index: int, apart: float, before: float, after: float) -> None:
@@ -428,7 +500,8 @@ def check_blends_fit(goal: Goal, index: int, apart: float, before: float, after:
             segment_field(index if after > 0.0 else index - 1, 'blend_radius'),
             f'is too large: the blends around points {index - 1} and {index} reach '
             f'{1e3 * before:g} mm and {1e3 * after:g} mm into a segment of {1e3 * apart:.3f} mm',
-            'make them smaller')
+            'make them smaller',
+        )
 
 
 def arc_of(index: int, start: Pose, via: Pose, end: Pose, mode: ArcMode) -> Arc:
@@ -440,8 +513,11 @@ def arc_of(index: int, start: Pose, via: Pose, end: Pose, mode: ArcMode) -> Arc:
     try:
         return Arc.through(start, via.position, end, mode)
     except ValueError as error:
-        raise InvalidGoal(segment_field(index, 'via'), f'gives no arc to point {index}: {error}',
-                          'move the via off the line, or use LINEAR') from None
+        raise InvalidGoal(
+            segment_field(index, 'via'),
+            f'gives no arc to point {index}: {error}',
+            'move the via off the line, or use LINEAR',
+        ) from None
 
 
 def no_way(goal: Goal, index: int) -> InvalidGoal:
@@ -449,8 +525,11 @@ def no_way(goal: Goal, index: int) -> InvalidGoal:
     dwell = goal.waypoints[index].time - goal.waypoints[index - 1].time
     waits = f' for {dwell:g} s' if is_timed(goal) else ''
     return InvalidGoal(
-        point_field(index), f'is the same as points[{index - 1}]{waits}: there is no way to go, '
-        'and the robot cannot wait at a point', 'remove one of the two, or split the goal there')
+        point_field(index),
+        f'is the same as points[{index - 1}]{waits}: there is no way to go, '
+        'and the robot cannot wait at a point',
+        'remove one of the two, or split the goal there',
+    )
 
 
 # -- details ------------------------------------------------------------------------------------
@@ -468,8 +547,14 @@ def _all_finite(point: Waypoint) -> bool:
     # A sum is finite only if every term is, except that huge numbers may add up to infinity:
     # then the slow check finds nothing and nothing is refused here.
     pose = point.pose
-    return isfinite(point.time + sum(pose.position) + sum(pose.quaternion) + sum(point.twist)
-                    + sum(point.acceleration) + sum(point.jerk))
+    return isfinite(
+        point.time
+        + sum(pose.position)
+        + sum(pose.quaternion)
+        + sum(point.twist)
+        + sum(point.acceleration)
+        + sum(point.jerk)
+    )
 
 
 def _name_the_infinite(index: int, point: Waypoint, chooses: bool) -> None:
@@ -483,8 +568,10 @@ def _name_the_infinite(index: int, point: Waypoint, chooses: bool) -> None:
     _check_finite(point_field(index, 'pose.orientation'), point.pose.quaternion)
     for field in ('twist', 'acceleration', 'jerk'):
         values = getattr(point, field)
-        _check_finite(point_field(index, field), (
-            0.0 if chooses and field != 'jerk' and isnan(value) else value for value in values))
+        _check_finite(
+            point_field(index, field),
+            (0.0 if chooses and field != 'jerk' and isnan(value) else value for value in values),
+        )
 
 
 def _check_finite(field: str, values: Iterable[float]) -> None:
@@ -500,42 +587,59 @@ def _check_unit(field: str, q: Quaternion) -> None:
         return
     length = sqrt(square) if isfinite(square) else hypot(x, y, z, w)
     if length == 0.0:
-        raise InvalidGoal(field, 'is zero, which is no orientation',
-                          'send x, y, z, w = 0, 0, 0, 1 for none')
+        raise InvalidGoal(
+            field, 'is zero, which is no orientation', 'send x, y, z, w = 0, 0, 0, 1 for none'
+        )
     if abs(length - 1.0) > QUATERNION_TOLERANCE:
-        raise InvalidGoal(field, f'has length {length:.6g}; a unit quaternion is needed (within '
-                          f'{QUATERNION_TOLERANCE:g})', 'divide it by its length')
+        raise InvalidGoal(
+            field,
+            f'has length {length:.6g}; a unit quaternion is needed (within '
+            f'{QUATERNION_TOLERANCE:g})',
+            'divide it by its length',
+        )
 
 
 def _speeds(index: int, segment: Segment, timed: bool) -> None:
     kind = SegmentType(segment.type)
     if timed and is_optimized(kind):
         raise InvalidGoal(
-            segment_field(index, 'type'), f'is {kind.name}, which cannot keep the time of '
-            f'points[{index}]', 'use another type, or set all times to 0')
+            segment_field(index, 'type'),
+            f'is {kind.name}, which cannot keep the time of points[{index}]',
+            'use another type, or set all times to 0',
+        )
     if timed and segment.velocity > 0.0:
         raise InvalidGoal(
-            segment_field(index, 'velocity'), f'is {segment.velocity:g} in a goal with times; '
-            'either counts, not both', 'set it, or all times, to 0')
+            segment_field(index, 'velocity'),
+            f'is {segment.velocity:g} in a goal with times; either counts, not both',
+            'set it, or all times, to 0',
+        )
     if is_optimized(kind):
         for field in ('velocity', 'acceleration'):
             value = getattr(segment, field)
             if value > 1.0:
-                raise InvalidGoal(segment_field(index, field), f'is {value:g}; for {kind.name} it '
-                                  'is a fraction in (0, 1]')
+                raise InvalidGoal(
+                    segment_field(index, field),
+                    f'is {value:g}; for {kind.name} it is a fraction in (0, 1]',
+                )
 
 
 def _via(index: int, segment: Segment) -> None:
     kind = SegmentType(segment.type)
     if kind == SegmentType.CIRCULAR:
         if segment.via is None:
-            raise InvalidGoal(segment_field(index, 'via'), 'is missing; an arc needs a pose '
-                              'between its ends')
+            raise InvalidGoal(
+                segment_field(index, 'via'), 'is missing; an arc needs a pose between its ends'
+            )
         return
     # The identity is what an unset pose of a ROS message looks like.
-    for field, given in (('via', segment.via not in (None, IDENTITY)),
-                         ('via_posture', bool(segment.via_posture)),
-                         ('arc_mode', segment.arc_mode != ArcMode.UNCONSTRAINED)):
+    for field, given in (
+        ('via', segment.via not in (None, IDENTITY)),
+        ('via_posture', bool(segment.via_posture)),
+        ('arc_mode', segment.arc_mode != ArcMode.UNCONSTRAINED),
+    ):
         if given:
-            raise InvalidGoal(segment_field(index, field), f'is set, but the type is {kind.name}',
-                              'set the type to CIRCULAR, or leave it empty')
+            raise InvalidGoal(
+                segment_field(index, field),
+                f'is set, but the type is {kind.name}',
+                'set the type to CIRCULAR, or leave it empty',
+            )

@@ -32,7 +32,8 @@ class Plane:
             raise ValueError(
                 f'workspace_planes: "{text}" has {len(words)} words instead of 7 or 8; write '
                 '"name x y z nx ny nz [margin]" [m], a point on the plane and the normal into '
-                'the allowed side, both in base.')
+                'the allowed side, both in base.'
+            )
         name, *texts = words
         try:
             x, y, z, nx, ny, nz, *rest = (float(number) for number in texts)
@@ -44,12 +45,14 @@ class Plane:
         if margin < 0.0:
             raise ValueError(
                 f'workspace_planes: the margin {margin:g} of "{name}" is negative; move the '
-                'point instead.')
+                'point instead.'
+            )
         length = hypot(nx, ny, nz)
         if length < 1e-6:
             raise ValueError(
                 f'workspace_planes: the normal of "{name}" is zero; it points into the allowed '
-                'side.')
+                'side.'
+            )
         return cls(name, (x, y, z), (nx / length, ny / length, nz / length), margin)
 
 

@@ -71,9 +71,12 @@ OUTPUT_LEAD = 1.5
 #: The words of an output that wait with it, and where in them the program looks.
 OUTPUT_WORDS = 18
 OUTPUT_COLUMNS = {
-    trajectory.PointField.OUTPUT_KIND: 'KIND', trajectory.PointField.OUTPUT_PIN: 'PIN',
-    trajectory.PointField.OUTPUT_VALUE: 'VALUE', trajectory.PointField.OUTPUT_DOMAIN: 'DOMAIN',
-    trajectory.PointField.COMES_ROUND: 'COMES_ROUND'}
+    trajectory.PointField.OUTPUT_KIND: 'KIND',
+    trajectory.PointField.OUTPUT_PIN: 'PIN',
+    trajectory.PointField.OUTPUT_VALUE: 'VALUE',
+    trajectory.PointField.OUTPUT_DOMAIN: 'DOMAIN',
+    trajectory.PointField.COMES_ROUND: 'COMES_ROUND',
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,7 +108,8 @@ class ProgramSettings:
         if not self.host or not all(c.isalnum() or c in '.-_:' for c in self.host):
             raise LocalProtocolError(
                 f'reverse_ip: {self.host!r} is no host name or address; set it to the address '
-                'at which the robot reaches this computer.')
+                'at which the robot reaches this computer.'
+            )
 
 
 def render(settings: ProgramSettings) -> str:

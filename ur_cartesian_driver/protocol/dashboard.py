@@ -57,60 +57,67 @@ class Shape:
 
 
 #: All commands of the dashboard that we know.
-SHAPES: Mapping[str, Shape] = MappingProxyType({
-    'load': Shape(reply='Loading program: {}', takes=True, cb3=(1, 4)),
-    'play': Shape(reply='Starting program', cb3=(1, 4)),
-    'pause': Shape(reply='Pausing program', cb3=(1, 4)),
-    'stop': Shape(reply='Stopped', cb3=(1, 4)),
-    'quit': Shape(reply='Disconnected', cb3=(1, 4)),
-    'shutdown': Shape(reply='Shutting down', cb3=(1, 4)),
-    'running': Shape(reply='Program running: {}', cb3=(1, 6)),
-    'robotmode': Shape(reply='Robotmode: {}', cb3=(1, 6)),
-    'safetymode': Shape(reply='Safetymode: {}', cb3=(3, 0)),
-    'safetystatus': Shape(reply='Safetystatus: {}', cb3=None, e_series=(5, 4)),
-    'get loaded program': Shape(reply='Loaded program: {}', cb3=(1, 6)),
-    'popup': Shape(reply='showing popup', takes=True, cb3=(1, 6)),
-    'close popup': Shape(reply='closing popup', cb3=(1, 6)),
-    'close safety popup': Shape(reply='closing safety popup', cb3=(3, 1)),
-    'addToLog': Shape(reply='Added log message', takes=True, cb3=(1, 8)),
-    'isProgramSaved': Shape(reply='{}', cb3=(1, 8)),
-    'programState': Shape(reply='{}', cb3=(1, 8)),
-    'PolyscopeVersion': Shape(reply='URSoftware {}', cb3=(1, 8)),
-    'version': Shape(reply='{}', cb3=None),
-    'setUserRole': Shape(reply='Setting user role: {}', takes=True, cb3=(3, 1), e_series=None),
-    'getUserRole': Shape(reply='{}', cb3=(3, 1), e_series=None),
-    'power on': Shape(reply='Powering on', cb3=(3, 0)),
-    'power off': Shape(reply='Powering off', cb3=(3, 0)),
-    'brake release': Shape(reply='Brake releasing', cb3=(3, 0)),
-    'unlock protective stop': Shape(reply='Protective stop releasing', cb3=(3, 1)),
-    'restart safety': Shape(reply='Restarting safety', cb3=(3, 7), e_series=(5, 1)),
-    'load installation': Shape(reply='Loading installation: {}', takes=True, cb3=(3, 2)),
-    'set operational mode': Shape(reply='Operational mode {}', takes=True, cb3=None),
-    'get operational mode': Shape(reply='{}', cb3=None, e_series=(5, 6)),
-    'clear operational mode': Shape(
-        reply='No longer controlling the operational mode. {}', cb3=None),
-    'is in remote control': Shape(reply='{}', cb3=None, e_series=(5, 6)),
-    'get serial number': Shape(reply='{}', cb3=(3, 12), e_series=(5, 6)),
-    'get robot model': Shape(reply='{}', cb3=(3, 12), e_series=(5, 6)),
-    'generate flight report': Shape(
-        reply='Flight Report generated with id: {}', takes=True, cb3=(3, 13), e_series=(5, 8)),
-    'generate support file': Shape(
-        reply='Completed successfully: {}', takes=True, cb3=(3, 13), e_series=(5, 8)),
-    'saveLog': Shape(reply='Log saved to disk', cb3=(3, 13), e_series=(5, 8)),
-})
+SHAPES: Mapping[str, Shape] = MappingProxyType(
+    {
+        'load': Shape(reply='Loading program: {}', takes=True, cb3=(1, 4)),
+        'play': Shape(reply='Starting program', cb3=(1, 4)),
+        'pause': Shape(reply='Pausing program', cb3=(1, 4)),
+        'stop': Shape(reply='Stopped', cb3=(1, 4)),
+        'quit': Shape(reply='Disconnected', cb3=(1, 4)),
+        'shutdown': Shape(reply='Shutting down', cb3=(1, 4)),
+        'running': Shape(reply='Program running: {}', cb3=(1, 6)),
+        'robotmode': Shape(reply='Robotmode: {}', cb3=(1, 6)),
+        'safetymode': Shape(reply='Safetymode: {}', cb3=(3, 0)),
+        'safetystatus': Shape(reply='Safetystatus: {}', cb3=None, e_series=(5, 4)),
+        'get loaded program': Shape(reply='Loaded program: {}', cb3=(1, 6)),
+        'popup': Shape(reply='showing popup', takes=True, cb3=(1, 6)),
+        'close popup': Shape(reply='closing popup', cb3=(1, 6)),
+        'close safety popup': Shape(reply='closing safety popup', cb3=(3, 1)),
+        'addToLog': Shape(reply='Added log message', takes=True, cb3=(1, 8)),
+        'isProgramSaved': Shape(reply='{}', cb3=(1, 8)),
+        'programState': Shape(reply='{}', cb3=(1, 8)),
+        'PolyscopeVersion': Shape(reply='URSoftware {}', cb3=(1, 8)),
+        'version': Shape(reply='{}', cb3=None),
+        'setUserRole': Shape(reply='Setting user role: {}', takes=True, cb3=(3, 1), e_series=None),
+        'getUserRole': Shape(reply='{}', cb3=(3, 1), e_series=None),
+        'power on': Shape(reply='Powering on', cb3=(3, 0)),
+        'power off': Shape(reply='Powering off', cb3=(3, 0)),
+        'brake release': Shape(reply='Brake releasing', cb3=(3, 0)),
+        'unlock protective stop': Shape(reply='Protective stop releasing', cb3=(3, 1)),
+        'restart safety': Shape(reply='Restarting safety', cb3=(3, 7), e_series=(5, 1)),
+        'load installation': Shape(reply='Loading installation: {}', takes=True, cb3=(3, 2)),
+        'set operational mode': Shape(reply='Operational mode {}', takes=True, cb3=None),
+        'get operational mode': Shape(reply='{}', cb3=None, e_series=(5, 6)),
+        'clear operational mode': Shape(
+            reply='No longer controlling the operational mode. {}', cb3=None
+        ),
+        'is in remote control': Shape(reply='{}', cb3=None, e_series=(5, 6)),
+        'get serial number': Shape(reply='{}', cb3=(3, 12), e_series=(5, 6)),
+        'get robot model': Shape(reply='{}', cb3=(3, 12), e_series=(5, 6)),
+        'generate flight report': Shape(
+            reply='Flight Report generated with id: {}', takes=True, cb3=(3, 13), e_series=(5, 8)
+        ),
+        'generate support file': Shape(
+            reply='Completed successfully: {}', takes=True, cb3=(3, 13), e_series=(5, 8)
+        ),
+        'saveLog': Shape(reply='Log saved to disk', cb3=(3, 13), e_series=(5, 8)),
+    }
+)
 
 #: Answers that have no words of their own, by the forms that are possible.
-_FORMS: Mapping[str, re.Pattern[str]] = MappingProxyType({
-    'running': re.compile('true|false'),
-    'isProgramSaved': re.compile(r'(?:true|false)(?: .*)?'),
-    'programState': re.compile(r'(?:STOPPED|PLAYING|PAUSED)(?: .*)?'),
-    'version': re.compile(r'\d+(?:\.\d+){1,3}'),
-    'getUserRole': re.compile('PROGRAMMER|OPERATOR|NONE|LOCKED|RESTRICTED'),
-    'get operational mode': re.compile('NONE|MANUAL|AUTOMATIC'),
-    'is in remote control': re.compile('true|false'),
-    'get serial number': re.compile(r'20\d+'),
-    'get robot model': re.compile('UR.*'),
-})
+_FORMS: Mapping[str, re.Pattern[str]] = MappingProxyType(
+    {
+        'running': re.compile('true|false'),
+        'isProgramSaved': re.compile(r'(?:true|false)(?: .*)?'),
+        'programState': re.compile(r'(?:STOPPED|PLAYING|PAUSED)(?: .*)?'),
+        'version': re.compile(r'\d+(?:\.\d+){1,3}'),
+        'getUserRole': re.compile('PROGRAMMER|OPERATOR|NONE|LOCKED|RESTRICTED'),
+        'get operational mode': re.compile('NONE|MANUAL|AUTOMATIC'),
+        'is in remote control': re.compile('true|false'),
+        'get serial number': re.compile(r'20\d+'),
+        'get robot model': re.compile('UR.*'),
+    }
+)
 #: Longest first, so that ``load installation`` is not taken for ``load``.
 _NAMES = sorted(SHAPES, key=len, reverse=True)
 
@@ -129,11 +136,13 @@ class Request:
             raise LocalProtocolError(f'{self.name!r} is not a command of the dashboard.')
         if '\n' in self.argument or '\r' in self.argument:
             raise LocalProtocolError(
-                f'{self.name} takes one line of text, but it got {self.argument!r}.')
+                f'{self.name} takes one line of text, but it got {self.argument!r}.'
+            )
         if bool(self.argument) != shape.takes:
             raise LocalProtocolError(
                 f'{self.name} takes {"a" if shape.takes else "no"} text, but it got '
-                f'{self.argument!r}.')
+                f'{self.argument!r}.'
+            )
 
     def encode(self) -> bytes:
         """Return the line."""
@@ -194,7 +203,8 @@ class DashboardClient:
         request = Request(name=name, argument=argument)
         if len(self._pending) >= MOST_PENDING:
             raise LocalProtocolError(
-                f'{MOST_PENDING} dashboard commands wait for an answer; connect anew.')
+                f'{MOST_PENDING} dashboard commands wait for an answer; connect anew.'
+            )
         self._pending.append(request)
         return request.encode()
 
@@ -210,7 +220,8 @@ class DashboardClient:
         if not data and self._pending:
             raise RemoteProtocolError(
                 f'The dashboard closed the connection instead of answering '
-                f'{self._pending[0].name!r}.')
+                f'{self._pending[0].name!r}.'
+            )
         for line in lines:
             if not self._greeted:
                 self._greeted = True
@@ -246,7 +257,7 @@ def parse_request(line: str) -> Request | str:
     for name in _NAMES:
         if line == name or line.startswith(name + ' '):
             try:
-                return Request(name=name, argument=line[len(name):].strip())
+                return Request(name=name, argument=line[len(name) :].strip())
             except LocalProtocolError:
                 return line
     return line
@@ -263,8 +274,9 @@ def success(request: Request, value: str | None = None) -> bytes:
 
     :param value: the telling part; None = the text that came with the command.
     """
-    return encode_line(SHAPES[request.name].reply.replace(
-        '{}', request.argument if value is None else value))
+    return encode_line(
+        SHAPES[request.name].reply.replace('{}', request.argument if value is None else value)
+    )
 
 
 def not_understood(line: str) -> bytes:

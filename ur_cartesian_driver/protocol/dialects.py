@@ -83,18 +83,44 @@ class Dialect:
 
 
 #: By name, the oldest first.
-DIALECTS: Mapping[str, Dialect] = MappingProxyType({dialect.name: dialect for dialect in (
-    Dialect(name='2.0', time_scale=1000, motion_types=_ARCS_AND_LINES | _SPLINE,
-            q_near=False, streams=False, sets_tcp=False),
-    Dialect(name='2.10', time_scale=FIXED_POINT,
-            motion_types=_ARCS_AND_LINES | _OPTIMOVES | _SPLINE,
-            q_near=False, streams=False, sets_tcp=False),
-    Dialect(name='2.12', time_scale=FIXED_POINT,
-            motion_types=_ARCS_AND_LINES | _OPTIMOVES | _OTHER_TARGETS | _SPLINE,
-            q_near=True, streams=False, sets_tcp=False),
-    Dialect(name='2.14', time_scale=FIXED_POINT,
-            motion_types=_ARCS_AND_LINES | _OPTIMOVES | _OTHER_TARGETS | _SPLINE | _OUTPUTS,
-            q_near=True, streams=True, sets_tcp=True),
-)})
+DIALECTS: Mapping[str, Dialect] = MappingProxyType(
+    {
+        dialect.name: dialect
+        for dialect in (
+            Dialect(
+                name='2.0',
+                time_scale=1000,
+                motion_types=_ARCS_AND_LINES | _SPLINE,
+                q_near=False,
+                streams=False,
+                sets_tcp=False,
+            ),
+            Dialect(
+                name='2.10',
+                time_scale=FIXED_POINT,
+                motion_types=_ARCS_AND_LINES | _OPTIMOVES | _SPLINE,
+                q_near=False,
+                streams=False,
+                sets_tcp=False,
+            ),
+            Dialect(
+                name='2.12',
+                time_scale=FIXED_POINT,
+                motion_types=_ARCS_AND_LINES | _OPTIMOVES | _OTHER_TARGETS | _SPLINE,
+                q_near=True,
+                streams=False,
+                sets_tcp=False,
+            ),
+            Dialect(
+                name='2.14',
+                time_scale=FIXED_POINT,
+                motion_types=_ARCS_AND_LINES | _OPTIMOVES | _OTHER_TARGETS | _SPLINE | _OUTPUTS,
+                q_near=True,
+                streams=True,
+                sets_tcp=True,
+            ),
+        )
+    }
+)
 #: The one that the robot program of this package speaks.
 NEWEST = DIALECTS['2.14']

@@ -19,8 +19,8 @@ from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocol
 #: What a value is multiplied by before it is rounded to an integer.
 FIXED_POINT = 1_000_000
 
-INT32_MIN = -(2 ** 31)
-INT32_MAX = 2 ** 31 - 1
+INT32_MIN = -(2**31)
+INT32_MAX = 2**31 - 1
 
 #: Longest piece of a stream that an error text quotes [bytes].
 _QUOTED = 48
@@ -54,7 +54,8 @@ def out_of_range(value: float, field: str, scale: int = FIXED_POINT) -> LocalPro
     """Return the error for a value that no int32 can stand for."""
     return LocalProtocolError(
         f'{field} is {value!r}, but only finite numbers from {INT32_MIN / scale!r} to '
-        f'{INT32_MAX / scale!r} can be sent to the robot.')
+        f'{INT32_MAX / scale!r} can be sent to the robot.'
+    )
 
 
 def checked_int32(value: int, field: str) -> int:
@@ -66,7 +67,8 @@ def checked_int32(value: int, field: str) -> int:
     if not INT32_MIN <= value <= INT32_MAX:
         raise LocalProtocolError(
             f'{field} is {value}, but only integers from {INT32_MIN} to {INT32_MAX} can be sent '
-            'to the robot.')
+            'to the robot.'
+        )
     return value
 
 
@@ -84,7 +86,8 @@ def checked_size(data: bytes, size: int, what: str) -> bytes:
     """
     if len(data) != size:
         raise RemoteProtocolError(
-            f'A {what} has {size} bytes, but {len(data)} came: {quote(data)}.')
+            f'A {what} has {size} bytes, but {len(data)} came: {quote(data)}.'
+        )
     return data
 
 
@@ -115,7 +118,7 @@ class RecordBuffer:
         data = self._rest + data
         end = len(data) - len(data) % self._size
         self._rest = data[end:]
-        return [data[i:i + self._size] for i in range(0, end, self._size)]
+        return [data[i : i + self._size] for i in range(0, end, self._size)]
 
 
 class FrameBuffer:
@@ -163,14 +166,14 @@ class FrameBuffer:
         frames = []
         start = 0
         while (size := self._size_at(start)) and start + size <= len(self._buffer):
-            frames.append(bytes(self._buffer[start:start + size]))
+            frames.append(bytes(self._buffer[start : start + size]))
             start += size
         del self._buffer[:start]
         return frames
 
     def _size_at(self, start: int) -> int:
         """Return the size of the frame that starts there; 0 = not known yet."""
-        head = self._buffer[start:start + self._width]
+        head = self._buffer[start : start + self._width]
         if len(head) < self._width:
             return 0
         size = int.from_bytes(head, 'big')
@@ -178,7 +181,8 @@ class FrameBuffer:
         if not smallest <= size <= largest:
             raise RemoteProtocolError(
                 f'A {self._what} says that it has {size} bytes, but only {smallest} to {largest} '
-                f'are possible: {quote(bytes(self._buffer[start:]))}.')
+                f'are possible: {quote(bytes(self._buffer[start:]))}.'
+            )
         return size
 
 
@@ -214,7 +218,8 @@ class LineBuffer:
             if len(line) > self._limit:
                 self._rest = b''
                 raise RemoteProtocolError(
-                    f'A line is longer than {self._limit} bytes: {quote(line)}.')
+                    f'A line is longer than {self._limit} bytes: {quote(line)}.'
+                )
         return [decode_text(line.removesuffix(b'\r')) for line in lines]
 
 

@@ -68,13 +68,44 @@ from ur_cartesian_driver.protocol.primary_state import (
 )
 
 __all__ = [
-    'SAFETY_DATA', 'AdditionalInfo', 'CalibrationData', 'CartesianInfo', 'Command',
-    'ConfigurationData', 'ErrorCodeMessage', 'ForceModeData', 'Frame', 'FrameType', 'Immi',
-    'JointData', 'KeyMessage', 'KinematicsInfo', 'MasterboardData', 'Message', 'OtherFrame',
-    'PrimaryDecoder', 'RawMessage', 'RawState', 'ReportLevel', 'RobotModeData', 'RobotState',
-    'RobotType', 'RuntimeExceptionMessage', 'SafetyModeMessage', 'ScriptDecoder', 'StatePackage',
-    'TextMessage', 'ToolCommunication', 'ToolData', 'ToolModeInfo', 'VersionMessage', 'command',
-    'decode_frame', 'encode_message', 'encode_state', 'upload',
+    'SAFETY_DATA',
+    'AdditionalInfo',
+    'CalibrationData',
+    'CartesianInfo',
+    'Command',
+    'ConfigurationData',
+    'ErrorCodeMessage',
+    'ForceModeData',
+    'Frame',
+    'FrameType',
+    'Immi',
+    'JointData',
+    'KeyMessage',
+    'KinematicsInfo',
+    'MasterboardData',
+    'Message',
+    'OtherFrame',
+    'PrimaryDecoder',
+    'RawMessage',
+    'RawState',
+    'ReportLevel',
+    'RobotModeData',
+    'RobotState',
+    'RobotType',
+    'RuntimeExceptionMessage',
+    'SafetyModeMessage',
+    'ScriptDecoder',
+    'StatePackage',
+    'TextMessage',
+    'ToolCommunication',
+    'ToolData',
+    'ToolModeInfo',
+    'VersionMessage',
+    'command',
+    'decode_frame',
+    'encode_message',
+    'encode_state',
+    'upload',
 ]
 
 
@@ -153,9 +184,12 @@ class VersionMessage:
     def body(self) -> bytes:
         """Return what follows the message type."""
         name = self.project.encode()
-        return (pack(struct.Struct('>b'), len(name)) + name
-                + pack(_VERSION, self.major, self.minor, self.bugfix, self.build)
-                + self.date.encode())
+        return (
+            pack(struct.Struct('>b'), len(name))
+            + name
+            + pack(_VERSION, self.major, self.minor, self.bugfix, self.build)
+            + self.date.encode()
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -198,8 +232,10 @@ class ErrorCodeMessage:
 
     def body(self) -> bytes:
         """Return what follows the message type."""
-        return pack(_ERROR, self.code, self.argument, self.level, self.data_type,
-                    self.data) + self.text.encode()
+        return (
+            pack(_ERROR, self.code, self.argument, self.level, self.data_type, self.data)
+            + self.text.encode()
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -250,8 +286,15 @@ class RawMessage:
         return self.content
 
 
-Message: TypeAlias = (TextMessage | VersionMessage | SafetyModeMessage | ErrorCodeMessage
-                      | KeyMessage | RuntimeExceptionMessage | RawMessage)
+Message: TypeAlias = (
+    TextMessage
+    | VersionMessage
+    | SafetyModeMessage
+    | ErrorCodeMessage
+    | KeyMessage
+    | RuntimeExceptionMessage
+    | RawMessage
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -298,7 +341,7 @@ def decode_frame(data: bytes) -> Frame:
     :raises RemoteProtocolError: something is shorter than it must be.
     """
     _, frame_type = unpack(_HEADER, data, 'primary frame')
-    body = data[_HEADER.size:]
+    body = data[_HEADER.size :]
     if frame_type == FrameType.ROBOT_STATE:
         return RobotState(packages=decode_sub_packages(body))
     if frame_type == FrameType.ROBOT_MESSAGE:
@@ -311,8 +354,9 @@ class PrimaryDecoder:
 
     def __init__(self) -> None:
         """Start empty."""
-        self._frames = FrameBuffer(width=4, smallest=_HEADER.size, largest=LARGEST_FRAME,
-                                   what='primary frame')
+        self._frames = FrameBuffer(
+            width=4, smallest=_HEADER.size, largest=LARGEST_FRAME, what='primary frame'
+        )
 
     def feed(self, data: bytes) -> list[Frame]:
         """
@@ -328,13 +372,14 @@ def _frame(frame_type: FrameType, body: bytes) -> bytes:
     size = _HEADER.size + len(body)
     if size > LARGEST_SENT_FRAME:
         raise LocalProtocolError(
-            f'A primary frame has {size} bytes, but clients read {LARGEST_SENT_FRAME} at most.')
+            f'A primary frame has {size} bytes, but clients read {LARGEST_SENT_FRAME} at most.'
+        )
     return _HEADER.pack(size, frame_type) + body
 
 
 def _decode_message(body: bytes) -> Message:
     timestamp, source, message_type = unpack(_MESSAGE, body, 'robot message')
-    content = body[_MESSAGE.size:]
+    content = body[_MESSAGE.size :]
     head = {'timestamp': timestamp, 'source': source}
     reader = _MESSAGES.get(message_type)
     if reader is None:
@@ -346,25 +391,40 @@ def _version_message(content: bytes, head: dict[str, Any]) -> VersionMessage:
     (length,) = unpack(struct.Struct('>b'), content, 'version message')
     if length < 0:
         raise RemoteProtocolError(
-            f'A version message has a name of {length} bytes: {quote(content)}.')
+            f'A version message has a name of {length} bytes: {quote(content)}.'
+        )
     end = 1 + length
     major, minor, bugfix, build = unpack(_VERSION, content, 'version message', end)
     return VersionMessage(
-        project=decode_text(content[1:end]), major=major, minor=minor, bugfix=bugfix, build=build,
-        date=decode_text(content[end + _VERSION.size:]), **head)
+        project=decode_text(content[1:end]),
+        major=major,
+        minor=minor,
+        bugfix=bugfix,
+        build=build,
+        date=decode_text(content[end + _VERSION.size :]),
+        **head,
+    )
 
 
 def _safety_mode_message(content: bytes, head: dict[str, Any]) -> SafetyModeMessage:
     code, argument, mode, data_type, data = unpack(_SAFETY, content, 'safety mode message')
     (datum,) = _DATUM.get(data_type, _DATUM_DEFAULT).unpack(data)
-    return SafetyModeMessage(code=code, argument=argument, safety_mode=mode, data_type=data_type,
-                             data=datum, **head)
+    return SafetyModeMessage(
+        code=code, argument=argument, safety_mode=mode, data_type=data_type, data=datum, **head
+    )
 
 
 def _error_code_message(content: bytes, head: dict[str, Any]) -> ErrorCodeMessage:
     code, argument, level, data_type, data = unpack(_ERROR, content, 'error code message')
-    return ErrorCodeMessage(code=code, argument=argument, level=level, data_type=data_type,
-                            data=data, text=decode_text(content[_ERROR.size:]), **head)
+    return ErrorCodeMessage(
+        code=code,
+        argument=argument,
+        level=level,
+        data_type=data_type,
+        data=data,
+        text=decode_text(content[_ERROR.size :]),
+        **head,
+    )
 
 
 def _key_message(content: bytes, head: dict[str, Any]) -> KeyMessage:
@@ -372,20 +432,26 @@ def _key_message(content: bytes, head: dict[str, Any]) -> KeyMessage:
     end = _KEY.size + length
     if len(content) < end:
         raise RemoteProtocolError(
-            f'A key message has a title of {length} bytes, but is shorter: {quote(content)}.')
-    return KeyMessage(code=code, argument=argument, title=decode_text(content[_KEY.size:end]),
-                      text=decode_text(content[end:]), **head)
+            f'A key message has a title of {length} bytes, but is shorter: {quote(content)}.'
+        )
+    return KeyMessage(
+        code=code,
+        argument=argument,
+        title=decode_text(content[_KEY.size : end]),
+        text=decode_text(content[end:]),
+        **head,
+    )
 
 
 def _runtime_exception(content: bytes, head: dict[str, Any]) -> RuntimeExceptionMessage:
     line, column = unpack(_EXCEPTION, content, 'runtime exception message')
-    return RuntimeExceptionMessage(line=line, column=column,
-                                   text=decode_text(content[_EXCEPTION.size:]), **head)
+    return RuntimeExceptionMessage(
+        line=line, column=column, text=decode_text(content[_EXCEPTION.size :]), **head
+    )
 
 
 _MESSAGES: Mapping[int, Callable[[bytes, dict[str, Any]], Message]] = {
-    TextMessage.message_type: lambda content, head: TextMessage(
-        text=decode_text(content), **head),
+    TextMessage.message_type: lambda content, head: TextMessage(text=decode_text(content), **head),
     VersionMessage.message_type: _version_message,
     SafetyModeMessage.message_type: _safety_mode_message,
     ErrorCodeMessage.message_type: _error_code_message,
@@ -448,7 +514,8 @@ class ScriptDecoder:
         texts = [text for line in lines if (text := self._line(line)) is not None]
         if self._size + len(self._rest) > LONGEST_PROGRAM:
             raise RemoteProtocolError(
-                f'A program is longer than {LONGEST_PROGRAM} bytes: {quote(self._rest)}.')
+                f'A program is longer than {LONGEST_PROGRAM} bytes: {quote(self._rest)}.'
+            )
         if not data and self._program:
             texts.append(self._take())
         return texts

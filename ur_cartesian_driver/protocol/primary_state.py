@@ -106,7 +106,8 @@ def unpack(layout: struct.Struct, body: bytes, what: str, offset: int = 0) -> tu
     if len(body) < offset + layout.size:
         raise RemoteProtocolError(
             f'A {what} has at least {offset + layout.size} bytes, but {len(body)} came: '
-            f'{quote(body)}.')
+            f'{quote(body)}.'
+        )
     return layout.unpack_from(body, offset)
 
 
@@ -144,16 +145,26 @@ class RobotModeData:
     def encode(self) -> bytes:
         """Return the body."""
         return pack(
-            _MODE, self.timestamp, self.real_robot_connected, self.real_robot_enabled,
-            self.power_on, self.emergency_stopped, self.protective_stopped, self.program_running,
-            self.program_paused, self.robot_mode, self.control_mode, self.target_speed_fraction,
-            self.speed_scaling, self.target_speed_fraction_limit) + bytes(1)
+            _MODE,
+            self.timestamp,
+            self.real_robot_connected,
+            self.real_robot_enabled,
+            self.power_on,
+            self.emergency_stopped,
+            self.protective_stopped,
+            self.program_running,
+            self.program_paused,
+            self.robot_mode,
+            self.control_mode,
+            self.target_speed_fraction,
+            self.speed_scaling,
+            self.target_speed_fraction_limit,
+        ) + bytes(1)
 
     @classmethod
     def decode(cls, body: bytes) -> RobotModeData:
         """Return the content of a body; RemoteProtocolError if it is too short."""
-        return cls(**dict(zip(cls.__slots__, unpack(_MODE, body, 'robot mode data'),
-                              strict=True)))
+        return cls(**dict(zip(cls.__slots__, unpack(_MODE, body, 'robot mode data'), strict=True)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -174,18 +185,31 @@ class JointData:
         return b''.join(
             pack(_JOINT, q, target, qd, current, voltage, temperature, 0.0, mode)
             for q, target, qd, current, voltage, temperature, mode in zip(
-                self.q_actual, self.q_target, self.qd_actual, self.current, self.voltage,
-                self.temperature, self.mode, strict=True))
+                self.q_actual,
+                self.q_target,
+                self.qd_actual,
+                self.current,
+                self.voltage,
+                self.temperature,
+                self.mode,
+                strict=True,
+            )
+        )
 
     @classmethod
     def decode(cls, body: bytes) -> JointData:
         """Return the content of a body; RemoteProtocolError if it is too short."""
         joints = [unpack(_JOINT, body, 'joint data', i * _JOINT.size) for i in range(6)]
         q, target, qd, current, voltage, temperature, _, mode = zip(*joints, strict=True)
-        return cls(q_actual=cast(Vector6, q), q_target=cast(Vector6, target),
-                   qd_actual=cast(Vector6, qd), current=cast(Vector6, current),
-                   voltage=cast(Vector6, voltage), temperature=cast(Vector6, temperature),
-                   mode=cast(Integers6, mode))
+        return cls(
+            q_actual=cast(Vector6, q),
+            q_target=cast(Vector6, target),
+            qd_actual=cast(Vector6, qd),
+            current=cast(Vector6, current),
+            voltage=cast(Vector6, voltage),
+            temperature=cast(Vector6, temperature),
+            mode=cast(Integers6, mode),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,15 +227,30 @@ class ToolData:
 
     def encode(self) -> bytes:
         """Return the body."""
-        return pack(_TOOL, *self.analog_input_range, *self.analog_input, self.voltage_48v,
-                    self.output_voltage, self.current, self.temperature, self.mode)
+        return pack(
+            _TOOL,
+            *self.analog_input_range,
+            *self.analog_input,
+            self.voltage_48v,
+            self.output_voltage,
+            self.current,
+            self.temperature,
+            self.mode,
+        )
 
     @classmethod
     def decode(cls, body: bytes) -> ToolData:
         """Return the content of a body; RemoteProtocolError if it is too short."""
         v = unpack(_TOOL, body, 'tool data')
-        return cls(analog_input_range=v[0:2], analog_input=v[2:4], voltage_48v=v[4],
-                   output_voltage=v[5], current=v[6], temperature=v[7], mode=v[8])
+        return cls(
+            analog_input_range=v[0:2],
+            analog_input=v[2:4],
+            voltage_48v=v[4],
+            output_voltage=v[5],
+            current=v[6],
+            temperature=v[7],
+            mode=v[8],
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -259,16 +298,43 @@ class MasterboardData:
     def encode(self) -> bytes:
         """Return the body."""
         head = pack(
-            _BOARD_HEAD, self.digital_input_bits, self.digital_output_bits,
-            *self.analog_input_range, *self.analog_input, *self.analog_output_domain,
-            *self.analog_output, self.temperature, self.robot_voltage_48v, self.robot_current,
-            self.io_current, self.safety_mode, self.reduced_mode, self.immi is not None)
-        immi = b'' if self.immi is None else pack(
-            _BOARD_IMMI, self.immi.input_bits, self.immi.output_bits, self.immi.voltage_24v,
-            self.immi.current)
-        return head + immi + pack(
-            _BOARD_TAIL, self.reserved_1, self.operational_mode_selector,
-            self.three_position_enabling_device, self.reserved_2)
+            _BOARD_HEAD,
+            self.digital_input_bits,
+            self.digital_output_bits,
+            *self.analog_input_range,
+            *self.analog_input,
+            *self.analog_output_domain,
+            *self.analog_output,
+            self.temperature,
+            self.robot_voltage_48v,
+            self.robot_current,
+            self.io_current,
+            self.safety_mode,
+            self.reduced_mode,
+            self.immi is not None,
+        )
+        immi = (
+            b''
+            if self.immi is None
+            else pack(
+                _BOARD_IMMI,
+                self.immi.input_bits,
+                self.immi.output_bits,
+                self.immi.voltage_24v,
+                self.immi.current,
+            )
+        )
+        return (
+            head
+            + immi
+            + pack(
+                _BOARD_TAIL,
+                self.reserved_1,
+                self.operational_mode_selector,
+                self.three_position_enabling_device,
+                self.reserved_2,
+            )
+        )
 
     @classmethod
     def decode(cls, body: bytes) -> MasterboardData:
@@ -284,12 +350,24 @@ class MasterboardData:
             body = body.ljust(offset + _BOARD_TAIL.size, b'\0')
         tail = unpack(_BOARD_TAIL, body, 'masterboard data', offset)
         return cls(
-            digital_input_bits=v[0], digital_output_bits=v[1], analog_input_range=v[2:4],
-            analog_input=v[4:6], analog_output_domain=v[6:8], analog_output=v[8:10],
-            temperature=v[10], robot_voltage_48v=v[11], robot_current=v[12], io_current=v[13],
-            safety_mode=v[14], reduced_mode=v[15], immi=immi, reserved_1=tail[0],
-            operational_mode_selector=tail[1], three_position_enabling_device=tail[2],
-            reserved_2=tail[3])
+            digital_input_bits=v[0],
+            digital_output_bits=v[1],
+            analog_input_range=v[2:4],
+            analog_input=v[4:6],
+            analog_output_domain=v[6:8],
+            analog_output=v[8:10],
+            temperature=v[10],
+            robot_voltage_48v=v[11],
+            robot_current=v[12],
+            io_current=v[13],
+            safety_mode=v[14],
+            reduced_mode=v[15],
+            immi=immi,
+            reserved_1=tail[0],
+            operational_mode_selector=tail[1],
+            three_position_enabling_device=tail[2],
+            reserved_2=tail[3],
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -329,16 +407,22 @@ class KinematicsInfo:
 
     def encode(self) -> bytes:
         """Return the body."""
-        return pack(_KINEMATICS, *self.checksum, *self.theta, *self.a, *self.d, *self.alpha,
-                    self.status)
+        return pack(
+            _KINEMATICS, *self.checksum, *self.theta, *self.a, *self.d, *self.alpha, self.status
+        )
 
     @classmethod
     def decode(cls, body: bytes) -> KinematicsInfo:
         """Return the content of a body; RemoteProtocolError if it is too short."""
         v = unpack(_KINEMATICS, body, 'kinematics info')
-        return cls(checksum=cast(Integers6, v[:6]), theta=cast(Vector6, v[6:12]),
-                   a=cast(Vector6, v[12:18]), d=cast(Vector6, v[18:24]),
-                   alpha=cast(Vector6, v[24:30]), status=v[30])
+        return cls(
+            checksum=cast(Integers6, v[:6]),
+            theta=cast(Vector6, v[6:12]),
+            a=cast(Vector6, v[12:18]),
+            d=cast(Vector6, v[18:24]),
+            alpha=cast(Vector6, v[24:30]),
+            status=v[30],
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -375,11 +459,22 @@ class ConfigurationData:
         """Return the body."""
         limits = [x for pair in (*self.position_limits, *self.motion_limits) for x in pair]
         return pack(
-            _CONFIGURATION, *limits, self.v_joint_default, self.a_joint_default,
-            self.v_tool_default, self.a_tool_default, self.eq_radius, *self.a, *self.d,
-            *self.alpha, *self.theta, self.masterboard_version, self.controller_box_type,
-            self.robot_type, self.robot_sub_type) + b''.join(
-                pack(struct.Struct('>h'), word) for word in self.reserved)
+            _CONFIGURATION,
+            *limits,
+            self.v_joint_default,
+            self.a_joint_default,
+            self.v_tool_default,
+            self.a_tool_default,
+            self.eq_radius,
+            *self.a,
+            *self.d,
+            *self.alpha,
+            *self.theta,
+            self.masterboard_version,
+            self.controller_box_type,
+            self.robot_type,
+            self.robot_sub_type,
+        ) + b''.join(pack(struct.Struct('>h'), word) for word in self.reserved)
 
     @classmethod
     def decode(cls, body: bytes) -> ConfigurationData:
@@ -387,13 +482,23 @@ class ConfigurationData:
         v = unpack(_CONFIGURATION, body, 'configuration data')
         surplus = min(len(body) - _CONFIGURATION.size, 4) // 2
         return cls(
-            position_limits=_pairs(v[0:12]), motion_limits=_pairs(v[12:24]),
-            v_joint_default=v[24], a_joint_default=v[25], v_tool_default=v[26],
-            a_tool_default=v[27], eq_radius=v[28], a=cast(Vector6, v[29:35]),
-            d=cast(Vector6, v[35:41]), alpha=cast(Vector6, v[41:47]),
-            theta=cast(Vector6, v[47:53]), masterboard_version=v[53], controller_box_type=v[54],
-            robot_type=v[55], robot_sub_type=v[56],
-            reserved=struct.unpack_from(f'>{surplus}h', body, _CONFIGURATION.size))
+            position_limits=_pairs(v[0:12]),
+            motion_limits=_pairs(v[12:24]),
+            v_joint_default=v[24],
+            a_joint_default=v[25],
+            v_tool_default=v[26],
+            a_tool_default=v[27],
+            eq_radius=v[28],
+            a=cast(Vector6, v[29:35]),
+            d=cast(Vector6, v[35:41]),
+            alpha=cast(Vector6, v[41:47]),
+            theta=cast(Vector6, v[47:53]),
+            masterboard_version=v[53],
+            controller_box_type=v[54],
+            robot_type=v[55],
+            robot_sub_type=v[56],
+            reserved=struct.unpack_from(f'>{surplus}h', body, _CONFIGURATION.size),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -427,14 +532,20 @@ class AdditionalInfo:
 
     def encode(self) -> bytes:
         """Return the body."""
-        return pack(_ADDITIONAL, self.teach_button_pressed, self.freedrive_button_enabled,
-                    self.io_enabled_freedrive, self.reserved)
+        return pack(
+            _ADDITIONAL,
+            self.teach_button_pressed,
+            self.freedrive_button_enabled,
+            self.io_enabled_freedrive,
+            self.reserved,
+        )
 
     @classmethod
     def decode(cls, body: bytes) -> AdditionalInfo:
         """Return the content of a body; RemoteProtocolError if it is too short."""
-        return cls(**dict(zip(cls.__slots__, unpack(_ADDITIONAL, body, 'additional info'),
-                              strict=True)))
+        return cls(
+            **dict(zip(cls.__slots__, unpack(_ADDITIONAL, body, 'additional info'), strict=True))
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -468,8 +579,15 @@ class ToolCommunication:
 
     def encode(self) -> bytes:
         """Return the body."""
-        return pack(_TOOL_COMMUNICATION, self.enabled, self.baud_rate, self.parity,
-                    self.stop_bits, self.rx_idle_chars, self.tx_idle_chars)
+        return pack(
+            _TOOL_COMMUNICATION,
+            self.enabled,
+            self.baud_rate,
+            self.parity,
+            self.stop_bits,
+            self.rx_idle_chars,
+            self.tx_idle_chars,
+        )
 
     @classmethod
     def decode(cls, body: bytes) -> ToolCommunication:
@@ -489,23 +607,36 @@ class ToolModeInfo:
 
     def encode(self) -> bytes:
         """Return the body."""
-        return pack(_TOOL_MODE, self.output_mode, self.digital_output_mode_0,
-                    self.digital_output_mode_1)
+        return pack(
+            _TOOL_MODE, self.output_mode, self.digital_output_mode_0, self.digital_output_mode_1
+        )
 
     @classmethod
     def decode(cls, body: bytes) -> ToolModeInfo:
         """Return the content of a body; RemoteProtocolError if it is too short."""
-        return cls(**dict(zip(cls.__slots__, unpack(_TOOL_MODE, body, 'tool mode info'),
-                              strict=True)))
+        return cls(
+            **dict(zip(cls.__slots__, unpack(_TOOL_MODE, body, 'tool mode info'), strict=True))
+        )
 
 
 #: The content is the manufacturer's own; only the size is known.
 SAFETY_DATA = RawState(sub_type=10, body=bytes(38))
 
 StatePackage: TypeAlias = (
-    RobotModeData | JointData | ToolData | MasterboardData | CartesianInfo | KinematicsInfo
-    | ConfigurationData | ForceModeData | AdditionalInfo | CalibrationData | ToolCommunication
-    | ToolModeInfo | RawState)
+    RobotModeData
+    | JointData
+    | ToolData
+    | MasterboardData
+    | CartesianInfo
+    | KinematicsInfo
+    | ConfigurationData
+    | ForceModeData
+    | AdditionalInfo
+    | CalibrationData
+    | ToolCommunication
+    | ToolModeInfo
+    | RawState
+)
 
 
 def encode_sub_package(package: StatePackage) -> bytes:
@@ -530,18 +661,21 @@ def decode_sub_packages(body: bytes) -> tuple[StatePackage, ...]:
         if not _SUB_HEADER.size <= size <= len(body) - start:
             raise RemoteProtocolError(
                 f'A state sub-package says that it has {size} bytes, but {len(body) - start} '
-                f'are left: {quote(body[start:])}.')
-        content = body[start + _SUB_HEADER.size:start + size]
+                f'are left: {quote(body[start:])}.'
+            )
+        content = body[start + _SUB_HEADER.size : start + size]
         reader = _READ.get(sub_type)
-        packages.append(RawState(sub_type=sub_type, body=content) if reader is None
-                        else reader.decode(content))
+        packages.append(
+            RawState(sub_type=sub_type, body=content) if reader is None else reader.decode(content)
+        )
         start += size
     return tuple(packages)
 
 
 _READ: dict[int, type[RobotModeData | MasterboardData | KinematicsInfo | ConfigurationData]] = {
     cls.sub_type: cls
-    for cls in (RobotModeData, MasterboardData, KinematicsInfo, ConfigurationData)}
+    for cls in (RobotModeData, MasterboardData, KinematicsInfo, ConfigurationData)
+}
 
 
 def _pairs(values: tuple[float, ...]) -> Pairs6:

@@ -35,8 +35,15 @@ ZERO3: Final[Vector3] = (0.0, 0.0, 0.0)
 
 #: Size of the packet [bytes] from a version (major, minor) on, oldest first.
 _SIZES: Final = (
-    ((3, 2), 1060), ((3, 5), 1108), ((3, 10), 1116), ((3, 14), 1140),
-    ((5, 0), 1108), ((5, 4), 1116), ((5, 9), 1140), ((5, 10), 1220))
+    ((3, 2), 1060),
+    ((3, 5), 1108),
+    ((3, 10), 1116),
+    ((3, 14), 1140),
+    ((5, 0), 1108),
+    ((5, 4), 1116),
+    ((5, 9), 1140),
+    ((5, 10), 1220),
+)
 SIZES: Final = frozenset(size for _, size in _SIZES)
 _SIZE = struct.Struct('>i')
 
@@ -108,8 +115,7 @@ class RealtimeData:
         :raises LocalProtocolError: no packet has this size.
         """
         if size not in SIZES:
-            raise LocalProtocolError(
-                f'A real-time packet has {sorted(SIZES)} bytes, not {size}.')
+            raise LocalProtocolError(f'A real-time packet has {sorted(SIZES)} bytes, not {size}.')
         numbers = [number for field in fields(self) for number in _flat(getattr(self, field.name))]
         count = _count(size)
         return struct.pack(f'>i{count}d', size, *numbers[:count])
@@ -137,13 +143,14 @@ def decode_packet(data: bytes) -> RealtimeData:
     stated = _SIZE.unpack_from(data)[0] if len(data) >= _SIZE.size else 0
     if stated != len(data) or stated < min(SIZES) or (stated - _SIZE.size) % 8:
         raise RemoteProtocolError(
-            f'A real-time packet of {len(data)} bytes says that it has {stated}: {quote(data)}.')
+            f'A real-time packet of {len(data)} bytes says that it has {stated}: {quote(data)}.'
+        )
     count = min(_count(stated), _ENDS[-1])
     numbers = struct.unpack_from(f'>{count}d', data, _SIZE.size)
     values: dict[str, float | tuple[float, ...]] = {}
     for field, length, end in zip(fields(RealtimeData), _LENGTHS, _ENDS, strict=True):
         if end <= count:
-            values[field.name] = numbers[end - 1] if length == 1 else numbers[end - length:end]
+            values[field.name] = numbers[end - 1] if length == 1 else numbers[end - length : end]
     # `_LENGTHS` says which fields are tuples; mypy cannot follow names that come from `fields`.
     return RealtimeData(**values)  # type: ignore[arg-type]
 
@@ -166,7 +173,8 @@ class RealtimeDecoder:
             size = _SIZE.unpack_from(self._rest)[0]
             if not min(SIZES) <= size <= 4 * max(SIZES):
                 raise RemoteProtocolError(
-                    f'A real-time packet says that it has {size} bytes: {quote(self._rest)}.')
+                    f'A real-time packet says that it has {size} bytes: {quote(self._rest)}.'
+                )
             if len(self._rest) < size:
                 return
             packet, self._rest = self._rest[:size], self._rest[size:]
@@ -184,5 +192,6 @@ def _count(size: int) -> int:
 #: Numbers in each field, and in all up to its end.
 _LENGTHS: Final = [
     len(cast(tuple[float, ...], field.default)) if isinstance(field.default, tuple) else 1
-    for field in fields(RealtimeData)]
+    for field in fields(RealtimeData)
+]
 _ENDS: Final = list(accumulate(_LENGTHS))

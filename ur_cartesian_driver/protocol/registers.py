@@ -102,8 +102,9 @@ class ExternalError(IntEnum):
 POINTS_BEGUN = OutputInteger.POINTS_BEGUN
 
 
-def field(register: InputInteger | InputDouble | OutputInteger | OutputDouble,
-          offset: int = 0) -> str:
+def field(
+    register: InputInteger | InputDouble | OutputInteger | OutputDouble, offset: int = 0
+) -> str:
     """
     Return the name of a register in an RTDE recipe.
 
@@ -121,14 +122,27 @@ def six_fields(register: InputDouble) -> tuple[str, ...]:
 
 #: The input recipe of the buffered servo, in this order.
 SERVO_INPUTS = (
-    field(InputInteger.DESIRED_MODE), field(InputInteger.SEQUENCE_ID),
-    field(InputInteger.EXTERNAL_ERROR), field(InputInteger.EXTERNAL_SYNC_STATE),
+    field(InputInteger.DESIRED_MODE),
+    field(InputInteger.SEQUENCE_ID),
+    field(InputInteger.EXTERNAL_ERROR),
+    field(InputInteger.EXTERNAL_SYNC_STATE),
     *six_fields(InputDouble.DESIRED_JOINT_POSITIONS),
-    *six_fields(InputDouble.MAX_JOINT_DIVERGENCE_THRESHOLDS), field(InputDouble.STATE_TIME))
+    *six_fields(InputDouble.MAX_JOINT_DIVERGENCE_THRESHOLDS),
+    field(InputDouble.STATE_TIME),
+)
 #: What the buffered servo reports, in this order: first what the guide's program does, too.
 SERVO_OUTPUTS = (
-    field(OutputInteger.ACTUAL_MODE), field(OutputInteger.LAST_SEQUENCE_ID),
+    field(OutputInteger.ACTUAL_MODE),
+    field(OutputInteger.LAST_SEQUENCE_ID),
     field(OutputDouble.LAG_TIME),
-    *(field(register) for register in (
-        OutputInteger.SETPOINTS_DONE, OutputInteger.REPEATS, OutputInteger.SKIPPED,
-        OutputInteger.BUFFER_SIZE, OutputInteger.OVERFLOWS)))
+    *(
+        field(register)
+        for register in (
+            OutputInteger.SETPOINTS_DONE,
+            OutputInteger.REPEATS,
+            OutputInteger.SKIPPED,
+            OutputInteger.BUFFER_SIZE,
+            OutputInteger.OVERFLOWS,
+        )
+    ),
+)

@@ -113,12 +113,20 @@ DEFAULT_STEP_TIME = 2
 # Tuples: to compare a few numbers is faster than to hash one.
 _STREAMS = (TrajectoryAction.STREAM_START, TrajectoryAction.STREAM_END)
 REALTIME_MODES = (
-    ControlMode.SERVOJ, ControlMode.SPEEDJ, ControlMode.SPEEDL, ControlMode.POSE,
-    ControlMode.TORQUE)
+    ControlMode.SERVOJ,
+    ControlMode.SPEEDJ,
+    ControlMode.SPEEDL,
+    ControlMode.POSE,
+    ControlMode.TORQUE,
+)
 _NEVER_SENT = (ControlMode.UNINITIALIZED, ControlMode.TOOL_IN_CONTACT)
 _VALUE_NAMES = {
-    ControlMode.SERVOJ: 'joint position', ControlMode.SPEEDJ: 'joint velocity',
-    ControlMode.SPEEDL: 'tool speed', ControlMode.POSE: 'pose', ControlMode.TORQUE: 'torque'}
+    ControlMode.SERVOJ: 'joint position',
+    ControlMode.SPEEDJ: 'joint velocity',
+    ControlMode.SPEEDL: 'tool speed',
+    ControlMode.POSE: 'pose',
+    ControlMode.TORQUE: 'torque',
+}
 
 Words: TypeAlias = tuple[int, int, int, int, int, int]
 
@@ -145,7 +153,8 @@ class ReverseMessage:
         if not 0 <= self.read_timeout <= INT32_MAX:
             raise LocalProtocolError(
                 f'read_timeout is {self.read_timeout} ms, but it must lie within 0 and '
-                f'{INT32_MAX}.')
+                f'{INT32_MAX}.'
+            )
         if not INT32_MIN <= min(self.payload) <= max(self.payload) <= INT32_MAX:
             for index, word in enumerate(self.payload, 1):
                 checked_int32(word, f'word {index} of a {self.mode.name} message')
@@ -163,11 +172,13 @@ class ReverseMessage:
         """
         words = _MESSAGE.unpack(checked_size(data, MESSAGE_SIZE, 'reverse message'))
         try:
-            return cls(read_timeout=words[0], mode=ControlMode(words[7]),
-                       payload=cast(Words, words[1:7]))
+            return cls(
+                read_timeout=words[0], mode=ControlMode(words[7]), payload=cast(Words, words[1:7])
+            )
         except (ValueError, LocalProtocolError) as error:
-            raise RemoteProtocolError(f'A reverse message is wrong: {error} {quote(data)}'
-                                      ) from None
+            raise RemoteProtocolError(
+                f'A reverse message is wrong: {error} {quote(data)}'
+            ) from None
 
     @property
     def values(self) -> Vector6:
@@ -206,7 +217,8 @@ def read_timeout_for(mode: ControlMode, requested: int, step_time: int = DEFAULT
     _refuse_internal_mode(mode)
     if requested < 0:
         raise LocalProtocolError(
-            f'read_timeout is {requested} ms, but it must not be negative (0 = for ever).')
+            f'read_timeout is {requested} ms, but it must not be negative (0 = for ever).'
+        )
     if mode is ControlMode.STOPPED:
         return STOPPED_TIMEOUT
     if mode in REALTIME_MODES:
@@ -214,8 +226,13 @@ def read_timeout_for(mode: ControlMode, requested: int, step_time: int = DEFAULT
     return max(requested, step_time) if requested else 0
 
 
-def trajectory(action: TrajectoryAction, count: int = 0, read_timeout: int = 200,
-               step_time: int = DEFAULT_STEP_TIME, dialect: Dialect = NEWEST) -> ReverseMessage:
+def trajectory(
+    action: TrajectoryAction,
+    count: int = 0,
+    read_timeout: int = 200,
+    step_time: int = DEFAULT_STEP_TIME,
+    dialect: Dialect = NEWEST,
+) -> ReverseMessage:
     """
     Return the message that starts, ends, cancels or keeps alive a trajectory.
 
@@ -225,22 +242,34 @@ def trajectory(action: TrajectoryAction, count: int = 0, read_timeout: int = 200
     if action in _STREAMS and not dialect.streams:
         raise LocalProtocolError(
             f'{action.name} does not exist in wire dialect {dialect.name}: its trajectories have '
-            'a number of points that is known at their start.')
+            'a number of points that is known at their start.'
+        )
     mode = ControlMode.FORWARD
-    return ReverseMessage(read_timeout=read_timeout_for(mode, read_timeout, step_time), mode=mode,
-                          payload=(action, count, 0, 0, 0, 0))
+    return ReverseMessage(
+        read_timeout=read_timeout_for(mode, read_timeout, step_time),
+        mode=mode,
+        payload=(action, count, 0, 0, 0, 0),
+    )
 
 
-def freedrive(action: FreedriveAction, read_timeout: int = 200,
-              step_time: int = DEFAULT_STEP_TIME) -> ReverseMessage:
+def freedrive(
+    action: FreedriveAction, read_timeout: int = 200, step_time: int = DEFAULT_STEP_TIME
+) -> ReverseMessage:
     """Return the message that starts, ends or keeps alive freedrive."""
     mode = ControlMode.FREEDRIVE
-    return ReverseMessage(read_timeout=read_timeout_for(mode, read_timeout, step_time), mode=mode,
-                          payload=(action, 0, 0, 0, 0, 0))
+    return ReverseMessage(
+        read_timeout=read_timeout_for(mode, read_timeout, step_time),
+        mode=mode,
+        payload=(action, 0, 0, 0, 0, 0),
+    )
 
 
-def setpoint(mode: ControlMode, values: Sequence[float], read_timeout: int = 20,
-             step_time: int = DEFAULT_STEP_TIME) -> ReverseMessage:
+def setpoint(
+    mode: ControlMode,
+    values: Sequence[float],
+    read_timeout: int = 20,
+    step_time: int = DEFAULT_STEP_TIME,
+) -> ReverseMessage:
     """
     Return a set-point of a real-time mode.
 
@@ -250,11 +279,15 @@ def setpoint(mode: ControlMode, values: Sequence[float], read_timeout: int = 20,
     if mode not in REALTIME_MODES or len(values) != 6:
         raise LocalProtocolError(
             f'{mode.name} with {len(values)} values is not a set-point: the modes are '
-            f'{", ".join(m.name for m in sorted(REALTIME_MODES))}, each with 6 values.')
+            f'{", ".join(m.name for m in sorted(REALTIME_MODES))}, each with 6 values.'
+        )
     name = _VALUE_NAMES[mode]
     words = tuple(to_fixed(value, f'{name}[{i}]') for i, value in enumerate(values))
-    return ReverseMessage(read_timeout=read_timeout_for(mode, read_timeout, step_time), mode=mode,
-                          payload=cast(Words, words))
+    return ReverseMessage(
+        read_timeout=read_timeout_for(mode, read_timeout, step_time),
+        mode=mode,
+        payload=cast(Words, words),
+    )
 
 
 def keepalive(read_timeout: int = 1000, step_time: int = DEFAULT_STEP_TIME) -> ReverseMessage:
@@ -263,8 +296,7 @@ def keepalive(read_timeout: int = 1000, step_time: int = DEFAULT_STEP_TIME) -> R
     return ReverseMessage(read_timeout=read_timeout_for(mode, read_timeout, step_time), mode=mode)
 
 
-def buffered_servo(read_timeout: int = 200,
-                   step_time: int = DEFAULT_STEP_TIME) -> ReverseMessage:
+def buffered_servo(read_timeout: int = 200, step_time: int = DEFAULT_STEP_TIME) -> ReverseMessage:
     """Return the message that enters the buffered servo, or keeps it alive."""
     mode = ControlMode.BUFFERED_SERVO
     return ReverseMessage(read_timeout=read_timeout_for(mode, read_timeout, step_time), mode=mode)

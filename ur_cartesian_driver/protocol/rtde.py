@@ -117,7 +117,8 @@ class FieldsNotFound(RemoteProtocolError):
         """Build the sentence from the names and the controller's version."""
         super().__init__(
             f'The robot does not know the RTDE {kind} {", ".join(names)}; its software is '
-            f'{version}, which may be too old.')
+            f'{version}, which may be too old.'
+        )
         self.names = tuple(names)
 
 
@@ -128,7 +129,8 @@ class InputsInUse(RemoteProtocolError):
         """Build the sentence from the names."""
         super().__init__(
             f'The RTDE inputs {", ".join(names)} are in use by another client; end it, or disable '
-            'EtherNet/IP, PROFINET or MODBUS in the installation of the robot.')
+            'EtherNet/IP, PROFINET or MODBUS in the installation of the robot.'
+        )
         self.names = tuple(names)
 
 
@@ -189,9 +191,14 @@ def greatest_frequency(version: ControllerVersion) -> float:
 class RtdeClient:
     """One RTDE connection, seen from the client; use it once."""
 
-    def __init__(self, outputs: Sequence[str], inputs: Sequence[str] = (), frequency: float = 0.0,
-                 optional_outputs: Iterable[str] = (),
-                 input_groups: Sequence[Sequence[str]] = ()) -> None:
+    def __init__(
+        self,
+        outputs: Sequence[str],
+        inputs: Sequence[str] = (),
+        frequency: float = 0.0,
+        optional_outputs: Iterable[str] = (),
+        input_groups: Sequence[Sequence[str]] = (),
+    ) -> None:
         """
         Say what is wanted.
 
@@ -210,7 +217,8 @@ class RtdeClient:
         if not outputs or not 0.0 <= frequency <= 500.0:
             raise LocalProtocolError(
                 f'An RTDE connection needs outputs and a frequency of 0 to 500 Hz, but '
-                f'{len(outputs)} outputs and {frequency!r} Hz were asked for.')
+                f'{len(outputs)} outputs and {frequency!r} Hz were asked for.'
+            )
         self.state = RtdeState.NEW
         self._outputs = tuple(outputs)
         self._optional = frozenset(optional_outputs)
@@ -265,7 +273,8 @@ class RtdeClient:
             frames = self._frames.feed(data)
             if not data and self.state is not RtdeState.READY:
                 raise RemoteProtocolError(
-                    f'The robot closed the RTDE connection, expected was {self.state.value}.')
+                    f'The robot closed the RTDE connection, expected was {self.state.value}.'
+                )
             return [event for frame in frames for event in self._frame(frame)]
         except (RemoteProtocolError, LocalProtocolError):
             self.state = RtdeState.BROKEN
@@ -273,8 +282,11 @@ class RtdeClient:
 
     def _frame(self, frame: bytes) -> list[RtdeEvent]:
         # The way of 500 frames a second.
-        if self._recipe is not None and frame[2] == PackageType.DATA_PACKAGE and (
-                self.state is RtdeState.READY):
+        if (
+            self._recipe is not None
+            and frame[2] == PackageType.DATA_PACKAGE
+            and (self.state is RtdeState.READY)
+        ):
             return [DataReceived(self._recipe.unpack(frame[3:]))]
         reply = decode_reply(frame, self._version)
         if isinstance(reply, TextMessage):
@@ -286,14 +298,17 @@ class RtdeClient:
             return self._out_of_turn(reply)
         return handle(reply)
 
-    def _handlers(self) -> dict[
-            RtdeState, tuple[PackageType, Callable[[Reply], list[RtdeEvent]]]]:
+    def _handlers(self) -> dict[RtdeState, tuple[PackageType, Callable[[Reply], list[RtdeEvent]]]]:
         """Return state -> the package that it waits for, and what is done with it."""
         return {
-            RtdeState.PROTOCOL_VERSION:
-                (PackageType.REQUEST_PROTOCOL_VERSION, self._on_protocol_version),
-            RtdeState.CONTROLLER_VERSION:
-                (PackageType.GET_URCONTROL_VERSION, self._on_controller_version),
+            RtdeState.PROTOCOL_VERSION: (
+                PackageType.REQUEST_PROTOCOL_VERSION,
+                self._on_protocol_version,
+            ),
+            RtdeState.CONTROLLER_VERSION: (
+                PackageType.GET_URCONTROL_VERSION,
+                self._on_controller_version,
+            ),
             RtdeState.OUTPUTS: (PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS, self._on_outputs),
             RtdeState.INPUTS: (PackageType.CONTROL_PACKAGE_SETUP_INPUTS, self._on_inputs),
             RtdeState.START: (PackageType.CONTROL_PACKAGE_START, self._on_start),
@@ -307,8 +322,11 @@ class RtdeClient:
         return []
 
     def _out_of_turn(self, reply: Reply) -> list[RtdeEvent]:
-        late_start = (self.state is RtdeState.READY and isinstance(reply, Acknowledgement)
-                      and reply.type is PackageType.CONTROL_PACKAGE_START)
+        late_start = (
+            self.state is RtdeState.READY
+            and isinstance(reply, Acknowledgement)
+            and reply.type is PackageType.CONTROL_PACKAGE_START
+        )
         if late_start:  # the data overtook the reply
             return self._on_start(reply)
         if self.state is not RtdeState.READY:
@@ -316,7 +334,8 @@ class RtdeClient:
             if self._foreign > FOREIGN_PACKAGES:
                 raise RemoteProtocolError(
                     f'The robot sent {self._foreign} RTDE packages out of turn, expected was '
-                    f'{self.state.value}; the last one was {reply!r:.200}.')
+                    f'{self.state.value}; the last one was {reply!r:.200}.'
+                )
         return [ForeignPackage(package=reply)]
 
     def _on_protocol_version(self, reply: Reply) -> list[RtdeEvent]:
@@ -334,14 +353,14 @@ class RtdeClient:
         if self._frequency > greatest:
             raise LocalProtocolError(
                 f'The robot, software {reply}, streams at {greatest:g} Hz at most, but '
-                f'{self._frequency:g} Hz were asked for.')
+                f'{self._frequency:g} Hz were asked for.'
+            )
         self._frequency = self._frequency or greatest
         return self._ask_outputs()
 
     def _ask_outputs(self) -> list[RtdeEvent]:
         frequency = None if self._version == 1 else self._frequency
-        return self._ask(RtdeState.OUTPUTS,
-                         SetupOutputs(names=self._outputs, frequency=frequency))
+        return self._ask(RtdeState.OUTPUTS, SetupOutputs(names=self._outputs, frequency=frequency))
 
     def _on_outputs(self, reply: Reply) -> list[RtdeEvent]:
         assert isinstance(reply, OutputsReply)
@@ -355,8 +374,10 @@ class RtdeClient:
             self._missing += tuple(missing)
             self._outputs = tuple(name for name in names if name not in missing)
             return self._ask_outputs()
-        types = [_type(name, text, OUTPUT_TYPES.get(name))
-                 for name, text in zip(names, reply.types, strict=True)]
+        types = [
+            _type(name, text, OUTPUT_TYPES.get(name))
+            for name, text in zip(names, reply.types, strict=True)
+        ]
         self._recipe = Recipe(names, types, reply.recipe_id)
         return self._ask_inputs()
 
@@ -387,10 +408,16 @@ class RtdeClient:
     def _ready(self) -> list[RtdeEvent]:
         assert self._recipe is not None
         self.state = RtdeState.READY
-        return [Ready(
-            protocol_version=self._version, controller_version=self._controller,
-            frequency=self._frequency, outputs=self._recipe, missing=self._missing,
-            inputs=tuple(self._inputs))]
+        return [
+            Ready(
+                protocol_version=self._version,
+                controller_version=self._controller,
+                frequency=self._frequency,
+                outputs=self._recipe,
+                missing=self._missing,
+                inputs=tuple(self._inputs),
+            )
+        ]
 
 
 def _accepted(reply: Reply) -> bool:
@@ -401,7 +428,8 @@ def _check_count(types: Sequence[str], names: Sequence[str]) -> None:
     if len(types) != len(names):
         raise RemoteProtocolError(
             f'The robot answered {len(types)} types to {len(names)} RTDE fields: '
-            f'{", ".join(types):.200}.')
+            f'{", ".join(types):.200}.'
+        )
 
 
 def _type(name: str, text: str, usual: DataType | None) -> DataType:
@@ -415,6 +443,6 @@ def _type(name: str, text: str, usual: DataType | None) -> DataType:
         return DataType[text]
     if usual is None:
         raise RemoteProtocolError(
-            f'The robot says that the RTDE field {name} is of type {text!r:.60}, which is '
-            'unknown.')
+            f'The robot says that the RTDE field {name} is of type {text!r:.60}, which is unknown.'
+        )
     return usual

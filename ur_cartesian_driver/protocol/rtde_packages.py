@@ -85,11 +85,21 @@ class Recipe:
     ``pack`` and ``unpack`` go through one precompiled struct, because they run 500 times a second.
     """
 
-    __slots__ = ('_frame', '_head', '_lengths', '_pick', '_size', '_struct', 'names', 'recipe_id',
-                 'types')
+    __slots__ = (
+        '_frame',
+        '_head',
+        '_lengths',
+        '_pick',
+        '_size',
+        '_struct',
+        'names',
+        'recipe_id',
+        'types',
+    )
 
-    def __init__(self, names: Sequence[str], types: Sequence[DataType],
-                 recipe_id: int | None = 1) -> None:
+    def __init__(
+        self, names: Sequence[str], types: Sequence[DataType], recipe_id: int | None = 1
+    ) -> None:
         """
         Compile the recipe.
 
@@ -127,7 +137,8 @@ class Recipe:
         if len(payload) != self._size:
             raise RemoteProtocolError(
                 f'An RTDE data package of this recipe has {self._size} bytes, but {len(payload)} '
-                f'came: {quote(payload)}.')
+                f'came: {quote(payload)}.'
+            )
         flat = self._struct.unpack(payload)
         if self._pick is None:
             return flat if len(flat) == 1 else (flat,)
@@ -135,8 +146,7 @@ class Recipe:
 
     def unpack_frame(self, data: bytes) -> Values | None:
         """Return the values of a whole frame; None where the bytes are anything else."""
-        if (len(data) != self._frame.size or self._pick is None
-                or data[:3] != self._head):
+        if len(data) != self._frame.size or self._pick is None or data[:3] != self._head:
             return None
         return cast(Values, self._pick(self._struct.unpack_from(data, _HEADER.size)))
 
@@ -172,7 +182,8 @@ class Recipe:
             surplus = ', '.join(set(values) - set(self.names)) or 'none'
             raise LocalProtocolError(
                 f'An RTDE package needs all values of its recipe; missing: {missing}, '
-                f'surplus: {surplus}.')
+                f'surplus: {surplus}.'
+            )
         return self.pack([values[name] for name in self.names])
 
     def named(self, values: Values) -> dict[str, Value]:
@@ -207,11 +218,13 @@ class Recipe:
         """Return the error that names the value which cannot be packed."""
         if len(values) != len(self.names):
             return LocalProtocolError(
-                f'{len(values)} values do not fill an RTDE recipe of {len(self.names)} fields.')
+                f'{len(values)} values do not fill an RTDE recipe of {len(self.names)} fields.'
+            )
         problems = [
             f'{name} is {value!r}, which is no {data_type.name}'
             for name, data_type, value in zip(self.names, self.types, values, strict=True)
-            if not _fits(data_type, value)]
+            if not _fits(data_type, value)
+        ]
         return LocalProtocolError('; '.join(problems) + '.')
 
 
@@ -321,10 +334,12 @@ class TextMessage:
         if max(len(text), len(source)) > 255:
             raise LocalProtocolError(
                 f'text has {len(text)} and source {len(source)} bytes, but an RTDE text message '
-                'holds at most 255 of each.')
-        return frame(PackageType.TEXT_MESSAGE,
-                     bytes([len(text)]) + text + bytes([len(source)]) + source
-                     + _packed('>B', self.level))
+                'holds at most 255 of each.'
+            )
+        return frame(
+            PackageType.TEXT_MESSAGE,
+            bytes([len(text)]) + text + bytes([len(source)]) + source + _packed('>B', self.level),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -350,8 +365,10 @@ class ControllerVersion:
 
     def encode(self) -> bytes:
         """Return the frame."""
-        return frame(PackageType.GET_URCONTROL_VERSION,
-                     _packed('>4I', self.major, self.minor, self.bugfix, self.build))
+        return frame(
+            PackageType.GET_URCONTROL_VERSION,
+            _packed('>4I', self.major, self.minor, self.bugfix, self.build),
+        )
 
     def __str__(self) -> str:
         """Return the version with dots."""
@@ -380,14 +397,25 @@ class InputsReply:
 
     def encode(self) -> bytes:
         """Return the frame."""
-        return frame(PackageType.CONTROL_PACKAGE_SETUP_INPUTS,
-                     _packed('>B', self.recipe_id) + join(self.types))
+        return frame(
+            PackageType.CONTROL_PACKAGE_SETUP_INPUTS,
+            _packed('>B', self.recipe_id) + join(self.types),
+        )
 
 
-Request: TypeAlias = (RequestProtocolVersion | GetControllerVersion | SetupOutputs | SetupInputs
-                      | Start | Pause | Data | TextMessage)
-Reply: TypeAlias = (Acknowledgement | ControllerVersion | OutputsReply | InputsReply | Data
-                    | TextMessage)
+Request: TypeAlias = (
+    RequestProtocolVersion
+    | GetControllerVersion
+    | SetupOutputs
+    | SetupInputs
+    | Start
+    | Pause
+    | Data
+    | TextMessage
+)
+Reply: TypeAlias = (
+    Acknowledgement | ControllerVersion | OutputsReply | InputsReply | Data | TextMessage
+)
 
 
 def frame(package_type: PackageType, payload: bytes = b'') -> bytes:
@@ -400,7 +428,8 @@ def frame(package_type: PackageType, payload: bytes = b'') -> bytes:
     if size > 65535:
         raise LocalProtocolError(
             f'An RTDE package of {size} bytes cannot be sent, 65535 are possible; ask for fewer '
-            'fields.')
+            'fields.'
+        )
     return _HEADER.pack(size, package_type) + payload
 
 
@@ -485,7 +514,8 @@ def _open(data: bytes) -> tuple[PackageType, bytes]:
         return PackageType(data[2]), data[3:]
     except ValueError:
         raise RemoteProtocolError(
-            f'{data[2]} is not a type of RTDE package: {quote(data)}.') from None
+            f'{data[2]} is not a type of RTDE package: {quote(data)}.'
+        ) from None
 
 
 def _split(payload: bytes) -> tuple[str, ...]:
@@ -514,5 +544,8 @@ def _text_message(data: bytes, payload: bytes, version: int) -> TextMessage:
     _at_least(data, payload, end + 2)
     source_end = end + 1 + payload[end]
     _at_least(data, payload, source_end + 1)
-    return TextMessage(text=decode_text(payload[1:end]),
-                       source=decode_text(payload[end + 1:source_end]), level=payload[source_end])
+    return TextMessage(
+        text=decode_text(payload[1:end]),
+        source=decode_text(payload[end + 1 : source_end]),
+        level=payload[source_end],
+    )

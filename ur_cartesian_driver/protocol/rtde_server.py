@@ -73,10 +73,14 @@ class InputReceived:
 class RtdeServer:
     """One connection, seen from the controller."""
 
-    def __init__(self, version: ControllerVersion, taken_inputs: set[str],
-                 frequency: float = 500.0,
-                 output_types: Mapping[str, DataType] = OUTPUT_TYPES,
-                 input_types: Mapping[str, DataType] = INPUT_TYPES) -> None:
+    def __init__(
+        self,
+        version: ControllerVersion,
+        taken_inputs: set[str],
+        frequency: float = 500.0,
+        output_types: Mapping[str, DataType] = OUTPUT_TYPES,
+        input_types: Mapping[str, DataType] = INPUT_TYPES,
+    ) -> None:
         """
         Wait for requests.
 
@@ -129,14 +133,20 @@ class RtdeServer:
             self._taken.difference_update(recipe.names)
         self._inputs.clear()
 
-    def _answer(self, request: RequestProtocolVersion | GetControllerVersion | SetupOutputs
-                | SetupInputs | Start | Pause) -> Reply:
+    def _answer(
+        self,
+        request: RequestProtocolVersion
+        | GetControllerVersion
+        | SetupOutputs
+        | SetupInputs
+        | Start
+        | Pause,
+    ) -> Reply:
         match request:
             case RequestProtocolVersion():
                 known = 1 <= request.version <= NEWEST_VERSION
                 self._protocol = request.version if known else self._protocol
-                return Acknowledgement(
-                    type=PackageType.REQUEST_PROTOCOL_VERSION, accepted=known)
+                return Acknowledgement(type=PackageType.REQUEST_PROTOCOL_VERSION, accepted=known)
             case GetControllerVersion():
                 return self._version
             case SetupOutputs():
@@ -145,12 +155,10 @@ class RtdeServer:
                 return self._set_up_inputs(request)
             case Start():
                 self.streaming = True
-                return Acknowledgement(
-                    type=PackageType.CONTROL_PACKAGE_START, accepted=True)
+                return Acknowledgement(type=PackageType.CONTROL_PACKAGE_START, accepted=True)
             case Pause():
                 self.streaming = False
-                return Acknowledgement(
-                    type=PackageType.CONTROL_PACKAGE_PAUSE, accepted=True)
+                return Acknowledgement(type=PackageType.CONTROL_PACKAGE_PAUSE, accepted=True)
 
     def _set_up_outputs(self, request: SetupOutputs) -> OutputsReply:
         types = [self._output_types.get(name) for name in request.names]
@@ -161,10 +169,15 @@ class RtdeServer:
         recipe_id = None if self._protocol == 1 else len(self.outputs) + 1 if valid else 0
         if valid:
             _check_number(self.outputs)
-            self.outputs.append(Output(recipe=Recipe(request.names, known, recipe_id),
-                                       frequency=self._granted(request.frequency)))
-        return OutputsReply(types=tuple(t.name if t else NOT_FOUND for t in types),
-                            recipe_id=recipe_id)
+            self.outputs.append(
+                Output(
+                    recipe=Recipe(request.names, known, recipe_id),
+                    frequency=self._granted(request.frequency),
+                )
+            )
+        return OutputsReply(
+            types=tuple(t.name if t else NOT_FOUND for t in types), recipe_id=recipe_id
+        )
 
     def _granted(self, frequency: float | None) -> float:
         """Return the frequency that a client gets [Hz]."""
@@ -177,8 +190,13 @@ class RtdeServer:
         ours = {name for recipe in self._inputs for name in recipe.names}
         for name in request.names:
             data_type = self._input_types.get(name)
-            texts.append(NOT_FOUND if data_type is None
-                         else IN_USE if name in self._taken - ours else data_type.name)
+            texts.append(
+                NOT_FOUND
+                if data_type is None
+                else IN_USE
+                if name in self._taken - ours
+                else data_type.name
+            )
         recipe_id = 0
         if texts and NOT_FOUND not in texts and IN_USE not in texts:
             _check_number(self._inputs)
@@ -195,7 +213,8 @@ class RtdeServer:
         number = data.recipe_id if len(self._inputs) > 1 else 1
         if not 1 <= number <= len(self._inputs):
             raise RemoteProtocolError(
-                f'An RTDE client wrote recipe {number}, but it set up 1 to {len(self._inputs)}.')
+                f'An RTDE client wrote recipe {number}, but it set up 1 to {len(self._inputs)}.'
+            )
         recipe = self._inputs[number - 1]
         return InputReceived(recipe=recipe, values=recipe.unpack(data.payload))
 

@@ -237,9 +237,20 @@ class SetTargetPayload:
 
 
 Command: TypeAlias = (
-    ZeroFtSensor | SetPayload | SetToolVoltage | StartForceMode | EndForceMode | StartToolContact
-    | EndToolContact | SetFrictionCompensation | FtRtdeInputEnable | SetGravity | SetTcpOffset
-    | SetFrictionScales | SetTargetPayload)
+    ZeroFtSensor
+    | SetPayload
+    | SetToolVoltage
+    | StartForceMode
+    | EndForceMode
+    | StartToolContact
+    | EndToolContact
+    | SetFrictionCompensation
+    | FtRtdeInputEnable
+    | SetGravity
+    | SetTcpOffset
+    | SetFrictionScales
+    | SetTargetPayload
+)
 
 #: Software from which a command works: CB3 and e-Series software 3 to 5, PolyScope X.
 MINIMUM_VERSIONS: Mapping[ScriptCommand, tuple[Version, Version]] = {
@@ -317,7 +328,8 @@ def _result(record: bytes) -> ToolContactResult:
         return ToolContactResult(number)
     except ValueError:
         raise RemoteProtocolError(
-            f'{number} is not a tool contact result (0 or 1): {quote(record)}.') from None
+            f'{number} is not a tool contact result (0 or 1): {quote(record)}.'
+        ) from None
 
 
 def _words(command: Command) -> list[int]:
@@ -331,29 +343,38 @@ def _words(command: Command) -> list[int]:
             return [
                 *_fixed_all(command.task_frame, 'task_frame'),
                 *(FIXED_POINT * bool(selected) for selected in command.selection),
-                *_fixed_all(command.wrench, 'wrench'), to_fixed(command.type, 'type'),
-                *_fixed_all(command.limits, 'limits'), to_fixed(command.damping, 'damping'),
-                to_fixed(command.gain_scaling, 'gain_scaling')]
+                *_fixed_all(command.wrench, 'wrench'),
+                to_fixed(command.type, 'type'),
+                *_fixed_all(command.limits, 'limits'),
+                to_fixed(command.damping, 'damping'),
+                to_fixed(command.gain_scaling, 'gain_scaling'),
+            ]
         case SetFrictionCompensation():
             return [int(command.enabled)]
         case FtRtdeInputEnable():
             return [
-                int(command.enabled), to_fixed(command.sensor_mass, 'sensor_mass'),
+                int(command.enabled),
+                to_fixed(command.sensor_mass, 'sensor_mass'),
                 *_fixed_all(command.sensor_offset, 'sensor_offset'),
-                *_fixed_all(command.sensor_cog, 'sensor_cog')]
+                *_fixed_all(command.sensor_cog, 'sensor_cog'),
+            ]
         case SetGravity():
             return _fixed_all(command.gravity, 'gravity')
         case SetTcpOffset():
             return [*_fixed_all(command.offset, 'offset'), int(command.hold)]
         case SetFrictionScales():
             # URCL limits these where it refuses other values; the bytes shall be the same.
-            return [*_fixed_all([min(max(v, 0.0), 1.0) for v in command.viscous], 'viscous'),
-                    *_fixed_all([min(max(v, 0.0), 1.0) for v in command.coulomb], 'coulomb')]
+            return [
+                *_fixed_all([min(max(v, 0.0), 1.0) for v in command.viscous], 'viscous'),
+                *_fixed_all([min(max(v, 0.0), 1.0) for v in command.coulomb], 'coulomb'),
+            ]
         case SetTargetPayload():
             return [
-                to_fixed(command.mass, 'mass'), *_fixed_all(command.cog, 'cog'),
+                to_fixed(command.mass, 'mass'),
+                *_fixed_all(command.cog, 'cog'),
                 *_fixed_all(command.inertia, 'inertia'),
-                to_fixed(command.transition_time, 'transition_time')]
+                to_fixed(command.transition_time, 'transition_time'),
+            ]
     return []
 
 
@@ -363,23 +384,36 @@ _READERS: Mapping[ScriptCommand, Callable[[list[int], list[float]], Command]] = 
     ScriptCommand.SET_PAYLOAD: lambda _, v: SetPayload(mass=v[0], cog=_three(v[1:4])),
     ScriptCommand.SET_TOOL_VOLTAGE: lambda _, v: SetToolVoltage(voltage=_whole(v[0], 'voltage')),
     ScriptCommand.START_FORCE_MODE: lambda _, v: StartForceMode(
-        task_frame=_six(v[0:6]), selection=_flags(v[6:12]), wrench=_six(v[12:18]),
-        type=_whole(v[18], 'type'), limits=_six(v[19:25]), damping=v[25], gain_scaling=v[26]),
+        task_frame=_six(v[0:6]),
+        selection=_flags(v[6:12]),
+        wrench=_six(v[12:18]),
+        type=_whole(v[18], 'type'),
+        limits=_six(v[19:25]),
+        damping=v[25],
+        gain_scaling=v[26],
+    ),
     ScriptCommand.END_FORCE_MODE: lambda _, v: EndForceMode(),
     ScriptCommand.START_TOOL_CONTACT: lambda _, v: StartToolContact(),
     ScriptCommand.END_TOOL_CONTACT: lambda _, v: EndToolContact(),
-    ScriptCommand.SET_FRICTION_COMPENSATION:
-        lambda raw, _: SetFrictionCompensation(enabled=raw[0] != 0),
+    ScriptCommand.SET_FRICTION_COMPENSATION: lambda raw, _: SetFrictionCompensation(
+        enabled=raw[0] != 0
+    ),
     ScriptCommand.FT_RTDE_INPUT_ENABLE: lambda raw, v: FtRtdeInputEnable(
-        enabled=raw[0] != 0, sensor_mass=v[1], sensor_offset=_three(v[2:5]),
-        sensor_cog=_three(v[5:8])),
+        enabled=raw[0] != 0,
+        sensor_mass=v[1],
+        sensor_offset=_three(v[2:5]),
+        sensor_cog=_three(v[5:8]),
+    ),
     ScriptCommand.SET_GRAVITY: lambda _, v: SetGravity(gravity=_three(v[0:3])),
     ScriptCommand.SET_TCP_OFFSET: lambda raw, v: SetTcpOffset(
-        offset=_six(v[0:6]), hold=TcpHold(raw[6])),
+        offset=_six(v[0:6]), hold=TcpHold(raw[6])
+    ),
     ScriptCommand.SET_FRICTION_SCALES: lambda _, v: SetFrictionScales(
-        viscous=_six(v[0:6]), coulomb=_six(v[6:12])),
+        viscous=_six(v[0:6]), coulomb=_six(v[6:12])
+    ),
     ScriptCommand.SET_TARGET_PAYLOAD: lambda _, v: SetTargetPayload(
-        mass=v[0], cog=_three(v[1:4]), inertia=_six(v[4:10]), transition_time=v[10]),
+        mass=v[0], cog=_three(v[1:4]), inertia=_six(v[4:10]), transition_time=v[10]
+    ),
 }
 
 
@@ -391,7 +425,8 @@ def _check_version(command: ScriptCommand, version: Version) -> None:
     if version < needed:
         raise LocalProtocolError(
             f'{command.name} needs software {_dotted(polyscope_5)} or {_dotted(polyscope_x)}, but '
-            f'the robot runs {_dotted(version)}; update the robot.')
+            f'the robot runs {_dotted(version)}; update the robot.'
+        )
 
 
 def _dotted(version: Version) -> str:

@@ -41,9 +41,8 @@ class RequestDecoder:
         data = self._rest + data
         count, rest = divmod(len(data), len(REQUEST))
         if data != REQUEST * count + REQUEST[:rest]:
-            raise RemoteProtocolError(
-                f'Expected {REQUEST!r}, but the robot sent {quote(data)}.')
-        self._rest = data[count * len(REQUEST):]
+            raise RemoteProtocolError(f'Expected {REQUEST!r}, but the robot sent {quote(data)}.')
+        self._rest = data[count * len(REQUEST) :]
         return count
 
 

@@ -170,19 +170,45 @@ _RESULT = struct.Struct('>i')
 
 _TARGET_NAMES = tuple(f'target[{i}]' for i in range(6))
 _FIELD_NAMES = (
-    *_TARGET_NAMES, *(f'words 6-11[{i}]' for i in range(6)),
-    'velocity', 'acceleration', 'mode', *(f'words 15-17[{i}]' for i in range(3)),
-    'duration', 'blend_radius', 'motion type')
+    *_TARGET_NAMES,
+    *(f'words 6-11[{i}]' for i in range(6)),
+    'velocity',
+    'acceleration',
+    'mode',
+    *(f'words 15-17[{i}]' for i in range(3)),
+    'duration',
+    'blend_radius',
+    'motion type',
+)
 _REPEATED_FIELD_NAMES = (
-    *_TARGET_NAMES, *['velocity'] * 6, *['acceleration'] * 6,
-    'duration', 'blend_radius', 'motion type')
+    *_TARGET_NAMES,
+    *['velocity'] * 6,
+    *['acceleration'] * 6,
+    'duration',
+    'blend_radius',
+    'motion type',
+)
 _SPLINE_FIELD_NAMES = (
-    *_TARGET_NAMES, *(f'velocities[{i}]' for i in range(6)),
-    *(f'accelerations[{i}]' for i in range(6)), 'duration', 'kind', 'motion type')
+    *_TARGET_NAMES,
+    *(f'velocities[{i}]' for i in range(6)),
+    *(f'accelerations[{i}]' for i in range(6)),
+    'duration',
+    'kind',
+    'motion type',
+)
 _OUTPUT_FIELD_NAMES = (
-    *(f'place[{i}]' for i in range(6)), *(f'heading[{i}]' for i in range(6)),
-    'output', 'pin', 'value', 'domain', 'has_place', 'comes_round', 'delay', 'word 19',
-    'motion type')
+    *(f'place[{i}]' for i in range(6)),
+    *(f'heading[{i}]' for i in range(6)),
+    'output',
+    'pin',
+    'value',
+    'domain',
+    'has_place',
+    'comes_round',
+    'delay',
+    'word 19',
+    'motion type',
+)
 
 #: Class -> motion type with joint positions, with a pose as target.
 _TYPES: dict[type[Primitive], tuple[MotionType, MotionType]] = {
@@ -194,13 +220,16 @@ _TYPES: dict[type[Primitive], tuple[MotionType, MotionType]] = {
 }
 #: Target is a pose, via is a pose -> motion type.
 _ARC_TYPES = {
-    (False, False): MotionType.MOVEC_JOINT, (False, True): MotionType.MOVEC_JOINT_POSE,
-    (True, False): MotionType.MOVEC_POSE_JOINT, (True, True): MotionType.MOVEC,
+    (False, False): MotionType.MOVEC_JOINT,
+    (False, True): MotionType.MOVEC_JOINT_POSE,
+    (True, False): MotionType.MOVEC_POSE_JOINT,
+    (True, True): MotionType.MOVEC,
 }
 _MOVES = {types[is_pose]: (cls, is_pose) for cls, types in _TYPES.items() for is_pose in (0, 1)}
 _ARCS = {motion: kinds for kinds, motion in _ARC_TYPES.items()}
 _OPTIMOVES = frozenset(
-    motion for motion, (cls, _) in _MOVES.items() if cls in (OptimoveJ, OptimoveL))
+    motion for motion, (cls, _) in _MOVES.items() if cls in (OptimoveJ, OptimoveL)
+)
 #: Where velocity and acceleration stand.
 _SPEEDS_ONCE = (PointField.VELOCITY, PointField.ACCELERATION)
 _SPEEDS_REPEATED = (PointField.SECOND, PointField.VELOCITY)
@@ -236,26 +265,65 @@ def to_fields(primitive: Instruction, dialect: Dialect = NEWEST) -> Fields:
         raise _unknown_in(dialect, f'{kind.name} (motion type {kind})')
     if isinstance(primitive, SwitchOutput):
         place = primitive.place
-        return (*(_numbers(place) if place else ZERO6), *primitive.heading, primitive.output,
-                primitive.pin, primitive.value, primitive.domain, place is not None,
-                primitive.comes_round, primitive.delay, 0, kind)
+        return (
+            *(_numbers(place) if place else ZERO6),
+            *primitive.heading,
+            primitive.output,
+            primitive.pin,
+            primitive.value,
+            primitive.domain,
+            place is not None,
+            primitive.comes_round,
+            primitive.delay,
+            0,
+            kind,
+        )
     if isinstance(primitive, Spline):
         spline = SplineKind.CUBIC if primitive.accelerations is None else SplineKind.QUINTIC
-        return (*primitive.target, *primitive.velocities, *(primitive.accelerations or ZERO6),
-                primitive.duration, spline, kind)
+        return (
+            *primitive.target,
+            *primitive.velocities,
+            *(primitive.accelerations or ZERO6),
+            primitive.duration,
+            spline,
+            kind,
+        )
     target, v, a = _numbers(primitive.target), primitive.velocity, primitive.acceleration
     if isinstance(primitive, MoveC):
-        return (*target, *_numbers(primitive.via), v, a,
-                primitive.mode, 0, 0, 0, 0, primitive.blend_radius, kind)
+        return (
+            *target,
+            *_numbers(primitive.via),
+            v,
+            a,
+            primitive.mode,
+            0,
+            0,
+            0,
+            0,
+            primitive.blend_radius,
+            kind,
+        )
     near = primitive.q_near
     if near is not None and not isinstance(primitive.target, Pose):
         raise LocalProtocolError(
             f'{type(primitive).__name__} has joint positions as its target and a q_near; a q_near '
-            'goes with a pose only.')
+            'goes with a pose only.'
+        )
     duration = primitive.duration if isinstance(primitive, MoveJ | MoveL) else 0
     if dialect.q_near:
-        return (*target, *(near or ZERO6), v, a,
-                near is not None, 0, 0, 0, duration, primitive.blend_radius, kind)
+        return (
+            *target,
+            *(near or ZERO6),
+            v,
+            a,
+            near is not None,
+            0,
+            0,
+            0,
+            duration,
+            primitive.blend_radius,
+            kind,
+        )
     if near is not None:
         raise _unknown_in(dialect, 'q_near')
     return (*target, v, v, v, v, v, v, a, a, a, a, a, a, duration, primitive.blend_radius, kind)
@@ -274,7 +342,8 @@ def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST) -> Instructi
     kind = _known(MotionType, fields[20], 'motion type (word 20)')
     if kind not in dialect.motion_types:
         raise RemoteProtocolError(
-            f'{kind:d} is an unknown motion type (word 20) in wire dialect {dialect.name}.')
+            f'{kind:d} is an unknown motion type (word 20) in wire dialect {dialect.name}.'
+        )
     target, second = _vector(fields[:6]), _vector(fields[6:12])
     if kind is MotionType.SPLINE:
         spline = _known(SplineKind, fields[19], 'spline kind (word 19)')
@@ -283,28 +352,46 @@ def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST) -> Instructi
     if kind is MotionType.SWITCH_OUTPUT:
         return SwitchOutput(
             output=_known(OutputKind, fields[12], 'kind of output (word 12)'),
-            pin=int(fields[13]), value=fields[14],
+            pin=int(fields[13]),
+            value=fields[14],
             domain=_known(AnalogDomain, fields[15], 'domain (word 15)'),
-            place=Pose.from_rotation_vector(target) if fields[16] else None, heading=second,
-            comes_round=bool(fields[17]), delay=fields[18])
+            place=Pose.from_rotation_vector(target) if fields[16] else None,
+            heading=second,
+            comes_round=bool(fields[17]),
+            delay=fields[18],
+        )
     velocity, acceleration, flag = fields[12:15]
     if kind in _ARCS:
         target_is_pose, via_is_pose = _ARCS[kind]
         return MoveC(
-            target=_target(target, target_is_pose), via=_target(second, via_is_pose),
-            velocity=velocity, acceleration=acceleration, blend_radius=fields[19],
-            mode=_known(ArcMode, flag, 'arc mode (word 14)'))
+            target=_target(target, target_is_pose),
+            via=_target(second, via_is_pose),
+            velocity=velocity,
+            acceleration=acceleration,
+            blend_radius=fields[19],
+            mode=_known(ArcMode, flag, 'arc mode (word 14)'),
+        )
     cls, is_pose = _MOVES[kind]
     if not dialect.q_near:
         velocity, acceleration, flag = fields[6], fields[12], 0.0
     near = second if is_pose and flag else None
     goal = _target(target, bool(is_pose))
     if cls is MoveJ or cls is MoveL:
-        return cls(target=goal, q_near=near, velocity=velocity, acceleration=acceleration,
-                   duration=fields[18], blend_radius=fields[19])
+        return cls(
+            target=goal,
+            q_near=near,
+            velocity=velocity,
+            acceleration=acceleration,
+            duration=fields[18],
+            blend_radius=fields[19],
+        )
     return cast(type[MoveP | OptimoveJ | OptimoveL], cls)(
-        target=goal, q_near=near, velocity=velocity, acceleration=acceleration,
-        blend_radius=fields[19])
+        target=goal,
+        q_near=near,
+        velocity=velocity,
+        acceleration=acceleration,
+        blend_radius=fields[19],
+    )
 
 
 def check_fields(fields: Fields, dialect: Dialect = NEWEST) -> None:
@@ -323,24 +410,33 @@ def check_fields(fields: Fields, dialect: Dialect = NEWEST) -> None:
     v_at, a_at = _SPEEDS_ONCE if dialect.q_near or kind in _ARCS else _SPEEDS_REPEATED
     velocity, acceleration = fields[v_at], fields[a_at]
     if velocity < 0.0 or acceleration < 0.0 or blend < 0.0:
-        name, value = next((name, value) for name, value in (
-            ('velocity', velocity), ('acceleration', acceleration), ('blend_radius', blend))
-            if value < 0.0)
+        name, value = next(
+            (name, value)
+            for name, value in (
+                ('velocity', velocity),
+                ('acceleration', acceleration),
+                ('blend_radius', blend),
+            )
+            if value < 0.0
+        )
         raise LocalProtocolError(f'{name} is {value!r}, but it must not be negative.')
     if kind in _OPTIMOVES and not (0.0 < velocity <= 1.0 and 0.0 < acceleration <= 1.0):
         raise LocalProtocolError(
             f'velocity is {velocity!r} and acceleration is {acceleration!r}, but an optimove '
-            'takes fractions in (0, 1].')
+            'takes fractions in (0, 1].'
+        )
 
 
 def _bad_duration(duration: float, dialect: Dialect) -> LocalProtocolError:
     if duration < dialect.least_duration:
         return LocalProtocolError(
             f'duration is {duration!r} s, but wire dialect {dialect.name} counts in '
-            f'{1.0 / dialect.time_scale:g} s, and 0 would mean that the velocity counts.')
+            f'{1.0 / dialect.time_scale:g} s, and 0 would mean that the velocity counts.'
+        )
     return LocalProtocolError(
         f'duration is {duration!r} s, but at most {dialect.max_duration} s can be sent in one '
-        f'point in wire dialect {dialect.name}.')
+        f'point in wire dialect {dialect.name}.'
+    )
 
 
 def encode_fields(fields: Fields, dialect: Dialect = NEWEST) -> bytes:
@@ -354,8 +450,7 @@ def encode_fields(fields: Fields, dialect: Dialect = NEWEST) -> bytes:
     names = _names(fields[20], dialect)
     words = [to_fixed(value, name) for value, name in zip(fields[:18], names[:18], strict=True)]
     word18 = to_fixed(fields[18], names[18], dialect.time_scale)
-    word19 = (int(fields[19]) if spline
-              else to_fixed(fields[19], names[19], dialect.time_scale))
+    word19 = int(fields[19]) if spline else to_fixed(fields[19], names[19], dialect.time_scale)
     return _POINT.pack(*words, word18, word19, int(fields[20]))
 
 
@@ -368,8 +463,12 @@ def decode_fields(data: bytes, dialect: Dialect = NEWEST) -> Fields:
     words = _POINT.unpack(checked_size(data, POINT_SIZE, 'trajectory point'))
     scale = dialect.time_scale
     word19 = words[19] if words[20] == MotionType.SPLINE else from_fixed(words[19], scale)
-    return (*(from_fixed(word) for word in words[:18]), from_fixed(words[18], scale), word19,
-            words[20])
+    return (
+        *(from_fixed(word) for word in words[:18]),
+        from_fixed(words[18], scale),
+        word19,
+        words[20],
+    )
 
 
 def encode_point(primitive: Instruction, dialect: Dialect = NEWEST) -> bytes:
@@ -434,8 +533,11 @@ def _encode_rows(fields: NDArray[np.float64], first: int, dialect: Dialect) -> b
     bad = ~((scaled > INT32_MIN - 0.5) & (scaled < INT32_MAX + 0.5))
     if bad.any():
         row, column = (int(i) for i in np.argwhere(bad)[0])
-        error = out_of_range(float(fields[row, column]),
-                             _names(fields[row, 20], dialect)[column], int(scales[column]))
+        error = out_of_range(
+            float(fields[row, column]),
+            _names(fields[row, 20], dialect)[column],
+            int(scales[column]),
+        )
         raise LocalProtocolError(f'Point {first + row}: {error}')
     # Ties away from zero, as to_fixed() does it.
     size = np.abs(scaled)
@@ -481,7 +583,8 @@ def _result(record: bytes) -> TrajectoryResult:
         return TrajectoryResult(number)
     except ValueError:
         raise RemoteProtocolError(
-            f'{number} is not a trajectory result (0, 1 or 2): {quote(record)}.') from None
+            f'{number} is not a trajectory result (0, 1 or 2): {quote(record)}.'
+        ) from None
 
 
 def _numbers(target: Target) -> Vector6:

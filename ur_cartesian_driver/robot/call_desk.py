@@ -53,10 +53,24 @@ PAYLOAD_TOLERANCE = 1e-4
 E_SERIES = 5
 
 #: Dashboard commands that only ask: also a robot that must not be moved answers them.
-QUESTIONS = frozenset({
-    'running', 'robotmode', 'safetymode', 'safetystatus', 'get loaded program', 'isProgramSaved',
-    'programState', 'PolyscopeVersion', 'version', 'getUserRole', 'get operational mode',
-    'is in remote control', 'get serial number', 'get robot model'})
+QUESTIONS = frozenset(
+    {
+        'running',
+        'robotmode',
+        'safetymode',
+        'safetystatus',
+        'get loaded program',
+        'isProgramSaved',
+        'programState',
+        'PolyscopeVersion',
+        'version',
+        'getUserRole',
+        'get operational mode',
+        'is in remote control',
+        'get serial number',
+        'get robot model',
+    }
+)
 
 #: Dashboard commands that change how the arm moves, or where it is thought to be.
 DISTURBING = frozenset({'load', 'load installation', 'restart safety'})
@@ -70,8 +84,9 @@ class CallDesk:
         self._settings = settings
         self._robot = robot
         self._dashboard = DashboardCalls(settings.robot_ip, dashboard_port, robot)
-        self._way_back = WayBack(robot, self._dashboard, self._send_program,
-                                 headless=settings.headless_mode)
+        self._way_back = WayBack(
+            robot, self._dashboard, self._send_program, headless=settings.headless_mode
+        )
         self._settings_under_way = 0
 
     @property
@@ -88,7 +103,7 @@ class CallDesk:
         except TimeoutError:
             return no(f'The robot has not done it within {bound:g} s.')
         except (OSError, DriverError) as error:
-            return no(f"{str(error).rstrip('.')}.")
+            return no(f'{str(error).rstrip(".")}.')
 
     async def _carry_out(self, call: Call) -> Answer:
         match call:
@@ -104,8 +119,8 @@ class CallDesk:
                 return await self._write(rtde_inputs.output(call), 'The output is set.')
             case SetSpeedSlider():
                 return await self._write(
-                    rtde_inputs.speed_slider(call),
-                    f'The speed slider is at {call.fraction:.0%}.')
+                    rtde_inputs.speed_slider(call), f'The speed slider is at {call.fraction:.0%}.'
+                )
             case SendProgram():
                 return await self._send_program()
             case Recover():
@@ -119,13 +134,18 @@ class CallDesk:
         if status.state is ConnectionState.REFUSED:
             return no(status.message)
         if isinstance(call, SetTcp) and self._robot.tcp_owed:
-            return no('The TCP that a goal has lent is being put back; try again when the status '
-                      'is READY.')
+            return no(
+                'The TCP that a goal has lent is being put back; try again when the status '
+                'is READY.'
+            )
         if status.state is ConnectionState.EXECUTING and (
-                isinstance(call, SetTcp | SetPayload | SendProgram)
-                or (isinstance(call, Dashboard) and call.command in DISTURBING)):
-            return no('A goal is running, and this would disturb it; wait for its end or cancel '
-                      'it, then try again.')
+            isinstance(call, SetTcp | SetPayload | SendProgram)
+            or (isinstance(call, Dashboard) and call.command in DISTURBING)
+        ):
+            return no(
+                'A goal is running, and this would disturb it; wait for its end or cancel '
+                'it, then try again.'
+            )
         return None
 
     # ---- robot program ------------------------------------------------------------------------
@@ -134,27 +154,35 @@ class CallDesk:
         """Send a command to the robot program; an answer only if it cannot be sent."""
         robot = self._robot.robot
         if robot is not None and robot.runtime_state is not RuntimeState.PLAYING:
-            return no(f'The robot program does not read commands now, it is '
-                      f'{robot.runtime_state.name}. {self._robot.status.message}'.rstrip())
+            return no(
+                f'The robot program does not read commands now, it is '
+                f'{robot.runtime_state.name}. {self._robot.status.message}'.rstrip()
+            )
         if not self._robot.send_command(script_command.encode(command)):
-            return no('The robot program does not run, and it is what does this. '
-                      f'{self._robot.status.message}'.rstrip())
+            return no(
+                'The robot program does not run, and it is what does this. '
+                f'{self._robot.status.message}'.rstrip()
+            )
         return None
 
     def _zero_ftsensor(self) -> Answer:
         version = self._robot.version
         if version is not None and version.major < E_SERIES:
-            return no(f'A CB3 robot (software {version}) has no force sensor to be zeroed: '
-                      'it works forces out from the currents of its joints.')
+            return no(
+                f'A CB3 robot (software {version}) has no force sensor to be zeroed: '
+                'it works forces out from the currents of its joints.'
+            )
         return self._command(script_command.ZeroFtSensor()) or yes(
-            'The robot program was told to zero the force sensor.')
+            'The robot program was told to zero the force sensor.'
+        )
 
     async def _set(self, call: SetTcp | SetPayload) -> Answer:
         """Set something; no goal begins meanwhile."""
         self._settings_under_way += 1
         try:
-            return await (self._set_tcp(call) if isinstance(call, SetTcp)
-                          else self._set_payload(call))
+            return await (
+                self._set_tcp(call) if isinstance(call, SetTcp) else self._set_payload(call)
+            )
         finally:
             self._settings_under_way -= 1
 
@@ -163,17 +191,21 @@ class CallDesk:
 
         def seen(robot: RobotState) -> bool:
             there = robot.T_flange_tcp
-            return (dist(there.position, wanted.position) < TCP_TOLERANCE
-                    and angle_between(there.quaternion, wanted.quaternion) < TCP_TOLERANCE)
+            return (
+                dist(there.position, wanted.position) < TCP_TOLERANCE
+                and angle_between(there.quaternion, wanted.quaternion) < TCP_TOLERANCE
+            )
 
         refusal = self._command(script_command.SetTcpOffset(offset=wanted.rotation_vector()))
         if refusal is not None:
             return refusal
         if await until(self._robot, seen, SETTING_TIMEOUT):
             return yes('The TCP is set.')
-        return no(f'The robot does not report the new TCP within {SETTING_TIMEOUT:g} s: its '
-                  'program may not know that command, or its software not report TCPs; set it on '
-                  'the pendant.')
+        return no(
+            f'The robot does not report the new TCP within {SETTING_TIMEOUT:g} s: its '
+            'program may not know that command, or its software not report TCPs; set it on '
+            'the pendant.'
+        )
 
     async def _set_payload(self, call: SetPayload) -> Answer:
         refusal = self._command(script_command.SetPayload(mass=call.mass, cog=call.cog))
@@ -181,45 +213,60 @@ class CallDesk:
             return refusal
         signals, rate = self._robot.signals, self._settings.io_publish_rate
         if signals is None:
-            return yes('The payload was sent; nothing reports it while inputs and outputs are not '
-                       'reported (io_publish_rate).')
+            return yes(
+                'The payload was sent; nothing reports it while inputs and outputs are not '
+                'reported (io_publish_rate).'
+            )
         if isnan(signals.payload):
             return yes('The payload was sent; the software of the robot does not report it.')
         within = SETTING_TIMEOUT + 1.0 / rate
         if await until(self._robot, lambda _: self._carries(call), within):
             return yes('The payload is set.')
-        return no(f'The robot does not report the new payload within {within:g} s: its program '
-                  'may not know that command; set it on the pendant.')
+        return no(
+            f'The robot does not report the new payload within {within:g} s: its program '
+            'may not know that command; set it on the pendant.'
+        )
 
     def _carries(self, call: SetPayload) -> bool:
         signals = self._robot.signals
-        return signals is not None and dist(
-            (signals.payload, *signals.payload_cog), (call.mass, *call.cog)) < PAYLOAD_TOLERANCE
+        return (
+            signals is not None
+            and dist((signals.payload, *signals.payload_cog), (call.mass, *call.cog))
+            < PAYLOAD_TOLERANCE
+        )
 
     async def _send_program(self) -> Answer:
         if not self._settings.headless_mode:
-            return no('The parameter headless_mode is false: play a program with External '
-                      'Control on the pendant.')
+            return no(
+                'The parameter headless_mode is false: play a program with External '
+                'Control on the pendant.'
+            )
         if self._robot.robot is None:
             return no(self._robot.status.message)
         replaces = self._robot.program_connected
         self._robot.upload_program()
         if replaces:  # its predecessor hangs up first
             await until(self._robot, lambda _: not self._robot.program_connected, SETTING_TIMEOUT)
-        if await until(self._robot, lambda _: self._robot.status.state is ConnectionState.READY,
-                       EFFECT_TIMEOUT):
+        if await until(
+            self._robot,
+            lambda _: self._robot.status.state is ConnectionState.READY,
+            EFFECT_TIMEOUT,
+        ):
             return yes('The robot program runs.')
         needed = self._robot.status.message
         if await self._dashboard.remote_control() is False:
             needed = 'The robot is in local control: switch it to remote control, then try again.'
-        return no(f'The robot program has not called within {EFFECT_TIMEOUT:g} s. '
-                  f'{needed}'.rstrip())
+        return no(
+            f'The robot program has not called within {EFFECT_TIMEOUT:g} s. {needed}'.rstrip()
+        )
 
     # ---- RTDE inputs --------------------------------------------------------------------------
 
     async def _write(self, writing: rtde_inputs.Writing, success: str) -> Answer:
         if await rtde_inputs.write(self._settings.robot_ip, self._settings.rtde_port, writing):
             return yes(success)
-        return no('The robot took the value, but does not report it within '
-                  f'{rtde_inputs.EFFECT_TIMEOUT:g} s; is it in local control, or does something '
-                  'else set the same?')
+        return no(
+            'The robot took the value, but does not report it within '
+            f'{rtde_inputs.EFFECT_TIMEOUT:g} s; is it in local control, or does something '
+            'else set the same?'
+        )

@@ -19,8 +19,12 @@ from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.protocol.dashboard import Request
 
 #: How many outputs there are of each kind.
-PINS = {OutputKind.STANDARD_DIGITAL: 8, OutputKind.CONFIGURABLE_DIGITAL: 8,
-        OutputKind.TOOL_DIGITAL: 2, OutputKind.STANDARD_ANALOG: 2}
+PINS = {
+    OutputKind.STANDARD_DIGITAL: 8,
+    OutputKind.CONFIGURABLE_DIGITAL: 8,
+    OutputKind.TOOL_DIGITAL: 2,
+    OutputKind.STANDARD_ANALOG: 2,
+}
 
 #: Longest text for the dashboard: as lines of any alphabet the server takes it.
 LONGEST_TEXT = 1000
@@ -66,7 +70,8 @@ class DashboardLine:
         """Check that it is one line."""
         if not self.line.strip() or '\n' in self.line or '\r' in self.line:
             raise LocalProtocolError(
-                f'A request to the dashboard is one line of text, not {self.line!r:.100}.')
+                f'A request to the dashboard is one line of text, not {self.line!r:.100}.'
+            )
         _check_length(self.line)
 
 
@@ -82,11 +87,13 @@ class SetTcp:
         if not all(abs(value) <= LARGEST_TOOL for value in position):  # NaN neither
             raise LocalProtocolError(
                 f'The TCP is at {position} m in the flange, farther than {LARGEST_TOOL:g} m; '
-                'give its position in metres.')
+                'give its position in metres.'
+            )
         if not abs(hypot(*quaternion) - 1.0) <= UNIT_TOLERANCE:
             raise LocalProtocolError(
                 f'The orientation of the TCP is {quaternion}, which is no unit quaternion (x, y, '
-                'z, w).')
+                'z, w).'
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,11 +105,13 @@ class SetPayload:
 
     def __post_init__(self) -> None:
         """Check that the mass can be one."""
-        if not 0.0 <= self.mass <= LARGEST_MASS \
-                or not all(abs(value) <= LARGEST_TOOL for value in self.cog):  # NaN neither
+        if not 0.0 <= self.mass <= LARGEST_MASS or not all(
+            abs(value) <= LARGEST_TOOL for value in self.cog
+        ):  # NaN neither
             raise LocalProtocolError(
                 f'The payload is {self.mass} kg at {self.cog} m; the mass has to be 0 to '
-                f'{LARGEST_MASS:g} kg, and each coordinate at most {LARGEST_TOOL:g} m.')
+                f'{LARGEST_MASS:g} kg, and each coordinate at most {LARGEST_TOOL:g} m.'
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,15 +137,15 @@ class SetOutput:
         """Check number and value."""
         if not 0 <= self.pin < PINS[self.kind]:
             raise LocalProtocolError(
-                f'pin is {self.pin}, but {self.kind.name} has the pins 0 to '
-                f'{PINS[self.kind] - 1}.')
+                f'pin is {self.pin}, but {self.kind.name} has the pins 0 to {PINS[self.kind] - 1}.'
+            )
         if self.is_analog and not 0.0 <= self.value <= 1.0:
             raise LocalProtocolError(
                 f'value is {self.value}, but an analog output takes a fraction of its range, 0 '
-                'to 1.')
+                'to 1.'
+            )
         if not self.is_analog and self.value not in (0.0, 1.0):
-            raise LocalProtocolError(
-                f'value is {self.value}, but a digital output takes 0 or 1.')
+            raise LocalProtocolError(f'value is {self.value}, but a digital output takes 0 or 1.')
 
     @property
     def is_analog(self) -> bool:
@@ -155,7 +164,8 @@ class SetSpeedSlider:
         if not 0.0 <= self.fraction <= 1.0:
             raise LocalProtocolError(
                 f'speed_slider_fraction is {self.fraction}, but the slider takes 0 (the arm '
-                'stands) to 1 (full speed).')
+                'stands) to 1 (full speed).'
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -181,8 +191,18 @@ def no(text: str) -> Answer:
 def _check_length(text: str) -> None:
     if len(text) > LONGEST_TEXT:
         raise LocalProtocolError(
-            f'A text for the dashboard has at most {LONGEST_TEXT} characters, not {len(text)}.')
+            f'A text for the dashboard has at most {LONGEST_TEXT} characters, not {len(text)}.'
+        )
 
 
-Call: TypeAlias = (Dashboard | DashboardLine | SetTcp | SetPayload | ZeroFtSensor | SetOutput
-                   | SetSpeedSlider | SendProgram | Recover)
+Call: TypeAlias = (
+    Dashboard
+    | DashboardLine
+    | SetTcp
+    | SetPayload
+    | ZeroFtSensor
+    | SetOutput
+    | SetSpeedSlider
+    | SendProgram
+    | Recover
+)

@@ -76,23 +76,34 @@ class Pulse:
         """Return it in words."""
         if not isfinite(self.sign):
             return ''
-        return (f'the last sign of life for the robot program was sent {self.sign:.3f} s before '
-                f'(it waits {self.timeout:g} s for one, the longest pause between two was '
-                f'{self.longest:.3f} s)')
+        return (
+            f'the last sign of life for the robot program was sent {self.sign:.3f} s before '
+            f'(it waits {self.timeout:g} s for one, the longest pause between two was '
+            f'{self.longest:.3f} s)'
+        )
 
 
 def changes(before: RobotState, after: RobotState) -> tuple[str, ...]:
     """Return which modes differ between two reports."""
     return tuple(
-        f'{what} {old.name} -> {new.name}' for what, old, new in (
+        f'{what} {old.name} -> {new.name}'
+        for what, old, new in (
             ('safety mode', before.safety_mode, after.safety_mode),
             ('robot mode', before.robot_mode, after.robot_mode),
-            ('program', before.runtime_state, after.runtime_state)) if old is not new)
+            ('program', before.runtime_state, after.runtime_state),
+        )
+        if old is not new
+    )
 
 
 def standing(robot: RobotState | None, pulse: Pulse) -> tuple[str, ...]:
     """Return what holds at the end: the modes, as the robot reported them last, and the pulse."""
-    modes = 'the robot has reported nothing' if robot is None else (
-        f'program {robot.runtime_state.name}, safety mode {robot.safety_mode.name}, robot mode '
-        f'{robot.robot_mode.name}, as the robot reported {pulse.report:.3f} s before')
+    modes = (
+        'the robot has reported nothing'
+        if robot is None
+        else (
+            f'program {robot.runtime_state.name}, safety mode {robot.safety_mode.name}, robot mode '
+            f'{robot.robot_mode.name}, as the robot reported {pulse.report:.3f} s before'
+        )
+    )
     return tuple(filter(None, (modes, pulse.line())))

@@ -31,22 +31,23 @@ class Effect:
 #: Dashboard commands that take a while, by what they lead to.
 EFFECTS: Mapping[str, Effect] = {
     'power on': Effect(
-        lambda r: r.robot_mode in (RobotMode.IDLE, RobotMode.RUNNING), POWER_TIMEOUT, 'IDLE'),
+        lambda r: r.robot_mode in (RobotMode.IDLE, RobotMode.RUNNING), POWER_TIMEOUT, 'IDLE'
+    ),
     'power off': Effect(
-        lambda r: r.robot_mode is RobotMode.POWER_OFF, EFFECT_TIMEOUT, 'POWER_OFF'),
-    'brake release': Effect(
-        lambda r: r.robot_mode is RobotMode.RUNNING, POWER_TIMEOUT, 'RUNNING'),
+        lambda r: r.robot_mode is RobotMode.POWER_OFF, EFFECT_TIMEOUT, 'POWER_OFF'
+    ),
+    'brake release': Effect(lambda r: r.robot_mode is RobotMode.RUNNING, POWER_TIMEOUT, 'RUNNING'),
     'unlock protective stop': Effect(
-        lambda r: r.safety_mode is not SafetyMode.PROTECTIVE_STOP, EFFECT_TIMEOUT, 'unlocked'),
+        lambda r: r.safety_mode is not SafetyMode.PROTECTIVE_STOP, EFFECT_TIMEOUT, 'unlocked'
+    ),
     'restart safety': Effect(
-        lambda r: r.safety_mode not in (SafetyMode.VIOLATION, SafetyMode.FAULT), POWER_TIMEOUT,
-        'restarted'),
-    'play': Effect(
-        lambda r: r.runtime_state is RuntimeState.PLAYING, EFFECT_TIMEOUT, 'PLAYING'),
-    'pause': Effect(
-        lambda r: r.runtime_state is RuntimeState.PAUSED, EFFECT_TIMEOUT, 'PAUSED'),
-    'stop': Effect(
-        lambda r: r.runtime_state is RuntimeState.STOPPED, EFFECT_TIMEOUT, 'STOPPED'),
+        lambda r: r.safety_mode not in (SafetyMode.VIOLATION, SafetyMode.FAULT),
+        POWER_TIMEOUT,
+        'restarted',
+    ),
+    'play': Effect(lambda r: r.runtime_state is RuntimeState.PLAYING, EFFECT_TIMEOUT, 'PLAYING'),
+    'pause': Effect(lambda r: r.runtime_state is RuntimeState.PAUSED, EFFECT_TIMEOUT, 'PAUSED'),
+    'stop': Effect(lambda r: r.runtime_state is RuntimeState.STOPPED, EFFECT_TIMEOUT, 'STOPPED'),
 }
 
 
@@ -65,12 +66,15 @@ class DashboardCalls:
             return no(reason)
         reply = await self._client.ask(call.command, call.argument)
         if not reply.ok:
-            return no(explain(call.command, reply.text, self._robot.robot,
-                              await self.remote_control()))
+            return no(
+                explain(call.command, reply.text, self._robot.robot, await self.remote_control())
+            )
         effect = EFFECTS.get(call.command)
         if effect is not None and not await until(self._robot, effect.seen, effect.timeout):
-            return no(f'The robot answers {reply.text!r}, but is not {effect.words} after '
-                      f'{effect.timeout:g} s: {modes(self._robot)}')
+            return no(
+                f'The robot answers {reply.text!r}, but is not {effect.words} after '
+                f'{effect.timeout:g} s: {modes(self._robot)}'
+            )
         return yes(reply.value or reply.text)
 
     async def ask_raw(self, call: DashboardLine) -> Answer:

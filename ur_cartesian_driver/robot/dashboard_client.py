@@ -33,14 +33,20 @@ ANSWER_TIMEOUT = 5.0
 #: The first software without a dashboard.
 POLYSCOPE_X = 10
 #: What serves instead there; a command that is not named is for a person at the pendant.
-INSTEAD: Mapping[str, str] = MappingProxyType({
-    **dict.fromkeys(('power on', 'brake release', 'unlock protective stop'),
-                    'call recover, or do it on the pendant'),
-    'robotmode': 'the topic robot_mode tells it',
-    **dict.fromkeys(('safetymode', 'safetystatus'), 'the topic safety_mode tells it'),
-    **dict.fromkeys(('running', 'programState'), 'the diagnostics tell it'),
-    **dict.fromkeys(('PolyscopeVersion', 'version', 'get robot model'),
-                    'the topic status tells it')})
+INSTEAD: Mapping[str, str] = MappingProxyType(
+    {
+        **dict.fromkeys(
+            ('power on', 'brake release', 'unlock protective stop'),
+            'call recover, or do it on the pendant',
+        ),
+        'robotmode': 'the topic robot_mode tells it',
+        **dict.fromkeys(('safetymode', 'safetystatus'), 'the topic safety_mode tells it'),
+        **dict.fromkeys(('running', 'programState'), 'the diagnostics tell it'),
+        **dict.fromkeys(
+            ('PolyscopeVersion', 'version', 'get robot model'), 'the topic status tells it'
+        ),
+    }
+)
 
 #: Begins the answer to an unlock that comes too early.
 TOO_EARLY = 'Cannot unlock protective stop'
@@ -65,8 +71,10 @@ class DashboardClient:
         await self._exchange(
             codec.send(command, argument),
             lambda data: replies.extend(
-                event for event in codec.feed(data) if not isinstance(event, Greeting)),
-            lambda: bool(replies))
+                event for event in codec.feed(data) if not isinstance(event, Greeting)
+            ),
+            lambda: bool(replies),
+        )
         return replies[0]
 
     async def ask_raw(self, line: str) -> str:
@@ -78,12 +86,14 @@ class DashboardClient:
         """
         buffer = LineBuffer(LONGEST_LINE)
         lines: list[str] = []
-        await self._exchange(encode_line(line), lambda data: lines.extend(buffer.feed(data)),
-                             lambda: len(lines) > 1)
+        await self._exchange(
+            encode_line(line), lambda data: lines.extend(buffer.feed(data)), lambda: len(lines) > 1
+        )
         return lines[1]  # the first one is the greeting
 
-    async def _exchange(self, request: bytes, feed: Callable[[bytes], None],
-                        answered: Callable[[], bool]) -> None:
+    async def _exchange(
+        self, request: bytes, feed: Callable[[bytes], None], answered: Callable[[], bool]
+    ) -> None:
         """Send a request and feed what comes back until it is answered."""
         ended: asyncio.Future[str] = asyncio.get_running_loop().create_future()
         errors: list[ProtocolError] = []
@@ -120,20 +130,25 @@ class DashboardClient:
 def why_not_available(command: str, version: ControllerVersion) -> str:
     """Return why the software of a robot does not have a command; empty when it has it."""
     if version.major >= POLYSCOPE_X:
-        return ('PolyScope X has no dashboard server, so this service is not available with '
-                f'software {version}; {INSTEAD.get(command, "do it on the pendant")}.')
+        return (
+            'PolyScope X has no dashboard server, so this service is not available with '
+            f'software {version}; {INSTEAD.get(command, "do it on the pendant")}.'
+        )
     shape = SHAPES[command]
     if shape.available((version.major, version.minor)):
         return ''
     least = shape.cb3 if version.major < 5 else shape.e_series
     if least is None:
         return f'The dashboard of this robot, software {version}, has no command {command!r}.'
-    return (f'The dashboard command {command!r} needs software {least[0]}.{least[1]} or newer, '
-            f'but the robot runs {version}.')
+    return (
+        f'The dashboard command {command!r} needs software {least[0]}.{least[1]} or newer, '
+        f'but the robot runs {version}.'
+    )
 
 
-def explain(command: str, answer: str, robot: RobotState | None,
-            remote_control: bool | None) -> str:
+def explain(
+    command: str, answer: str, robot: RobotState | None, remote_control: bool | None
+) -> str:
     """
     Return what a refusal of the dashboard means.
 
@@ -141,11 +156,13 @@ def explain(command: str, answer: str, robot: RobotState | None,
     :param remote_control: whether clients may control the robot; None = it cannot be known.
     """
     return f'The robot refuses {command!r} and says: {answer.rstrip(".")}. ' + _reason(
-        command, answer, robot, remote_control)
+        command, answer, robot, remote_control
+    )
 
 
-def _reason(command: str, answer: str, robot: RobotState | None,
-            remote_control: bool | None) -> str:
+def _reason(
+    command: str, answer: str, robot: RobotState | None, remote_control: bool | None
+) -> str:
     if remote_control is False:
         return 'It is in local control: switch it to remote control on the pendant.'
     if answer.startswith(TOO_EARLY):
@@ -165,6 +182,7 @@ def _reason(command: str, answer: str, robot: RobotState | None,
     if command == 'pause' and robot.runtime_state is not RuntimeState.PLAYING:
         return 'No program is running.'
     if command in ('load', 'load installation') and robot.runtime_state is not (
-            RuntimeState.STOPPED):
+        RuntimeState.STOPPED
+    ):
         return 'A program is running: stop it first.'
     return f'Robot mode {robot.robot_mode.name}, program {robot.runtime_state.name}.'

@@ -60,8 +60,11 @@ class Evidence:
         """Return how the two sides have heard of each other until now."""
         now = _now()
         return Pulse(
-            report=now - self._last_report, sign=now - self._program.last_keepalive,
-            longest=max(self._gap_before, self._program.longest_gap), timeout=self._timeout)
+            report=now - self._last_report,
+            sign=now - self._program.last_keepalive,
+            longest=max(self._gap_before, self._program.longest_gap),
+            timeout=self._timeout,
+        )
 
 
 def _now() -> float:

@@ -26,8 +26,15 @@ POWER_UP_TIMEOUT = 30.0
 class FirstStart:
     """One upload of the program on the first connection, or none."""
 
-    def __init__(self, settings: LinkSettings, *, pending: bool, power_up: Callable[[], bool],
-                 upload: Callable[[], None], warn: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        settings: LinkSettings,
+        *,
+        pending: bool,
+        power_up: Callable[[], bool],
+        upload: Callable[[], None],
+        warn: Callable[[str], None],
+    ) -> None:
         """
         Prepare; nothing happens before :meth:`review`.
 
@@ -44,7 +51,9 @@ class FirstStart:
     def review(self, robot: RobotState, status: DriverStatus, *, program_connected: bool) -> None:
         """Start the program, or say why not, once the robot is known."""
         if not self._pending or status.state not in (
-                ConnectionState.CONNECTED, ConnectionState.STOPPED):
+            ConnectionState.CONNECTED,
+            ConnectionState.STOPPED,
+        ):
             return
         if self._waits_for_power(robot, status):
             return
@@ -54,16 +63,21 @@ class FirstStart:
         if status.state is ConnectionState.STOPPED or robot.robot_mode is not RobotMode.RUNNING:
             self._warn(f'the robot program is not started: {status.message}')
         elif robot.robot_status & RobotStatus.PROGRAM_RUNNING or not has_ended(robot):
-            self._warn('the robot program is not started: another program runs on the robot, or '
-                       'is paused; stop it, then call resend_robot_program')
+            self._warn(
+                'the robot program is not started: another program runs on the robot, or '
+                'is paused; stop it, then call resend_robot_program'
+            )
         else:
             self._upload()
 
     def _waits_for_power(self, robot: RobotState, status: DriverStatus) -> bool:
         """Switch the arm on, where that is wanted; tell whether the program has to wait for it."""
         s = self._settings
-        if not (s.auto_power and s.headless_mode) or robot.robot_mode not in _WITHOUT_MOTION \
-                or status.state is ConnectionState.STOPPED:
+        if (
+            not (s.auto_power and s.headless_mode)
+            or robot.robot_mode not in _WITHOUT_MOTION
+            or status.state is ConnectionState.STOPPED
+        ):
             return False
         if not self._powering_up and self._power_up():
             self._powering_up = True
@@ -75,5 +89,7 @@ class FirstStart:
         """Start nothing by itself any more, if the arm did not come up."""
         if self._pending:
             self._pending = False
-            self._warn(f'auto_power: the arm is not running after {POWER_UP_TIMEOUT:g} s; '
-                       'is the robot in remote control?')
+            self._warn(
+                f'auto_power: the arm is not running after {POWER_UP_TIMEOUT:g} s; '
+                'is the robot in remote control?'
+            )

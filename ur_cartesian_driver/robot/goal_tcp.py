@@ -24,8 +24,9 @@ _RUNS = frozenset({RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.RESU
 class GoalTcp:
     """The two ways to set a TCP: by the robot program, or by a program of its own."""
 
-    def __init__(self, program: ProgramSockets, primary_client: PrimaryClient, *,
-                 headless_mode: bool) -> None:
+    def __init__(
+        self, program: ProgramSockets, primary_client: PrimaryClient, *, headless_mode: bool
+    ) -> None:
         """
         Prepare.
 
@@ -60,5 +61,8 @@ class GoalTcp:
         self._program_remembers = False
 
     def _send(self, T_flange_tcp: Pose, hold: TcpHold) -> None:
-        self._program.send_command(script_command.encode(script_command.SetTcpOffset(
-            offset=T_flange_tcp.rotation_vector(), hold=hold)))
+        self._program.send_command(
+            script_command.encode(
+                script_command.SetTcpOffset(offset=T_flange_tcp.rotation_vector(), hold=hold)
+            )
+        )

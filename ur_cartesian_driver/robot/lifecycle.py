@@ -56,39 +56,41 @@ class Change(Enum):
 S, C = ConnectionState, Change
 
 #: A change that a state does not name leaves it as it is.
-TRANSITIONS: Mapping[ConnectionState, Mapping[Change, ConnectionState]] = MappingProxyType({
-    S.DISCONNECTED: {C.ROBOT_ANSWERED: S.CONNECTING},
-    S.CONNECTING: {
-        C.ROBOT_ACCEPTED: S.CONNECTED,
-        C.ROBOT_REFUSED: S.REFUSED,
-        C.ROBOT_LOST: S.DISCONNECTED,
-    },
-    S.CONNECTED: {
-        C.PROGRAM_CONNECTED: S.READY,
-        C.ROBOT_STOPPED: S.STOPPED,
-        C.ROBOT_LOST: S.DISCONNECTED,
-    },
-    S.READY: {
-        C.GOAL_STARTED: S.EXECUTING,
-        C.PROGRAM_PAUSED: S.CONNECTED,
-        C.PROGRAM_LOST: S.CONNECTED,
-        C.TCP_OWED: S.CONNECTED,
-        C.ROBOT_STOPPED: S.STOPPED,
-        C.ROBOT_LOST: S.DISCONNECTED,
-    },
-    S.EXECUTING: {
-        C.GOAL_ENDED: S.READY,
-        C.PROGRAM_LOST: S.CONNECTED,
-        C.TCP_OWED: S.CONNECTED,
-        C.ROBOT_STOPPED: S.STOPPED,
-        C.ROBOT_LOST: S.DISCONNECTED,
-    },
-    S.STOPPED: {
-        C.ROBOT_FREE: S.CONNECTED,
-        C.ROBOT_LOST: S.DISCONNECTED,
-    },
-    S.REFUSED: {C.ROBOT_LOST: S.DISCONNECTED},
-})
+TRANSITIONS: Mapping[ConnectionState, Mapping[Change, ConnectionState]] = MappingProxyType(
+    {
+        S.DISCONNECTED: {C.ROBOT_ANSWERED: S.CONNECTING},
+        S.CONNECTING: {
+            C.ROBOT_ACCEPTED: S.CONNECTED,
+            C.ROBOT_REFUSED: S.REFUSED,
+            C.ROBOT_LOST: S.DISCONNECTED,
+        },
+        S.CONNECTED: {
+            C.PROGRAM_CONNECTED: S.READY,
+            C.ROBOT_STOPPED: S.STOPPED,
+            C.ROBOT_LOST: S.DISCONNECTED,
+        },
+        S.READY: {
+            C.GOAL_STARTED: S.EXECUTING,
+            C.PROGRAM_PAUSED: S.CONNECTED,
+            C.PROGRAM_LOST: S.CONNECTED,
+            C.TCP_OWED: S.CONNECTED,
+            C.ROBOT_STOPPED: S.STOPPED,
+            C.ROBOT_LOST: S.DISCONNECTED,
+        },
+        S.EXECUTING: {
+            C.GOAL_ENDED: S.READY,
+            C.PROGRAM_LOST: S.CONNECTED,
+            C.TCP_OWED: S.CONNECTED,
+            C.ROBOT_STOPPED: S.STOPPED,
+            C.ROBOT_LOST: S.DISCONNECTED,
+        },
+        S.STOPPED: {
+            C.ROBOT_FREE: S.CONNECTED,
+            C.ROBOT_LOST: S.DISCONNECTED,
+        },
+        S.REFUSED: {C.ROBOT_LOST: S.DISCONNECTED},
+    }
+)
 
 
 def after(state: ConnectionState, change: Change) -> ConnectionState:

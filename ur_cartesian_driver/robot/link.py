@@ -75,13 +75,18 @@ GHOST = 0.5
 class RobotLink:
     """The only owner of the driver's sockets; used from one event loop."""
 
-    def __init__(self, settings: LinkSettings, *, on_state: Callable[[RobotState], None],
-                 on_event: Callable[[Event], None],
-                 on_status: Callable[[DriverStatus], None],
-                 on_geometry: Callable[[Geometry], None],
-                 on_log: Callable[[int, str], None],
-                 on_signals: Callable[[Signals], None] = lambda _: None,
-                 may_upload: bool = True) -> None:
+    def __init__(
+        self,
+        settings: LinkSettings,
+        *,
+        on_state: Callable[[RobotState], None],
+        on_event: Callable[[Event], None],
+        on_status: Callable[[DriverStatus], None],
+        on_geometry: Callable[[Geometry], None],
+        on_log: Callable[[int, str], None],
+        on_signals: Callable[[Signals], None] = lambda _: None,
+        may_upload: bool = True,
+    ) -> None:
         """
         Prepare; :meth:`run` connects.
 
@@ -110,20 +115,35 @@ class RobotLink:
         #: The program that runs on the robot has called us, even if it has hung up since.
         self._program_is_ours = False
         self._explanation: asyncio.TimerHandle | None = None
-        self._primary = PrimaryClient(PrimaryListener(
-            configuration=self._on_configuration, geometry=self._on_kinematics,
-            error=self._robot_error, trouble=self._error,
-            text=self._robot_text))
-        self._program = ProgramSockets(settings, ProgramListener(
-            connected=self._on_program_connected, lost=self._on_program_lost,
-            result=lambda result: self._on_event(TrajectoryEnded(result=result)),
-            warning=self._warn))
+        self._primary = PrimaryClient(
+            PrimaryListener(
+                configuration=self._on_configuration,
+                geometry=self._on_kinematics,
+                error=self._robot_error,
+                trouble=self._error,
+                text=self._robot_text,
+            )
+        )
+        self._program = ProgramSockets(
+            settings,
+            ProgramListener(
+                connected=self._on_program_connected,
+                lost=self._on_program_lost,
+                result=lambda result: self._on_event(TrajectoryEnded(result=result)),
+                warning=self._warn,
+            ),
+        )
         self._evidence = Evidence(self._program, settings.robot_receive_timeout)
         self._goal_tcp = GoalTcp(
-            self._program, self._primary, headless_mode=settings.headless_mode)
+            self._program, self._primary, headless_mode=settings.headless_mode
+        )
         self._first_start = FirstStart(
-            settings, pending=may_upload, upload=self.upload_program, warn=self._warn,
-            power_up=lambda: self.send_primary(primary.Command.RUN))
+            settings,
+            pending=may_upload,
+            upload=self.upload_program,
+            warn=self._warn,
+            power_up=lambda: self.send_primary(primary.Command.RUN),
+        )
 
     # ---- what is known ------------------------------------------------------------------------
 
@@ -174,7 +194,7 @@ class RobotLink:
         if self._explanation is not None:
             self._explanation.cancel()
             self._explanation = None
-        self._tell(last_error=stamped(f"{text} {'; '.join(self.chain())}."))
+        self._tell(last_error=stamped(f'{text} {"; ".join(self.chain())}.'))
 
     def set_serial_number(self, serial_number: str) -> None:
         """Take note of the serial number of the robot."""
@@ -247,20 +267,30 @@ class RobotLink:
         elif self._status.state is ConnectionState.EXECUTING:
             self._warn('the robot program is not sent: a goal is running; cancel it first')
         elif self._foreign_program_runs():
-            self._warn('the robot program is not sent: another program runs on the robot, maybe '
-                       'of another driver; let it end, or stop it')
+            self._warn(
+                'the robot program is not sent: another program runs on the robot, maybe '
+                'of another driver; let it end, or stop it'
+            )
         elif not self._program.text:
-            self._warn('the robot program is not sent: wire_dialect says that the robot has an '
-                       'older one of its own; play that on the pendant')
+            self._warn(
+                'the robot program is not sent: wire_dialect says that the robot has an '
+                'older one of its own; play that on the pendant'
+            )
         elif not self._primary.send(primary.upload(as_program(self._program.text))):
-            self._warn('the robot program is not sent: there is no connection to the primary '
-                       'interface of the robot')
+            self._warn(
+                'the robot program is not sent: there is no connection to the primary '
+                'interface of the robot'
+            )
         else:
             self._evidence.note('the driver sent the robot program')
 
     def _foreign_program_runs(self) -> bool:
-        return (self._robot is not None and not has_ended(self._robot)
-                and not self._program.connected and not self._program_is_ours)
+        return (
+            self._robot is not None
+            and not has_ended(self._robot)
+            and not self._program.connected
+            and not self._program_is_ours
+        )
 
     def not_ready(self) -> str:
         """Return why no goal can run now; empty when one can."""
@@ -306,12 +336,15 @@ class RobotLink:
             self._change(Change.ROBOT_ANSWERED)
             await self._listen(stream, self._version)
             async with asyncio.TaskGroup() as tasks:
-                others = [
-                    tasks.create_task(self._primary.hold(s.robot_ip, s.primary_port))]
+                others = [tasks.create_task(self._primary.hold(s.robot_ip, s.primary_port))]
                 if s.io_publish_rate > 0.0:
-                    others.append(tasks.create_task(
-                        SignalStream(self._on_signals, self._warn).hold(
-                            s.robot_ip, s.rtde_port, s.io_publish_rate)))
+                    others.append(
+                        tasks.create_task(
+                            SignalStream(self._on_signals, self._warn).hold(
+                                s.robot_ip, s.rtde_port, s.io_publish_rate
+                            )
+                        )
+                    )
                 reason = await stream.ended()
                 for task in others:
                     task.cancel()
@@ -324,17 +357,24 @@ class RobotLink:
         s = self._settings
         host = s.bind_address or stream.local_address
         await self._program.open(
-            host, frozenset(s.allowed_peers or (s.robot_ip, stream.peer_address)))
+            host, frozenset(s.allowed_peers or (s.robot_ip, stream.peer_address))
+        )
         ports = self._program.ports
         if s.dialect is NEWEST:  # else the program on the robot is another one
-            self._program.text = render(ProgramSettings(
-                host=s.reverse_ip or host, reverse_port=ports['reverse_port'],
-                trajectory_port=ports['trajectory_port'],
-                script_command_port=ports['script_command_port'],
-                version=(version.major, version.minor, version.bugfix),
-                stop_deceleration=s.stop_deceleration,
-                servoj_gain=s.servoj_gain, servoj_lookahead_time=s.servoj_lookahead_time,
-                servo_buffer_depth=s.servo_buffer_depth, allow_teach=s.allow_teach))
+            self._program.text = render(
+                ProgramSettings(
+                    host=s.reverse_ip or host,
+                    reverse_port=ports['reverse_port'],
+                    trajectory_port=ports['trajectory_port'],
+                    script_command_port=ports['script_command_port'],
+                    version=(version.major, version.minor, version.bugfix),
+                    stop_deceleration=s.stop_deceleration,
+                    servoj_gain=s.servoj_gain,
+                    servoj_lookahead_time=s.servoj_lookahead_time,
+                    servo_buffer_depth=s.servo_buffer_depth,
+                    allow_teach=s.allow_teach,
+                )
+            )
         self._tell(ports=ports)
 
     # ---- what comes in ------------------------------------------------------------------------
@@ -385,14 +425,18 @@ class RobotLink:
         expected = self._settings.ur_type
         found = ' or '.join(models)
         if expected in models:
-            self._change(Change.ROBOT_ACCEPTED, robot_model=expected,
-                         polyscope_version=str(self._version))
+            self._change(
+                Change.ROBOT_ACCEPTED, robot_model=expected, polyscope_version=str(self._version)
+            )
             self._review()
         else:
             self._change(
-                Change.ROBOT_REFUSED, robot_model=found, polyscope_version=str(self._version),
+                Change.ROBOT_REFUSED,
+                robot_model=found,
+                polyscope_version=str(self._version),
                 message=f'The robot is a {found}, but ur_type is {expected}; set ur_type to the '
-                        'model that is there.')
+                'model that is there.',
+            )
 
     def _on_kinematics(self, geometry: Geometry) -> None:
         if not self._status.calibration_known:
@@ -406,11 +450,14 @@ class RobotLink:
         self._review()
 
     def _on_program_lost(self, reason: str) -> None:
-        self._evidence.note(f'{reason}, {self._evidence.pulse().sign:.3f} s after the last sign '
-                            'of life that it was sent')
+        self._evidence.note(
+            f'{reason}, {self._evidence.pulse().sign:.3f} s after the last sign '
+            'of life that it was sent'
+        )
         if self._explanation is None:
             self._explanation = asyncio.get_running_loop().call_later(
-                GATHER, self.explain, 'The robot program is gone.')
+                GATHER, self.explain, 'The robot program is gone.'
+            )
         self._goal_tcp.program_lost()
         self._change(Change.PROGRAM_LOST, program_running=False)
         self._on_event(LinkLost(link='program', reason=reason))
@@ -418,12 +465,19 @@ class RobotLink:
     def _on_robot_lost(self, reason: str, told: str) -> None:
         """Take note that the robot is gone, or never was there; people are told by whom."""
         self._evidence.note(told)
-        news = stamped(told, self._status.last_error) if self._robot is None else stamped(
-            f"The robot is gone. {'; '.join(self.chain())}.")
+        news = (
+            stamped(told, self._status.last_error)
+            if self._robot is None
+            else stamped(f'The robot is gone. {"; ".join(self.chain())}.')
+        )
         before, self._robot, self._signals = self._robot, None, None
         self._program.deaf = False  # nobody knows; too many messages are better than none
-        self._change(Change.ROBOT_LOST, calibration_known=False, last_error=news,
-                     message=f"No connection to the robot: {told.rstrip('.')}.")
+        self._change(
+            Change.ROBOT_LOST,
+            calibration_known=False,
+            last_error=news,
+            message=f'No connection to the robot: {told.rstrip(".")}.',
+        )
         if before is not None:
             self._on_event(LinkLost(link='RTDE', reason=reason))
 
@@ -447,8 +501,13 @@ class RobotLink:
     def _program_reads(self) -> bool:
         """Tell whether the robot program would act now on what it is sent."""
         robot = self._robot
-        return (robot is not None and self._program.connected and not self._program_is_ending
-                and not is_paused(robot) and not has_ended(robot))
+        return (
+            robot is not None
+            and self._program.connected
+            and not self._program_is_ending
+            and not is_paused(robot)
+            and not has_ended(robot)
+        )
 
     def _change(self, change: Change, **news: object) -> None:
         """Go where the table of the life cycle leads, and tell it with other news."""
@@ -458,11 +517,18 @@ class RobotLink:
         # Who calls names fields; mypy cannot follow names.
         status = replace(self._status, **news)  # type: ignore[arg-type]
         if status.state not in _OUT_OF_REACH:
-            status = replace(status, message=what_is_needed(
-                status.state, self._robot, program_connected=self._program.connected,
-                headless_mode=self._settings.headless_mode, tcp_owed=self._tcp_owed,
-                program_is_ending=self._program_is_ending,
-                foreign_program=self._foreign_program_runs()))
+            status = replace(
+                status,
+                message=what_is_needed(
+                    status.state,
+                    self._robot,
+                    program_connected=self._program.connected,
+                    headless_mode=self._settings.headless_mode,
+                    tcp_owed=self._tcp_owed,
+                    program_is_ending=self._program_is_ending,
+                    foreign_program=self._foreign_program_runs(),
+                ),
+            )
         if status != self._status:
             before, self._status = self._status, status
             self._on_status(status)
@@ -505,8 +571,11 @@ class RobotLink:
 
 def model_names(robot_type: int, software_major: int) -> list[str]:
     """Return the models that report this type: a UR7e says that it is a UR5."""
-    names = [name for name, model in MODELS.items() if model.wire_type == robot_type
-             and (model.series == 'CB3') == (software_major < 5)]
+    names = [
+        name
+        for name, model in MODELS.items()
+        if model.wire_type == robot_type and (model.series == 'CB3') == (software_major < 5)
+    ]
     return names or [f'robot of the unknown type {robot_type}']
 
 

@@ -83,7 +83,9 @@ class PrimaryClient:
         self._reported = False
         self._connection = Connection(
             # Cancelled, where the link is closed while it waits here.
-            self._on_data, lambda reason: None if closed.done() else closed.set_result(reason))
+            self._on_data,
+            lambda reason: None if closed.done() else closed.set_result(reason),
+        )
         try:
             await dial(self._connection, host, port)
             begin = asyncio.get_running_loop().time()
@@ -133,12 +135,16 @@ class PrimaryClient:
     def _on_message(self, message: primary.Frame) -> None:
         match message:
             case primary.ErrorCodeMessage(level=level) if (
-                    primary.ReportLevel.WARNING <= level <= primary.ReportLevel.CRITICAL_FAULT):
-                self._listener.error(f'the robot reports {message.label} '
-                                     f'{one_line(message.text)}'.rstrip())
+                primary.ReportLevel.WARNING <= level <= primary.ReportLevel.CRITICAL_FAULT
+            ):
+                self._listener.error(
+                    f'the robot reports {message.label} {one_line(message.text)}'.rstrip()
+                )
             case primary.RuntimeExceptionMessage():
-                self._listener.error(f'the robot program failed in line {message.line}, column '
-                                     f'{message.column}: {one_line(message.text)}')
+                self._listener.error(
+                    f'the robot program failed in line {message.line}, column '
+                    f'{message.column}: {one_line(message.text)}'
+                )
             case primary.TextMessage():
                 self._listener.text(one_line(message.text))
 

@@ -77,15 +77,23 @@ class ProgramSockets:
         self._commands = self._program_port('script_command_port', _ignore)
         self._reverse = self._program_port('reverse_port', _ignore)
         self._sender = Listener(
-            'script_sender_port', on_open=self._on_sender_open, on_data=self._on_request,
-            on_closed=_ignore, on_refused=listener.warning)
+            'script_sender_port',
+            on_open=self._on_sender_open,
+            on_data=self._on_request,
+            on_closed=_ignore,
+            on_refused=listener.warning,
+        )
         self._program_ports = (self._trajectory, self._commands, self._reverse)
 
     def _program_port(self, name: str, on_data: Callable[[bytes], None]) -> Listener:
-        return Listener(name, on_open=self._on_open, on_data=on_data,
-                        on_closed=partial(self._on_closed, name),
-                        on_refused=self._listener.warning,
-                        is_taken=lambda: self.connected and not self.ended)
+        return Listener(
+            name,
+            on_open=self._on_open,
+            on_data=on_data,
+            on_closed=partial(self._on_closed, name),
+            on_refused=self._listener.warning,
+            is_taken=lambda: self.connected and not self.ended,
+        )
 
     @property
     def ports(self) -> Mapping[str, int]:
@@ -119,8 +127,9 @@ class ProgramSockets:
 
     def send_control(self, action: TrajectoryAction, count: int) -> None:
         """Send a trajectory action."""
-        self._send(reverse.trajectory(action, count, self._read_timeout,
-                                      dialect=self._settings.dialect))
+        self._send(
+            reverse.trajectory(action, count, self._read_timeout, dialect=self._settings.dialect)
+        )
 
     def send_points(self, data: bytes) -> None:
         """Send trajectory points."""
@@ -129,8 +138,11 @@ class ProgramSockets:
 
     def send_command(self, data: bytes) -> bool:
         """Send a single command; False where no robot program would read it."""
-        return self.connected and self._commands.connection is not None \
+        return (
+            self.connected
+            and self._commands.connection is not None
             and self._commands.connection.send(data)
+        )
 
     def drop(self, reason: str) -> None:
         """Hang up on a program, and say that it is lost."""
@@ -161,8 +173,11 @@ class ProgramSockets:
     def send_servo(self, on: bool) -> None:
         """Have the program enter the buffered servo, or leave it and stand."""
         self.servo = on
-        self._send(reverse.buffered_servo(self._read_timeout) if on
-                   else reverse.keepalive(self._read_timeout))
+        self._send(
+            reverse.buffered_servo(self._read_timeout)
+            if on
+            else reverse.keepalive(self._read_timeout)
+        )
 
     def _send_keepalive(self) -> None:
         if self.servo:
@@ -185,7 +200,7 @@ class ProgramSockets:
             self.connected = False
             self._listener.lost('another robot program calls')
         called = [port.connection for port in self._program_ports].index(connection)
-        for port in self._program_ports[called + 1:]:
+        for port in self._program_ports[called + 1 :]:
             port.hang_up()  # a stranger, or a program that died while it connected
         if connection is self._trajectory.connection:
             self._results = ResultDecoder()
@@ -221,7 +236,8 @@ class ProgramSockets:
         if not self.text:
             self._sender.complain(
                 'the robot asks for a robot program, but wire_dialect says that it has an older '
-                'one of its own; leave wire_dialect out to have ours run')
+                'one of its own; leave wire_dialect out to have ours run'
+            )
             return
         for _ in range(wanted):
             if not connection.send(script_sender.reply(self.text)):

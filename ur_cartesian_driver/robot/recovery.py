@@ -40,59 +40,64 @@ class Step(Enum):
 
 
 #: What a step is called in a sentence: an imperative.
-WORDS: Mapping[Step, str] = MappingProxyType({
-    Step.UNLOCK: 'unlock the protective stop',
-    Step.RESTART_SAFETY: 'restart the safety system',
-    Step.POWER_ON: 'switch the arm on',
-    Step.RELEASE_BRAKES: 'release the brakes',
-    Step.STOP_PROGRAM: 'stop the paused program',
-    Step.SEND_PROGRAM: 'send the robot program',
-    Step.PLAY: 'play the loaded program',
-})
+WORDS: Mapping[Step, str] = MappingProxyType(
+    {
+        Step.UNLOCK: 'unlock the protective stop',
+        Step.RESTART_SAFETY: 'restart the safety system',
+        Step.POWER_ON: 'switch the arm on',
+        Step.RELEASE_BRAKES: 'release the brakes',
+        Step.STOP_PROGRAM: 'stop the paused program',
+        Step.SEND_PROGRAM: 'send the robot program',
+        Step.PLAY: 'play the loaded program',
+    }
+)
 
 _GUARD = 'The safeguard stop is active: close the safeguard and reset it.'
 _BUTTON = 'The emergency stop is pressed: see that nobody is in danger, then release the button.'
 _ENABLE = 'An enabling device is in use: let go of it, or choose the automatic mode.'
 
 #: What the safety system needs; a sentence = a person has to act, None = nothing.
-SAFETY: Mapping[SafetyMode, Step | str | None] = MappingProxyType({
-    SafetyMode.NORMAL: None,
-    SafetyMode.REDUCED: None,
-    SafetyMode.PROTECTIVE_STOP: Step.UNLOCK,
-    SafetyMode.RECOVERY: 'The arm is outside its safety limits: move it back on the pendant.',
-    SafetyMode.SAFEGUARD_STOP: _GUARD,
-    SafetyMode.SYSTEM_EMERGENCY_STOP: _BUTTON,
-    SafetyMode.ROBOT_EMERGENCY_STOP: _BUTTON,
-    SafetyMode.VIOLATION: Step.RESTART_SAFETY,
-    SafetyMode.FAULT: Step.RESTART_SAFETY,
-    SafetyMode.VALIDATE_JOINT_ID: 'A joint has to be identified: follow the pendant.',
-    SafetyMode.UNDEFINED_SAFETY_MODE: 'The safety mode is not known: look at the pendant.',
-    SafetyMode.AUTOMATIC_MODE_SAFEGUARD_STOP: _GUARD,
-    SafetyMode.SYSTEM_THREE_POSITION_ENABLING_STOP: _ENABLE,
-    SafetyMode.TP_THREE_POSITION_ENABLING_STOP: _ENABLE,
-    SafetyMode.IMMI_EMERGENCY_STOP: _BUTTON,
-    SafetyMode.IMMI_SAFEGUARD_STOP: _GUARD,
-    SafetyMode.PROFISAFE_WAITING_FOR_PARAMETERS:
-        'The safety system waits for the PROFIsafe controller: start that.',
-    SafetyMode.PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP: _GUARD,
-    SafetyMode.PROFISAFE_SAFEGUARD_STOP: _GUARD,
-    SafetyMode.PROFISAFE_EMERGENCY_STOP: _BUTTON,
-    SafetyMode.SAFETY_API_SAFEGUARD_STOP: _GUARD,
-})
+SAFETY: Mapping[SafetyMode, Step | str | None] = MappingProxyType(
+    {
+        SafetyMode.NORMAL: None,
+        SafetyMode.REDUCED: None,
+        SafetyMode.PROTECTIVE_STOP: Step.UNLOCK,
+        SafetyMode.RECOVERY: 'The arm is outside its safety limits: move it back on the pendant.',
+        SafetyMode.SAFEGUARD_STOP: _GUARD,
+        SafetyMode.SYSTEM_EMERGENCY_STOP: _BUTTON,
+        SafetyMode.ROBOT_EMERGENCY_STOP: _BUTTON,
+        SafetyMode.VIOLATION: Step.RESTART_SAFETY,
+        SafetyMode.FAULT: Step.RESTART_SAFETY,
+        SafetyMode.VALIDATE_JOINT_ID: 'A joint has to be identified: follow the pendant.',
+        SafetyMode.UNDEFINED_SAFETY_MODE: 'The safety mode is not known: look at the pendant.',
+        SafetyMode.AUTOMATIC_MODE_SAFEGUARD_STOP: _GUARD,
+        SafetyMode.SYSTEM_THREE_POSITION_ENABLING_STOP: _ENABLE,
+        SafetyMode.TP_THREE_POSITION_ENABLING_STOP: _ENABLE,
+        SafetyMode.IMMI_EMERGENCY_STOP: _BUTTON,
+        SafetyMode.IMMI_SAFEGUARD_STOP: _GUARD,
+        SafetyMode.PROFISAFE_WAITING_FOR_PARAMETERS: 'The safety system waits for the PROFIsafe controller: start that.',
+        SafetyMode.PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP: _GUARD,
+        SafetyMode.PROFISAFE_SAFEGUARD_STOP: _GUARD,
+        SafetyMode.PROFISAFE_EMERGENCY_STOP: _BUTTON,
+        SafetyMode.SAFETY_API_SAFEGUARD_STOP: _GUARD,
+    }
+)
 
 #: What power and brakes need, as above.
-POWER: Mapping[RobotMode, Step | str | None] = MappingProxyType({
-    RobotMode.NO_CONTROLLER: 'The controller does not run: look at the pendant.',
-    RobotMode.DISCONNECTED: 'The arm is not connected to its controller: look at the pendant.',
-    RobotMode.CONFIRM_SAFETY: 'The safety configuration has to be confirmed on the pendant.',
-    RobotMode.BOOTING: Step.WAIT,
-    RobotMode.POWER_OFF: Step.POWER_ON,
-    RobotMode.POWER_ON: Step.WAIT,
-    RobotMode.IDLE: Step.RELEASE_BRAKES,
-    RobotMode.BACKDRIVE: 'The arm is being moved by hand: end that on the pendant.',
-    RobotMode.RUNNING: None,
-    RobotMode.UPDATING_FIRMWARE: 'The firmware of the arm is being updated: wait for its end.',
-})
+POWER: Mapping[RobotMode, Step | str | None] = MappingProxyType(
+    {
+        RobotMode.NO_CONTROLLER: 'The controller does not run: look at the pendant.',
+        RobotMode.DISCONNECTED: 'The arm is not connected to its controller: look at the pendant.',
+        RobotMode.CONFIRM_SAFETY: 'The safety configuration has to be confirmed on the pendant.',
+        RobotMode.BOOTING: Step.WAIT,
+        RobotMode.POWER_OFF: Step.POWER_ON,
+        RobotMode.POWER_ON: Step.WAIT,
+        RobotMode.IDLE: Step.RELEASE_BRAKES,
+        RobotMode.BACKDRIVE: 'The arm is being moved by hand: end that on the pendant.',
+        RobotMode.RUNNING: None,
+        RobotMode.UPDATING_FIRMWARE: 'The firmware of the arm is being updated: wait for its end.',
+    }
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,7 +137,9 @@ def next_step(situation: Situation) -> Next:
     if situation.connection is ConnectionState.REFUSED:
         return Next(Step.PERSON, situation.message)
     if situation.robot is None or situation.connection in (
-            ConnectionState.DISCONNECTED, ConnectionState.CONNECTING):
+        ConnectionState.DISCONNECTED,
+        ConnectionState.CONNECTING,
+    ):
         # Restarting the safety system may cost the connection; it comes back by itself.
         return Next(Step.WAIT, situation.message)
     return _unless_local(_of_robot(situation, situation.robot), situation)
@@ -164,8 +171,11 @@ def _of_program(situation: Situation, runtime: RuntimeState) -> Next:
         case RuntimeState.PLAYING if situation.program_connected:
             return Next(Step.WAIT)
         case RuntimeState.PLAYING:
-            return Next(Step.PERSON, 'Another program runs on the robot: stop it, or let it come '
-                                     'to its External Control node.')
+            return Next(
+                Step.PERSON,
+                'Another program runs on the robot: stop it, or let it come '
+                'to its External Control node.',
+            )
         case RuntimeState.STOPPED:
             return Next(Step.SEND_PROGRAM if situation.headless else Step.PLAY)
 
@@ -173,8 +183,12 @@ def _of_program(situation: Situation, runtime: RuntimeState) -> Next:
 def _unless_local(wanted: Next, situation: Situation) -> Next:
     """Leave to a person what the robot does for nobody else in local control."""
     if situation.remote_control is False and wanted.step in WORDS:
-        at_hand = '' if wanted.step is Step.SEND_PROGRAM else (
-            f', or {WORDS[wanted.step]} on the pendant')
-        return Next(Step.PERSON, 'The robot is in local control: switch it to remote control'
-                                 f'{at_hand}.')
+        at_hand = (
+            ''
+            if wanted.step is Step.SEND_PROGRAM
+            else (f', or {WORDS[wanted.step]} on the pendant')
+        )
+        return Next(
+            Step.PERSON, f'The robot is in local control: switch it to remote control{at_hand}.'
+        )
     return wanted

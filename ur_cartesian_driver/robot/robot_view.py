@@ -77,5 +77,7 @@ def modes(robot: Robot) -> str:
     state = robot.robot
     if state is None:
         return robot.status.message
-    return (f'robot mode {state.robot_mode.name}, safety mode {state.safety_mode.name}, '
-            f'program {state.runtime_state.name}.')
+    return (
+        f'robot mode {state.robot_mode.name}, safety mode {state.safety_mode.name}, '
+        f'program {state.runtime_state.name}.'
+    )

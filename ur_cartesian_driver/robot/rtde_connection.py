@@ -29,8 +29,13 @@ SILENCE = 1.0
 class RtdeConnection:
     """Used once, from one event loop: open it, wait for its end, close it."""
 
-    def __init__(self, client: RtdeClient, on_values: Callable[[Sequence[str], Values], None], *,
-                 silence: float = SILENCE) -> None:
+    def __init__(
+        self,
+        client: RtdeClient,
+        on_values: Callable[[Sequence[str], Values], None],
+        *,
+        silence: float = SILENCE,
+    ) -> None:
         """
         Prepare a connection.
 
@@ -72,8 +77,9 @@ class RtdeConnection:
             async with asyncio.timeout(ANSWER_TIMEOUT):
                 await self._answered.wait()
         except TimeoutError:
-            raise OSError(f'{host} port {port} does not answer as an RTDE server; it may be no '
-                          'robot') from None
+            raise OSError(
+                f'{host} port {port} does not answer as an RTDE server; it may be no robot'
+            ) from None
         if self._version is None:
             raise OSError(f'{host} port {port} (RTDE): {self._closed.result()}')
         self._last_packet = asyncio.get_running_loop().time()

@@ -32,7 +32,9 @@ _DIGITAL: Mapping[OutputKind, tuple[str, int]] = {
 }
 #: Range of an analog output: its least and greatest value [A], [V].
 RANGES: Mapping[AnalogDomain, tuple[float, float]] = {
-    AnalogDomain.CURRENT: (0.004, 0.020), AnalogDomain.VOLTAGE: (0.0, 10.0)}
+    AnalogDomain.CURRENT: (0.004, 0.020),
+    AnalogDomain.VOLTAGE: (0.0, 10.0),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,7 +58,8 @@ def speed_slider(call: SetSpeedSlider) -> Writing:
         inputs={'speed_slider_mask': 1, 'speed_slider_fraction': call.fraction},
         outputs=('target_speed_fraction',),
         # The pendant shows whole percents.
-        done=lambda values: isclose(values['target_speed_fraction'], call.fraction, abs_tol=0.006))
+        done=lambda values: isclose(values['target_speed_fraction'], call.fraction, abs_tol=0.006),
+    )
 
 
 def output(call: SetOutput) -> Writing:
@@ -69,8 +72,11 @@ def _digital(call: SetOutput) -> Writing:
     return Writing(
         inputs={f'{name}_mask': 1 << call.pin, name: round(call.value) << call.pin},
         outputs=('actual_digital_output_bits',),
-        done=lambda values: (values['actual_digital_output_bits'] >> (first_bit + call.pin)) & 1
-        == round(call.value))
+        done=lambda values: (
+            (values['actual_digital_output_bits'] >> (first_bit + call.pin)) & 1
+            == round(call.value)
+        ),
+    )
 
 
 def _analog(call: SetOutput) -> Writing:
@@ -81,10 +87,14 @@ def _analog(call: SetOutput) -> Writing:
         inputs={
             'standard_analog_output_mask': 1 << call.pin,
             'standard_analog_output_type': call.domain << call.pin,
-            f'standard_analog_output_{call.pin}': call.value},
+            f'standard_analog_output_{call.pin}': call.value,
+        },
         outputs=(shown, 'analog_io_types'),
-        done=lambda values: isclose(values[shown], expected, abs_tol=0.02 * (high - low))
-        and values['analog_io_types'] >> (2 + call.pin) & 1 == call.domain)
+        done=lambda values: (
+            isclose(values[shown], expected, abs_tol=0.02 * (high - low))
+            and values['analog_io_types'] >> (2 + call.pin) & 1 == call.domain
+        ),
+    )
 
 
 async def write(host: str, port: int, writing: Writing) -> bool:
@@ -100,7 +110,8 @@ async def write(host: str, port: int, writing: Writing) -> bool:
             done.set()
 
     connection = RtdeConnection(
-        RtdeClient(outputs=writing.outputs, inputs=tuple(writing.inputs)), look)
+        RtdeClient(outputs=writing.outputs, inputs=tuple(writing.inputs)), look
+    )
     try:
         await connection.open(host, port)
         connection.write(writing.inputs)

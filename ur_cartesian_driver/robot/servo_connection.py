@@ -114,6 +114,15 @@ def feedback_of(values: tuple[Any, ...]) -> ServoFeedback:
     """Return a packet with the values of :data:`OUTPUTS`."""
     timestamp, scaling, state, mode, sequence, lag, done, repeats, skipped, size, over = values
     return ServoFeedback(
-        timestamp=timestamp, speed_scaling=scaling, playing=state == RuntimeState.PLAYING,
-        mode=mode, last_sequence=sequence, lag=lag, setpoints_done=done, repeats=repeats,
-        skipped=skipped, buffer_size=size, overflows=over)
+        timestamp=timestamp,
+        speed_scaling=scaling,
+        playing=state == RuntimeState.PLAYING,
+        mode=mode,
+        last_sequence=sequence,
+        lag=lag,
+        setpoints_done=done,
+        repeats=repeats,
+        skipped=skipped,
+        buffer_size=size,
+        overflows=over,
+    )

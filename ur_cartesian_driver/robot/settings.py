@@ -74,11 +74,13 @@ class LinkSettings:
         if self.rtde_frequency != 0.0 and not self.rtde_frequency >= LEAST_FREQUENCY:
             raise ValueError(
                 f'rtde_frequency is {self.rtde_frequency:g} Hz, it has to be 0 (as often as the '
-                f'robot can) or at least {LEAST_FREQUENCY:g} Hz.')
+                f'robot can) or at least {LEAST_FREQUENCY:g} Hz.'
+            )
         if self.robot_receive_timeout < 2.0 * self.keepalive_period:
             raise ValueError(
                 f'robot_receive_timeout is {self.robot_receive_timeout} s, it has to be at least '
-                f'twice the keepalive_period of {self.keepalive_period} s.')
+                f'twice the keepalive_period of {self.keepalive_period} s.'
+            )
 
     @property
     def dialect(self) -> Dialect:
@@ -89,13 +91,15 @@ class LinkSettings:
         if self.wire_dialect not in DIALECTS:
             raise ValueError(
                 f'wire_dialect is {self.wire_dialect!r}, it has to be one of '
-                f'{", ".join(DIALECTS)}.')
+                f'{", ".join(DIALECTS)}.'
+            )
         if self.headless_mode and self.dialect is not NEWEST:
             raise ValueError(
                 f"wire_dialect is '{self.wire_dialect}' and headless_mode is true, but "
                 f"headless_mode sends our own robot program, which understands '{NEWEST.name}'; "
                 'leave wire_dialect out, or set headless_mode to false and start the program that '
-                'is saved on the robot.')
+                'is saved on the robot.'
+            )
 
     def _require_within(self, name: str, low: float, high: float) -> None:
         value = getattr(self, name)
@@ -118,5 +122,7 @@ def _require_address(name: str, text: str) -> None:
     try:
         ipaddress.ip_address(text)
     except ValueError:
-        raise ValueError(f'{name} has {text!r}, which is no address; write it in numbers, such as '
-                         '192.168.56.101.') from None
+        raise ValueError(
+            f'{name} has {text!r}, which is no address; write it in numbers, such as '
+            '192.168.56.101.'
+        ) from None

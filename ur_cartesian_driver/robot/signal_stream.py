@@ -27,17 +27,29 @@ from ur_cartesian_driver.robot.transport import Retry
 REQUIRED = ('actual_digital_input_bits', 'actual_digital_output_bits')
 #: Old software does not have all of these.
 OPTIONAL = (
-    'analog_io_types', 'standard_analog_input0', 'standard_analog_input1',
-    'standard_analog_output0', 'standard_analog_output1', 'tool_mode', 'tool_analog_input_types',
-    'tool_analog_input0', 'tool_analog_input1', 'tool_output_voltage', 'tool_output_current',
-    'tool_temperature', 'payload', 'payload_cog')
+    'analog_io_types',
+    'standard_analog_input0',
+    'standard_analog_input1',
+    'standard_analog_output0',
+    'standard_analog_output1',
+    'tool_mode',
+    'tool_analog_input_types',
+    'tool_analog_input0',
+    'tool_analog_input1',
+    'tool_output_voltage',
+    'tool_output_current',
+    'tool_temperature',
+    'payload',
+    'payload_cog',
+)
 
 
 class SignalStream:
     """Keeps a connection of its own while the robot is there."""
 
-    def __init__(self, on_signals: Callable[[Signals], None],
-                 on_warning: Callable[[str], None]) -> None:
+    def __init__(
+        self, on_signals: Callable[[Signals], None], on_warning: Callable[[str], None]
+    ) -> None:
         """
         Prepare; :meth:`hold` connects.
 
@@ -52,9 +64,12 @@ class SignalStream:
         retry, complaint = Retry(), ''
         while True:
             connection = RtdeConnection(
-                RtdeClient(outputs=(*REQUIRED, *OPTIONAL), optional_outputs=OPTIONAL,
-                           frequency=frequency),
-                self._on_values, silence=max(SILENCE, 5.0 / frequency))
+                RtdeClient(
+                    outputs=(*REQUIRED, *OPTIONAL), optional_outputs=OPTIONAL, frequency=frequency
+                ),
+                self._on_values,
+                silence=max(SILENCE, 5.0 / frequency),
+            )
             try:
                 await connection.open(host, port)
                 retry.reset()
@@ -81,8 +96,11 @@ def signals(values: Mapping[str, Any]) -> Signals:
 
     def pair(name: str, domains: int) -> tuple[AnalogChannel, AnalogChannel]:
         first, second = (
-            AnalogChannel(domain=AnalogDomain(domains >> i & 1),
-                          value=values.get(f'{name}{i}', nan)) for i in (0, 1))
+            AnalogChannel(
+                domain=AnalogDomain(domains >> i & 1), value=values.get(f'{name}{i}', nan)
+            )
+            for i in (0, 1)
+        )
         return first, second
 
     return Signals(
@@ -95,4 +113,6 @@ def signals(values: Mapping[str, Any]) -> Signals:
         tool_current=values.get('tool_output_current', nan),
         tool_temperature=values.get('tool_temperature', nan),
         tool_mode=values.get('tool_mode', 0),
-        payload=values.get('payload', nan), payload_cog=values.get('payload_cog', (nan,) * 3))
+        payload=values.get('payload', nan),
+        payload_cog=values.get('payload_cog', (nan,) * 3),
+    )

@@ -29,13 +29,32 @@ from ur_cartesian_driver.protocol.rtde import Values
 POINTS_BEGUN = registers.field(registers.OutputInteger.POINTS_BEGUN)
 
 REQUIRED = (
-    'timestamp', 'actual_q', 'actual_qd', 'target_q', 'target_qd', 'actual_TCP_pose',
-    'actual_TCP_speed', 'target_TCP_pose', 'target_TCP_speed', 'actual_TCP_force',
-    'speed_scaling', 'target_speed_fraction', 'robot_mode', 'safety_mode', 'runtime_state',
-    'robot_status_bits', 'safety_status_bits')
+    'timestamp',
+    'actual_q',
+    'actual_qd',
+    'target_q',
+    'target_qd',
+    'actual_TCP_pose',
+    'actual_TCP_speed',
+    'target_TCP_pose',
+    'target_TCP_speed',
+    'actual_TCP_force',
+    'speed_scaling',
+    'target_speed_fraction',
+    'robot_mode',
+    'safety_mode',
+    'runtime_state',
+    'robot_status_bits',
+    'safety_status_bits',
+)
 #: Old software does not have these.
-OPTIONAL = ('tcp_offset', 'actual_TCP_acceleration', 'target_TCP_acceleration',
-            'actual_current_as_torque', POINTS_BEGUN)
+OPTIONAL = (
+    'tcp_offset',
+    'actual_TCP_acceleration',
+    'target_TCP_acceleration',
+    'actual_current_as_torque',
+    POINTS_BEGUN,
+)
 #: The order in which they are asked for.
 NAMES = (*REQUIRED, *OPTIONAL)
 
@@ -64,12 +83,37 @@ def robot_state(values: tuple[Any, ...]) -> RobotState:
     :raises RemoteProtocolError: a number is not finite: no comparison with it would ever be true,
         so whoever watches the motion would see nothing.
     """
-    (timestamp, actual_q, actual_qd, target_q, target_qd, actual_pose, actual_twist, target_pose,
-     target_twist, wrench, speed_scaling, speed_fraction, robot_mode, safety_mode, runtime_state,
-     robot_bits, safety_bits, offset, actual_acceleration, target_acceleration, torque,
-     points_begun) = values
-    if not isfinite(sum(map(sum, values[_VECTORS])) + timestamp + speed_scaling + speed_fraction
-                    + sum(offset or ())):
+    (
+        timestamp,
+        actual_q,
+        actual_qd,
+        target_q,
+        target_qd,
+        actual_pose,
+        actual_twist,
+        target_pose,
+        target_twist,
+        wrench,
+        speed_scaling,
+        speed_fraction,
+        robot_mode,
+        safety_mode,
+        runtime_state,
+        robot_bits,
+        safety_bits,
+        offset,
+        actual_acceleration,
+        target_acceleration,
+        torque,
+        points_begun,
+    ) = values
+    if not isfinite(
+        sum(map(sum, values[_VECTORS]))
+        + timestamp
+        + speed_scaling
+        + speed_fraction
+        + sum(offset or ())
+    ):
         raise RemoteProtocolError(_not_finite(values))
     modes = _modes(robot_mode, safety_mode, runtime_state, robot_bits, safety_bits)
     return RobotState(
@@ -94,7 +138,8 @@ def robot_state(values: tuple[Any, ...]) -> RobotState:
         runtime_state=modes[2],
         robot_status=modes[3],
         safety_status=modes[4],
-        points_begun=points_begun or 0)
+        points_begun=points_begun or 0,
+    )
 
 
 @lru_cache(maxsize=16)
@@ -103,18 +148,24 @@ def _tcp(offset: Vector6 | None) -> Pose:
 
 
 @lru_cache(maxsize=64)
-def _modes(robot_mode: int, safety_mode: int, runtime_state: int, robot_bits: int,
-           safety_bits: int) -> tuple[
-               RobotMode, SafetyMode, RuntimeState, RobotStatus, SafetyStatus]:
+def _modes(
+    robot_mode: int, safety_mode: int, runtime_state: int, robot_bits: int, safety_bits: int
+) -> tuple[RobotMode, SafetyMode, RuntimeState, RobotStatus, SafetyStatus]:
     """Return numbers as what they mean; they are the same ones in most packets."""
-    return (_ROBOT_MODES.get(robot_mode, RobotMode.NO_CONTROLLER),
-            _SAFETY_MODES.get(safety_mode, SafetyMode.UNDEFINED_SAFETY_MODE),
-            _RUNTIME_STATES.get(runtime_state, RuntimeState.STOPPED),
-            RobotStatus(robot_bits & 0xF), SafetyStatus(safety_bits & 0xFFF))
+    return (
+        _ROBOT_MODES.get(robot_mode, RobotMode.NO_CONTROLLER),
+        _SAFETY_MODES.get(safety_mode, SafetyMode.UNDEFINED_SAFETY_MODE),
+        _RUNTIME_STATES.get(runtime_state, RuntimeState.STOPPED),
+        RobotStatus(robot_bits & 0xF),
+        SafetyStatus(safety_bits & 0xFFF),
+    )
 
 
 def _not_finite(values: tuple[Any, ...]) -> str:
-    names = [name for name, value in zip(NAMES, values, strict=True)
-             if name in (*NAMES[_VECTORS], *_NUMBERS, 'tcp_offset') and not isfinite(
-                 sum(value) if isinstance(value, tuple) else value or 0.0)]
-    return f"The robot reports numbers that are not finite: {', '.join(names)}."
+    names = [
+        name
+        for name, value in zip(NAMES, values, strict=True)
+        if name in (*NAMES[_VECTORS], *_NUMBERS, 'tcp_offset')
+        and not isfinite(sum(value) if isinstance(value, tuple) else value or 0.0)
+    ]
+    return f'The robot reports numbers that are not finite: {", ".join(names)}.'

@@ -24,4 +24,5 @@ class StateStream(RtdeConnection):
         """
         super().__init__(
             RtdeClient(outputs=NAMES, optional_outputs=OPTIONAL, frequency=frequency),
-            lambda names, values: on_state(robot_state(in_order(names, values))))
+            lambda names, values: on_state(robot_state(in_order(names, values))),
+        )

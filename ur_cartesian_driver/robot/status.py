@@ -84,9 +84,16 @@ def has_ended(robot: RobotState) -> bool:
     return robot.runtime_state in (RuntimeState.STOPPING, RuntimeState.STOPPED)
 
 
-def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_connected: bool,
-                   headless_mode: bool, tcp_owed: bool = False,
-                   program_is_ending: bool = False, foreign_program: bool = False) -> str:
+def what_is_needed(
+    state: ConnectionState,
+    robot: RobotState | None,
+    *,
+    program_connected: bool,
+    headless_mode: bool,
+    tcp_owed: bool = False,
+    program_is_ending: bool = False,
+    foreign_program: bool = False,
+) -> str:
     """
     Return the sentence that says what is needed before a goal can run; empty when nothing is.
 
@@ -96,39 +103,61 @@ def what_is_needed(state: ConnectionState, robot: RobotState | None, *, program_
     :param foreign_program: a program runs on the robot that has not called us.
     """
     if state is ConnectionState.CONNECTING or robot is None:
-        return ('The robot answers; waiting for its report of itself on the primary interface '
-                '(primary_port).')
+        return (
+            'The robot answers; waiting for its report of itself on the primary interface '
+            '(primary_port).'
+        )
     if state is ConnectionState.STOPPED:
         return _after_a_stop(robot)
     if state is not ConnectionState.CONNECTED:
         return ''
     if robot.robot_mode is not RobotMode.RUNNING:
-        return (f'The arm is in mode {robot.robot_mode.name}; switch it on and release its '
-                'brakes, then start the robot program.')
+        return (
+            f'The arm is in mode {robot.robot_mode.name}; switch it on and release its '
+            'brakes, then start the robot program.'
+        )
     if program_connected and not has_ended(robot):
         if is_paused(robot):
             return 'The robot program is paused; play it on the pendant.'
         if program_is_ending:
-            return ('The robot program was told to end, and is still there; if it does not go, '
-                    'stop it on the pendant.')
-        return ('The TCP that the last goal had set is still to be put back; should it stay, set '
-                'the right one on the robot.') if tcp_owed else ''
+            return (
+                'The robot program was told to end, and is still there; if it does not go, '
+                'stop it on the pendant.'
+            )
+        return (
+            (
+                'The TCP that the last goal had set is still to be put back; should it stay, set '
+                'the right one on the robot.'
+            )
+            if tcp_owed
+            else ''
+        )
     if foreign_program:
-        return ('A program runs on the robot, and it has not called this driver: it is another '
-                'one, or it belongs to another driver. Let it end, or stop it; then '
-                + ('call resend_robot_program.' if headless_mode else
-                   'play a program whose External Control node calls this computer.'))
+        return (
+            'A program runs on the robot, and it has not called this driver: it is another '
+            'one, or it belongs to another driver. Let it end, or stop it; then '
+            + (
+                'call resend_robot_program.'
+                if headless_mode
+                else 'play a program whose External Control node calls this computer.'
+            )
+        )
     if headless_mode:
-        return ('The robot program does not run; call resend_robot_program when the arm may '
-                'move.')
-    return ('The robot program does not run; play a program with the External Control node on '
-            'the pendant.')
+        return 'The robot program does not run; call resend_robot_program when the arm may move.'
+    return (
+        'The robot program does not run; play a program with the External Control node on '
+        'the pendant.'
+    )
 
 
 def _after_a_stop(robot: RobotState) -> str:
     mode = robot.safety_mode.name.replace('_', ' ').lower()
     if robot.safety_mode is SafetyMode.PROTECTIVE_STOP:
-        return (f'The robot is in a {mode}; remove the cause, unlock it, then start the robot '
-                'program again.')
-    return (f'The safety system reports {mode}; clear it on the robot, then start the robot '
-            'program again.')
+        return (
+            f'The robot is in a {mode}; remove the cause, unlock it, then start the robot '
+            'program again.'
+        )
+    return (
+        f'The safety system reports {mode}; clear it on the robot, then start the robot '
+        'program again.'
+    )

@@ -50,8 +50,12 @@ class Connection(asyncio.BufferedProtocol):
     fresh memory at each read, which takes longer than to read a packet.
     """
 
-    def __init__(self, on_data: OnData, on_closed: OnClosed,
-                 on_open: Callable[[Connection], None] | None = None) -> None:
+    def __init__(
+        self,
+        on_data: OnData,
+        on_closed: OnClosed,
+        on_open: Callable[[Connection], None] | None = None,
+    ) -> None:
         """
         Set the callbacks; all of them run on the event loop.
 
@@ -221,9 +225,16 @@ class Listener:
     may have died without hanging up, or be no robot program at all.
     """
 
-    def __init__(self, name: str, *, on_open: Callable[[Connection], None], on_data: OnData,
-                 on_closed: OnClosed, on_refused: Callable[[str], None],
-                 is_taken: Callable[[], bool] = lambda: False) -> None:
+    def __init__(
+        self,
+        name: str,
+        *,
+        on_open: Callable[[Connection], None],
+        on_data: OnData,
+        on_closed: OnClosed,
+        on_refused: Callable[[str], None],
+        is_taken: Callable[[], bool] = lambda: False,
+    ) -> None:
         """
         Describe the port.
 
@@ -257,13 +268,16 @@ class Listener:
         try:
             # In two steps, so that there is something to close when we are cancelled between.
             self._server = await asyncio.get_running_loop().create_server(
-                self._accept, host, port, backlog=4, reuse_address=True, start_serving=False)
+                self._accept, host, port, backlog=4, reuse_address=True, start_serving=False
+            )
             await self._server.start_serving()
         except OSError as error:
-            remedy = REMEDIES.get(error.errno or 0, 'set bind_address to an address of this '
-                                                    'computer').format(name=self.name)
+            remedy = REMEDIES.get(
+                error.errno or 0, 'set bind_address to an address of this computer'
+            ).format(name=self.name)
             raise OSError(
-                f'cannot listen on {host} port {port} ({cause(error)}): {remedy}') from error
+                f'cannot listen on {host} port {port} ({cause(error)}): {remedy}'
+            ) from error
         self.port = int(self._server.sockets[0].getsockname()[1])
 
     def close(self) -> None:
@@ -281,7 +295,8 @@ class Listener:
 
     def _accept(self) -> Connection:
         connection = Connection(
-            self._on_data, lambda reason: self._ended(connection, reason), self._opened)
+            self._on_data, lambda reason: self._ended(connection, reason), self._opened
+        )
         return connection
 
     def _opened(self, connection: Connection) -> None:
@@ -289,11 +304,13 @@ class Listener:
         if not self.is_open or not peer:  # closed, or hung up, between the call and here
             connection.abort('nobody is left on one side')
         elif self._allowed and peer not in self._allowed:
-            self._turn_away(connection, f'{peer} may not connect; add it to allowed_peers if it '
-                                        'is the robot')
+            self._turn_away(
+                connection, f'{peer} may not connect; add it to allowed_peers if it is the robot'
+            )
         elif self.connection is not None and self._is_taken():
-            self._turn_away(connection, f'{peer} was turned away, the robot program is connected '
-                                        'already')
+            self._turn_away(
+                connection, f'{peer} was turned away, the robot program is connected already'
+            )
         else:
             self.hang_up()
             self.connection = connection

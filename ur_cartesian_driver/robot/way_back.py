@@ -50,8 +50,14 @@ PRIMARY: Mapping[Step, primary.Command] = {
 class WayBack:
     """One at a time."""
 
-    def __init__(self, robot: Robot, dashboard: DashboardCalls,
-                 send_program: Callable[[], Awaitable[Answer]], *, headless: bool) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        dashboard: DashboardCalls,
+        send_program: Callable[[], Awaitable[Answer]],
+        *,
+        headless: bool,
+    ) -> None:
         """
         Prepare.
 
@@ -119,9 +125,13 @@ class WayBack:
     def _situation(self, remote: bool | None) -> Situation:
         robot = self._robot
         return Situation(
-            connection=robot.status.state, message=robot.status.message, robot=robot.robot,
-            program_connected=robot.program_connected, headless=self._headless,
-            remote_control=remote)
+            connection=robot.status.state,
+            message=robot.status.message,
+            robot=robot.robot,
+            program_connected=robot.program_connected,
+            headless=self._headless,
+            remote_control=remote,
+        )
 
     async def _do(self, step: Step) -> Answer:
         """Do one step and wait until it is done."""
@@ -137,10 +147,17 @@ class WayBack:
         while not answer.ok and TOO_EARLY in answer.text:
             await asyncio.sleep(REPEAT)
             answer = await self._dashboard.ask(Dashboard(command=command))
-        if answer.ok and step is Step.PLAY and not await until(
-                self._robot, lambda _: self._robot.program_connected, EFFECT_TIMEOUT):
-            return no('it plays, but has not come to its External Control node within '
-                      f'{EFFECT_TIMEOUT:g} s.')
+        if (
+            answer.ok
+            and step is Step.PLAY
+            and not await until(
+                self._robot, lambda _: self._robot.program_connected, EFFECT_TIMEOUT
+            )
+        ):
+            return no(
+                'it plays, but has not come to its External Control node within '
+                f'{EFFECT_TIMEOUT:g} s.'
+            )
         return answer
 
     async def _do_without_dashboard(self, step: Step, effect: Effect) -> Answer:

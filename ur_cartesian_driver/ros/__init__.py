@@ -22,5 +22,6 @@ def __getattr__(name: str) -> Any:
     """Load the node when it is asked for: `python -m` of a module here must not load it first."""
     if name in __all__:
         from ur_cartesian_driver.ros import node
+
         return getattr(node, name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

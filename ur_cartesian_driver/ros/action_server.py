@@ -88,7 +88,10 @@ class CartesianActionServer:
         self._runs: dict[bytes, GoalRun] = {}
         self._closing = False
         self._server: Any = DeferringActionServer(  # type: ignore[no-untyped-call]  # rclpy's
-            node, FollowCartesianTrajectory, '~/follow_cartesian_trajectory', self._begin,
+            node,
+            FollowCartesianTrajectory,
+            '~/follow_cartesian_trajectory',
+            self._begin,
             # Of its own: goals and cancel requests are served while other callbacks run.
             callback_group=MutuallyExclusiveCallbackGroup(),
             cancel_callback=self._cancel,
@@ -148,9 +151,16 @@ class CartesianActionServer:
             if self._closing:
                 run.shut_down()
         if one_too_many:
-            self.ended(run, Outcome(code=ErrorCode.ROBOT_NOT_READY, text=(
-                f'{MOST_GOALS} goals are being planned, wait or run; send this one again when '
-                'some of them have ended.')))
+            self.ended(
+                run,
+                Outcome(
+                    code=ErrorCode.ROBOT_NOT_READY,
+                    text=(
+                        f'{MOST_GOALS} goals are being planned, wait or run; send this one again when '
+                        'some of them have ended.'
+                    ),
+                ),
+            )
         else:
             run.thread.start()
 
@@ -181,13 +191,22 @@ class CartesianActionServer:
     def converted(self, run: GoalRun) -> Goal:
         """Return the goal of a run, in our own terms."""
         return goal_from_message(
-            run.handle.request, self._frames, now=run.received, stand=self._stand(),
-            time_tolerance=self._settings.node.goal_time_tolerance)
+            run.handle.request,
+            self._frames,
+            now=run.received,
+            stand=self._stand(),
+            time_tolerance=self._settings.node.goal_time_tolerance,
+        )
 
     def placed(self, run: GoalRun, goal: Goal) -> Goal:
         """Return a goal with its frames where they are now: the arm may have moved since."""
-        return placed(goal, run.handle.request.trajectory, self._frames,
-                      now=self._clock.now().nanoseconds, stand=self._stand())
+        return placed(
+            goal,
+            run.handle.request.trajectory,
+            self._frames,
+            now=self._clock.now().nanoseconds,
+            stand=self._stand(),
+        )
 
     def _stand(self) -> Stand | None:
         state = self._driver.rest_state
@@ -218,10 +237,15 @@ class CartesianActionServer:
             return
         check(goal, self._settings.planning)
         holder = self.turns.holder
-        other = 'Another goal is' if not holder or holder.startswith('goal ') \
+        other = (
+            'Another goal is'
+            if not holder or holder.startswith('goal ')
             else f'{holder.capitalize()} is'
-        raise RobotNotReady(f'{other} running and on_new_goal is reject; wait for its end or '
-                            'cancel it, then send this goal again.')
+        )
+        raise RobotNotReady(
+            f'{other} running and on_new_goal is reject; wait for its end or '
+            'cancel it, then send this goal again.'
+        )
 
     def claim(self, run: GoalRun) -> None:
         """
@@ -335,10 +359,14 @@ class GoalRun:
             outcome = Outcome(code=code_of(error), text=self._sentence(error))
         except Exception as error:
             # A goal always ends with a result; the traceback goes the way of all threads.
-            self._server.ended(self, Outcome(
-                code=ErrorCode.EXECUTION_FAILED,
-                text=f'The driver has a defect, {type(error).__name__}: {error}; its log says '
-                     'more.'))
+            self._server.ended(
+                self,
+                Outcome(
+                    code=ErrorCode.EXECUTION_FAILED,
+                    text=f'The driver has a defect, {type(error).__name__}: {error}; its log says '
+                    'more.',
+                ),
+            )
             raise
         finally:
             self._begun.set()
@@ -350,8 +378,11 @@ class GoalRun:
         server, request = self._server, self.handle.request
         goal = server.converted(self)
         if request.validate_only:
-            return Outcome(code=ErrorCode.SUCCESSFUL, text='The goal passed all checks.',
-                           report=self._checked(server.plan(goal)).report)
+            return Outcome(
+                code=ErrorCode.SUCCESSFUL,
+                text='The goal passed all checks.',
+                report=self._checked(server.plan(goal)).report,
+            )
         if self.is_for_later:
             self._checked(server.plan(goal))
             server.wait(self.start_time, self._given_up)
@@ -360,7 +391,8 @@ class GoalRun:
             server.turns.line_up(self.turn)
             goal = replace(goal, age=0.0)
         return self._moved(
-            self._plan_preempting(goal) if server.preempts else self._plan_if_free(goal))
+            self._plan_preempting(goal) if server.preempts else self._plan_if_free(goal)
+        )
 
     def _plan_if_free(self, goal: Goal) -> Plan:
         """Return the plan of a goal that runs if no other one does."""
@@ -403,14 +435,16 @@ class GoalRun:
         if self._given_up.is_set():
             raise self._cancelled('before anything moved')
         if successor := self.turn.successor:
-            raise Preempted(f'{successor.capitalize()} took the place of this one before anything '
-                            'moved.')
+            raise Preempted(
+                f'{successor.capitalize()} took the place of this one before anything moved.'
+            )
 
     def _moved(self, plan: Plan) -> Outcome:
         server = self._server
         frame = server.feedback_frame(self, plan)
         motion = server.start(
-            plan, lambda progress: server.publish_feedback(self, progress, frame))
+            plan, lambda progress: server.publish_feedback(self, progress, frame)
+        )
         with self._lock:
             self._motion = motion
             given_up = self._given_up.is_set()
@@ -420,8 +454,11 @@ class GoalRun:
         elif self.turn.successor:
             motion.preempt(self.turn.successor)
         outcome = motion.result()
-        if outcome.code is ErrorCode.CANCELLED and not self._cancel_requested \
-                and self._given_up.is_set():
+        if (
+            outcome.code is ErrorCode.CANCELLED
+            and not self._cancel_requested
+            and self._given_up.is_set()
+        ):
             return replace(outcome, text=str(self._cancelled('and the arm was stopped')))
         return outcome
 
@@ -430,8 +467,10 @@ class GoalRun:
         predecessor = self.turn.predecessor
         if not (isinstance(error, GoalRefused) and predecessor):
             return str(error)
-        return (f'{error} The goal had passed all checks from where the arm was expected to come '
-                f'to rest, so {predecessor} has made way for it and is over.')
+        return (
+            f'{error} The goal had passed all checks from where the arm was expected to come '
+            f'to rest, so {predecessor} has made way for it and is over.'
+        )
 
     def _cancelled(self, when: str) -> Cancelled:
         if self._cancel_requested:

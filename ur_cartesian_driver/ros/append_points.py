@@ -43,8 +43,9 @@ class AppendService:
         self._server = server
         self._thread = ThreadPoolExecutor(1, thread_name_prefix='append points')
         self._places = threading.Semaphore(MOST_WAITING)
-        self._service = _Service(node, AppendPoints, '~/append_points', self._ask,
-                                 MutuallyExclusiveCallbackGroup())
+        self._service = _Service(
+            node, AppendPoints, '~/append_points', self._ask, MutuallyExclusiveCallbackGroup()
+        )
 
     def close(self) -> None:
         """Take nothing any more; what is being planned comes to its end."""
@@ -70,15 +71,18 @@ class AppendService:
         """Return the response to a request."""
         run = self._server.run_of(bytes(request.goal_id.uuid))
         if run is None:
-            return _refused('There is no goal with this goal_id that is being carried out: it '
-                            'has ended, or was never sent.')
+            return _refused(
+                'There is no goal with this goal_id that is being carried out: it '
+                'has ended, or was never sent.'
+            )
         try:
             return self._appended(run, request)
         except DriverError as error:
             return _refused(str(error), run.points)
         except Exception as error:
-            return _refused(f'The driver has a defect, {type(error).__name__}: {error}.',
-                            run.points)
+            return _refused(
+                f'The driver has a defect, {type(error).__name__}: {error}.', run.points
+            )
 
     def _appended(self, run: GoalRun, request: Any) -> Any:
         """
@@ -90,8 +94,10 @@ class AppendService:
         motion = run.motion(0.0 if run.waits else BEGIN_PATIENCE)
         if motion is None or motion.continuing is None:
             raise RobotNotReady(
-                'The goal does not move yet; append its points when it does.' if motion is None
-                else 'The goal was sent without keep_open: nothing can be appended.')
+                'The goal does not move yet; append its points when it does.'
+                if motion is None
+                else 'The goal was sent without keep_open: nothing can be appended.'
+            )
         addition = addition_from_message(request)
         asked = request.first_index, _digest(addition)
         if run.answered is not None and run.answered[0] == asked:
@@ -99,12 +105,16 @@ class AppendService:
         points = motion.continuing.points
         if request.first_index != points:
             raise InvalidGoal(
-                'first_index', f'is {request.first_index}, but the goal has {points} points',
-                f'append point {points} first' if request.first_index > points
-                else f'go on with point {points}')
+                'first_index',
+                f'is {request.first_index}, but the goal has {points} points',
+                f'append point {points} first'
+                if request.first_index > points
+                else f'go on with point {points}',
+            )
         appended = motion.continuing.append(addition)
         response = AppendPoints.Response(
-            accepted=True, message=appended.text, points_received=appended.points)
+            accepted=True, message=appended.text, points_received=appended.points
+        )
         run.answered = (asked, response)
         return response
 

@@ -48,8 +48,11 @@ STATUS_NAMES = {
 }
 #: Without a server for that long, the driver counts as gone [s].
 SERVER_PATIENCE = 3.0
-_INTEGERS = {f'{sign}int{bits}': (0 if sign else -2**(bits - 1), 2**(bits - (not sign)) - 1)
-             for sign in ('', 'u') for bits in (8, 16, 32, 64)}
+_INTEGERS = {
+    f'{sign}int{bits}': (0 if sign else -(2 ** (bits - 1)), 2 ** (bits - (not sign)) - 1)
+    for sign in ('', 'u')
+    for bits in (8, 16, 32, 64)
+}
 _FLOATS = ('float', 'double', 'long double')
 
 
@@ -81,8 +84,9 @@ def load_goal(source: str | os.PathLike[str]) -> FollowCartesianTrajectory.Goal:
     return goal
 
 
-def with_prefix(goal: FollowCartesianTrajectory.Goal,
-                tf_prefix: str) -> FollowCartesianTrajectory.Goal:
+def with_prefix(
+    goal: FollowCartesianTrajectory.Goal, tf_prefix: str
+) -> FollowCartesianTrajectory.Goal:
     """Change a goal to the frames and joints of an arm with a ``tf_prefix``; return it."""
     trajectory = goal.trajectory
     trajectory.header.frame_id = _prefixed(tf_prefix, trajectory.header.frame_id)
@@ -91,7 +95,8 @@ def with_prefix(goal: FollowCartesianTrajectory.Goal,
     postures += [segment.via_posture for segment in goal.segments]
     for posture in postures:
         posture.posture_joint_names = [
-            _prefixed(tf_prefix, name) for name in posture.posture_joint_names]
+            _prefixed(tf_prefix, name) for name in posture.posture_joint_names
+        ]
     return goal
 
 
@@ -108,7 +113,8 @@ def _fill(message: Message, values: object, key: str) -> None:
         path = f'{key}.{name}' if key else str(name)
         if name not in types:
             raise GoalFileError(
-                f'{path}: there is no such field; {key or "a goal"} has {", ".join(types)}.')
+                f'{path}: there is no such field; {key or "a goal"} has {", ".join(types)}.'
+            )
         setattr(message, name, _value(types[name], value, path))
 
 
@@ -143,8 +149,7 @@ def _number(typename: str, value: object, key: str) -> bool | int | float:
         raise GoalFileError(f'{key} is {value!r}, but it is a number.')
     low, high = _INTEGERS[typename]
     if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
-        raise GoalFileError(
-            f'{key} is {value!r}, but it is a whole number from {low} to {high}.')
+        raise GoalFileError(f'{key} is {value!r}, but it is a whole number from {low} to {high}.')
     return value
 
 
@@ -161,8 +166,9 @@ class GoalClient:
             status, result = client.send(load_goal(Path('square.yaml')), print)
     """
 
-    def __init__(self, driver: str = 'ur_cartesian_driver',
-                 node_name: str = 'ur_cartesian_client') -> None:
+    def __init__(
+        self, driver: str = 'ur_cartesian_driver', node_name: str = 'ur_cartesian_client'
+    ) -> None:
         """
         Prepare a client.
 
@@ -174,8 +180,7 @@ class GoalClient:
         self._context = Context()
         rclpy.init(args=[], context=self._context)
         self._node = rclpy.create_node(node_name, context=self._context)
-        self._client = ActionClient(
-            self._node, FollowCartesianTrajectory, self.action)
+        self._client = ActionClient(self._node, FollowCartesianTrajectory, self.action)
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self._node)
 
@@ -183,8 +188,12 @@ class GoalClient:
         """Do nothing; the client is ready."""
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 traceback: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
         """Close."""
         self.close()
 
@@ -196,9 +205,12 @@ class GoalClient:
             self._node.destroy_node()
             rclpy.shutdown(context=self._context)
 
-    def send(self, goal: FollowCartesianTrajectory.Goal,
-             on_feedback: Callable[[FollowCartesianTrajectory.Feedback], None] | None = None,
-             timeout: float = 10.0) -> tuple[int, FollowCartesianTrajectory.Result]:
+    def send(
+        self,
+        goal: FollowCartesianTrajectory.Goal,
+        on_feedback: Callable[[FollowCartesianTrajectory.Feedback], None] | None = None,
+        timeout: float = 10.0,
+    ) -> tuple[int, FollowCartesianTrajectory.Result]:
         """
         Send a goal and return its status (:data:`STATUS_NAMES`) and result.
 
@@ -211,11 +223,14 @@ class GoalClient:
         self._find_server(timeout)
         with _interrupts() as interrupted:
             request = self._client.send_goal_async(
-                goal, None if on_feedback is None else lambda m: on_feedback(m.feedback))
+                goal, None if on_feedback is None else lambda m: on_feedback(m.feedback)
+            )
             handle = self._spin_until(request, lambda: None)
             if not handle.accepted:
-                raise ConnectionError(f'{self.action} did not accept the goal; this driver '
-                                      'accepts all, so it is another one, or it is ending.')
+                raise ConnectionError(
+                    f'{self.action} did not accept the goal; this driver '
+                    'accepts all, so it is another one, or it is ending.'
+                )
             cancelled = False
 
             def cancel_once() -> None:
@@ -236,14 +251,16 @@ class GoalClient:
         latest: list[DriverStatus] = []
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         subscription = self._node.create_subscription(
-            DriverStatus, f'{self._driver}/status', latest.append, latched)
+            DriverStatus, f'{self._driver}/status', latest.append, latched
+        )
         try:
             deadline = monotonic() + timeout
             while not latest or latest[-1].state < DriverStatus.READY:
                 if monotonic() > deadline:
                     needed = latest[-1].message if latest else 'Its status does not come.'
                     raise TimeoutError(
-                        f'The driver {self._driver} is not ready after {timeout:g} s: {needed}')
+                        f'The driver {self._driver} is not ready after {timeout:g} s: {needed}'
+                    )
                 self._executor.spin_once(timeout_sec=0.1)
         finally:
             self._node.destroy_subscription(subscription)
@@ -253,7 +270,8 @@ class GoalClient:
             domain = os.environ.get('ROS_DOMAIN_ID', '0')
             raise TimeoutError(
                 f'Nobody serves {self.action} (looked for {timeout:g} s): start the driver, with '
-                f'the same ROS_DOMAIN_ID as here, which is {domain}.')
+                f'the same ROS_DOMAIN_ID as here, which is {domain}.'
+            )
 
     def _spin_until(self, future: Any, between: Callable[[], None]) -> Any:
         """Serve callbacks until a future is done."""
@@ -266,7 +284,8 @@ class GoalClient:
             elif monotonic() - seen > SERVER_PATIENCE:
                 raise ConnectionError(
                     f'The driver that served {self.action} is gone; how the goal ended is not '
-                    'known.')
+                    'known.'
+                )
         return future.result()
 
 

@@ -41,8 +41,14 @@ _Enum = TypeVar('_Enum', bound=IntEnum)
 _NO_POSTURE = Posture()
 
 
-def goal_from_message(message: Message, frames: Frames, *, now: int,
-                      stand: Stand | None = None, time_tolerance: float = 0.0) -> Goal:
+def goal_from_message(
+    message: Message,
+    frames: Frames,
+    *,
+    now: int,
+    stand: Stand | None = None,
+    time_tolerance: float = 0.0,
+) -> Goal:
     """
     Return the goal of a ``FollowCartesianTrajectory.Goal``.
 
@@ -54,21 +60,29 @@ def goal_from_message(message: Message, frames: Frames, *, now: int,
     :raises RobotNotReady: a frame moves with the arm, and nobody knows where that stands.
     """
     trajectory = message.trajectory
-    return placed(Goal(
-        waypoints=tuple(map(_waypoint, trajectory.points)),
-        segments=tuple(
-            _segment(segment, f'segments[{i}]') for i, segment in enumerate(message.segments)),
-        frame_id=trajectory.header.frame_id,
-        age=_age(trajectory.header.stamp, now),
-        path_tolerance=_tolerance(message.path_tolerance),
-        goal_tolerance=_tolerance(message.goal_tolerance),
-        goal_time_tolerance=seconds(message.goal_time_tolerance) or time_tolerance,
-        execution=_member(ExecutionMode, message.execution, 'execution'),
-        io_commands=tuple(
-            _io_command(command, f'io_commands[{i}]')
-            for i, command in enumerate(message.io_commands)),
-        keep_open=message.keep_open,
-    ), trajectory, frames, now=now, stand=stand)
+    return placed(
+        Goal(
+            waypoints=tuple(map(_waypoint, trajectory.points)),
+            segments=tuple(
+                _segment(segment, f'segments[{i}]') for i, segment in enumerate(message.segments)
+            ),
+            frame_id=trajectory.header.frame_id,
+            age=_age(trajectory.header.stamp, now),
+            path_tolerance=_tolerance(message.path_tolerance),
+            goal_tolerance=_tolerance(message.goal_tolerance),
+            goal_time_tolerance=seconds(message.goal_time_tolerance) or time_tolerance,
+            execution=_member(ExecutionMode, message.execution, 'execution'),
+            io_commands=tuple(
+                _io_command(command, f'io_commands[{i}]')
+                for i, command in enumerate(message.io_commands)
+            ),
+            keep_open=message.keep_open,
+        ),
+        trajectory,
+        frames,
+        now=now,
+        stand=stand,
+    )
 
 
 def addition_from_message(message: Message) -> Addition:
@@ -80,15 +94,19 @@ def addition_from_message(message: Message) -> Addition:
     return Addition(
         waypoints=tuple(map(_waypoint, message.points)),
         segments=tuple(
-            _segment(segment, f'segments[{i}]') for i, segment in enumerate(message.segments)),
+            _segment(segment, f'segments[{i}]') for i, segment in enumerate(message.segments)
+        ),
         io_commands=tuple(
             _io_command(command, f'io_commands[{i}]')
-            for i, command in enumerate(message.io_commands)),
-        last=message.last)
+            for i, command in enumerate(message.io_commands)
+        ),
+        last=message.last,
+    )
 
 
-def placed(goal: Goal, trajectory: Message, frames: Frames, *, now: int,
-           stand: Stand | None) -> Goal:
+def placed(
+    goal: Goal, trajectory: Message, frames: Frames, *, now: int, stand: Stand | None
+) -> Goal:
     """
     Return a goal whose frames are where they are at this moment.
 
@@ -104,10 +122,12 @@ def placed(goal: Goal, trajectory: Message, frames: Frames, *, now: int,
     return replace(
         goal,
         T_base_frame=frames.T_base_frame(
-            trajectory.header.frame_id, stand, at=stamp if stamp <= now else 0),
+            trajectory.header.frame_id, stand, at=stamp if stamp <= now else 0
+        ),
         T_flange_controlled=T_flange_controlled,
         # Empty: the active TCP, by whatever name it was given.
-        controlled_frame='' if T_flange_controlled is None else trajectory.controlled_frame)
+        controlled_frame='' if T_flange_controlled is None else trajectory.controlled_frame,
+    )
 
 
 def seconds(duration: Message) -> float:

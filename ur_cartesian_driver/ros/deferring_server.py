@@ -54,7 +54,8 @@ class DeferringActionServer(ActionServer):
     def _hand_over(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:
         if not self._destroyed:
             super().notify_execute(  # type: ignore[no-untyped-call]  # rclpy's
-                goal_handle, callback)
+                goal_handle, callback
+            )
 
     def destroy(self) -> None:
         """Send no more results."""

@@ -41,10 +41,16 @@ def diagnostics_message(driver: Driver, node_name: str, stamp: Time) -> Diagnost
         'longest gap between signs of life sent [s]': f'{gaps.keepalives:.4f}',
         'longest gap between robot reports [s]': f'{gaps.reports:.4f}',
     }
-    message = DiagnosticArray(status=[DiagnosticStatus(
-        level=LEVELS[status.state], name=f'{node_name}: robot',
-        message=status.message or status.state.name,
-        hardware_id=status.serial_number or driver.config.robot_ip,
-        values=[KeyValue(key=key, value=value) for key, value in values.items()])])
+    message = DiagnosticArray(
+        status=[
+            DiagnosticStatus(
+                level=LEVELS[status.state],
+                name=f'{node_name}: robot',
+                message=status.message or status.state.name,
+                hardware_id=status.serial_number or driver.config.robot_ip,
+                values=[KeyValue(key=key, value=value) for key, value in values.items()],
+            )
+        ]
+    )
     message.header.stamp = stamp
     return message

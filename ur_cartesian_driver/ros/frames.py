@@ -58,7 +58,8 @@ class StaticFrame:
         if len(words) != 9:
             raise ValueError(
                 f'static_frames: "{text}" has {len(words)} words instead of 9; write '
-                '"name parent x y z qx qy qz qw" [m, unit quaternion].')
+                '"name parent x y z qx qy qz qw" [m, unit quaternion].'
+            )
         name, parent, *numbers = words
         try:
             x, y, z, qx, qy, qz, qw = (float(number) for number in numbers)
@@ -70,7 +71,8 @@ class StaticFrame:
         if abs(length - 1.0) > _UNIT_TOLERANCE:
             raise ValueError(
                 f'static_frames: the quaternion {qx:g} {qy:g} {qz:g} {qw:g} of '
-                f'"{name}" has length {length:.4g} instead of 1; the order is x y z w.')
+                f'"{name}" has length {length:.4g} instead of 1; the order is x y z w.'
+            )
         return cls(name, parent, Pose((x, y, z), normalize((qx, qy, qz, qw))))
 
 
@@ -101,16 +103,20 @@ class Frames:
         self.tcp = tf_prefix + TCP
         self.tool0 = tf_prefix + TOOL0
         self._transforms: Transforms | None = None
-        resolved = _resolved({
-            self.base: (self.base, IDENTITY),
-            tf_prefix + BASE_LINK: (self.base, T_BASE_BASE_LINK),
-            self.tool0: (self.tool0, IDENTITY),
-            tf_prefix + FLANGE: (self.tool0, T_TOOL0_FLANGE),
-            self.tcp: (self.tcp, IDENTITY),
-        }, static_frames)
+        resolved = _resolved(
+            {
+                self.base: (self.base, IDENTITY),
+                tf_prefix + BASE_LINK: (self.base, T_BASE_BASE_LINK),
+                self.tool0: (self.tool0, IDENTITY),
+                tf_prefix + FLANGE: (self.tool0, T_TOOL0_FLANGE),
+                self.tcp: (self.tcp, IDENTITY),
+            },
+            static_frames,
+        )
         self._T_base, self._T_flange, self._T_tcp = (
             {name: T for name, (root, T) in resolved.items() if root == of}
-            for of in (self.base, self.tool0, self.tcp))
+            for of in (self.base, self.tool0, self.tcp)
+        )
 
     def with_transforms(self, transforms: Transforms | None) -> Frames:
         """Return the same frames, and those of tf2."""
@@ -138,9 +144,11 @@ class Frames:
         if self._transforms is not None:
             return self._transforms.T_target_source(_FRAME_ID, self.base, name, at)
         raise InvalidGoal(
-            _FRAME_ID, f'is "{name}", which is not a known frame',
+            _FRAME_ID,
+            f'is "{name}", which is not a known frame',
             f'known are {", ".join([*self._T_base, *self._T_flange, *self._T_tcp])}; others can '
-            'be named in the parameter static_frames')
+            'be named in the parameter static_frames',
+        )
 
     def T_flange_frame(self, name: str, stand: Stand | None = None) -> Pose | None:
         """
@@ -159,25 +167,32 @@ class Frames:
         known = ', '.join([self.tcp, *self._T_flange, *list(self._T_tcp)[1:]])
         if name in self._T_base:
             raise InvalidGoal(
-                _CONTROLLED, f'is "{name}", which does not move with the arm',
-                f'leave it empty for the active TCP of the robot, or name one of {known}')
+                _CONTROLLED,
+                f'is "{name}", which does not move with the arm',
+                f'leave it empty for the active TCP of the robot, or name one of {known}',
+            )
         if self._transforms is not None:
             return self._transforms.T_rigid(_CONTROLLED, self.tool0, name)
         raise InvalidGoal(
-            _CONTROLLED, f'is "{name}", which is not a known frame',
+            _CONTROLLED,
+            f'is "{name}", which is not a known frame',
             f'leave it empty for the active TCP of the robot, or name one of {known}; others can '
-            f'be named in the parameter static_frames, with {self.tool0} as their parent')
+            f'be named in the parameter static_frames, with {self.tool0} as their parent',
+        )
 
 
 def _known(stand: Stand | None, field: str, name: str) -> Stand:
     if stand is None:
-        raise RobotNotReady(f'{field} is "{name}", which moves with the arm, and the robot has '
-                            'not said yet where it stands; wait for the connection to the robot.')
+        raise RobotNotReady(
+            f'{field} is "{name}", which moves with the arm, and the robot has '
+            'not said yet where it stands; wait for the connection to the robot.'
+        )
     return stand
 
 
-def _resolved(known: Mapping[str, tuple[str, Pose]], static_frames: Iterable[StaticFrame]
-              ) -> dict[str, tuple[str, Pose]]:
+def _resolved(
+    known: Mapping[str, tuple[str, Pose]], static_frames: Iterable[StaticFrame]
+) -> dict[str, tuple[str, Pose]]:
     """Return each frame's root and where it is there, whatever the order of the static ones."""
     frames = dict(known)
     waiting: dict[str, StaticFrame] = {}
@@ -191,7 +206,8 @@ def _resolved(known: Mapping[str, tuple[str, Pose]], static_frames: Iterable[Sta
             frame = next(iter(waiting.values()))
             raise ValueError(
                 f'static_frames: the parent "{frame.parent}" of "{frame.name}" does not lead '
-                f'to {", ".join(dict.fromkeys(root for root, _ in known.values()))}.')
+                f'to {", ".join(dict.fromkeys(root for root, _ in known.values()))}.'
+            )
         for frame in ready:
             root, T_root_parent = frames[frame.parent]
             frames[frame.name] = root, T_root_parent @ frame.T_parent_frame

@@ -52,9 +52,14 @@ class CartesianDriverNode(Node):
     then the arm is stopped.
     """
 
-    def __init__(self, node_name: str = 'ur_cartesian_driver', *, namespace: str | None = None,
-                 parameter_overrides: Mapping[str, Value] | Iterable[Parameter] | None = None,
-                 **node_kwargs: Any) -> None:
+    def __init__(
+        self,
+        node_name: str = 'ur_cartesian_driver',
+        *,
+        namespace: str | None = None,
+        parameter_overrides: Mapping[str, Value] | Iterable[Parameter] | None = None,
+        **node_kwargs: Any,
+    ) -> None:
         """
         Declare the parameters and start to connect.
 
@@ -64,13 +69,19 @@ class CartesianDriverNode(Node):
         """
         try:
             super().__init__(
-                node_name, namespace=namespace, parameter_overrides=overrides(parameter_overrides),
-                automatically_declare_parameters_from_overrides=True, **node_kwargs)
+                node_name,
+                namespace=namespace,
+                parameter_overrides=overrides(parameter_overrides),
+                automatically_declare_parameters_from_overrides=True,
+                **node_kwargs,
+            )
         except ValueError as error:
             if 'PARAMETER_NOT_SET' not in str(error):
                 raise
-            raise ParameterError("A parameter is given without a value; write '' for an empty "
-                                 "text and [''] for an empty list.") from None
+            raise ParameterError(
+                "A parameter is given without a value; write '' for an empty "
+                "text and [''] for an empty list."
+            ) from None
         self._parts: list[Any] = []  # with close(), the last one first
         try:
             self._start()
@@ -95,20 +106,22 @@ class CartesianDriverNode(Node):
         if settings.node.servo_state_rate > 0.0:
             self._servo_states = ServoStates(self, self.driver, settings.node.servo_state_rate)
         if settings.node.servo_target_enabled:
-            self.servo_targets = ServoTargets(
-                self, self.driver, turns, self.action_server.frames)
+            self.servo_targets = ServoTargets(self, self.driver, turns, self.action_server.frames)
             self._parts.append(self.servo_targets)
         self._teach_service = TeachService(self, self.driver, turns)
         self._parts.append(self._teach_service)
         self._publisher.start()
         self._call_services = Services(self, self.driver, self._is_idle)
         self.create_timer(
-            min(HEARTBEAT_PERIOD, settings.driver.node_timeout / 4.0), self.driver.heartbeat,
+            min(HEARTBEAT_PERIOD, settings.driver.node_timeout / 4.0),
+            self.driver.heartbeat,
             # Of its own, and on a clock that no simulation stops.
             callback_group=MutuallyExclusiveCallbackGroup(),
-            clock=Clock(clock_type=ClockType.STEADY_TIME))
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
+        )
         self._twin_timer = self.create_timer(
-            DISCOVERY, self._look_for_a_twin, clock=Clock(clock_type=ClockType.STEADY_TIME))
+            DISCOVERY, self._look_for_a_twin, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        )
 
     def _is_idle(self) -> bool:
         """Tell whether nobody counts on the TCP and the payload that are set."""
@@ -122,7 +135,8 @@ class CartesianDriverNode(Node):
             self.get_logger().error(  # type: ignore[no-untyped-call]  # rclpy's
                 f'Another node is called {self.get_fully_qualified_name()}: goals and calls may '
                 'reach the wrong robot. Give each driver a namespace, a tf_prefix and ports of '
-                'its own.')
+                'its own.'
+            )
 
     def destroy_node(self) -> None:
         """Stop the arm if it moves, end all goals, threads and connections, then the node."""
@@ -135,8 +149,7 @@ class CartesianDriverNode(Node):
 class _LogBridge(logging.Handler):
     """Passes what our own modules log on to the logger of the node."""
 
-    _SEVERITIES = (
-        (logging.ERROR, 'error'), (logging.WARNING, 'warning'), (logging.INFO, 'info'))
+    _SEVERITIES = ((logging.ERROR, 'error'), (logging.WARNING, 'warning'), (logging.INFO, 'info'))
 
     def __init__(self, logger: RcutilsLogger) -> None:
         super().__init__()
@@ -179,8 +192,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     # rclpy's own handlers would shut ROS down at once, and no goal could end with a result.
     try:
-        rclpy.init(args=list(sys.argv if arguments is None else arguments),
-                   signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(
+            args=list(sys.argv if arguments is None else arguments),
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
     except RuntimeError as error:
         # Behind the sentence stands where in the source of rcl it was written.
         sys.exit(f'ur_cartesian_driver: {re.split(r", at /", str(error))[0]}')
@@ -201,8 +216,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         rclpy.shutdown()
 
 
-def _end_goals(node: CartesianDriverNode, executor: SingleThreadedExecutor,
-               signals: _Signals) -> None:
+def _end_goals(
+    node: CartesianDriverNode, executor: SingleThreadedExecutor, signals: _Signals
+) -> None:
     node.action_server.stop()
     deadline = monotonic() + SHUTDOWN_PATIENCE
     while not node.action_server.idle and monotonic() < deadline and signals.count < 2:

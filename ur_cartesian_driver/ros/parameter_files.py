@@ -42,12 +42,14 @@ def _of_file(file: Path) -> dict[str, Value]:
     """Return the parameters that a file has for the node, whatever its namespace."""
     content: object = _yaml(file.read_text(encoding='utf-8'), str(file))
     found: dict[str, Value] = {}
-    for node, values in (content.items() if isinstance(content, dict) else ()):
+    for node, values in content.items() if isinstance(content, dict) else ():
         if str(node).split('/')[-1] in ('**', '*', _NODE) and isinstance(values, dict):
             found |= values.get('ros__parameters') or {}
     if not found:
-        raise ParameterError(f'{file} has no parameters for a node {_NODE}; they stand below '
-                             '"/**:" and "ros__parameters:", as in config/driver.yaml.')
+        raise ParameterError(
+            f'{file} has no parameters for a node {_NODE}; they stand below '
+            '"/**:" and "ros__parameters:", as in config/driver.yaml.'
+        )
     return found
 
 

@@ -31,8 +31,12 @@ from ur_cartesian_driver.ros.frames import Frames, StaticFrame
 Value: TypeAlias = bool | int | float | str | list[str]
 
 _TYPE_NAMES: Mapping[type, str] = {
-    bool: 'true or false', int: 'a whole number', float: 'a number', str: 'a text',
-    list: 'a list of texts'}
+    bool: 'true or false',
+    int: 'a whole number',
+    float: 'a number',
+    str: 'a text',
+    list: 'a list of texts',
+}
 #: Fields that are not set but found out.
 _FOUND_OUT = ('calibration_known', 'optimove_known', 'acceleration_known', 'dialect')
 #: Parameters that rclpy itself makes out of what it is given.
@@ -80,15 +84,20 @@ class Declaration:
     def descriptor(self, default: Value) -> ParameterDescriptor:
         """Return what ``ros2 param describe`` shows."""
         descriptor = ParameterDescriptor(
-            name=self.name, description=self.description, read_only=True,
-            additional_constraints='one of: ' + ', '.join(self.choices) if self.choices else '')
+            name=self.name,
+            description=self.description,
+            read_only=True,
+            additional_constraints='one of: ' + ', '.join(self.choices) if self.choices else '',
+        )
         if isfinite(self.low) and isfinite(self.high) and not isinstance(default, bool):
             if isinstance(default, int):
                 descriptor.integer_range = [
-                    IntegerRange(from_value=int(self.low), to_value=int(self.high))]
+                    IntegerRange(from_value=int(self.low), to_value=int(self.high))
+                ]
             elif isinstance(default, float):
                 descriptor.floating_point_range = [
-                    FloatingPointRange(from_value=self.low, to_value=self.high)]
+                    FloatingPointRange(from_value=self.low, to_value=self.high)
+                ]
         return descriptor
 
     def check(self, value: Value, default: Value) -> None:
@@ -103,14 +112,17 @@ class Declaration:
             if wanted is str:  # YAML reads off as false, 2.14 as a number
                 hint = '; put it in quotes, which the shell must not take away'
             raise ParameterError(
-                f'Parameter {self.name} is {value!r}, but it is {_TYPE_NAMES[wanted]}{hint}.')
+                f'Parameter {self.name} is {value!r}, but it is {_TYPE_NAMES[wanted]}{hint}.'
+            )
         if isinstance(value, (int, float)) and not self.low <= value <= self.high:
             raise ParameterError(
                 f'Parameter {self.name} is {value}; it must lie between {self.low:g} and '
-                f'{self.high:g}.')
+                f'{self.high:g}.'
+            )
         if self.choices and value not in self.choices:
             raise ParameterError(
-                f'Parameter {self.name} is {value!r}; it is one of {", ".join(self.choices)}.')
+                f'Parameter {self.name} is {value!r}; it is one of {", ".join(self.choices)}.'
+            )
 
 
 _PORT = (0, 65535)
@@ -129,225 +141,469 @@ _TOLERATED = (
 def _tolerances(which: str, where: str) -> tuple[Declaration, ...]:
     """Return the parameters that stand in for zeros of ``<which>_tolerance``."""
     return tuple(
-        Declaration(f'{which}_tolerance_{name}',
-                    f'Largest deviation of the {words} {where}, where the goal does not say '
-                    f'[{unit}]; 0: without limit.', 0.0, largest)
-        for name, words, unit, largest in _TOLERATED)
+        Declaration(
+            f'{which}_tolerance_{name}',
+            f'Largest deviation of the {words} {where}, where the goal does not say '
+            f'[{unit}]; 0: without limit.',
+            0.0,
+            largest,
+        )
+        for name, words, unit, largest in _TOLERATED
+    )
 
 
 #: Every parameter of the node, in the order of ``config/driver.yaml``.
 DECLARATIONS: tuple[Declaration, ...] = (
     # -- which robot
-    Declaration('ur_type', 'Model of the robot; a robot that reports another one is refused.',
-                choices=tuple(MODELS)),
+    Declaration(
+        'ur_type',
+        'Model of the robot; a robot that reports another one is refused.',
+        choices=tuple(MODELS),
+    ),
     Declaration('robot_ip', 'Address of the robot.'),
     Declaration('tf_prefix', 'Prefix of joint and frame names, for example left_.'),
-    Declaration('static_frames',
-                'Fixed frames in which goals may be given, and tools that they may move, each as '
-                '"name parent x y z qx qy qz qw" [m, unit quaternion]; the parent is base, '
-                'base_link, tool0, flange, tool0_controller or another one of them. Empty texts '
-                'are skipped.'),
-    Declaration('tf_max_age',
-                'How old the newest transform of a frame of tf2 may be when a goal is planned '
-                '[s]; static ones are never old.', 0.001, 3600.0),
+    Declaration(
+        'static_frames',
+        'Fixed frames in which goals may be given, and tools that they may move, each as '
+        '"name parent x y z qx qy qz qw" [m, unit quaternion]; the parent is base, '
+        'base_link, tool0, flange, tool0_controller or another one of them. Empty texts '
+        'are skipped.',
+    ),
+    Declaration(
+        'tf_max_age',
+        'How old the newest transform of a frame of tf2 may be when a goal is planned '
+        '[s]; static ones are never old.',
+        0.001,
+        3600.0,
+    ),
     # -- the robot program
-    Declaration('headless_mode',
-                'Send the robot program directly (needs remote control), instead of serving it '
-                'to the External Control URCap.'),
-    Declaration('auto_power',
-                'Switch the arm on and release its brakes on the first connection, and never '
-                'again; only with headless_mode.'),
-    Declaration('wire_dialect',
-                'Version of the messages that the robot program understands; an older one only '
-                'for a robot that runs a saved, older External Control program of its own.',
-                choices=tuple(DIALECTS)),
+    Declaration(
+        'headless_mode',
+        'Send the robot program directly (needs remote control), instead of serving it '
+        'to the External Control URCap.',
+    ),
+    Declaration(
+        'auto_power',
+        'Switch the arm on and release its brakes on the first connection, and never '
+        'again; only with headless_mode.',
+    ),
+    Declaration(
+        'wire_dialect',
+        'Version of the messages that the robot program understands; an older one only '
+        'for a robot that runs a saved, older External Control program of its own.',
+        choices=tuple(DIALECTS),
+    ),
     # -- what a goal may do
-    Declaration('on_new_goal',
-                'A goal that comes while another one runs: it may preempt that one once it has '
-                'passed all checks, or reject it (it ends ABORTED).',
-                choices=('preempt', 'reject')),
+    Declaration(
+        'on_new_goal',
+        'A goal that comes while another one runs: it may preempt that one once it has '
+        'passed all checks, or reject it (it ends ABORTED).',
+        choices=('preempt', 'reject'),
+    ),
     Declaration('max_points', 'Longest list of points that a goal may have.', 1, 1_000_000),
-    Declaration('max_tool_speed',
-                'Largest speed of the TCP [m/s]; 0: without bound. Motions without times are '
-                'slowed to it.', 0.0, 10.0),
-    Declaration('on_too_fast',
-                'A goal whose times need more speed than the limits allow: refuse it, or slow '
-                'it down.', choices=('refuse', 'slow')),
-    Declaration('after_robot_stop',
-                'What becomes of a goal when the robot makes a protective or safeguard stop: '
-                'abort it, and the old motion never goes on; or continue it when somebody has '
-                'unlocked the robot and plays its program, as the robot itself does.',
-                choices=('abort', 'continue')),
-    Declaration('max_approach_distance',
-                'Longest way of the tool to the first point [m]; 0: without bound.', 0.0, 10.0),
-    Declaration('on_posture_change',
-                'A straight line or arc that cannot arrive in the posture asked for, or cannot be '
-                'gone although its end can be reached: refuse the goal, or go there by a joint '
-                'motion.', choices=('refuse', 'movej')),
-    Declaration('singularity_margin_wrist',
-                'How near straight lines and arcs may come to a straight wrist [rad]; 0: without '
-                'limit.', 0.0, 1.0),
-    Declaration('singularity_margin_elbow',
-                'How near straight lines and arcs may come to a stretched arm [rad]; 0: without '
-                'limit.', 0.0, 1.0),
-    Declaration('singularity_margin_shoulder',
-                'How near straight lines and arcs may bring the centre of the wrist to the place '
-                'above or below the shoulder, measured along the arm [m]; 0: without limit.',
-                0.0, 1.0),
-    Declaration('allow_tcp_change',
-                'Set the TCP of the robot to the controlled frame of a goal for the time of the '
-                'goal. False: a goal whose controlled frame is not the TCP must not turn it on '
-                'straight or circular segments.'),
-    Declaration('self_collision',
-                'A goal on whose way the arm comes too near to itself: off, warn in its report, '
-                'refuse it, or auto: refuse where meshes tell (UR3, UR5, UR10), warn where only '
-                'capsules do.', choices=('auto', 'off', 'warn', 'refuse')),
+    Declaration(
+        'max_tool_speed',
+        'Largest speed of the TCP [m/s]; 0: without bound. Motions without times are '
+        'slowed to it.',
+        0.0,
+        10.0,
+    ),
+    Declaration(
+        'on_too_fast',
+        'A goal whose times need more speed than the limits allow: refuse it, or slow it down.',
+        choices=('refuse', 'slow'),
+    ),
+    Declaration(
+        'after_robot_stop',
+        'What becomes of a goal when the robot makes a protective or safeguard stop: '
+        'abort it, and the old motion never goes on; or continue it when somebody has '
+        'unlocked the robot and plays its program, as the robot itself does.',
+        choices=('abort', 'continue'),
+    ),
+    Declaration(
+        'max_approach_distance',
+        'Longest way of the tool to the first point [m]; 0: without bound.',
+        0.0,
+        10.0,
+    ),
+    Declaration(
+        'on_posture_change',
+        'A straight line or arc that cannot arrive in the posture asked for, or cannot be '
+        'gone although its end can be reached: refuse the goal, or go there by a joint '
+        'motion.',
+        choices=('refuse', 'movej'),
+    ),
+    Declaration(
+        'singularity_margin_wrist',
+        'How near straight lines and arcs may come to a straight wrist [rad]; 0: without limit.',
+        0.0,
+        1.0,
+    ),
+    Declaration(
+        'singularity_margin_elbow',
+        'How near straight lines and arcs may come to a stretched arm [rad]; 0: without limit.',
+        0.0,
+        1.0,
+    ),
+    Declaration(
+        'singularity_margin_shoulder',
+        'How near straight lines and arcs may bring the centre of the wrist to the place '
+        'above or below the shoulder, measured along the arm [m]; 0: without limit.',
+        0.0,
+        1.0,
+    ),
+    Declaration(
+        'allow_tcp_change',
+        'Set the TCP of the robot to the controlled frame of a goal for the time of the '
+        'goal. False: a goal whose controlled frame is not the TCP must not turn it on '
+        'straight or circular segments.',
+    ),
+    Declaration(
+        'self_collision',
+        'A goal on whose way the arm comes too near to itself: off, warn in its report, '
+        'refuse it, or auto: refuse where meshes tell (UR3, UR5, UR10), warn where only '
+        'capsules do.',
+        choices=('auto', 'off', 'warn', 'refuse'),
+    ),
     Declaration('min_clearance', 'How near the arm may come to itself [m].', 0.0, 1.0),
-    Declaration('tool_radius',
-                'Radius of a tool between flange and TCP, for self_collision and '
-                'workspace_planes [m]; 0: no tool.', 0.0, 1.0),
-    Declaration('workspace_planes',
-                'Planes that neither arm, tool nor TCP may cross, each as "name x y z nx ny nz '
-                '[margin]" [m]: a point on it and its normal into the allowed side, both in '
-                'base (not base_link). Empty texts are skipped.'),
-    Declaration('stamp_tolerance',
-                'How old the stamp of a goal may be when it arrives [s].', 0.0, 3600.0),
-    Declaration('goal_time_tolerance',
-                'How much later than planned the end may be reached, where the goal does not say '
-                '[s].', 0.001, 3600.0),
-    Declaration('start_tolerance_position',
-                'How far the robot may stand from a first point at time 0 [m].', 0.0, 1.0),
-    Declaration('start_tolerance_angle',
-                'How far the robot may stand from a first point at time 0 [rad].', 0.0, 3.2),
+    Declaration(
+        'tool_radius',
+        'Radius of a tool between flange and TCP, for self_collision and '
+        'workspace_planes [m]; 0: no tool.',
+        0.0,
+        1.0,
+    ),
+    Declaration(
+        'workspace_planes',
+        'Planes that neither arm, tool nor TCP may cross, each as "name x y z nx ny nz '
+        '[margin]" [m]: a point on it and its normal into the allowed side, both in '
+        'base (not base_link). Empty texts are skipped.',
+    ),
+    Declaration(
+        'stamp_tolerance', 'How old the stamp of a goal may be when it arrives [s].', 0.0, 3600.0
+    ),
+    Declaration(
+        'goal_time_tolerance',
+        'How much later than planned the end may be reached, where the goal does not say [s].',
+        0.001,
+        3600.0,
+    ),
+    Declaration(
+        'start_tolerance_position',
+        'How far the robot may stand from a first point at time 0 [m].',
+        0.0,
+        1.0,
+    ),
+    Declaration(
+        'start_tolerance_angle',
+        'How far the robot may stand from a first point at time 0 [rad].',
+        0.0,
+        3.2,
+    ),
     # -- what is watched
-    Declaration('max_plan_deviation',
-                "How far the controller's own target may be from the plan, corners apart [m]; "
-                '0: any way.', 0.0, 1.0),
-    Declaration('max_plan_deviation_angle',
-                "How far the controller's own target may be from the plan, corners apart [rad]; "
-                '0: any angle.', 0.0, 3.2),
-    Declaration('max_calibration_difference',
-                'Warn of a robot whose calibration moves the flange farther than this from where '
-                'the nominal model has it [m]; 0: never.', 0.0, 1.0),
+    Declaration(
+        'max_plan_deviation',
+        "How far the controller's own target may be from the plan, corners apart [m]; 0: any way.",
+        0.0,
+        1.0,
+    ),
+    Declaration(
+        'max_plan_deviation_angle',
+        "How far the controller's own target may be from the plan, corners apart [rad]; "
+        '0: any angle.',
+        0.0,
+        3.2,
+    ),
+    Declaration(
+        'max_calibration_difference',
+        'Warn of a robot whose calibration moves the flange farther than this from where '
+        'the nominal model has it [m]; 0: never.',
+        0.0,
+        1.0,
+    ),
     *_tolerances('path', 'on the way'),
     *_tolerances('goal', 'at the end'),
     # -- speeds where the goal says nothing
     Declaration('linear_velocity', 'Speed of the tool on lines and arcs [m/s].', 1e-4, 10.0),
-    Declaration('linear_acceleration', 'Acceleration of the tool on lines and arcs [m/s^2].',
-                1e-3, 100.0),
-    Declaration('angular_velocity', 'Speed of a segment that only turns the tool [rad/s].',
-                1e-3, 20.0),
-    Declaration('angular_acceleration',
-                'Acceleration of a segment that only turns the tool [rad/s^2].', 1e-2, 400.0),
-    Declaration('joint_velocity', 'Speed of the leading axis in joint motions [rad/s].',
-                1e-3, 10.0),
-    Declaration('joint_acceleration',
-                'Acceleration of the leading axis in joint motions [rad/s^2].', 1e-2, 400.0),
-    Declaration('optimized_velocity',
-                "Speed of OPTIMIZED_* segments, as a fraction of the robot's limits.", 1e-3, 1.0),
-    Declaration('optimized_acceleration',
-                "Acceleration of OPTIMIZED_* segments, as a fraction of the robot's limits.",
-                1e-3, 1.0),
+    Declaration(
+        'linear_acceleration', 'Acceleration of the tool on lines and arcs [m/s^2].', 1e-3, 100.0
+    ),
+    Declaration(
+        'angular_velocity', 'Speed of a segment that only turns the tool [rad/s].', 1e-3, 20.0
+    ),
+    Declaration(
+        'angular_acceleration',
+        'Acceleration of a segment that only turns the tool [rad/s^2].',
+        1e-2,
+        400.0,
+    ),
+    Declaration(
+        'joint_velocity', 'Speed of the leading axis in joint motions [rad/s].', 1e-3, 10.0
+    ),
+    Declaration(
+        'joint_acceleration',
+        'Acceleration of the leading axis in joint motions [rad/s^2].',
+        1e-2,
+        400.0,
+    ),
+    Declaration(
+        'optimized_velocity',
+        "Speed of OPTIMIZED_* segments, as a fraction of the robot's limits.",
+        1e-3,
+        1.0,
+    ),
+    Declaration(
+        'optimized_acceleration',
+        "Acceleration of OPTIMIZED_* segments, as a fraction of the robot's limits.",
+        1e-3,
+        1.0,
+    ),
     # -- bounds of timed motions
-    Declaration('max_linear_acceleration',
-                'Largest acceleration of the tool that a time may lead to [m/s^2].', 0.1, 100.0),
-    Declaration('max_angular_acceleration',
-                'Largest angular acceleration of the tool that a time may lead to [rad/s^2].',
-                0.1, 1000.0),
-    Declaration('max_joint_acceleration',
-                'Largest acceleration of a joint that a time may lead to [rad/s^2].',
-                0.1, 1000.0),
+    Declaration(
+        'max_linear_acceleration',
+        'Largest acceleration of the tool that a time may lead to [m/s^2].',
+        0.1,
+        100.0,
+    ),
+    Declaration(
+        'max_angular_acceleration',
+        'Largest angular acceleration of the tool that a time may lead to [rad/s^2].',
+        0.1,
+        1000.0,
+    ),
+    Declaration(
+        'max_joint_acceleration',
+        'Largest acceleration of a joint that a time may lead to [rad/s^2].',
+        0.1,
+        1000.0,
+    ),
     Declaration('max_segment_time', 'Longest duration of one segment [s].', 0.1, 2147.483647),
     # -- splines
-    Declaration('spline_tolerance', 'How far the tool may be beside the curve through the points '
-                'of SPLINE and SERVO goals [m]; how far turned is as much at 0.1 m.', 1e-6, 0.01),
-    Declaration('closing_deceleration', 'How hard the fastest joint brakes where an open goal '
-                'ends without a last point [rad/s^2].', 0.1, 100.0),
+    Declaration(
+        'spline_tolerance',
+        'How far the tool may be beside the curve through the points '
+        'of SPLINE and SERVO goals [m]; how far turned is as much at 0.1 m.',
+        1e-6,
+        0.01,
+    ),
+    Declaration(
+        'closing_deceleration',
+        'How hard the fastest joint brakes where an open goal '
+        'ends without a last point [rad/s^2].',
+        0.1,
+        100.0,
+    ),
     # -- live targets
-    Declaration('servo_target_enabled',
-                'Follow the poses on ~/servo_target; false: nobody listens there.'),
-    Declaration('servo_target_max_age',
-                'How old a live target may be, by its stamp or else since it came [s]; then the '
-                'arm stops smoothly until a newer one comes.', 0.01, 10.0),
-    Declaration('servo_target_timeout',
-                'How long after the last live target the session ends [s].', 0.1, 3600.0),
-    Declaration('servo_target_linear_velocity', 'Largest speed of the tool when it follows live '
-                'targets [m/s]; not above max_tool_speed.', 1e-4, 10.0),
-    Declaration('servo_target_linear_acceleration', 'Acceleration of the tool when it follows '
-                'live targets [m/s^2].', 1e-3, 100.0),
-    Declaration('servo_target_angular_velocity', 'Largest speed at which the tool turns when it '
-                'follows live targets [rad/s].', 1e-3, 20.0),
-    Declaration('servo_target_angular_acceleration', 'Angular acceleration of the tool when it '
-                'follows live targets [rad/s^2].', 1e-2, 400.0),
-    Declaration('servo_target_joint_velocity', 'Largest speed of a joint when the tool follows '
-                'live targets [rad/s].', 1e-3, 10.0),
+    Declaration(
+        'servo_target_enabled', 'Follow the poses on ~/servo_target; false: nobody listens there.'
+    ),
+    Declaration(
+        'servo_target_max_age',
+        'How old a live target may be, by its stamp or else since it came [s]; then the '
+        'arm stops smoothly until a newer one comes.',
+        0.01,
+        10.0,
+    ),
+    Declaration(
+        'servo_target_timeout',
+        'How long after the last live target the session ends [s].',
+        0.1,
+        3600.0,
+    ),
+    Declaration(
+        'servo_target_linear_velocity',
+        'Largest speed of the tool when it follows live targets [m/s]; not above max_tool_speed.',
+        1e-4,
+        10.0,
+    ),
+    Declaration(
+        'servo_target_linear_acceleration',
+        'Acceleration of the tool when it follows live targets [m/s^2].',
+        1e-3,
+        100.0,
+    ),
+    Declaration(
+        'servo_target_angular_velocity',
+        'Largest speed at which the tool turns when it follows live targets [rad/s].',
+        1e-3,
+        20.0,
+    ),
+    Declaration(
+        'servo_target_angular_acceleration',
+        'Angular acceleration of the tool when it follows live targets [rad/s^2].',
+        1e-2,
+        400.0,
+    ),
+    Declaration(
+        'servo_target_joint_velocity',
+        'Largest speed of a joint when the tool follows live targets [rad/s].',
+        1e-3,
+        10.0,
+    ),
     # -- what is published
-    Declaration('state_publish_rate',
-                'How often joint states, TCP pose, wrench, speed scaling and tf are published '
-                '[Hz].', 1.0, 500.0),
-    Declaration('io_publish_rate',
-                'How often changes of inputs, outputs and tool data are looked for [Hz]; 0: '
-                'never.', 0.0, 125.0),
-    Declaration('diagnostics_rate', 'How often /diagnostics is published [Hz]; 0: never.',
-                0.0, 50.0),
-    Declaration('servo_state_rate', 'How often ~/servo_state is published at most [Hz]; 0: never.',
-                0.0, 500.0),
+    Declaration(
+        'state_publish_rate',
+        'How often joint states, TCP pose, wrench, speed scaling and tf are published [Hz].',
+        1.0,
+        500.0,
+    ),
+    Declaration(
+        'io_publish_rate',
+        'How often changes of inputs, outputs and tool data are looked for [Hz]; 0: never.',
+        0.0,
+        125.0,
+    ),
+    Declaration(
+        'diagnostics_rate', 'How often /diagnostics is published [Hz]; 0: never.', 0.0, 50.0
+    ),
+    Declaration(
+        'servo_state_rate',
+        'How often ~/servo_state is published at most [Hz]; 0: never.',
+        0.0,
+        500.0,
+    ),
     Declaration('feedback_rate', 'How often a goal sends feedback [Hz].', 0.5, 500.0),
     # -- set-points
     Declaration('servoj_gain', 'SERVO: how stiff servoj holds a set-point.', 100.0, 2000.0),
-    Declaration('servoj_lookahead_time', 'SERVO: how far servoj looks ahead, and so lags behind '
-                '[s].', 0.03, 0.2),
-    Declaration('servo_target_lag', 'SERVO: motion time that is under way to the arm, so how long '
-                'nothing may come through [s].', 0.008, 0.2),
-    Declaration('servo_buffer_depth', 'SERVO: set-points that the buffer of the robot program '
-                'holds; servo_target_lag has to fit in at 500 Hz.', 20, 1000),
-    Declaration('servo_max_divergence', 'SERVO: the robot program stops the arm when a joint is '
-                'farther from its set-point [rad].', 0.01, 3.0),
-    Declaration('allow_teach', 'Whether people may push the arm in the teach mode of the servo; '
-                'the robot program is made for it.'),
+    Declaration(
+        'servoj_lookahead_time',
+        'SERVO: how far servoj looks ahead, and so lags behind [s].',
+        0.03,
+        0.2,
+    ),
+    Declaration(
+        'servo_target_lag',
+        'SERVO: motion time that is under way to the arm, so how long '
+        'nothing may come through [s].',
+        0.008,
+        0.2,
+    ),
+    Declaration(
+        'servo_buffer_depth',
+        'SERVO: set-points that the buffer of the robot program '
+        'holds; servo_target_lag has to fit in at 500 Hz.',
+        20,
+        1000,
+    ),
+    Declaration(
+        'servo_max_divergence',
+        'SERVO: the robot program stops the arm when a joint is farther from its set-point [rad].',
+        0.01,
+        3.0,
+    ),
+    Declaration(
+        'allow_teach',
+        'Whether people may push the arm in the teach mode of the servo; '
+        'the robot program is made for it.',
+    ),
     # -- goals that go on
-    Declaration('stream_horizon', 'Goals with keep_open: planned time of the motion that the '
-                'robot is given ahead [s]; at least twice stream_margin.', 0.1, 60.0),
-    Declaration('stream_margin', 'Goals with keep_open: how long before the robot runs out of '
-                'points it is brought to rest, if no more come [s].', 0.02, 10.0),
-    Declaration('keep_open_timeout', 'Goals with keep_open: how long one waits at rest for more '
-                'points until it ends [s]; 0: without end.', 0.0, 86400.0),
+    Declaration(
+        'stream_horizon',
+        'Goals with keep_open: planned time of the motion that the '
+        'robot is given ahead [s]; at least twice stream_margin.',
+        0.1,
+        60.0,
+    ),
+    Declaration(
+        'stream_margin',
+        'Goals with keep_open: how long before the robot runs out of '
+        'points it is brought to rest, if no more come [s].',
+        0.02,
+        10.0,
+    ),
+    Declaration(
+        'keep_open_timeout',
+        'Goals with keep_open: how long one waits at rest for more '
+        'points until it ends [s]; 0: without end.',
+        0.0,
+        86400.0,
+    ),
     # -- what is recorded
-    Declaration('record_directory', 'Directory in which each motion is recorded, a file each, to '
-                'be drawn by `ur-cartesian plot`; empty: nothing is.'),
-    Declaration('record_max_size', 'What the recordings may take together [MB]; the oldest ones '
-                'are removed, and one alone ends at half of it.', 1.0, 1e6),
+    Declaration(
+        'record_directory',
+        'Directory in which each motion is recorded, a file each, to '
+        'be drawn by `ur-cartesian plot`; empty: nothing is.',
+    ),
+    Declaration(
+        'record_max_size',
+        'What the recordings may take together [MB]; the oldest ones '
+        'are removed, and one alone ends at half of it.',
+        1.0,
+        1e6,
+    ),
     # -- network
     Declaration('rtde_port', 'Port of RTDE on the robot.', *_PORT),
     Declaration('primary_port', 'Port of the primary interface on the robot.', *_PORT),
     Declaration('dashboard_port', 'Port of the dashboard of the robot.', *_PORT),
-    Declaration('reverse_port', 'Port to which the robot program connects for control messages; '
-                '0: any free one.', *_PORT),
-    Declaration('script_sender_port', 'Port that serves the robot program to the External '
-                'Control URCap; 0: any free one.', *_PORT),
-    Declaration('trajectory_port', 'Port to which the robot program connects for trajectory '
-                'points; 0: any free one.', *_PORT),
-    Declaration('script_command_port', 'Port to which the robot program connects for single '
-                'commands; 0: any free one.', *_PORT),
-    Declaration('bind_address', 'Address at which the ports above listen; empty: the local '
-                'address of the connection to the robot.'),
-    Declaration('reverse_ip', 'Address at which the robot reaches this computer (NAT, '
-                'containers); empty: the one that is listened at.'),
-    Declaration('allowed_peers', 'Addresses that may connect to the ports above; empty: '
-                'robot_ip. Empty texts are skipped.'),
+    Declaration(
+        'reverse_port',
+        'Port to which the robot program connects for control messages; 0: any free one.',
+        *_PORT,
+    ),
+    Declaration(
+        'script_sender_port',
+        'Port that serves the robot program to the External Control URCap; 0: any free one.',
+        *_PORT,
+    ),
+    Declaration(
+        'trajectory_port',
+        'Port to which the robot program connects for trajectory points; 0: any free one.',
+        *_PORT,
+    ),
+    Declaration(
+        'script_command_port',
+        'Port to which the robot program connects for single commands; 0: any free one.',
+        *_PORT,
+    ),
+    Declaration(
+        'bind_address',
+        'Address at which the ports above listen; empty: the local '
+        'address of the connection to the robot.',
+    ),
+    Declaration(
+        'reverse_ip',
+        'Address at which the robot reaches this computer (NAT, '
+        'containers); empty: the one that is listened at.',
+    ),
+    Declaration(
+        'allowed_peers',
+        'Addresses that may connect to the ports above; empty: robot_ip. Empty texts are skipped.',
+    ),
     # -- timing
-    Declaration('rtde_frequency', 'How often the robot reports its state [Hz], at least 10; 0: as '
-                'often as it can.', 0.0, 500.0),
-    Declaration('robot_receive_timeout', 'How long the robot program waits for a sign of life '
-                'before it stops the arm [s].', 0.02, 10.0),
-    Declaration('keepalive_period', 'How often the robot program gets a sign of life [s].',
-                0.002, 1.0),
-    Declaration('node_timeout', 'How long this node may be silent before the arm is stopped [s]; '
-                'longer than the largest goal takes to arrive.', 0.5, 60.0),
-    Declaration('stop_deceleration', 'Deceleration of the leading axis when a goal is stopped '
-                '[rad/s^2].', 0.1, 100.0),
-    Declaration('robot_loop', 'Where the connection to the robot is served: in a process of its '
-                'own, or in a thread (tests).', choices=('process', 'thread')),
+    Declaration(
+        'rtde_frequency',
+        'How often the robot reports its state [Hz], at least 10; 0: as often as it can.',
+        0.0,
+        500.0,
+    ),
+    Declaration(
+        'robot_receive_timeout',
+        'How long the robot program waits for a sign of life before it stops the arm [s].',
+        0.02,
+        10.0,
+    ),
+    Declaration(
+        'keepalive_period', 'How often the robot program gets a sign of life [s].', 0.002, 1.0
+    ),
+    Declaration(
+        'node_timeout',
+        'How long this node may be silent before the arm is stopped [s]; '
+        'longer than the largest goal takes to arrive.',
+        0.5,
+        60.0,
+    ),
+    Declaration(
+        'stop_deceleration',
+        'Deceleration of the leading axis when a goal is stopped [rad/s^2].',
+        0.1,
+        100.0,
+    ),
+    Declaration(
+        'robot_loop',
+        'Where the connection to the robot is served: in a process of its '
+        'own, or in a thread (tests).',
+        choices=('process', 'thread'),
+    ),
 )
 
 
@@ -379,7 +635,8 @@ def declare(node: Node) -> Settings:
             node.undeclare_parameter(declaration.name)
         try:
             parameter = node.declare_parameter(
-                declaration.name, default, declaration.descriptor(default))
+                declaration.name, default, declaration.descriptor(default)
+            )
         # What check() does not know.
         except (InvalidParameterException, InvalidParameterTypeException) as error:
             raise ParameterError(f'Parameter {declaration.name}: {error}.') from None
@@ -425,8 +682,10 @@ def settings(values: Mapping[str, Value]) -> Settings:
 def overrides(values: Mapping[str, Value] | Iterable[Parameter] | None) -> list[Parameter]:
     """Return values by name as rclpy wants them."""
     if isinstance(values, Mapping):
-        return [Parameter(name, value=[''] if value == [] else value)  # [] would be bytes
-                for name, value in values.items()]
+        return [
+            Parameter(name, value=[''] if value == [] else value)  # [] would be bytes
+            for name, value in values.items()
+        ]
     return list(values or ())
 
 

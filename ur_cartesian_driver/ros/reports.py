@@ -37,8 +37,9 @@ class FeedbackFrame:
     joint_names: tuple[str, ...]
 
 
-def feedback_message(progress: Progress, frame: FeedbackFrame,
-                     stamp: Time) -> FollowCartesianTrajectory.Feedback:
+def feedback_message(
+    progress: Progress, frame: FeedbackFrame, stamp: Time
+) -> FollowCartesianTrajectory.Feedback:
     """Return the feedback for one report of a running motion."""
     message = FollowCartesianTrajectory.Feedback()
     message.header.stamp = stamp
@@ -49,16 +50,18 @@ def feedback_message(progress: Progress, frame: FeedbackFrame,
     actual = frame.T_frame_base @ progress.actual_pose
     desired_twist = _turned(frame.T_frame_base, progress.desired_twist)
     actual_twist = _turned(frame.T_frame_base, progress.actual_twist)
-    desired_acceleration = _turned(
-        frame.T_frame_base, progress.desired_acceleration or _UNKNOWN)
+    desired_acceleration = _turned(frame.T_frame_base, progress.desired_acceleration or _UNKNOWN)
     actual_acceleration = _turned(frame.T_frame_base, progress.actual_acceleration or _UNKNOWN)
     message.desired = _point(progress.time, desired, desired_twist, desired_acceleration)
     message.actual = _point(progress.time, actual, actual_twist, actual_acceleration)
     message.actual.posture.posture_joint_names = list(frame.joint_names)
     message.actual.posture.posture_joint_values = list(progress.actual_q)
     message.error = _point(
-        0.0, pose_error(desired, actual), _difference(desired_twist, actual_twist),
-        _difference(desired_acceleration, actual_acceleration))
+        0.0,
+        pose_error(desired, actual),
+        _difference(desired_twist, actual_twist),
+        _difference(desired_acceleration, actual_acceleration),
+    )
 
     message.point_index = progress.waypoint
     message.progress = progress.fraction
@@ -106,8 +109,9 @@ def tcp_pose_message(state: RobotState, base: str, stamp: Time) -> PoseStamped:
 def pose_message(pose: Pose) -> PoseMessage:
     """Return a pose as a message."""
     (x, y, z), (qx, qy, qz, qw) = pose.position, pose.quaternion
-    return PoseMessage(position=Point(x=x, y=y, z=z),
-                       orientation=Quaternion(x=qx, y=qy, z=qz, w=qw))
+    return PoseMessage(
+        position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw)
+    )
 
 
 def duration_message(time: float) -> Duration:
@@ -116,8 +120,9 @@ def duration_message(time: float) -> Duration:
     return Duration(sec=sec, nanosec=nanosec)
 
 
-def _point(time: float, pose: Pose, twist: Vector6,
-           acceleration: Vector6) -> CartesianTrajectoryPoint:
+def _point(
+    time: float, pose: Pose, twist: Vector6, acceleration: Vector6
+) -> CartesianTrajectoryPoint:
     vx, vy, vz, wx, wy, wz = twist
     return CartesianTrajectoryPoint(
         time_from_start=duration_message(time),

@@ -58,28 +58,31 @@ TRIGGERS: Mapping[str, Call] = {
     'recover': Recover(),
     'resend_robot_program': SendProgram(),
     'zero_ftsensor': ZeroFtSensor(),
-    **{f'dashboard/{name}': Dashboard(command=command) for name, command in {
-        'power_on': 'power on',
-        'power_off': 'power off',
-        'brake_release': 'brake release',
-        'unlock_protective_stop': 'unlock protective stop',
-        'restart_safety': 'restart safety',
-        'close_popup': 'close popup',
-        'close_safety_popup': 'close safety popup',
-        'play': 'play',
-        'pause': 'pause',
-        'stop': 'stop',
-        'get_robot_mode': 'robotmode',
-        'get_safety_mode': 'safetymode',
-        'get_loaded_program': 'get loaded program',
-        'program_state': 'programState',
-        'program_running': 'running',
-        'program_saved': 'isProgramSaved',
-        'is_in_remote_control': 'is in remote control',
-        'get_serial_number': 'get serial number',
-        'get_robot_model': 'get robot model',
-        'get_polyscope_version': 'PolyscopeVersion',
-    }.items()},
+    **{
+        f'dashboard/{name}': Dashboard(command=command)
+        for name, command in {
+            'power_on': 'power on',
+            'power_off': 'power off',
+            'brake_release': 'brake release',
+            'unlock_protective_stop': 'unlock protective stop',
+            'restart_safety': 'restart safety',
+            'close_popup': 'close popup',
+            'close_safety_popup': 'close safety popup',
+            'play': 'play',
+            'pause': 'pause',
+            'stop': 'stop',
+            'get_robot_mode': 'robotmode',
+            'get_safety_mode': 'safetymode',
+            'get_loaded_program': 'get loaded program',
+            'program_state': 'programState',
+            'program_running': 'running',
+            'program_saved': 'isProgramSaved',
+            'is_in_remote_control': 'is in remote control',
+            'get_serial_number': 'get serial number',
+            'get_robot_model': 'get robot model',
+            'get_polyscope_version': 'PolyscopeVersion',
+        }.items()
+    },
 }
 
 
@@ -106,14 +109,22 @@ OTHERS: Mapping[str, tuple[Any, Callable[[Any], Call]]] = {
     'set_tcp': (SetTCP, _tcp),
     'set_payload': (SetPayloadService, _payload),
     'set_io': (SetIO, _output),
-    'set_speed_slider': (SetSpeedSliderFraction, lambda request: SetSpeedSlider(
-        fraction=request.speed_slider_fraction)),
-    'dashboard/load_program': (Load, lambda request: Dashboard(
-        command='load', argument=request.filename)),
-    'dashboard/load_installation': (Load, lambda request: Dashboard(
-        command='load installation', argument=request.filename)),
-    'dashboard/popup': (Popup, lambda request: Dashboard(
-        command='popup', argument=request.message)),
+    'set_speed_slider': (
+        SetSpeedSliderFraction,
+        lambda request: SetSpeedSlider(fraction=request.speed_slider_fraction),
+    ),
+    'dashboard/load_program': (
+        Load,
+        lambda request: Dashboard(command='load', argument=request.filename),
+    ),
+    'dashboard/load_installation': (
+        Load,
+        lambda request: Dashboard(command='load installation', argument=request.filename),
+    ),
+    'dashboard/popup': (
+        Popup,
+        lambda request: Dashboard(command='popup', argument=request.message),
+    ),
     'dashboard/raw_request': (RawRequest, lambda request: DashboardLine(line=request.query)),
 }
 
@@ -131,14 +142,16 @@ class Services:
         kinds = {name: (Trigger, lambda _, call=call: call) for name, call in TRIGGERS.items()}
         self._services = [
             PromisedService(node, kind, f'~/{name}', _Asker(driver, is_idle, call_of), group)
-            for name, (kind, call_of) in {**kinds, **OTHERS}.items()]
+            for name, (kind, call_of) in {**kinds, **OTHERS}.items()
+        ]
 
 
 class _Asker:
     """Turns a request into a call of the driver."""
 
-    def __init__(self, driver: Driver, is_idle: Callable[[], bool],
-                 call_of: Callable[[Any], Call]) -> None:
+    def __init__(
+        self, driver: Driver, is_idle: Callable[[], bool], call_of: Callable[[Any], Call]
+    ) -> None:
         self._driver, self._is_idle, self._call_of = driver, is_idle, call_of
 
     def __call__(self, request: Any) -> Future[Answer]:
@@ -149,17 +162,24 @@ class _Asker:
             return kept(str(error))
         # A goal that is only planned so far counts on what it found.
         if isinstance(call, SetTcp | SetPayload) and not self._is_idle():
-            return kept('A goal is being planned or carried out, and this would change what it '
-                        'counts on; wait for its end or cancel it, then try again.')
+            return kept(
+                'A goal is being planned or carried out, and this would change what it '
+                'counts on; wait for its end or cancel it, then try again.'
+            )
         return self._driver.call(call)
 
 
 class PromisedService:
     """A service whose responses are sent when they are there, from whatever thread."""
 
-    def __init__(self, node: Node, kind: Any, name: str,
-                 ask: Callable[[Any], Future[Answer]],
-                 group: MutuallyExclusiveCallbackGroup) -> None:
+    def __init__(
+        self,
+        node: Node,
+        kind: Any,
+        name: str,
+        ask: Callable[[Any], Future[Answer]],
+        group: MutuallyExclusiveCallbackGroup,
+    ) -> None:
         self._kind, self._ask = kind, ask
         service: Any = node.create_service(kind, name, self._begin, callback_group=group)
         self._send_now = service.send_response

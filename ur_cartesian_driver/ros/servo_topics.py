@@ -56,9 +56,15 @@ NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 #: As the other topics that tell the state.
 STATES = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 #: After these somebody has to look at the robot.
-STOPPED = (SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED
-           | SafetyStatus.EMERGENCY_STOPPED | SafetyStatus.ROBOT_EMERGENCY_STOPPED
-           | SafetyStatus.SYSTEM_EMERGENCY_STOPPED | SafetyStatus.VIOLATION | SafetyStatus.FAULT)
+STOPPED = (
+    SafetyStatus.PROTECTIVE_STOPPED
+    | SafetyStatus.SAFEGUARD_STOPPED
+    | SafetyStatus.EMERGENCY_STOPPED
+    | SafetyStatus.ROBOT_EMERGENCY_STOPPED
+    | SafetyStatus.SYSTEM_EMERGENCY_STOPPED
+    | SafetyStatus.VIOLATION
+    | SafetyStatus.FAULT
+)
 #: How often the same kind of trouble is told, at most [s].
 COMPLAINT = 2.0
 #: How long the end of a session is waited for when the node is destroyed [s].
@@ -72,8 +78,9 @@ def pose_of(message: Message) -> Pose:
     return Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
 
 
-def target_from_message(message: Message, frames: Frames, *, stand: Stand | None, now: int,
-                        max_age: float) -> tuple[Pose, float]:
+def target_from_message(
+    message: Message, frames: Frames, *, stand: Stand | None, now: int, max_age: float
+) -> tuple[Pose, float]:
     """
     Return where the TCP is to be in the robot's base, and how old that is [s].
 
@@ -88,22 +95,32 @@ def target_from_message(message: Message, frames: Frames, *, stand: Stand | None
     age = (now - stamp) / 1_000_000_000 if stamp else 0.0
     if abs(age) > max_age:
         raise InvalidGoal(
-            'header.stamp', f'is {abs(age):.3f} s {"old" if age > 0.0 else "in the future"}, '
+            'header.stamp',
+            f'is {abs(age):.3f} s {"old" if age > 0.0 else "in the future"}, '
             f'servo_target_max_age is {max_age:g} s',
             'compare the clocks of both computers, or leave the stamp 0: then the age counts '
-            'from the receipt')
+            'from the receipt',
+        )
     return frames.T_base_frame(message.header.frame_id, stand) @ pose, max(0.0, age)
 
 
 def servo_state_message(report: ServoReport, stamp: Time) -> ServoState:
     """Return how the streaming of set-points is going."""
     message = ServoState(
-        state=int(report.activity), setpoints_sent=report.setpoints_sent,
-        setpoints_done=report.setpoints_done, buffer_size=report.buffer_size,
-        buffer_capacity=report.buffer_capacity, buffered=duration_message(report.buffered),
-        lag=report.lag, speed_scaling=report.speed_scaling, joint_error=report.joint_error,
-        underruns=report.underruns, overruns=report.overruns, repeats=report.repeats,
-        skipped=report.skipped)
+        state=int(report.activity),
+        setpoints_sent=report.setpoints_sent,
+        setpoints_done=report.setpoints_done,
+        buffer_size=report.buffer_size,
+        buffer_capacity=report.buffer_capacity,
+        buffered=duration_message(report.buffered),
+        lag=report.lag,
+        speed_scaling=report.speed_scaling,
+        joint_error=report.joint_error,
+        underruns=report.underruns,
+        overruns=report.overruns,
+        repeats=report.repeats,
+        skipped=report.skipped,
+    )
     message.header.stamp = stamp
     return message
 
@@ -141,7 +158,8 @@ class TeachService:
         self._motion: Motion | None = None
         self._lock = threading.Lock()
         self._service = PromisedService(
-            node, SetBool, '~/teach_mode', self.ask, MutuallyExclusiveCallbackGroup())
+            node, SetBool, '~/teach_mode', self.ask, MutuallyExclusiveCallbackGroup()
+        )
 
     @property
     def idle(self) -> bool:
@@ -161,27 +179,37 @@ class TeachService:
         with self._lock:
             motion = self._motion
             if request.data:
-                return kept('The arm can be guided by hand already.', ok=True) \
-                    if motion is not None else self._begin()
+                return (
+                    kept('The arm can be guided by hand already.', ok=True)
+                    if motion is not None
+                    else self._begin()
+                )
         if motion is None:
             return kept('Nobody guides the arm.', ok=True)
         answer = _Promise()
-        motion.add_done_callback(lambda outcome: answer.keep(
-            outcome.code is ErrorCode.CANCELLED,
-            'The arm is held by the robot again.'
-            if outcome.code is ErrorCode.CANCELLED else outcome.text))
+        motion.add_done_callback(
+            lambda outcome: answer.keep(
+                outcome.code is ErrorCode.CANCELLED,
+                'The arm is held by the robot again.'
+                if outcome.code is ErrorCode.CANCELLED
+                else outcome.text,
+            )
+        )
         motion.cancel()
         return answer.future
 
     def _begin(self) -> Future[Answer]:
         turn = Turn('a person who guides the arm', lambda: None)
         if not self._turns.seize(turn):
-            return kept('A goal or a session of live targets has the arm; wait for its end or '
-                        'cancel it, then try again.')
+            return kept(
+                'A goal or a session of live targets has the arm; wait for its end or '
+                'cancel it, then try again.'
+            )
         answer = _Promise()
         try:
             motion = self._driver.teach(
-                lambda: answer.keep(True, 'The arm can be guided by hand.'))
+                lambda: answer.keep(True, 'The arm can be guided by hand.')
+            )
         except DriverError as error:
             self._turns.leave(turn)
             return kept(str(error))
@@ -256,8 +284,12 @@ class ServoTargets:
         self._thread = threading.Thread(target=self._run, name='servo targets', daemon=True)
         self._thread.start()
         self._subscription = node.create_subscription(
-            PoseStamped, '~/servo_target', self._take, NEWEST,
-            callback_group=MutuallyExclusiveCallbackGroup())
+            PoseStamped,
+            '~/servo_target',
+            self._take,
+            NEWEST,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+        )
 
     @property
     def idle(self) -> bool:
@@ -311,12 +343,16 @@ class ServoTargets:
                 self._follow(message, received)
             except DriverError as error:
                 reason = str(error).removeprefix('trajectory.')  # as of a goal, which it is not
-                self._logger.warning(f'A message on ~/servo_target is ignored: {reason}',
-                                     throttle_duration_sec=COMPLAINT)
+                self._logger.warning(
+                    f'A message on ~/servo_target is ignored: {reason}',
+                    throttle_duration_sec=COMPLAINT,
+                )
             except Exception as error:  # the next one may be better
                 self._logger.error(
                     'A message on ~/servo_target is ignored, because of a defect of the driver, '
-                    f'{type(error).__name__}: {error}.', throttle_duration_sec=COMPLAINT)
+                    f'{type(error).__name__}: {error}.',
+                    throttle_duration_sec=COMPLAINT,
+                )
 
     def _follow(self, message: Message, received: int) -> None:
         state = self._driver.state
@@ -326,11 +362,17 @@ class ServoTargets:
             self._logger.warning(
                 'Live targets are ignored because the robot was stopped while they came: send '
                 f'none for {self._driver.options.servo_target_timeout:g} s (servo_target_timeout) '
-                'before new ones.', throttle_duration_sec=COMPLAINT)
+                'before new ones.',
+                throttle_duration_sec=COMPLAINT,
+            )
             return
         T_base_tcp, age = target_from_message(
-            message, self._frames, now=received, max_age=self._max_age,
-            stand=None if state is None else Stand.of(state))
+            message,
+            self._frames,
+            now=received,
+            max_age=self._max_age,
+            stand=None if state is None else Stand.of(state),
+        )
         age += (self._clock.now().nanoseconds - received) / 1_000_000_000
         session = self._session
         if session is None or session.motion.done():
@@ -348,7 +390,8 @@ class ServoTargets:
         if not self._turns.seize_for_now(turn):
             self._logger.info(
                 f'Live targets are ignored as long as {self._turns.holder} has the arm.',
-                throttle_duration_sec=COMPLAINT)
+                throttle_duration_sec=COMPLAINT,
+            )
             return
         try:
             session = self._driver.follow_targets(T_base_tcp, age=age)
@@ -370,18 +413,24 @@ class ServoTargets:
 
     def _ending(self, turn: Turn) -> Callable[[Outcome], None]:
         """Return what is done at the end of a session."""
+
         def ended(outcome: Outcome) -> None:
             if outcome.code not in (ErrorCode.SUCCESSFUL, ErrorCode.PREEMPTED):
                 self._restraint.impose()
             self._session = None
             self._turns.leave(turn)
             self._tell(outcome)
+
         return ended
 
     def _tell(self, outcome: Outcome) -> None:
         """Write into the log how a session ended."""
-        text = ' '.join((f'The session of live targets has ended: {outcome.text}',
-                         *(f'{line[:1].upper()}{line[1:]}.' for line in outcome.report)))
+        text = ' '.join(
+            (
+                f'The session of live targets has ended: {outcome.text}',
+                *(f'{line[:1].upper()}{line[1:]}.' for line in outcome.report),
+            )
+        )
         if outcome.code in (ErrorCode.SUCCESSFUL, ErrorCode.PREEMPTED, ErrorCode.CANCELLED):
             self._logger.info(text)
         else:

@@ -43,7 +43,8 @@ def tcp_transform(state: RobotState, base: str, tcp: str, stamp: Time) -> Transf
     x, y, z, w = state.actual_tcp_pose.quaternion
     message.transform = Transform(
         translation=_vector(state.actual_tcp_pose.position),
-        rotation=Quaternion(x=x, y=y, z=z, w=w))
+        rotation=Quaternion(x=x, y=y, z=z, w=w),
+    )
     return message
 
 

@@ -48,8 +48,9 @@ from ur_cartesian_driver.ros.state_messages import (
 #: The newest value is enough, but a reliable subscriber shall be served too.
 STATE = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 #: Who comes late gets the last value at once.
-LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE,
-                     durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LATCHED = QoSProfile(
+    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
 #: As tf2 wants it.
 TF = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 #: How often an unchanged status is confirmed [s].
@@ -104,7 +105,9 @@ class StatePublisher:
                 # One bad value must not silence all topics for good.
                 self._logger.error(
                     f'The state of the robot is not published, because of a defect of the driver, '
-                    f'{type(error).__name__}: {error}.', throttle_duration_sec=COMPLAINT)
+                    f'{type(error).__name__}: {error}.',
+                    throttle_duration_sec=COMPLAINT,
+                )
             due += self._period * max(1.0, (monotonic() - due) // self._period)
 
     def _publish(self, now: float) -> None:
@@ -140,8 +143,9 @@ class _Steady:
         self._wrench.publish(wrench_message(state, self._tcp, stamp))
         self._speed_scaling.publish(Float64(data=state.speed_scaling))
         if self._tf is not None:
-            self._tf.publish(self._tf_kind(
-                transforms=[tcp_transform(state, self._base, self._tcp, stamp)]))
+            self._tf.publish(
+                self._tf_kind(transforms=[tcp_transform(state, self._base, self._tcp, stamp)])
+            )
 
 
 class _Changes:
@@ -200,8 +204,9 @@ class _Diagnostics:
     def __init__(self, node: Node, rate: float) -> None:
         self._name = node.get_fully_qualified_name().strip('/')
         self._period = 1.0 / rate if rate > 0.0 else 0.0
-        self._topic = node.create_publisher(DiagnosticArray, '/diagnostics', STATE) \
-            if rate > 0.0 else None
+        self._topic = (
+            node.create_publisher(DiagnosticArray, '/diagnostics', STATE) if rate > 0.0 else None
+        )
         self._due = 0.0
 
     def publish(self, driver: Driver, now: float, stamp: Time) -> None:

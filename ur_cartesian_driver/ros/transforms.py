@@ -30,17 +30,24 @@ PATIENCE = 0.5
 class Buffer(Protocol):
     """What is used of ``tf2_ros.Buffer``."""
 
-    def lookup_transform(self, target_frame: str, source_frame: str, time: Time,
-                         timeout: Duration) -> Message:
+    def lookup_transform(
+        self, target_frame: str, source_frame: str, time: Time, timeout: Duration
+    ) -> Message:
         """Return a ``TransformStamped`` that maps coordinates of the source to the target."""
 
 
 class Transforms:
     """A buffer of transforms, asked on behalf of goals."""
 
-    def __init__(self, buffer: Buffer, errors: type[Exception] | tuple[type[Exception], ...], *,
-                 now: Callable[[], int], max_age: float,
-                 close: Callable[[], None] = lambda: None) -> None:
+    def __init__(
+        self,
+        buffer: Buffer,
+        errors: type[Exception] | tuple[type[Exception], ...],
+        *,
+        now: Callable[[], int],
+        max_age: float,
+        close: Callable[[], None] = lambda: None,
+    ) -> None:
         """
         Use a buffer.
 
@@ -73,9 +80,11 @@ class Transforms:
         age = (self._now() - stamp) / 1e9
         if age > self._max_age:
             raise InvalidGoal(
-                field, f'is "{source}", and its newest transform to "{target}" is {age:.3f} s '
+                field,
+                f'is "{source}", and its newest transform to "{target}" is {age:.3f} s '
                 f'old, tf_max_age is {self._max_age:g} s',
-                'see why it is not published any more, or raise the parameter')
+                'see why it is not published any more, or raise the parameter',
+            )
 
     def T_rigid(self, field: str, target: str, source: str) -> Pose:
         """
@@ -86,21 +95,27 @@ class Transforms:
         message = self._looked_up(field, target, source, 0)
         if _nanoseconds(message.header.stamp) != 0:
             raise InvalidGoal(
-                field, f'is "{source}", which is not fixed to "{target}": tf2 has only a '
-                'transform between them that changes', 'publish it as a static transform if it '
-                'does not, or name it in the parameter static_frames')
+                field,
+                f'is "{source}", which is not fixed to "{target}": tf2 has only a '
+                'transform between them that changes',
+                'publish it as a static transform if it '
+                'does not, or name it in the parameter static_frames',
+            )
         return _pose(message.transform)
 
     def _looked_up(self, field: str, target: str, source: str, at: int) -> Message:
         try:
             return self._buffer.lookup_transform(
-                target, source, Time(nanoseconds=at), Duration(seconds=PATIENCE))
+                target, source, Time(nanoseconds=at), Duration(seconds=PATIENCE)
+            )
         except self._errors as error:
             when = ' for the stamp of the goal' if at else ''
             raise InvalidGoal(
-                field, f'is "{source}", and tf2 has no transform from it to "{target}"{when} '
-                f'({str(error).rstrip(".")})', 'see that it is published, or name the frame in '
-                'the parameter static_frames') from None
+                field,
+                f'is "{source}", and tf2 has no transform from it to "{target}"{when} '
+                f'({str(error).rstrip(".")})',
+                'see that it is published, or name the frame in the parameter static_frames',
+            ) from None
 
 
 def listen(node: Node, max_age: float) -> Transforms | None:
@@ -116,8 +131,12 @@ def listen(node: Node, max_age: float) -> Transforms | None:
     buffer = tf2_ros.Buffer()
     listener = tf2_ros.TransformListener(buffer, node)
     return Transforms(
-        buffer, tf2_ros.TransformException, max_age=max_age, close=listener.unregister,
-        now=lambda: int(node.get_clock().now().nanoseconds))
+        buffer,
+        tf2_ros.TransformException,
+        max_age=max_age,
+        close=listener.unregister,
+        now=lambda: int(node.get_clock().now().nanoseconds),
+    )
 
 
 def _nanoseconds(stamp: Message) -> int:

@@ -97,9 +97,15 @@ class Turns:
         On return the arm is that of this turn, unless it has a ``successor`` or was withdrawn.
         """
         with self._condition:
-            older = [] if turn.successor or turn._withdrawn else [
-                other for other in self._line
-                if other._number < turn._number and not other.successor]
+            older = (
+                []
+                if turn.successor or turn._withdrawn
+                else [
+                    other
+                    for other in self._line
+                    if other._number < turn._number and not other.successor
+                ]
+            )
             for other in older:
                 other.successor = turn.name
             if self._owner is not None:
@@ -109,7 +115,8 @@ class Turns:
             other.make_way()
         with self._condition:
             self._condition.wait_for(
-                lambda: self._owner is None or turn.successor or turn._withdrawn)
+                lambda: self._owner is None or turn.successor or turn._withdrawn
+            )
             if not (turn.successor or turn._withdrawn):
                 self._owner = turn
 

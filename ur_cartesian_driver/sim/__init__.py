@@ -12,5 +12,12 @@ from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.robot import Ports, RobotSnapshot, SimulatedRobot
 from ur_cartesian_driver.sim.script_sockets import MemorySockets
 
-__all__ = ['HOME', 'Controller', 'MemorySockets', 'Ports', 'RobotSnapshot', 'SimulatedRobot',
-           'SimulatorConfig']
+__all__ = [
+    'HOME',
+    'Controller',
+    'MemorySockets',
+    'Ports',
+    'RobotSnapshot',
+    'SimulatedRobot',
+    'SimulatorConfig',
+]

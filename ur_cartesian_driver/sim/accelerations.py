@@ -27,8 +27,9 @@ class PointMotion:
     angular_acceleration: Vector3
 
 
-def point_motion(frames: Frames, qd: Vector6, qdd: Vector6, point: Vector3,
-                 joints: int = 6) -> PointMotion:
+def point_motion(
+    frames: Frames, qd: Vector6, qdd: Vector6, point: Vector3, joints: int = 6
+) -> PointMotion:
     """
     Return how a point moves that is fixed behind the first joints.
 
@@ -42,15 +43,20 @@ def point_motion(frames: Frames, qd: Vector6, qdd: Vector6, point: Vector3,
     here = frames.origins[0]
     for i in range(joints):
         axis, origin = frames.axes[i], frames.origins[i]
-        velocity, acceleration = _carried(velocity, acceleration, omega, alpha,
-                                          _minus(origin, here))
+        velocity, acceleration = _carried(
+            velocity, acceleration, omega, alpha, _minus(origin, here)
+        )
         turning = _times(qd[i], axis)
         alpha = _plus(alpha, _times(qdd[i], axis), cross(omega, turning))
         omega = _plus(omega, turning)
         here = origin
     velocity, acceleration = _carried(velocity, acceleration, omega, alpha, _minus(point, here))
-    return PointMotion(velocity=velocity, acceleration=acceleration, angular_velocity=omega,
-                       angular_acceleration=alpha)
+    return PointMotion(
+        velocity=velocity,
+        acceleration=acceleration,
+        angular_velocity=omega,
+        angular_acceleration=alpha,
+    )
 
 
 def moments_for(frames: Frames, point: Vector3, force: Vector3) -> Vector6:
@@ -62,7 +68,8 @@ def moments_for(frames: Frames, point: Vector3, force: Vector3) -> Vector6:
     # Six joints have six axes; mypy does not count what a generator yields.
     return tuple(  # type: ignore[return-value]
         dot(axis, cross(_minus(point, origin), force))
-        for origin, axis in zip(frames.origins, frames.axes, strict=True))
+        for origin, axis in zip(frames.origins, frames.axes, strict=True)
+    )
 
 
 def flange_point(frames: Frames, offset: Vector3) -> Vector3:
@@ -71,12 +78,12 @@ def flange_point(frames: Frames, offset: Vector3) -> Vector3:
     return _plus(frames.position, _times(x, frames.x), _times(y, frames.y), _times(z, frames.z))
 
 
-def _carried(velocity: Vector3, acceleration: Vector3, omega: Vector3, alpha: Vector3,
-             arm: Vector3) -> tuple[Vector3, Vector3]:
+def _carried(
+    velocity: Vector3, acceleration: Vector3, omega: Vector3, alpha: Vector3, arm: Vector3
+) -> tuple[Vector3, Vector3]:
     """Return velocity and acceleration of a point of the same link, an arm farther out."""
     round_ = cross(omega, arm)
-    return (_plus(velocity, round_),
-            _plus(acceleration, cross(alpha, arm), cross(omega, round_)))
+    return (_plus(velocity, round_), _plus(acceleration, cross(alpha, arm), cross(omega, round_)))
 
 
 def dot(a: Vector3, b: Vector3) -> float:

@@ -44,8 +44,9 @@ class Actual:
         self._drift: Vector6 = _ZERO
         self._solved: tuple[object, object, Vector6] | None = None
 
-    def deviate(self, pose: Vector6 | None, twist: Vector6 | None, acceleration: Vector6 | None
-                ) -> None:
+    def deviate(
+        self, pose: Vector6 | None, twist: Vector6 | None, acceleration: Vector6 | None
+    ) -> None:
         """Be off by this in this cycle, in base axes; None = not at all."""
         self._pose = pose
         self.acceleration_error = acceleration or _ZERO
@@ -63,8 +64,10 @@ class Actual:
             return target
         x, y, z, rx, ry, rz = self._pose
         px, py, pz = target.position
-        return Pose((px + x, py + y, pz + z), multiply(
-            quaternion_from_rotation_vector((rx, ry, rz)), target.quaternion))
+        return Pose(
+            (px + x, py + y, pz + z),
+            multiply(quaternion_from_rotation_vector((rx, ry, rz)), target.quaternion),
+        )
 
     @property
     def q(self) -> Vector6:

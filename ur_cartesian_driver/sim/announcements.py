@@ -61,21 +61,26 @@ class Announcements:
 
     def key(self, title: str, text: str) -> None:
         """Announce an event of a program's life."""
-        self.pending.append(
-            KeyMessage(timestamp=self._stamp(), title=title, text=_cut(text)))
+        self.pending.append(KeyMessage(timestamp=self._stamp(), title=title, text=_cut(text)))
 
     def exception(self, line: int, column: int, text: str) -> None:
         """Announce why a program does not start, or ended; line and column from 1."""
         self.log.append(f'{line}:{column}: {text}')
-        self.pending.append(RuntimeExceptionMessage(
-            timestamp=self._stamp(), line=max(0, line), column=max(0, column),
-            text=_cut(text)))
+        self.pending.append(
+            RuntimeExceptionMessage(
+                timestamp=self._stamp(), line=max(0, line), column=max(0, column), text=_cut(text)
+            )
+        )
 
     def error(self, code: int, argument: int, text: str) -> None:
         """Announce an error code; a protective stop, too, is a warning to the controller."""
         message = ErrorCodeMessage(
-            timestamp=self._stamp(), code=code, argument=argument, level=ReportLevel.WARNING,
-            text=_cut(text))
+            timestamp=self._stamp(),
+            code=code,
+            argument=argument,
+            level=ReportLevel.WARNING,
+            text=_cut(text),
+        )
         self.log.append(f'{message.label}: {text}')
         self.pending.append(message)
         if self.on_error is not None:
@@ -94,10 +99,17 @@ class Announcements:
         """
         title = popup.title.encode()[:255]
         flags = bytes([0, popup.warning, popup.error, popup.blocking])
-        self.pending.append(RawMessage(
-            message_type=_POPUP, timestamp=self._stamp(),
-            content=bytes(4) + flags + bytes([len(title)]) + title
-            + popup.text.encode()[:_LONGEST - 255]))
+        self.pending.append(
+            RawMessage(
+                message_type=_POPUP,
+                timestamp=self._stamp(),
+                content=bytes(4)
+                + flags
+                + bytes([len(title)])
+                + title
+                + popup.text.encode()[: _LONGEST - 255],
+            )
+        )
 
     def _stamp(self) -> int:
         return round(self._now() * 1e6)

@@ -61,8 +61,9 @@ def read_calibration(path: Path, model: RobotModel) -> Geometry:
     try:
         content = yaml.safe_load(path.read_text(encoding='utf-8'))
     except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ValueError(f'The calibration {path} is not YAML: {" ".join(str(error).split())}'
-                         ) from None
+        raise ValueError(
+            f'The calibration {path} is not YAML: {" ".join(str(error).split())}'
+        ) from None
     links = content.get('kinematics') if isinstance(content, Mapping) else None
     if not isinstance(links, Mapping):
         raise ValueError(f'The calibration {path} has no mapping `kinematics`.')
@@ -96,7 +97,8 @@ def _link(path: Path, links: Mapping[Any, Any], name: str) -> Array:
         if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
             raise ValueError(
                 f'The calibration {path} gives {value!r} as kinematics.{name}.{field}; '
-                'it must be a number.')
+                'it must be a number.'
+            )
         values.append(float(value))
     x, y, z, roll, pitch, yaw = values
     T = _turn('z', yaw) @ _turn('y', pitch) @ _turn('x', roll)
@@ -112,8 +114,10 @@ def _axes_of_links(links: list[Array], path: Path) -> _Axes:
         points.append(T[:3, 3])
         directions.append(T[:3, 2])
     if np.abs([*points[0][:2], *directions[0][:2]]).max() > _OFF_AXIS:
-        raise ValueError(f'The calibration {path} moves the shoulder off the axis of the base: '
-                         'its x, y, roll and pitch must be 0.')
+        raise ValueError(
+            f'The calibration {path} moves the shoulder off the axis of the base: '
+            'its x, y, roll and pitch must be 0.'
+        )
     return _Axes(np.array(points), np.array(directions), T)
 
 
@@ -121,7 +125,8 @@ def _nominal_axes(geometry: Geometry) -> _Axes:
     T = np.eye(4)
     points, directions = [], []
     for theta, d, a, alpha in zip(
-            geometry.theta, geometry.d, geometry.a, geometry.alpha, strict=True):
+        geometry.theta, geometry.d, geometry.a, geometry.alpha, strict=True
+    ):
         points.append(T[:3, 3])
         directions.append(T[:3, 2])
         T = T @ _turn('z', theta) @ _shift(a, 0.0, d) @ _turn('x', alpha)
@@ -145,12 +150,14 @@ def _table(axes: _Axes, model: RobotModel) -> Geometry:
     flange_x, flange = axes.flange[:3, 0], axes.flange[:3, 3]
     rows.append((_angle(z, x, flange_x), float(z @ (flange - origin)), 0.0, 0.0))
     thetas, ds, lengths, alphas = (
-        (c[0], c[1], c[2], c[3], c[4], c[5]) for c in zip(*rows, strict=True))
+        (c[0], c[1], c[2], c[3], c[4], c[5]) for c in zip(*rows, strict=True)
+    )
     return Geometry(theta=thetas, d=ds, a=lengths, alpha=alphas)
 
 
-def _common_normal(origin: Array, z: Array, point: Array, following: Array
-                   ) -> tuple[Array, float, float]:
+def _common_normal(
+    origin: Array, z: Array, point: Array, following: Array
+) -> tuple[Array, float, float]:
     """Return the direction between two axes, how far along the first it begins, its length."""
     normal = np.cross(z, following)
     size = float(np.linalg.norm(normal))

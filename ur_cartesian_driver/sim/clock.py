@@ -86,5 +86,9 @@ class RealClock:
     def lateness(self) -> Lateness:
         """Return the figures of the last 20,000 cycles."""
         late = sorted(self._late) or [0.0]
-        return Lateness(p50=late[len(late) // 2], p99=late[int(0.99 * (len(late) - 1))],
-                        worst=late[-1], cycles=len(self._late))
+        return Lateness(
+            p50=late[len(late) // 2],
+            p99=late[int(0.99 * (len(late) - 1))],
+            worst=late[-1],
+            cycles=len(self._late),
+        )

@@ -76,16 +76,24 @@ class SimulatorConfig:
             raise ValueError(f'frequency is {self.frequency} Hz; use 1 to 1000 Hz.')
         if self.rate < 0.0:
             raise ValueError(f'rate is {self.rate}; use 1 for real time, 0 for no waiting.')
-        for name in ('rtde_port', 'primary_port', 'dashboard_port', 'secondary_port',
-                     'realtime_port', 'interpreter_port'):
+        for name in (
+            'rtde_port',
+            'primary_port',
+            'dashboard_port',
+            'secondary_port',
+            'realtime_port',
+            'interpreter_port',
+        ):
             port = getattr(self, name)
             if port is not None and not 0 <= port <= 65535:
                 raise ValueError(f'{name} is {port}; use 0 (any free one) to 65535.')
         if len(self.q) != 6:
             raise ValueError(f'q has {len(self.q)} values; give one for each of the 6 joints.')
         if (self.version[0] >= 5) == (model.series == 'CB3'):
-            raise ValueError(f'polyscope {self.polyscope} does not run a {self.model}; use 3.x '
-                             'for CB3 models and 5.x for all others.')
+            raise ValueError(
+                f'polyscope {self.polyscope} does not run a {self.model}; use 3.x '
+                'for CB3 models and 5.x for all others.'
+            )
 
     @property
     def robot_model(self) -> RobotModel:

@@ -75,7 +75,9 @@ class Controller:
         self.safety = Safety(config.unlock_delay)
         self.power = Power(
             RobotMode.RUNNING if config.power == 'running' else RobotMode.POWER_OFF,
-            config.power_on_time, config.brake_release_time)
+            config.power_on_time,
+            config.brake_release_time,
+        )
         self.announcements = Announcements(lambda: self.time)
         self.ownership = Ownership(self.motion)
         self.watchdogs = Watchdogs()
@@ -177,8 +179,11 @@ class Controller:
             return
         stopped = self.safety.mode not in OPERATIONAL
         change = self.cycle / (PROTECTIVE_STOP_TIME if stopped else SLIDER_TIME)
-        self.scale = max(target, self.scale - change) if self.scale > target else (
-            min(target, self.scale + change))
+        self.scale = (
+            max(target, self.scale - change)
+            if self.scale > target
+            else (min(target, self.scale + change))
+        )
 
     def _look_at_motion(self) -> None:
         for warning in self.motion.warnings:

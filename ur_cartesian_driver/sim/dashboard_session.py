@@ -25,9 +25,13 @@ BANNER = 'Connected: Universal Robots Dashboard Server'
 _LONGEST = 4096
 
 _RUNTIME_WORDS = {
-    RuntimeState.STOPPING: 'STOPPED', RuntimeState.STOPPED: 'STOPPED',
-    RuntimeState.PLAYING: 'PLAYING', RuntimeState.RESUMING: 'PLAYING',
-    RuntimeState.PAUSING: 'PAUSED', RuntimeState.PAUSED: 'PAUSED'}
+    RuntimeState.STOPPING: 'STOPPED',
+    RuntimeState.STOPPED: 'STOPPED',
+    RuntimeState.PLAYING: 'PLAYING',
+    RuntimeState.RESUMING: 'PLAYING',
+    RuntimeState.PAUSING: 'PAUSED',
+    RuntimeState.PAUSED: 'PAUSED',
+}
 _ROLES = ('PROGRAMMER', 'OPERATOR', 'NONE', 'LOCKED', 'RESTRICTED')
 
 Action = Callable[['Desk', str], str]
@@ -94,8 +98,10 @@ class Desk:
         """Unlock a protective stop, if it has lasted long enough."""
         refusal = self.controller.safety_event(SafetyEvent.UNLOCK)
         if 'cannot be unlocked' in refusal:
-            return ('Cannot unlock protective stop until 5s after occurrence. Always inspect '
-                    'cause of protective stop before unlocking')
+            return (
+                'Cannot unlock protective stop until 5s after occurrence. Always inspect '
+                'cause of protective stop before unlocking'
+            )
         return 'Protective stop releasing'
 
     def restart_safety(self, _: str) -> str:
@@ -238,7 +244,7 @@ class Command:
         """Return the argument if the line is this command, None if it is another one."""
         if not self.argument:
             return '' if line == self.words else None
-        return line[len(self.words) + 1:].strip() if line.startswith(self.words + ' ') else None
+        return line[len(self.words) + 1 :].strip() if line.startswith(self.words + ' ') else None
 
 
 COMMANDS = (
@@ -291,8 +297,10 @@ class DashboardSession:
         version = controller.config.version[:2]
         cb3 = version[0] < 5
         self._commands = [
-            command for command in COMMANDS
-            if (since := command.cb3 if cb3 else command.e) is not None and since <= version]
+            command
+            for command in COMMANDS
+            if (since := command.cb3 if cb3 else command.e) is not None and since <= version
+        ]
 
     def open(self) -> bytes:
         """Greet."""

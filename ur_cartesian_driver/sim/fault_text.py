@@ -70,8 +70,9 @@ class _Words:
     def wrong(self, expected: str, word: str | None = None) -> ValueError:
         """Return the error of the next word, or of one that was taken."""
         word = self.peek() if word is None else word
-        return ValueError(f'The fault {self._text!r} is not understood at {word!r}; '
-                          f'expected {expected}.')
+        return ValueError(
+            f'The fault {self._text!r} is not understood at {word!r}; expected {expected}.'
+        )
 
     def one_of(self, choices: tuple[str, ...]) -> Any:
         if self.peek() not in choices:
@@ -98,8 +99,13 @@ def _read_nothing_but(action: Action) -> Callable[[_Words], dict[str, Any]]:
 
 def _read_deviation(shape: Shape) -> Callable[[_Words], dict[str, Any]]:
     def read(words: _Words) -> dict[str, Any]:
-        return {'shape': shape, 'quantity': words.one_of(QUANTITIES),
-                'axis': words.one_of(AXES), 'amount': words.number('an amount')}
+        return {
+            'shape': shape,
+            'quantity': words.one_of(QUANTITIES),
+            'axis': words.one_of(AXES),
+            'amount': words.number('an amount'),
+        }
+
     return read
 
 
@@ -135,18 +141,20 @@ def _read_motion(words: _Words) -> dict[str, Any]:
 _Kind = tuple[Callable[..., Fault], Callable[[_Words], dict[str, Any]], bool]
 
 #: What begins a fault: what it makes, how its arguments are read, whether it can last.
-_KINDS: Mapping[str, _Kind] = MappingProxyType({
-    **{action.value: (Event, _read_nothing_but(action), False) for action in Action},
-    'slider': (Slider, _read_slider, False),
-    'foreign_motion': (ForeignMotion, _read_motion, False),
-    **{shape: (Deviation, _read_deviation(shape), True) for shape in get_args(Shape)},
-    'drop': (Drop, _read_interface, True),
-    'half_open': (HalfOpen, _read_interface, False),
-    'silence': (Silence, _read_interface, True),
-    'delay': (Delay, _read_delay, True),
-    'throttle': (Throttle, _read_throttle, True),
-    'garbage': (Garbage, _read_garbage, False),
-})
+_KINDS: Mapping[str, _Kind] = MappingProxyType(
+    {
+        **{action.value: (Event, _read_nothing_but(action), False) for action in Action},
+        'slider': (Slider, _read_slider, False),
+        'foreign_motion': (ForeignMotion, _read_motion, False),
+        **{shape: (Deviation, _read_deviation(shape), True) for shape in get_args(Shape)},
+        'drop': (Drop, _read_interface, True),
+        'half_open': (HalfOpen, _read_interface, False),
+        'silence': (Silence, _read_interface, True),
+        'delay': (Delay, _read_delay, True),
+        'throttle': (Throttle, _read_throttle, True),
+        'garbage': (Garbage, _read_garbage, False),
+    }
+)
 
 
 def parse_fault(text: str) -> Fault:

@@ -42,6 +42,7 @@ _ROUNDING = 1e-9
 
 # --- When ------------------------------------------------------------------------------------
 
+
 @dataclass(frozen=True, slots=True)
 class After:
     """So long after the fault was set [s] of the controller's time."""
@@ -69,6 +70,7 @@ NOW = After()
 
 
 # --- What ------------------------------------------------------------------------------------
+
 
 class Action(Enum):
     """What somebody else does to the robot: another client, or a person at it."""
@@ -120,9 +122,7 @@ class ForeignMotion:
     def script(self) -> str:
         """Return that program."""
         step = ', '.join(f'{self.distance:.9f}' if axis == self.axis else '0' for axis in AXES)
-        return ('def foreign_motion():\n'
-                f'  movel(pose_add(get_target_tcp_pose(), p[{step}]))\n'
-                'end\n')
+        return f'def foreign_motion():\n  movel(pose_add(get_target_tcp_pose(), p[{step}]))\nend\n'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,7 +202,8 @@ class Throttle:
         """Reject what carries nothing: that is another fault."""
         if self.rate <= 0.0:
             raise ValueError(
-                f'A rate of {self.rate:g} bytes/s cannot be; use more than 0, or silence.')
+                f'A rate of {self.rate:g} bytes/s cannot be; use more than 0, or silence.'
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -220,13 +221,24 @@ class Garbage:
             raise ValueError(f'Garbage of {self.size} bytes cannot be; use 1 to 1000000.')
 
 
-Fault: TypeAlias = (Event | Slider | ForeignMotion | Deviation
-                    | Drop | HalfOpen | Silence | Delay | Throttle | Garbage)
+Fault: TypeAlias = (
+    Event
+    | Slider
+    | ForeignMotion
+    | Deviation
+    | Drop
+    | HalfOpen
+    | Silence
+    | Delay
+    | Throttle
+    | Garbage
+)
 _Lasting: TypeAlias = Deviation | Drop | Silence | Delay | Throttle
 _OnInterface = Drop | HalfOpen | Silence | Delay | Throttle | Garbage
 
 
 # --- Letting it happen -----------------------------------------------------------------------
+
 
 def _safety(event: SafetyEvent) -> Callable[[Controller], str]:
     return lambda controller: controller.safety_event(event)
@@ -242,20 +254,22 @@ def _power_off(controller: Controller) -> str:
     return ''
 
 
-_ACTIONS: Mapping[Action, Callable[[Controller], str]] = MappingProxyType({
-    Action.PROTECTIVE_STOP: _safety(SafetyEvent.PROTECTIVE_STOP),
-    Action.EMERGENCY_STOP: _safety(SafetyEvent.EMERGENCY_STOP),
-    Action.RELEASE_EMERGENCY_STOP: _safety(SafetyEvent.RELEASE),
-    Action.SAFEGUARD_STOP: _safety(SafetyEvent.SAFEGUARD_STOP),
-    Action.RESET_SAFEGUARD: _safety(SafetyEvent.SAFEGUARD_RESET),
-    Action.VIOLATION: _safety(SafetyEvent.VIOLATION),
-    Action.FAULT: _safety(SafetyEvent.FAULT),
-    Action.UNLOCK: _safety(SafetyEvent.UNLOCK),
-    Action.STOP: _stop,
-    Action.PAUSE: lambda controller: controller.programs.pause(),
-    Action.PLAY: lambda controller: controller.programs.play(),
-    Action.POWER_OFF: _power_off,
-})
+_ACTIONS: Mapping[Action, Callable[[Controller], str]] = MappingProxyType(
+    {
+        Action.PROTECTIVE_STOP: _safety(SafetyEvent.PROTECTIVE_STOP),
+        Action.EMERGENCY_STOP: _safety(SafetyEvent.EMERGENCY_STOP),
+        Action.RELEASE_EMERGENCY_STOP: _safety(SafetyEvent.RELEASE),
+        Action.SAFEGUARD_STOP: _safety(SafetyEvent.SAFEGUARD_STOP),
+        Action.RESET_SAFEGUARD: _safety(SafetyEvent.SAFEGUARD_RESET),
+        Action.VIOLATION: _safety(SafetyEvent.VIOLATION),
+        Action.FAULT: _safety(SafetyEvent.FAULT),
+        Action.UNLOCK: _safety(SafetyEvent.UNLOCK),
+        Action.STOP: _stop,
+        Action.PAUSE: lambda controller: controller.programs.pause(),
+        Action.PLAY: lambda controller: controller.programs.play(),
+        Action.POWER_OFF: _power_off,
+    }
+)
 
 
 @dataclass(slots=True)
@@ -307,7 +321,8 @@ class Faults:
         if isinstance(fault, _OnInterface) and fault.interface not in self.interfaces:
             known = ', '.join(self.interfaces) or 'none'
             raise ValueError(
-                f'The robot has no interface {fault.interface!r}; faults know {known}.')
+                f'The robot has no interface {fault.interface!r}; faults know {known}.'
+            )
         when = fault.when
         side = isinstance(when, Crossing) and self._beyond(when)
         self._waiting.append(_Waiting(fault, self._controller.time, self._travelled, side))
@@ -399,11 +414,12 @@ class Faults:
             fault = running.fault
             if isinstance(fault, Deviation):
                 values = sums.setdefault(fault.quantity, [0.0] * 6)
-                values[AXES.index(fault.axis)] += fault.value(
-                    now - running.since, running.random)
+                values[AXES.index(fault.axis)] += fault.value(now - running.since, running.random)
         self._controller.actual.deviate(
-            pose=_six(sums.get('pose')), twist=_six(sums.get('twist')),
-            acceleration=_six(sums.get('acceleration')))
+            pose=_six(sums.get('pose')),
+            twist=_six(sums.get('twist')),
+            acceleration=_six(sums.get('acceleration')),
+        )
 
     def _impairments(self) -> dict[str, Impairment]:
         """Return what is wrong with each interface: the sum of its faults."""
@@ -416,7 +432,8 @@ class Faults:
                     silent=before.silent or isinstance(fault, Silence),
                     refusing=before.refusing or isinstance(fault, Drop),
                     delay=before.delay + (fault.seconds if isinstance(fault, Delay) else 0.0),
-                    rate=min(before.rate, fault.rate if isinstance(fault, Throttle) else inf))
+                    rate=min(before.rate, fault.rate if isinstance(fault, Throttle) else inf),
+                )
         return found
 
 

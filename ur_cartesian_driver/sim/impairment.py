@@ -76,9 +76,9 @@ class Line:
         arrived = bytearray()
         while self._pieces and self._pieces[0][0] <= now and self._budget >= 1.0:
             due, data = self._pieces.popleft()
-            part = data if len(data) <= self._budget else data[:int(self._budget)]
+            part = data if len(data) <= self._budget else data[: int(self._budget)]
             if len(part) < len(data):
-                self._pieces.appendleft((due, data[len(part):]))
+                self._pieces.appendleft((due, data[len(part) :]))
             self._budget -= len(part)
             arrived += part
         if not self._pieces or self._budget == inf:
@@ -109,8 +109,12 @@ class Hampered:
     @property
     def over(self) -> bool:
         """Whether nothing is wrong any more and nothing held back."""
-        return (self.impairment is None and not self.frozen
-                and not self._incoming.size and not self._outgoing.size)
+        return (
+            self.impairment is None
+            and not self.frozen
+            and not self._incoming.size
+            and not self._outgoing.size
+        )
 
     def say(self, data: bytes, now: float) -> None:
         """Take what the robot says."""

@@ -17,9 +17,11 @@ from ur_cartesian_driver.sim.signals import BITS, FLOATS, INTEGERS, Registers
 if TYPE_CHECKING:
     from ur_cartesian_driver.sim.controller import Controller
 
-_DIGITAL = (('standard', 'standard_digital_output'),
-            ('configurable', 'configurable_digital_output'),
-            ('tool', 'tool_digital_output'))
+_DIGITAL = (
+    ('standard', 'standard_digital_output'),
+    ('configurable', 'configurable_digital_output'),
+    ('tool', 'tool_digital_output'),
+)
 
 
 def apply_inputs(controller: Controller, values: Mapping[str, Any]) -> None:
@@ -62,13 +64,15 @@ Write = Callable[[Registers, Any], None]
 
 def _write_packed(first: int) -> Write:
     def write(registers: Registers, value: int) -> None:
-        registers.bits[first:first + 32] = [bool(value >> i & 1) for i in range(32)]
+        registers.bits[first : first + 32] = [bool(value >> i & 1) for i in range(32)]
+
     return write
 
 
 def _write_item(values: Callable[[Registers], list[Any]], i: int) -> Write:
     def write(registers: Registers, value: Any) -> None:
         values(registers)[i] = value
+
     return write
 
 
@@ -78,10 +82,13 @@ def _writers() -> dict[str, Write]:
         'input_bit_registers0_to_31': _write_packed(0),
         'input_bit_registers32_to_63': _write_packed(32),
         **{f'input_bit_register_{i}': _write_item(lambda r: r.bits, i) for i in range(64, BITS)},
-        **{f'input_int_register_{i}': _write_item(lambda r: r.integers, i)
-           for i in range(INTEGERS)},
-        **{f'input_double_register_{i}': _write_item(lambda r: r.floats, i)
-           for i in range(FLOATS)},
+        **{
+            f'input_int_register_{i}': _write_item(lambda r: r.integers, i)
+            for i in range(INTEGERS)
+        },
+        **{
+            f'input_double_register_{i}': _write_item(lambda r: r.floats, i) for i in range(FLOATS)
+        },
     }
 
 

@@ -44,11 +44,13 @@ class Interpreter:
         self._programs = programs
         self._ownership = ownership
         self._commands: Mapping[str, Callable[[], str]] = {
-            'abort': self._abort, 'skipbuffer': self._skip,
+            'abort': self._abort,
+            'skipbuffer': self._skip,
             'statelastexecuted': lambda: f'state: {self._executed}',
             'statelastinterpreted': lambda: f'state: {self._interpreted}',
             'statelastcleared': lambda: f'state: {self._cleared}',
-            'stateunexecuted': lambda: f'state: {len(self._queue)}'}
+            'stateunexecuted': lambda: f'state: {len(self._queue)}',
+        }
         self._queue: deque[tuple[int, Line]] = deque()
         self._waiting: deque[tuple[str, Answer]] = deque()
         self.end_of_program()

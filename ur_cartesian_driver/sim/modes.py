@@ -41,42 +41,53 @@ _STOPS = {
     SafetyEvent.VIOLATION: SafetyMode.VIOLATION,
     SafetyEvent.FAULT: SafetyMode.FAULT,
 }
-_CUTS = {event: _STOPS[event] for event in (
-    SafetyEvent.EMERGENCY_STOP, SafetyEvent.VIOLATION, SafetyEvent.FAULT)}
+_CUTS = {
+    event: _STOPS[event]
+    for event in (SafetyEvent.EMERGENCY_STOP, SafetyEvent.VIOLATION, SafetyEvent.FAULT)
+}
 
 #: What is not in the table is refused.
-SAFETY: Mapping[SafetyMode, Mapping[SafetyEvent, SafetyMode]] = MappingProxyType({
-    SafetyMode.NORMAL: _STOPS,
-    SafetyMode.REDUCED: _STOPS,
-    SafetyMode.PROTECTIVE_STOP: {**_CUTS, SafetyEvent.UNLOCK: SafetyMode.NORMAL},
-    SafetyMode.SAFEGUARD_STOP: {**_CUTS, SafetyEvent.SAFEGUARD_RESET: SafetyMode.NORMAL},
-    SafetyMode.ROBOT_EMERGENCY_STOP: {SafetyEvent.RELEASE: SafetyMode.NORMAL},
-    SafetyMode.VIOLATION: {SafetyEvent.RESTART: SafetyMode.NORMAL},
-    SafetyMode.FAULT: {SafetyEvent.RESTART: SafetyMode.NORMAL},
-})
+SAFETY: Mapping[SafetyMode, Mapping[SafetyEvent, SafetyMode]] = MappingProxyType(
+    {
+        SafetyMode.NORMAL: _STOPS,
+        SafetyMode.REDUCED: _STOPS,
+        SafetyMode.PROTECTIVE_STOP: {**_CUTS, SafetyEvent.UNLOCK: SafetyMode.NORMAL},
+        SafetyMode.SAFEGUARD_STOP: {**_CUTS, SafetyEvent.SAFEGUARD_RESET: SafetyMode.NORMAL},
+        SafetyMode.ROBOT_EMERGENCY_STOP: {SafetyEvent.RELEASE: SafetyMode.NORMAL},
+        SafetyMode.VIOLATION: {SafetyEvent.RESTART: SafetyMode.NORMAL},
+        SafetyMode.FAULT: {SafetyEvent.RESTART: SafetyMode.NORMAL},
+    }
+)
 
 #: The bits that RTDE reports beside the mode.
-STATUS_BITS: Mapping[SafetyMode, SafetyStatus] = MappingProxyType({
-    SafetyMode.NORMAL: SafetyStatus.NORMAL_MODE,
-    SafetyMode.REDUCED: SafetyStatus.REDUCED_MODE,
-    SafetyMode.PROTECTIVE_STOP:
-        SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.STOPPED_DUE_TO_SAFETY,
-    SafetyMode.RECOVERY: SafetyStatus.RECOVERY_MODE,
-    SafetyMode.SAFEGUARD_STOP:
-        SafetyStatus.SAFEGUARD_STOPPED | SafetyStatus.STOPPED_DUE_TO_SAFETY,
-    SafetyMode.ROBOT_EMERGENCY_STOP:
-        SafetyStatus.ROBOT_EMERGENCY_STOPPED | SafetyStatus.EMERGENCY_STOPPED
+STATUS_BITS: Mapping[SafetyMode, SafetyStatus] = MappingProxyType(
+    {
+        SafetyMode.NORMAL: SafetyStatus.NORMAL_MODE,
+        SafetyMode.REDUCED: SafetyStatus.REDUCED_MODE,
+        SafetyMode.PROTECTIVE_STOP: SafetyStatus.PROTECTIVE_STOPPED
         | SafetyStatus.STOPPED_DUE_TO_SAFETY,
-    SafetyMode.VIOLATION: SafetyStatus.VIOLATION | SafetyStatus.STOPPED_DUE_TO_SAFETY,
-    SafetyMode.FAULT: SafetyStatus.FAULT | SafetyStatus.STOPPED_DUE_TO_SAFETY,
-})
+        SafetyMode.RECOVERY: SafetyStatus.RECOVERY_MODE,
+        SafetyMode.SAFEGUARD_STOP: SafetyStatus.SAFEGUARD_STOPPED
+        | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+        SafetyMode.ROBOT_EMERGENCY_STOP: SafetyStatus.ROBOT_EMERGENCY_STOPPED
+        | SafetyStatus.EMERGENCY_STOPPED
+        | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+        SafetyMode.VIOLATION: SafetyStatus.VIOLATION | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+        SafetyMode.FAULT: SafetyStatus.FAULT | SafetyStatus.STOPPED_DUE_TO_SAFETY,
+    }
+)
 
 #: Modes in which the arm may be powered and may move.
 OPERATIONAL = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED})
 #: Modes in which the brakes hold and the motors are off.
-POWERLESS = frozenset({
-    SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP,
-    SafetyMode.VIOLATION, SafetyMode.FAULT})
+POWERLESS = frozenset(
+    {
+        SafetyMode.ROBOT_EMERGENCY_STOP,
+        SafetyMode.SYSTEM_EMERGENCY_STOP,
+        SafetyMode.VIOLATION,
+        SafetyMode.FAULT,
+    }
+)
 
 _CHAIN = (RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.RUNNING)
 
@@ -105,8 +116,10 @@ class Safety:
             return f'{event.value} is not possible in safety mode {self.mode.name}'
         wait = self._unlock_delay - (now - self._since)
         if event is SafetyEvent.UNLOCK and wait > 1e-9:
-            return (f'a protective stop cannot be unlocked for {self._unlock_delay:g} s after it '
-                    f'happened; wait another {wait:.1f} s')
+            return (
+                f'a protective stop cannot be unlocked for {self._unlock_delay:g} s after it '
+                f'happened; wait another {wait:.1f} s'
+            )
         self.mode, self._since = target, now
         return ''
 
@@ -118,8 +131,11 @@ class Power:
         """Begin in a mode of the chain; times in [s]."""
         self.mode = mode
         self._goal = mode
-        self._times = {RobotMode.POWER_OFF: 0.0, RobotMode.POWER_ON: power_on_time,
-                       RobotMode.IDLE: brake_release_time}
+        self._times = {
+            RobotMode.POWER_OFF: 0.0,
+            RobotMode.POWER_ON: power_on_time,
+            RobotMode.IDLE: brake_release_time,
+        }
         self._since = 0.0
 
     def on(self, now: float) -> None:

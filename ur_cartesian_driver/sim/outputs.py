@@ -52,8 +52,9 @@ def _tcp_acceleration(controller: Controller) -> Vector6:
     if not any(motion.qd) and not any(motion.qdd):
         return _ZERO6  # most arms stand most of the time
     frames = controller.arm.frames(motion.q)
-    tcp = point_motion(frames, motion.qd, motion.qdd,
-                       flange_point(frames, motion.T_flange_tcp.position))
+    tcp = point_motion(
+        frames, motion.qd, motion.qdd, flange_point(frames, motion.T_flange_tcp.position)
+    )
     return (*tcp.acceleration, *tcp.angular_acceleration)
 
 
@@ -99,8 +100,12 @@ def _joint_mode(controller: Controller) -> int:
 
 
 def _actual_acceleration(controller: Controller) -> Vector6:
-    x, y, z, rx, ry, rz = (target + error for target, error in zip(
-        _tcp_acceleration(controller), controller.actual.acceleration_error, strict=True))
+    x, y, z, rx, ry, rz = (
+        target + error
+        for target, error in zip(
+            _tcp_acceleration(controller), controller.actual.acceleration_error, strict=True
+        )
+    )
     return x, y, z, rx, ry, rz
 
 
@@ -113,75 +118,86 @@ def _scaled_momentum(controller: Controller) -> float:
 
 
 #: Outputs that are computed.
-COMPUTED: Mapping[str, Getter] = MappingProxyType({
-    'timestamp': lambda c: c.time,
-    'control_step': lambda c: c.cycles,
-    'target_q': lambda c: c.motion.q,
-    'actual_q': lambda c: c.actual.q,
-    'target_qd': lambda c: c.qd,
-    'actual_qd': lambda c: c.actual.qd,
-    'target_qdd': lambda c: c.motion.qdd,
-    'target_TCP_pose': _tcp,
-    'actual_TCP_pose': lambda c: c.actual.T_base_tcp.rotation_vector(),
-    'target_TCP_speed': lambda c: c.tcp_twist,
-    'actual_TCP_speed': lambda c: c.actual.tcp_twist,
-    'tcp_offset': lambda c: (
-        _ZERO6 if c.motion.T_flange_tcp is IDENTITY else c.motion.T_flange_tcp.rotation_vector()),
-    'speed_scaling': lambda c: c.motion.scaling,
-    'target_speed_fraction': lambda c: c.slider,
-    'robot_mode': lambda c: c.power.mode,
-    'safety_mode': lambda c: c.safety.mode,
-    'safety_status': lambda c: c.safety.mode,
-    'runtime_state': lambda c: c.programs.state,
-    'robot_status_bits': lambda c: c.robot_status,
-    'safety_status_bits': lambda c: c.safety_status,
-    'joint_mode': lambda c: (_joint_mode(c),) * 6,
-    'tool_mode': _tool_mode,
-    'actual_joint_voltage': lambda c: (_VOLTAGE if _powered(c) else 0.0,) * 6,
-    'actual_robot_voltage': lambda c: _VOLTAGE if _powered(c) else 0.0,
-    'actual_robot_current': lambda c: _CURRENT if _powered(c) else 0.0,
-    'target_moment': _moments,
-    'actual_current_as_torque': _moments,
-    'target_TCP_acceleration': _tcp_acceleration,
-    'actual_TCP_acceleration': _actual_acceleration,
-    'actual_tool_accelerometer': _accelerometer,
-    'elbow_velocity': _elbow_velocity,
-    'actual_momentum': _scaled_momentum,
-    'payload': lambda c: c.payload.mass,
-    'payload_cog': lambda c: c.payload.cog,
-    'payload_inertia': lambda c: c.payload.inertia,
-    'target_gravity': lambda c: c.gravity,
-    'actual_TCP_force': lambda c: c.signals.external_force if c.external_ft else _NO_FORCE,
-    'ft_raw_wrench': lambda c: c.signals.external_force if c.external_ft else _NO_FORCE,
-    'tcp_force_scalar': lambda c: (
-        hypot(*c.signals.external_force[:3]) if c.external_ft else 0.0),
-    'actual_digital_input_bits': lambda c: c.signals.digital_in.packed(),
-    'actual_digital_output_bits': lambda c: c.signals.digital_out.packed(),
-    'actual_configurable_digital_input_bits':
-        lambda c: pack_bits(c.signals.digital_in.configurable),
-    'actual_configurable_digital_output_bits':
-        lambda c: pack_bits(c.signals.digital_out.configurable),
-    'analog_io_types': lambda c: c.signals.analog_types(),
-    'standard_analog_input0': lambda c: c.signals.analog_in[0],
-    'standard_analog_input1': lambda c: c.signals.analog_in[1],
-    'standard_analog_output0': lambda c: c.signals.analog_out[0],
-    'standard_analog_output1': lambda c: c.signals.analog_out[1],
-    'tool_analog_input0': lambda c: c.signals.tool_analog_in[0],
-    'tool_analog_input1': lambda c: c.signals.tool_analog_in[1],
-    'tool_output_voltage': lambda c: c.signals.tool_voltage,
-    'elbow_position': _elbow,
-})
+COMPUTED: Mapping[str, Getter] = MappingProxyType(
+    {
+        'timestamp': lambda c: c.time,
+        'control_step': lambda c: c.cycles,
+        'target_q': lambda c: c.motion.q,
+        'actual_q': lambda c: c.actual.q,
+        'target_qd': lambda c: c.qd,
+        'actual_qd': lambda c: c.actual.qd,
+        'target_qdd': lambda c: c.motion.qdd,
+        'target_TCP_pose': _tcp,
+        'actual_TCP_pose': lambda c: c.actual.T_base_tcp.rotation_vector(),
+        'target_TCP_speed': lambda c: c.tcp_twist,
+        'actual_TCP_speed': lambda c: c.actual.tcp_twist,
+        'tcp_offset': lambda c: (
+            _ZERO6
+            if c.motion.T_flange_tcp is IDENTITY
+            else c.motion.T_flange_tcp.rotation_vector()
+        ),
+        'speed_scaling': lambda c: c.motion.scaling,
+        'target_speed_fraction': lambda c: c.slider,
+        'robot_mode': lambda c: c.power.mode,
+        'safety_mode': lambda c: c.safety.mode,
+        'safety_status': lambda c: c.safety.mode,
+        'runtime_state': lambda c: c.programs.state,
+        'robot_status_bits': lambda c: c.robot_status,
+        'safety_status_bits': lambda c: c.safety_status,
+        'joint_mode': lambda c: (_joint_mode(c),) * 6,
+        'tool_mode': _tool_mode,
+        'actual_joint_voltage': lambda c: (_VOLTAGE if _powered(c) else 0.0,) * 6,
+        'actual_robot_voltage': lambda c: _VOLTAGE if _powered(c) else 0.0,
+        'actual_robot_current': lambda c: _CURRENT if _powered(c) else 0.0,
+        'target_moment': _moments,
+        'actual_current_as_torque': _moments,
+        'target_TCP_acceleration': _tcp_acceleration,
+        'actual_TCP_acceleration': _actual_acceleration,
+        'actual_tool_accelerometer': _accelerometer,
+        'elbow_velocity': _elbow_velocity,
+        'actual_momentum': _scaled_momentum,
+        'payload': lambda c: c.payload.mass,
+        'payload_cog': lambda c: c.payload.cog,
+        'payload_inertia': lambda c: c.payload.inertia,
+        'target_gravity': lambda c: c.gravity,
+        'actual_TCP_force': lambda c: c.signals.external_force if c.external_ft else _NO_FORCE,
+        'ft_raw_wrench': lambda c: c.signals.external_force if c.external_ft else _NO_FORCE,
+        'tcp_force_scalar': lambda c: (
+            hypot(*c.signals.external_force[:3]) if c.external_ft else 0.0
+        ),
+        'actual_digital_input_bits': lambda c: c.signals.digital_in.packed(),
+        'actual_digital_output_bits': lambda c: c.signals.digital_out.packed(),
+        'actual_configurable_digital_input_bits': lambda c: pack_bits(
+            c.signals.digital_in.configurable
+        ),
+        'actual_configurable_digital_output_bits': lambda c: pack_bits(
+            c.signals.digital_out.configurable
+        ),
+        'analog_io_types': lambda c: c.signals.analog_types(),
+        'standard_analog_input0': lambda c: c.signals.analog_in[0],
+        'standard_analog_input1': lambda c: c.signals.analog_in[1],
+        'standard_analog_output0': lambda c: c.signals.analog_out[0],
+        'standard_analog_output1': lambda c: c.signals.analog_out[1],
+        'tool_analog_input0': lambda c: c.signals.tool_analog_in[0],
+        'tool_analog_input1': lambda c: c.signals.tool_analog_in[1],
+        'tool_output_voltage': lambda c: c.signals.tool_voltage,
+        'elbow_position': _elbow,
+    }
+)
 
 #: Outputs that never change, because nothing behind them is simulated.
-FIXED: Mapping[str, Any] = MappingProxyType({
-    'joint_temperatures': (25.0,) * 6,
-    'actual_main_voltage': _VOLTAGE,
-    'tool_temperature': 25.0,
-})
+FIXED: Mapping[str, Any] = MappingProxyType(
+    {
+        'joint_temperatures': (25.0,) * 6,
+        'actual_main_voltage': _VOLTAGE,
+        'tool_temperature': 25.0,
+    }
+)
 
 
 def _register_getters(prefix: str, of: Callable[[Controller], Registers]) -> dict[str, Getter]:
     """Return what reads each register of one direction."""
+
     def item(values: Callable[[Controller], list[Any]], i: int) -> Getter:
         return lambda controller: values(controller)[i]
 
@@ -189,17 +205,22 @@ def _register_getters(prefix: str, of: Callable[[Controller], Registers]) -> dic
         f'{prefix}_bit_registers0_to_31': lambda c: pack_bits(of(c).bits[:32]),
         f'{prefix}_bit_registers32_to_63': lambda c: pack_bits(of(c).bits[32:64]),
         **{f'{prefix}_bit_register_{i}': item(lambda c: of(c).bits, i) for i in range(64, BITS)},
-        **{f'{prefix}_int_register_{i}': item(lambda c: of(c).integers, i)
-           for i in range(INTEGERS)},
-        **{f'{prefix}_double_register_{i}': item(lambda c: of(c).floats, i)
-           for i in range(FLOATS)},
+        **{
+            f'{prefix}_int_register_{i}': item(lambda c: of(c).integers, i)
+            for i in range(INTEGERS)
+        },
+        **{
+            f'{prefix}_double_register_{i}': item(lambda c: of(c).floats, i) for i in range(FLOATS)
+        },
     }
 
 
-REGISTERS: Mapping[str, Getter] = MappingProxyType({
-    **_register_getters('input', lambda c: c.signals.inputs),
-    **_register_getters('output', lambda c: c.signals.outputs),
-})
+REGISTERS: Mapping[str, Getter] = MappingProxyType(
+    {
+        **_register_getters('input', lambda c: c.signals.inputs),
+        **_register_getters('output', lambda c: c.signals.outputs),
+    }
+)
 
 
 def getter(name: str, zero: Any) -> Getter:

@@ -40,9 +40,16 @@ _ENDLESS = 1e6
 def version_frame(controller: Controller) -> bytes:
     """Return the message that comes first on every connection."""
     major, minor, bugfix, build = controller.config.version
-    return encode_message(VersionMessage(
-        major=major, minor=minor, bugfix=bugfix, build=build, date='2026-01-01, 00:00:00',
-        timestamp=round(controller.time * 1e6)))
+    return encode_message(
+        VersionMessage(
+            major=major,
+            minor=minor,
+            bugfix=bugfix,
+            build=build,
+            date='2026-01-01, 00:00:00',
+            timestamp=round(controller.time * 1e6),
+        )
+    )
 
 
 class PrimaryStream:
@@ -69,9 +76,20 @@ class PrimaryStream:
         controller = self._controller
         kinematics, configuration = self._constant
         packages: tuple[StatePackage, ...] = (
-            _mode(controller), _joints(controller), _cartesian(controller), kinematics,
-            CalibrationData(), _masterboard(controller), _tool(controller), configuration,
-            ForceModeData(), AdditionalInfo(), SAFETY_DATA, ToolCommunication(), ToolModeInfo())
+            _mode(controller),
+            _joints(controller),
+            _cartesian(controller),
+            kinematics,
+            CalibrationData(),
+            _masterboard(controller),
+            _tool(controller),
+            configuration,
+            ForceModeData(),
+            AdditionalInfo(),
+            SAFETY_DATA,
+            ToolCommunication(),
+            ToolModeInfo(),
+        )
         return encode_state(packages)
 
 
@@ -83,23 +101,33 @@ def _mode(controller: Controller) -> RobotModeData:
         power_on=bool(controller.robot_status & RobotStatus.POWER_ON),
         emergency_stopped=safety in _EMERGENCY,
         protective_stopped=safety is SafetyMode.PROTECTIVE_STOP,
-        program_running=controller.programs.running and not paused, program_paused=paused,
-        robot_mode=controller.power.mode, target_speed_fraction=controller.slider,
-        speed_scaling=controller.motion.scaling)
+        program_running=controller.programs.running and not paused,
+        program_paused=paused,
+        robot_mode=controller.power.mode,
+        target_speed_fraction=controller.slider,
+        speed_scaling=controller.motion.scaling,
+    )
 
 
 def _joints(controller: Controller) -> JointData:
     motion = controller.motion
     mode = 253 if controller.power.mode is RobotMode.RUNNING else 239
-    return JointData(q_actual=controller.actual.q, q_target=motion.q,
-                     qd_actual=controller.actual.qd,
-                     voltage=(48.0,) * 6, temperature=(25.0,) * 6, mode=(mode,) * 6)
+    return JointData(
+        q_actual=controller.actual.q,
+        q_target=motion.q,
+        qd_actual=controller.actual.qd,
+        voltage=(48.0,) * 6,
+        temperature=(25.0,) * 6,
+        mode=(mode,) * 6,
+    )
 
 
 def _cartesian(controller: Controller) -> CartesianInfo:
     motion = controller.motion
-    return CartesianInfo(tcp_pose=controller.actual.T_base_tcp.rotation_vector(),
-                         tcp_offset=motion.T_flange_tcp.rotation_vector())
+    return CartesianInfo(
+        tcp_pose=controller.actual.T_base_tcp.rotation_vector(),
+        tcp_offset=motion.T_flange_tcp.rotation_vector(),
+    )
 
 
 def _masterboard(controller: Controller) -> MasterboardData:
@@ -112,13 +140,19 @@ def _masterboard(controller: Controller) -> MasterboardData:
         analog_input=(signals.analog_in[0], signals.analog_in[1]),
         analog_output_domain=(int(aout[0]), int(aout[1])),
         analog_output=(signals.analog_out[0], signals.analog_out[1]),
-        temperature=25.0, safety_mode=controller.safety.mode)
+        temperature=25.0,
+        safety_mode=controller.safety.mode,
+    )
 
 
 def _tool(controller: Controller) -> ToolData:
     signals = controller.signals
-    return ToolData(analog_input=(signals.tool_analog_in[0], signals.tool_analog_in[1]),
-                    voltage_48v=48.0, output_voltage=signals.tool_voltage, temperature=25.0)
+    return ToolData(
+        analog_input=(signals.tool_analog_in[0], signals.tool_analog_in[1]),
+        voltage_48v=48.0,
+        output_voltage=signals.tool_voltage,
+        temperature=25.0,
+    )
 
 
 def _kinematics(controller: Controller) -> KinematicsInfo:
@@ -132,6 +166,11 @@ def _configuration(controller: Controller) -> ConfigurationData:
     a, b, c, d, e, f = limits
     s1, s2, s3, s4, s5, s6 = ((speed, _JOINT_ACCELERATION) for speed in model.max_joint_speed)
     return ConfigurationData(
-        position_limits=(a, b, c, d, e, f), motion_limits=(s1, s2, s3, s4, s5, s6),
-        a=geometry.a, d=geometry.d, alpha=geometry.alpha, theta=geometry.theta,
-        robot_type=model.wire_type)
+        position_limits=(a, b, c, d, e, f),
+        motion_limits=(s1, s2, s3, s4, s5, s6),
+        a=geometry.a,
+        d=geometry.d,
+        alpha=geometry.alpha,
+        theta=geometry.theta,
+        robot_type=model.wire_type,
+    )

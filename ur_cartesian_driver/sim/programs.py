@@ -33,8 +33,9 @@ _log = logging.getLogger(__name__)
 _parsed = lru_cache(maxsize=8)(parse)
 
 #: What happens to the arm and to the modes around a program.
-RUNNING = frozenset({RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.PAUSED,
-                     RuntimeState.RESUMING})
+RUNNING = frozenset(
+    {RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING}
+)
 
 
 class Arm(Protocol):
@@ -63,8 +64,9 @@ class Arm(Protocol):
 class Programs:
     """The primary program, its state, and the secondary programs of this cycle."""
 
-    def __init__(self, builtins: Mapping[str, Any], announcements: Announcements, arm: Arm
-                 ) -> None:
+    def __init__(
+        self, builtins: Mapping[str, Any], announcements: Announcements, arm: Arm
+    ) -> None:
         """Begin with no program."""
         self._builtins = builtins
         self._secondary_builtins = timeless(builtins)
@@ -108,8 +110,7 @@ class Programs:
         try:
             program = _parsed(text)
             secondary = program.kind == 'sec'
-            machine = Machine(program,
-                              self._secondary_builtins if secondary else self._builtins)
+            machine = Machine(program, self._secondary_builtins if secondary else self._builtins)
         except CompileError as error:
             self._announce.exception(error.line - line_offset, error.column, error.text)
             return

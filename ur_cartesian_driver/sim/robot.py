@@ -88,8 +88,13 @@ class SimulatedRobot:
             connect_to(ur.ports.rtde)
     """
 
-    def __init__(self, config: SimulatorConfig | None = None, *,
-                 sockets: ScriptSockets | None = None, clock: Clock | None = None) -> None:
+    def __init__(
+        self,
+        config: SimulatorConfig | None = None,
+        *,
+        sockets: ScriptSockets | None = None,
+        clock: Clock | None = None,
+    ) -> None:
         """
         Make a robot; it lives from `start` to `close`, or as long as `run` runs.
 
@@ -110,14 +115,22 @@ class SimulatedRobot:
         self._dashboard = TcpServer('dashboard', lambda: DashboardSession(self.controller))
         self._interpreter = TcpServer('interpreter', lambda: InterpreterSession(self.controller))
         self._servers: tuple[TcpServer[Any], ...] = (
-            self._rtde, self._primary, self._secondary, self._realtime, self._dashboard,
-            self._interpreter)
+            self._rtde,
+            self._primary,
+            self._secondary,
+            self._realtime,
+            self._dashboard,
+            self._interpreter,
+        )
         self.controller.faults.interfaces = {'sockets': hampered} | {
-            server.name.lower().replace('-', ''): server for server in self._servers}
+            server.name.lower().replace('-', ''): server for server in self._servers
+        }
         self.inject(*self.config.faults)
         self._clock: Clock = clock or (
             RealClock(self.config.cycle, self.config.rate)
-            if self.config.rate > 0.0 else VirtualClock())
+            if self.config.rate > 0.0
+            else VirtualClock()
+        )
         self._thread: threading.Thread | None = None
         self._running: asyncio.Task[None] | None = None
         self._ports: Ports | None = None
@@ -132,7 +145,8 @@ class SimulatedRobot:
         """
         listening: Future[None] = Future()
         self._thread = threading.Thread(
-            target=self._run_thread, args=(listening,), name='ur-sim', daemon=True)
+            target=self._run_thread, args=(listening,), name='ur-sim', daemon=True
+        )
         self._thread.start()
         try:
             listening.result()
@@ -155,8 +169,12 @@ class SimulatedRobot:
         """Start."""
         return self.start()
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 traceback: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
         """Close."""
         self.close()
 
@@ -207,10 +225,14 @@ class SimulatedRobot:
         await self._secondary.listen(host, config.listening_secondary_port)
         await self._realtime.listen(host, config.listening_realtime_port)
         await self._interpreter.listen(host, config.listening_interpreter_port)
-        self._ports = Ports(rtde=self._rtde.port, primary=self._primary.port,
-                            dashboard=dashboard, secondary=self._secondary.port,
-                            realtime=self._realtime.port,
-                            interpreter=self._interpreter.port)
+        self._ports = Ports(
+            rtde=self._rtde.port,
+            primary=self._primary.port,
+            dashboard=dashboard,
+            secondary=self._secondary.port,
+            realtime=self._realtime.port,
+            interpreter=self._interpreter.port,
+        )
 
     async def _cycles(self) -> None:
         stream, realtime = PrimaryStream(self.controller), RealtimeStream(self.controller)
@@ -345,8 +367,7 @@ class SimulatedRobot:
     def lateness(self) -> Lateness | None:
         """Return how late cycles begin; None without real time."""
         clock = self._clock
-        return self.call(
-            lambda _: clock.lateness() if isinstance(clock, RealClock) else None)
+        return self.call(lambda _: clock.lateness() if isinstance(clock, RealClock) else None)
 
     def _safety(self, event: SafetyEvent) -> None:
         self._checked(lambda controller: controller.safety_event(event))
@@ -359,11 +380,12 @@ class SimulatedRobot:
     def status_line(self) -> str:
         """Return one line for a terminal: model, modes, program, clients, slider."""
         state = self.state()
-        clients = ' '.join(
-            f'{server.name} {len(server.connections)}' for server in self._servers)
-        return (f'{self.config.model} | {state.robot_mode.name} {state.safety_mode.name} | '
-                f'{state.runtime_state.name} {state.program or "no program"} | '
-                f'clients: {clients} | speed {state.speed_slider:.0%}')
+        clients = ' '.join(f'{server.name} {len(server.connections)}' for server in self._servers)
+        return (
+            f'{self.config.model} | {state.robot_mode.name} {state.safety_mode.name} | '
+            f'{state.runtime_state.name} {state.program or "no program"} | '
+            f'clients: {clients} | speed {state.speed_slider:.0%}'
+        )
 
 
 def _is_running_in(loop: asyncio.AbstractEventLoop) -> bool:
@@ -376,10 +398,18 @@ def _is_running_in(loop: asyncio.AbstractEventLoop) -> bool:
 def _snapshot(controller: Controller) -> RobotSnapshot:
     motion, programs = controller.motion, controller.programs
     return RobotSnapshot(
-        timestamp=controller.time, q=motion.q, qd=controller.qd, T_base_tcp=motion.T_base_tcp,
-        T_flange_tcp=motion.T_flange_tcp, robot_mode=controller.power.mode,
-        safety_mode=controller.safety.mode, runtime_state=programs.state, program=programs.name,
-        speed_slider=controller.slider, speed_scaling=motion.scaling,
+        timestamp=controller.time,
+        q=motion.q,
+        qd=controller.qd,
+        T_base_tcp=motion.T_base_tcp,
+        T_flange_tcp=motion.T_flange_tcp,
+        robot_mode=controller.power.mode,
+        safety_mode=controller.safety.mode,
+        runtime_state=programs.state,
+        program=programs.name,
+        speed_slider=controller.slider,
+        speed_scaling=motion.scaling,
         digital_outputs=controller.signals.digital_out.packed(),
         messages=tuple(controller.announcements.log),
-        popups=tuple(popup.text for popup in controller.popups))
+        popups=tuple(popup.text for popup in controller.popups),
+    )

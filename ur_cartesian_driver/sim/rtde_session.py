@@ -20,8 +20,10 @@ class _Stream:
 
     def __init__(self, output: Output, maximum: float) -> None:
         self._recipe: Recipe = output.recipe
-        self._getters = [getter(name, _zero(data_type)) for name, data_type in zip(
-            output.recipe.names, output.recipe.types, strict=True)]
+        self._getters = [
+            getter(name, _zero(data_type))
+            for name, data_type in zip(output.recipe.names, output.recipe.types, strict=True)
+        ]
         self._ratio = output.frequency / maximum
 
     def is_due(self, cycle: int) -> bool:
@@ -47,7 +49,9 @@ class RtdeSession:
         self._maximum = 1.0 / controller.cycle
         self._server = RtdeServer(
             ControllerVersion(major=major, minor=minor, bugfix=bugfix, build=build),
-            taken_inputs, self._maximum)
+            taken_inputs,
+            self._maximum,
+        )
         self._outputs: list[Output] = []
         self._streams: list[_Stream] = []
 

@@ -19,23 +19,27 @@ from ur_cartesian_driver.sim.uploads import Line, ProgramText
 #: Error code of a script port that is read-only.
 READ_ONLY = 210
 
-_CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType({
-    'power on': Controller.power_on,
-    'power off': Controller.power_off,
-    'set robotmode run': Controller.release_brakes,
-    'set unlock protective stop':
-        lambda controller: controller.safety_event(SafetyEvent.UNLOCK),
-    'stop program': lambda controller: controller.programs.stop(),
-    'pause program': lambda controller: controller.programs.pause(),
-    'resume program': lambda controller: controller.programs.play(),
-})
+_CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
+    {
+        'power on': Controller.power_on,
+        'power off': Controller.power_off,
+        'set robotmode run': Controller.release_brakes,
+        'set unlock protective stop': lambda controller: controller.safety_event(
+            SafetyEvent.UNLOCK
+        ),
+        'stop program': lambda controller: controller.programs.stop(),
+        'pause program': lambda controller: controller.programs.pause(),
+        'resume program': lambda controller: controller.programs.play(),
+    }
+)
 
 
 def execute(controller: Controller, item: ProgramText | Line) -> None:
     """Do what a client has sent; answers are announcements to everybody."""
     if not controller.remote_control:
         controller.announcements.error(
-            READ_ONLY, 0, 'Socket is read-only when the robot is in local (Teach pendant) control')
+            READ_ONLY, 0, 'Socket is read-only when the robot is in local (Teach pendant) control'
+        )
     elif isinstance(item, ProgramText):
         controller.programs.submit(item.text)
     elif item.text in _CONTROL:

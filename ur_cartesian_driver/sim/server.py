@@ -131,8 +131,7 @@ class _Connection(asyncio.Protocol, Generic[S]):
 
     def write_state(self, data: bytes) -> None:
         """Send a piece that the next of its kind replaces, if the client has read the others."""
-        if self._transport is not None and (
-                self._transport.get_write_buffer_size() < MANY_UNREAD):
+        if self._transport is not None and (self._transport.get_write_buffer_size() < MANY_UNREAD):
             self.write(data)
 
     def hamper(self, impairment: Impairment | None) -> Hampered:

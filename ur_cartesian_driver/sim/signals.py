@@ -72,7 +72,8 @@ class Signals:
         """Set an analog output to a fraction 0 to 1 of its range: 0-10 V, or 4-20 mA."""
         fraction = min(1.0, max(0.0, fraction))
         self.analog_out[index] = (
-            10.0 * fraction if self.analog_out_voltage[index] else 0.004 + 0.016 * fraction)
+            10.0 * fraction if self.analog_out_voltage[index] else 0.004 + 0.016 * fraction
+        )
 
     def analog_types(self) -> int:
         """Return the domains as RTDE packs them: inputs in bits 0-1, outputs in bits 2-3."""

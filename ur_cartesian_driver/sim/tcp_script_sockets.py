@@ -139,7 +139,8 @@ class TcpScriptSockets:
         host = '127.0.0.1' if address == 'localhost' else address
         try:
             resolved = socket.getaddrinfo(
-                host, port, type=socket.SOCK_STREAM, flags=socket.AI_NUMERICHOST)
+                host, port, type=socket.SOCK_STREAM, flags=socket.AI_NUMERICHOST
+            )
         except (OSError, OverflowError):
             connection.resolving = self._lookup(address, port)
             return
@@ -153,8 +154,7 @@ class TcpScriptSockets:
         if self._resolver is None:
             self._resolver = ThreadPoolExecutor(1, thread_name_prefix='ur-sim-resolver')
         # The same as above.
-        return self._resolver.submit(
-            socket.getaddrinfo, address, port, type=socket.SOCK_STREAM)  # type: ignore[arg-type]
+        return self._resolver.submit(socket.getaddrinfo, address, port, type=socket.SOCK_STREAM)  # type: ignore[arg-type]
 
     def state(self, name: str) -> SocketState:
         """Return the state of a name."""

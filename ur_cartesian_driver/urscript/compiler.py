@@ -32,8 +32,12 @@ from ur_cartesian_driver.urscript.scopes import Builtin, FIRST_LOCAL, Scope
 from ur_cartesian_driver.urscript.values import Value
 
 
-def compile_program(root: Scope, builtins: Mapping[str, Builtin], runtime: Runtime,
-                    procedures: dict[int, Procedure]) -> Procedure:
+def compile_program(
+    root: Scope,
+    builtins: Mapping[str, Builtin],
+    runtime: Runtime,
+    procedures: dict[int, Procedure],
+) -> Procedure:
     """
     Compile a checked program; the result is the body of its main thread.
 

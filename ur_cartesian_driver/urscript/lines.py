@@ -33,8 +33,13 @@ class Line:
 class Lines:
     """Compiles the lines of one program and knows what they have made."""
 
-    def __init__(self, program: Scope, procedures: dict[int, Procedure],
-                 builtins: Mapping[str, Builtin], runtime: Runtime) -> None:
+    def __init__(
+        self,
+        program: Scope,
+        procedures: dict[int, Procedure],
+        builtins: Mapping[str, Builtin],
+        runtime: Runtime,
+    ) -> None:
         """
         Begin without lines.
 
@@ -50,10 +55,11 @@ class Lines:
 
     def forget(self) -> None:
         """Forget the variables and functions of all lines."""
-        self._scope = Scope(parent=self._program, owner=self._program.owner,
-                            globals=dict(self._program.globals))
+        self._scope = Scope(
+            parent=self._program, owner=self._program.owner, globals=dict(self._program.globals)
+        )
         self._procedures = dict(self._of_program)
-        del self._runtime.globals[self._slots:]
+        del self._runtime.globals[self._slots :]
 
     def compile(self, text: str) -> Line:
         """
@@ -72,6 +78,8 @@ class Lines:
         variables = self._runtime.globals
         variables.extend([UNSET] * (len(scope.globals) - len(variables)))
         calls = frozenset(
-            node.call.function for node in program.body
-            if isinstance(node, tree.CallStatement) and isinstance(node.call, tree.Call))
+            node.call.function
+            for node in program.body
+            if isinstance(node, tree.CallStatement) and isinstance(node.call, tree.Call)
+        )
         return Line(procedure.steps(), calls)

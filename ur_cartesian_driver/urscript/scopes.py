@@ -69,8 +69,9 @@ class Scope:
             yield from inner.walk()
 
 
-def resolve(program: tree.Program, builtins: Mapping[str, Builtin], around: Scope | None = None
-            ) -> Scope:
+def resolve(
+    program: tree.Program, builtins: Mapping[str, Builtin], around: Scope | None = None
+) -> Scope:
     """
     Check a program and return the scope of its body.
 

@@ -83,8 +83,11 @@ def recorder(arm):
 @pytest.fixture(scope='session')
 def shifted():
     """A maker of poses moved by x, y, z [m] and turned by a rotation vector in the tool."""
+
     def shift(pose, x=0.0, y=0.0, z=0.0, turn=(0.0, 0.0, 0.0)):
         px, py, pz = pose.position
         return Pose((px + x, py + y, pz + z), pose.quaternion) @ Pose.from_rotation_vector(
-            (0.0, 0.0, 0.0, *turn))
+            (0.0, 0.0, 0.0, *turn)
+        )
+
     return shift

@@ -37,7 +37,8 @@ CALLS = {
     'movel': lambda g, w, a, v, t, r: g.movel(near(g, w), a, v, t, r),
     'movep': lambda g, w, a, v, t, r: g.movep(near(g, w), a, v, r),
     'movec': lambda g, w, a, v, t, r: g.movec(
-        near(g, (*w[1:3], w[0], *w[3:]), 0.5), near(g, w), a, v, r, int(t > 0.0)),
+        near(g, (*w[1:3], w[0], *w[3:]), 0.5), near(g, w), a, v, r, int(t > 0.0)
+    ),
     'optimovej': lambda g, w, a, v, t, r: g.optimovej(joints(g, w), a / 2.0, v / 2.0, r),
     'optimovel': lambda g, w, a, v, t, r: g.optimovel(near(g, w), a / 2.0, v / 2.0, r),
     'servoj': lambda g, w, a, v, t, r: g.servoj(joints(g, w), t),
@@ -47,9 +48,16 @@ CALLS = {
     'stopl': lambda g, w, a, v, t, r: g.stopl(a),
     'set_tcp': lambda g, w, a, v, t, r: setattr(g, 'T_flange_tcp', Pose(w[:3])),
 }
-calls = st.tuples(st.sampled_from(sorted(CALLS)), six, rates, rates, times, radii,
-                  st.sampled_from([None, None, None, 0, 3, 150]),
-                  st.sampled_from([1.0, 1.0, 0.4]))
+calls = st.tuples(
+    st.sampled_from(sorted(CALLS)),
+    six,
+    rates,
+    rates,
+    times,
+    radii,
+    st.sampled_from([None, None, None, 0, 3, 150]),
+    st.sampled_from([1.0, 1.0, 0.4]),
+)
 
 
 @pytest.mark.slow

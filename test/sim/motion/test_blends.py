@@ -27,10 +27,10 @@ def distances(r, waypoint):
 
 @pytest.mark.slow
 @few
-@given(directions, directions, st.floats(0.01, 0.05), st.floats(0.05, 0.4),
-       st.floats(0.05, 0.4))
+@given(directions, directions, st.floats(0.01, 0.05), st.floats(0.05, 0.4), st.floats(0.05, 0.4))
 def test_blend_of_straight_lines_returns_at_the_radius_and_stays_in_the_corner(
-        recorder, shifted, one, two, radius, v1, v2):
+    recorder, shifted, one, two, radius, v1, v2
+):
     assume(np.dot(one, two) > -0.9 * np.linalg.norm(one) * np.linalg.norm(two))
     r = recorder()
     start = r.generator.T_base_tcp
@@ -65,7 +65,8 @@ def test_blend_of_straight_lines_returns_at_the_radius_and_stays_in_the_corner(
 @few
 @given(directions, directions, st.floats(0.01, 0.05), st.floats(0.05, 0.5), st.floats(0.3, 2.0))
 def test_tool_never_jumps_and_its_acceleration_is_bounded_through_a_blend(
-        recorder, shifted, one, two, radius, v, a):
+    recorder, shifted, one, two, radius, v, a
+):
     r = recorder()
     waypoint = shifted(r.generator.T_base_tcp, *along(one, 0.12))
     r.run(r.generator.movel(waypoint, a=a, v=v, r=radius))
@@ -85,7 +86,7 @@ def test_blend_keeps_the_arm_from_stopping(recorder, shifted):
     r.run(r.generator.movel(waypoint, v=0.1, r=0.03))
     entered = len(r.poses)
     r.run(r.generator.movel(shifted(waypoint, y=0.1), v=0.1))
-    speeds = np.linalg.norm(r.tool_speeds(), axis=1)[entered:entered + 200]
+    speeds = np.linalg.norm(r.tool_speeds(), axis=1)[entered : entered + 200]
     assert speeds.min() > 0.1 / sqrt(2.0) * 0.99
 
 
@@ -104,8 +105,17 @@ MIXED = {
     'optimovej': lambda g, q, pose, r: g.optimovej(q, r=r),
     'optimovel': lambda g, q, pose, r: g.optimovel(pose, r=r),
     'movec': lambda g, q, pose, r: g.movec(
-        Pose(tuple(np.array(pose.position) + (g.T_base_tcp.position - np.array(
-            pose.position)) / 2 + (0.0, 0.0, 0.02)), pose.quaternion), pose, r=r),
+        Pose(
+            tuple(
+                np.array(pose.position)
+                + (g.T_base_tcp.position - np.array(pose.position)) / 2
+                + (0.0, 0.0, 0.02)
+            ),
+            pose.quaternion,
+        ),
+        pose,
+        r=r,
+    ),
 }
 PAIRS = [(a, b) for a in MIXED for b in MIXED]
 
@@ -169,8 +179,7 @@ def test_late_call_blends_from_where_the_arm_is(recorder, shifted, late):
     assert np.linalg.norm(accelerations, axis=1).max() < 3.0 * 1.2
 
 
-def test_waypoint_whose_blend_overlaps_the_one_before_is_skipped_with_a_warning(
-        recorder, shifted):
+def test_waypoint_whose_blend_overlaps_the_one_before_is_skipped_with_a_warning(recorder, shifted):
     r = recorder()
     start = r.generator.T_base_tcp
     first = shifted(start, x=0.1)
@@ -235,7 +244,7 @@ def test_stop_waypoint_inside_the_blend_before_it_makes_the_arm_stop_there(recor
 @pytest.mark.parametrize(('turn', 'radius'), [(pi / 2, 0.03), (pi / 3, 0.03), (2.0, 0.02)])
 def test_movep_goes_at_constant_speed_through_circular_fillets(recorder, shifted, turn, radius):
     r = recorder()
-    a, v = 1.2, 0.4   # v^2 / 2a is longer than the radius: movel would have slowed down
+    a, v = 1.2, 0.4  # v^2 / 2a is longer than the radius: movel would have slowed down
     waypoint = shifted(r.generator.T_base_tcp, y=0.15)
     r.run(r.generator.movep(waypoint, a=a, v=v, r=radius))
     entered = len(r.poses)
@@ -245,13 +254,12 @@ def test_movep_goes_at_constant_speed_through_circular_fillets(recorder, shifted
     inside = (near < radius - 1e-9).nonzero()[0]
     speeds = np.linalg.norm(r.tool_speeds(), axis=1)
     assert inside[0] >= entered
-    assert speeds[entered - 5:inside[-1]] == pytest.approx(v, rel=1e-3)
+    assert speeds[entered - 5 : inside[-1]] == pytest.approx(v, rel=1e-3)
     into, onwards = np.array([0.0, 1.0, 0.0]), np.array([sin(turn), np.cos(turn), 0.0])
     fillet = radius / tan(turn / 2.0)
     bisector = (onwards - into) / np.linalg.norm(onwards - into)
     centre = np.array(waypoint.position) + bisector * np.hypot(radius, fillet)
-    assert np.linalg.norm(r.positions[inside] - centre, axis=1) == pytest.approx(
-        fillet, abs=1e-9)
+    assert np.linalg.norm(r.positions[inside] - centre, axis=1) == pytest.approx(fillet, abs=1e-9)
     assert atan2(radius, fillet) == pytest.approx(turn / 2.0)
 
 
@@ -269,8 +277,11 @@ def test_times_are_kept_in_sum_through_blends(recorder, shifted, radius):
     r = recorder()
     pose, count, n, seconds = r.generator.T_base_tcp, 0, 12, 0.4
     for i in range(n):
-        pose = shifted(pose, x=0.04 * (-1.0 if i // 3 % 2 else 1.0) * (i % 2), y=0.04 * (1 - i % 2)
-                       * (-1.0 if i > 5 else 1.0))
+        pose = shifted(
+            pose,
+            x=0.04 * (-1.0 if i // 3 % 2 else 1.0) * (i % 2),
+            y=0.04 * (1 - i % 2) * (-1.0 if i > 5 else 1.0),
+        )
         last = i == n - 1
         count += r.run(r.generator.movel(pose, t=seconds, r=0.0 if last else radius))
     assert r.generator.fault is None

@@ -11,8 +11,18 @@ from ur_cartesian_driver.sim import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.rtde_session import RtdeSession
 
-OUTPUTS = ('timestamp', 'target_q', 'actual_q', 'actual_qd', 'target_qdd', 'actual_TCP_pose',
-           'actual_TCP_speed', 'speed_scaling', 'runtime_state', 'output_double_register_24')
+OUTPUTS = (
+    'timestamp',
+    'target_q',
+    'actual_q',
+    'actual_qd',
+    'target_qdd',
+    'actual_TCP_pose',
+    'actual_TCP_speed',
+    'speed_scaling',
+    'runtime_state',
+    'output_double_register_24',
+)
 
 numbers = st.floats(-0.1, 0.1)
 ways = st.tuples(*[numbers] * 6).map(lambda way: f'[{", ".join(f"{x:.4f}" for x in way)}]')
@@ -25,7 +35,8 @@ lines = st.one_of(
     st.builds('speedl({0}, 0.5, 0.1)'.format, ways),
     st.builds('servoj(home + 0.1 * {0}, t=0.1)'.format, ways),
     st.just('write_output_float_register(24, random())'),
-    st.sampled_from(['stopj(2.0)', 'sleep(0.01)', 'set_tcp(p[0, 0, 0.1, 0, 0, 0])']))
+    st.sampled_from(['stopj(2.0)', 'sleep(0.01)', 'set_tcp(p[0, 0, 0.1, 0, 0, 0])']),
+)
 sliders = st.lists(st.tuples(st.integers(1, 400), st.floats(0.1, 1.0)), max_size=3)
 
 

@@ -71,20 +71,28 @@ def test_exact_wrist_singularity_is_a_fault(recorder, shifted):
     r.run(r.generator.movel(r.generator.arm.forward((*q[:4], -0.3, q[5])), v=0.1))
     assert np.abs(np.diff(r.q, axis=0)).max() <= pi * CYCLE * (1.0 + 1e-5)
     if r.generator.fault is None:
-        assert r.generator.T_base_tcp.angle_to(
-            r.generator.arm.forward((*q[:4], -0.3, q[5]))) < 1e-6
+        assert (
+            r.generator.T_base_tcp.angle_to(r.generator.arm.forward((*q[:4], -0.3, q[5]))) < 1e-6
+        )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize('cycle', [0.002, 0.008, 0.02, 0.04])
-@pytest.mark.parametrize(('begin', 'end'), [
-    # A milliradian beside a straight wrist: the forearm swings round by half a turn.
-    ((-0.2779, 1.4236, 2.0608, -0.3522, 0.1176, -0.9574),
-     (-0.0597, 1.9699, 2.2753, -4.2343, 0.1006, 2.164)),
-    # 10 um beside the column over the base, where the two shoulders are 1 mm apart.
-    ((1.5708, -2.4704, 2.3683, -1.8101, -1.4204, 1.3913),
-     (3.1366, -2.4763, 2.3303, -1.586, -1.9074, 2.9037)),
-])
+@pytest.mark.parametrize(
+    ('begin', 'end'),
+    [
+        # A milliradian beside a straight wrist: the forearm swings round by half a turn.
+        (
+            (-0.2779, 1.4236, 2.0608, -0.3522, 0.1176, -0.9574),
+            (-0.0597, 1.9699, 2.2753, -4.2343, 0.1006, 2.164),
+        ),
+        # 10 um beside the column over the base, where the two shoulders are 1 mm apart.
+        (
+            (1.5708, -2.4704, 2.3683, -1.8101, -1.4204, 1.3913),
+            (3.1366, -2.4763, 2.3303, -1.586, -1.9074, 2.9037),
+        ),
+    ],
+)
 def test_a_line_beside_a_singularity_ends_the_same_whatever_the_cycle(cycle, begin, end):
     generator = MotionGenerator(Arm(robot_model('ur20')), cycle, begin)
     move = generator.movel(generator.arm.forward(end), a=1.0, v=1.0)
@@ -94,12 +102,15 @@ def test_a_line_beside_a_singularity_ends_the_same_whatever_the_cycle(cycle, beg
     assert generator.q == pytest.approx(end, abs=1e-3)
 
 
-@pytest.mark.parametrize('call', [
-    lambda g: g.movej((*HOME[:5], 7.0), v=3.0, a=20.0),
-    lambda g: g.speedj((0.0, 0.0, 0.0, 0.0, 0.0, 3.0), 10.0, 100.0),
-    lambda g: g.speedl((0.0, 0.0, 0.0, 0.0, 0.0, -1.0), 10.0, 100.0),
-    lambda g: g.servoj((*HOME[:5], 7.0), 100.0),
-])
+@pytest.mark.parametrize(
+    'call',
+    [
+        lambda g: g.movej((*HOME[:5], 7.0), v=3.0, a=20.0),
+        lambda g: g.speedj((0.0, 0.0, 0.0, 0.0, 0.0, 3.0), 10.0, 100.0),
+        lambda g: g.speedl((0.0, 0.0, 0.0, 0.0, 0.0, -1.0), 10.0, 100.0),
+        lambda g: g.servoj((*HOME[:5], 7.0), 100.0),
+    ],
+)
 def test_joint_limit_is_approached_slowly_and_never_crossed(recorder, call):
     r = recorder((*HOME[:5], 5.0))
     r.run(call(r.generator))

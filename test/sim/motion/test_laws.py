@@ -23,8 +23,7 @@ BULGE = 0.01
 few = settings(max_examples=6, deadline=None, phases=[Phase.generate])
 directions = st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda d: np.linalg.norm(d) > 0.2)
 turns = st.tuples(*[st.floats(-0.05, 0.05)] * 3)
-joint_ways = st.tuples(*[st.floats(-0.2, 0.2)] * 6).filter(
-    lambda way: max(map(abs, way)) > 0.05)
+joint_ways = st.tuples(*[st.floats(-0.2, 0.2)] * 6).filter(lambda way: max(map(abs, way)) > 0.05)
 sliders = st.floats(0.2, 1.0)
 
 
@@ -55,8 +54,9 @@ ways = st.builds(Way, directions, turns, joint_ways, st.floats(0.5, 2.0), st.flo
 
 
 def arc(g, way, r, mode):
-    return g.movec(way.pose(g.T_base_tcp, 0.5, BULGE), way.pose(g.T_base_tcp), way.a, way.v, r,
-                   mode)
+    return g.movec(
+        way.pose(g.T_base_tcp, 0.5, BULGE), way.pose(g.T_base_tcp), way.a, way.v, r, mode
+    )
 
 
 MOVES = {
@@ -70,8 +70,10 @@ MOVES = {
 }
 JOINT_MOVES = {'movej', 'optimovej'}
 any_move = pytest.mark.parametrize('name', sorted(MOVES))
-blend_kinds = pytest.mark.parametrize(('first', 'second'), [
-    ('movej', 'movej'), ('movej', 'movel'), ('movel', 'movej'), ('movel', 'movel')])
+blend_kinds = pytest.mark.parametrize(
+    ('first', 'second'),
+    [('movej', 'movej'), ('movej', 'movel'), ('movel', 'movej'), ('movel', 'movel')],
+)
 
 
 def rates(r, name):
@@ -167,13 +169,12 @@ def test_straight_moves_are_straight_at_every_speed(recorder, name, way, slider)
 def test_arcs_are_circles_at_every_speed(recorder, name, way, slider):
     r = run(recorder, name, way, slider)
     start = r.poses[0]
-    a, b, c = (np.array(p.position) for p in (
-        start, way.pose(start, 0.5, BULGE), way.pose(start)))
+    a, b, c = (np.array(p.position) for p in (start, way.pose(start, 0.5, BULGE), way.pose(start)))
     # Equally far from the three points, in their plane.
     normal = np.cross(b - a, c - a)
     centre = np.linalg.solve(
-        [b - a, c - a, normal],
-        [(b @ b - a @ a) / 2.0, (c @ c - a @ a) / 2.0, normal @ a])
+        [b - a, c - a, normal], [(b @ b - a @ a) / 2.0, (c @ c - a @ a) / 2.0, normal @ a]
+    )
     out = r.positions - centre
     assert np.linalg.norm(out, axis=1) == pytest.approx(np.linalg.norm(a - centre), abs=1e-9)
     assert np.abs(out @ normal).max() / np.linalg.norm(normal) < 1e-9

@@ -85,8 +85,9 @@ def test_movec_stays_on_its_circle_at_tool_speed(recorder, radius, angle, mode):
     x, y, z = start.position
 
     def on_circle(phi):
-        return Pose((x + radius * np.sin(phi), y, z + radius * (1.0 - np.cos(phi))),
-                    start.quaternion)
+        return Pose(
+            (x + radius * np.sin(phi), y, z + radius * (1.0 - np.cos(phi))), start.quaternion
+        )
 
     # A tool that turns with the tangent must not turn too fast, nor over a wrist singularity.
     a, v = 1.2, 0.1
@@ -217,13 +218,20 @@ def test_optimovel_is_straight(recorder, shifted):
     assert r.positions[-1][1] == pytest.approx(start.position[1] + 0.2)
 
 
-@pytest.mark.parametrize('call', [
-    lambda g, p: g.optimovej(HOME, a=0.0), lambda g, p: g.optimovej(HOME, v=1.1),
-    lambda g, p: g.optimovel(p, r=-0.1), lambda g, p: g.movej(HOME, a=0.0),
-    lambda g, p: g.movel(p, v=-1.0), lambda g, p: g.movel(p, t=-1.0),
-    lambda g, p: g.movel(p, v=float('nan')), lambda g, p: g.movep(p, r=float('inf')),
-    lambda g, p: g.movec(p, p),
-])
+@pytest.mark.parametrize(
+    'call',
+    [
+        lambda g, p: g.optimovej(HOME, a=0.0),
+        lambda g, p: g.optimovej(HOME, v=1.1),
+        lambda g, p: g.optimovel(p, r=-0.1),
+        lambda g, p: g.movej(HOME, a=0.0),
+        lambda g, p: g.movel(p, v=-1.0),
+        lambda g, p: g.movel(p, t=-1.0),
+        lambda g, p: g.movel(p, v=float('nan')),
+        lambda g, p: g.movep(p, r=float('inf')),
+        lambda g, p: g.movec(p, p),
+    ],
+)
 def test_calls_that_make_no_sense_are_refused_and_nothing_moves(recorder, call):
     r = recorder()
     with pytest.raises(MotionError):
@@ -247,7 +255,8 @@ def test_tool_offset_moves_on_the_straight_line_not_the_flange(recorder, shifted
 
 
 def test_next_move_in_the_frame_of_the_return_loses_no_cycle_and_hits_the_corner(
-        recorder, shifted):
+    recorder, shifted
+):
     r = recorder()
     first = shifted(r.generator.T_base_tcp, x=0.05)
     r.run(r.generator.movel(first))
@@ -277,7 +286,8 @@ def test_speeds_are_the_differences_of_the_positions(recorder, shifted):
         assert r.generator.tcp_twist[:3] == pytest.approx(r.tool_speeds()[-1], abs=1e-9)
         jacobian = r.generator.arm.jacobian((r.q[-1] + r.q[-2]) / 2.0)
         assert r.generator.tcp_twist == pytest.approx(
-            jacobian @ np.array(r.generator.qd), abs=1e-5)
+            jacobian @ np.array(r.generator.qd), abs=1e-5
+        )
 
 
 def test_the_same_calls_give_the_same_bits(recorder, shifted):

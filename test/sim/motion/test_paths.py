@@ -44,13 +44,16 @@ def test_line_is_straight_even_and_turns_the_shortest_way(a, b, f):
 def test_length_of_a_line_is_the_larger_of_distance_and_angle():
     start = Pose()
     assert Line(start, Pose.from_rotation_vector((0.3, 0.0, 0.0, 0.1, 0.0, 0.0))).length == (
-        pytest.approx(0.3))
+        pytest.approx(0.3)
+    )
     assert Line(start, Pose.from_rotation_vector((0.3, 0.0, 0.0, 0.7, 0.0, 0.0))).length == (
-        pytest.approx(0.7))
+        pytest.approx(0.7)
+    )
 
 
-@given(poses, st.floats(0.01, 2.0), points, st.floats(0.1, 6.1), fractions, fractions,
-       st.booleans())
+@given(
+    poses, st.floats(0.01, 2.0), points, st.floats(0.1, 6.1), fractions, fractions, st.booleans()
+)
 def test_arc_runs_on_the_circle_through_its_points(start, radius, axis, angle, at, f, fixed):
     assume(hypot(*axis) > 0.1)
     frame = Pose(start.position, quaternion_from_rotation_vector(axis))
@@ -67,7 +70,8 @@ def test_arc_runs_on_the_circle_through_its_points(start, radius, axis, angle, a
     place = arc.at(f * arc.length)
     assert array(place) == pytest.approx(np.array(on_circle(f * angle)), abs=1e-7)
     assert np.linalg.norm(array(place) - np.array(arc.centre)) == pytest.approx(
-        arc.radius, abs=1e-9)
+        arc.radius, abs=1e-9
+    )
 
 
 @given(fractions)
@@ -78,7 +82,8 @@ def test_fixed_arc_keeps_the_orientation_to_the_tangent(f):
     turn = quaternion_from_rotation_vector((0.0, 0.0, pi * f))
     for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
         assert rotate(place.quaternion, axis) == pytest.approx(
-            rotate(turn, rotate(start.quaternion, axis)), abs=1e-12)
+            rotate(turn, rotate(start.quaternion, axis)), abs=1e-12
+        )
 
 
 def test_unconstrained_arc_turns_from_start_to_end_whatever_is_at_the_via():
@@ -89,13 +94,16 @@ def test_unconstrained_arc_turns_from_start_to_end_whatever_is_at_the_via():
     assert arc.at(inf) == end
 
 
-@pytest.mark.parametrize(('via', 'end', 'text'), [
-    ((0.5, 0.0, 0.0), (1.0, 0.0, 0.0), 'straight line'),
-    ((2.0, 0.0, 0.0), (1.0, 0.0, 0.0), 'straight line'),
-    ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 'different points'),
-    ((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), 'different points'),
-    ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 'full circle'),
-])
+@pytest.mark.parametrize(
+    ('via', 'end', 'text'),
+    [
+        ((0.5, 0.0, 0.0), (1.0, 0.0, 0.0), 'straight line'),
+        ((2.0, 0.0, 0.0), (1.0, 0.0, 0.0), 'straight line'),
+        ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 'different points'),
+        ((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), 'different points'),
+        ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 'full circle'),
+    ],
+)
 def test_points_that_make_no_circle_are_refused(via, end, text):
     with pytest.raises(MotionError, match=text):
         Arc(Pose(), via, Pose(end), False)
@@ -104,17 +112,26 @@ def test_points_that_make_no_circle_are_refused(via, end, text):
 def two_lines(direction, turn, lengths, rotations=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))):
     """Return two lines that meet in the origin, the second turned about z."""
     (a, b), (ra, rb) = lengths, rotations
-    start = Pose((-a * cos(direction), -a * sin(direction), 0.0),
-                 quaternion_from_rotation_vector(ra))
-    end = Pose((b * cos(direction + turn), b * sin(direction + turn), 0.0),
-               quaternion_from_rotation_vector(rb))
+    start = Pose(
+        (-a * cos(direction), -a * sin(direction), 0.0), quaternion_from_rotation_vector(ra)
+    )
+    end = Pose(
+        (b * cos(direction + turn), b * sin(direction + turn), 0.0),
+        quaternion_from_rotation_vector(rb),
+    )
     return Line(start, Pose()), Line(Pose(), end)
 
 
 angles = st.floats(0.05, 3.0)
 corners = st.builds(
     lambda d, turn, a, b, ra, rb: two_lines(d, turn, (a, b), (ra, rb)),
-    st.floats(-3.0, 3.0), angles, st.floats(0.1, 2.0), st.floats(0.1, 2.0), points, points)
+    st.floats(-3.0, 3.0),
+    angles,
+    st.floats(0.1, 2.0),
+    st.floats(0.1, 2.0),
+    points,
+    points,
+)
 
 
 @given(corners, st.floats(0.01, 0.09), st.booleans(), fractions)
@@ -140,9 +157,11 @@ def test_corner_is_tangent_to_both_legs_and_stays_inside(legs, radius, circular,
     # Tangent, and as fast as the rates say.
     h = 1e-6
     assert (array(turn.at(h)) - array(turn.at(0.0))) / h == pytest.approx(
-        turn.entry_rate * into * before.distance / before.length, abs=1e-3 * radius)
+        turn.entry_rate * into * before.distance / before.length, abs=1e-3 * radius
+    )
     assert (array(turn.at(1.0)) - array(turn.at(1.0 - h))) / h == pytest.approx(
-        turn.exit_rate * onwards * after.distance / after.length, abs=1e-3 * radius)
+        turn.exit_rate * onwards * after.distance / after.length, abs=1e-3 * radius
+    )
 
 
 @given(angles, st.floats(0.01, 0.09), fractions)
@@ -150,7 +169,8 @@ def test_fillet_is_a_circle_and_evenly_passed(turn, radius, f):
     before, after = two_lines(0.3, turn, (1.0, 1.0))
     fillet = corner(before, radius, after, radius, True)
     assert np.linalg.norm(array(fillet.at(f)) - np.array(fillet.centre)) == pytest.approx(
-        fillet.radius, abs=1e-12)
+        fillet.radius, abs=1e-12
+    )
     assert fillet.entry_rate == pytest.approx(fillet.exit_rate)
     assert fillet.entry_rate == pytest.approx(fillet.radius * turn)
 
@@ -174,7 +194,8 @@ def test_blend_of_a_joint_line_begins_at_the_radius_of_the_tool(arm, a, b, radiu
     tail, head = tail_within(line, radius), head_within(line, radius)
     assume(tail is not None and head is not None)
     assert line.pose(line.length - tail).distance_to(arm.forward(b)) == pytest.approx(
-        radius, abs=1e-9)
+        radius, abs=1e-9
+    )
     assert line.pose(head).distance_to(arm.forward(a)) == pytest.approx(radius, abs=1e-9)
 
 
@@ -185,7 +206,7 @@ def test_corner_of_two_joint_lines_stays_in_their_plane_and_between_them(arm, a,
     turn = corner(before, 0.05, after, 0.04, False)
     w, p = np.array(b), np.array(turn.at(f))
     into, onwards = w - before.at(before.length - 0.05), np.array(after.at(0.04)) - w
-    assert p - w == pytest.approx(-(1.0 - f) ** 2 * into + f * f * onwards, abs=1e-12)
+    assert p - w == pytest.approx(-((1.0 - f) ** 2) * into + f * f * onwards, abs=1e-12)
     assert turn.at(1.0) == after.at(0.04)
 
 

@@ -31,8 +31,7 @@ def assert_runs_smoothly(profile, start_speed):
     assert s[-1] - s[-2] <= s[-2] - s[-3] + 1e-9 * profile.length + dt * dt
     assert profile.speed(0.0) == pytest.approx(start_speed)
     speeds = [profile.speed(x) for x in t]
-    assert np.sum(speeds) * dt == pytest.approx(
-        s[-1], rel=0.02, abs=dt * max(speeds))
+    assert np.sum(speeds) * dt == pytest.approx(s[-1], rel=0.02, abs=dt * max(speeds))
 
 
 @given(lengths, rates, rates)
@@ -102,11 +101,14 @@ def test_s_curve_from_rest_keeps_its_jerk(d, a, v, jerk):
     assert np.abs(np.diff(acceleration)).max() <= jerk * t[1] * 1.01 + 1e-4 * a + 1e-4
 
 
-@pytest.mark.parametrize(('d', 'a', 'v', 'jerk', 'expected'), [
-    # d/v + v/a + a/j with a full ramp; 4 (d / 2j)^(1/3) when neither v nor a is reached.
-    (4.0, 2.0, 1.0, 8.0, 4.0 + 0.5 + 0.25),
-    (0.001, 100.0, 100.0, 8.0, 4.0 * (0.001 / 16.0) ** (1.0 / 3.0)),
-])
+@pytest.mark.parametrize(
+    ('d', 'a', 'v', 'jerk', 'expected'),
+    [
+        # d/v + v/a + a/j with a full ramp; 4 (d / 2j)^(1/3) when neither v nor a is reached.
+        (4.0, 2.0, 1.0, 8.0, 4.0 + 0.5 + 0.25),
+        (0.001, 100.0, 100.0, 8.0, 4.0 * (0.001 / 16.0) ** (1.0 / 3.0)),
+    ],
+)
 def test_s_curve_from_rest_takes_the_time_of_the_closed_formula(d, a, v, jerk, expected):
     assert s_curve(d, a, v, jerk).duration == pytest.approx(expected, rel=1e-9)
 

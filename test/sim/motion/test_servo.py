@@ -123,8 +123,9 @@ def test_speedj_with_no_time_returns_without_a_cycle(recorder):
 
 def test_speed_scaling_slows_speedj_and_lengthens_its_time(recorder):
     r = recorder()
-    assert r.run(r.generator.speedj((0.4, 0.0, 0.0, 0.0, 0.0, 0.0), 4.0, 0.4),
-                 lambda i: 0.5) == 400
+    assert (
+        r.run(r.generator.speedj((0.4, 0.0, 0.0, 0.0, 0.0, 0.0), 4.0, 0.4), lambda i: 0.5) == 400
+    )
     assert r.generator.qd[0] == pytest.approx(0.2)
     full = recorder()
     full.run(full.generator.speedj((0.4, 0.0, 0.0, 0.0, 0.0, 0.0), 4.0, 0.4))
@@ -148,7 +149,8 @@ def test_speedl_moves_the_tool_straight_and_turns_it(recorder):
     r.run(r.generator.speedl((0.1, 0.0, 0.0, 0.0, 0.0, 0.2), 0.5, 1.0, a_rot=1.0))
     assert r.generator.tcp_twist == pytest.approx((0.1, 0.0, 0.0, 0.0, 0.0, 0.2), abs=1e-9)
     assert r.positions[-1] - start.position == pytest.approx(
-        (0.1 * 1.0 - 0.1**2 / (2 * 0.5), 0.0, 0.0), abs=1e-9)
+        (0.1 * 1.0 - 0.1**2 / (2 * 0.5), 0.0, 0.0), abs=1e-9
+    )
     assert start.angle_to(r.poses[-1]) == pytest.approx(0.2 - 0.2**2 / 2.0)
     r.rest()
     assert np.abs(r.positions[:, 1:] - np.array(start.position)[1:]).max() < 1e-9
@@ -165,8 +167,10 @@ def test_servoj_lags_behind_a_ramp_by_its_lookahead(recorder, lookahead, gain):
     assert target[0] - r.q[-2, 0] == pytest.approx(speed * lookahead, abs=1e-5)
 
 
-@pytest.mark.parametrize(('scale', 't', 'cycles'), [
-    (1.0, 0.002, 1), (1.0, 0.008, 4), (0.5, 0.002, 2), (0.25, 0.008, 16)])
+@pytest.mark.parametrize(
+    ('scale', 't', 'cycles'),
+    [(1.0, 0.002, 1), (1.0, 0.008, 4), (0.5, 0.002, 2), (0.25, 0.008, 16)],
+)
 def test_servoj_lasts_its_time_divided_by_the_scaling(recorder, scale, t, cycles):
     r = recorder()
     assert r.run(r.generator.servoj(HOME, t), lambda i: scale) == cycles

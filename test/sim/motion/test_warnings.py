@@ -19,8 +19,7 @@ def codes(r):
     return [(warning.code, warning.argument) for warning in r.generator.warnings]
 
 
-def test_movep_that_the_joints_cannot_keep_up_with_is_said_to_be_too_fast_once(
-        recorder, shifted):
+def test_movep_that_the_joints_cannot_keep_up_with_is_said_to_be_too_fast_once(recorder, shifted):
     r = recorder()
     start = r.generator.T_base_tcp
     r.run(r.generator.movep(shifted(start, y=0.6), a=20.0, v=3.0))
@@ -31,7 +30,8 @@ def test_movep_that_the_joints_cannot_keep_up_with_is_said_to_be_too_fast_once(
 
 
 def test_movep_that_is_too_fast_for_its_blend_is_said_to_be_and_keeps_its_fillet(
-        recorder, shifted):
+    recorder, shifted
+):
     r = recorder()
     waypoint = shifted(r.generator.T_base_tcp, y=0.15)
     r.run(r.generator.movep(waypoint, a=5.0, v=0.8, r=0.01))
@@ -49,10 +49,18 @@ def test_movep_at_its_default_speed_is_not_too_fast(recorder, shifted, slider):
     assert codes(r) == []
 
 
-@pytest.mark.parametrize(('call', 'argument'), [
-    (lambda g, pose, shift: g.movep(pose, v=0.4, r=0.0005), 10),
-    (lambda g, pose, shift: g.movec(shift(g.T_base_tcp, x=0.05, z=0.02), pose, v=0.4, r=0.0005),
-     1)])
+@pytest.mark.parametrize(
+    ('call', 'argument'),
+    [
+        (lambda g, pose, shift: g.movep(pose, v=0.4, r=0.0005), 10),
+        (
+            lambda g, pose, shift: g.movec(
+                shift(g.T_base_tcp, x=0.05, z=0.02), pose, v=0.4, r=0.0005
+            ),
+            1,
+        ),
+    ],
+)
 def test_blend_that_is_passed_within_a_cycle_is_none(recorder, shifted, call, argument):
     r = recorder()
     waypoint = shifted(r.generator.T_base_tcp, x=0.1)
@@ -75,16 +83,24 @@ def test_limit_of_the_tool_speed_is_kept_on_the_same_path(recorder, shifted):
 
 @pytest.mark.slow
 @settings(max_examples=8, deadline=None, phases=[Phase.generate])
-@given(st.tuples(*[st.floats(-0.5, 0.5)] * 6).filter(any), st.floats(0.1, 0.5),
-       st.sampled_from(['movej', 'optimovej', 'servoj', 'speedj']))
+@given(
+    st.tuples(*[st.floats(-0.5, 0.5)] * 6).filter(any),
+    st.floats(0.1, 0.5),
+    st.sampled_from(['movej', 'optimovej', 'servoj', 'speedj']),
+)
 def test_joint_motion_keeps_the_limit_of_the_tool_speed(recorder, way, limit, name):
     r = recorder()
     g = r.generator
     g.max_tool_speed = limit
     target = tuple(a + b for a, b in zip(HOME, way, strict=True))
-    r.run({'movej': lambda: g.movej(target, 20.0, 3.0), 'optimovej': lambda: g.optimovej(target),
-           'servoj': lambda: g.servoj(target, 0.5), 'speedj': lambda: g.speedj(way, 5.0, 0.5),
-           }[name]())
+    r.run(
+        {
+            'movej': lambda: g.movej(target, 20.0, 3.0),
+            'optimovej': lambda: g.optimovej(target),
+            'servoj': lambda: g.servoj(target, 0.5),
+            'speedj': lambda: g.speedj(way, 5.0, 0.5),
+        }[name]()
+    )
     assert np.linalg.norm(r.tool_speeds(), axis=1).max() <= limit * (1.0 + 1e-5)
     if name.endswith('movej'):
         assert g.q == pytest.approx(target, abs=1e-9)

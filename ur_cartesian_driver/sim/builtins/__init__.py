@@ -39,12 +39,21 @@ Builtins = Mapping[str, Any]
 def builtins_of(controller: Controller) -> Builtins:
     """Return all functions of a primary program."""
     groups = (
-        DigitalBuiltins(controller.signals), AnalogBuiltins(controller.signals),
-        RegisterBuiltins(controller.signals), KinematicsBuiltins(controller),
-        ModeBuiltins(controller), MotionBuiltins(controller), PathOffsetBuiltins(controller),
-        PortBuiltins(controller.signals), PoseBuiltins(), ProcessBuiltins(controller),
+        DigitalBuiltins(controller.signals),
+        AnalogBuiltins(controller.signals),
+        RegisterBuiltins(controller.signals),
+        KinematicsBuiltins(controller),
+        ModeBuiltins(controller),
+        MotionBuiltins(controller),
+        PathOffsetBuiltins(controller),
+        PortBuiltins(controller.signals),
+        PoseBuiltins(),
+        ProcessBuiltins(controller),
         SocketBuiltins(controller.sockets, lambda: controller.time),
-        PeopleBuiltins(controller), RobotBuiltins(controller), TimeBuiltins(controller))
+        PeopleBuiltins(controller),
+        RobotBuiltins(controller),
+        TimeBuiltins(controller),
+    )
     found = dict(core_builtins())
     for group in groups:
         found |= builtins_in(group)
@@ -53,16 +62,20 @@ def builtins_of(controller: Controller) -> Builtins:
 
 def timeless(builtins: Builtins) -> Builtins:
     """Return the functions of a secondary program: what takes time raises."""
-    return {name: _refusing(name, function) if inspect.isgeneratorfunction(function) else function
-            for name, function in builtins.items()}
+    return {
+        name: _refusing(name, function) if inspect.isgeneratorfunction(function) else function
+        for name, function in builtins.items()
+    }
 
 
 def _refusing(name: str, function: Any) -> Any:
     @functools.wraps(function)
     def refuse(*arguments: Any, **named: Any) -> None:
         raise RuntimeException(f'{name} takes time, which a secondary program does not have.')
+
     # The signature stays that of the function; what counts as a generator must not.
     refuse.__signature__ = inspect.signature(  # type: ignore[attr-defined]  # all have it
-        function)
+        function
+    )
     del refuse.__wrapped__
     return refuse

@@ -131,8 +131,14 @@ class AnalogBuiltins:
         self._signals.tool_voltage = volts
 
     def set_tool_communication(
-            self, enabled: Value, baud_rate: Value, parity: Value, stop_bits: Value,
-            rx_idle_chars: Value, tx_idle_chars: Value) -> None:
+        self,
+        enabled: Value,
+        baud_rate: Value,
+        parity: Value,
+        stop_bits: Value,
+        rx_idle_chars: Value,
+        tx_idle_chars: Value,
+    ) -> None:
         """Accept settings of the tool's serial line, which ends nowhere."""
 
 
@@ -158,7 +164,8 @@ class PortBuiltins:
     def write_port_register(self, address: Value, value: Value) -> None:
         """Write one of 256, with 16 bits each."""
         self._signals.port_registers[index(address, 'address', PORTS)] = index(
-            value, 'value', 2**16)
+            value, 'value', 2**16
+        )
 
 
 class RegisterBuiltins:

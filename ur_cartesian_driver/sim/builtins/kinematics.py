@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from ur_cartesian_driver.sim.controller import Controller
 
 
-def solve(controller: Controller, T_base_tcp: Pose, T_flange_tcp: Pose,
-          near: Vector6) -> Vector6 | None:
+def solve(
+    controller: Controller, T_base_tcp: Pose, T_flange_tcp: Pose, near: Vector6
+) -> Vector6 | None:
     """Return the joints nearest to given ones that bring the TCP to a pose."""
     found = nearest(controller.arm, T_base_tcp @ T_flange_tcp.inverse(), near)
     return None if found is None else six(list(found), 'solution')
@@ -37,7 +38,8 @@ def joints_of(controller: Controller, value: Value, function: str) -> Vector6:
     if found is None:
         raise RuntimeException(
             'The robot cannot reach the requested pose. Script function '
-            f'{function} is unable to find an inverse kinematics solution.')
+            f'{function} is unable to find an inverse kinematics solution.'
+        )
     return found
 
 
@@ -62,25 +64,37 @@ class KinematicsBuiltins:
         near = list(self._controller.motion.q) if qnear is None else qnear
         return solve(self._controller, pose(x, 'x'), self._tcp(tcp), six(near, 'qnear'))
 
-    def get_inverse_kin(self, x: Value, qnear: Value = None, maxPositionError: Value = 1e-10,
-                        maxOrientationError: Value = 1e-10, tcp: Value = 'active_tcp'
-                        ) -> list[float]:
+    def get_inverse_kin(
+        self,
+        x: Value,
+        qnear: Value = None,
+        maxPositionError: Value = 1e-10,
+        maxOrientationError: Value = 1e-10,
+        tcp: Value = 'active_tcp',
+    ) -> list[float]:
         """Return the joints of a pose nearest to `qnear`, by default to the present ones."""
         found = self._solve(x, qnear, tcp)
         if found is None:
             raise RuntimeException(
                 'The robot cannot reach the requested pose. Script function get_inverse_kin is '
-                'unable to find an inverse kinematics solution.')
+                'unable to find an inverse kinematics solution.'
+            )
         return list(found)
 
     def get_inverse_kin_has_solution(
-            self, pose: Value, qnear: Value = None, maxPositionError: Value = 1e-10,
-            maxOrientationError: Value = 1e-10, tcp: Value = 'active_tcp') -> bool:
+        self,
+        pose: Value,
+        qnear: Value = None,
+        maxPositionError: Value = 1e-10,
+        maxOrientationError: Value = 1e-10,
+        tcp: Value = 'active_tcp',
+    ) -> bool:
         """Tell whether a pose can be reached."""
         return self._solve(pose, qnear, tcp) is not None
 
-    def get_forward_kin(self, q: Value = 'current_joint_positions', tcp: Value = 'active_tcp'
-                        ) -> ScriptPose:
+    def get_forward_kin(
+        self, q: Value = 'current_joint_positions', tcp: Value = 'active_tcp'
+    ) -> ScriptPose:
         """Return the pose of the TCP at joints, by default the present ones."""
         joints = self._controller.motion.q if q == 'current_joint_positions' else six(q, 'q')
         return script_pose(self._controller.arm.forward(joints) @ self._tcp(tcp))
@@ -90,8 +104,10 @@ class KinematicsBuiltins:
         if is_pose(pose):
             return self._solve(pose, qNear, 'active_tcp') is not None
         limits = self._controller.arm.model.position_limits
-        return all(low <= angle <= high
-                   for angle, (low, high) in zip(six(pose, 'position'), limits, strict=True))
+        return all(
+            low <= angle <= high
+            for angle, (low, high) in zip(six(pose, 'position'), limits, strict=True)
+        )
 
     def get_actual_tcp_pose(self) -> ScriptPose:
         """Return where the TCP is."""
@@ -105,7 +121,8 @@ class KinematicsBuiltins:
         """Return where the running move leads to; without one, where the TCP should be."""
         motion, waypoint = self._controller.motion, self._controller.waypoint
         return script_pose(
-            waypoint if waypoint is not None and motion.moving else motion.T_base_tcp)
+            waypoint if waypoint is not None and motion.moving else motion.T_base_tcp
+        )
 
     def get_actual_tool_flange_pose(self) -> ScriptPose:
         """Return where the flange is."""
@@ -119,4 +136,5 @@ class KinematicsBuiltins:
         """Set the active TCP."""
         offset = six(pose, 'pose')
         self._controller.motion.T_flange_tcp = (
-            Pose.from_rotation_vector(offset) if any(offset) else IDENTITY)
+            Pose.from_rotation_vector(offset) if any(offset) else IDENTITY
+        )

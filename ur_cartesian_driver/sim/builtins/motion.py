@@ -143,25 +143,29 @@ class MotionBuiltins:
     def _pose(self, value: Value, name: str = 'pose') -> Pose:
         return pose_of(self._controller, value, name)
 
-    def movej(self, q: Value, a: Value = 1.4, v: Value = 1.05, t: Value = 0, r: Value = 0
-              ) -> Steps:
+    def movej(
+        self, q: Value, a: Value = 1.4, v: Value = 1.05, t: Value = 0, r: Value = 0
+    ) -> Steps:
         """Move straight in joint space; a pose means its solution nearest to the present one."""
         limits = _limits(a, v, t)
         radius = not_negative(r, 'r')
         target = self._joints(q, 'movej')
         self._take(self._pose(list(target)))
         yield from self._ownership.run(
-            lambda: self._motion.movej(target, *limits, radius), abortable=True)
+            lambda: self._motion.movej(target, *limits, radius), abortable=True
+        )
 
-    def movel(self, pose: Value, a: Value = 1.2, v: Value = 0.25, t: Value = 0, r: Value = 0
-              ) -> Steps:
+    def movel(
+        self, pose: Value, a: Value = 1.2, v: Value = 0.25, t: Value = 0, r: Value = 0
+    ) -> Steps:
         """Move straight in space; joints mean the pose that they reach."""
         limits = _limits(a, v, t)
         radius = not_negative(r, 'r')
         target = self._pose(pose)
         self._take(target)
         yield from self._ownership.run(
-            lambda: self._motion.movel(target, *limits, radius), abortable=True)
+            lambda: self._motion.movel(target, *limits, radius), abortable=True
+        )
 
     def movep(self, pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Steps:
         """Move straight at constant speed, corners rounded by arcs."""
@@ -169,11 +173,17 @@ class MotionBuiltins:
         radius = not_negative(r, 'r')
         target = self._pose(pose)
         self._take(target)
-        yield from self._ownership.run(
-            lambda: self._motion.movep(target, a_, v_, radius))
+        yield from self._ownership.run(lambda: self._motion.movep(target, a_, v_, radius))
 
-    def movec(self, pose_via: Value, pose_to: Value, a: Value = 1.2, v: Value = 0.25,
-              r: Value = 0, mode: Value = 0) -> Steps:
+    def movec(
+        self,
+        pose_via: Value,
+        pose_to: Value,
+        a: Value = 1.2,
+        v: Value = 0.25,
+        r: Value = 0,
+        mode: Value = 0,
+    ) -> Steps:
         """Move on the circle through two more points."""
         a_, v_, _ = _limits(a, v, 0)
         radius, mode_ = not_negative(r, 'r'), whole(mode, 'mode')
@@ -181,34 +191,40 @@ class MotionBuiltins:
             raise RuntimeException(f'mode is {mode_}; it must be 0 or 1')
         via, to = self._pose(pose_via, 'pose_via'), self._pose(pose_to, 'pose_to')
         self._take(to)
-        yield from self._ownership.run(
-            lambda: self._motion.movec(via, to, a_, v_, radius, mode_))
+        yield from self._ownership.run(lambda: self._motion.movec(via, to, a_, v_, radius, mode_))
 
     def optimovej(self, goal: Value, a: Value = 0.3, v: Value = 0.3, r: Value = 0) -> Steps:
         """Move in joint space with limited jerk, at fractions of what the joints can do."""
         a_, v_, radius = _fraction(a, 'a'), _fraction(v, 'v'), not_negative(r, 'r')
         target = self._joints(goal, 'optimovej')
         self._take(self._pose(list(target)))
-        yield from self._ownership.run(
-            lambda: self._motion.optimovej(target, a_, v_, radius))
+        yield from self._ownership.run(lambda: self._motion.optimovej(target, a_, v_, radius))
 
     def optimovel(self, goal: Value, a: Value = 0.3, v: Value = 0.3, r: Value = 0) -> Steps:
         """Move straight in space with limited jerk, at fractions of what the joints can do."""
         a_, v_, radius = _fraction(a, 'a'), _fraction(v, 'v'), not_negative(r, 'r')
         target = self._pose(goal, 'goal')
         self._take(target)
-        yield from self._ownership.run(
-            lambda: self._motion.optimovel(target, a_, v_, radius))
+        yield from self._ownership.run(lambda: self._motion.optimovel(target, a_, v_, radius))
 
-    def servoj(self, q: Value, a: Value = 0, v: Value = 0, t: Value = 0.002,
-               lookahead_time: Value = 0.1, gain: Value = 300) -> Steps:
+    def servoj(
+        self,
+        q: Value,
+        a: Value = 0,
+        v: Value = 0,
+        t: Value = 0.002,
+        lookahead_time: Value = 0.1,
+        gain: Value = 300,
+    ) -> Steps:
         """Follow a set-point for a time; a and v are ignored, as on the robot."""
         target = six(q, 'q')
-        settings = (positive(t, 't'), _within(lookahead_time, 'lookahead_time', 0.03, 0.2),
-                    _within(gain, 'gain', 100, 2000))
+        settings = (
+            positive(t, 't'),
+            _within(lookahead_time, 'lookahead_time', 0.03, 0.2),
+            _within(gain, 'gain', 100, 2000),
+        )
         self._take()
-        yield from self._ownership.run(
-            lambda: self._motion.servoj(target, *settings))
+        yield from self._ownership.run(lambda: self._motion.servoj(target, *settings))
 
     def servoc(self, pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Steps:
         """
@@ -227,8 +243,7 @@ class MotionBuiltins:
         """Go to joint speeds; return after a time, or when they are reached."""
         target, acceleration, time = six(qd, 'qd'), positive(a, 'a'), _duration(t)
         self._take()
-        yield from self._ownership.run(
-            lambda: self._motion.speedj(target, acceleration, time))
+        yield from self._ownership.run(lambda: self._motion.speedj(target, acceleration, time))
 
     def speedl(self, xd: Value, a: Value, t: Value = None, aRot: Value = 'a') -> Steps:
         """Go to a speed of the tool; return after a time, or when it is reached."""
@@ -236,25 +251,29 @@ class MotionBuiltins:
         turning = acceleration if aRot == 'a' else positive(aRot, 'aRot')
         self._take()
         yield from self._ownership.run(
-            lambda: self._motion.speedl(twist, acceleration, time, turning))
+            lambda: self._motion.speedl(twist, acceleration, time, turning)
+        )
 
     def stopj(self, a: Value) -> Steps:
         """Brake in joint space; return at rest."""
         acceleration = positive(a, 'a')
         self._ownership.take(self._controller.programs.current_thread)
-        yield from self._ownership.run(
-            lambda: self._motion.stopj(acceleration))
+        yield from self._ownership.run(lambda: self._motion.stopj(acceleration))
 
     def stopl(self, a: Value, aRot: Value = 'a') -> Steps:
         """Brake the tool on its tangent; return at rest."""
         acceleration = positive(a, 'a')
         turning = acceleration if aRot == 'a' else positive(aRot, 'aRot')
         self._ownership.take(self._controller.programs.current_thread)
-        yield from self._ownership.run(
-            lambda: self._motion.stopl(acceleration, turning))
+        yield from self._ownership.run(lambda: self._motion.stopl(acceleration, turning))
 
-    def direct_torque(self, torque: Value, friction_comp: Value = True,
-                      viscous_scale: Value = None, coulomb_scale: Value = None) -> Steps:
+    def direct_torque(
+        self,
+        torque: Value,
+        friction_comp: Value = True,
+        viscous_scale: Value = None,
+        coulomb_scale: Value = None,
+    ) -> Steps:
         """Take a cycle and check the torques; a robot without dynamics does not move by them."""
         six(torque, 'torque')
         self._take()
@@ -294,12 +313,16 @@ class ModeBuiltins:
         """End it; harmless when there is none."""
         self._controller.hand_guided = HandGuided.NOBODY
 
-    def force_mode(self, task_frame: Value, selection_vector: Value, wrench: Value, type: Value,
-                   limits: Value) -> None:
+    def force_mode(
+        self, task_frame: Value, selection_vector: Value, wrench: Value, type: Value, limits: Value
+    ) -> None:
         """Enter force mode, which changes nothing in an arm that touches nothing."""
         pose(task_frame, 'task_frame')
-        for value, name in ((selection_vector, 'selection_vector'), (wrench, 'wrench'),
-                            (limits, 'limits')):
+        for value, name in (
+            (selection_vector, 'selection_vector'),
+            (wrench, 'wrench'),
+            (limits, 'limits'),
+        ):
             six(value, name)
         if whole(type, 'type') not in (1, 2, 3):
             raise RuntimeException(f'type is {type}; it must be 1, 2 or 3')
@@ -349,5 +372,3 @@ def _within(value: Value, name: str, low: float, high: float) -> float:
 def _duration(value: Value) -> float | None:
     """Return the time of a speed command; left out means until the speed is reached."""
     return None if value is None else not_negative(value, 't')
-
-

@@ -55,8 +55,7 @@ class PoseBuiltins:
         """Return the difference of the positions with the rotation R_to R_from^-1."""
         to, start = pose(p_to, 'p_to'), pose(p_from, 'p_from')
         x, y, z = (i - j for i, j in zip(to.position, start.position, strict=True))
-        return script_pose(
-            Pose((x, y, z), multiply(to.quaternion, conjugate(start.quaternion))))
+        return script_pose(Pose((x, y, z), multiply(to.quaternion, conjugate(start.quaternion))))
 
     def pose_dist(self, pose_from: Value, pose_to: Value) -> float:
         """Return the length of `pose_sub` as six numbers."""

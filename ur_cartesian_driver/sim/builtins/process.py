@@ -57,10 +57,12 @@ class PathOffsetBuiltins:
 
     def _limited(self, offset: Vector6) -> Vector6:
         state = self._state
-        x, y, z = (max(-state.most_translation, min(state.most_translation, item))
-                   for item in offset[:3])
-        rx, ry, rz = (max(-state.most_rotation, min(state.most_rotation, item))
-                      for item in offset[3:])
+        x, y, z = (
+            max(-state.most_translation, min(state.most_translation, item)) for item in offset[:3]
+        )
+        rx, ry, rz = (
+            max(-state.most_rotation, min(state.most_rotation, item)) for item in offset[3:]
+        )
         return x, y, z, rx, ry, rz
 
     def path_offset_get(self, type: Value) -> ScriptPose:
@@ -96,22 +98,29 @@ class ProcessBuiltins:
 
     def screw_driving(self, f: Value, v_limit: Value) -> None:
         """Push along the tool's z axis with a force [N], at most at a speed [m/s]."""
-        self._controller.process.screw_driving = (
-            number(f, 'f'), not_negative(v_limit, 'v_limit'))
+        self._controller.process.screw_driving = (number(f, 'f'), not_negative(v_limit, 'v_limit'))
 
     def end_screw_driving(self) -> None:
         """End it; harmless when it has not begun."""
         self._controller.process.screw_driving = None
 
     def tool_wrench_limit_set(
-            self, frame_offset: Value, Fx: Value = None, Fy: Value = None, Fz: Value = None,
-            Mx: Value = None, My: Value = None, Mz: Value = None) -> None:
+        self,
+        frame_offset: Value,
+        Fx: Value = None,
+        Fy: Value = None,
+        Fz: Value = None,
+        Mx: Value = None,
+        My: Value = None,
+        Mz: Value = None,
+    ) -> None:
         """Limit forces [N] and torques [Nm] of acceleration in a frame of the flange."""
         pose(frame_offset, 'frame_offset')
         names = ('Fx', 'Fy', 'Fz', 'Mx', 'My', 'Mz')
         given = zip(names, (Fx, Fy, Fz, Mx, My, Mz), strict=True)
         self._controller.process.wrench_limits = {
-            name: not_negative(value, name) for name, value in given if value is not None}
+            name: not_negative(value, name) for name, value in given if value is not None
+        }
 
     def tool_wrench_limit_disable(self) -> None:
         """Remove the limits."""
@@ -135,4 +144,5 @@ class ProcessBuiltins:
     def pause_on_error_code(self, code: Value, argument: Value = None) -> None:
         """Pause the program when an error code occurs; without an argument, with any."""
         self._controller.process.pause_on.add(
-            (whole(code, 'code'), None if argument is None else whole(argument, 'argument')))
+            (whole(code, 'code'), None if argument is None else whole(argument, 'argument'))
+        )

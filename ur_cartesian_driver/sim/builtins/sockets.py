@@ -37,8 +37,9 @@ class SocketBuiltins:
         self._sockets = sockets
         self._now = now
 
-    def socket_open(self, address: Value, port: Value, socket_name: Value = 'socket_0'
-                    ) -> Generator[None, None, bool]:
+    def socket_open(
+        self, address: Value, port: Value, socket_name: Value = 'socket_0'
+    ) -> Generator[None, None, bool]:
         """Connect; give up after 2 s."""
         name = text(socket_name, 'socket_name')
         self._sockets.open(name, text(address, 'address'), whole(port, 'port'))
@@ -54,8 +55,9 @@ class SocketBuiltins:
         """Close; a name that is not open is no error."""
         self._sockets.close(text(socket_name, 'socket_name'))
 
-    def _wait(self, name: Value, timeout: Value, take: Callable[[bytearray], T | None]
-              ) -> Generator[None, None, T | None]:
+    def _wait(
+        self, name: Value, timeout: Value, take: Callable[[bytearray], T | None]
+    ) -> Generator[None, None, T | None]:
         """Return what `take` finds in the received bytes; None for a timeout or a closed peer."""
         limit = number(timeout, 'timeout')
         deadline = self._now() + limit if limit > 0.0 else float('inf')
@@ -64,14 +66,13 @@ class SocketBuiltins:
             found = take(self._sockets.received(name_))
             if found is not None:
                 return found
-            if (self._now() >= deadline
-                    or self._sockets.state(name_) is not SocketState.OPEN):
+            if self._now() >= deadline or self._sockets.state(name_) is not SocketState.OPEN:
                 return None
             yield
 
     def socket_read_binary_integer(
-            self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2
-            ) -> Generator[None, None, list[int]]:
+        self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2
+    ) -> Generator[None, None, list[int]]:
         """Read 32 bit integers in network order: [n, v1 .. vn], or [0, -1 .. -1]."""
         count = _count(number)
         data = yield from self._wait(socket_name, timeout, _exactly(4 * count))
@@ -80,16 +81,16 @@ class SocketBuiltins:
         return [count, *struct.unpack(f'>{count}i', data)]
 
     def socket_read_byte_list(
-            self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2
-            ) -> Generator[None, None, list[int]]:
+        self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2
+    ) -> Generator[None, None, list[int]]:
         """Read bytes: [n, v1 .. vn], or [0, -1 .. -1]."""
         count = _count(number)
         data = yield from self._wait(socket_name, timeout, _exactly(count))
         return [0] + [-1] * count if data is None else [count, *data]
 
     def socket_read_ascii_float(
-            self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2
-            ) -> Generator[None, None, list[float]]:
+        self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2
+    ) -> Generator[None, None, list[float]]:
         """Read numbers written as `(1.4, 2)`: [n, v1 .. vn], or [0, nan .. nan]."""
         count = _count(number)
         data = yield from self._wait(socket_name, timeout, _through(b')'))
@@ -102,22 +103,28 @@ class SocketBuiltins:
         return [float(count), *values]
 
     def socket_read_string(
-            self, socket_name: Value = 'socket_0', prefix: Value = '', suffix: Value = '',
-            interpret_escape: Value = False, timeout: Value = 2
-            ) -> Generator[None, None, str]:
+        self,
+        socket_name: Value = 'socket_0',
+        prefix: Value = '',
+        suffix: Value = '',
+        interpret_escape: Value = False,
+        timeout: Value = 2,
+    ) -> Generator[None, None, str]:
         """Read what is there, or what stands between a prefix and a suffix; '' for a timeout."""
         before, after = (_bytes(prefix, interpret_escape), _bytes(suffix, interpret_escape))
         data = yield from self._wait(socket_name, timeout, _between(before, after))
         return '' if data is None else data.decode('latin-1')
 
-    def socket_read_line(self, socket_name: Value = 'socket_0', timeout: Value = 2
-                         ) -> Generator[None, None, str]:
+    def socket_read_line(
+        self, socket_name: Value = 'socket_0', timeout: Value = 2
+    ) -> Generator[None, None, str]:
         """Read up to the end of the line; the result is without it."""
         data = yield from self._wait(socket_name, timeout, _through(b'\n'))
         return '' if data is None else data.decode('latin-1').rstrip('\r\n')
 
-    def socket_get_var(self, name: Value, socket_name: Value = 'socket_0'
-                       ) -> Generator[None, None, int]:
+    def socket_get_var(
+        self, name: Value, socket_name: Value = 'socket_0'
+    ) -> Generator[None, None, int]:
         """Ask for a variable by `GET name`, expect `name value`; 0 for a timeout."""
         self._send(f'GET {text(name, "name")}\n'.encode('latin-1'), socket_name)
         answer = yield from self.socket_read_line(socket_name)
@@ -173,6 +180,7 @@ def _exactly(size: int) -> Callable[[bytearray], bytes | None]:
         data = bytes(received[:size])
         del received[:size]
         return data
+
     return take
 
 
@@ -181,9 +189,10 @@ def _through(end: bytes) -> Callable[[bytearray], bytes | None]:
         at = received.find(end)
         if at < 0:
             return None
-        data = bytes(received[:at + len(end)])
-        del received[:at + len(end)]
+        data = bytes(received[: at + len(end)])
+        del received[: at + len(end)]
         return data
+
     return take
 
 
@@ -197,6 +206,7 @@ def _between(before: bytes, after: bytes) -> Callable[[bytearray], bytes | None]
         if end < 0:
             return None
         data = bytes(received[start:end])
-        del received[:end + len(after)]
+        del received[: end + len(after)]
         return data
+
     return take

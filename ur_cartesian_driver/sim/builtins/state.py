@@ -55,11 +55,11 @@ class TimeBuiltins:
         nanoseconds = round(self._controller.time * 1e9)
         return Struct({'sec': nanoseconds // 10**9, 'nanosec': nanoseconds % 10**9})
 
-    def interpreter_mode(self, clearQueueOnEnter: Value = True, clearOnEnd: Value = True
-                         ) -> Steps:
+    def interpreter_mode(self, clearQueueOnEnter: Value = True, clearOnEnd: Value = True) -> Steps:
         """Execute what the clients of the interpreter port send, until it is ended."""
         yield from self._controller.interpreter.run(
-            clear_queue=truth(clearQueueOnEnter), clear_on_end=truth(clearOnEnd))
+            clear_queue=truth(clearQueueOnEnter), clear_on_end=truth(clearOnEnd)
+        )
 
     def end_interpreter(self) -> None:
         """End the interpreter mode after the statement that is being executed."""
@@ -69,12 +69,15 @@ class TimeBuiltins:
         """Forget what statements have made after the one that is being executed."""
         self._controller.interpreter.clear()
 
-    def rtde_set_watchdog(self, variable_name: Value, min_frequency: Value,
-                          action: Value = 'pause') -> None:
+    def rtde_set_watchdog(
+        self, variable_name: Value, min_frequency: Value, action: Value = 'pause'
+    ) -> None:
         """Watch how often an input is written; the watch ends with the program."""
         self._controller.watch_input(
-            text(variable_name, 'variable_name'), not_negative(min_frequency, 'min_frequency'),
-            text(action, 'action'))
+            text(variable_name, 'variable_name'),
+            not_negative(min_frequency, 'min_frequency'),
+            text(action, 'action'),
+        )
 
 
 class PeopleBuiltins:
@@ -88,11 +91,22 @@ class PeopleBuiltins:
         """Write to the log: all clients of the primary interface see it."""
         self._controller.announcements.text(to_text(s1) + to_text(s2))
 
-    def popup(self, s: Value, title: Value = 'Popup', warning: Value = False,
-              error: Value = False, blocking: Value = False) -> Steps:
+    def popup(
+        self,
+        s: Value,
+        title: Value = 'Popup',
+        warning: Value = False,
+        error: Value = False,
+        blocking: Value = False,
+    ) -> Steps:
         """Show a window; a blocking one holds its thread until it is closed."""
-        popup = Popup(text=to_text(s), title=to_text(title), warning=truth(warning),
-                      error=truth(error), blocking=truth(blocking))
+        popup = Popup(
+            text=to_text(s),
+            title=to_text(title),
+            warning=truth(warning),
+            error=truth(error),
+            blocking=truth(blocking),
+        )
         self._controller.show_popup(popup)
         while popup.blocking and popup.open:
             yield
@@ -166,15 +180,23 @@ class RobotBuiltins:
     def zero_ftsensor(self) -> None:
         """Do nothing: the sensor reads zero."""
 
-    def ft_rtde_input_enable(self, enable: Value, sensor_mass: Value = 0,
-                             sensor_measuring_offset: Value = None, sensor_cog: Value = None
-                             ) -> None:
+    def ft_rtde_input_enable(
+        self,
+        enable: Value,
+        sensor_mass: Value = 0,
+        sensor_measuring_offset: Value = None,
+        sensor_cog: Value = None,
+    ) -> None:
         """Take the force of an external sensor from RTDE."""
         self._controller.external_ft = truth(enable)
 
-    def enable_external_ft_sensor(self, enable: Value, sensor_mass: Value = 0,
-                                  sensor_measuring_offset: Value = None, sensor_cog: Value = None
-                                  ) -> None:
+    def enable_external_ft_sensor(
+        self,
+        enable: Value,
+        sensor_mass: Value = 0,
+        sensor_measuring_offset: Value = None,
+        sensor_cog: Value = None,
+    ) -> None:
         """Take the force of an external sensor from RTDE: the old name."""
         self._controller.external_ft = truth(enable)
 
@@ -183,16 +205,19 @@ class RobotBuiltins:
         centre = (0.0, 0.0, 0.0) if cog is None else three(cog, 'cog')
         self._controller.payload = Payload(mass=not_negative(m, 'm'), cog=centre)
 
-    def set_target_payload(self, m: Value, cog: Value, inertia: Value = None,
-                           transition_time: Value = 0) -> None:
+    def set_target_payload(
+        self, m: Value, cog: Value, inertia: Value = None, transition_time: Value = 0
+    ) -> None:
         """Set mass [kg], centre of gravity [m] and inertia [kg m^2], at once."""
         not_negative(transition_time, 'transition_time')
         matrix = (0.0,) * 6 if inertia is None else six(inertia, 'inertia')
         if min(matrix[:3]) < 0.0 or max(abs(item) for item in matrix) > 133.0:
             raise RuntimeException(
-                'inertia must lie within -133..133, and its first three items not below 0')
+                'inertia must lie within -133..133, and its first three items not below 0'
+            )
         self._controller.payload = Payload(
-            mass=not_negative(m, 'm'), cog=three(cog, 'cog'), inertia=matrix)
+            mass=not_negative(m, 'm'), cog=three(cog, 'cog'), inertia=matrix
+        )
 
     def get_target_payload(self) -> float:
         """Return the mass [kg]."""
@@ -226,7 +251,8 @@ class RobotBuiltins:
         turn = 2.0 * pi
         counted = [
             q + turn * round((close - q) / turn) if isinf(high - low) else q
-            for q, close, (low, high) in zip(self._motion.q, near, limits, strict=True)]
+            for q, close, (low, high) in zip(self._motion.q, near, limits, strict=True)
+        ]
         if counted != list(self._motion.q):
             self._controller.teleport(six(counted, 'q'))
 

@@ -68,8 +68,9 @@ class Branch:
                 step *= 0.5
         return q
 
-    def _continued(self, step: Callable[[float], Place], q: Vector6, begin: float, end: float,
-                   halvings: int) -> Vector6 | None:
+    def _continued(
+        self, step: Callable[[float], Place], q: Vector6, begin: float, end: float, halvings: int
+    ) -> Vector6 | None:
         """
         Return the joints at the end of a step, come to in small steps where the arm changes sides.
 
@@ -77,8 +78,12 @@ class Branch:
         """
         place = step(end)
         after = self._nearest(place, q)
-        if halvings <= 0 or after is None or not isinstance(place, Pose) \
-                or not self.reach.changes_sides(q, after):
+        if (
+            halvings <= 0
+            or after is None
+            or not isinstance(place, Pose)
+            or not self.reach.changes_sides(q, after)
+        ):
             return after
         middle = 0.5 * (begin + end)
         half = self._continued(step, q, begin, middle, halvings - 1)

@@ -145,16 +145,22 @@ class MotionGenerator:
 
     # -- calls -------------------------------------------------------------------------------
 
-    def movej(self, q: Vector6, a: float = 1.4, v: float = 1.05, t: float = 0.0,
-              r: float = 0.0) -> Move:
+    def movej(
+        self, q: Vector6, a: float = 1.4, v: float = 1.05, t: float = 0.0, r: float = 0.0
+    ) -> Move:
         """Go straight in joint space; a, v of the leading axis [rad/s^2, rad/s], r [m]."""
         return self._follow('movej', self._joint_leg(q), Law(acceleration=a, speed=v, time=t), r)
 
-    def movel(self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, t: float = 0.0,
-              r: float = 0.0) -> Move:
+    def movel(
+        self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, t: float = 0.0, r: float = 0.0
+    ) -> Move:
         """Go straight with the tool; a, v [m/s^2, m/s; for rotations rad], t [s], r [m]."""
-        return self._follow('movel', lambda start: Line(start.pose, T_base_tcp),
-                            Law(acceleration=a, speed=v, time=t), r)
+        return self._follow(
+            'movel',
+            lambda start: Line(start.pose, T_base_tcp),
+            Law(acceleration=a, speed=v, time=t),
+            r,
+        )
 
     def movep(self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, r: float = 0.0) -> Move:
         """
@@ -164,49 +170,62 @@ class MotionGenerator:
         harder than ``a`` where it has to.
         """
         radius = self._drivable('movep', r, v)
-        return self._follow('movep', lambda start: Line(start.pose, T_base_tcp),
-                            constant_speed(a, v, radius), radius)
+        return self._follow(
+            'movep',
+            lambda start: Line(start.pose, T_base_tcp),
+            constant_speed(a, v, radius),
+            radius,
+        )
 
-    def movec(self, via: Pose, to: Pose, a: float = 1.2, v: float = 0.25, r: float = 0.0,
-              mode: int = 0) -> Move:
+    def movec(
+        self, via: Pose, to: Pose, a: float = 1.2, v: float = 0.25, r: float = 0.0, mode: int = 0
+    ) -> Move:
         """
         Go on a circle; mode 1 keeps the orientation fixed to the tangent.
 
         :raises MotionError: the three points do not lie on a circle.
         """
-        return self._follow('movec', lambda start: Arc(start.pose, via.position, to, mode == 1),
-                            Law(acceleration=a, speed=v), self._drivable('movec', r, v))
+        return self._follow(
+            'movec',
+            lambda start: Arc(start.pose, via.position, to, mode == 1),
+            Law(acceleration=a, speed=v),
+            self._drivable('movec', r, v),
+        )
 
     def optimovej(self, q: Vector6, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
         """Like movej with limited jerk; a, v fractions in (0, 1] of what the joints can do."""
         check_fractions('optimovej', a, v)
-        return self._follow('optimovej', self._joint_leg(q),
-                            self._optimal(a, v), r)
+        return self._follow('optimovej', self._joint_leg(q), self._optimal(a, v), r)
 
     def optimovel(self, T_base_tcp: Pose, a: float = 0.3, v: float = 0.3, r: float = 0.0) -> Move:
         """Like movel with limited jerk; a, v fractions in (0, 1] of what the joints can do."""
         check_fractions('optimovel', a, v)
-        return self._follow('optimovel', lambda start: Line(start.pose, T_base_tcp),
-                            self._optimal(a, v), r)
+        return self._follow(
+            'optimovel', lambda start: Line(start.pose, T_base_tcp), self._optimal(a, v), r
+        )
 
-    def servoj(self, q: Vector6, t: float, lookahead_time: float = 0.1,
-               gain: float = 300.0) -> Move:
+    def servoj(
+        self, q: Vector6, t: float, lookahead_time: float = 0.1, gain: float = 300.0
+    ) -> Move:
         """Be drawn to ``q`` for ``t`` scaled seconds."""
-        servo = Servo(self.q, self._nominal_joint_speed(), q, t, lookahead_time, gain,
-                      MAX_JOINT_ACCELERATION)
+        servo = Servo(
+            self.q, self._nominal_joint_speed(), q, t, lookahead_time, gain, MAX_JOINT_ACCELERATION
+        )
         return self._take_over(servo)
 
     def speedj(self, qd: Vector6, a: float, t: float | None = None) -> Move:
         """Change to joint speeds [rad/s] and hold them; return after ``t`` or when reached."""
         return self._take_over(JointSpeed(self.q, self._nominal_joint_speed(), qd, a, t))
 
-    def speedl(self, twist: Vector6, a: float, t: float | None = None,
-               a_rot: float | None = None) -> Move:
+    def speedl(
+        self, twist: Vector6, a: float, t: float | None = None, a_rot: float | None = None
+    ) -> Move:
         """Change to a tool speed (base axes [m/s, rad/s]) and hold it."""
         motion = self._motion
         now = motion.twist if isinstance(motion, ToolSpeed) else self._unscaled(self._real_twist())
-        return self._take_over(ToolSpeed(
-            self.T_base_tcp, now, twist, a, a if a_rot is None else a_rot, t))
+        return self._take_over(
+            ToolSpeed(self.T_base_tcp, now, twist, a, a if a_rot is None else a_rot, t)
+        )
 
     def stopj(self, a: float) -> Move:
         """
@@ -220,8 +239,9 @@ class MotionGenerator:
         """Brake along the tool's tangent; in real time, and a cycle at least."""
         if not self.moving:
             return self.stopj(a)
-        return self._take_over(ToolStop(
-            self.T_base_tcp, self._real_twist(), a, a if a_rot is None else a_rot))
+        return self._take_over(
+            ToolStop(self.T_base_tcp, self._real_twist(), a, a if a_rot is None else a_rot)
+        )
 
     def halt_hard(self) -> None:
         """Stay where the target is (the power is cut); a running call returns as aborted."""
@@ -287,8 +307,11 @@ class MotionGenerator:
             if ratio == inf:
                 break
             # A jump to another branch does not shrink with the step: creep up to its place.
-            jump = is_singular(self.q, q, self.T_base_tcp, place) if isinstance(
-                place, Pose) else self._on_tool_path and joints > _JUMP_RATIO
+            jump = (
+                is_singular(self.q, q, self.T_base_tcp, place)
+                if isinstance(place, Pose)
+                else self._on_tool_path and joints > _JUMP_RATIO
+            )
             before, h = (h, ratio), h / (2.0 if jump else _cut((h, ratio), before))
         if isinstance(motion, ToolStop):
             # No straight line left: brake in joint space.
@@ -349,12 +372,20 @@ class MotionGenerator:
             return
         slowed = self._rate < self._scale / _WITHIN
         hard = isinstance(track.pieces[track.index].path, Fillet) and (
-            lead(self.qdd, _STILL) > MAX_JOINT_ACCELERATION)
+            lead(self.qdd, _STILL) > MAX_JOINT_ACCELERATION
+        )
         if slowed or hard:
             self._too_fast = call
-            self._warn(196, 0, 'MoveP speed too high: ' + (
-                'the arm cannot keep it here.' if slowed else
-                'a joint would need too much acceleration in a blend; enlarge its radius.'))
+            self._warn(
+                196,
+                0,
+                'MoveP speed too high: '
+                + (
+                    'the arm cannot keep it here.'
+                    if slowed
+                    else 'a joint would need too much acceleration in a blend; enlarge its radius.'
+                ),
+            )
 
     def _come_to_rest(self) -> None:
         """End what has come to rest, and begin what waited for that."""
@@ -371,8 +402,9 @@ class MotionGenerator:
     def _run_out(self, motion: JointSpeed | Servo | ToolSpeed) -> _Motion:
         """Brake, because nobody has called again in time."""
         if isinstance(motion, ToolSpeed):
-            return ToolStop(self.T_base_tcp, self._real_twist(), motion.acceleration,
-                            motion.acceleration_rot)
+            return ToolStop(
+                self.T_base_tcp, self._real_twist(), motion.acceleration, motion.acceleration_rot
+            )
         a = RUN_OUT_BRAKING if isinstance(motion, Servo) else motion.acceleration
         return JointStop(self.q, self._real_joint_speed(), a)
 
@@ -381,8 +413,13 @@ class MotionGenerator:
     def _joint_leg(self, q: Vector6) -> Callable[[Start], Leg]:
         return lambda start: JointLine(start.q, q, self._forward)
 
-    def _follow(self, name: str, leg: Callable[[Start], Leg],
-                law: Law | Callable[[Leg, Start], Law], radius: float) -> Move:
+    def _follow(
+        self,
+        name: str,
+        leg: Callable[[Start], Leg],
+        law: Law | Callable[[Leg, Start], Law],
+        radius: float,
+    ) -> Move:
         chosen = (lambda _leg, _start: law) if isinstance(law, Law) else law
         if isinstance(law, Law):
             check_law(name, law)
@@ -439,9 +476,14 @@ class MotionGenerator:
         blended, whole = joined(track, leg, law, call.radius, call.move, circular)
         way = _length(pose, leg)
         if not whole and call.radius <= 0.0 and way <= before.radius:
-            self._warn(197, 0, (
-                f'Blend overlap: the waypoint of this {call.name} lies within the blend before '
-                'it, so the arm stops at the waypoint before.'))
+            self._warn(
+                197,
+                0,
+                (
+                    f'Blend overlap: the waypoint of this {call.name} lies within the blend before '
+                    'it, so the arm stops at the waypoint before.'
+                ),
+            )
         room = way - call.radius - (before.radius if call.radius > 0.0 else 0.0)
         self._run(track, blended, call, room)
 
@@ -472,9 +514,14 @@ class MotionGenerator:
         """Return the radius, 0 where the tool passes it within one cycle: that is no blend."""
         if not 0.0 < radius < speed * self.cycle:
             return radius
-        self._warn(171, TOO_SMALL[name], (
-            f'Blend radius too small in a {name}: {radius:g} m is less than the way of one cycle, '
-            'so the arm stops at the waypoint.'))
+        self._warn(
+            171,
+            TOO_SMALL[name],
+            (
+                f'Blend radius too small in a {name}: {radius:g} m is less than the way of one cycle, '
+                'so the arm stops at the waypoint.'
+            ),
+        )
         return 0.0
 
     def _warn(self, code: int, argument: int, text: str) -> None:
@@ -513,6 +560,7 @@ class MotionGenerator:
     def _optimal(self, a: float, v: float) -> Callable[[Leg, Start], Law]:
         def law(leg: Leg, start: Start) -> Law:
             return self._reach.fastest(leg, start.q, self._T_tcp_flange, a, v)
+
         return law
 
     def _real_joint_speed(self) -> Vector6:

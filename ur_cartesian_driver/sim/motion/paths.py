@@ -73,8 +73,7 @@ class JointLine:
     :param forward: joint positions to T_base_tcp.
     """
 
-    def __init__(self, start: Vector6, end: Vector6,
-                 forward: Callable[[Vector6], Pose]) -> None:
+    def __init__(self, start: Vector6, end: Vector6, forward: Callable[[Vector6], Pose]) -> None:
         """Take the leading axis: the one with the longest way."""
         self.start, self.end, self._forward = start, end, forward
         self._way = tuple(b - a for a, b in zip(start, end, strict=True))
@@ -87,8 +86,14 @@ class JointLine:
             return self.end
         f = s / self.length
         a, w = self.start, self._way
-        return (a[0] + f * w[0], a[1] + f * w[1], a[2] + f * w[2],
-                a[3] + f * w[3], a[4] + f * w[4], a[5] + f * w[5])
+        return (
+            a[0] + f * w[0],
+            a[1] + f * w[1],
+            a[2] + f * w[2],
+            a[3] + f * w[3],
+            a[4] + f * w[4],
+            a[5] + f * w[5],
+        )
 
     def pose(self, s: float) -> Pose:
         """Return T_base_tcp."""
@@ -160,8 +165,13 @@ class Arc:
         return atan2(_dot(r, self._y), _dot(r, self._x)) % (2.0 * pi)
 
     def _place(self, angle: float) -> Pose:
-        position = _plus(self.centre, _plus(
-            _times(self._x, self.radius * cos(angle)), _times(self._y, self.radius * sin(angle))))
+        position = _plus(
+            self.centre,
+            _plus(
+                _times(self._x, self.radius * cos(angle)),
+                _times(self._y, self.radius * sin(angle)),
+            ),
+        )
         if self._fixed:
             turn = quaternion_from_rotation_vector(_times(self.normal, angle))
             return Pose(position, multiply(turn, self.start.quaternion))
@@ -189,8 +199,14 @@ class JointCorner:
         a = self._before.at(self._before.length - self._tail * (1.0 - u) ** 2)
         b = self._after.at(self._head * u * u)
         w = self._before.end
-        return (a[0] + b[0] - w[0], a[1] + b[1] - w[1], a[2] + b[2] - w[2],
-                a[3] + b[3] - w[3], a[4] + b[4] - w[4], a[5] + b[5] - w[5])
+        return (
+            a[0] + b[0] - w[0],
+            a[1] + b[1] - w[1],
+            a[2] + b[2] - w[2],
+            a[3] + b[3] - w[3],
+            a[4] + b[4] - w[4],
+            a[5] + b[5] - w[5],
+        )
 
 
 class ToolCorner:
@@ -214,8 +230,10 @@ class ToolCorner:
         a = self._before.pose(self._before.length - self._tail * (1.0 - u) ** 2)
         b = self._after.pose(self._head * u * u)
         back = conjugate(self._waypoint.quaternion)
-        return Pose(_minus(_plus(a.position, b.position), self._waypoint.position),
-                    multiply(a.quaternion, multiply(back, b.quaternion)))
+        return Pose(
+            _minus(_plus(a.position, b.position), self._waypoint.position),
+            multiply(a.quaternion, multiply(back, b.quaternion)),
+        )
 
 
 class Fillet:
@@ -248,9 +266,16 @@ class Fillet:
         if u >= 1.0:
             return turned
         phi = self.angle * u
-        return Pose(_plus(self.centre, _plus(
-            _times(self._x, self.radius * cos(phi)), _times(self._y, self.radius * sin(phi)))),
-            turned.quaternion)
+        return Pose(
+            _plus(
+                self.centre,
+                _plus(
+                    _times(self._x, self.radius * cos(phi)),
+                    _times(self._y, self.radius * sin(phi)),
+                ),
+            ),
+            turned.quaternion,
+        )
 
 
 Corner: TypeAlias = JointCorner | ToolCorner | Fillet
@@ -271,8 +296,12 @@ def corner(before: Leg, tail: float, after: Leg, head: float, circular: bool) ->
     """
     if isinstance(before, JointLine) and isinstance(after, JointLine):
         return JointCorner(before, tail, after, head)
-    if (circular and isinstance(before, Line) and isinstance(after, Line)
-            and _STRAIGHT < fillet_angle(before, after) < pi - _STRAIGHT):
+    if (
+        circular
+        and isinstance(before, Line)
+        and isinstance(after, Line)
+        and _STRAIGHT < fillet_angle(before, after) < pi - _STRAIGHT
+    ):
         return Fillet(before, tail, after, head)
     return ToolCorner(before, tail, after, head)
 
@@ -324,11 +353,13 @@ def _check_circle(a: Vector3, b: Vector3, n: Vector3) -> None:
     if min(sides) < _COINCIDENT:
         raise MotionError(
             'movec needs three different points: start, via and target; two of them are '
-            f'{min(sides):.2g} m apart. A full circle takes two arcs.')
+            f'{min(sides):.2g} m apart. A full circle takes two arcs.'
+        )
     if _norm(n) < _COLLINEAR * sides[0] * sides[1]:
         raise MotionError(
             'movec: start, via and target lie on one straight line, which is no circle; '
-            'use movel or move the via point aside.')
+            'use movel or move the via point aside.'
+        )
 
 
 def _plus(a: Vector3, b: Vector3) -> Vector3:

@@ -31,7 +31,8 @@ class _Phase:
 
     def position_after(self, t: float) -> float:
         return self.position + t * (
-            self.speed + t * (self.acceleration / 2.0 + t * self.jerk / 6.0))
+            self.speed + t * (self.acceleration / 2.0 + t * self.jerk / 6.0)
+        )
 
     def speed_after(self, t: float) -> float:
         return self.speed + t * (self.acceleration + t * self.jerk / 2.0)
@@ -88,8 +89,7 @@ class Profile:
         return found
 
 
-def _chain(length: float, speed: float,
-           phases: Iterable[tuple[float, float, float]]) -> Profile:
+def _chain(length: float, speed: float, phases: Iterable[tuple[float, float, float]]) -> Profile:
     """Join phases given as (duration, acceleration at the beginning, jerk)."""
     time = position = 0.0
     chain: list[_Phase] = []
@@ -102,8 +102,13 @@ def _chain(length: float, speed: float,
     return Profile(length, time, tuple(chain))
 
 
-def trapezoid(length: float, acceleration: float, speed: float, start_speed: float = 0.0,
-              braking: float | None = None) -> Profile:
+def trapezoid(
+    length: float,
+    acceleration: float,
+    speed: float,
+    start_speed: float = 0.0,
+    braking: float | None = None,
+) -> Profile:
     """
     Accelerate, cruise, brake to rest.
 
@@ -117,16 +122,21 @@ def trapezoid(length: float, acceleration: float, speed: float, start_speed: flo
     if length <= 0.0:
         return Profile(0.0, 0.0, (_Phase(0.0, 0.0, 0.0, 0.0, 0.0),))
     if start_speed * start_speed >= 2.0 * b * length:
-        return _chain(length, start_speed, [
-            (2.0 * length / start_speed, -start_speed * start_speed / (2.0 * length), 0.0)])
-    reachable = sqrt((2.0 * length + start_speed**2 / acceleration)
-                     / (1.0 / acceleration + 1.0 / b))
+        return _chain(
+            length,
+            start_speed,
+            [(2.0 * length / start_speed, -start_speed * start_speed / (2.0 * length), 0.0)],
+        )
+    reachable = sqrt(
+        (2.0 * length + start_speed**2 / acceleration) / (1.0 / acceleration + 1.0 / b)
+    )
     rate = acceleration if start_speed <= speed else -b
     peak = min(speed, reachable)
     up, down = (peak - start_speed) / rate, peak / b
     cruise = (length - 0.5 * (start_speed + peak) * up - 0.5 * peak * down) / peak
-    return _chain(length, start_speed,
-                  [(up, rate, 0.0), (max(cruise, 0.0), 0.0, 0.0), (down, -b, 0.0)])
+    return _chain(
+        length, start_speed, [(up, rate, 0.0), (max(cruise, 0.0), 0.0, 0.0), (down, -b, 0.0)]
+    )
 
 
 def timed_cruise(length: float, duration: float, start_speed: float = 0.0) -> float:
@@ -151,8 +161,11 @@ def timed(length: float, duration: float, start_speed: float = 0.0) -> Profile:
         return Profile(0.0, duration, (_Phase(0.0, 0.0, 0.0, 0.0, 0.0),))
     x, y = _timed_ramps(length, duration, start_speed)
     c = timed_cruise(length, duration, start_speed)
-    return _chain(length, start_speed, [
-        (x, (c - start_speed) / x, 0.0), (duration - x - y, 0.0, 0.0), (y, -c / y, 0.0)])
+    return _chain(
+        length,
+        start_speed,
+        [(x, (c - start_speed) / x, 0.0), (duration - x - y, 0.0, 0.0), (y, -c / y, 0.0)],
+    )
 
 
 def _timed_ramps(length: float, duration: float, start_speed: float) -> tuple[float, float]:
@@ -165,12 +178,12 @@ def _timed_ramps(length: float, duration: float, start_speed: float) -> tuple[fl
 def ramp(length: float, start_speed: float, end_speed: float) -> Profile:
     """Change the speed evenly over the length: T = 2 d / (v0 + v1)."""
     duration = 2.0 * length / (start_speed + end_speed)
-    return _chain(length, start_speed,
-                  [(duration, (end_speed - start_speed) / duration, 0.0)])
+    return _chain(length, start_speed, [(duration, (end_speed - start_speed) / duration, 0.0)])
 
 
-def s_curve(length: float, acceleration: float, speed: float, jerk: float,
-            start_speed: float = 0.0) -> Profile:
+def s_curve(
+    length: float, acceleration: float, speed: float, jerk: float, start_speed: float = 0.0
+) -> Profile:
     """
     Accelerate, cruise, brake to rest with limited jerk.
 
@@ -181,8 +194,9 @@ def s_curve(length: float, acceleration: float, speed: float, jerk: float,
         return trapezoid(length, acceleration, speed)
 
     def distance(cruise: float) -> float:
-        return (_s_distance(start_speed, cruise, acceleration, jerk)
-                + _s_distance(cruise, 0.0, acceleration, jerk))
+        return _s_distance(start_speed, cruise, acceleration, jerk) + _s_distance(
+            cruise, 0.0, acceleration, jerk
+        )
 
     if start_speed > 0.0 and distance(min(start_speed, speed)) > length:
         return trapezoid(length, acceleration, speed, start_speed)
@@ -194,9 +208,15 @@ def s_curve(length: float, acceleration: float, speed: float, jerk: float,
             low, high = (middle, high) if distance(middle) <= length else (low, middle)
         peak = low
     cruise = max(length - distance(peak), 0.0) / peak
-    return _chain(length, start_speed, [
-        *_s_ramp(start_speed, peak, acceleration, jerk), (cruise, 0.0, 0.0),
-        *_s_ramp(peak, 0.0, acceleration, jerk)])
+    return _chain(
+        length,
+        start_speed,
+        [
+            *_s_ramp(start_speed, peak, acceleration, jerk),
+            (cruise, 0.0, 0.0),
+            *_s_ramp(peak, 0.0, acceleration, jerk),
+        ],
+    )
 
 
 def _s_times(change: float, acceleration: float, jerk: float) -> tuple[float, float]:
@@ -212,8 +232,9 @@ def _s_distance(start: float, end: float, acceleration: float, jerk: float) -> f
     return 0.5 * (start + end) * (2.0 * rise + hold)
 
 
-def _s_ramp(start: float, end: float, acceleration: float,
-            jerk: float) -> list[tuple[float, float, float]]:
+def _s_ramp(
+    start: float, end: float, acceleration: float, jerk: float
+) -> list[tuple[float, float, float]]:
     rise, hold = _s_times(abs(end - start), acceleration, jerk)
     j = jerk if end >= start else -jerk
     return [(rise, 0.0, j), (hold, j * rise, 0.0), (rise, j * rise, -j)]

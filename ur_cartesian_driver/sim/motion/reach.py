@@ -73,8 +73,11 @@ class Reach:
         """
         upper_arm, forearm, wrist = self._lengths
         angle = q[1] + q[2]
-        return (upper_arm * cos(q[1]) + forearm * cos(angle) + wrist * sin(angle + q[3]),
-                sin(q[2]), sin(q[4]))
+        return (
+            upper_arm * cos(q[1]) + forearm * cos(angle) + wrist * sin(angle + q[3]),
+            sin(q[2]),
+            sin(q[4]),
+        )
 
     def overspeed(self, q: Vector6, q_before: Vector6) -> float:
         """
@@ -85,7 +88,8 @@ class Reach:
         """
         worst = 0.0
         for new, old, fastest, (low, high) in zip(
-                q, q_before, self._speeds, self._limits, strict=True):
+            q, q_before, self._speeds, self._limits, strict=True
+        ):
             way = abs(new - old)
             if way < NO_CHANGE:
                 continue
@@ -102,17 +106,32 @@ class Reach:
         """Return why the way from ``q`` to ``q_next`` (None: no solution) cannot be gone."""
         for i, (position, (low, high)) in enumerate(zip(q, self._limits, strict=True)):
             if position - low < _AT_LIMIT or high - position < _AT_LIMIT:
-                return MotionFault(code=191, argument=1, text=(
-                    f'Joint position limit: joint {i} stands at {position:.4f} rad and would '
-                    f'leave [{low:.4f}, {high:.4f}].'))
+                return MotionFault(
+                    code=191,
+                    argument=1,
+                    text=(
+                        f'Joint position limit: joint {i} stands at {position:.4f} rad and would '
+                        f'leave [{low:.4f}, {high:.4f}].'
+                    ),
+                )
         if q_next is None:
-            return MotionFault(code=154, argument=0, text=(
-                'Position in singularity: the path goes on where there is no inverse kinematics '
-                'solution.'))
+            return MotionFault(
+                code=154,
+                argument=0,
+                text=(
+                    'Position in singularity: the path goes on where there is no inverse kinematics '
+                    'solution.'
+                ),
+            )
         joint = max(range(6), key=lambda i: abs(q[i] - q_next[i]))
-        return MotionFault(code=204, argument=7, text=(
-            'Robot approaching singularity: acceleration threshold failed, joint '
-            f'{joint} would have to turn at once.'))
+        return MotionFault(
+            code=204,
+            argument=7,
+            text=(
+                'Robot approaching singularity: acceleration threshold failed, joint '
+                f'{joint} would have to turn at once.'
+            ),
+        )
 
     def fastest(self, leg: Leg, q: Vector6, T_tcp_flange: Pose, a: float, v: float) -> Law:
         """
@@ -146,21 +165,32 @@ def is_singular(q_before: Vector6, q: Vector6, before: Pose, pose: Pose) -> bool
 
 def lead(a: Vector6, b: Vector6) -> float:
     """Return the largest difference of a joint."""
-    return max(abs(a[0] - b[0]), abs(a[1] - b[1]), abs(a[2] - b[2]),
-               abs(a[3] - b[3]), abs(a[4] - b[4]), abs(a[5] - b[5]))
+    return max(
+        abs(a[0] - b[0]),
+        abs(a[1] - b[1]),
+        abs(a[2] - b[2]),
+        abs(a[3] - b[3]),
+        abs(a[4] - b[4]),
+        abs(a[5] - b[5]),
+    )
 
 
 def rate_of(after: Vector6, before: Vector6, rate: float) -> Vector6:
     """Return the difference times the rate [1/s]."""
-    return ((after[0] - before[0]) * rate, (after[1] - before[1]) * rate,
-            (after[2] - before[2]) * rate, (after[3] - before[3]) * rate,
-            (after[4] - before[4]) * rate, (after[5] - before[5]) * rate)
+    return (
+        (after[0] - before[0]) * rate,
+        (after[1] - before[1]) * rate,
+        (after[2] - before[2]) * rate,
+        (after[3] - before[3]) * rate,
+        (after[4] - before[4]) * rate,
+        (after[5] - before[5]) * rate,
+    )
 
 
 def twist_between(before: Pose, after: Pose, rate: float) -> Vector6:
     """Return the mean twist between two poses, base axes."""
     (ax, ay, az), (bx, by, bz) = before.position, after.position
     wx, wy, wz = rotation_vector_from_quaternion(
-        multiply(after.quaternion, conjugate(before.quaternion)))
-    return ((bx - ax) * rate, (by - ay) * rate, (bz - az) * rate,
-            wx * rate, wy * rate, wz * rate)
+        multiply(after.quaternion, conjugate(before.quaternion))
+    )
+    return ((bx - ax) * rate, (by - ay) * rate, (bz - az) * rate, wx * rate, wy * rate, wz * rate)

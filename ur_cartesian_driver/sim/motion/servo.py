@@ -93,8 +93,12 @@ class Servo:
     def preview(self, h: float) -> tuple[Place, _JointState]:
         """Return the place and state after ``h`` seconds (semi-implicit Euler)."""
         bound = self.max_acceleration
-        qd = _six([v + h * min(max(self.gain * (wanted - (q + self.lookahead * v)), -bound), bound)
-                   for q, v, wanted in zip(self.q, self.qd, self.target, strict=True)])
+        qd = _six(
+            [
+                v + h * min(max(self.gain * (wanted - (q + self.lookahead * v)), -bound), bound)
+                for q, v, wanted in zip(self.q, self.qd, self.target, strict=True)
+            ]
+        )
         q = _add(self.q, qd, h)
         return q, (q, qd, self.elapsed + h)
 
@@ -157,7 +161,8 @@ class ToolSpeed:
     def preview(self, h: float) -> tuple[Place, _ToolState]:
         """Return the place and state after ``h`` seconds."""
         twist = _approach_twist(
-            self.twist, self.target, self.acceleration * h, self.acceleration_rot * h)
+            self.twist, self.target, self.acceleration * h, self.acceleration_rot * h
+        )
         pose = _moved(self.pose, self.twist, twist, h)
         return pose, (pose, twist, self.elapsed + h)
 
@@ -186,7 +191,8 @@ class ToolStop:
     def preview(self, h: float) -> tuple[Place, _ToolState]:
         """Return the place and state after ``h`` seconds."""
         twist = _approach_twist(
-            self.twist, _STILL, self.acceleration * h, self.acceleration_rot * h)
+            self.twist, _STILL, self.acceleration * h, self.acceleration_rot * h
+        )
         pose = _moved(self.pose, self.twist, twist, h)
         return pose, (pose, twist, 0.0)
 
@@ -226,8 +232,14 @@ def _moved(pose: Pose, before: Vector6, after: Vector6, h: float) -> Pose:
 
 
 def _add(a: Vector6, b: Vector6, f: float) -> Vector6:
-    return (a[0] + f * b[0], a[1] + f * b[1], a[2] + f * b[2],
-            a[3] + f * b[3], a[4] + f * b[4], a[5] + f * b[5])
+    return (
+        a[0] + f * b[0],
+        a[1] + f * b[1],
+        a[2] + f * b[2],
+        a[3] + f * b[3],
+        a[4] + f * b[4],
+        a[5] + f * b[5],
+    )
 
 
 def _minus(a: Vector6, b: Vector6) -> Vector6:

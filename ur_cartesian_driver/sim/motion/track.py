@@ -152,8 +152,9 @@ def from_rest(leg: Leg, law: Law, radius: float, call: Move) -> Track:
     return Track((piece,), Tip(leg, law, radius, _entry(piece, leg, radius), call))
 
 
-def joined(track: Track, leg: Leg, law: Law, radius: float, call: Move,
-           circular: bool) -> tuple[Track, bool]:
+def joined(
+    track: Track, leg: Leg, law: Law, radius: float, call: Move, circular: bool
+) -> tuple[Track, bool]:
     """
     Return the track with one more leg, blended where that is possible, and whether it is.
 
@@ -162,15 +163,14 @@ def joined(track: Track, leg: Leg, law: Law, radius: float, call: Move,
     does not leave the blend: then the arm stops at the waypoint. (Both legs share the speed
     through the corner, and a short one would be driven by the other's.)
     """
-    last, tip, ahead = track.pieces[-1], track.tip, track.pieces[track.index:-1]
+    last, tip, ahead = track.pieces[-1], track.tip, track.pieces[track.index : -1]
     now = track.time if track.index + 1 == len(track.pieces) else 0.0
     leave = max(now, tip.entry)
     tail = tip.leg.length - last.offset - last.profile.at(leave)
     speed = last.profile.speed(leave)
     head = None
     if speed > _NOTHING and tail > _NOTHING:
-        reach = distance(tip.leg.pose(tip.leg.length - tail).position,
-                         tip.leg.pose(inf).position)
+        reach = distance(tip.leg.pose(tip.leg.length - tail).position, tip.leg.pose(inf).position)
         head = head_within(leg, min(reach, tip.radius))
     if head is None:
         rest = from_rest(leg, law, radius, call)
@@ -178,11 +178,16 @@ def joined(track: Track, leg: Leg, law: Law, radius: float, call: Move,
         return Track(pieces, rest.tip, 0, track.time), False
     turn = corner(tip.leg, tail, leg, head, circular)
     through, after = _corner_profiles(
-        (turn.entry_rate, turn.exit_rate), speed, last.profile.duration - leave, tip.law, law,
-        head, leg.length - head)
+        (turn.entry_rate, turn.exit_rate),
+        speed,
+        last.profile.duration - leave,
+        tip.law,
+        law,
+        head,
+        leg.length - head,
+    )
     end = Piece(leg, after, head, after.duration)
-    pieces = (*ahead, replace(last, stop=leave),
-              Piece(turn, through, 0.0, through.duration), end)
+    pieces = (*ahead, replace(last, stop=leave), Piece(turn, through, 0.0, through.duration), end)
     new_tip = Tip(leg, law, radius, _entry(end, leg, radius), call)
     return Track(pieces, new_tip, 0, track.time), True
 
@@ -197,8 +202,15 @@ def _entry(piece: Piece, leg: Leg, radius: float) -> float:
     return piece.profile.time_at(leg.length - tail - piece.offset)
 
 
-def _corner_profiles(rates: tuple[float, float], speed: float, remaining: float, before: Law,
-                     after: Law, head: float, rest: float) -> tuple[Profile, Profile]:
+def _corner_profiles(
+    rates: tuple[float, float],
+    speed: float,
+    remaining: float,
+    before: Law,
+    after: Law,
+    head: float,
+    rest: float,
+) -> tuple[Profile, Profile]:
     """
     Return the profiles of the corner (0 to 1) and of the rest of the leg behind it.
 
