@@ -306,7 +306,8 @@ REFUSALS = [
     (
         with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.15, 0.0, 0.0))),
         InvalidGoal,
-        'segments[1].via gives no arc to point 1: the start, the via and the end of the arc lie on',
+        'segments[1].via gives no arc to point 1: the start, the via and the end of the arc lie '
+        'on',
     ),
     (
         with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.1, 0.0, 0.0))),
@@ -358,7 +359,8 @@ REFUSALS = [
     (
         with_segment(PLAIN, 1, blend_radius=0.11),
         InvalidGoal,
-        'segments[1].blend_radius is too large: the blends around points 0 and 1 reach 0 mm and 110',
+        'segments[1].blend_radius is too large: the blends around points 0 and 1 reach 0 mm and '
+        '110',
     ),
     (
         replace(

@@ -39,8 +39,8 @@ def test_an_empty_text_is_an_empty_goal(text):
     [
         (
             'trajectory: {points: [{}, {pose: {positon: {}}}]}',
-            'trajectory.points[1].pose.positon: there is no such field; trajectory.points[1].pose has '
-            'position, orientation.',
+            'trajectory.points[1].pose.positon: there is no such field; trajectory.points[1].pose '
+            'has position, orientation.',
         ),
         (
             'trajectry: {}',
@@ -63,7 +63,8 @@ def test_an_empty_text_is_an_empty_goal(text):
         ('execution: 300', 'execution is 300, but it is a whole number from 0 to 255.'),
         (
             'goal_time_tolerance: {sec: 0.5}',
-            'goal_time_tolerance.sec is 0.5, but it is a whole number from -2147483648 to 2147483647.',
+            'goal_time_tolerance.sec is 0.5, but it is a whole number from -2147483648 to '
+            '2147483647.',
         ),
         ('validate_only: 1', 'validate_only is 1, but it is true or false.'),
         ('[1, 2]', 'the goal is [1, 2], but it is a mapping of fields.'),

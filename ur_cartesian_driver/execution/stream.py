@@ -265,7 +265,7 @@ class StreamMachine(TrajectoryMachine):
             *super()._report(),
             (
                 f'the motion was brought to rest {times}, the last time behind point '
-                f'{self._closed_at}, because no more points came in time; what was appended later is '
-                'later by as much as that took'
+                f'{self._closed_at}, because no more points came in time; what was appended later '
+                'is later by as much as that took'
             ),
         )

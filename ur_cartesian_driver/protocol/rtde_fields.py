@@ -59,7 +59,9 @@ INPUT_TYPES: Mapping[str, DataType] = MappingProxyType(
         **_table(
             {
                 DataType.UINT32: 'speed_slider_mask',
-                DataType.DOUBLE: 'speed_slider_fraction standard_analog_output_0 standard_analog_output_1',
+                DataType.DOUBLE: (
+                    'speed_slider_fraction standard_analog_output_0 standard_analog_output_1'
+                ),
                 DataType.UINT8: """
             standard_digital_output_mask standard_digital_output configurable_digital_output_mask
             configurable_digital_output tool_digital_output_mask tool_digital_output

@@ -102,8 +102,8 @@ def standing(robot: RobotState | None, pulse: Pulse) -> tuple[str, ...]:
         'the robot has reported nothing'
         if robot is None
         else (
-            f'program {robot.runtime_state.name}, safety mode {robot.safety_mode.name}, robot mode '
-            f'{robot.robot_mode.name}, as the robot reported {pulse.report:.3f} s before'
+            f'program {robot.runtime_state.name}, safety mode {robot.safety_mode.name}, robot '
+            f'mode {robot.robot_mode.name}, as the robot reported {pulse.report:.3f} s before'
         )
     )
     return tuple(filter(None, (modes, pulse.line())))

@@ -75,7 +75,9 @@ SAFETY: Mapping[SafetyMode, Step | str | None] = MappingProxyType(
         SafetyMode.TP_THREE_POSITION_ENABLING_STOP: _ENABLE,
         SafetyMode.IMMI_EMERGENCY_STOP: _BUTTON,
         SafetyMode.IMMI_SAFEGUARD_STOP: _GUARD,
-        SafetyMode.PROFISAFE_WAITING_FOR_PARAMETERS: 'The safety system waits for the PROFIsafe controller: start that.',
+        SafetyMode.PROFISAFE_WAITING_FOR_PARAMETERS: (
+            'The safety system waits for the PROFIsafe controller: start that.'
+        ),
         SafetyMode.PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP: _GUARD,
         SafetyMode.PROFISAFE_SAFEGUARD_STOP: _GUARD,
         SafetyMode.PROFISAFE_EMERGENCY_STOP: _BUTTON,

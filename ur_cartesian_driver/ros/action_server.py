@@ -156,8 +156,8 @@ class CartesianActionServer:
                 Outcome(
                     code=ErrorCode.ROBOT_NOT_READY,
                     text=(
-                        f'{MOST_GOALS} goals are being planned, wait or run; send this one again when '
-                        'some of them have ended.'
+                        f'{MOST_GOALS} goals are being planned, wait or run; send this one again '
+                        'when some of them have ended.'
                     ),
                 ),
             )

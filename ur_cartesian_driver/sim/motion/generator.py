@@ -480,8 +480,8 @@ class MotionGenerator:
                 197,
                 0,
                 (
-                    f'Blend overlap: the waypoint of this {call.name} lies within the blend before '
-                    'it, so the arm stops at the waypoint before.'
+                    f'Blend overlap: the waypoint of this {call.name} lies within the blend '
+                    'before it, so the arm stops at the waypoint before.'
                 ),
             )
         room = way - call.radius - (before.radius if call.radius > 0.0 else 0.0)
@@ -518,8 +518,8 @@ class MotionGenerator:
             171,
             TOO_SMALL[name],
             (
-                f'Blend radius too small in a {name}: {radius:g} m is less than the way of one cycle, '
-                'so the arm stops at the waypoint.'
+                f'Blend radius too small in a {name}: {radius:g} m is less than the way of one '
+                'cycle, so the arm stops at the waypoint.'
             ),
         )
         return 0.0

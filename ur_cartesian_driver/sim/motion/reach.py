@@ -119,8 +119,8 @@ class Reach:
                 code=154,
                 argument=0,
                 text=(
-                    'Position in singularity: the path goes on where there is no inverse kinematics '
-                    'solution.'
+                    'Position in singularity: the path goes on where there is no inverse '
+                    'kinematics solution.'
                 ),
             )
         joint = max(range(6), key=lambda i: abs(q[i] - q_next[i]))
