@@ -248,8 +248,8 @@ class Observer:
             if not off
             else (
                 f'the robot program reports the end {off[0]:.4f} m or rad away from the last '
-                'point: it left out motions that it does not know; set wire_dialect to the version '
-                'of that program'
+                'point: it left out motions that it does not know; set wire_dialect to the '
+                'version of that program'
             )
         )
 
