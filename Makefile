@@ -15,7 +15,7 @@ export ROS_DOMAIN_ID
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH
 
-.PHONY: help setup demo demo-two test lint bench clean
+.PHONY: help setup hooks demo demo-two test lint bench clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 8
@@ -28,6 +28,9 @@ $(stamp): $(wildcard msg/* srv/* action/* cmake/*) CMakeLists.txt setup.py packa
 	@echo 'Setting up $(VENV): about a minute the first time.'
 	VENV=$(VENV) scripts/setup.sh
 	@touch $@
+
+hooks: $(stamp)  ## Check formatting, types and the message at each git commit
+	$(bin)/pre-commit install
 
 demo: $(stamp)  ## Simulated robot, driver and a client that moves it; draws the path
 	$(bin)/ur-cartesian demo
