@@ -15,10 +15,10 @@ export ROS_DOMAIN_ID
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH
 
-.PHONY: help setup hooks demo demo-two test lint bench clean
+.PHONY: help setup hooks demo demo-two test lint format bench clean
 
 help:  ## Show this list
-	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 8
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 15
 
 setup: $(stamp)  ## Make .venv with ROS 2, the tools and this package (PYTHON=python3.12 chooses one)
 
@@ -41,11 +41,16 @@ demo-two: $(stamp)  ## The same with two arms at once, each with a goal of its o
 test: lint  ## Lint, then all tests (PYTEST_ARGS='-k name' chooses)
 	$(bin)/pytest --no-skips $(PYTEST_ARGS)
 
-lint: $(stamp)  ## ruff, mypy, the rules for imports, spelling
+lint: $(stamp)  ## Formatting, ruff, mypy, the rules for imports, spelling
+	$(bin)/ruff format --check
 	$(bin)/ruff check
 	$(bin)/mypy
 	$(bin)/lint-imports --no-logo
 	$(bin)/codespell
+
+format: $(stamp)  ## Sort the imports and format all Python
+	$(bin)/ruff check --select I --fix
+	$(bin)/ruff format
 
 bench: $(stamp)  ## Measure, and print a table
 	$(bin)/python benchmark/run.py
