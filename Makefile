@@ -15,7 +15,7 @@ export ROS_DOMAIN_ID
 unexport _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH PYTHONHOME
 unexport AMENT_PREFIX_PATH CMAKE_PREFIX_PATH
 
-.PHONY: help setup hooks demo demo-two test lint format bench clean
+.PHONY: help setup hooks demo demo-two test lint format bench release-check clean
 
 help:  ## Show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 15
@@ -54,6 +54,9 @@ format: $(stamp)  ## Sort the imports and format all Python
 
 bench: $(stamp)  ## Measure, and print a table
 	$(bin)/python benchmark/run.py
+
+release-check: $(stamp)  ## Refuse placeholders, versions that disagree, an empty changelog
+	$(bin)/python scripts/check_release.py
 
 clean:  ## Remove all that was built or installed here
 	rm -rf $(VENV) build install log dist *.egg-info .*_cache .hypothesis

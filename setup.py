@@ -176,6 +176,7 @@ setup(
     license_files=['LICENSE'],
     maintainer=text('maintainer'),
     maintainer_email=PACKAGE.findall('maintainer')[0].get('email'),
+    project_urls={'Repository': text('url')},
     classifiers=[
         'Operating System :: POSIX :: Linux',
         'Programming Language :: Python :: 3.11',
