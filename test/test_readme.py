@@ -90,8 +90,10 @@ def snippets():
 
 
 def snippet(part):
-    """Return the one Python snippet of the README that contains a text."""
-    (found,) = [body for body in blocks(README, 'python') if part in body]
+    """Return the one Python snippet of all documents that contains a text."""
+    (found,) = [
+        body for document in DOCUMENTS for body in blocks(document, 'python') if part in body
+    ]
     return found
 
 
@@ -100,8 +102,13 @@ def snippet(part):
 
 @pytest.fixture(scope='module')
 def send_goal():
-    """Return the words of the README's ros2 action send_goal line."""
-    (found,) = [words for words in commands(README) if words[1:3] == ['action', 'send_goal']]
+    """Return the words of the one ros2 action send_goal line of all documents."""
+    (found,) = [
+        words
+        for document in DOCUMENTS
+        for words in commands(document)
+        if words[1:3] == ['action', 'send_goal']
+    ]
     return found
 
 
@@ -153,7 +160,12 @@ def test_what_where_prints_is_a_point_of_a_goal():
     assert (position.x, position.y, position.z) == pytest.approx(
         arm.forward(HOME).position, abs=1e-6
     )
-    (shown,) = [body for body in blocks(README, 'console') if 'ur-cartesian where' in body]
+    (shown,) = [
+        body
+        for document in DOCUMENTS
+        for body in blocks(document, 'console')
+        if 'ur-cartesian where' in body
+    ]
     assert printed.splitlines()[3:] == shown.splitlines()[4:]
 
 
@@ -245,6 +257,26 @@ def check_launch(words):
         assert f"'{word.split(':=')[0]}'" in text
 
 
+def sections(document):
+    """Return the anchors that GitHub gives the headings of a document."""
+    text = re.sub(r'^ *```.*?^ *```$', '', document.read_text('utf-8'), flags=re.DOTALL | re.M)
+    return [
+        re.sub(r'[^\w\- ]', '', heading.lower()).replace(' ', '-')
+        for heading in re.findall(r'^#+ (.*?)$', text, re.MULTILINE)
+    ]
+
+
+@pytest.mark.parametrize('document', DOCUMENTS, ids=name_of)
+def test_links_lead_to_sections(document):
+    text = document.read_text(encoding='utf-8')
+    missing = [
+        f'{target}#{section}'
+        for target, section in re.findall(r'\]\(([^)#:]*\.md|)#([^)]+)\)', text)
+        if section not in sections(document.parent / target if target else document)
+    ]
+    assert missing == []
+
+
 @pytest.mark.parametrize('document', DOCUMENTS, ids=name_of)
 def test_links_lead_to_files(document):
     text = document.read_text(encoding='utf-8')
@@ -284,15 +316,18 @@ def test_every_error_code_is_described_with_its_number():
 def test_every_parameter_that_is_named_as_one_exists():
     from ur_cartesian_driver.ros.parameters import defaults
 
-    (table,) = re.findall(
-        r'^\| parameter \|.*?\n\n', README.read_text(encoding='utf-8'), re.DOTALL | re.MULTILINE
-    )
     named = [
         name
+        for document in DOCUMENTS
+        for table in re.findall(
+            r'^\| parameter \|.*?\n\n',
+            document.read_text(encoding='utf-8'),
+            re.DOTALL | re.MULTILINE,
+        )
         for line in table.strip().splitlines()[2:]
         for name in re.findall(r'`(\w+)`', line.split('|')[1])
     ]
-    assert named
+    assert {'robot_ip', 'ur_type', 'max_tool_speed'} <= set(named)
     assert set(named) <= set(defaults())
 
 
