@@ -145,6 +145,22 @@ def test_send_goal_passes_planning_from_home_and_takes_ten_seconds(send_goal):
     assert [segment.length for segment in found.segments] == pytest.approx([0.2] * 4)
 
 
+def test_plain_goal_passes_planning_from_home():
+    from ur_cartesian_driver.cli.plans import standing_at
+    from ur_cartesian_driver.kinematics.chain import Arm
+    from ur_cartesian_driver.kinematics.robots import robot_model
+    from ur_cartesian_driver.planning import plan, PlanningOptions
+    from ur_cartesian_driver.ros.client import load_goal
+    from ur_cartesian_driver.ros.convert import goal_from_message
+    from ur_cartesian_driver.ros.frames import Frames
+    from ur_cartesian_driver.sim import HOME
+
+    (body,) = blocks(CHECKOUT / 'doc' / 'goals.md', 'yaml')
+    arm = Arm(robot_model('ur5e'))
+    goal = goal_from_message(load_goal(body), Frames(), now=0)
+    assert plan(goal, standing_at(arm, HOME), arm, PlanningOptions()).duration == 2.0
+
+
 def test_what_where_prints_is_a_point_of_a_goal():
     from ur_cartesian_driver.cli.commands import point_as_yaml
     from ur_cartesian_driver.cli.plans import standing_at
@@ -329,6 +345,14 @@ def test_every_parameter_that_is_named_as_one_exists():
     ]
     assert {'robot_ip', 'ur_type', 'max_tool_speed'} <= set(named)
     assert set(named) <= set(defaults())
+
+
+def test_every_example_is_listed():
+    text = (CHECKOUT / 'doc' / 'goals.md').read_text(encoding='utf-8')
+    listed = re.findall(r'\]\(\.\./config/examples/(\w+)\.yaml\)', text)
+    assert sorted(listed) == sorted(
+        path.stem for path in (share_path() / 'config' / 'examples').glob('*.yaml')
+    )
 
 
 def test_every_robot_model_is_listed():
