@@ -16,7 +16,7 @@ import threading
 
 import pytest
 
-from ur_cartesian_driver.cli import parser
+from ur_cartesian_driver.cli import main, parser
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.resources import share_path
 
@@ -185,6 +185,20 @@ def test_what_where_prints_is_a_point_of_a_goal():
     assert printed.splitlines()[3:] == shown.splitlines()[4:]
 
 
+def test_demo_plans_what_the_document_shows(capsys):
+    main(['validate', 'seam'])
+    printed = ' '.join(capsys.readouterr().out.split())
+    (shown,) = [
+        body
+        for body in blocks(CHECKOUT / 'doc' / 'getting_started.md', '')
+        if 'client are starting' in body
+    ]
+    plan = re.search(r'^plan:\n(.*?)^SUCCEEDED: ', shown, re.DOTALL | re.MULTILINE)[1]
+    lines = [line for line in plan.splitlines() if line != '...']
+    assert len(lines) == 6
+    assert [line for line in lines if line not in printed] == []
+
+
 # ---- snippets -----------------------------------------------------------------------------------
 
 
@@ -200,7 +214,7 @@ def test_snippet_without_ros_moves_the_arm(ur_sim, capsys):
         f"robot_ip='127.0.0.1', rtde_port={ports.rtde}, primary_port={ports.primary}, "
         'reverse_port=0, script_sender_port=0, trajectory_port=0, script_command_port=0'
     )
-    body = snippet('DriverConfig(')
+    body = snippet('outcome.code.name')
     assert "robot_ip='127.0.0.1'" in body
     exec(body.replace("robot_ip='127.0.0.1'", there), {})
     assert 'SUCCESSFUL All 2 points' in capsys.readouterr().out
@@ -230,10 +244,20 @@ def test_snippet_of_an_action_client_moves_the_arm(ur_sim, cartesian_driver):
 
 
 @pytest.mark.slow
-def test_snippet_of_a_test_passes(ur_sim, cartesian_driver):
-    names = {}
-    exec(snippet('def test_my_cell'), names)
-    names['test_my_cell'](ur_sim, cartesian_driver)
+@pytest.mark.parametrize('part', ['def test_my_cell', 'def test_arm_is_simulated'])
+def test_snippet_of_a_test_passes(part, tmp_path):
+    file = tmp_path / 'test_snippet.py'
+    file.write_text(snippet(part), encoding='utf-8')
+    ended = subprocess.run(
+        [sys.executable, '-m', 'pytest', '-p', 'no:cacheprovider', '--strict-markers', file],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        cwd=tmp_path,
+    )
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert '1 passed' in ended.stdout
 
 
 # ---- commands and links -------------------------------------------------------------------------
@@ -315,6 +339,10 @@ def test_readme_leads_to_every_document():
         if document == CHECKOUT / 'doc' / 'architecture.md':
             linked |= set((CHECKOUT / 'doc' / 'diagrams').glob('*.md'))
     assert [name_of(d) for d in DOCUMENTS[1:] if d not in linked] == []
+
+
+def test_readme_is_one_page():
+    assert len(README.read_text(encoding='utf-8').splitlines()) <= 150
 
 
 # ---- what is said about the code ----------------------------------------------------------------
