@@ -10,7 +10,7 @@ import struct
 from figures import Figure, seconds_each
 
 from ur_cartesian_driver.protocol.rtde import OUTPUT_TYPES, Recipe
-from ur_cartesian_driver.robot.state_recipe import NAMES, robot_state
+from ur_cartesian_driver.robot.state_recipe import robot_state_from_rtde, STATE_FIELDS
 
 NAME = 'RTDE, per package of the driver'
 
@@ -18,7 +18,7 @@ NAME = 'RTDE, per package of the driver'
 def run(quick: bool) -> Iterator[Figure]:
     """Pack and unpack the driver's own recipe."""
     budget = 0.1 if quick else 0.5
-    recipe = Recipe(NAMES, [OUTPUT_TYPES[name] for name in NAMES])
+    recipe = Recipe(STATE_FIELDS, [OUTPUT_TYPES[name] for name in STATE_FIELDS])
     values = recipe.zeros()
     frame = recipe.pack(values)
     payload = frame[3:]
@@ -39,7 +39,7 @@ def run(quick: bool) -> Iterator[Figure]:
         ),
         (
             'values to RobotState',
-            lambda: robot_state(values),
+            lambda: robot_state_from_rtde(values),
             lambda: recipe.unpack(payload),
             'unpack',
         ),

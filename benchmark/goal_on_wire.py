@@ -19,7 +19,7 @@ from ros_client import goal_message, TimedClient
 from wire_tap import marks_until_first_point, wire_tap
 
 from ur_cartesian_driver.driver import channel
-from ur_cartesian_driver.execution import order_of
+from ur_cartesian_driver.execution import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.planning import plan, PlanningOptions
@@ -114,7 +114,7 @@ def _breakdown(totals: Sequence[float]) -> Iterator[Figure]:
     points = encode_points(s.primitive for s in planned.segments)
 
     def handed_over() -> object:
-        request = channel.StartMotion(motion=1, order=order_of(planned), points=points)
+        request = channel.StartMotion(motion=1, job=job_from_plan(planned), points=points)
         return channel.unpack(channel.pack(request)[channel.LENGTH.size :])
 
     left = total

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 import paths
 
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.inverse_rows import all_solutions, solve_path
 from ur_cartesian_driver.kinematics.robots import robot_model
-from ur_cartesian_driver.kinematics.rows import branches, follow
 from ur_cartesian_driver.motion.pose import pose_from_row, Vector6
 
 NAME = 'kinematics, poses of a path per second'
 START: Vector6 = (0.3, -1.6, 1.9, -1.8, -1.5, 0.4)
-WAY = (0.8, 0.4, -0.6, 0.5, 0.3, 1.0)
+PATH_LENGTH = (0.8, 0.4, -0.6, 0.5, 0.3, 1.0)
 #: Of pinocchio fewer rows are timed.
 ROWS, ROWS_ONE_BY_ONE = 40_000, 2_000
 Rows = NDArray[np.float64]
@@ -29,23 +29,23 @@ Rows = NDArray[np.float64]
 def run(quick: bool) -> Iterator[Figure]:
     """Follow a path of a UR5e, nominal and calibrated, whose joint positions are known."""
     rows = ROWS // 10 if quick else ROWS
-    joints = np.array(START) + np.linspace(0.0, 1.0, rows)[:, None] * np.array(WAY)
+    joints = np.array(START) + np.linspace(0.0, 1.0, rows)[:, None] * np.array(PATH_LENGTH)
     for name, arm in ('nominal', Arm(robot_model('ur5e'))), ('calibrated', paths.calibrated_arm()):
         poses = arm.forward_rows(joints)
-        follow(arm, poses[:1], START)  # the fit of the ideal arm is made once for each arm
-        yield from _followed(name, arm, poses, joints)
-        taken = seconds(lambda arm=arm, poses=poses: branches(arm, poses))
+        solve_path(arm, poses[:1], START)  # the fit of the ideal arm is made once for each arm
+        yield from _path_figure(name, arm, poses, joints)
+        taken = seconds(lambda arm=arm, poses=poses: all_solutions(arm, poses))
         yield Figure(benchmark=NAME, name=f'{name}, all branches', value=rows / taken, unit='1/s')
 
 
-def _followed(name: str, arm: Arm, poses: Rows, joints: Rows) -> Iterator[Figure]:
+def _path_figure(name: str, arm: Arm, poses: Rows, joints: Rows) -> Iterator[Figure]:
     reference = pinocchio_or_none(arm)
-    taken = seconds(lambda: follow(arm, poses, START))
+    taken = seconds(lambda: solve_path(arm, poses, START))
     other = None
     if reference is not None:
         sparse = poses[:ROWS_ONE_BY_ONE]
         other = len(sparse) / seconds(lambda: _one_by_one(reference, sparse), repeat=2)
-    path = follow(arm, poses, START)
+    path = solve_path(arm, poses, START)
     yield Figure(
         benchmark=NAME,
         name=f'{name}, followed',

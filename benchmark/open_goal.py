@@ -23,16 +23,16 @@ from ur_cartesian_driver.motion.pose import Pose
 
 #: From point to point, a cycle of the controller [s]; one request has so many, and is made when
 #: less than so many seconds are left.
-STEP, CHUNK, LEAD = 0.008, 500, 2.5
+STEP, CHUNK, LEAD_TIME = 0.008, 500, 2.5
 #: The circle: radius [m], time once round [s], and how long it gets faster at its begin [s].
-RADIUS, ROUND, RAMP = 0.05, 4.0, 1.0
+RADIUS, ROUND_TIME, RAMP = 0.05, 4.0, 1.0
 #: How often memory is looked at, in requests.
-LOOK = 20
+SAMPLE_PERIOD = 20
 
 
 def point(home: Pose, number: int, last: bool) -> Waypoint:
     """Return a point of a circle beside the tool, with its time and twist."""
-    t, rate = STEP * number, 2.0 * pi / ROUND
+    t, rate = STEP * number, 2.0 * pi / ROUND_TIME
     angle, turn = (
         (0.5 * rate / RAMP * t * t, rate / RAMP * t)
         if t < RAMP
@@ -57,9 +57,13 @@ def resident() -> float:
     return 0.0
 
 
-async def carried_out(cell: Any, points: int) -> dict[str, Any]:
+async def run_goal(cell: Any, points: int) -> dict[str, Any]:
     """Run an open goal of so many points; return what was seen."""
-    from open_goals import forget, kept, OpenMotion  # beside robot_cell, see run()
+    from append_goals import (  # beside robot_cell, see run()
+        AppendMotion,
+        clear_network_log,
+        retained_sizes,
+    )
 
     home = cell.memory.read().actual_tcp_pose
 
@@ -68,7 +72,7 @@ async def carried_out(cell: Any, points: int) -> dict[str, Any]:
 
     seen: dict[str, Any] = {'memory': [], 'kept': [], 'left': []}
     begin, planning, number = perf_counter(), 0.0, 0
-    motion = OpenMotion(
+    motion = AppendMotion(
         cell,
         Goal(waypoints=tuple(chunk(1, CHUNK)), keep_open=True, execution=ExecutionMode.SPLINE),
         self_collision='off',
@@ -77,7 +81,7 @@ async def carried_out(cell: Any, points: int) -> dict[str, Any]:
         while motion.outcome is None and not (
             motion.motion.progress
             and motion.progress.points_received == motion.points
-            and motion.progress.time_remaining < LEAD
+            and motion.progress.time_remaining < LEAD_TIME
         ):
             await cell.sleep(0.1)
         if motion.outcome is not None:
@@ -89,14 +93,14 @@ async def carried_out(cell: Any, points: int) -> dict[str, Any]:
         planning += perf_counter() - at
         number += 1
         del motion.motion.progress[:-1]  # the owner of a real one keeps the newest only
-        forget(cell)
-        if number % LOOK == 0:
+        clear_network_log(cell)
+        if number % SAMPLE_PERIOD == 0:
             seen['memory'].append(resident())
-            seen['kept'].append(kept(cell))
-            if number % (5 * LOOK) == 0:
+            seen['kept'].append(retained_sizes(cell))
+            if number % (5 * SAMPLE_PERIOD) == 0:
                 print(
                     f'  {motion.points:,} points, {perf_counter() - begin:.0f} s, '
-                    f'{resident():.1f} MB, kept {kept(cell)}',
+                    f'{resident():.1f} MB, kept {retained_sizes(cell)}',
                     flush=True,
                 )
     while motion.outcome is None:
@@ -115,7 +119,7 @@ def run(quick: bool, points: int = 50_000) -> Iterator[Figure]:
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'support'))
     from robot_cell import run_cell
 
-    seen = run_cell(lambda cell: carried_out(cell, 2_000 if quick else points), feedback_rate=5.0)
+    seen = run_cell(lambda cell: run_goal(cell, 2_000 if quick else points), feedback_rate=5.0)
     end, memory = seen['outcome'], seen['memory'] or [resident()]
     if not end.succeeded or end.report:
         raise RuntimeError(f'{end.text} {end.report}')
@@ -136,6 +140,6 @@ def run(quick: bool, points: int = 50_000) -> Iterator[Figure]:
         unit='MB',
         value=memory[-1],
         baseline=settled,
-        than=f'after {3 * LOOK * CHUNK:,} points',
+        than=f'after {3 * SAMPLE_PERIOD * CHUNK:,} points',
         note='driver, simulated robot and producer',
     )

@@ -34,9 +34,9 @@ from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 NAME = 'points a second'
 #: The driver sends at most 500 points that the robot has not begun, and learns of that with each
 #: of 500 RTDE packages a second.
-BOUND = 500 * 500
+MAX_RATE = 500 * 500
 #: Runs as long as the reader stands in for it.
-STAND_IN = 'def stand_in():\n  while True:\n    sync()\n  end\nend\n'
+IDLE_PROGRAM = 'def stand_in():\n  while True:\n    sync()\n  end\nend\n'
 
 
 def run(quick: bool) -> Iterator[Figure]:
@@ -91,7 +91,7 @@ def _sending(points: int) -> Iterator[Figure]:
         value=points / taken,
         baseline=points / baseline,
         than='the same bytes, plain sockets',
-        note=f'{points:,} points, the window bounds it to {BOUND:,} after the first 500',
+        note=f'{points:,} points, the window bounds it to {MAX_RATE:,} after the first 500',
     )
 
 
@@ -130,14 +130,14 @@ def _read(connection: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     config = SimulatorConfig(rtde_port=0, primary_port=0, dashboard_port=0)
     with SimulatedRobot(config) as robot, ExitStack() as sockets:
-        robot.run_script(STAND_IN)
-        reader = Reader(robot, sockets)
+        robot.run_script(IDLE_PROGRAM)
+        reader = FakeRobotProgram(robot, sockets)
         answer_calls(
             connection, {'ports': lambda: robot.ports, 'join': reader.join, 'times': reader.times}
         )
 
 
-class Reader:
+class FakeRobotProgram:
     """Stands for the robot program."""
 
     def __init__(self, robot: SimulatedRobot, sockets: ExitStack) -> None:
@@ -181,4 +181,4 @@ class Reader:
             self._first = self._last
         self._arrived += size
         begun = self._arrived // POINT_SIZE
-        self._robot.controller.signals.outputs.integers[POINTS_BEGUN] = begun
+        self._robot.controller.io.outputs.integers[POINTS_BEGUN] = begun

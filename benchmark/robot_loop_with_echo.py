@@ -26,14 +26,14 @@ from processes import HOST
 from ur_cartesian_driver.driver.robot_loop import serve
 from ur_cartesian_driver.protocol.reverse import MESSAGE_SIZE, trajectory, TrajectoryAction
 from ur_cartesian_driver.protocol.rtde import OUTPUT_TYPES, Recipe
-from ur_cartesian_driver.robot.state_recipe import NAMES, robot_state
-from ur_cartesian_driver.robot.transport import Connection, dial
+from ur_cartesian_driver.robot.state_recipe import robot_state_from_rtde, STATE_FIELDS
+from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
 #: The variable of the environment that names the port to dial.
 PORT = 'BENCHMARK_ECHO_PORT'
 
 
-RECIPE = Recipe(NAMES, [OUTPUT_TYPES[name] for name in NAMES])
+RECIPE = Recipe(STATE_FIELDS, [OUTPUT_TYPES[name] for name in STATE_FIELDS])
 ZEROS = bytes(MESSAGE_SIZE)
 
 
@@ -42,7 +42,7 @@ class Echo:
 
     def __init__(self) -> None:
         """Prepare; :meth:`open` connects."""
-        self._connection = Connection(self._answer, lambda _: None)
+        self._connection = TcpConnection(self._answer, lambda _: None)
         self._reads = False
 
     async def open(self) -> None:
@@ -58,7 +58,7 @@ def _read(data: bytes) -> bytes:
     """Return a CANCEL, for a robot that reports anything."""
     values = RECIPE.unpack_frame(data)
     assert values is not None
-    robot_state(values)
+    robot_state_from_rtde(values)
     return trajectory(TrajectoryAction.CANCEL, 1).encode()
 
 

@@ -18,7 +18,7 @@ import time
 from figures import Figure, percentile
 from processes import Child, cpu_seconds, empty_loop, HOST, lateness, PERIOD, simulator
 
-from ur_cartesian_driver.protocol.rtde import DataReceived, RtdeClient
+from ur_cartesian_driver.protocol.rtde import DataReceived, RtdeClientCodec
 
 BENCHMARK = 'RTDE at 500 Hz in real time'
 QUICK_SECONDS = 3.0
@@ -80,7 +80,7 @@ def run(quick: bool, seconds: float) -> Iterator[Figure]:
 
 def _packages(wire: socket.socket) -> Iterator[tuple[float, float]]:
     """Yield the clock of each package and when it came; those that come in one piece together."""
-    client = RtdeClient(_OUTPUTS)
+    client = RtdeClientCodec(_OUTPUTS)
     wire.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     wire.sendall(client.start())
     while True:

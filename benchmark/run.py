@@ -23,7 +23,7 @@ import time
 from figures import as_json, Figure, machine, table
 
 #: Those that are told how much to measure; soak and open goal are no part of a usual run.
-RTDE_RATE, SOAK, OPEN_GOAL = 'rtde_rate', 'soak', 'open_goal'
+RTDE_RATE, SOAK, APPEND = 'rtde_rate', 'soak', 'append'
 #: In the order of the table: what is measured with many processes first.
 MODULES = (
     'goal_on_wire',
@@ -56,7 +56,7 @@ def main() -> int:
             options = {'seconds': arguments.seconds} if name in (RTDE_RATE, SOAK) else {}
             if name == SOAK:
                 options |= {'goals': arguments.goals, 'undisturbed': arguments.undisturbed}
-            if name == OPEN_GOAL:
+            if name == APPEND:
                 options = {'points': arguments.points}
             measured = list(import_module(name).run(arguments.quick, **options))
         except Exception as error:
@@ -79,9 +79,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         '--only',
         action='append',
-        choices=(*MODULES, SOAK, OPEN_GOAL),
+        choices=(*MODULES, SOAK, APPEND),
         metavar='NAME',
-        help=f'only this one (may be repeated): {", ".join((*MODULES, SOAK, OPEN_GOAL))}',
+        help=f'only this one (may be repeated): {", ".join((*MODULES, SOAK, APPEND))}',
     )
     parser.add_argument(
         '--quick', action='store_true', help='smaller goals, shorter times: to see that it runs'
@@ -99,7 +99,7 @@ def _parser() -> argparse.ArgumentParser:
         '--points',
         type=int,
         default=50_000,
-        help=f'how many points {OPEN_GOAL} has (1000000 for the record)',
+        help=f'how many points {APPEND} has (1000000 for the record)',
     )
     parser.add_argument(
         '--undisturbed',

@@ -55,29 +55,29 @@ PERCENTILES = (('p50', 50.0), ('p99', 99.0), ('most', 100.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Streamed:
+class SetpointStream:
     """What servoj was told: in which cycle, and where on the path that is [s]; the lags [s]."""
 
     cycles: NDArray[np.float64]
-    places: NDArray[np.float64]
+    path_times: NDArray[np.float64]
     lag: float
 
     @property
     def jitter(self) -> list[float]:
         """How far each set-point is from where an even stream would have it [ms]."""
-        off = self.places - STEP * self.cycles
+        off = self.path_times - STEP * self.cycles
         return list(1e3 * np.abs(off - np.median(off)))
 
     def share(self, low: float, high: float) -> float:
         """Return the share of cycles whose set-point is so many steps after the one before [%]."""
-        steps = np.diff(self.places) / (STEP * np.diff(self.cycles))
+        steps = np.diff(self.path_times) / (STEP * np.diff(self.cycles))
         return float(100.0 * np.mean((steps > low) & (steps <= high)))
 
 
 def run(quick: bool) -> Iterator[Figure]:
     """Stream the same path in both ways."""
     seconds = 3.0 if quick else 10.0
-    with simulator(told, host=ROBOT, **PORTS) as robot:
+    with simulator(count_servoj, host=ROBOT, **PORTS) as robot:
         ours, spline = _servo(robot, seconds)
         other = _ur_rtde(robot, spline) if importlib.util.find_spec('rtde_control') else None
     for text, percent in PERCENTILES:
@@ -113,25 +113,25 @@ def run(quick: bool) -> Iterator[Figure]:
     )
 
 
-def told(robot: SimulatedRobot) -> Mapping[str, Callable[..., Any]]:
+def count_servoj(robot: SimulatedRobot) -> Mapping[str, Callable[..., Any]]:
     """Return a call that tells what servoj was told, and forgets it."""
-    motion, seen = robot.controller.motion, list[tuple[int, tuple[float, ...]]]()
+    motion, received = robot.controller.motion, list[tuple[int, tuple[float, ...]]]()
     carry_out = motion.servoj
 
     def servoj(q: Any, *settings: Any) -> Any:
-        seen.append((robot.controller.cycles, tuple(q)))
+        received.append((robot.controller.cycles, tuple(q)))
         return carry_out(q, *settings)
 
     def take() -> list[tuple[int, tuple[float, ...]]]:
-        taken = list(seen)
-        seen.clear()
+        taken = list(received)
+        received.clear()
         return taken
 
     motion.servoj = servoj  # type: ignore[method-assign]  # what is measured
-    return {'told': take}
+    return {'servoj_calls': take}
 
 
-def _servo(robot: Child, seconds: float) -> tuple[Streamed, JointSpline]:
+def _servo(robot: Child, seconds: float) -> tuple[SetpointStream, JointSpline]:
     config = DriverConfig(
         robot_ip=ROBOT,
         ur_type='ur5e',
@@ -152,12 +152,12 @@ def _servo(robot: Child, seconds: float) -> tuple[Streamed, JointSpline]:
     with Driver(config) as driver:
         driver.wait_ready(20.0)
         plan = driver.plan(_goal(driver.state.actual_tcp_pose, seconds))
-        robot.call('told')
+        robot.call('servoj_calls')
         outcome = driver.start(plan, on_progress=note).result(seconds + 20.0)
         if not outcome.succeeded:
             raise RuntimeError(outcome.text)
         time.sleep(0.1)
-    return _streamed(robot, spline_of(plan), max(lags[3:-3])), spline_of(plan)
+    return _measured_stream(robot, spline_of(plan), max(lags[3:-3])), spline_of(plan)
 
 
 def _goal(here: Pose, seconds: float) -> Goal:
@@ -174,10 +174,10 @@ def spline_of(plan: Plan) -> JointSpline:
     )
 
 
-def _ur_rtde(robot: Child, spline: JointSpline) -> Streamed:
+def _ur_rtde(robot: Child, spline: JointSpline) -> SetpointStream:
     """Let a process with the other library stream the path."""
     rows = spline.rows(np.arange(0.0, spline.duration + STEP, STEP))[0]
-    robot.call('told')
+    robot.call('servoj_calls')
     with tempfile.TemporaryDirectory() as folder:
         path, sent = Path(folder) / 'rows.npy', Path(folder) / 'sent.npy'
         np.save(path, rows)
@@ -189,21 +189,23 @@ def _ur_rtde(robot: Child, spline: JointSpline) -> Streamed:
         )
         newest, actual = np.load(sent)
     inner = slice(round(FIRST * len(newest)), round(LAST * len(newest)))
-    behind = _place(spline, newest[inner]) - _place(spline, actual[inner])
-    return _streamed(robot, spline, float(np.median(behind)))
+    behind = _path_time(spline, newest[inner]) - _path_time(spline, actual[inner])
+    return _measured_stream(robot, spline, float(np.median(behind)))
 
 
-def _streamed(robot: Child, spline: JointSpline, lag: float) -> Streamed:
-    seen = robot.call('told')
-    places = _place(spline, np.array([q for _, q in seen]))
+def _measured_stream(robot: Child, spline: JointSpline, lag: float) -> SetpointStream:
+    received = robot.call('servoj_calls')
+    path_times = _path_time(spline, np.array([q for _, q in received]))
     # While the arm goes there; it is led back to the start by another program.
-    inner = (places > FIRST * spline.duration) & (places < LAST * spline.duration)
-    return Streamed(
-        cycles=np.array([float(cycle) for cycle, _ in seen])[inner], places=places[inner], lag=lag
+    inner = (path_times > FIRST * spline.duration) & (path_times < LAST * spline.duration)
+    return SetpointStream(
+        cycles=np.array([float(cycle) for cycle, _ in received])[inner],
+        path_times=path_times[inner],
+        lag=lag,
     )
 
 
-def _place(spline: JointSpline, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def _path_time(spline: JointSpline, q: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return when the path is at joints, by the joint that moves farthest and never turns."""
     times = np.arange(0.0, spline.duration, 0.5 * STEP)
     rows = spline.rows(times)[0]

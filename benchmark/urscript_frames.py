@@ -8,11 +8,11 @@ from collections.abc import Iterator
 
 from figures import Figure, seconds_each
 
-from ur_cartesian_driver.program import as_program, ProgramSettings, render
+from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
 from ur_cartesian_driver.sim.config import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.tcp_script_sockets import TcpScriptSockets
-from ur_cartesian_driver.urscript import core_builtins, Machine, parse
+from ur_cartesian_driver.urscript import core_builtins, parse, ScriptInterpreter
 
 NAME = 'URScript'
 #: 100 rounds of arithmetic, a comparison, lists and a call, then the end of the frame.
@@ -46,7 +46,7 @@ end
 def run(quick: bool) -> Iterator[Figure]:
     """Run frames without a controller, then whole cycles of one."""
     budget = 0.1 if quick else 0.5
-    text = as_program(
+    text = wrap_in_program(
         render(
             ProgramSettings(
                 host='127.0.0.1', reverse_port=1, trajectory_port=2, script_command_port=3
@@ -60,7 +60,7 @@ def run(quick: bool) -> Iterator[Figure]:
         value=1e3 * seconds_each(lambda: parse(text), budget),
         note=f'{len(text.splitlines())} lines',
     )
-    machine = Machine(parse(WORK), core_builtins() | {'sync': _sync})
+    machine = ScriptInterpreter(parse(WORK), core_builtins() | {'sync': _sync})
     yield Figure(
         benchmark=NAME,
         name='frame with 100 rounds of a loop',
@@ -92,7 +92,7 @@ def _cycle(program: str, budget: float) -> float:
         controller.programs.submit(program)
     for _ in range(5):
         controller.step()
-    assert bool(program) == controller.programs.running, controller.announcements.log
+    assert bool(program) == controller.programs.running, controller.messages.log
     return seconds_each(controller.step, budget)
 
 

@@ -37,7 +37,7 @@ from figures import Figure, percentile
 import paths
 from processes import answer_calls, Child, child, HOST, PERIOD, simulator
 import robot_loop_with_echo
-from wire_tap import Relay, TAP_HOST, Way
+from wire_tap import Relay, RelayDirection, TAP_HOST
 
 from ur_cartesian_driver.driver import Driver, DriverConfig, host
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -46,7 +46,7 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.rtde import OUTPUT_TYPES, Recipe
-from ur_cartesian_driver.robot.state_recipe import NAMES
+from ur_cartesian_driver.robot.state_recipe import STATE_FIELDS
 from ur_cartesian_driver.sim import SimulatedRobot
 from ur_cartesian_driver.sim.rtde_session import RtdeSession
 
@@ -57,10 +57,10 @@ PUSH, BOUND = 0.004, 0.002
 TRIALS = 100
 TIMEOUT = 10.0
 #: The robot loop's own.
-RECIPE = Recipe(NAMES, [OUTPUT_TYPES[name] for name in NAMES])
+RECIPE = Recipe(STATE_FIELDS, [OUTPUT_TYPES[name] for name in STATE_FIELDS])
 FRAME_SIZE = len(RECIPE.pack(RECIPE.zeros()))
 TIMESTAMP = struct.Struct('>d')
-ACTUAL, TARGET = NAMES.index('actual_TCP_pose'), NAMES.index('target_TCP_pose')
+ACTUAL, TARGET = STATE_FIELDS.index('actual_TCP_pose'), STATE_FIELDS.index('target_TCP_pose')
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,42 +275,42 @@ class RelayWithEcho(Relay):
         """Wait for a packet with a push; it may be for the echo first."""
         self._asks_echo, self.echoed, self.pushed = asks_echo, None, None
 
-    def ways(self, name: str) -> tuple[int, str, str]:
+    def directions(self, name: str) -> tuple[int, str, str]:
         """Let the robot be called for who calls its port; the echo has called before."""
         if name != 'rtde_port':
-            return super().ways(name)
+            return super().directions(name)
         if self._echo is None:
             self._echo, _ = self._echo_listener.accept()
-            self.add_way(self._echo, self._echo, 'echo')
+            self.add_direction(self._echo, self._echo, 'echo')
         return self._rtde_port, '', name
 
-    def pass_on(self, source: socket.socket, way: Way) -> None:
+    def forward(self, source: socket.socket, direction: RelayDirection) -> None:
         """Treat the robot's packets and the echo's answers apart."""
-        if way.noted == 'rtde_port':
+        if direction.port_name == 'rtde_port':
             with suppress(OSError):  # it has hung up, which its own way tells
-                self._pass_state_on(source, way)
-        elif way.noted == 'echo':
+                self._forward_state(source, direction)
+        elif direction.port_name == 'echo':
             self._echoed(source)
         else:
-            super().pass_on(source, way)
+            super().forward(source, direction)
 
-    def _pass_state_on(self, source: socket.socket, way: Way) -> None:
+    def _forward_state(self, source: socket.socket, direction: RelayDirection) -> None:
         packets, rest = divmod(len(source.recv(65536, socket.MSG_PEEK)), FRAME_SIZE)
         if rest or not packets:
-            super().pass_on(source, way)  # the handshake, or the end
+            super().forward(source, direction)  # the handshake, or the end
         for _ in range(0 if rest else packets):  # several where we were kept from looking
             self._release()  # the echo is late: the robot loop shall not wait for it
-            self._pass_packet_on(source.recv(FRAME_SIZE), way)
+            self._forward_packet(source.recv(FRAME_SIZE), direction)
 
-    def _pass_packet_on(self, data: bytes, way: Way) -> None:
+    def _forward_packet(self, data: bytes, direction: RelayDirection) -> None:
         is_awaited = self.pushed is None and is_pushed(data)
         if is_awaited:
             self.pushed = cycle_of(data), time.monotonic_ns()
         if is_awaited and self._asks_echo and self._echo is not None:
-            self._held = data, way.target
+            self._held = data, direction.target
             self._echo.sendall(data)
         else:
-            way.target.sendall(data)
+            direction.target.sendall(data)
 
     def _echoed(self, echo: socket.socket) -> None:
         answer = echo.recv(65536)

@@ -100,7 +100,7 @@ class Relay:
         self.ports[name] = listener.getsockname()[1]
         self._selector.register(listener, selectors.EVENT_READ, name)
 
-    def ways(self, name: str) -> tuple[int, str, str]:
+    def directions(self, name: str) -> tuple[int, str, str]:
         """Return the port that is called for a caller there, and what its and our bytes are."""
         return self.ports[name], '', name
 
@@ -115,55 +115,55 @@ class Relay:
             for key, _ in self._selector.select():
                 sock = key.fileobj
                 assert isinstance(sock, socket.socket)
-                if isinstance(key.data, Way):
-                    self.pass_on(sock, key.data)
+                if isinstance(key.data, RelayDirection):
+                    self.forward(sock, key.data)
                 else:
                     self._accept(sock, key.data)
 
     def _accept(self, listener: socket.socket, name: str) -> None:
         caller, _ = listener.accept()
-        port, asked, answered = self.ways(name)
+        port, asked, answered = self.directions(name)
         called = socket.create_connection((HOST, port))
-        self.add_way(caller, called, asked)
-        self.add_way(called, caller, answered)
+        self.add_direction(caller, called, asked)
+        self.add_direction(called, caller, answered)
 
-    def add_way(self, source: socket.socket, target: socket.socket, noted: str) -> None:
+    def add_direction(self, source: socket.socket, target: socket.socket, port_name: str) -> None:
         """Pass on what comes from one socket to the other."""
         source.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._selector.register(source, selectors.EVENT_READ, Way(target, noted))
+        self._selector.register(source, selectors.EVENT_READ, RelayDirection(target, port_name))
 
-    def pass_on(self, source: socket.socket, way: Way) -> None:
+    def forward(self, source: socket.socket, direction: RelayDirection) -> None:
         """Pass on what has come, or that it was the last."""
         try:
             data = source.recv(65536)
             now = time.monotonic_ns()
-            way.target.sendall(data)
+            direction.target.sendall(data)
         except OSError:
             data = b''
         if data:
-            way.note(self._marks, now, data)
+            direction.add_marks(self._marks, now, data)
             return
         self.hang_ups += 1
         self._selector.unregister(source)
         with suppress(OSError):  # the other one hung up too
-            way.target.shutdown(socket.SHUT_WR)
+            direction.target.shutdown(socket.SHUT_WR)
 
 
-class Way:
+class RelayDirection:
     """One direction of one connection."""
 
-    def __init__(self, target: socket.socket, noted: str) -> None:
-        """Begin with nothing; ``noted`` is the port's name where it comes from the driver."""
+    def __init__(self, target: socket.socket, port_name: str) -> None:
+        """Begin with nothing; ``port_name`` is the port's name where it comes from the driver."""
         self.target = target
-        self.noted = noted
+        self.port_name = port_name
         self._messages = ReverseDecoder()
 
-    def note(self, marks: list[Mark], now: int, data: bytes) -> None:
+    def add_marks(self, marks: list[Mark], now: int, data: bytes) -> None:
         """Add what came from the driver to the marks."""
-        if self.noted == 'reverse_port':
+        if self.port_name == 'reverse_port':
             marks += [
-                Mark(now, self.noted, len(data), message.mode, message.payload[0])
+                Mark(now, self.port_name, len(data), message.mode, message.payload[0])
                 for message in self._messages.feed(data)
             ]
-        elif self.noted:
-            marks.append(Mark(now, self.noted, len(data)))
+        elif self.port_name:
+            marks.append(Mark(now, self.port_name, len(data)))

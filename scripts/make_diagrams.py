@@ -16,7 +16,8 @@ from enum import Enum
 from pathlib import Path
 from typing import TypeAlias
 
-from ur_cartesian_driver.execution import servo_stream, states
+import ur_cartesian_driver.execution.servo_stream as servo_stream
+import ur_cartesian_driver.execution.states as states
 from ur_cartesian_driver.robot import lifecycle
 
 DIAGRAMS = Path(__file__).resolve().parents[1] / 'doc' / 'diagrams'
@@ -32,19 +33,19 @@ def pages() -> dict[str, str]:
             'The connection to the robot',
             'ur_cartesian_driver/robot/lifecycle.py',
             connection(),
-            [change.name for change in lifecycle.Change],
+            [change.name for change in lifecycle.ConnectionEvent],
         ),
         'trajectory.md': page(
             'A goal on its way through the robot program',
             'ur_cartesian_driver/execution/states.py',
             goal(),
-            [signal.name for signal in states.Signal],
+            [signal.name for signal in states.GoalSignal],
         ),
         'servo.md': page(
             'Streaming of set-points',
             'ur_cartesian_driver/execution/servo_stream.py',
             servo(),
-            [change.name for change in servo_stream.Change],
+            [change.name for change in servo_stream.ServoEvent],
         ),
     }
 

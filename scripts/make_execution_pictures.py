@@ -51,12 +51,12 @@ def a_goal(
         from ur_cartesian_driver.planning import plan, PlanningOptions
         from ur_cartesian_driver.ros.client import load_goal
         from ur_cartesian_driver.ros.convert import goal_from_message
-        from ur_cartesian_driver.ros.frames import Frames, Stand
+        from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames
         from ur_cartesian_driver.sim.fault_text import parse_fault
 
         state = cell.memory.read()
         goal = goal_from_message(
-            load_goal(goal_file(name)), Frames(), now=0, stand=Stand.of(state)
+            load_goal(goal_file(name)), Frames(), now=0, snapshot=ArmSnapshot.of(state)
         )
         cell.robot.inject(*map(parse_fault, faults))
         if execution:
@@ -72,12 +72,12 @@ def a_goal(
 
 async def a_late_producer(cell: Any) -> Any:
     """Go round and round on points that come when half a second is left, but for once."""
-    from open_goals import circle, OpenMotion
+    from append_goals import AppendMotion, circle
 
     from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, ZERO6
 
     home = cell.memory.read().actual_tcp_pose
-    motion = OpenMotion(
+    motion = AppendMotion(
         cell,
         Goal(waypoints=tuple(circle(home, 1, 10)), keep_open=True, execution=ExecutionMode.SPLINE),
     )
@@ -86,7 +86,11 @@ async def a_late_producer(cell: Any) -> Any:
         await motion.until(
             lambda late=late: (
                 motion.motion.progress
-                and (motion.progress.waits if late else motion.progress.time_remaining < 0.5)
+                and (
+                    motion.progress.awaiting_points
+                    if late
+                    else motion.progress.time_remaining < 0.5
+                )
             )
         )
         if late:

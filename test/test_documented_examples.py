@@ -27,9 +27,9 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.convert import goal_from_message
-from ur_cartesian_driver.ros.frames import Frames, Stand
+from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames
 from ur_cartesian_driver.sim import SimulatedRobot
-from ur_cartesian_driver.sim.faults import After
+from ur_cartesian_driver.sim.faults import AfterTime
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(
@@ -79,8 +79,8 @@ def assert_shows(shown, came):
 def test_validate_says_what_the_document_shows(commands, shown, capsys):
     ((_, *words),) = commands
     main(words)
-    said = capsys.readouterr()
-    assert_shows(shown, said.out + said.err)
+    due_outgoing = capsys.readouterr()
+    assert_shows(shown, due_outgoing.out + due_outgoing.err)
 
 
 # ---- with the simulated one ---------------------------------------------------------------------
@@ -90,7 +90,7 @@ def sent(cell, words):
     """Return the plan of a goal for the robot of a cell."""
     state = cell.memory.read()
     goal = goal_from_message(
-        load_goal(goal_file(words.file)), Frames(), now=0, stand=Stand.of(state)
+        load_goal(goal_file(words.file)), Frames(), now=0, snapshot=ArmSnapshot.of(state)
     )
     return plan(goal, state, Arm(robot_model(cell.robot.config.model)), PlanningOptions())
 
@@ -152,7 +152,7 @@ def test_a_goal_ends_as_the_document_shows(commands, shown):
     )
     request = parser().parse_args(send)
     # A reader needs some time between the commands.
-    assert not [fault for fault in started.faults if isinstance(fault.when, After)]
+    assert not [fault for fault in started.faults if isinstance(fault.trigger, AfterTime)]
     if started.power_off:
         outcome = by_a_robot_that_is_not_ready(started, request)
     else:

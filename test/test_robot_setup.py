@@ -20,9 +20,9 @@ import pytest
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.msg import DriverStatus
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.recovery import next_step, Situation, Step
-from ur_cartesian_driver.robot.status import what_is_needed
-from ur_cartesian_driver.robot.transport import cause, Connection, dial, Listener
+from ur_cartesian_driver.robot.recovery import next_step, RecoverySituation, RecoveryStep
+from ur_cartesian_driver.robot.status import required_action
+from ur_cartesian_driver.robot.transport import dial, error_reason, TcpConnection, TcpListener
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 PAGE = CHECKOUT / 'doc' / 'robot_setup.md'
@@ -31,8 +31,8 @@ pytestmark = pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has 
 
 #: Where the sentences come from; the simulator says what a robot says itself.
 SOURCES = [
-    *PACKAGE.glob('robot/*.py'),
-    *PACKAGE.glob('driver/*.py'),
+    *PACKAGE.glob('robot/**/*.py'),
+    *PACKAGE.glob('driver/**/*.py'),
     PACKAGE / 'protocol' / 'rtde.py',
     PACKAGE / 'ros' / 'node.py',
     *PACKAGE.glob('sim/*.py'),
@@ -104,12 +104,12 @@ def test_every_state_is_in_the_table_with_its_number():
 
 def test_all_that_can_be_needed_is_on_the_page():
     said = {
-        what_is_needed(
+        required_action(
             state,
             robot,
             program_connected=connected,
             headless_mode=headless,
-            tcp_owed=owed,
+            tcp_restore_pending=owed,
             program_is_ending=ending,
             foreign_program=foreign,
         )
@@ -124,7 +124,7 @@ def test_all_that_can_be_needed_is_on_the_page():
 def test_all_that_a_recovery_leaves_to_a_person_is_on_the_page():
     steps = [
         next_step(
-            Situation(
+            RecoverySituation(
                 connection=state,
                 robot=robot,
                 program_connected=connected,
@@ -136,7 +136,7 @@ def test_all_that_a_recovery_leaves_to_a_person_is_on_the_page():
             ConnectionState, ROBOTS, (False, True), (False, True), (None, False)
         )
     ]
-    said = {step.text for step in steps if step.step is Step.PERSON} - {''}
+    said = {step.text for step in steps if step.step is RecoveryStep.OPERATOR} - {''}
     assert len(said) > 10
     assert [text for text in sorted(said) if not is_on_page(text)] == []
 
@@ -170,15 +170,15 @@ async def refusals_of_the_system():
     with socket.create_server(('127.0.0.1', 0)) as taken:
         port = taken.getsockname()[1]
         for host in ('127.0.0.1', '192.0.2.1'):  # RFC 5737: nobody's
-            listener = Listener(
+            listener = TcpListener(
                 'reverse_port', on_open=print, on_data=print, on_closed=print, on_refused=print
             )
             with pytest.raises(OSError, match='port') as refused:
                 await listener.open(host, port, frozenset())
             said.append(str(refused.value))
     with pytest.raises(OSError, match='port') as refused:
-        await dial(Connection(print, print), '127.0.0.1', port)
-    unreachable = cause(OSError(errno.EHOSTUNREACH, ''))
+        await dial(TcpConnection(print, print), '127.0.0.1', port)
+    unreachable = error_reason(OSError(errno.EHOSTUNREACH, ''))
     return [*said, str(refused.value), f'127.0.0.1 port {port}: {unreachable}']
 
 

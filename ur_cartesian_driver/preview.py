@@ -57,14 +57,14 @@ def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
         np.searchsorted(reference.time, time, side='right') - 1, 0, max(len(reference.time) - 2, 0)
     )
     span = reference.time[np.minimum(row + 1, len(reference.time) - 1)] - reference.time[row]
-    share = np.clip((time - reference.time[row]) / np.where(span > 0.0, span, 1.0), 0.0, 1.0)
-    share[time >= end] = 1.0
-    poses = [_between(reference, int(k), float(f)) for k, f in zip(row, share, strict=True)]
+    fraction = np.clip((time - reference.time[row]) / np.where(span > 0.0, span, 1.0), 0.0, 1.0)
+    fraction[time >= end] = 1.0
+    poses = [_between(reference, int(k), float(f)) for k, f in zip(row, fraction, strict=True)]
     tcp = T_flange_tcp if plan.T_flange_tcp is None else plan.T_flange_tcp
     if plan.execution in (ExecutionMode.SPLINE, ExecutionMode.SERVO):
         joints = _spline(plan).rows(time)[0]
     else:
-        joints = _joints(plan, arm, tcp.inverse(), poses, row + share)
+        joints = _joints(plan, arm, tcp.inverse(), poses, row + fraction)
     return Preview(time=time, poses=np.array([pose.row() for pose in poses]), joints=joints)
 
 
@@ -118,15 +118,15 @@ def _spline(plan: Plan) -> JointSpline:
     return JointSpline.of(plan.start, (piece for piece in pieces if isinstance(piece, Spline)))
 
 
-def _between(reference: ReferencePath, row: int, share: float) -> Pose:
+def _between(reference: ReferencePath, row: int, fraction: float) -> Pose:
     after = min(row + 1, len(reference.poses) - 1)
     return pose_from_row(reference.poses[row]).interpolate(
-        pose_from_row(reference.poses[after]), share
+        pose_from_row(reference.poses[after]), fraction
     )
 
 
 def _joints(
-    plan: Plan, arm: Arm, T_tcp_flange: Pose, poses: list[Pose], place: NDArray[np.float64]
+    plan: Plan, arm: Arm, T_tcp_flange: Pose, poses: list[Pose], row_position: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """
     Return joint positions for poses at places of the reference path (rows and fractions).
@@ -134,13 +134,13 @@ def _joints(
     The solution nearest to the one before; in joint moves, which may pass through singularities
     where branches meet, the one nearest to the straight line in joint space.
     """
-    lines = _joint_lines(plan)
+    lines = _joint_moves(plan)
     point = plan.reference.point
     rows = np.full((len(poses), 6), np.nan)
     q = plan.start
     for k, pose in enumerate(poses):
-        line = lines.get(int(point[min(ceil(place[k]), len(point) - 1)]))
-        q_near = q if line is None else line.at(float(place[k]))
+        line = lines.get(int(point[min(ceil(row_position[k]), len(point) - 1)]))
+        q_near = q if line is None else line.at(float(row_position[k]))
         found = nearest(arm, pose @ T_tcp_flange, q_near)
         if found is not None:
             rows[k] = q = found
@@ -148,7 +148,7 @@ def _joints(
 
 
 @dataclass(frozen=True, slots=True)
-class _JointLine:
+class _JointMove:
     """A joint move between two rows of the reference path, which has evenly spaced samples."""
 
     q_start: Joints
@@ -156,13 +156,13 @@ class _JointLine:
     first: int
     last: int
 
-    def at(self, place: float) -> Joints:
-        u = min(1.0, max(0.0, (place - self.first) / max(1, self.last - self.first)))
+    def at(self, row_position: float) -> Joints:
+        u = min(1.0, max(0.0, (row_position - self.first) / max(1, self.last - self.first)))
         a, b, c, d, e, f = (x + u * (y - x) for x, y in zip(self.q_start, self.q_end, strict=True))
         return (a, b, c, d, e, f)
 
 
-def _joint_lines(plan: Plan) -> dict[int, _JointLine]:
+def _joint_moves(plan: Plan) -> dict[int, _JointMove]:
     """Return the joint moves by point."""
     point = plan.reference.point
     lines = {}
@@ -170,7 +170,7 @@ def _joint_lines(plan: Plan) -> dict[int, _JointLine]:
     for segment in plan.segments:
         if isinstance(segment.primitive, MoveJ | OptimoveJ):
             first, last = np.searchsorted(point, [segment.waypoint, segment.waypoint + 1])
-            lines[segment.waypoint] = _JointLine(
+            lines[segment.waypoint] = _JointMove(
                 q, segment.joints, max(0, int(first) - 1), int(last) - 1
             )
         q = segment.joints

@@ -56,7 +56,7 @@ def ur_sim(request: pytest.FixtureRequest) -> Iterator[SimulatedRobot]:
     from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
     settings = {'rtde_port': 0, 'primary_port': 0, 'dashboard_port': 0}
-    with SimulatedRobot(SimulatorConfig(**settings | _marked(request, 'ur_sim'))) as robot:
+    with SimulatedRobot(SimulatorConfig(**settings | _marker_values(request, 'ur_sim'))) as robot:
         yield robot
 
 
@@ -69,7 +69,7 @@ def private_ros_graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]
     go to a temporary folder. Variables that are set already are left alone.
     """
     with contextlib.ExitStack() as stack, pytest.MonkeyPatch.context() as environment:
-        domain = next(d for d in DOMAINS if _taken(d, stack))
+        domain = next(d for d in DOMAINS if _lock_domain(d, stack))
         for name, value in {
             'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
             'ROS_LOG_DIR': str(tmp_path_factory.mktemp('ros_log')),
@@ -80,7 +80,7 @@ def private_ros_graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]
         yield domain
 
 
-def _taken(domain: int, stack: contextlib.ExitStack) -> bool:
+def _lock_domain(domain: int, stack: contextlib.ExitStack) -> bool:
     """Take a domain for as long as the stack lives, unless another run has it."""
     path = Path(tempfile.gettempdir(), f'ur_cartesian_driver_test_domain_{domain}')
     lock = stack.enter_context(path.open('w'))
@@ -115,7 +115,7 @@ def cartesian_driver(
         'script_command_port': 0,
         # Robot, driver and test share one interpreter, which can be busy for longer than 0.2 s.
         'robot_receive_timeout': 1.0,
-    } | _marked(request, 'cartesian_driver')
+    } | _marker_values(request, 'cartesian_driver')
     started_here = not get_default_context().ok()
     if started_here:
         rclpy.init()
@@ -131,6 +131,6 @@ def cartesian_driver(
             rclpy.shutdown()
 
 
-def _marked(request: pytest.FixtureRequest, name: str) -> dict[str, Any]:
+def _marker_values(request: pytest.FixtureRequest, name: str) -> dict[str, Any]:
     marker = request.node.get_closest_marker(name)
     return {} if marker is None else dict(marker.kwargs)

@@ -12,7 +12,7 @@ import pytest
 from ur_cartesian_driver.driver import Driver, DriverConfig
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.protocol.rtde import DataReceived, RtdeClient
+from ur_cartesian_driver.protocol.rtde import DataReceived, RtdeClientCodec
 from ur_cartesian_driver.protocol.trajectory import POINT_SIZE
 
 READY = 10.0
@@ -63,7 +63,7 @@ def record(ur_sim):
         end = threading.Event()
         with socket.create_connection(('127.0.0.1', ur_sim.ports.rtde)) as connection:
             connection.settimeout(5.0)
-            client = RtdeClient(['timestamp', 'actual_TCP_pose', 'actual_q', 'actual_qd'])
+            client = RtdeClientCodec(['timestamp', 'actual_TCP_pose', 'actual_q', 'actual_qd'])
             connection.sendall(client.start())
             running = threading.Event()
 

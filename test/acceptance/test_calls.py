@@ -14,10 +14,16 @@ from ur_cartesian_driver.motion.goal import Goal, OutputKind, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.motion.state import RobotMode
-from ur_cartesian_driver.program.render import as_program
-from ur_cartesian_driver.protocol.rtde import RtdeClient
-from ur_cartesian_driver.robot import call_desk
-from ur_cartesian_driver.robot.calls import Dashboard, Recover, SendProgram, SetPayload, SetTcp
+from ur_cartesian_driver.program.render import wrap_in_program
+from ur_cartesian_driver.protocol.rtde import RtdeClientCodec
+from ur_cartesian_driver.robot.calls import (
+    DashboardCall,
+    RecoverCall,
+    SendProgramCall,
+    SetPayloadCall,
+    SetTcpCall,
+)
+from ur_cartesian_driver.robot.services import service_dispatcher
 from ur_cartesian_driver.sim.modes import SafetyEvent
 
 # A slow controller does the same for less.
@@ -67,15 +73,17 @@ def test_a_digital_output_is_set_and_no_other(driver, ur_sim):
 
 def test_an_analog_output_is_set_in_its_domain(driver, ur_sim):
     assert driver.set_analog_output(1, 0.25, AnalogDomain.VOLTAGE).ok
-    assert ur_sim.call(lambda c: list(c.signals.analog_out)) == [0.0, 2.5]
+    assert ur_sim.call(lambda c: list(c.io.analog_out)) == [0.0, 2.5]
     assert driver.set_analog_output(0, 0.5, AnalogDomain.CURRENT).ok
-    assert ur_sim.call(lambda c: c.signals.analog_out[0]) == pytest.approx(0.012)
+    assert ur_sim.call(lambda c: c.io.analog_out[0]) == pytest.approx(0.012)
     wait_for(lambda: driver.signals.analog_outputs[0].domain is AnalogDomain.CURRENT)
 
 
 def test_inputs_that_another_client_holds_are_named(driver, ur_sim):
     with socket.create_connection(('127.0.0.1', ur_sim.ports.rtde)) as other:
-        client = RtdeClient(['timestamp'], inputs=['speed_slider_mask', 'speed_slider_fraction'])
+        client = RtdeClientCodec(
+            ['timestamp'], inputs=['speed_slider_mask', 'speed_slider_fraction']
+        )
         other.sendall(client.start())
         while client.state.name != 'READY':
             client.feed(other.recv(65536))
@@ -118,7 +126,7 @@ def test_a_setting_needs_the_robot_program(driver, ur_sim):
 
 def test_of_a_goal_and_a_new_tcp_at_the_same_time_one_is_refused(driver, home):
     plan = driver.plan(Goal(waypoints=(Waypoint(time=0.5, pose=home(z=0.02)),)))
-    pending = driver.call(SetTcp(T_flange_tcp=NOZZLE))
+    pending = driver.call(SetTcpCall(T_flange_tcp=NOZZLE))
     outcome, answer = driver.start(plan).result(5.0), pending.result(5.0)
     if answer.ok:
         assert outcome.code.name == 'ROBOT_NOT_READY'
@@ -197,14 +205,14 @@ def test_a_program_that_is_sent_in_local_control_is_refused_with_the_reason(
     driver = make_driver()
     wait_for(lambda: 'read-only' in driver.status.last_error)
     with monkeypatch.context() as patch:
-        patch.setattr(call_desk, 'EFFECT_TIMEOUT', 0.3)
-        answer = driver.call(SendProgram()).result(READY)
+        patch.setattr(service_dispatcher, 'EFFECT_TIMEOUT', 0.3)
+        answer = driver.call(SendProgramCall()).result(READY)
     assert not answer.ok
     assert answer.text.endswith(
         'The robot is in local control: switch it to remote control, then try again.'
     )
     ur_sim.call(lambda c: setattr(c, 'remote_control', True))
-    assert driver.call(SendProgram()).result(READY).ok
+    assert driver.call(SendProgramCall()).result(READY).ok
 
 
 @QUICK
@@ -227,7 +235,7 @@ def served_program(driver):
         text = ''
         while '# NODE_CONTROL_LOOP_ENDS' not in text:
             text += s.recv(65536).decode()
-    return as_program(text)
+    return wrap_in_program(text)
 
 
 @QUICK
@@ -328,20 +336,20 @@ def test_a_wrong_robot_is_not_touched(make_driver, ur_sim):
 def test_calls_are_answered_when_the_robot_loop_dies_or_the_driver_closes(make_driver):
     driver = make_driver(robot_loop='process')
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
-    pending = driver.call(Dashboard(command='power on'))
+    pending = driver.call(DashboardCall(command='power on'))
     os.kill(driver._host.pid, signal.SIGKILL)
     assert 'robot loop ended unexpectedly' in pending.result(5.0).text
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
-    pending = driver.call(Recover())
+    pending = driver.call(RecoverCall())
     driver.close()
     assert not pending.result(5.0).ok
-    assert driver.call(SetTcp(T_flange_tcp=NOZZLE)).result(0.0).text == (
+    assert driver.call(SetTcpCall(T_flange_tcp=NOZZLE)).result(0.0).text == (
         'The driver is closed; open it.'
     )
 
 
 def test_a_defect_of_ours_is_an_answer_too(driver):
-    broken = SetPayload(mass=1.0)
+    broken = SetPayloadCall(mass=1.0)
     object.__setattr__(broken, 'mass', 'heavy')
     answer = driver.call(broken).result(5.0)
     assert not answer.ok

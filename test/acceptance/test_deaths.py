@@ -26,7 +26,7 @@ from waiting import wait_for
 
 from ur_cartesian_driver.cli.demo import process
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.protocol.rtde import DataReceived, RtdeClient
+from ur_cartesian_driver.protocol.rtde import DataReceived, RtdeClientCodec
 from ur_cartesian_driver.ros.client import GoalClient, load_goal
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
@@ -53,7 +53,7 @@ class Witness:
     def __init__(self, port):
         self._connection = socket.create_connection(('127.0.0.1', port))
         self._connection.settimeout(0.5)
-        self._client = RtdeClient(['actual_qd'], frequency=125.0)
+        self._client = RtdeClientCodec(['actual_qd'], frequency=125.0)
         self._connection.sendall(self._client.start())
         self._closing = threading.Event()
         self.speed = 0.0

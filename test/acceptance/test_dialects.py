@@ -12,13 +12,13 @@ from dataclasses import replace
 from math import hypot
 
 import pytest
-from robot_cell import HOST, Motion, PENDANT_PROGRAM, RobotCell
+from robot_cell import CellMotion, HOST, PENDANT_PROGRAM, RobotCell
 from saved_program import DIALECTS as NAMES
 from saved_program import saved_program
 from virtual_network import VirtualLoop
 
 from ur_cartesian_driver.driver.channel import StartMotion
-from ur_cartesian_driver.execution import order_of
+from ur_cartesian_driver.execution import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, robot_model
@@ -71,11 +71,11 @@ class SavedCell(RobotCell):
         )
         owner = self.owner
         number = len(owner.motions) + 1
-        motion = owner.motions[number] = Motion()
+        motion = owner.motions[number] = CellMotion()
         owner.send(
             StartMotion(
                 motion=number,
-                order=order_of(made, self.dialect),
+                job=job_from_plan(made, self.dialect),
                 points=encode_points((s.primitive for s in made.segments), self.dialect),
             )
         )

@@ -12,15 +12,15 @@ from dataclasses import replace
 from math import hypot, pi
 import re
 
-from agreement import blind, OPTIONS
 import numpy as np
+from planner_verdict import blind, OPTIONS
 import pytest
 from random_goals import Case
 from robot_in_memory import RobotInMemory
 
 from ur_cartesian_driver.kinematics.inverse import nearest, solutions
+from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
-from ur_cartesian_driver.kinematics.rows import postures
 from ur_cartesian_driver.motion.errors import InvalidPosture, NearSingularity
 from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import (
@@ -57,7 +57,7 @@ def past_the_column(arm):
     """The centre of the wrist 0.2 mm beside the column over the base."""
     d4, d6 = arm.geometry.d[3], arm.geometry.d[5]
     wrist = Pose(
-        (hypot(d4, 0.008), 0.0, arm.geometry.d[0] + 0.6 * arm.model.reach),
+        (hypot(d4, 0.008), 0.0, arm.geometry.d[0] + 0.6 * arm.model.max_reach),
         arm.forward((0.5, -1.2, 1.6, -2.0, -1.2, 0.3)).quaternion,
     )
     return line(arm, wrist @ Pose((0.0, 0.0, d6)), (0.0, 1.0, 0.0), 0.15)
@@ -65,7 +65,7 @@ def past_the_column(arm):
 
 def line(arm, middle, direction, half):
     """Return where an arm stands at the beginning of a line, and the end of the line."""
-    way = half * arm.model.reach * np.array(direction)
+    way = half * arm.model.max_reach * np.array(direction)
     ends = [
         Pose(tuple((np.array(middle.position) + side * way).tolist()), middle.quaternion)
         for side in (-1.0, 1.0)
@@ -138,5 +138,5 @@ def other_side(arm, pose, q, flip):
 
 
 def signs_of(arm, q):
-    measures = postures(arm, np.array([q]))
+    measures = branch_measures(arm, np.array([q]))
     return [int(np.sign(m[0])) for m in (measures.shoulder, measures.elbow, measures.wrist)]

@@ -22,7 +22,7 @@ from ur_cartesian_driver.kinematics.robots import MODELS
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, quaternion_from_rotation_vector
-from ur_cartesian_driver.program import as_program
+from ur_cartesian_driver.program import wrap_in_program
 from ur_cartesian_driver.sim.calibration import random_calibration
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
@@ -319,7 +319,7 @@ def served_program(driver):
         text = ''
         while end not in text:
             text += s.recv(65536).decode()
-    return as_program(text)
+    return wrap_in_program(text)
 
 
 @pytest.mark.ur_sim(frequency=125.0)

@@ -6,16 +6,16 @@ import asyncio
 from math import cos, hypot, sin
 
 import pytest
-from robot_cell import CYCLE, Motion, run_cell
+from robot_cell import CellMotion, CYCLE, run_cell
 
-from ur_cartesian_driver.driver.channel import AimMotion, StartMotion
-from ur_cartesian_driver.driver.live import live_order, standing_order, standing_plan
+from ur_cartesian_driver.driver.channel import SetLiveTarget, StartMotion
+from ur_cartesian_driver.driver.live import live_setup, stationary_job, stationary_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.sim.builtins.motion import HandGuided
+from ur_cartesian_driver.sim.builtins.motion import FreedriveState
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
@@ -32,17 +32,17 @@ class Session:
     def __init__(self, cell, **options):
         self.cell = cell
         self.number = len(cell.owner.motions) + 1
-        self.motion = cell.owner.motions[self.number] = Motion()
+        self.motion = cell.owner.motions[self.number] = CellMotion()
         state = cell.memory.read()
         self.start = state.target_tcp_pose
-        plan = standing_plan(state)
+        plan = stationary_plan(state)
         cell.owner.send(
             StartMotion(
                 motion=self.number,
                 points=b'',
-                order=standing_order(plan),
-                live=live_order(
-                    ARM, state.target_q, PlanningOptions(**{'servo_target_timeout': 0.6} | options)
+                job=stationary_job(plan),
+                live=live_setup(
+                    ARM, state.target_q, PlanningOptions(**{'live_target_timeout': 0.6} | options)
                 ),
             )
         )
@@ -53,7 +53,7 @@ class Session:
 
     def aim(self, x=0.0, y=0.0, z=0.0, age=0.0):
         self.cell.owner.send(
-            AimMotion(motion=self.number, T_base_tcp=self.beside(x, y, z), age=age)
+            SetLiveTarget(motion=self.number, T_base_tcp=self.beside(x, y, z), age=age)
         )
 
     async def lead(self, seconds, way):
@@ -105,7 +105,7 @@ def test_a_circle_is_followed_and_the_session_ends_when_nobody_tells_targets():
 
 def test_old_targets_stop_the_arm_smoothly_and_fresh_ones_go_on():
     async def scenario(cell):
-        session = Session(cell, servo_target_timeout=5.0)
+        session = Session(cell, live_target_timeout=5.0)
         await session.lead(0.5, lambda t: (0.0, 0.3, 0.0))
         assert not cell.at_rest()
         await cell.until(cell.at_rest, 0.2 + 0.25 + LAG, 'the target is too old')
@@ -171,15 +171,17 @@ def test_what_ends_a_goal_ends_a_session(what, code):
 
 
 def is_taught(cell):
-    return cell.robot.controller.hand_guided is HandGuided.TEACH
+    return cell.robot.controller.freedrive is FreedriveState.TEACH
 
 
 def test_a_person_may_guide_the_arm_until_that_is_ended():
     async def scenario(cell):
-        motion = cell.owner.motions[1] = Motion()
-        plan = standing_plan(cell.memory.read())
-        cell.owner.send(StartMotion(motion=1, points=b'', order=standing_order(plan), teach=True))
-        if not cell.config.allow_teach:
+        motion = cell.owner.motions[1] = CellMotion()
+        plan = stationary_plan(cell.memory.read())
+        cell.owner.send(
+            StartMotion(motion=1, points=b'', job=stationary_job(plan), freedrive=True)
+        )
+        if not cell.config.allow_freedrive:
             await cell.until(lambda: motion.outcome is not None, 2.0)
             assert not motion.progress
             return motion.outcome
@@ -193,7 +195,7 @@ def test_a_person_may_guide_the_arm_until_that_is_ended():
         await cell.until(cell.is_ready)
         return motion.outcome
 
-    assert run_cell(scenario, allow_teach=True).code is ErrorCode.CANCELLED
+    assert run_cell(scenario, allow_freedrive=True).code is ErrorCode.CANCELLED
     refused = run_cell(scenario)
     assert refused.code is ErrorCode.EXECUTION_FAILED
-    assert 'allow_teach' in refused.text
+    assert 'allow_freedrive' in refused.text

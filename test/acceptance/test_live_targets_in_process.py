@@ -23,7 +23,7 @@ pytestmark = [
     # The tests pay for each cycle.
     pytest.mark.ur_sim(frequency=125.0),
     pytest.mark.cartesian_driver(
-        servo_target_enabled=True, servo_target_timeout=0.5, allow_teach=True
+        live_target_enabled=True, live_target_timeout=0.5, allow_freedrive=True
     ),
 ]
 
@@ -78,11 +78,11 @@ class Sender(Node):
     def __init__(self):
         super().__init__('sender')
         self.states = []
-        self.teach = self.create_client(SetBool, f'{NAME}/teach_mode')
+        self.freedrive_client = self.create_client(SetBool, f'{NAME}/freedrive_mode')
         self.actions = ActionClient(
             self, FollowCartesianTrajectory, f'{NAME}/follow_cartesian_trajectory'
         )
-        self.targets = self.create_publisher(PoseStamped, f'{NAME}/servo_target', 1)
+        self.targets = self.create_publisher(PoseStamped, f'{NAME}/live_target', 1)
         self.create_subscription(ServoState, f'{NAME}/servo_state', self.states.append, 10)
 
     def go(self, cell, pose):
@@ -132,14 +132,14 @@ def test_the_example_of_the_page_leads_the_tool_on_its_circle(ur_sim, cell_with)
         off.append(abs(hypot(y - y0, z - z0 - 0.04) - 0.04))
     assert max(off) < 0.008
     assert max(z for _, z in seen) > 0.05, 'it came around'
-    assert not cell.driver.servo_targets.idle
+    assert not cell.driver.live_targets.idle
 
 
 def test_a_goal_takes_its_place_and_people_may_guide_the_arm(ur_sim, cell_with):
     """One cell for several claims, as a cell costs seconds."""
     sender = Sender()
     cell = cell_with(sender)
-    targets = cell.driver.servo_targets
+    targets = cell.driver.live_targets
     cell.until(lambda: sender.targets.get_subscription_count() == 1)
     here = ur_sim.state().T_base_tcp
     for frame, dy in (('no such frame', 0.0), ('base', 3.0)):
@@ -171,16 +171,16 @@ def test_a_goal_takes_its_place_and_people_may_guide_the_arm(ur_sim, cell_with):
     assert max(map(abs, ur_sim.state().qd)) < 1e-6
 
     # The third claim: teach mode is a service.
-    def teach(on):
-        answer = sender.teach.call_async(SetBool.Request(data=on))
+    def freedrive_client(on):
+        answer = sender.freedrive_client.call_async(SetBool.Request(data=on))
         cell.until(answer.done)
         return answer.result().success, answer.result().message
 
     here = ur_sim.state().T_base_tcp
-    assert teach(True) == (True, 'The arm can be guided by hand.')
+    assert freedrive_client(True) == (True, 'The arm can be guided by hand.')
     result = sender.go(cell, here)
     cell.until(result.done)
     assert 'guides the arm by hand' in result.result().result.error_string
-    assert teach(True)[0], 'it is on already'
-    assert teach(False) == (True, 'The arm is held by the robot again.')
-    assert teach(False) == (True, 'Nobody guides the arm.')
+    assert freedrive_client(True)[0], 'it is on already'
+    assert freedrive_client(False) == (True, 'The arm is held by the robot again.')
+    assert freedrive_client(False) == (True, 'Nobody guides the arm.')

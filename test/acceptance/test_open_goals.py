@@ -7,8 +7,16 @@ from dataclasses import replace
 import gc
 import sys
 
+from append_goals import (
+    AppendMotion,
+    BLEND,
+    circle,
+    clear_network_log,
+    corners,
+    moved,
+    retained_sizes,
+)
 import numpy as np
-from open_goals import BLEND, circle, corners, forget, kept, moved, OpenMotion
 import pytest
 from robot_cell import CYCLE, run_cell
 
@@ -92,7 +100,7 @@ class Speeds:
 async def produced(cell, kind, total, chunk, lead):
     """Run an open goal whose producer appends when less is left than that [s]."""
     home, speeds = cell.memory.read().actual_tcp_pose, Speeds(cell)
-    motion = OpenMotion(cell, goal(kind, home, chunk))
+    motion = AppendMotion(cell, goal(kind, home, chunk))
     while motion.points < total:
         assert await motion.until(
             lambda: (
@@ -146,8 +154,8 @@ def test_a_producer_that_is_late_by_less_than_the_margin_is_not_noticed(kind):
 async def closed(cell, kind, count=6, **changes):
     """Run an open goal whose producer stops until it rests; return it, home, and its speeds."""
     home, speeds = cell.memory.read().actual_tcp_pose, Speeds(cell)
-    motion = OpenMotion(cell, goal(kind, home, count, **changes))
-    assert await motion.until(lambda: motion.motion.progress and motion.progress.waits)
+    motion = AppendMotion(cell, goal(kind, home, count, **changes))
+    assert await motion.until(lambda: motion.motion.progress and motion.progress.awaiting_points)
     return motion, home, speeds.stop()
 
 
@@ -164,7 +172,7 @@ def test_a_producer_that_stops_is_closed_gracefully_and_may_go_on(kind):
         said = await motion.append(points, segments)
         assert 'had come to rest before them' in said.text
         assert ('later than their times say' in said.text) == (kind == 'spline')
-        assert await motion.until(lambda: not motion.progress.waits)
+        assert await motion.until(lambda: not motion.progress.awaiting_points)
         points, segments = KINDS[kind][1](home, 12, 5, True)
         said = await motion.append(points, segments, last=True)
         assert said.text.startswith('5 points appended, the goal has 16, these are the last.')
@@ -181,7 +189,7 @@ def test_a_producer_that_stops_is_closed_gracefully_and_may_go_on(kind):
 def test_the_word_that_nothing_follows_ends_a_goal_where_it_is_known_to_end():
     async def scenario(cell):
         home = cell.memory.read().actual_tcp_pose
-        moving = OpenMotion(cell, goal('spline', home, 6))
+        moving = AppendMotion(cell, goal('spline', home, 6))
         said = await moving.append(last=True)
         assert said.text == 'The goal ends with the 6 points that it has.'
         with pytest.raises(GoalRefused, match=r'were said to be the last\.$'):
@@ -213,7 +221,7 @@ def test_nobody_waits_for_ever():
 def test_points_that_are_refused_leave_the_goal_as_it_was():
     async def scenario(cell):
         home = cell.memory.read().actual_tcp_pose
-        motion = OpenMotion(cell, goal('lines', home, 5))
+        motion = AppendMotion(cell, goal('lines', home, 5))
         far = replace(corners(home, 6, 1)[0], pose=moved(home, 2.0, 0.0, 0.0))
         for wrong, text in (
             (([*corners(home, 6, 1), far], (BLEND,) * 2), r'points\[6\]'),
@@ -270,7 +278,7 @@ async def outputs_at(cell, kind, chunk):
         )
         await cell.until(lambda: motion.outcome, 60.0)
     else:
-        motion = OpenMotion(cell, goal(kind, home, chunk, io_commands=switches(0, chunk)))
+        motion = AppendMotion(cell, goal(kind, home, chunk, io_commands=switches(0, chunk)))
         while motion.points < 15:
             assert await motion.until(
                 lambda: motion.motion.progress and motion.progress.time_remaining < HORIZON
@@ -300,7 +308,7 @@ def test_memory_stays_the_same_however_long_a_goal_goes_on():
         def part(first):
             return circle(home, first, 125, step=CYCLE)
 
-        motion = OpenMotion(
+        motion = AppendMotion(
             cell,
             Goal(waypoints=tuple(part(1)), keep_open=True, execution=ExecutionMode.SPLINE),
             self_collision='off',
@@ -314,9 +322,9 @@ def test_memory_stays_the_same_however_long_a_goal_goes_on():
                 )
             ), motion.outcome.text
             await motion.append(part(motion.points + 1))
-            forget(cell)
+            clear_network_log(cell)
             del motion.motion.progress[:-1]
-            sizes.append(kept(cell))
+            sizes.append(retained_sizes(cell))
             gc.collect()
             blocks.append(sys.getallocatedblocks())
         await motion.append(last=True)

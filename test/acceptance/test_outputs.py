@@ -89,7 +89,7 @@ class Watched:
     """In which cycle which output changed, and all places of the tool."""
 
     def __init__(self, controller):
-        self._outputs = controller.signals.digital_out.standard
+        self._outputs = controller.io.digital_out.standard
         self._outputs[:] = [False] * 8
         self._before = [False] * 8
         self.changes, self.path = [], []
@@ -194,7 +194,7 @@ def test_along_a_spline_at_points_and_after_them():
 
 
 def standing(cell):
-    return [value for value in cell.robot.controller.signals.digital_out.standard]
+    return [value for value in cell.robot.controller.io.digital_out.standard]
 
 
 def test_the_whole_driver_switches_them_and_waits_for_the_last():

@@ -16,9 +16,9 @@ from itertools import pairwise
 from math import inf
 import os
 
-from agreement import at_the_border, judge, TOO_LONG
 from forward_model import dh_forward, pose_matrix
 import numpy as np
+from planner_verdict import at_the_border, judge, TOO_LONG
 import pytest
 from random_goals import random_case
 from robot_in_memory import RobotInMemory

@@ -15,7 +15,7 @@ from waiting import wait_for
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
-from ur_cartesian_driver.program import as_program
+from ur_cartesian_driver.program import wrap_in_program
 from ur_cartesian_driver.protocol.primary import PrimaryDecoder, RuntimeExceptionMessage
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
@@ -53,7 +53,7 @@ def short_goal(driver, y=0.02):
 
 def test_the_served_program_runs_as_it_is(served, ur_sim):
     driver, text = served
-    upload(ur_sim, as_program(text))
+    upload(ur_sim, wrap_in_program(text))
     driver.wait_ready(5.0)
     assert driver.execute(short_goal(driver), timeout=10.0).succeeded
 
@@ -71,7 +71,7 @@ def test_a_program_with_other_names_does_the_same(served, ur_sim):
     ):
         text, count = re.subn(rf'\b{name}\b', f'renamed_{name}', text)
         assert count >= 2
-    upload(ur_sim, as_program(text))
+    upload(ur_sim, wrap_in_program(text))
     driver.wait_ready(5.0)
     assert driver.execute(short_goal(driver), timeout=10.0).succeeded
 
@@ -82,7 +82,7 @@ def test_a_line_that_is_added_is_carried_out(served, ur_sim):
         '  local kind = point[POINT_TYPE]',
         '  local kind = point[POINT_TYPE]\n  textmsg("this point is a ", kind)',
     )
-    upload(ur_sim, as_program(text))
+    upload(ur_sim, wrap_in_program(text))
     driver.wait_ready(5.0)
     assert driver.execute(short_goal(driver), timeout=10.0).succeeded
     assert 'this point is a 1' in ur_sim.state().messages
@@ -92,7 +92,7 @@ def test_a_changed_constant_changes_the_motion(served, ur_sim, record):
     """Half the length of a metre: the arm goes half the way, in the program's own scale."""
     driver, text = served
     text = text.replace('MULT_TIME = 1000000', 'MULT_TIME = 500000')
-    upload(ur_sim, as_program(text))
+    upload(ur_sim, wrap_in_program(text))
     driver.wait_ready(5.0)
     with record() as recording:
         assert driver.execute(short_goal(driver), timeout=10.0).succeeded
@@ -101,7 +101,7 @@ def test_a_changed_constant_changes_the_motion(served, ur_sim, record):
 
 def test_a_changed_result_changes_the_outcome(served, ur_sim):
     driver, text = served
-    upload(ur_sim, as_program(text.replace('RESULT_SUCCESS = 0', 'RESULT_SUCCESS = 2')))
+    upload(ur_sim, wrap_in_program(text.replace('RESULT_SUCCESS = 0', 'RESULT_SUCCESS = 2')))
     driver.wait_ready(5.0)
     outcome = driver.execute(short_goal(driver), timeout=10.0)
     assert outcome.code is ErrorCode.EXECUTION_FAILED
@@ -118,7 +118,7 @@ def test_a_broken_program_is_refused_with_line_and_column(
     served, ur_sim, line, replacement, expected
 ):
     driver, text = served
-    program = as_program(text)
+    program = wrap_in_program(text)
     assert line in program
     lines = program.splitlines()
     at = next(i for i, row in enumerate(lines) if row.strip() == line)

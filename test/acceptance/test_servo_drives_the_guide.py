@@ -11,7 +11,7 @@ from servo_cell import GuideCell
 from ur_cartesian_driver.execution import (
     EnterServo,
     Finish,
-    Order,
+    MotionJob,
     ServoMachine,
     ServoSettings,
     WriteServo,
@@ -32,7 +32,7 @@ REST = (0.0,) * 6
 DURATION = 0.6
 
 
-def order(home):
+def job(home):
     """There and on, through a point that is passed in motion."""
     arm = Arm(robot_model('ur5e'))
     via, to = (tuple(a + part for a in home) for part in (0.1, 0.2))
@@ -45,7 +45,7 @@ def order(home):
     )
     times = np.linspace(0.0, DURATION, 121)
     poses = [arm.forward(tuple(q)) for q in spline.rows(times)[0]]
-    return Order(
+    return MotionJob(
         points=2,
         duration=DURATION,
         due=DURATION,
@@ -82,7 +82,7 @@ def state_of(controller):
 def drive(slider=1.0, cancel_after=None):
     """Run a goal on the sample program; return what was seen of it."""
     cell = GuideCell()
-    goal = ServoMachine(order(cell.q), settings=ServoSettings(lookahead_time=0.06))
+    goal = ServoMachine(job(cell.q), settings=ServoSettings(lookahead_time=0.06))
     seen = SimpleNamespace(
         commands=goal.start(state_of(cell.controller)),
         home=cell.q,
@@ -90,7 +90,7 @@ def drive(slider=1.0, cancel_after=None):
         motion=[],
         q=[],
         cell=cell,
-        spline=goal.order.spline,
+        spline=goal.job.spline,
     )
 
     def take(feedback):

@@ -9,23 +9,23 @@ import pytest
 import robot_cell
 from robot_cell import run_cell
 
-from ur_cartesian_driver.driver.channel import MotionProgress, ServoChanged
+from ur_cartesian_driver.driver.channel import MotionProgress, ServoProgress
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
 from ur_cartesian_driver.motion.servo import ServoActivity
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.spline_plan import SplineState
-from ur_cartesian_driver.planning.spline_points import tool_points
-from ur_cartesian_driver.planning.tool_spline import ToolSpline
+from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline
+from ur_cartesian_driver.planning.spline.spline_planner import SplineState
+from ur_cartesian_driver.planning.spline.spline_points import tool_points
 from ur_cartesian_driver.protocol import registers
-from ur_cartesian_driver.protocol.rtde import RtdeClient
+from ur_cartesian_driver.protocol.rtde import RtdeClientCodec
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.robot.rtde_connection import RtdeConnection
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.convert import goal_from_message
-from ur_cartesian_driver.ros.frames import Frames, Stand
+from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
@@ -38,14 +38,17 @@ class Run:
 
     def __init__(self, cell, goal):
         self.cell, self.packets, self.reports, self.progress = cell, [], [], []
-        stand = cell.memory.read()
+        snapshot = cell.memory.read()
         self.made = plan(
-            replace(goal(stand), execution=ExecutionMode.SERVO), stand, ARM, PlanningOptions()
+            replace(goal(snapshot), execution=ExecutionMode.SERVO),
+            snapshot,
+            ARM,
+            PlanningOptions(),
         )
         take = cell.owner._take
 
         def tell(notice):
-            if isinstance(notice, ServoChanged):
+            if isinstance(notice, ServoProgress):
                 self.reports.append(notice.report)
             elif isinstance(notice, MotionProgress):
                 self.progress.append(notice.progress)
@@ -74,18 +77,18 @@ class Run:
 
 
 def straight(seconds=1.0, way=0.1):
-    def goal(stand):
-        x, y, z = stand.actual_tcp_pose.position
-        there = replace(stand.actual_tcp_pose, position=(x, y + way, z))
+    def goal(snapshot):
+        x, y, z = snapshot.actual_tcp_pose.position
+        there = replace(snapshot.actual_tcp_pose, position=(x, y + way, z))
         return Goal(waypoints=(Waypoint(pose=there, time=seconds),))
 
     return goal
 
 
 def example(name, factor):
-    def goal(stand):
+    def goal(snapshot):
         made = goal_from_message(
-            load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0, stand=Stand.of(stand)
+            load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0, snapshot=ArmSnapshot.of(snapshot)
         )
         return replace(
             made,
@@ -164,7 +167,9 @@ def test_feedback_and_reports_tell_the_lag_and_the_inputs_are_given_back():
         assert last.setpoints_done == pytest.approx(last.setpoints_sent, abs=1)
         assert (last.underruns, last.overruns, last.skipped) == (0, 0, 0)
         # Another client can have the inputs now.
-        other = RtdeConnection(RtdeClient(['timestamp'], registers.SERVO_INPUTS), lambda *_: None)
+        other = RtdeConnection(
+            RtdeClientCodec(['timestamp'], registers.SERVO_INPUTS), lambda *_: None
+        )
         await other.open(robot_cell.HOST, robot_cell.RTDE)
         # And while it has them no goal moves anything.
         refused = Run(cell, straight(way=-0.05))

@@ -18,7 +18,7 @@ pytestmark = [
     pytest.mark.ur_sim(frequency=125.0, geometry=random_calibration(robot_model('ur5e'), 7)),
 ]
 
-OPTIONS = {'servo_target_timeout': 0.3}
+OPTIONS = {'live_target_timeout': 0.3}
 
 
 def test_a_calibrated_arm_goes_to_the_last_target_exactly(make_driver, ur_sim):
@@ -32,17 +32,17 @@ def test_a_calibrated_arm_goes_to_the_last_target_exactly(make_driver, ur_sim):
     turned = multiply(here.quaternion, quaternion_from_rotation_vector((0.1, 0.0, 0.2)))
     target = type(here)((x + 0.02, y + 0.03, z), turned)
     for _ in range(30):
-        motion = driver.servo_to(target)
+        motion = driver.send_live_target(target)
         sleep(0.02)
     with pytest.raises(RobotNotReady, match='A motion is running'):
         driver.start(driver.plan(Goal(waypoints=(Waypoint(pose=here, time=1.0),))))
     with pytest.raises(InvalidGoal, match='max_approach_distance'):
-        driver.servo_to(type(here)((x + 0.7, y, z), turned))
+        driver.send_live_target(type(here)((x + 0.7, y, z), turned))
     assert motion.result(5.0).code is ErrorCode.SUCCESSFUL
     arrived = ur_sim.state().T_base_tcp
     assert arrived.distance_to(target) < 1e-5
     assert arrived.angle_to(target) < 1e-5
     assert reports
-    with pytest.raises(RobotNotReady, match='allow_teach is false'):
-        driver.teach()
+    with pytest.raises(RobotNotReady, match='allow_freedrive is false'):
+        driver.start_freedrive()
     assert driver.execute(Goal(waypoints=(Waypoint(pose=here, time=0.4),)), timeout=5.0).succeeded

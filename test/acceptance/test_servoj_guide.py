@@ -16,12 +16,12 @@ from socket import create_connection
 import pytest
 
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.protocol.rtde import DataReceived, Ready, RtdeClient
+from ur_cartesian_driver.protocol.rtde import DataReceived, HandshakeDone, RtdeClientCodec
 from ur_cartesian_driver.sim import SimulatorConfig
-from ur_cartesian_driver.sim.builtins.motion import HandGuided
+from ur_cartesian_driver.sim.builtins.motion import FreedriveState
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.rtde_session import RtdeSession
-from ur_cartesian_driver.sim.uploads import Uploads
+from ur_cartesian_driver.sim.uploads import UploadDecoder
 
 pytestmark = pytest.mark.slow
 
@@ -53,10 +53,12 @@ class ExternalController:
     def __init__(self):
         self.controller = Controller(SimulatorConfig())
         self._session = RtdeSession(self.controller, set())
-        self._client = RtdeClient(
+        self._client = RtdeClientCodec(
             OUTPUTS, [MODE, SEQUENCE, ERROR, SYNC, *JOINTS, *THRESHOLDS, STATE_TIME]
         )
-        self._slider = RtdeClient(['timestamp'], ['speed_slider_mask', 'speed_slider_fraction'])
+        self._slider = RtdeClientCodec(
+            ['timestamp'], ['speed_slider_mask', 'speed_slider_fraction']
+        )
         self._inputs = self._connect(self._session, self._client)
         self._slider_session = RtdeSession(self.controller, set())
         self._slider_inputs = self._connect(self._slider_session, self._slider)
@@ -67,7 +69,7 @@ class ExternalController:
         self.cycle()
         self.hold(self.q)
         # As a script port does; text without indentation has no line that ends it for sure.
-        (program,) = Uploads().feed(PROGRAM.read_bytes())
+        (program,) = UploadDecoder().feed(PROGRAM.read_bytes())
         self.controller.programs.submit(program.text)
 
     @staticmethod
@@ -75,7 +77,9 @@ class ExternalController:
         data, ready = client.start(), []
         while not ready:
             ready = [
-                event for event in client.feed(session.feed(data)) if isinstance(event, Ready)
+                event
+                for event in client.feed(session.feed(data))
+                if isinstance(event, HandshakeDone)
             ]
             data = client.data_to_send()
         return ready[0].inputs[0]
@@ -97,7 +101,7 @@ class ExternalController:
 
     @property
     def log(self):
-        return list(self.controller.announcements.log)
+        return list(self.controller.messages.log)
 
     @property
     def stopped(self):
@@ -190,11 +194,11 @@ def test_modes_follow_the_client_with_their_entry_and_exit(client):
     client.values[MODE] = TEACH
     client.until(lambda: client.mode == TEACH)
     client.wait(2 * CYCLE)
-    assert client.controller.hand_guided is HandGuided.TEACH
+    assert client.controller.freedrive is FreedriveState.TEACH
     client.values |= {MODE: SERVO, SYNC: EXTERNAL_TO_ROBOT}
     client.until(lambda: client.mode == SERVO)
     client.wait(2 * CYCLE)
-    assert client.controller.hand_guided is HandGuided.NOBODY
+    assert client.controller.freedrive is FreedriveState.OFF
     client.stream(swing(client.q), 0.5)
     client.values |= {MODE: IDLE, SYNC: WAITING}
     client.until(lambda: client.log[-1] == 'running entry invokes for IDLE')
@@ -317,7 +321,9 @@ def test_same_inputs_give_the_same_packets():
 
 
 def test_program_follows_a_client_over_tcp_in_real_time(ur_sim):
-    client = RtdeClient(OUTPUTS, [MODE, SEQUENCE, ERROR, SYNC, *JOINTS, *THRESHOLDS, STATE_TIME])
+    client = RtdeClientCodec(
+        OUTPUTS, [MODE, SEQUENCE, ERROR, SYNC, *JOINTS, *THRESHOLDS, STATE_TIME]
+    )
     values = dict.fromkeys([MODE, SEQUENCE, ERROR, SYNC, *JOINTS, *THRESHOLDS, STATE_TIME], 0)
     values |= dict.fromkeys(THRESHOLDS, THRESHOLD) | {MODE: SERVO, SYNC: EXTERNAL_TO_ROBOT}
     inputs, path, time, q = None, None, 0.0, ()
@@ -328,7 +334,7 @@ def test_program_follows_a_client_over_tcp_in_real_time(ur_sim):
         rtde.sendall(client.start())
         while time < 1.5:
             for event in client.feed(rtde.recv(65536)):
-                if isinstance(event, Ready):
+                if isinstance(event, HandshakeDone):
                     inputs = event.inputs[0]
                     primary.sendall(PROGRAM.read_bytes())
                 elif isinstance(event, DataReceived):

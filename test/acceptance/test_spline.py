@@ -22,13 +22,13 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.spline_plan import SplineState
-from ur_cartesian_driver.planning.spline_points import tool_points
-from ur_cartesian_driver.planning.tool_spline import ToolSpline
+from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline
+from ur_cartesian_driver.planning.spline.spline_planner import SplineState
+from ur_cartesian_driver.planning.spline.spline_points import tool_points
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.convert import goal_from_message
-from ur_cartesian_driver.ros.frames import Frames, Stand
+from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
@@ -69,10 +69,10 @@ def carried_out(goal_from):
     """Run a goal that is made from where the arm stands."""
 
     async def scenario(cell):
-        stand = cell.memory.read()
+        snapshot = cell.memory.read()
         made = plan(
-            replace(goal_from(stand), execution=ExecutionMode.SPLINE),
-            stand,
+            replace(goal_from(snapshot), execution=ExecutionMode.SPLINE),
+            snapshot,
             ARM,
             PlanningOptions(),
         )
@@ -118,9 +118,9 @@ def times_as_long(goal, factor):
     )
 
 
-def example(name, stand):
+def example(name, snapshot):
     return goal_from_message(
-        load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0, stand=Stand.of(stand)
+        load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0, snapshot=ArmSnapshot.of(snapshot)
     )
 
 
@@ -138,7 +138,7 @@ def test_every_point_is_passed_in_time_with_its_twist_and_the_tool_keeps_to_the_
     name, factor, monkeypatch
 ):
     monkeypatch.setattr(robot_cell, 'CYCLE', 0.002)  # of an e-Series
-    run = carried_out(lambda stand: times_as_long(example(name, stand), factor))
+    run = carried_out(lambda snapshot: times_as_long(example(name, snapshot), factor))
     assert run.outcome.code is ErrorCode.SUCCESSFUL, run.outcome.text
     curve = run.curve()
     points = run.made.goal.waypoints
@@ -162,13 +162,13 @@ def test_every_point_is_passed_in_time_with_its_twist_and_the_tool_keeps_to_the_
 
 
 def test_an_arm_that_waits_at_a_point_for_long_is_not_stuck():
-    def goal(stand):
-        x, y, z = stand.actual_tcp_pose.position
-        there = replace(stand.actual_tcp_pose, position=(x, y + 0.02, z))
+    def goal(snapshot):
+        x, y, z = snapshot.actual_tcp_pose.position
+        there = replace(snapshot.actual_tcp_pose, position=(x, y + 0.02, z))
         return Goal(
             waypoints=tuple(
                 Waypoint(time=time, pose=pose)
-                for time, pose in ((0.5, there), (4.0, there), (4.5, stand.actual_tcp_pose))
+                for time, pose in ((0.5, there), (4.0, there), (4.5, snapshot.actual_tcp_pose))
             )
         )
 

@@ -9,7 +9,7 @@ from waiting import wait_for
 
 from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.goal import Goal, OutputKind, Waypoint
-from ur_cartesian_driver.protocol.rtde import RtdeClient
+from ur_cartesian_driver.protocol.rtde import RtdeClientCodec
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
@@ -54,7 +54,7 @@ def test_an_address_that_is_not_ours_is_named_with_its_parameter(make_driver):
 
 @pytest.mark.ur_sim(frequency=125.0)
 def test_inputs_that_another_client_holds_are_named(driver, ur_sim):
-    client = RtdeClient(
+    client = RtdeClientCodec(
         ['timestamp'], inputs=('standard_digital_output_mask', 'standard_digital_output')
     )
     with socket.create_connection(('127.0.0.1', ur_sim.ports.rtde)) as other:

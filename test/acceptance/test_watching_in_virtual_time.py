@@ -23,12 +23,19 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.reverse import ReverseDecoder, TrajectoryAction
 from ur_cartesian_driver.protocol.rtde import OUTPUT_TYPES, Recipe
 from ur_cartesian_driver.protocol.rtde_packages import RtdeFrameBuffer
-from ur_cartesian_driver.robot.state_recipe import OPTIONAL, REQUIRED
-from ur_cartesian_driver.sim.faults import Action, After, Deviation, Event, Slider, Travelled
+from ur_cartesian_driver.robot.state_recipe import OPTIONAL_FIELDS, REQUIRED_FIELDS
+from ur_cartesian_driver.sim.faults import (
+    AfterDistance,
+    AfterTime,
+    DeviationFault,
+    EventFault,
+    FaultEvent,
+    SpeedSliderFault,
+)
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
-AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
+DEVIATION_AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
 #: Quantity of a fault: what texts call its two halves, how far each is pushed, and its limit.
 PUSHES = {
     'pose': (('position', 'orientation'), (0.02, 0.2), (0.005, 0.05)),
@@ -37,7 +44,7 @@ PUSHES = {
 }
 #: The tool points down: what is an axis of base to a push is one of the tool to an orientation.
 TOOL_AXES = {'x': 'y', 'y': 'x', 'z': 'z'}
-NAMES = (*REQUIRED, *OPTIONAL)
+NAMES = (*REQUIRED_FIELDS, *OPTIONAL_FIELDS)
 RECIPE = Recipe(NAMES, [OUTPUT_TYPES[name] for name in NAMES])
 
 
@@ -145,12 +152,12 @@ def test_each_axis_stops_the_arm_in_the_cycle_of_the_packet_that_violates(quanti
                     ),
                     path_tolerance=tolerance_of_one(quantity, at, limits),
                 ),
-                Deviation(
+                DeviationFault(
                     quantity=quantity,
-                    axis=AXES[axis],
+                    axis=DEVIATION_AXES[axis],
                     shape='offset',
                     amount=sign * sizes,
-                    when=Travelled(0.005),
+                    trigger=AfterDistance(0.005),
                     duration=0.05,
                 ),
             )
@@ -181,16 +188,16 @@ def test_a_push_on_an_axis_without_a_limit_stops_nothing(quantity, limit):
             motion, _ = await executed(
                 cell,
                 goal,
-                Deviation(
+                DeviationFault(
                     quantity=quantity,
-                    axis=AXES[axis],
+                    axis=DEVIATION_AXES[axis],
                     shape='offset',
                     amount=size,
-                    when=Travelled(0.005),
+                    trigger=AfterDistance(0.005),
                     duration=0.05,
                 ),
             )
-            assert motion.outcome.succeeded, (AXES[axis], motion.outcome.text)
+            assert motion.outcome.succeeded, (DEVIATION_AXES[axis], motion.outcome.text)
             await asyncio.sleep(0.1)
 
     run_cell(scenario)
@@ -251,11 +258,11 @@ def troubles(random, slider, duration):
     """What people do while it moves: the slider, up to two times, and a pause in half the runs."""
     instants = sorted(random.uniform(0.0, duration) for _ in range(3))
     faults = [
-        Slider(fraction=slider),
+        SpeedSliderFault(fraction=slider),
         *(
-            Slider(
+            SpeedSliderFault(
                 fraction=min(1.0, max(0.01, slider * random.uniform(0.3, 3.0))),
-                when=After(instant),
+                trigger=AfterTime(instant),
             )
             for instant in instants[: random.randint(0, 2)]
         ),
@@ -263,8 +270,8 @@ def troubles(random, slider, duration):
     pause = random.uniform(0.1, 0.3) if random.random() < 0.5 else 0.0
     if pause:
         faults += [
-            Event(action=Action.PAUSE, when=After(instants[2])),
-            Event(action=Action.PLAY, when=After(instants[2] + pause)),
+            EventFault(action=FaultEvent.PAUSE, trigger=AfterTime(instants[2])),
+            EventFault(action=FaultEvent.PLAY, trigger=AfterTime(instants[2] + pause)),
         ]
     return faults, pause
 
@@ -277,11 +284,11 @@ def test_no_slider_and_no_pause_ever_fails_a_goal(batch):
         if batch % 2:
             cell.robot.inject(
                 *(
-                    Deviation(
+                    DeviationFault(
                         quantity=quantity, axis=axis, shape='noise', amount=amount, seed=batch
                     )
                     for quantity, amount in NOISE
-                    for axis in AXES
+                    for axis in DEVIATION_AXES
                 )
             )
         for number in range(RUNS // BATCHES):

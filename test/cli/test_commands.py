@@ -14,7 +14,7 @@ import yaml
 
 from ur_cartesian_driver.cli import main, picture
 from ur_cartesian_driver.cli.commands import goal_file
-from ur_cartesian_driver.cli.plans import standing_at
+from ur_cartesian_driver.cli.plans import stationary_state
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, robot_model
 from ur_cartesian_driver.ros.client import load_goal
@@ -144,7 +144,7 @@ def unused_port():
 
 def test_an_arm_that_is_said_to_stand_somewhere_stands_there():
     arm = Arm(robot_model('ur10e'))
-    state = standing_at(arm, HOME)
+    state = stationary_state(arm, HOME)
     assert state.actual_q == HOME
     assert state.actual_tcp_pose == arm.forward(HOME)
 

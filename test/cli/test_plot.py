@@ -5,9 +5,9 @@
 import csv
 import sys
 
-from made_up_recording import only_file, outputs, packet, record
 import numpy as np
 import pytest
+from synthetic_recording import only_file, outputs, packet, record
 
 from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.driver.recording import Recording
@@ -26,9 +26,9 @@ def busy(i):
 
 def switch(recorder, i):
     if i % 40 == 0:
-        recorder.take_signals(outputs(i // 40 & 1))
+        recorder.add_signals(outputs(i // 40 & 1))
     if i == 120:
-        recorder.note('cancel', 'preempted by a newer motion')
+        recorder.add_event('cancel', 'preempted by a newer motion')
 
 
 @pytest.mark.slow

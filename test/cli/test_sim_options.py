@@ -9,7 +9,7 @@ import pytest
 from ur_cartesian_driver.cli import commands, main, parser
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.sim.calibration import random_calibration
-from ur_cartesian_driver.sim.faults import Action, After, Drop, Event
+from ur_cartesian_driver.sim.faults import AfterTime, DropFault, EventFault, FaultEvent
 
 
 def test_a_fault_that_is_not_understood_is_one_sentence_with_the_word(capsys):
@@ -50,4 +50,7 @@ def test_options_reach_the_robot():
     config = commands.simulator_config(arguments)
     assert config.rate == 0.0
     assert config.geometry == random_calibration(robot_model('ur10e'), 3)
-    assert config.faults == [Event(action=Action.STOP, when=After(2.0)), Drop(interface='rtde')]
+    assert config.faults == [
+        EventFault(action=FaultEvent.STOP, trigger=AfterTime(2.0)),
+        DropFault(interface='rtde'),
+    ]

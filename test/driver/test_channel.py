@@ -9,30 +9,32 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.driver import channel, DriverConfig, DriverStatus
-from ur_cartesian_driver.execution import AnswerExtension, Order
+from ur_cartesian_driver.execution import AnswerAppend, MotionJob
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.robot import calls
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.status import Gaps
+from ur_cartesian_driver.robot.services import service_calls
+from ur_cartesian_driver.robot.status import LinkGaps
 
 MESSAGES = [
     channel.Configure(config=DriverConfig(robot_ip='10.0.0.1', headless_mode=True)),
     channel.CancelMotion(motion=3),
-    channel.Heartbeat(),
+    channel.OwnerHeartbeat(),
     channel.Shutdown(),
     channel.ResendProgram(),
-    channel.MotionExtended(motion=3, answer=AnswerExtension(number=1, refusal='The goal ended.')),
+    channel.AppendAnswered(motion=3, answer=AnswerAppend(number=1, refusal='The goal ended.')),
     channel.MotionEnded(motion=3, outcome=Outcome(code=ErrorCode.SUCCESSFUL, text='Done.')),
     channel.StatusChanged(
         status=DriverStatus(state=ConnectionState.READY, ports={'reverse_port': 50001})
     ),
-    channel.CallRobot(number=2, call=calls.SetTcp(T_flange_tcp=Pose((0.0, 0.0, 0.1)))),
-    channel.CallAnswered(number=2, answer=calls.Answer(ok=True, text='The TCP is set.')),
-    channel.Alive(gaps=Gaps(reports=0.002, keepalives=0.021)),
-    channel.LogLine(level=30, text='a line'),
+    channel.CallRobot(number=2, call=service_calls.SetTcpCall(T_flange_tcp=Pose((0.0, 0.0, 0.1)))),
+    channel.CallAnswered(
+        number=2, answer=service_calls.ServiceAnswer(ok=True, text='The TCP is set.')
+    ),
+    channel.LoopHeartbeat(gaps=LinkGaps(reports=0.002, keepalives=0.021)),
+    channel.LogMessage(level=30, text='a line'),
 ]
 
 
@@ -50,7 +52,7 @@ def test_a_large_order_arrives_whole():
         poses=np.ones((n, 7)), point=np.zeros(n, np.int32), time=np.arange(n, dtype=float)
     )
     sent = channel.StartMotion(
-        motion=1, order=Order(points=n, reference=reference, duration=1.0), points=bytes(84 * n)
+        motion=1, job=MotionJob(points=n, reference=reference, duration=1.0), points=bytes(84 * n)
     )
     ours, theirs = socket.socketpair()
     with ours, theirs:
@@ -59,12 +61,12 @@ def test_a_large_order_arrives_whole():
         arrived = channel.receive(theirs)
         thread.join()
     assert arrived.points == sent.points
-    assert np.array_equal(arrived.order.reference.time, reference.time)
+    assert np.array_equal(arrived.job.reference.time, reference.time)
 
 
 def test_the_end_of_the_pipe_is_none_also_inside_a_message():
     ours, theirs = socket.socketpair()
     with theirs:
-        ours.sendall(channel.pack(channel.Heartbeat())[:-1])
+        ours.sendall(channel.pack(channel.OwnerHeartbeat())[:-1])
         ours.close()
         assert channel.receive(theirs) is None

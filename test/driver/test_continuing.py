@@ -8,8 +8,8 @@ import queue
 
 import pytest
 
-from ur_cartesian_driver.driver.continuing import Continuing
-from ur_cartesian_driver.execution import AnswerExtension
+from ur_cartesian_driver.driver.appender import Appender
+from ur_cartesian_driver.execution import AnswerAppend
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import RobotNotReady
@@ -17,9 +17,9 @@ from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.continuation import opened
-from ur_cartesian_driver.planning.open_goal import Addition
-from ur_cartesian_driver.protocol.dialects import NEWEST
+from ur_cartesian_driver.planning.append.append_planner import plan_first_part
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
+from ur_cartesian_driver.protocol.dialects import NEWEST_DIALECT
 
 ARM = Arm(robot_model('ur5e'))
 Q = (0.3, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
@@ -46,14 +46,14 @@ def goal(sent):
     """A goal of one point whose robot loop answers as the test says."""
 
     def made(timeout=60.0):
-        part = opened(
+        part = plan_first_part(
             plan(Goal(waypoints=(point(1),), keep_open=True), STATE, ARM, OPTIONS), ARM, OPTIONS
         )
-        return Continuing(
+        return Appender(
             1,
             part,
-            dialect=NEWEST,
-            arm_and_options=lambda: (ARM, OPTIONS),
+            dialect=NEWEST_DIALECT,
+            planning_inputs=lambda: (ARM, OPTIONS),
             send=sent.put,
             progress=lambda: None,
             timeout=timeout,
@@ -70,28 +70,28 @@ def elsewhere():
 
 
 def number(sent):
-    return sent.get(timeout=20.0).extension.number
+    return sent.get(timeout=20.0).append_job.number
 
 
 def test_points_that_are_taken_count_and_refused_ones_do_not(goal, sent, elsewhere):
-    continuing = goal()
-    first = elsewhere.submit(continuing.append, Addition(waypoints=(point(2), point(3))))
-    continuing.answer(AnswerExtension(number=number(sent)))
-    assert first.result(20.0).points == continuing.points == 3
-    second = elsewhere.submit(continuing.append, Addition(waypoints=(point(4),)))
-    continuing.answer(AnswerExtension(number=number(sent), refusal='The goal is ending.'))
+    appender = goal()
+    first = elsewhere.submit(appender.append, AppendedPoints(waypoints=(point(2), point(3))))
+    appender.answer(AnswerAppend(number=number(sent)))
+    assert first.result(20.0).points == appender.points == 3
+    second = elsewhere.submit(appender.append, AppendedPoints(waypoints=(point(4),)))
+    appender.answer(AnswerAppend(number=number(sent), refusal='The goal is ending.'))
     with pytest.raises(RobotNotReady, match='The goal is ending'):
         second.result(20.0)
-    assert continuing.points == 3
+    assert appender.points == 3
 
 
 def test_the_end_of_the_goal_answers_who_waits_and_all_who_come_later(goal, sent, elsewhere):
-    continuing = goal()
-    waits = elsewhere.submit(continuing.append, Addition(waypoints=(point(2),)))
+    appender = goal()
+    waits = elsewhere.submit(appender.append, AppendedPoints(waypoints=(point(2),)))
     asked = number(sent)
-    continuing.end()
-    continuing.answer(AnswerExtension(number=asked))  # it comes too late
-    for ended in (waits, elsewhere.submit(continuing.append, Addition(last=True))):
+    appender.end()
+    appender.answer(AnswerAppend(number=asked))  # it comes too late
+    for ended in (waits, elsewhere.submit(appender.append, AppendedPoints(last=True))):
         with pytest.raises(RobotNotReady, match='The goal has ended'):
             ended.result(20.0)
     assert sent.empty(), 'nobody is asked any more'
@@ -99,9 +99,9 @@ def test_the_end_of_the_goal_answers_who_waits_and_all_who_come_later(goal, sent
 
 def test_a_robot_loop_that_does_not_answer_is_not_asked_again(goal, sent):
     """It may have the points or not, and where others would have to begin depends on that."""
-    continuing = goal(timeout=0.0)
+    appender = goal(timeout=0.0)
     for waypoints in ((point(2),), (point(2), point(3))):
         with pytest.raises(RobotNotReady, match='has not answered: nothing can be appended'):
-            continuing.append(Addition(waypoints=waypoints))
+            appender.append(AppendedPoints(waypoints=waypoints))
     assert number(sent) == 1
     assert sent.empty()

@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 
 from ur_cartesian_driver.driver import Driver
-from ur_cartesian_driver.driver.channel import AimMotion, LENGTH, pack, StartMotion, unpack
+from ur_cartesian_driver.driver.channel import LENGTH, pack, SetLiveTarget, StartMotion, unpack
 from ur_cartesian_driver.driver.config import DriverConfig
-from ur_cartesian_driver.driver.live import live_order, standing_order, standing_plan
-from ur_cartesian_driver.driver.machines import is_slow, machine_of
-from ur_cartesian_driver.execution.live_machine import LiveMachine, TeachMachine
+from ur_cartesian_driver.driver.live import live_setup, stationary_job, stationary_plan
+from ur_cartesian_driver.driver.machines import is_slow_to_make, make_machine
+from ur_cartesian_driver.execution.live_machine import FreedriveMachine, LiveMachine
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import RobotNotReady
@@ -29,7 +29,7 @@ STATE = RobotState(
 
 
 def limits(**options):
-    return live_order(ARM, HOME, PlanningOptions(**options)).settings.limits
+    return live_setup(ARM, HOME, PlanningOptions(**options)).settings.limits
 
 
 @pytest.mark.parametrize(('most', 'expected'), [(0.1, 0.1), (0.0, 0.25), (1.0, 0.25)])
@@ -38,8 +38,8 @@ def test_the_tool_is_never_faster_than_max_tool_speed(most, expected):
 
 
 def test_joints_are_as_fast_as_both_bounds_allow():
-    assert limits(servo_target_joint_velocity=1.0).joint_velocity == (1.0,) * 6
-    assert limits(servo_target_joint_velocity=9.0).joint_velocity == UR5E.max_joint_speed
+    assert limits(live_target_joint_velocity=1.0).joint_velocity == (1.0,) * 6
+    assert limits(live_target_joint_velocity=9.0).joint_velocity == UR5E.max_joint_speed
 
 
 def test_margins_and_planes_are_those_of_goals():
@@ -49,14 +49,14 @@ def test_margins_and_planes_are_those_of_goals():
         workspace_planes=('table 0 0 0.1 0 0 2 0.02',),
     )
     assert found.singularity_margins == (0.05, 0.2, 0.02)
-    assert found.surroundings.tool_radius == 0.03
-    (table,) = found.surroundings.planes
+    assert found.workspace.tool_radius == 0.03
+    (table,) = found.workspace.planes
     assert (table.name, table.normal, table.margin) == ('table', (0.0, 0.0, 1.0), 0.02)
 
 
 @pytest.mark.parametrize(('choice', 'expected'), [('auto', None), ('refuse', 0.02)])
 def test_the_arm_keeps_away_from_itself_where_capsules_refuse_goals(choice, expected):
-    found = limits(self_collision=choice, min_clearance=0.02).surroundings
+    found = limits(self_collision=choice, min_clearance=0.02).workspace
     assert found.min_clearance == expected
     assert bool(found) is (expected is not None)
 
@@ -71,39 +71,39 @@ def start(arm=ARM, **fields):
         StartMotion(
             motion=7,
             points=b'',
-            order=standing_order(standing_plan(STATE)),
-            live=live_order(arm, HOME, PlanningOptions()),
+            job=stationary_job(stationary_plan(STATE)),
+            live=live_setup(arm, HOME, PlanningOptions()),
             **fields,
         )
     )
 
 
 def test_a_session_and_its_targets_come_through_the_pipe():
-    machine = machine_of(start(), DriverConfig())
+    machine = make_machine(start(), DriverConfig())
     assert isinstance(machine, LiveMachine)
-    aim = sent(AimMotion(motion=7, T_base_tcp=HERE, age=0.05))
-    machine.aim(aim.T_base_tcp, aim.age, 10.0)
-    assert machine.live.taken == 1
+    set_target = sent(SetLiveTarget(motion=7, T_base_tcp=HERE, age=0.05))
+    machine.set_target(set_target.T_base_tcp, set_target.age, 10.0)
+    assert machine.live.accepted == 1
     assert isinstance(
-        machine_of(replace(start(), live=None, teach=True), DriverConfig()), TeachMachine
+        make_machine(replace(start(), live=None, freedrive=True), DriverConfig()), FreedriveMachine
     )
 
 
 def test_only_a_calibrated_arm_takes_long():
     other = Arm(UR5E, replace(UR5E.geometry, a=(0.0, -0.4252, -0.3925, 0.0, 0.0, 0.0)))
-    assert is_slow(start(other))
-    assert not is_slow(start())
-    assert not is_slow(replace(start(), live=None))
+    assert is_slow_to_make(start(other))
+    assert not is_slow_to_make(start())
+    assert not is_slow_to_make(replace(start(), live=None))
 
 
 def test_another_robot_program_does_not_follow_targets():
     driver = Driver(DriverConfig(wire_dialect='2.12'))
     with pytest.raises(RobotNotReady, match=r'follow live targets; wire_dialect .* 2\.12'):
-        driver.servo_to(HERE)
+        driver.send_live_target(HERE)
     with pytest.raises(RobotNotReady, match='does not report its state'):
-        Driver(DriverConfig()).servo_to(HERE)
+        Driver(DriverConfig()).send_live_target(HERE)
 
 
 def test_a_plan_that_stands_has_nothing_on_the_wire():
-    plan = standing_plan(STATE)
+    plan = stationary_plan(STATE)
     assert (plan.segments, plan.report, plan.T_flange_active) == ((), (), IDENTITY)

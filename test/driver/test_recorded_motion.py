@@ -5,8 +5,8 @@
 import asyncio
 from dataclasses import replace
 
+from append_goals import AppendMotion, circle
 import numpy as np
-from open_goals import circle, OpenMotion
 import pytest
 from robot_cell import CYCLE, run_cell
 
@@ -25,7 +25,7 @@ from ur_cartesian_driver.motion.goal import (
 )
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.sim.faults import Action, Event, Slider, Travelled
+from ur_cartesian_driver.sim.faults import AfterDistance, EventFault, FaultEvent, SpeedSliderFault
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
@@ -81,11 +81,11 @@ def test_a_recording_equals_what_happened(tmp_path):
     """Packet by packet, with a slider that moves and an output that somebody switches."""
 
     async def scenario(cell):
-        cell.robot.inject(Slider(fraction=0.5, when=Travelled(0.02)))
+        cell.robot.inject(SpeedSliderFault(fraction=0.5, trigger=AfterDistance(0.02)))
 
         async def switch(motion):
             await cell.until(lambda: len(motion.progress) > 3)
-            cell.robot.controller.signals.digital_out.standard[3] = True
+            cell.robot.controller.io.digital_out.standard[3] = True
 
         return await executed(cell, corner(cell), switch)
 
@@ -127,7 +127,7 @@ def test_each_motion_is_a_file_that_says_how_it_ended(tmp_path):
 
         async def stop(motion):
             await cell.until(lambda: len(motion.progress) > 5)
-            cell.robot.inject(Event(action=Action.PROTECTIVE_STOP))
+            cell.robot.inject(EventFault(action=FaultEvent.PROTECTIVE_STOP))
 
         ends = []
         for act in (cancel, stop):
@@ -169,7 +169,7 @@ def test_the_recording_of_an_open_goal_has_the_path_that_was_gone(tmp_path, late
 
     async def scenario(cell):
         home = cell.memory.read().actual_tcp_pose
-        motion = OpenMotion(
+        motion = AppendMotion(
             cell,
             Goal(
                 waypoints=tuple(circle(home, 1, 4)), execution=ExecutionMode.SPLINE, keep_open=True
@@ -178,7 +178,11 @@ def test_the_recording_of_an_open_goal_has_the_path_that_was_gone(tmp_path, late
         await motion.until(
             lambda: (
                 motion.motion.progress
-                and (motion.progress.waits if late else motion.progress.time_remaining < 0.6)
+                and (
+                    motion.progress.awaiting_points
+                    if late
+                    else motion.progress.time_remaining < 0.6
+                )
             )
         )
         points = circle(home, 5, 4)

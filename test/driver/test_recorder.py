@@ -12,10 +12,12 @@ import subprocess
 import sys
 import tracemalloc
 
-from made_up_recording import (
+import numpy as np
+import pytest
+from synthetic_recording import (
     DONE,
-    HEAD,
     keep_pace,
+    METADATA,
     only_file,
     ORDER,
     outputs,
@@ -23,18 +25,22 @@ from made_up_recording import (
     path,
     PERIOD,
     record,
-    Said,
     SPEED,
     START,
+    Warnings,
 )
-import numpy as np
-import pytest
 
 from ur_cartesian_driver.driver import DriverConfig, recording_format
-from ur_cartesian_driver.driver.recorder import about, head_of, PIECE, PIECES, Recorder
+from ur_cartesian_driver.driver.recorder import (
+    BUFFER_COUNT,
+    BUFFER_ROWS,
+    motion_metadata,
+    plan_metadata,
+    Recorder,
+)
 from ur_cartesian_driver.driver.recording import Recording
-from ur_cartesian_driver.driver.recording_folder import keep_within, name_of
-from ur_cartesian_driver.execution import order_of
+from ur_cartesian_driver.driver.recording_folder import enforce_quota, recording_name
+from ur_cartesian_driver.execution import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
@@ -67,18 +73,18 @@ def test_numpy_alone_opens_a_recording_without_pickle(tmp_path):
     record(tmp_path, [packet(i) for i in range(10)])
     with np.load(only_file(tmp_path), allow_pickle=False) as file:
         shapes = {name: file[name].shape for name in file.files}
-        head = json.loads(file['metadata'].item())
+        metadata = json.loads(file['metadata'].item())
     assert shapes['actual_pose'] == (10, 7)
     assert shapes['planned_pose'] == (4, 7)
-    assert head['outcome'] == {
+    assert metadata['outcome'] == {
         'code': 0,
         'name': 'SUCCESSFUL',
         'text': 'Done.',
         'report': ['a line'],
     }
-    assert head['report'] == ['point 0: there']
-    assert head['parameters']['x'] == 1
-    assert head['parameters']['ur_type'] == 'ur5e'
+    assert metadata['report'] == ['point 0: there']
+    assert metadata['parameters']['x'] == 1
+    assert metadata['parameters']['ur_type'] == 'ur5e'
 
 
 def test_the_deviation_is_what_the_arm_was_beside_its_plan(tmp_path):
@@ -93,11 +99,11 @@ def test_the_deviation_is_what_the_arm_was_beside_its_plan(tmp_path):
 def test_events_are_what_changed_and_what_was_noted_in_the_order_of_time(tmp_path):
     def between(recorder, i):
         if i == 10:
-            recorder.take_signals(outputs(1 << 0))
+            recorder.add_signals(outputs(1 << 0))
         elif i == 30:
-            recorder.take_signals(outputs(1 << 0 | 1 << 9 | 1 << 17))
+            recorder.add_signals(outputs(1 << 0 | 1 << 9 | 1 << 17))
         elif i == 300:
-            recorder.note('cancel', '')
+            recorder.add_event('cancel', '')
 
     def state(i):
         begun = 7 if i < 5 else 1 if i < 100 else 2  # 7: of the goal before
@@ -134,9 +140,9 @@ def test_events_are_what_changed_and_what_was_noted_in_the_order_of_time(tmp_pat
 def test_what_a_path_is_continued_by_takes_the_place_of_its_ending(tmp_path):
     def between(recorder, i):
         if i == 50:  # from 0.3 m on, the arm does not stop at 0.4 m
-            recorder.extend(path(0.3, 0.6, 1), 0.4 / SPEED)
+            recorder.add_plan(path(0.3, 0.6, 1), 0.4 / SPEED)
         elif i == 60:
-            recorder.extend(path(0.5, 0.7, 2), 0.5 / SPEED)
+            recorder.add_plan(path(0.5, 0.7, 2), 0.5 / SPEED)
 
     record(tmp_path, [packet(i) for i in range(160)], between=between)
     found = Recording.load(only_file(tmp_path))
@@ -148,7 +154,7 @@ def test_what_a_path_is_continued_by_takes_the_place_of_its_ending(tmp_path):
 def test_files_are_named_after_time_and_motion_and_never_overwritten(tmp_path):
     for _ in range(2):
         record(tmp_path, [packet(0)])
-    name = name_of(HEAD)
+    name = recording_name(METADATA)
     assert name.endswith('_primitives_2_points')
     assert {file.name for file in tmp_path.iterdir()} == {f'{name}.npz', f'{name}_2.npz'}
 
@@ -165,39 +171,39 @@ def test_nothing_is_recorded_without_a_directory(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_an_endless_motion_takes_no_memory(tmp_path):
     count, packets = 8_000, [packet(i) for i in range(100)]
-    recorder = Recorder(str(tmp_path), 100.0, Said())
-    recorder.start(ORDER, dict(HEAD), packet(0))
+    recorder = Recorder(str(tmp_path), 100.0, Warnings())
+    recorder.start(ORDER, dict(METADATA), packet(0))
     tracemalloc.start()
     try:
         for i in range(1, count):
             keep_pace(recorder)
-            recorder.take(packets[i % len(packets)])
+            recorder.add_state(packets[i % len(packets)])
         recorder.end(DONE)
         recorder.close(30.0)
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
     file = only_file(tmp_path)
-    size = count * recording_format.ROW.size
+    size = count * recording_format.EXECUTED_STRUCT.size
     assert file.stat().st_size > size
     assert peak < 0.1 * size
 
 
 def test_a_disk_that_is_too_slow_costs_rows_and_not_memory(tmp_path):
     """Nobody writes while the packets come: what there is no memory for is counted."""
-    recorder = Recorder(str(tmp_path), 100.0, Said())
-    recorder.start(ORDER, dict(HEAD), packet(0))
-    held = [recorder._free.get() for _ in range(PIECES - 1)]
-    count = 3 * PIECE
+    recorder = Recorder(str(tmp_path), 100.0, Warnings())
+    recorder.start(ORDER, dict(METADATA), packet(0))
+    held = [recorder._free_buffers.get() for _ in range(BUFFER_COUNT - 1)]
+    count = 3 * BUFFER_ROWS
     for i in range(1, count):
-        recorder.take(packet(i))
+        recorder.add_state(packet(i))
     for piece in held:
-        recorder._free.put(piece)
+        recorder._free_buffers.put(piece)
     recorder.end(DONE)
     recorder.close(10.0)
     found = Recording.load(only_file(tmp_path))
     assert len(found.time) + found.metadata['rows_left_out'] == count
-    assert found.metadata['rows_left_out'] > PIECE
+    assert found.metadata['rows_left_out'] > BUFFER_ROWS
 
 
 @contextlib.contextmanager
@@ -213,8 +219,8 @@ def a_disk_of(size):
 
 def test_a_full_disk_ends_the_recording_with_one_sentence_and_keeps_what_was_written(tmp_path):
     with a_disk_of(200_000):
-        said = record(tmp_path, [packet(i) for i in range(1000)])
-    (sentence,) = said
+        warnings = record(tmp_path, [packet(i) for i in range(1000)])
+    (sentence,) = warnings
     assert 'File too large' in sentence
     assert 'record_directory' in sentence
     found = Recording.load(only_file(tmp_path))
@@ -228,23 +234,23 @@ def test_a_full_disk_ends_the_recording_with_one_sentence_and_keeps_what_was_wri
 def test_a_directory_that_cannot_be_written_is_said_once_not_with_each_motion(tmp_path):
     blocked = tmp_path / 'file'
     blocked.write_text('no directory')
-    said = Said()
-    recorder = Recorder(str(blocked / 'below'), 100.0, said)
+    warnings = Warnings()
+    recorder = Recorder(str(blocked / 'below'), 100.0, warnings)
     for _ in range(3):
-        recorder.start(ORDER, dict(HEAD), packet(0))
-        for i in range(3 * PIECE * PIECES):
-            recorder.take(packet(i))
+        recorder.start(ORDER, dict(METADATA), packet(0))
+        for i in range(3 * BUFFER_ROWS * BUFFER_COUNT):
+            recorder.add_state(packet(i))
         recorder.end(DONE)
     recorder.close(10.0)
-    assert len(said) == 1
-    assert 'Not a directory' in said[0]
+    assert len(warnings) == 1
+    assert 'Not a directory' in warnings[0]
 
 
 def test_a_motion_that_takes_more_than_half_of_the_room_is_recorded_as_far_as_that(tmp_path):
-    said = record(tmp_path, [packet(i) for i in range(1500)], max_size=0.5)
-    assert ['half of record_max_size = 0.5 MB' in text for text in said] == [True]
+    warnings = record(tmp_path, [packet(i) for i in range(1500)], max_size=0.5)
+    assert ['half of record_max_size = 0.5 MB' in text for text in warnings] == [True]
     found = Recording.load(only_file(tmp_path))
-    assert found.metadata['trouble'] == said[0]
+    assert found.metadata['trouble'] == warnings[0]
     assert found.metadata['outcome']['name'] == 'SUCCESSFUL'
     assert 400 < len(found.time) < 800
 
@@ -253,7 +259,7 @@ def test_the_oldest_recordings_make_room_and_other_files_stay(tmp_path):
     names = [f'2026010{day}-120000-000_spline_5_points' for day in (1, 2, 3)]
     for name in [*names, 'kept for the report']:
         (tmp_path / f'{name}.npz').write_bytes(bytes(1000))
-    keep_within(tmp_path, 2500.0)
+    enforce_quota(tmp_path, 2500.0)
     assert {file.stem for file in tmp_path.iterdir()} == {*names[1:], 'kept for the report'}
 
 
@@ -261,16 +267,16 @@ def test_the_oldest_recordings_make_room_and_other_files_stay(tmp_path):
 
 KILLED = """
 import os, pickle, signal, sys, time
-from ur_cartesian_driver.driver.recorder import PIECES, Recorder
+from ur_cartesian_driver.driver.recorder import BUFFER_COUNT, Recorder
 directory, scene = sys.argv[1:]
 with open(scene, 'rb') as file:
     order, head, packets = pickle.load(file)
 recorder = Recorder(directory, 100.0, print)
 recorder.start(order, head, packets[0])
-recorder.note('cancel', '')
+recorder.add_event('cancel', '')
 for packet in packets[1:]:
-    recorder.take(packet)
-while recorder._free.qsize() < PIECES - 1:
+    recorder.add_state(packet)
+while recorder._free_buffers.qsize() < BUFFER_COUNT - 1:
     time.sleep(0.001)
 os.kill(os.getpid(), signal.SIGKILL)
 """
@@ -281,7 +287,7 @@ def test_what_a_killed_process_has_written_can_be_read_and_becomes_a_file_later(
     scene, tmp_path = tmp_path / 'scene', tmp_path / 'recordings'
     scene.write_bytes(
         pickle.dumps(
-            (ORDER, HEAD, [packet(i, runtime_state=RuntimeState.PLAYING) for i in range(1000)])
+            (ORDER, METADATA, [packet(i, runtime_state=RuntimeState.PLAYING) for i in range(1000)])
         )
     )
     ended = subprocess.run([sys.executable, '-c', KILLED, str(tmp_path), str(scene)], check=False)
@@ -304,18 +310,18 @@ def test_what_a_killed_process_has_written_can_be_read_and_becomes_a_file_later(
 
 
 def test_a_motion_that_runs_can_be_looked_at_and_is_not_taken_for_a_dead_one(tmp_path):
-    recorder = Recorder(str(tmp_path), 100.0, Said())
-    recorder.start(ORDER, dict(HEAD), packet(0))
-    for i in range(1, PIECE):
-        recorder.take(packet(i))
-    while recorder._free.qsize() < PIECES - 1:
+    recorder = Recorder(str(tmp_path), 100.0, Warnings())
+    recorder.start(ORDER, dict(METADATA), packet(0))
+    for i in range(1, BUFFER_ROWS):
+        recorder.add_state(packet(i))
+    while recorder._free_buffers.qsize() < BUFFER_COUNT - 1:
         os.sched_yield()
-    assert 200 < len(Recording.load(only_file(tmp_path)).time) <= PIECE
-    keep_within(tmp_path, 1e6)
+    assert 200 < len(Recording.load(only_file(tmp_path)).time) <= BUFFER_ROWS
+    enforce_quota(tmp_path, 1e6)
     assert only_file(tmp_path).suffix == '.part'
     recorder.end(DONE)
     recorder.close(10.0)
-    assert len(Recording.load(only_file(tmp_path)).time) == PIECE
+    assert len(Recording.load(only_file(tmp_path)).time) == BUFFER_ROWS
 
 
 @pytest.mark.parametrize('data', [b'', b'no zip', b'PK\x03\x04 no zip either'])
@@ -330,14 +336,14 @@ def test_what_is_no_recording_is_refused(tmp_path, data):
 
 
 def test_a_session_that_nothing_was_planned_for_has_no_plan(tmp_path):
-    head = head_of(ORDER, robot={}, parameters=DriverConfig(), led_by='LIVE_TARGETS')
-    record(tmp_path, [packet(i) for i in range(10)], head=head)
+    metadata = motion_metadata(ORDER, robot={}, parameters=DriverConfig(), mode='LIVE_TARGETS')
+    record(tmp_path, [packet(i) for i in range(10)], metadata=metadata)
     file = only_file(tmp_path)
     assert file.stem.endswith('_live_targets_0_points')
     found = Recording.load(file)
     assert len(found.planned_time) == 0
     assert np.isnan(found.deviation().position).all()
-    keep_within(tmp_path, 0.0)
+    enforce_quota(tmp_path, 0.0)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -353,14 +359,14 @@ def test_the_metadata_have_what_only_the_planner_knew():
         arm,
         PlanningOptions(linear_velocity=0.07),
     )
-    head = head_of(
-        order_of(made),
+    metadata = motion_metadata(
+        job_from_plan(made),
         robot={},
         parameters=DriverConfig(keepalive_period=0.01),
-        of_owner=about(made, PlanningOptions(linear_velocity=0.07)),
+        plan_metadata_json=plan_metadata(made, PlanningOptions(linear_velocity=0.07)),
     )
-    assert head['report'] == list(made.report)
-    assert head['frame_id'] == 'base'
-    assert head['parameters']['linear_velocity'] == 0.07
-    assert head['parameters']['keepalive_period'] == 0.01
-    json.dumps(head)
+    assert metadata['report'] == list(made.report)
+    assert metadata['frame_id'] == 'base'
+    assert metadata['parameters']['linear_velocity'] == 0.07
+    assert metadata['parameters']['keepalive_period'] == 0.01
+    json.dumps(metadata)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Records of a motion that goes on: each is sent once, and then forgotten."""
 
-from ur_cartesian_driver.driver.records_to_send import RecordsToSend
+from ur_cartesian_driver.driver.records_to_send import PointBuffer
 from ur_cartesian_driver.protocol.trajectory import POINT_SIZE
 
 
@@ -11,7 +11,7 @@ def records(*names):
 
 
 def test_what_is_taken_is_forgotten_and_numbers_go_on():
-    store = RecordsToSend(records('a', 'b', 'c', 'd'))
+    store = PointBuffer(records('a', 'b', 'c', 'd'))
     assert store.take(0, 2) == records('a', 'b')
     assert len(store) == 2
     assert store.take(2, 3) == records('c')
@@ -20,7 +20,7 @@ def test_what_is_taken_is_forgotten_and_numbers_go_on():
 
 
 def test_what_comes_behind_takes_the_place_of_what_was_there():
-    store = RecordsToSend(records('a', 'b', 'z'))
+    store = PointBuffer(records('a', 'b', 'z'))
     assert store.take(0, 1) == records('a')
     store.put(2, records('c', 'd', 'y'))
     assert store.take(1, 4) == records('b', 'c', 'd')

@@ -7,7 +7,7 @@ import os
 import socket
 
 from ur_cartesian_driver.driver import channel, DriverConfig
-from ur_cartesian_driver.driver.robot_loop import MOST_UNREAD, RobotLoop
+from ur_cartesian_driver.driver.robot_loop import MAX_UNREAD, RobotLoop
 from ur_cartesian_driver.driver.snapshot import create, StateMemory
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
@@ -22,11 +22,11 @@ def test_an_owner_that_does_not_read_costs_no_memory_and_misses_no_end():
         descriptor = create()
         memory = StateMemory(descriptor)
         loop = RobotLoop(channel.Configure(config=DriverConfig()), memory, writer)
-        line = channel.LogLine(level=20, text='x' * 10_000)
+        line = channel.LogMessage(level=20, text='x' * 10_000)
         for _ in range(1000):
-            loop._notify(line)
-        assert writer.transport.get_write_buffer_size() < MOST_UNREAD + 20_000
-        loop._notify(ended)
+            loop._send(line)
+        assert writer.transport.get_write_buffer_size() < MAX_UNREAD + 20_000
+        loop._send(ended)
         ours.settimeout(5.0)
         told = [line]
         while told[-1] == line:

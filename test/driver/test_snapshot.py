@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 import pytest
 
-from ur_cartesian_driver.driver import snapshot
+from ur_cartesian_driver.driver.ipc import state_memory
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.state import (
     RobotMode,
@@ -25,8 +25,8 @@ from ur_cartesian_driver.motion.state import (
 @pytest.fixture
 def memories():
     """The views of a writer and of a reader."""
-    descriptor = snapshot.create()
-    writer, reader = snapshot.StateMemory(descriptor), snapshot.StateMemory(descriptor)
+    descriptor = state_memory.create()
+    writer, reader = state_memory.StateMemory(descriptor), state_memory.StateMemory(descriptor)
     os.close(descriptor)
     yield writer, reader
     writer.close()
@@ -69,8 +69,8 @@ states = st.builds(
 
 @given(states)
 def test_every_field_arrives_as_it_was_written(state):
-    descriptor = snapshot.create()
-    memory = snapshot.StateMemory(descriptor)
+    descriptor = state_memory.create()
+    memory = state_memory.StateMemory(descriptor)
     os.close(descriptor)
     memory.write(state)
     assert memory.read() == state

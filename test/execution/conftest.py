@@ -8,7 +8,7 @@ from math import pi
 
 import pytest
 
-from ur_cartesian_driver.execution import order_of, TrajectoryMachine
+from ur_cartesian_driver.execution import GoalMachine, job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robots import robot_model
@@ -69,8 +69,8 @@ class Cell:
         :param instead: a plan that the robot runs while the machine believes in the other.
         :returns: the machine, and the commands of each packet.
         """
-        order = order_of(made)
-        machine = TrajectoryMachine(order, **settings)
+        job = job_from_plan(made)
+        machine = GoalMachine(job, **settings)
         robot = MotionGenerator(self.arm, CYCLE, made.start)
         robot.T_flange_tcp = self.T_flange_tcp
         time, begun, twists, answers = 0.0, 0, ZERO6, []

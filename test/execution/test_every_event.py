@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.execution import (
-    AnswerExtension,
-    Extension,
+    AnswerAppend,
+    AppendJob,
+    AppendMachine,
     Finish,
-    Order,
+    GoalMachine,
+    MotionJob,
     SendControl,
     SendPoints,
-    StreamMachine,
-    TrajectoryMachine,
 )
-from ur_cartesian_driver.execution.states import State, TRANSITIONS
+from ur_cartesian_driver.execution.states import GoalState, TRANSITIONS
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
@@ -44,8 +44,8 @@ BOUND = 10.0
 
 def machine(T_flange_tcp):
     poses = np.array([[0.1 * i, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0] for i in range(POINTS + 1)])
-    return TrajectoryMachine(
-        Order(
+    return GoalMachine(
+        MotionJob(
             points=POINTS,
             duration=3.0,
             T_flange_tcp=T_flange_tcp,
@@ -61,8 +61,8 @@ def machine(T_flange_tcp):
 
 
 def stream(T_flange_tcp, deviation):
-    order = replace(machine(T_flange_tcp).order, open_end=True, ending=1)
-    return StreamMachine(order, max_plan_deviation=(deviation, deviation))
+    job = replace(machine(T_flange_tcp).job, keep_open=True, ending_records=1)
+    return AppendMachine(job, max_plan_deviation=(deviation, deviation))
 
 
 def robot(part=0.0, off=0.0, speed=0.0, begun=0, T_flange_tcp=IDENTITY, **changes):
@@ -139,7 +139,7 @@ def test_a_goal_ends_once_whatever_happens(events, lends):
     (end,) = [command for command in commands if isinstance(command, Finish)]
     assert isinstance(end.outcome.code, ErrorCode)
     assert end.outcome.text.endswith('.')
-    assert goal.state is State.ENDED
+    assert goal.state is GoalState.ENDED
     sent = [
         index
         for command in commands
@@ -150,21 +150,21 @@ def test_a_goal_ends_once_whatever_happens(events, lends):
     assert len(sent) <= POINTS
 
 
-def extension(number, behind, begin, count, last):
+def extension(number, records_before, begin, count, last):
     """Points that go on along the line from a place on it; all but the last one are firm."""
     x = 0.1 * (begin + np.arange(count))
     poses = np.stack([x, *np.tile([[0.0], [0.2], [0.0], [0.0], [0.0], [1.0]], count)], axis=1)
     point, time = np.arange(begin, begin + count) - 1, np.arange(begin, begin + count, dtype=float)
-    return Extension(
+    return AppendJob(
         number=number,
-        behind=behind,
-        order=None
+        records_before=records_before,
+        job=None
         if not count
-        else Order(
+        else MotionJob(
             points=count,
             duration=float(begin + count),
-            open_end=not last,
-            ending=0 if last else 1,
+            keep_open=not last,
+            ending_records=0 if last else 1,
             reference=ReferencePath(poses=poses, point=point.astype(np.int32), time=time),
             waypoint=point.astype(np.int32),
         ),
@@ -174,7 +174,7 @@ def extension(number, behind, begin, count, last):
 EXTENSIONS = st.builds(
     extension,
     number=st.integers(1, 9),
-    behind=st.integers(0, 8),
+    records_before=st.integers(0, 8),
     begin=st.integers(1, 8),
     count=st.integers(0, 4),
     last=st.booleans(),
@@ -199,9 +199,9 @@ def test_an_open_goal_ends_once_whatever_happens(events, lends, deviation):
     commands = commands_of(goal, events)
     (end,) = [command for command in commands if isinstance(command, Finish)]
     assert end.outcome.text.endswith('.')
-    assert goal.state is State.ENDED
-    asked = [event for event, _ in events if isinstance(event, Extension)]
-    answers = [command for command in commands if isinstance(command, AnswerExtension)]
+    assert goal.state is GoalState.ENDED
+    asked = [event for event, _ in events if isinstance(event, AppendJob)]
+    answers = [command for command in commands if isinstance(command, AnswerAppend)]
     ended = next(i for i, c in enumerate(commands) if isinstance(c, Finish))
     assert len(answers) == len(asked), 'who appends is answered, also behind the end'
     assert all(answer.refusal for answer in answers if commands.index(answer) > ended)
@@ -232,10 +232,10 @@ def counts_fit(commands):
                 assert sent is None or count == sent
 
 
-@pytest.mark.parametrize('state', [state for state in State if state is not State.ENDED])
+@pytest.mark.parametrize('state', [state for state in GoalState if state is not GoalState.ENDED])
 def test_every_state_has_a_way_to_the_end(state):
     seen, ahead = set(), {state}
     while ahead:
         seen |= ahead
         ahead = {step.state for s in ahead for step in TRANSITIONS[s].values()} - seen
-    assert State.ENDED in seen
+    assert GoalState.ENDED in seen

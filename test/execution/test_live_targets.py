@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from ur_cartesian_driver.execution.live_targets import LiveSettings, LiveTargets
-from ur_cartesian_driver.execution.target_follower import TargetFollower
+from ur_cartesian_driver.execution.target_follower import OnlineTrajectoryGenerator
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
@@ -22,28 +22,28 @@ class Session:
     """A session and the clock of its owner."""
 
     def __init__(self):
-        self.follower = TargetFollower(ARM, IDENTITY, HOME, SETTINGS.limits)
+        self.generator = OnlineTrajectoryGenerator(ARM, IDENTITY, HOME, SETTINGS.limits)
         self.now = 100.0
-        self.live = LiveTargets(self.follower, SETTINGS)
-        self.live.look(self.now)
-        self.home = self.follower.T_base_tcp
+        self.live = LiveTargets(self.generator, SETTINGS)
+        self.live.update(self.now)
+        self.home = self.generator.T_base_tcp
 
     def beside(self, y):
         x, y0, z = self.home.position
         return Pose((x, y0 + y, z), self.home.quaternion)
 
-    def take(self, y, age=0.0):
-        self.live.take(self.beside(y), age, self.now)
+    def add(self, y, age=0.0):
+        self.live.add(self.beside(y), age, self.now)
 
     def run(self, seconds):
         for _ in range(round(seconds / DT)):
             self.now += DT
-            self.live.look(self.now)
+            self.live.update(self.now)
             self.live.next(DT)
 
     @property
     def y(self):
-        return self.follower.T_base_tcp.position[1] - self.home.position[1]
+        return self.generator.T_base_tcp.position[1] - self.home.position[1]
 
 
 @pytest.fixture
@@ -52,15 +52,15 @@ def session():
 
 
 def test_a_stale_target_stops_the_arm_and_a_fresh_one_continues(session):
-    session.take(0.3)
+    session.add(0.3)
     session.run(0.2)
-    assert session.follower.linear[1] > 0.15
+    assert session.generator.linear[1] > 0.15
     session.run(0.3)
-    assert session.follower.at_rest
+    assert session.generator.at_rest
     assert 0.01 < session.y < 0.15
     assert not session.live.done
     for _ in range(20):
-        session.take(0.3)
+        session.add(0.3)
         session.run(0.1)
     assert session.y == pytest.approx(0.3, abs=1e-9)
     assert session.live.pauses == 1
@@ -68,32 +68,32 @@ def test_a_stale_target_stops_the_arm_and_a_fresh_one_continues(session):
 
 
 def test_the_age_counts_from_the_stamp(session):
-    session.take(0.3, age=0.15)
+    session.add(0.3, age=0.15)
     session.run(0.064)
-    assert session.follower.target is None, 'it was 0.15 s old when it came'
+    assert session.generator.target is None, 'it was 0.15 s old when it came'
     for age in (0.25, float('nan')):
-        session.take(0.1, age=age)
-        assert session.follower.target is None
-    assert session.live.left_out == 2
+        session.add(0.1, age=age)
+        assert session.generator.target is None
+    assert session.live.dropped == 2
 
 
 def test_the_newest_stamp_wins_whatever_comes_last(session):
-    session.take(0.02, age=0.01)
-    session.take(0.3, age=0.1)
-    session.take(0.3, age=0.01)
-    assert session.follower.target == session.beside(0.02)
-    assert (session.live.taken, session.live.left_out) == (1, 2)
+    session.add(0.02, age=0.01)
+    session.add(0.3, age=0.1)
+    session.add(0.3, age=0.01)
+    assert session.generator.target == session.beside(0.02)
+    assert (session.live.accepted, session.live.dropped) == (1, 2)
 
 
 def test_an_arm_that_has_arrived_is_not_stopped_by_the_age(session):
-    session.take(0.002)
+    session.add(0.002)
     session.run(0.5)
     assert session.y == pytest.approx(0.002, abs=1e-9)
     assert session.live.pauses == 0
 
 
 def test_the_session_ends_when_no_target_came_for_long(session):
-    session.take(0.01)
+    session.add(0.01)
     session.run(0.9)
     assert not session.live.done
     session.run(0.2)
@@ -106,29 +106,29 @@ def test_the_session_ends_when_no_target_came_for_long(session):
 )
 def test_targets_are_counted_in_the_report(session, count, said):
     for _ in range(count):
-        session.take(0.1)
+        session.add(0.1)
         session.run(0.01)
     assert session.live.report[0] == said
 
 
 def test_it_does_not_end_before_the_arm_rests(session):
     session.run(0.9)
-    session.take(0.3)
-    session.live.look(session.now + 2.0)
+    session.add(0.3)
+    session.live.update(session.now + 2.0)
     session.live.next(DT)
     session.run(0.1)
     for _ in range(100):
         if session.live.done:
-            assert session.follower.at_rest
+            assert session.generator.at_rest
         session.run(DT)
-        session.live.look(session.now + 2.0)
+        session.live.update(session.now + 2.0)
     assert session.live.done
 
 
 def test_what_stops_it_is_reported_once_in_words(session):
     for i in range(30):
         x, y, z = session.home.position
-        session.live.take(
+        session.live.add(
             Pose((x - 0.45 - 1e-3 * (i % 3), y, z), session.home.quaternion), 0.0, session.now
         )
         session.run(0.1)
@@ -138,7 +138,7 @@ def test_what_stops_it_is_reported_once_in_words(session):
 
 
 def test_no_time_gives_no_step(session):
-    session.take(0.3)
+    session.add(0.3)
     assert session.live.next(0.0) == HOME
 
 

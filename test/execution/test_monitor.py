@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution.monitor import LAG_TIME, LAG_WAY, PathTracker, Place
+from ur_cartesian_driver.execution.monitor import LAG_DISTANCE, LAG_TIME, PathPosition, PathTracker
 from ur_cartesian_driver.motion.goal import ZERO6
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
@@ -55,7 +55,7 @@ def test_a_tool_on_the_path_is_where_the_tracker_says():
     tracker = PathTracker(path(*SQUARE))
     for actual, found in zip(along(SQUARE), walk(tracker, along(SQUARE)), strict=True):
         assert found == pytest.approx(actual, abs=1e-12)
-    assert tracker.place.row == tracker.last_row
+    assert tracker.path_position.row == tracker.last_row
     assert tracker.waypoint() == 3
 
 
@@ -122,7 +122,9 @@ FAST = (0.1, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize('side', [1.0, -1.0])
-@pytest.mark.parametrize(('twist', 'lag'), [(ZERO6, LAG_WAY), (FAST, LAG_WAY + 0.1 * LAG_TIME)])
+@pytest.mark.parametrize(
+    ('twist', 'lag'), [(ZERO6, LAG_DISTANCE), (FAST, LAG_DISTANCE + 0.1 * LAG_TIME)]
+)
 def test_the_tool_may_lag_as_its_speed_explains_and_not_more(twist, lag, side):
     tracker = PathTracker(path(*SQUARE))
     tracker.update(Pose((0.5, 0.0, 0.2), DOWN), 0.2)
@@ -163,10 +165,10 @@ def test_a_turn_lags_as_a_way_does():
 
 
 def test_the_target_is_compared_with_the_plan_apart_from_the_room_of_corners():
-    room = np.array([[0.0, 0.0], [0.003, 0.1], [0.0, 0.0]])
+    blend_tolerance = np.array([[0.0, 0.0], [0.003, 0.1], [0.0, 0.0]])
     corner = (0.4, 0.0, 0.2), (0.5, 0.0, 0.2), (0.5, 0.1, 0.2)
     beside = Pose((0.45, 0.0, 0.204), quaternion_from_rotation_vector((pi + 0.15, 0.0, 0.0)))
-    for allowed, expected in ((None, (0.004, 0.15)), (room, (0.001, 0.05))):
+    for allowed, expected in ((None, (0.004, 0.15)), (blend_tolerance, (0.001, 0.05))):
         tracker = PathTracker(path(*corner, **({} if allowed is None else {'room': allowed})))
         tracker.update(beside, 0.2)
         assert tracker.deviation(beside) == pytest.approx(expected, abs=1e-6)
@@ -190,21 +192,21 @@ def test_what_is_surely_near_the_plan_is_near_it(seed):
     draw = np.random.default_rng(seed)
     quaternions = draw.normal(size=(2, 4))
     quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
-    ends = [(0.4, 0.0, 0.2), (0.5, 0.0, 0.2)]
-    tracker = PathTracker(path(*ends, quaternions=list(quaternions)))
-    place = tracker.pose(Place(0, draw.uniform(0.0, 1.0)))
+    end_times = [(0.4, 0.0, 0.2), (0.5, 0.0, 0.2)]
+    tracker = PathTracker(path(*end_times, quaternions=list(quaternions)))
+    path_position = tracker.pose(PathPosition(0, draw.uniform(0.0, 1.0)))
     size = 10.0 ** draw.uniform(-6.0, -1.0)
-    target = place @ Pose(
+    target = path_position @ Pose(
         tuple(size * draw.normal(size=3)),
         quaternion_from_rotation_vector(10.0 * size * draw.normal(size=3)),
     )
     tracker.update(target, 1.0)
-    way, angle = tracker.deviation(target)
+    distance, angle = tracker.deviation(target)
     for part in (0.5, 0.99):  # neither limit is kept, then one of them is not
-        assert not tracker.is_within(part * way, part * angle)
+        assert not tracker.is_within(part * distance, part * angle)
         assert not tracker.is_within(inf, part * angle)
-        assert not tracker.is_within(part * way, inf)
-    assert tracker.is_within(2.0 * tracker.miss, 20.0 * tracker.miss)
+        assert not tracker.is_within(part * distance, inf)
+    assert tracker.is_within(2.0 * tracker.residual, 20.0 * tracker.residual)
 
 
 def test_a_target_on_the_plan_is_surely_near_it():
@@ -220,4 +222,4 @@ def test_a_robot_that_says_it_is_anywhere_is_somewhere_on_the_path():
     ]
     tracker = PathTracker(path(*rows))
     tracker.update(Pose((0.4, 0.0, 1e160), DOWN), 1e161)
-    assert 0 <= tracker.place.row < len(rows)
+    assert 0 <= tracker.path_position.row < len(rows)

@@ -6,7 +6,7 @@ from math import pi
 
 import pytest
 
-from ur_cartesian_driver.execution import order_of
+from ur_cartesian_driver.execution import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
@@ -35,6 +35,6 @@ def test_a_goal_is_due_at_its_time_or_where_it_is_slowed_at_the_end_of_its_plan(
         execution=execution,
     )
     options = PlanningOptions(on_too_fast='slow', max_tool_speed=0.1, self_collision='off')
-    order = order_of(plan(goal, STATE, ARM, options))
-    assert order.due == pytest.approx(due, abs=0.01)
-    assert order.due >= order.duration - 1e-9
+    job = job_from_plan(plan(goal, STATE, ARM, options))
+    assert job.due == pytest.approx(due, abs=0.01)
+    assert job.due >= job.duration - 1e-9

@@ -5,8 +5,14 @@
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution import Finish, Order, SendControl, TrajectoryMachine
-from ur_cartesian_driver.execution.pace import BEGIN, HARMLESS, Pace, PEAK, SLOW
+from ur_cartesian_driver.execution import Finish, GoalMachine, MotionJob, SendControl
+from ur_cartesian_driver.execution.pace import (
+    MAX_SLOWDOWN,
+    MAX_START_DELAY,
+    MIN_SPEED_LIMITS,
+    PEAK_TO_MEAN,
+    SpeedCheck,
+)
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import StateReceived, TrajectoryEnded, TrajectoryResult
 from ur_cartesian_driver.motion.goal import ZERO6
@@ -26,7 +32,7 @@ POSES = np.array(
 PATH = ReferencePath(
     poses=POSES, point=np.array([0, 0, 1], dtype=np.int32), time=np.array([0.0, 1.0, 3.0])
 )
-FASTEST = PEAK * 0.1 + HARMLESS[0], PEAK * 0.5 + HARMLESS[1]
+FASTEST = PEAK_TO_MEAN * 0.1 + MIN_SPEED_LIMITS[0], PEAK_TO_MEAN * 0.5 + MIN_SPEED_LIMITS[1]
 
 
 def twist(v=0.0, w=0.0):
@@ -40,12 +46,17 @@ def twist(v=0.0, w=0.0):
         (twist(FASTEST[0] + 1e-6), 1.0, 1.0, 'm/s'),
         (twist(w=FASTEST[1] - 1e-3), 1.0, 1.0, None),
         (twist(w=FASTEST[1] + 1e-3), 1.0, 1.0, 'rad/s'),
-        (ZERO6, BEGIN + SLOW * 0.5 - 0.01, 0.5, None),
-        (ZERO6, BEGIN + SLOW * 0.5 + 0.01, 0.5, 'controller is where the plan is after 0.50 s'),
+        (ZERO6, MAX_START_DELAY + MAX_SLOWDOWN * 0.5 - 0.01, 0.5, None),
+        (
+            ZERO6,
+            MAX_START_DELAY + MAX_SLOWDOWN * 0.5 + 0.01,
+            0.5,
+            'controller is where the plan is after 0.50 s',
+        ),
     ],
 )
 def test_the_bounds_follow_from_the_plan(moved, elapsed, planned, clause):
-    said = Pace(PATH).violation(moved, elapsed, planned)
+    said = SpeedCheck(PATH).violation(moved, elapsed, planned)
     if clause is None:
         assert said is None
     else:
@@ -59,7 +70,7 @@ def test_a_path_that_stands_still_bounds_nothing_but_harm():
         point=np.zeros(2, dtype=np.int32),
         time=np.array([0.0, 1.0]),
     )
-    assert Pace(still).violation(twist(0.9 * HARMLESS[0]), 0.1, 0.0) is None
+    assert SpeedCheck(still).violation(twist(0.9 * MIN_SPEED_LIMITS[0]), 0.1, 0.0) is None
 
 
 def robot(time, x=0.4, v=0.0, begun=0, qd=0.0):
@@ -80,7 +91,7 @@ def robot(time, x=0.4, v=0.0, begun=0, qd=0.0):
 
 
 def machine(**changes):
-    made = TrajectoryMachine(Order(points=2, reference=PATH, duration=3.0, **changes))
+    made = GoalMachine(MotionJob(points=2, reference=PATH, duration=3.0, **changes))
     made.start(robot(0.0).state)
     made.step(robot(0.0), 0.0)
     return made
@@ -91,16 +102,16 @@ def is_cancelled(commands):
 
 
 @pytest.mark.parametrize(
-    ('begun', 'order', 'stopped'),
+    ('begun', 'job', 'stopped'),
     [
         (0, {}, True),
         (1, {}, False),
-        (1, {'reports_begun': False}, True),
-        (0, {'knows_pace': False}, False),
+        (1, {'reports_points_begun': False}, True),
+        (0, {'has_speed_profile': False}, False),
     ],
 )
-def test_only_who_tells_no_progress_is_watched(begun, order, stopped):
-    made = machine(**order)
+def test_only_who_tells_no_progress_is_watched(begun, job, stopped):
+    made = machine(**job)
     assert is_cancelled(made.step(robot(0.01, x=0.4001, v=0.5, begun=begun), 0.01)) == stopped
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution import Finish, Order, order_of, Report
-from ur_cartesian_driver.execution.records import Records
+from ur_cartesian_driver.execution import Finish, job_from_plan, MotionJob, ReportProgress
+from ur_cartesian_driver.execution.records import WireRecords
 from ur_cartesian_driver.motion.goal import Goal, OutputKind, Segment, Waypoint
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.primitive import SwitchOutput
@@ -18,9 +18,9 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 VALVE = SwitchOutput(output=OutputKind.STANDARD_DIGITAL, pin=1, value=1.0)
 
 
-def order(waypoint, is_motion, **fields):
+def job(waypoint, is_motion, **fields):
     poses = np.array([[0.1 * i, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0] for i in range(4)])
-    return Order(
+    return MotionJob(
         points=len(waypoint),
         duration=3.0,
         waypoint=np.array(waypoint, dtype=np.int32),
@@ -49,21 +49,21 @@ MIXED = ([0, 0, 0, 1, 2, 2], [1, 1, 0, 1, 1, 1])
     ],
 )
 def test_motions_that_the_program_counts_become_records_and_points(motions, begun, running):
-    records = Records(order(*MIXED))
-    assert records.begun(motions) == begun
-    assert records.running(motions) == running
+    records = WireRecords(job(*MIXED))
+    assert records.begun_records(motions) == begun
+    assert records.running_waypoints(motions) == running
 
 
 def test_a_point_has_the_records_before_it_behind_it():
-    records = Records(order(*MIXED))
-    assert [records.before(point) for point in range(4)] == [0, 3, 4, 6]
+    records = WireRecords(job(*MIXED))
+    assert [records.count_before_waypoint(point) for point in range(4)] == [0, 3, 4, 6]
     assert (records.total, records.points) == (6, 3)
 
 
 def test_an_order_without_records_of_its_own_has_one_motion_for_each_point():
-    records = Records(Order(points=3, duration=3.0, reference=order(*MIXED).reference))
-    assert [records.running(k) for k in (1, 2, 3)] == [(0, -1), (1, 0), (2, 1)]
-    assert [records.end(k) for k in range(4)] == [0.0, 1.0, 2.0, 3.0]
+    records = WireRecords(MotionJob(points=3, duration=3.0, reference=job(*MIXED).reference))
+    assert [records.running_waypoints(k) for k in (1, 2, 3)] == [(0, -1), (1, 0), (2, 1)]
+    assert [records.end_time(k) for k in range(4)] == [0.0, 1.0, 2.0, 3.0]
 
 
 def test_an_output_belongs_to_the_motion_before_it(cell):
@@ -72,15 +72,17 @@ def test_an_output_belongs_to_the_motion_before_it(cell):
     )
     first, second = made.segments
     made = replace(made, segments=(replace(first, outputs=(VALVE,)), second))
-    told = order_of(made)
+    told = job_from_plan(made)
     assert told.points == 3
     assert told.is_motion.tolist() == [True, False, True]
     assert told.waypoint.tolist() == [0, 0, 1]
-    assert told.ends == pytest.approx(
+    assert told.end_times == pytest.approx(
         [first.duration, first.duration, first.duration + second.duration]
     )
-    assert told.asks[2] == told.ends[2]
-    assert told.asks[0] == pytest.approx(0.8 * first.duration), 'its blend is a fifth of it'
+    assert told.request_times[2] == told.end_times[2]
+    assert told.request_times[0] == pytest.approx(0.8 * first.duration), (
+        'its blend is a fifth of it'
+    )
 
 
 def test_a_goal_whose_first_point_is_where_the_arm_stands_is_followed(cell):
@@ -112,7 +114,7 @@ def test_a_goal_whose_first_point_is_where_the_arm_stands_is_followed(cell):
     (end,) = [command.outcome for command in said if isinstance(command, Finish)]
     assert end.succeeded, end.text
     assert end.text.startswith('All 3 points were')
-    progress = [command.progress for command in said if isinstance(command, Report)]
+    progress = [command.progress for command in said if isinstance(command, ReportProgress)]
     assert [p.waypoint for p in progress] == sorted(p.waypoint for p in progress)
     assert {p.waypoint for p in progress} == {1, 2}
     assert {p.points_received for p in progress} == {3}

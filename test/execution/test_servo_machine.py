@@ -11,15 +11,15 @@ from ur_cartesian_driver.execution import (
     EnterServo,
     Finish,
     LeaveServo,
-    LendTcp,
+    MotionJob,
     OpenServo,
-    Order,
     SERVO_LINK,
     ServoMachine,
     ServoSettings,
+    SetTemporaryTcp,
     WriteServo,
 )
-from ur_cartesian_driver.execution.states import State
+from ur_cartesian_driver.execution.states import GoalState
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
@@ -53,7 +53,7 @@ def machine(T_flange_tcp=None):
         [Spline(target=(LENGTH,) * 6, velocities=REST, accelerations=REST, duration=DURATION)],
     )
     return ServoMachine(
-        Order(
+        MotionJob(
             points=1,
             duration=DURATION,
             due=DURATION,
@@ -122,7 +122,7 @@ class Cell:
             self.joint = self.row[4]
             self.lag = max(0.0, self.lag + self.row[-1] - self.read - STEP)
             self.read = self.row[-1]
-        tcp = NOZZLE if any(isinstance(c, LendTcp) for c in self.commands) else IDENTITY
+        tcp = NOZZLE if any(isinstance(c, SetTemporaryTcp) for c in self.commands) else IDENTITY
         self.event(ServoReceived(feedback=registers(mode, sequence, self.lag, timestamp=self.now)))
         if self.goal.state is until:
             return
@@ -153,7 +153,7 @@ class Cell:
 
 
 def test_a_goal_arrives_and_gives_the_inputs_back():
-    cell = Cell(machine()).until(State.ENDED)
+    cell = Cell(machine()).until(GoalState.ENDED)
     assert cell.outcome.code is ErrorCode.SUCCESSFUL, cell.outcome
     kinds = [type(command) for command in cell.commands]
     assert kinds[0] is OpenServo
@@ -178,7 +178,7 @@ def test_inputs_of_another_client_end_the_goal_before_anything_moves():
 def test_a_program_that_does_not_answer_ends_the_goal_before_anything_moves():
     cell = Cell(machine())
     cell.answers = False
-    cell.until(State.ENDED)
+    cell.until(GoalState.ENDED)
     assert cell.outcome.code is ErrorCode.ROBOT_NOT_READY
     assert 'did not answer through its registers' in cell.outcome.text
     assert {c.values[0] for c in cell.commands if isinstance(c, WriteServo)} == {0}
@@ -188,7 +188,7 @@ def test_a_program_that_does_not_answer_ends_the_goal_before_anything_moves():
 def test_an_arm_that_was_moved_since_the_plan_is_not_torn_to_its_start(T_flange_tcp):
     cell = Cell(machine(T_flange_tcp))
     cell.joint = 0.05
-    cell.until(State.ENDED)
+    cell.until(GoalState.ENDED)
     assert cell.outcome.code is ErrorCode.ROBOT_NOT_READY
     assert 'A joint is 0.0500 rad away' in cell.outcome.text
     assert 'the arm was moved meanwhile' in cell.outcome.text
@@ -200,45 +200,45 @@ def test_an_arm_that_was_moved_since_the_plan_is_not_torn_to_its_start(T_flange_
     [(CancelRequested(), ErrorCode.CANCELLED), (PreemptRequested(), ErrorCode.PREEMPTED)],
 )
 def test_a_wish_is_written_at_once_and_answered_by_leaving(event, code):
-    cell = Cell(machine()).until(State.MOVING)
+    cell = Cell(machine()).until(GoalState.MOVING)
     for _ in range(60):
         cell.cycle()
     cell.event(event)
     assert isinstance(cell.commands[-1], WriteServo)
     assert cell.commands[-1].values[0] == 0
-    assert cell.goal.state is State.STOPPING
+    assert cell.goal.state is GoalState.CANCELLING
     cell.cycle(speed=1.0)
-    assert cell.goal.state is State.HALTING
-    cell.until(State.ENDED)
+    assert cell.goal.state is GoalState.COMING_TO_REST
+    cell.until(GoalState.ENDED)
     assert cell.outcome.code is code
 
 
 def test_a_program_that_leaves_by_itself_ends_the_goal():
-    cell = Cell(machine()).until(State.MOVING)
+    cell = Cell(machine()).until(GoalState.MOVING)
     for _ in range(60):
         cell.cycle()
     cell.row = (0, *cell.row[1:])
     cell.event(ServoReceived(feedback=registers(0, cell.row[1], timestamp=cell.now)))
-    assert cell.goal.state is State.ENDING
-    cell.until(State.ENDED)
+    assert cell.goal.state is GoalState.PROGRAM_LOST
+    cell.until(GoalState.ENDED)
     assert cell.outcome.code is ErrorCode.PROGRAM_STOPPED
     assert 'left the servo by itself' in cell.outcome.text
 
 
 def test_a_program_that_takes_the_place_of_a_lost_one_finds_no_setpoints_in_the_inputs():
-    cell = Cell(machine()).until(State.MOVING)
+    cell = Cell(machine()).until(GoalState.MOVING)
     for _ in range(60):
         cell.cycle()
     assert cell.row[0] == 2
     cell.event(LinkLost(link='program', reason='it has ended'))
-    assert cell.goal.state is State.ENDING
+    assert cell.goal.state is GoalState.PROGRAM_LOST
     for _ in range(20):
         assert cell.row[0] == 0
         cell.cycle()
 
 
 def test_lost_inputs_end_a_moving_goal_and_the_program_is_told_to_brake():
-    cell = Cell(machine()).until(State.MOVING)
+    cell = Cell(machine()).until(GoalState.MOVING)
     cell.event(LinkLost(link=SERVO_LINK, reason='it closed'))
     assert cell.outcome.code is ErrorCode.CONNECTION_LOST
     assert [type(c) for c in cell.commands if not isinstance(c, WriteServo)].count(LeaveServo) == 1
@@ -248,21 +248,21 @@ def test_lost_inputs_end_a_moving_goal_and_the_program_is_told_to_brake():
 def test_a_dwell_is_no_stall_while_the_program_reads():
     goal = machine()
     goal.stream._source = type('Dwell', (), {'done': False, 'next': lambda self, dt: (0.0,) * 6})()
-    cell = Cell(goal).until(State.MOVING)
+    cell = Cell(goal).until(GoalState.MOVING)
     for _ in range(1050):  # 2.1 s, longer than an arm may stand for no reason
         cell.cycle()
-    assert goal.state is State.MOVING
+    assert goal.state is GoalState.MOVING
     cell.answers = False
     for _ in range(510):
         cell.cycle()
-    assert goal.state is State.ENDED
+    assert goal.state is GoalState.ENDED
 
 
 def test_due_counts_from_when_the_arm_can_follow():
     goal = machine()
-    Cell(goal).until(State.SETTLING)
-    assert goal.order.due == pytest.approx(DURATION + 0.1, abs=0.1)
-    assert goal.order.due > DURATION
+    Cell(goal).until(GoalState.SETTLING)
+    assert goal.job.due == pytest.approx(DURATION + 0.1, abs=0.1)
+    assert goal.job.due > DURATION
 
 
 SAFETY = [
@@ -322,30 +322,30 @@ def test_a_goal_ends_once_whatever_happens(good, events, lends):
         cell.event(Tick())
     assert isinstance(cell.outcome.code, ErrorCode)
     assert cell.outcome.text.endswith('.')
-    assert cell.goal.state is State.ENDED
+    assert cell.goal.state is GoalState.ENDED
     kinds = [type(command) for command in cell.commands]
     assert kinds.count(LeaveServo) == 1
 
 
 #: How a goal comes into each state.
 WAYS = {
-    State.ARMING: lambda cell: None,
-    State.MOVING: lambda cell: cell.until(State.MOVING),
-    State.SETTLING: lambda cell: cell.until(State.SETTLING),
-    State.STOPPING: lambda cell: (
-        cell.until(State.MOVING),
+    GoalState.ARMING: lambda cell: None,
+    GoalState.MOVING: lambda cell: cell.until(GoalState.MOVING),
+    GoalState.SETTLING: lambda cell: cell.until(GoalState.SETTLING),
+    GoalState.CANCELLING: lambda cell: (
+        cell.until(GoalState.MOVING),
         cell.cycle(),
         cell.event(CancelRequested()),
     ),
-    State.HALTING: lambda cell: (
-        cell.until(State.MOVING),
+    GoalState.COMING_TO_REST: lambda cell: (
+        cell.until(GoalState.MOVING),
         [cell.cycle() for _ in range(60)],
         cell.event(CancelRequested()),
         cell.cycle(speed=1.0),
     ),
-    State.RESTORING: lambda cell: cell.until(State.RESTORING),
-    State.ENDING: lambda cell: cell.event(LinkLost(link='program', reason='it closed')),
-    State.ENDED: lambda cell: cell.until(State.ENDED),
+    GoalState.RESTORING: lambda cell: cell.until(GoalState.RESTORING),
+    GoalState.PROGRAM_LOST: lambda cell: cell.event(LinkLost(link='program', reason='it closed')),
+    GoalState.ENDED: lambda cell: cell.until(GoalState.ENDED),
 }
 EACH = [
     StateReceived(state=robot()),
@@ -363,7 +363,7 @@ EACH = [
 @pytest.mark.parametrize('state', WAYS)
 def test_every_event_in_every_state_leads_to_one_end(state):
     for event in EACH:
-        cell = Cell(machine(NOZZLE if state is State.RESTORING else None))
+        cell = Cell(machine(NOZZLE if state is GoalState.RESTORING else None))
         WAYS[state](cell)
         assert cell.goal.state is state
         cell.event(event)
@@ -375,11 +375,11 @@ def test_every_event_in_every_state_leads_to_one_end(state):
 
 
 def test_a_target_that_trails_by_many_dense_points_is_on_the_path():
-    points, trail = 100, 20  # 2 ms each; 40 ms of servoj at 0.5 m/s are 20 mm
+    points, lag_motions = 100, 20  # 2 ms each; 40 ms of servoj at 0.5 m/s are 20 mm
     at = np.linspace(0.0, 1.0, points + 1)
     speed = (LENGTH / DURATION,) * 6
     goal = ServoMachine(
-        Order(
+        MotionJob(
             points=points,
             duration=DURATION,
             execution=ExecutionMode.SERVO,
@@ -408,7 +408,7 @@ def test_a_target_that_trails_by_many_dense_points_is_on_the_path():
         def event(self, event):
             if isinstance(event, StateReceived):
                 self.led.append(event.state.target_q[0])
-                before, now = ([0.0] * trail + self.led)[-trail - 2 : -trail]
+                before, now = ([0.0] * lag_motions + self.led)[-lag_motions - 2 : -lag_motions]
                 event = StateReceived(
                     state=robot(now, (now - before) / STEP, timestamp=event.state.timestamp)
                 )
@@ -416,5 +416,5 @@ def test_a_target_that_trails_by_many_dense_points_is_on_the_path():
 
     cell = Trailing(goal)
     cell.led = [0.0]
-    cell.until(State.ENDED)
+    cell.until(GoalState.ENDED)
     assert cell.outcome.code is ErrorCode.SUCCESSFUL, cell.outcome

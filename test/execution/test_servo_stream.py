@@ -15,8 +15,8 @@ import pytest
 from ur_cartesian_driver.execution.servo_clock import ServoClock
 from ur_cartesian_driver.execution.servo_source import SplineSetpoints
 from ur_cartesian_driver.execution.servo_stream import (
-    Change,
-    Phase,
+    ServoEvent,
+    ServoPhase,
     ServoSettings,
     ServoStream,
     TRANSITIONS,
@@ -115,15 +115,15 @@ def run(stream, robot, *, seconds, slider=lambda t: 1.0, stalls=(), begin=True, 
         if any(first <= cycle < first + long for first, long in stalls):
             continue
         for feedback in waiting:
-            row = stream.take(feedback, cycle * robot.step)
+            row = stream.on_feedback(feedback, cycle * robot.step)
             if row is not None:
                 robot.inputs = dict(zip(SERVO_INPUTS, row, strict=True))
         waiting = []
-        if begin and stream.phase is Phase.READY:
+        if begin and stream.phase is ServoPhase.READY:
             stream.begin()
         if watch is not None:
             watch()
-        if stream.phase is Phase.ARRIVED:
+        if stream.phase is ServoPhase.ARRIVED:
             return cycle
     return None
 
@@ -153,9 +153,9 @@ def test_the_buffer_neither_runs_empty_nor_over_where_little_is_late(slider, pau
     empties = []
 
     def watch():
-        if stream.phase is Phase.SERVOING:
+        if stream.phase is ServoPhase.SERVOING:
             empties.append(robot.empty)
-        assert stream.under_way <= SETTINGS.most_lag
+        assert stream.in_flight <= SETTINGS.max_lag
 
     run(stream, robot, seconds=1.6, slider=slider, stalls=spaced(pauses), watch=watch)
     assert empties[0] == empties[-1], 'it never ran empty once the motion had begun'
@@ -203,7 +203,7 @@ def test_a_paused_program_is_sent_no_more_than_is_under_way():
     robot.playing = False
     before = stream.report().setpoints_sent
     run(stream, robot, seconds=2.0)
-    assert stream.report().setpoints_sent - before <= SETTINGS.most_lag / STEP
+    assert stream.report().setpoints_sent - before <= SETTINGS.max_lag / STEP
     robot.playing = True
     run(stream, robot, seconds=0.5)
     steps = np.diff([q[0] for q in robot.done])
@@ -211,7 +211,7 @@ def test_a_paused_program_is_sent_no_more_than_is_under_way():
 
 
 def test_with_the_loop_open_the_lag_grows_by_what_the_slider_takes():
-    opened = ServoSettings(closed_loop=False, most_lag=0.5)
+    opened = ServoSettings(closed_loop=False, max_lag=0.5)
     stream, robot = ServoStream(Ramp(), opened), Robot()
     run(stream, robot, seconds=0.2)
     lags = []
@@ -220,7 +220,7 @@ def test_with_the_loop_open_the_lag_grows_by_what_the_slider_takes():
         robot,
         seconds=0.8,
         slider=lambda t: 0.5,
-        watch=lambda: lags.append(stream.under_way),
+        watch=lambda: lags.append(stream.in_flight),
     )
     assert lags[-1] - lags[150] == pytest.approx(0.5 * (len(lags) - 151) * STEP, abs=0.01)
 
@@ -236,12 +236,12 @@ def test_thresholds_are_written_before_the_mode_is():
     stream, robot = ServoStream(Ramp(), SETTINGS), Robot()
     rows = []
     for cycle in range(40):
-        row = stream.take(robot.cycle(), cycle * STEP)
+        row = stream.on_feedback(robot.cycle(), cycle * STEP)
         if row is not None:
             robot.inputs = dict(zip(SERVO_INPUTS, row, strict=True))
             rows.append(robot.inputs)
         if cycle == 20:
-            assert stream.phase is Phase.READY
+            assert stream.phase is ServoPhase.READY
             stream.begin()
     modes = [row['input_int_register_24'] for row in rows]
     assert modes == sorted(modes)
@@ -260,13 +260,13 @@ def test_stop_is_written_at_once_and_with_a_new_number():
     assert stream.stop() is None
     robot.inputs = row
     run(stream, robot, seconds=0.02)
-    assert stream.phase is Phase.LEFT
+    assert stream.phase is ServoPhase.LEFT
 
 
 def test_packets_in_one_go_are_answered_once():
     stream, robot = ServoStream(Ramp(), SETTINGS), Robot()
     run(stream, robot, seconds=0.5)
-    rows = [stream.take(robot.cycle(), 10.0) for _ in range(5)]
+    rows = [stream.on_feedback(robot.cycle(), 10.0) for _ in range(5)]
     assert [row is None for row in rows] == [False, True, True, True, True]
 
 
@@ -293,13 +293,13 @@ def test_a_spline_is_sampled_where_it_is():
 )
 def test_the_clock_is_never_negative_nor_fast_and_leaves_the_rest_of_the_buffer(passed):
     clock = ServoClock(step=STEP, target=0.04, most=0.2)
-    for time, scaling, under_way in passed:
-        clock.advance(time, scaling, under_way)
+    for time, scaling, in_flight in passed:
+        clock.advance(time, scaling, in_flight)
         assert 0.0 <= clock.rate <= 1.5
-        assert under_way + clock.take(under_way) * STEP <= max(0.2 + 1e-6, under_way)
+        assert in_flight + clock.take_steps(in_flight) * STEP <= max(0.2 + 1e-6, in_flight)
 
 
-@pytest.mark.parametrize('phase', [phase for phase in Phase if phase is not Phase.LEFT])
+@pytest.mark.parametrize('phase', [phase for phase in ServoPhase if phase is not ServoPhase.LEFT])
 def test_every_phase_has_a_way_out_by_a_stop(phase):
     seen, ahead = set(), {phase}
     while ahead:
@@ -307,10 +307,10 @@ def test_every_phase_has_a_way_out_by_a_stop(phase):
         ahead = {
             TRANSITIONS[p][c]
             for p in ahead
-            for c in (Change.STOP, Change.PROGRAM_LEFT)
+            for c in (ServoEvent.STOP, ServoEvent.PROGRAM_LEFT)
             if c in TRANSITIONS[p]
         } - seen
-    assert Phase.LEFT in seen
+    assert ServoPhase.LEFT in seen
 
 
 @pytest.mark.parametrize(
@@ -331,9 +331,9 @@ def test_the_first_write_that_the_arm_follows_has_what_the_source_says_then():
     source, robot = Ramp(), Robot()
     stream = ServoStream(source, SETTINGS)
     run(stream, robot, seconds=0.1, begin=False)
-    assert stream.phase is Phase.READY
+    assert stream.phase is ServoPhase.READY
     source.time = 0.25  # the arm stands elsewhere by now
     stream.begin()
-    row = stream.take(robot.cycle(), 1.0)
+    row = stream.on_feedback(robot.cycle(), 1.0)
     assert row[0] == ServoMode.SERVO
     assert row[4:10] == (0.25,) * 6

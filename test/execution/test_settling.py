@@ -8,7 +8,7 @@ from math import inf
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution import Finish, Order, TrajectoryMachine
+from ur_cartesian_driver.execution import Finish, GoalMachine, MotionJob
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     StateReceived,
@@ -34,7 +34,7 @@ AT_REST = RobotState(
 )
 #: When the goal is due, by the controller's clock [s].
 DUE = 2.0
-POINT = Order(
+POINT = MotionJob(
     points=1,
     duration=DUE,
     due=DUE,
@@ -71,9 +71,9 @@ WRONG = [
 ]
 
 
-def arrived(late=0.0, **order):
+def arrived(late=0.0, **job):
     """A machine that was told SUCCESS, so long after the goal was due; and what it answered."""
-    machine = TrajectoryMachine(replace(POINT, **order), max_plan_deviation=(0.0, 0.0))
+    machine = GoalMachine(replace(POINT, **job), max_plan_deviation=(0.0, 0.0))
     on_the_way = replace(AT_REST, target_q=(0.1,) + (0.0,) * 5)
     machine.start(on_the_way)
     machine.step(StateReceived(state=on_the_way), 0.0)

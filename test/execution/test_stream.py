@@ -7,19 +7,19 @@ from dataclasses import replace
 import numpy as np
 
 from ur_cartesian_driver.execution import (
-    AnswerExtension,
-    Extension,
+    AnswerAppend,
+    AppendJob,
+    AppendMachine,
+    AppendSettings,
     Finish,
-    LendTcp,
-    Order,
+    MotionJob,
     SendControl,
     SendPoints,
-    StreamMachine,
-    StreamSettings,
+    SetTemporaryTcp,
 )
-from ur_cartesian_driver.execution.records import Records
-from ur_cartesian_driver.execution.states import State
-from ur_cartesian_driver.execution.stream import PATIENCE
+from ur_cartesian_driver.execution.records import WireRecords
+from ur_cartesian_driver.execution.states import GoalState
+from ur_cartesian_driver.execution.stream import FIRST_POINTS_TIMEOUT
 from ur_cartesian_driver.motion.events import StateReceived, TrajectoryEnded, TrajectoryResult
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
@@ -30,17 +30,17 @@ SPEED, STEP = 0.1, 0.1
 NOZZLE = Pose((0.0, 0.0, 0.1))
 
 
-def order(first, count, **fields):
+def job(first, count, **fields):
     """Points on a line, 0.1 s apart, the first one at the place with the number ``first``."""
     k = np.arange(first - 1, first + count)
     poses = np.zeros((count + 1, 7))
     poses[:, 0], poses[:, 6] = SPEED * STEP * k, 1.0
-    return Order(
+    return MotionJob(
         **{
             'points': count,
             'duration': STEP * (first + count - 1),
-            'open_end': True,
-            'ending': 1,
+            'keep_open': True,
+            'ending_records': 1,
             'reference': ReferencePath(
                 poses=poses, point=np.maximum(k - 1, first - 1).astype(np.int32), time=STEP * k
             ),
@@ -86,7 +86,7 @@ def actions(commands):
 
 
 def started(count=30, **settings):
-    machine = StreamMachine(order(1, count), settings=StreamSettings(**settings))
+    machine = AppendMachine(job(1, count), settings=AppendSettings(**settings))
     return machine, machine.start(packet(0.0, moves=False).state)
 
 
@@ -94,8 +94,10 @@ def test_no_more_is_sent_than_the_horizon_says():
     machine, commands = started(horizon=0.5)
     assert actions(commands) == [(TrajectoryAction.STREAM_START, 0)]
     assert sent(commands) == [(0, 5)]
-    ends = [end for _, end in sent(run(machine, 0.0, 1.0))]
-    assert ends[-1] in (15, 16), 'half a second ahead of the arm, and the point in which that ends'
+    end_times = [end for _, end in sent(run(machine, 0.0, 1.0))]
+    assert end_times[-1] in (15, 16), (
+        'half a second ahead of the arm, and the point in which that ends'
+    )
 
 
 def test_the_ending_is_sent_at_the_margin_and_counted():
@@ -106,28 +108,28 @@ def test_the_ending_is_sent_at_the_margin_and_counted():
     closing = run(machine, 0.7, 0.72)
     assert sent(closing) == [(9, 10)]
     assert actions(closing) == [(TrajectoryAction.STREAM_END, 10)]
-    assert machine.state is State.CLOSING
+    assert machine.state is GoalState.RUNNING_OUT
 
 
 def test_points_that_come_in_time_take_the_place_of_the_ending():
     machine, _ = started(count=10)
     run(machine, 0.0, 0.68)
-    commands = machine.step(Extension(number=7, behind=9, order=order(10, 11)), 0.69)
-    assert commands[0] == AnswerExtension(number=7)
+    commands = machine.step(AppendJob(number=7, records_before=9, job=job(10, 11)), 0.69)
+    assert commands[0] == AnswerAppend(number=7)
     assert sent(commands) == [(9, 17)], 'the new one of this number, a second ahead'
     assert actions(run(machine, 0.7, 1.2)) == []
-    assert machine.state is State.MOVING
+    assert machine.state is GoalState.MOVING
 
 
 def test_points_for_a_motion_that_was_closed_have_to_begin_at_rest():
     machine, _ = started(count=10)
     run(machine, 0.0, 0.72)
-    (answer,) = machine.step(Extension(number=1, behind=9, order=order(10, 5)), 0.73)
-    assert answer.from_rest
+    (answer,) = machine.step(AppendJob(number=1, records_before=9, job=job(10, 5)), 0.73)
+    assert answer.replan_from_rest
     assert answer.refusal == 'The motion was closed before these points came.'
-    later = replace(order(11, 5), reference=order(11, 5).reference)
-    assert machine.step(Extension(number=2, behind=10, order=later), 0.74) == [
-        AnswerExtension(number=2)
+    later = replace(job(11, 5), reference=job(11, 5).reference)
+    assert machine.step(AppendJob(number=2, records_before=10, job=later), 0.74) == [
+        AnswerAppend(number=2)
     ], 'they wait until the arm is at rest'
     run(machine, 0.76, 0.98)
     machine.step(packet(1.0, 10, moves=False), 1.0)
@@ -135,34 +137,34 @@ def test_points_for_a_motion_that_was_closed_have_to_begin_at_rest():
     commands += machine.step(packet(1.0, 10, moves=False), 1.02)
     assert actions(commands) == [(TrajectoryAction.STREAM_START, 0)]
     assert sent(commands) == [(10, 14)]
-    assert machine.state is State.MOVING
+    assert machine.state is GoalState.MOVING
 
 
 def test_a_motion_goes_on_when_a_packet_shows_the_arm_at_rest_and_counts_its_own_records():
     machine, _ = started(count=10)
     run(machine, 0.0, 0.72)
-    machine.step(Extension(number=1, behind=10, order=order(11, 5)), 0.74)
+    machine.step(AppendJob(number=1, records_before=10, job=job(11, 5)), 0.74)
     run(machine, 0.76, 0.98)
     success = TrajectoryEnded(result=TrajectoryResult.SUCCESS)
     assert actions(machine.step(success, 1.0)) == [], 'packets may be late'
     commands = machine.step(packet(1.0, 10, moves=False), 1.02)
     assert actions(commands) == [(TrajectoryAction.STREAM_START, 0)]
-    commands = machine.step(Extension(number=2, behind=0, order=None), 1.04)
+    commands = machine.step(AppendJob(number=2, records_before=0, job=None), 1.04)
     assert actions(commands) == [(TrajectoryAction.STREAM_END, 5)]
 
 
 def test_the_time_at_rest_makes_nothing_late():
     machine, _ = started(count=10)
-    machine.order = replace(machine.order, goal_time_tolerance=0.2)
+    machine.job = replace(machine.job, goal_time_tolerance=0.2)
     run(machine, 0.0, 0.98)
     for k in range(100):
         machine.step(rest_at(1.0 + 0.01 * k, 1.0, 10), 1.0 + 0.01 * k)
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
     machine.step(
-        Extension(
+        AppendJob(
             number=1,
-            behind=10,
-            order=order(11, 5, open_end=False, ending=0, due=1.5, goal_time_tolerance=0.2),
+            records_before=10,
+            job=job(11, 5, keep_open=False, ending_records=0, due=1.5, goal_time_tolerance=0.2),
         ),
         2.0,
     )
@@ -182,10 +184,10 @@ def rest_at(time, place, begun):
 
 def test_the_word_that_they_are_the_last_sends_the_ending_with_the_others():
     machine, _ = started(count=10)
-    commands = machine.step(Extension(number=1, behind=0, order=None), 0.01)
+    commands = machine.step(AppendJob(number=1, records_before=0, job=None), 0.01)
     assert sent(commands) == [(9, 10)]
     assert actions(commands) == [(TrajectoryAction.STREAM_END, 10)]
-    (answer,) = machine.step(Extension(number=2, behind=10, order=order(11, 5)), 0.02)
+    (answer,) = machine.step(AppendJob(number=2, records_before=10, job=job(11, 5)), 0.02)
     assert 'said to be the last' in answer.refusal
 
 
@@ -193,44 +195,49 @@ def test_a_goal_that_is_only_an_ending_waits_a_moment_for_more():
     machine, commands = started(count=1)
     assert sent(commands) == []
     assert sent(machine.step(packet(0.0, moves=False), 0.0)) == []
-    still = replace(packet(0.0, moves=False).state, timestamp=PATIENCE)
-    assert sent(machine.step(StateReceived(state=still), PATIENCE)) == [(0, 1)]
+    still = replace(packet(0.0, moves=False).state, timestamp=FIRST_POINTS_TIMEOUT)
+    assert sent(machine.step(StateReceived(state=still), FIRST_POINTS_TIMEOUT)) == [(0, 1)]
 
 
 def test_points_may_come_before_the_tcp_of_the_goal_is_set():
-    machine = StreamMachine(order(1, 5, T_flange_tcp=NOZZLE))
+    machine = AppendMachine(job(1, 5, T_flange_tcp=NOZZLE))
     (lend,) = machine.start(packet(0.0, moves=False).state)
-    assert isinstance(lend, LendTcp)
+    assert isinstance(lend, SetTemporaryTcp)
     assert machine.step(
-        Extension(number=1, behind=4, order=order(5, 10, T_flange_tcp=NOZZLE)), 0.01
-    ) == [AnswerExtension(number=1)]
+        AppendJob(number=1, records_before=4, job=job(5, 10, T_flange_tcp=NOZZLE)), 0.01
+    ) == [AnswerAppend(number=1)]
     commands = machine.step(packet(0.0, moves=False, T_flange_tcp=NOZZLE), 0.02)
-    assert machine.state is State.MOVING
+    assert machine.state is GoalState.MOVING
     assert sent(commands)[0][0] == 0
 
 
 def test_what_was_passed_is_forgotten():
     machine, _ = started(count=20)
-    behind, held = 19, []
+    records_before, held = 19, []
     for k in range(8):
         run(machine, 1.5 * k, 1.5 * (k + 1) - 0.02)
-        machine.step(Extension(number=k, behind=behind, order=order(behind + 1, 15 + 1)), 0.0)
-        behind += 15
-        held.append((machine._records.kept, len(machine._observer._tracker.path.time)))
+        machine.step(
+            AppendJob(
+                number=k, records_before=records_before, job=job(records_before + 1, 15 + 1)
+            ),
+            0.0,
+        )
+        records_before += 15
+        held.append((machine._records.kept, len(machine._monitor._tracker.path.time)))
     assert max(records for records, _ in held) < 40
     assert max(rows for _, rows in held) < 60
-    assert machine.state is State.MOVING
+    assert machine.state is GoalState.MOVING
 
 
 def test_records_keep_their_numbers_when_earlier_ones_are_forgotten():
-    whole, forgetful = Records(order(1, 30)), Records(order(1, 30))
+    whole, forgetful = WireRecords(job(1, 30)), WireRecords(job(1, 30))
     forgetful.forget(12)
     assert forgetful.kept == 18
     for k in range(13, 31):
-        assert forgetful.begun(k) == whole.begun(k)
-        assert forgetful.end(k) == whole.end(k)
-        assert forgetful.before(k - 1) == whole.before(k - 1)
-    assert [forgetful.running(k) for k in range(14, 31)] == [
-        whole.running(k) for k in range(14, 31)
+        assert forgetful.begun_records(k) == whole.begun_records(k)
+        assert forgetful.end_time(k) == whole.end_time(k)
+        assert forgetful.count_before_waypoint(k - 1) == whole.count_before_waypoint(k - 1)
+    assert [forgetful.running_waypoints(k) for k in range(14, 31)] == [
+        whole.running_waypoints(k) for k in range(14, 31)
     ]
     assert forgetful.total == whole.total

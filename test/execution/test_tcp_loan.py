@@ -7,11 +7,11 @@ from itertools import pairwise
 import pytest
 
 from ur_cartesian_driver.execution.tcp_loan import (
-    CARRIED_OUT,
-    FIRST_PAUSE,
-    LONGEST_PAUSE,
+    MAX_RETRY_PERIOD,
+    MIN_RETRY_PERIOD,
     same_tcp,
-    TcpLoan,
+    SET_TIMEOUT,
+    TemporaryTcp,
 )
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.state import RobotState
@@ -25,49 +25,49 @@ def robot(T_flange_tcp, qd=REST):
 
 
 @pytest.fixture
-def loan():
-    return TcpLoan(OWN, NOZZLE)
+def temporary_tcp():
+    return TemporaryTcp(OWN, NOZZLE)
 
 
 @pytest.mark.parametrize('after', [OWN, THEIRS])
-def test_it_is_over_when_the_robot_has_another_tcp_whoever_set_it(loan, after):
-    loan.observe(robot(NOZZLE), 0.0)
-    assert not loan.returned
-    loan.observe(robot(after), 0.1)
-    assert loan.returned
-    assert not loan.is_due(robot(after), 9.0)
+def test_it_is_over_when_the_robot_has_another_tcp_whoever_set_it(temporary_tcp, after):
+    temporary_tcp.observe(robot(NOZZLE), 0.0)
+    assert not temporary_tcp.is_restored
+    temporary_tcp.observe(robot(after), 0.1)
+    assert temporary_tcp.is_restored
+    assert not temporary_tcp.is_restore_due(robot(after), 9.0)
 
 
-def test_a_tcp_that_was_never_seen_is_waited_for(loan):
-    loan.observe(robot(OWN), 5.0)
-    loan.observe(robot(OWN), 5.0 + CARRIED_OUT - 0.01)
-    assert not loan.returned
-    loan.observe(robot(OWN), 5.0 + CARRIED_OUT)
-    assert loan.returned
+def test_a_tcp_that_was_never_seen_is_waited_for(temporary_tcp):
+    temporary_tcp.observe(robot(OWN), 5.0)
+    temporary_tcp.observe(robot(OWN), 5.0 + SET_TIMEOUT - 0.01)
+    assert not temporary_tcp.is_restored
+    temporary_tcp.observe(robot(OWN), 5.0 + SET_TIMEOUT)
+    assert temporary_tcp.is_restored
 
 
-def test_a_tcp_that_comes_later_than_expected_is_not_overlooked(loan):
-    loan.observe(robot(OWN), 0.0)
-    loan.observe(robot(OWN), CARRIED_OUT)
-    loan.observe(robot(NOZZLE), CARRIED_OUT + 0.1)
-    assert not loan.returned
-    assert loan.is_due(robot(NOZZLE), CARRIED_OUT + 0.1)
+def test_a_tcp_that_comes_later_than_expected_is_not_overlooked(temporary_tcp):
+    temporary_tcp.observe(robot(OWN), 0.0)
+    temporary_tcp.observe(robot(OWN), SET_TIMEOUT)
+    temporary_tcp.observe(robot(NOZZLE), SET_TIMEOUT + 0.1)
+    assert not temporary_tcp.is_restored
+    assert temporary_tcp.is_restore_due(robot(NOZZLE), SET_TIMEOUT + 0.1)
 
 
-def test_it_is_put_back_at_rest_only(loan):
-    assert not loan.is_due(robot(NOZZLE, qd=MOVING), 0.0)
-    assert loan.is_due(robot(NOZZLE), 0.0)
+def test_it_is_put_back_at_rest_only(temporary_tcp):
+    assert not temporary_tcp.is_restore_due(robot(NOZZLE, qd=MOVING), 0.0)
+    assert temporary_tcp.is_restore_due(robot(NOZZLE), 0.0)
 
 
-def test_tries_become_rare_until_something_changes(loan):
-    tries = [t / 8 for t in range(800) if loan.is_due(robot(NOZZLE), t / 8)]
+def test_tries_become_rare_until_something_changes(temporary_tcp):
+    tries = [t / 8 for t in range(800) if temporary_tcp.is_restore_due(robot(NOZZLE), t / 8)]
     pauses = [b - a for a, b in pairwise(tries)]
-    assert pauses[0] == pytest.approx(FIRST_PAUSE, abs=0.125)
+    assert pauses[0] == pytest.approx(MIN_RETRY_PERIOD, abs=0.125)
     assert pauses == sorted(pauses)
-    assert pauses[-1] == pytest.approx(LONGEST_PAUSE, abs=0.125)
-    assert not loan.is_due(robot(NOZZLE), 100.0)
-    loan.hurry()
-    assert loan.is_due(robot(NOZZLE), 100.0)
+    assert pauses[-1] == pytest.approx(MAX_RETRY_PERIOD, abs=0.125)
+    assert not temporary_tcp.is_restore_due(robot(NOZZLE), 100.0)
+    temporary_tcp.retry_now()
+    assert temporary_tcp.is_restore_due(robot(NOZZLE), 100.0)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from math import nan, pi
 
 import pytest
 
-from ur_cartesian_driver.execution.tolerances import QUANTITIES, Watch
+from ur_cartesian_driver.execution.tolerances import QUANTITIES, ToleranceCheck
 from ur_cartesian_driver.motion.goal import Tolerance, ZERO6
 from ur_cartesian_driver.motion.pose import (
     IDENTITY,
@@ -90,7 +90,7 @@ def test_each_axis_trips_alone_and_is_named(name, axis, sign, frame):
     for other, other_axis in AXES:
         limits = [-1.0] * 3
         limits[other_axis] = 0.002
-        clause = Watch(limit(other, limits), frame).violation(WANTED, packet)
+        clause = ToleranceCheck(limit(other, limits), frame).violation(WANTED, packet)
         if (other, other_axis) == (name, axis):
             assert clause == (
                 f'{name} {"xyz"[axis]} is off by 0.002100 {unit}, the tolerance is 0.002000 {unit}'
@@ -103,7 +103,7 @@ def test_each_axis_trips_alone_and_is_named(name, axis, sign, frame):
         twist=(0.002,) * 6,
         acceleration=(0.002,) * 6,
     )
-    clause = Watch(all_axes, frame).violation(WANTED, packet)
+    clause = ToleranceCheck(all_axes, frame).violation(WANTED, packet)
     assert clause.startswith(f'{name} {"xyz"[axis]} is off')
 
 
@@ -113,34 +113,36 @@ def test_zero_negative_and_larger_limits_let_it_pass(name, axis, bound):
     limits = [0.001] * 3  # so that the quantity is watched
     limits[axis] = bound
     assert (
-        Watch(limit(name, limits, 0.0), IDENTITY).violation(WANTED, disturbed(name, axis, 0.0021))
+        ToleranceCheck(limit(name, limits, 0.0), IDENTITY).violation(
+            WANTED, disturbed(name, axis, 0.0021)
+        )
         is None
     )
 
 
 def test_a_tolerance_without_a_limit_watches_nothing():
-    assert not Watch(Tolerance(), IDENTITY)
-    assert not Watch(Tolerance(twist=(-1.0,) * 6), IDENTITY)
-    assert Watch(Tolerance(twist=(0.0,) * 5 + (1.0,)), IDENTITY)
+    assert not ToleranceCheck(Tolerance(), IDENTITY)
+    assert not ToleranceCheck(Tolerance(twist=(-1.0,) * 6), IDENTITY)
+    assert ToleranceCheck(Tolerance(twist=(0.0,) * 5 + (1.0,)), IDENTITY)
 
 
 def test_of_several_axes_the_worst_is_named():
     packet = replace(ON_TIME, actual_tcp_pose=Pose((0.403, -0.21, 0.3), DOWN))
     both = Tolerance(position=(0.002, 0.002, 0.002))
-    assert 'position y' in Watch(both, IDENTITY).violation(WANTED, packet)
+    assert 'position y' in ToleranceCheck(both, IDENTITY).violation(WANTED, packet)
 
 
 def test_what_is_no_number_is_outside():
-    watched = Watch(limit('linear acceleration', [1.0, -1.0, -1.0]), IDENTITY)
+    watched = ToleranceCheck(limit('linear acceleration', [1.0, -1.0, -1.0]), IDENTITY)
     silent = replace(ON_TIME, actual_tcp_acceleration=None)
     assert 'linear acceleration x is off by nan' in watched.violation(WANTED, silent)
     broken = replace(ON_TIME, actual_tcp_pose=Pose((nan, 0.0, 0.0), DOWN))
-    assert 'is off by nan m' in Watch(limit('position', [1.0] * 3), IDENTITY).violation(
+    assert 'is off by nan m' in ToleranceCheck(limit('position', [1.0] * 3), IDENTITY).violation(
         WANTED, broken
     )
 
 
 def test_opposite_signs_of_a_quaternion_are_no_error():
     flipped = Pose(WANTED.position, tuple(-v for v in DOWN))
-    watched = Watch(limit('orientation', [1e-6] * 3), IDENTITY)
+    watched = ToleranceCheck(limit('orientation', [1e-6] * 3), IDENTITY)
     assert watched.violation(flipped, ON_TIME) is None

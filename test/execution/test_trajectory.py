@@ -9,20 +9,20 @@ import pytest
 
 from ur_cartesian_driver.execution import (
     Finish,
-    LendTcp,
-    Order,
-    Report,
-    ReturnTcp,
+    GoalMachine,
+    MotionJob,
+    ReportProgress,
+    RestoreTcp,
     SendControl,
     SendPoints,
+    SetTemporaryTcp,
     StopProgram,
-    TrajectoryMachine,
 )
-from ur_cartesian_driver.execution.observer import STALL_BOUND
-from ur_cartesian_driver.execution.states import Signal, State, STOPS, TRANSITIONS
-from ur_cartesian_driver.execution.stream import PATIENCE, StreamMachine
-from ur_cartesian_driver.execution.tcp_loan import CARRIED_OUT
-from ur_cartesian_driver.execution.trajectory import GATHER, STOP_BOUND, TCP_BOUND
+from ur_cartesian_driver.execution.observer import STALL_TIMEOUT
+from ur_cartesian_driver.execution.states import GoalSignal, GoalState, STOP_SIGNALS, TRANSITIONS
+from ur_cartesian_driver.execution.stream import AppendMachine, FIRST_POINTS_TIMEOUT
+from ur_cartesian_driver.execution.tcp_loan import SET_TIMEOUT
+from ur_cartesian_driver.execution.trajectory import CAUSE_TIMEOUT, STOP_TIMEOUT, TCP_TIMEOUT
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
@@ -46,7 +46,7 @@ REST = (0.0,) * 6
 OWN, NOZZLE = Pose((0.0, 0.0, 0.1)), Pose((0.02, 0.0, 0.15))
 
 
-def order(points=1, **changes):
+def job(points=1, **changes):
     positions = np.linspace(START, END, points + 1)
     poses = np.hstack([positions, np.tile([0.0, 0.0, 0.0, 1.0], (points + 1, 1))])
     reference = ReferencePath(
@@ -54,7 +54,7 @@ def order(points=1, **changes):
         point=np.maximum(np.arange(points + 1) - 1, 0).astype(np.int32),
         time=np.linspace(0.0, 2.0, points + 1),
     )
-    return Order(points=points, reference=reference, duration=2.0, **changes)
+    return MotionJob(points=points, reference=reference, duration=2.0, **changes)
 
 
 def robot(part=0.0, timestamp=0.0, qd=MOVING, **changes):
@@ -78,7 +78,7 @@ def robot(part=0.0, timestamp=0.0, qd=MOVING, **changes):
 
 def started(**changes):
     # These robots leap from place to place: where that does not matter it is no deviation.
-    machine = TrajectoryMachine(order(**changes), max_plan_deviation=(0.0, 0.0))
+    machine = GoalMachine(job(**changes), max_plan_deviation=(0.0, 0.0))
     machine.start(robot().state)
     machine.step(robot(), 0.0)
     return machine
@@ -91,8 +91,8 @@ def with_tcp(T_flange_tcp, part=0.0, qd=REST, **changes):
 
 def lent(**changes):
     """Return a machine whose goal needs another TCP, in ARMING, and its first commands."""
-    machine = TrajectoryMachine(
-        order(T_flange_active=OWN, T_flange_tcp=NOZZLE, **changes), max_plan_deviation=(0.0, 0.0)
+    machine = GoalMachine(
+        job(T_flange_active=OWN, T_flange_tcp=NOZZLE, **changes), max_plan_deviation=(0.0, 0.0)
     )
     return machine, machine.start(with_tcp(OWN).state)
 
@@ -100,36 +100,38 @@ def lent(**changes):
 def armed(**changes):
     machine, _ = lent(**changes)
     machine.step(with_tcp(NOZZLE), 0.0)
-    assert machine.state is State.MOVING
+    assert machine.state is GoalState.MOVING
     return machine
 
 
 def brought_to(state):
-    if state is State.ARMING:
+    if state is GoalState.ARMING:
         return lent()[0]
-    if state is State.RESTORING:
+    if state is GoalState.RESTORING:
         machine = armed()
         machine.step(TrajectoryEnded(result=TrajectoryResult.FAILURE), 1.0)
         assert machine.state is state
         return machine
-    if state in (State.CLOSING, State.WAITING):
-        machine = StreamMachine(order(open_end=True, ending=1), max_plan_deviation=(0.0, 0.0))
+    if state in (GoalState.RUNNING_OUT, GoalState.AWAITING_POINTS):
+        machine = AppendMachine(
+            job(keep_open=True, ending_records=1), max_plan_deviation=(0.0, 0.0)
+        )
         machine.start(robot().state)
-        machine.step(robot(timestamp=PATIENCE), PATIENCE)
-        if state is State.WAITING:
+        machine.step(robot(timestamp=FIRST_POINTS_TIMEOUT), FIRST_POINTS_TIMEOUT)
+        if state is GoalState.AWAITING_POINTS:
             machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 1.0)
         assert machine.state is state
         return machine
     machine = started()
-    if state is State.SETTLING:
+    if state is GoalState.SETTLING:
         machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 1.0)
-    if state in (State.STOPPING, State.HALTING):
+    if state in (GoalState.CANCELLING, GoalState.COMING_TO_REST):
         machine.step(CancelRequested(), 1.0)
-    if state is State.HALTING:
+    if state is GoalState.COMING_TO_REST:
         machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 1.1)
-    if state is State.ENDING:
+    if state is GoalState.PROGRAM_LOST:
         machine.step(LinkLost(link='program', reason='it hung up'), 1.0)
-    if state is State.ENDED:
+    if state is GoalState.ENDED:
         machine.step(TrajectoryEnded(result=TrajectoryResult.FAILURE), 1.0)
     assert machine.state is state
     return machine
@@ -141,7 +143,7 @@ def outcome(commands):
 
 
 def test_a_motion_starts_with_start_and_its_points():
-    commands = TrajectoryMachine(order(points=3)).start(robot().state)
+    commands = GoalMachine(job(points=3)).start(robot().state)
     assert commands == [
         SendControl(action=TrajectoryAction.START, count=3),
         SendPoints(first=0, end=3),
@@ -162,7 +164,7 @@ def test_a_motion_that_arrives_succeeds():
 
 
 def test_points_beyond_the_window_wait_for_the_robot():
-    machine = TrajectoryMachine(order(points=2000))
+    machine = GoalMachine(job(points=2000))
     assert machine.start(robot().state)[1] == SendPoints(first=0, end=500)
     machine.step(robot(0.0), 0.05)
     commands = machine.step(robot(0.0, points_begun=10), 0.1)
@@ -174,14 +176,14 @@ def test_points_beyond_the_window_wait_for_the_robot():
 
 
 def test_the_count_of_the_last_trajectory_is_not_taken_for_this_one_s():
-    machine = TrajectoryMachine(order(points=4))
+    machine = GoalMachine(job(points=4))
     machine.start(robot(points_begun=4).state)
 
     def place(count, part):
         (report,) = (
             c
             for c in machine.step(robot(part, points_begun=count), next(times))
-            if isinstance(c, Report)
+            if isinstance(c, ReportProgress)
         )
         return report.progress.waypoint
 
@@ -223,7 +225,7 @@ def test_of_a_cancel_and_a_preemption_the_first_counts(first, second, code):
         assert end.text == 'Goal 7 took the place of this one (on the way to point 0).'
 
 
-@pytest.mark.parametrize('state', [State.ARMING, State.SETTLING])
+@pytest.mark.parametrize('state', [GoalState.ARMING, GoalState.SETTLING])
 def test_a_motion_that_is_preempted_where_nothing_is_to_be_stopped_ends_at_once(state):
     machine = brought_to(state)
     commands = machine.step(PreemptRequested(by='goal 7'), 1.1)
@@ -236,7 +238,7 @@ def test_a_success_that_overtakes_the_cancel_is_not_its_answer():
     machine = started()
     machine.step(CancelRequested(), 1.0)
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 1.01)
-    assert machine.state is State.STOPPING
+    assert machine.state is GoalState.CANCELLING
     machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 1.02)
     assert outcome(machine.step(robot(1.0, qd=REST), 1.3)).code is ErrorCode.CANCELLED
 
@@ -244,8 +246,8 @@ def test_a_success_that_overtakes_the_cancel_is_not_its_answer():
 def test_a_cancel_without_an_answer_ends_the_program_within_the_bound():
     machine = started()
     machine.step(CancelRequested(), 1.0)
-    assert machine.step(Tick(), 1.0 + STOP_BOUND - 0.01) == []
-    commands = machine.step(Tick(), 1.0 + STOP_BOUND)
+    assert machine.step(Tick(), 1.0 + STOP_TIMEOUT - 0.01) == []
+    commands = machine.step(Tick(), 1.0 + STOP_TIMEOUT)
     assert any(isinstance(c, StopProgram) for c in commands)
     assert outcome(commands).code is ErrorCode.EXECUTION_FAILED
 
@@ -254,7 +256,7 @@ def test_a_cancel_that_a_paused_program_cannot_read_ends_the_goal_and_the_progra
     machine = started()
     machine.step(CancelRequested(), 1.0)
     machine.step(robot(0.5, qd=REST), 1.5)
-    commands = machine.step(Tick(), 1.0 + STOP_BOUND)
+    commands = machine.step(Tick(), 1.0 + STOP_TIMEOUT)
     assert any(isinstance(c, StopProgram) for c in commands)
     assert outcome(commands).code is ErrorCode.CANCELLED
 
@@ -264,7 +266,7 @@ def test_an_answer_to_a_lost_goal_is_not_taken_for_this_one_s():
     machine.step(TrajectoryEnded(result=TrajectoryResult.CANCELED), 0.1)
     machine.step(robot(0.1, points_begun=1), 0.2)
     assert machine.step(Tick(), 2.0) == []
-    assert machine.state is State.MOVING
+    assert machine.state is GoalState.MOVING
 
 
 def test_a_program_that_cancels_and_begins_nothing_ends_the_goal():
@@ -302,7 +304,7 @@ def test_leaving_the_path_stops_the_arm_and_names_point_axis_value_and_limit():
     ],
 )
 def test_a_controller_that_makes_another_motion_is_stopped_in_the_same_step(pose, text):
-    machine = TrajectoryMachine(order())
+    machine = GoalMachine(job())
     machine.start(robot().state)
     machine.step(robot(), 0.0)
     commands = machine.step(robot(0.05, timestamp=0.1, target_tcp_pose=pose), 0.1)
@@ -316,16 +318,16 @@ def test_a_controller_that_makes_another_motion_is_stopped_in_the_same_step(pose
 
 @pytest.mark.parametrize('limits', [(0.01, 0.02), (0.0, 0.0)])
 def test_a_controller_within_the_bounds_or_without_any_goes_on(limits):
-    machine = TrajectoryMachine(order(), max_plan_deviation=limits)
+    machine = GoalMachine(job(), max_plan_deviation=limits)
     machine.start(robot().state)
     machine.step(robot(), 0.0)
     machine.step(robot(0.05, timestamp=0.1, target_tcp_pose=Pose((0.41, 0.005, 0.2))), 0.1)
-    assert machine.state is State.MOVING
+    assert machine.state is GoalState.MOVING
 
 
 def test_nothing_is_watched_before_the_program_has_begun():
     """The TCP may still be another one; it is changed before the first point."""
-    machine = TrajectoryMachine(order(path_tolerance=Tolerance(position=(0.001,) * 3)))
+    machine = GoalMachine(job(path_tolerance=Tolerance(position=(0.001,) * 3)))
     elsewhere = {
         'actual_tcp_pose': Pose((0.4, 0, 0)),
         'target_tcp_pose': Pose((0.4, 0, 0)),
@@ -334,9 +336,9 @@ def test_nothing_is_watched_before_the_program_has_begun():
     machine.start(robot(**elsewhere, points_begun=7).state)
     machine.step(robot(**elsewhere, points_begun=7), 0.0)
     machine.step(robot(**elsewhere, points_begun=0), 0.1)
-    assert machine.state is State.MOVING
+    assert machine.state is GoalState.MOVING
     machine.step(robot(**elsewhere, points_begun=1), 0.2)
-    assert machine.state is State.STOPPING
+    assert machine.state is GoalState.CANCELLING
 
 
 def test_an_arm_that_does_not_settle_violates_the_goal_tolerance():
@@ -391,7 +393,7 @@ def test_an_arm_that_settles_in_time_succeeds():
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
     machine.step(robot(0.95, timestamp=2.3, qd=REST), 2.3)
     machine.step(robot(0.999, timestamp=2.4), 2.4)
-    assert machine.state is State.SETTLING
+    assert machine.state is GoalState.SETTLING
     assert outcome(machine.step(robot(0.999, timestamp=2.49, qd=REST), 2.49)).succeeded
 
 
@@ -401,77 +403,87 @@ def test_an_arm_may_settle_without_end():
     )
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
     machine.step(robot(0.95, timestamp=900.0, qd=REST), 900.0)
-    assert machine.state is State.SETTLING
+    assert machine.state is GoalState.SETTLING
 
 
 def test_progress_is_reported_at_its_rate():
-    machine = TrajectoryMachine(order(), feedback_period=0.1)
+    machine = GoalMachine(job(), feedback_period=0.1)
     machine.start(robot().state)
     reports = [
         c
         for i in range(100)
         for c in machine.step(robot(i / 200, timestamp=0.01 * i), 0.01 * i)
-        if isinstance(c, Report)
+        if isinstance(c, ReportProgress)
     ]
     assert len(reports) == 10
     fractions = [r.progress.fraction for r in reports]
     assert fractions == sorted(fractions)
 
 
-@pytest.mark.parametrize('state', list(State))
-@pytest.mark.parametrize('signal', list(Signal))
+@pytest.mark.parametrize('state', list(GoalState))
+@pytest.mark.parametrize('signal', list(GoalSignal))
 def test_every_signal_has_a_defined_meaning_in_every_state(state, signal):
     own = {
-        State.SETTLING: {Signal.SETTLED, Signal.LATE, Signal.DEVIATION},
-        State.STOPPING: {Signal.LATE, Signal.UNANSWERED},
-        State.HALTING: {Signal.AT_REST, Signal.LATE},
-        State.ARMING: {Signal.ARMED, Signal.LATE},
-        State.RESTORING: {Signal.RESTORED, Signal.LATE},
-        State.MOVING: {Signal.VIOLATION, Signal.DEVIATION, Signal.STALLED, Signal.STARVING},
-        State.CLOSING: {Signal.VIOLATION, Signal.DEVIATION, Signal.STALLED},
-        State.WAITING: {Signal.EXTENDED, Signal.LAST, Signal.DEVIATION, Signal.LATE},
-        State.ENDING: {Signal.LATE},
+        GoalState.SETTLING: {GoalSignal.SETTLED, GoalSignal.TIMEOUT, GoalSignal.DEVIATION},
+        GoalState.CANCELLING: {GoalSignal.TIMEOUT, GoalSignal.UNANSWERED},
+        GoalState.COMING_TO_REST: {GoalSignal.AT_REST, GoalSignal.TIMEOUT},
+        GoalState.ARMING: {GoalSignal.ARMED, GoalSignal.TIMEOUT},
+        GoalState.RESTORING: {GoalSignal.RESTORED, GoalSignal.TIMEOUT},
+        GoalState.MOVING: {
+            GoalSignal.VIOLATION,
+            GoalSignal.DEVIATION,
+            GoalSignal.STALLED,
+            GoalSignal.STARVING,
+        },
+        GoalState.RUNNING_OUT: {GoalSignal.VIOLATION, GoalSignal.DEVIATION, GoalSignal.STALLED},
+        GoalState.AWAITING_POINTS: {
+            GoalSignal.APPENDED,
+            GoalSignal.NO_MORE_POINTS,
+            GoalSignal.DEVIATION,
+            GoalSignal.TIMEOUT,
+        },
+        GoalState.PROGRAM_LOST: {GoalSignal.TIMEOUT},
     }
     judged = {
-        Signal.ARMED,
-        Signal.RESTORED,
-        Signal.SETTLED,
-        Signal.AT_REST,
-        Signal.LATE,
-        Signal.UNANSWERED,
-        Signal.VIOLATION,
-        Signal.DEVIATION,
-        Signal.STALLED,
-        Signal.STARVING,
-        Signal.EXTENDED,
-        Signal.LAST,
+        GoalSignal.ARMED,
+        GoalSignal.RESTORED,
+        GoalSignal.SETTLED,
+        GoalSignal.AT_REST,
+        GoalSignal.TIMEOUT,
+        GoalSignal.UNANSWERED,
+        GoalSignal.VIOLATION,
+        GoalSignal.DEVIATION,
+        GoalSignal.STALLED,
+        GoalSignal.STARVING,
+        GoalSignal.APPENDED,
+        GoalSignal.NO_MORE_POINTS,
     }
-    possible = state is not State.ENDED and (
+    possible = state is not GoalState.ENDED and (
         signal not in judged or signal in own.get(state, set())
     )
     assert (signal in TRANSITIONS[state]) == possible
 
 
 #: Where the outcome is not decided yet.
-RUNNING = [s for s in State if s not in (State.RESTORING, State.ENDED)]
+RUNNING = [s for s in GoalState if s not in (GoalState.RESTORING, GoalState.ENDED)]
 
 STOPPED_STATES = [
     pytest.param(
         {'safety_status': SafetyStatus.PROTECTIVE_STOPPED},
-        Signal.PROTECTIVE_STOP,
+        GoalSignal.PROTECTIVE_STOP,
         id='protective stop',
     ),
     pytest.param(
         {'safety_status': SafetyStatus.SAFEGUARD_STOPPED},
-        Signal.PROTECTIVE_STOP,
+        GoalSignal.PROTECTIVE_STOP,
         id='safeguard stop',
     ),
     pytest.param(
         {'safety_status': SafetyStatus.EMERGENCY_STOPPED},
-        Signal.EMERGENCY_STOP,
+        GoalSignal.EMERGENCY_STOP,
         id='emergency stop',
     ),
-    pytest.param({'robot_mode': RobotMode.POWER_OFF}, Signal.PROGRAM_STOPPED, id='power off'),
+    pytest.param({'robot_mode': RobotMode.POWER_OFF}, GoalSignal.PROGRAM_STOPPED, id='power off'),
 ]
 
 
@@ -480,8 +492,10 @@ STOPPED_STATES = [
 def test_a_robot_that_stops_by_itself_ends_the_goal_in_every_state(state, changes, signal):
     machine = brought_to(state)
     commands = machine.step(robot(0.5, **changes), 1.05)
-    assert outcome(commands + machine.step(Tick(), 1.05 + GATHER)).code is STOPS[signal]
-    assert machine.state is State.ENDED
+    assert (
+        outcome(commands + machine.step(Tick(), 1.05 + CAUSE_TIMEOUT)).code is STOP_SIGNALS[signal]
+    )
+    assert machine.state is GoalState.ENDED
 
 
 @pytest.mark.parametrize(
@@ -491,9 +505,9 @@ def test_a_robot_that_stops_by_itself_ends_the_goal_in_every_state(state, change
 def test_a_lost_link_ends_the_goal_in_every_state_and_says_who_hung_up(state, link, code):
     machine = brought_to(state)
     commands = machine.step(LinkLost(link=link, reason='it closed'), 1.05)
-    end = outcome(commands + machine.step(Tick(), 1.05 + GATHER))
+    end = outcome(commands + machine.step(Tick(), 1.05 + CAUSE_TIMEOUT))
     assert end.code is code
-    assert 'it closed' in end.text or state is State.ENDING
+    assert 'it closed' in end.text or state is GoalState.PROGRAM_LOST
 
 
 @pytest.mark.parametrize(
@@ -526,7 +540,7 @@ def standing(machine, seconds, **changes):
 
 
 def test_an_arm_that_stands_for_no_reason_does_not_stand_for_ever():
-    commands = standing(started(), STALL_BOUND + 0.3)
+    commands = standing(started(), STALL_TIMEOUT + 0.3)
     assert outcome(commands).code is ErrorCode.EXECUTION_FAILED
     assert any(isinstance(c, StopProgram) for c in commands)
 
@@ -542,7 +556,7 @@ def test_an_arm_that_stands_for_no_reason_does_not_stand_for_ever():
 def test_an_arm_that_is_held_may_stand_as_long_as_it_likes(reason):
     machine = started()
     assert not [c for c in standing(machine, 20.0, **reason) if isinstance(c, Finish)]
-    assert machine.state is State.MOVING
+    assert machine.state is GoalState.MOVING
 
 
 def test_a_protective_stop_ends_the_program_so_that_the_motion_cannot_resume():
@@ -562,21 +576,21 @@ def test_a_protective_stop_ends_the_program_so_that_the_motion_cannot_resume():
     ],
 )
 def test_nothing_happens_after_the_end(event):
-    assert brought_to(State.ENDED).step(event, 9.0) == []
+    assert brought_to(GoalState.ENDED).step(event, 9.0) == []
 
 
 @pytest.mark.parametrize(('changes', 'signal'), STOPPED_STATES)
 def test_what_was_decided_stays_when_the_robot_stops_before_its_tcp_is_back(changes, signal):
-    machine = brought_to(State.RESTORING)
+    machine = brought_to(GoalState.RESTORING)
     commands = machine.step(with_tcp(NOZZLE, **changes), 1.2)
     assert outcome(commands).code is ErrorCode.EXECUTION_FAILED
     assert not any(isinstance(c, StopProgram) for c in commands)
-    assert not machine.loan.returned
+    assert not machine.temporary_tcp.is_restored
 
 
 def test_the_tcp_is_set_first_and_nothing_is_sent_before_the_robot_has_it():
     machine, commands = lent(points=3)
-    assert commands == [LendTcp(T_flange_tcp=NOZZLE)]
+    assert commands == [SetTemporaryTcp(T_flange_tcp=NOZZLE)]
     assert machine.step(with_tcp(OWN), 0.01) == []
     assert machine.step(Tick(), 0.02) == []
     # The same packet may still show the pose of the old TCP.
@@ -593,14 +607,14 @@ def test_the_tcp_is_set_first_and_nothing_is_sent_before_the_robot_has_it():
 def test_a_tcp_within_the_resolution_of_the_wire_has_arrived():
     machine, _ = lent()
     machine.step(with_tcp(Pose((0.02 + 5e-7, -5e-7, 0.15 + 5e-7))), 0.01)
-    assert machine.state is State.MOVING
+    assert machine.state is GoalState.MOVING
 
 
 def test_the_outcome_waits_until_the_tcp_is_back():
     machine = armed()
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
     commands = machine.step(with_tcp(NOZZLE, 1.0), 2.01)
-    assert ReturnTcp(T_flange_tcp=OWN) in commands
+    assert RestoreTcp(T_flange_tcp=OWN) in commands
     assert not any(isinstance(c, Finish) for c in commands)
     assert machine.step(with_tcp(NOZZLE, 1.0), 2.02) == []
     end = outcome(machine.step(with_tcp(OWN, 1.0), 2.03))
@@ -612,7 +626,7 @@ def test_the_goal_tolerance_is_judged_with_the_tcp_of_the_goal():
     machine = armed(goal_tolerance=Tolerance(position=(0.001,) * 3))
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
     machine.step(with_tcp(NOZZLE, 1.0), 2.01)
-    assert machine.state is State.RESTORING
+    assert machine.state is GoalState.RESTORING
     elsewhere = Pose((0.6, 0.05, 0.2))
     assert outcome(machine.step(with_tcp(OWN, 1.0, actual_tcp_pose=elsewhere), 2.02)).succeeded
 
@@ -623,18 +637,18 @@ def test_nothing_is_reported_about_another_tcp():
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
     at_end = machine.step(with_tcp(NOZZLE, 1.0), 2.01)
     after = machine.step(with_tcp(OWN, actual_tcp_pose=Pose((9.0, 9.0, 9.0))), 2.1)
-    assert sum(isinstance(c, Report) for c in commands) == 1
-    assert any(isinstance(c, Report) for c in at_end)
-    assert not any(isinstance(c, Report) for c in after)
+    assert sum(isinstance(c, ReportProgress) for c in commands) == 1
+    assert any(isinstance(c, ReportProgress) for c in at_end)
+    assert not any(isinstance(c, ReportProgress) for c in after)
 
 
 def test_a_robot_that_does_not_take_the_tcp_is_not_moved():
     machine, _ = lent()
     machine.step(with_tcp(OWN), 0.0)
-    assert machine.step(with_tcp(OWN), TCP_BOUND - 0.01) == []
-    commands = machine.step(Tick(), TCP_BOUND)
-    assert commands == [ReturnTcp(T_flange_tcp=OWN)]
-    end = outcome(machine.step(with_tcp(OWN), TCP_BOUND + 0.01))
+    assert machine.step(with_tcp(OWN), TCP_TIMEOUT - 0.01) == []
+    commands = machine.step(Tick(), TCP_TIMEOUT)
+    assert commands == [RestoreTcp(T_flange_tcp=OWN)]
+    end = outcome(machine.step(with_tcp(OWN), TCP_TIMEOUT + 0.01))
     assert end.code is ErrorCode.ROBOT_NOT_READY
     assert 'did not take the TCP of the goal within 1 s' in end.text
     assert 'nothing was moved' in end.text
@@ -644,9 +658,9 @@ def test_an_arm_that_went_away_before_it_was_armed_is_not_moved():
     machine, _ = lent()
     elsewhere = Pose((0.4, 0.05, 0.2))
     machine.step(with_tcp(NOZZLE, actual_tcp_pose=elsewhere), 0.0)
-    commands = machine.step(with_tcp(NOZZLE, actual_tcp_pose=elsewhere), TCP_BOUND)
-    assert ReturnTcp(T_flange_tcp=OWN) in commands
-    end = outcome(machine.step(with_tcp(OWN), TCP_BOUND + 0.01))
+    commands = machine.step(with_tcp(NOZZLE, actual_tcp_pose=elsewhere), TCP_TIMEOUT)
+    assert RestoreTcp(T_flange_tcp=OWN) in commands
+    end = outcome(machine.step(with_tcp(OWN), TCP_TIMEOUT + 0.01))
     assert end.code is ErrorCode.ROBOT_NOT_READY
     assert 'the arm is 0.0500 m' in end.text.lower()
 
@@ -655,10 +669,10 @@ def test_a_cancel_before_the_motion_waits_until_no_tcp_is_on_its_way():
     """The TCP of the goal may be read and put back between two packets, or never."""
     machine, _ = lent()
     machine.step(with_tcp(OWN), 0.0)
-    assert machine.step(CancelRequested(), 0.01) == [ReturnTcp(T_flange_tcp=OWN)]
+    assert machine.step(CancelRequested(), 0.01) == [RestoreTcp(T_flange_tcp=OWN)]
     assert machine.step(with_tcp(OWN), 0.02) == []
-    assert machine.step(with_tcp(OWN), CARRIED_OUT - 0.01) == []
-    end = outcome(machine.step(with_tcp(OWN), CARRIED_OUT))
+    assert machine.step(with_tcp(OWN), SET_TIMEOUT - 0.01) == []
+    end = outcome(machine.step(with_tcp(OWN), SET_TIMEOUT))
     assert end.code is ErrorCode.CANCELLED
     assert 'before anything moved' in end.text
 
@@ -667,19 +681,19 @@ def test_a_cancel_before_the_motion_waits_until_no_tcp_is_on_its_way():
 def test_a_late_result_of_the_goal_before_does_not_arm(result):
     machine, _ = lent()
     assert machine.step(TrajectoryEnded(result=result), 0.1) == []
-    assert machine.state is State.ARMING
+    assert machine.state is GoalState.ARMING
 
 
 def test_a_tcp_that_does_not_come_back_is_said_and_left_to_the_owner():
     machine = armed()
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
     machine.step(with_tcp(NOZZLE, 1.0), 2.01)
-    commands = machine.step(Tick(), 2.01 + TCP_BOUND)
+    commands = machine.step(Tick(), 2.01 + TCP_TIMEOUT)
     assert not any(isinstance(c, StopProgram) for c in commands)
     end = outcome(commands)
     assert end.succeeded
     assert 'is not back yet' in end.report[0]
-    assert not machine.loan.returned
+    assert not machine.temporary_tcp.is_restored
 
 
 def test_tolerances_and_reports_are_about_the_controlled_frame():
@@ -698,7 +712,7 @@ def test_tolerances_and_reports_are_about_the_controlled_frame():
         target_tcp_acceleration=(0.0, 0.0, 0.0, 0.0, 2.0, 0.0),
     )
     assert machine.step(packet, 1.0) == [SendControl(action=TrajectoryAction.CANCEL, count=1)]
-    (report,) = (c.progress for c in machine.step(packet, 1.002) if isinstance(c, Report))
+    (report,) = (c.progress for c in machine.step(packet, 1.002) if isinstance(c, ReportProgress))
     assert report.desired_pose.position == pytest.approx((0.5, 0.0, 0.3), abs=1e-3)
     assert report.actual_pose.position == pytest.approx((0.502, 0.0, 0.3), abs=1e-4)
     assert report.actual_twist[0] == pytest.approx(0.15, abs=1e-4)

@@ -14,7 +14,7 @@ from random import Random
 import pytest
 
 from ur_cartesian_driver.execution import Finish, SendControl
-from ur_cartesian_driver.execution.states import State
+from ur_cartesian_driver.execution.states import GoalState
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Segment, SegmentType, Tolerance
 from ur_cartesian_driver.motion.pose import multiply, Pose, quaternion_from_rotation_vector
@@ -156,7 +156,7 @@ def test_a_disturbance_trips_its_axis_in_the_cycle_it_comes_in(cell, name, axis,
     machine, answers = cell.run(made, disturb=disturb)
     first = next(k for k, t in enumerate(packets[1:]) if t >= 0.1)  # the 0th goes to start()
     assert sent(answers) == [first]
-    assert machine.state is not State.MOVING
+    assert machine.state is not GoalState.MOVING
     assert f'point 0 {name} {"xyz"[axis]} is off by' in machine._text
 
 

@@ -3,17 +3,17 @@
 """What faults leave behind when they last: queues, dead connections, and who notices."""
 
 from fault_cell import do, let_happen
-from fault_goals import AroundCorners, planned
+from fault_goals import BlendGoal, planned
 import pytest
 import robot_cell
 from robot_cell import run_cell
 
-from ur_cartesian_driver.execution.observer import STALL_BOUND
+from ur_cartesian_driver.execution.observer import STALL_TIMEOUT
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import IOCommand, OutputKind
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.primary_client import SILENCE
+from ur_cartesian_driver.robot.primary_client import SILENCE_TIMEOUT
 
 pytestmark = pytest.mark.slow
 
@@ -31,7 +31,7 @@ def test_a_pause_leaves_no_queue_behind_which_a_goal_would_wait():
         assert 1 <= unread(cell) <= 3, 'one for the read that is under way, and no more'
         await do(cell, 'play')
         await cell.until(cell.is_ready)
-        goal = AroundCorners(cell)
+        goal = BlendGoal(cell)
         goal.send()
         await cell.until(lambda: not cell.at_rest(), 0.1)
         await cell.until(lambda: goal.motion.outcome)
@@ -46,8 +46,8 @@ def test_a_stop_is_followed_up_also_when_the_primary_interface_was_dead(fault):
 
     async def scenario(cell):
         await let_happen(cell, fault)
-        await cell.sleep(2.0 * SILENCE + 0.5)
-        goal = AroundCorners(cell)
+        await cell.sleep(2.0 * SILENCE_TIMEOUT + 0.5)
+        goal = BlendGoal(cell)
         await goal.reach('mid-segment')
         cell.robot.protective_stop()
         await cell.until(lambda: goal.motion.outcome, 0.2)
@@ -76,7 +76,7 @@ def test_who_pulls_the_cable_for_a_moment_is_not_taken_for_ready():
 
 def test_an_owner_that_hangs_up_stops_the_arm_and_the_program():
     async def scenario(cell):
-        await AroundCorners(cell).reach('mid-segment')
+        await BlendGoal(cell).reach('mid-segment')
         cell.owner.hang_up()
         assert await cell.until(cell.at_rest, 0.5) > 0.0
         await cell.until(lambda: cell.robot.state().runtime_state is RuntimeState.STOPPED, 0.5)
@@ -86,7 +86,7 @@ def test_an_owner_that_hangs_up_stops_the_arm_and_the_program():
 
 def test_sending_the_program_does_not_take_it_away_from_a_goal():
     async def scenario(cell):
-        goal = AroundCorners(cell)
+        goal = BlendGoal(cell)
         await goal.reach('mid-segment')
         cell.resend()
         await cell.until(lambda: goal.motion.outcome)
@@ -102,7 +102,7 @@ def test_an_output_long_after_the_end_is_waited_for():
     async def scenario(cell):
         late = IOCommand(
             waypoint=0,
-            offset=2.0 * STALL_BOUND,
+            offset=2.0 * STALL_TIMEOUT,
             pin=1,
             value=1.0,
             output=OutputKind.STANDARD_DIGITAL,
@@ -110,9 +110,9 @@ def test_an_output_long_after_the_end_is_waited_for():
         motion = cell.owner.start(
             planned(cell.memory.read(), ((0.0, 0.01, 0.0),), 0.1, 1.0, io_commands=(late,))
         )
-        await cell.until(lambda: motion.outcome, 3.0 * STALL_BOUND)
+        await cell.until(lambda: motion.outcome, 3.0 * STALL_TIMEOUT)
         assert motion.outcome.succeeded, motion.outcome
-        assert cell.robot.controller.signals.digital_out.standard[1]
+        assert cell.robot.controller.io.digital_out.standard[1]
 
     run_cell(scenario)
 
@@ -120,7 +120,7 @@ def test_an_output_long_after_the_end_is_waited_for():
 @pytest.mark.parametrize('moment', ['before', 'after'])
 def test_a_cancel_and_a_protective_stop_at_the_same_time_end_in_the_stop(moment):
     async def scenario(cell):
-        goal = AroundCorners(cell)
+        goal = BlendGoal(cell)
         await goal.reach('mid-segment')
         if moment == 'before':
             cell.owner.cancel()

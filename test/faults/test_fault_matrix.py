@@ -3,13 +3,13 @@
 """Every fault in every phase of a goal: the matrix of doc/faults.md, in virtual time."""
 
 from fault_cell import scenario
-from fault_goals import AroundCorners, GOALS
+from fault_goals import BlendGoal, GOALS
 from fault_modes import MODES
 from fault_table import CONTINUED, HEADLESS, LOCAL, PHASES
 import pytest
 from robot_cell import run_cell
 
-from ur_cartesian_driver.sim import faults
+import ur_cartesian_driver.sim.faults as faults
 
 pytestmark = pytest.mark.slow
 
@@ -18,7 +18,7 @@ CONTINUE = {'after_robot_stop': 'continue'}
 CASES = [
     pytest.param(kind, phases, row, settings | more, id=prefix + where + row.fault)
     for kind, prefix, phases, tables, more in [
-        (AroundCorners, '', PHASES, (HEADLESS, LOCAL, CONTINUED), {}),
+        (BlendGoal, '', PHASES, (HEADLESS, LOCAL, CONTINUED), {}),
         *(
             (
                 GOALS[mode.name],
@@ -53,7 +53,7 @@ def test_a_goal_ends_as_the_table_says_and_the_next_one_works(kind, phases, row,
 def test_every_fault_that_can_be_injected_is_in_the_table():
     causes = ' '.join(cause for row in HEADLESS for cause in row.cause)
     words = set(causes.split())
-    assert {action.value for action in faults.Action} <= words
+    assert {action.value for action in faults.FaultEvent} <= words
     assert {
         'slider',
         'foreign_motion',
@@ -63,7 +63,7 @@ def test_every_fault_that_can_be_injected_is_in_the_table():
         'delay',
         'throttle',
         'garbage',
-        *faults.SHAPES,
+        *faults.DEVIATION_SHAPES,
     } <= words
     for interface in ('rtde', 'primary', 'sockets'):
         for kind in ('drop', 'half_open', 'silence', 'delay', 'throttle', 'garbage'):

@@ -3,8 +3,8 @@
 """Each way of execution takes the place of each other one, at once, and runs to its end."""
 
 from fault_cell import go_home
-from fault_goals import AroundCorners, Continued, GOALS, Guided
-from fault_ways import Ways
+from fault_goals import AppendGoal, BlendGoal, FreedriveGoal, GOALS
+from joint_trace import JointTrace
 import pytest
 from robot_cell import run_cell
 
@@ -13,7 +13,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 
 pytestmark = pytest.mark.slow
 
-KINDS = {'PRIMITIVES': AroundCorners, **GOALS}
+KINDS = {'PRIMITIVES': BlendGoal, **GOALS}
 MIDDLE = {
     'PRIMITIVES': 'mid-segment',
     'SPLINE': 'between points',
@@ -26,20 +26,20 @@ MIDDLE = {
 STRONGEST = 12.0
 
 
-async def make_way(cell, ways, first, second):
+async def preempt_motion(cell, trace, first, second):
     """Preempt a goal in the middle of its way, and run the next one."""
     goal = KINDS[first](cell)
     goal.send()
-    await ways.until(lambda: goal.is_in(MIDDLE[first]), 2.0)
+    await trace.until(lambda: goal.is_in(MIDDLE[first]), 2.0)
     cell.owner.send(CancelMotion(motion=len(cell.owner.motions), preempted_by='goal 7'))
-    await ways.until(lambda: goal.motion.outcome, 0.4)
+    await trace.until(lambda: goal.motion.outcome, 0.4)
     assert goal.motion.outcome.code is ErrorCode.PREEMPTED, (first, goal.motion.outcome)
     following = KINDS[second](cell)
     following.send()
-    if isinstance(following, Continued):
-        await ways.until(lambda: following.is_in('moving'), 2.0)
+    if isinstance(following, AppendGoal):
+        await trace.until(lambda: following.is_in('moving'), 2.0)
         following.follow_up('moving')
-    await ways.until(lambda: following.motion.outcome, 4.0)
+    await trace.until(lambda: following.motion.outcome, 4.0)
     outcome = following.motion.outcome
     assert outcome.succeeded, f'{second} after {first}: {outcome}'
 
@@ -50,11 +50,11 @@ def test_any_way_of_execution_takes_the_place_of_any_other(first):
     async def scenario(cell):
         home = cell.robot.controller.motion.T_base_tcp.position
         for second in KINDS:
-            if KINDS[second] is Guided:
+            if KINDS[second] is FreedriveGoal:
                 continue
-            ways = Ways(cell)
-            await make_way(cell, ways, first, second)
-            assert ways.fastest_and_strongest()[1] < STRONGEST, (first, second)
+            trace = JointTrace(cell)
+            await preempt_motion(cell, trace, first, second)
+            assert trace.max_speed_and_acceleration()[1] < STRONGEST, (first, second)
             await go_home(cell, home, f'{second} after {first}')
 
-    run_cell(scenario, allow_teach=True)
+    run_cell(scenario, allow_freedrive=True)

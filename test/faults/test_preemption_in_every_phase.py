@@ -2,14 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A motion makes way for the next one in every phase: messages, brakes, place of rest."""
 
-from fault_goals import ARM, AroundCorners, planned
-from fault_ways import Ways
+from fault_goals import ARM, BlendGoal, planned
+from joint_trace import JointTrace
 import pytest
 from robot_cell import CYCLE, run_cell
 
 from ur_cartesian_driver.driver.channel import CancelMotion
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.planning.rest import come_to_rest
+from ur_cartesian_driver.planning.stop_prediction import predict_stop
 from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
 
 pytestmark = pytest.mark.slow
@@ -31,7 +31,7 @@ PHASES = {
 }
 
 
-def said(cell, first):
+def was_action_sent(cell, first):
     return [
         TrajectoryAction(message.payload[0])
         for message in cell.control_messages(first)
@@ -42,12 +42,12 @@ def said(cell, first):
 async def preempted(cell, phase):
     first = len(cell.control_messages())
     home = cell.robot.controller.motion.T_base_tcp.position
-    goal = AroundCorners(cell)
+    goal = BlendGoal(cell)
     await goal.reach(phase)
-    predicted = come_to_rest(cell.memory.read(), ARM, STOP_DECELERATION)
-    ways = Ways(cell)
+    predicted = predict_stop(cell.memory.read(), ARM, STOP_DECELERATION)
+    trace = JointTrace(cell)
     cell.owner.send(CancelMotion(motion=len(cell.owner.motions), preempted_by='goal 7'))
-    await ways.until(lambda: goal.motion.outcome, BOUND)
+    await trace.until(lambda: goal.motion.outcome, BOUND)
     messages, code = PHASES[phase]
     assert goal.motion.outcome.code is code, f'{phase}: {goal.motion.outcome}'
     if code is ErrorCode.PREEMPTED:
@@ -69,11 +69,11 @@ async def preempted(cell, phase):
             2.0,
         )
     )
-    await ways.until(lambda: following.outcome, 3.0)
+    await trace.until(lambda: following.outcome, 3.0)
     assert following.outcome.succeeded, f'{phase}: {following.outcome}'
-    assert said(cell, first) == messages, phase
-    assert 'ignored' not in ' '.join(map(str, cell.robot.controller.announcements.log))
-    speed, change = ways.fastest_and_strongest()
+    assert was_action_sent(cell, first) == messages, phase
+    assert 'ignored' not in ' '.join(map(str, cell.robot.controller.messages.log))
+    speed, change = trace.max_speed_and_acceleration()
     assert speed < FASTEST, phase
     assert change < STRONGEST, phase
 

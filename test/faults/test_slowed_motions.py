@@ -7,9 +7,9 @@ Slowed, held and let go again the tool stays on its path, no joint is thrown, an
 is slowed brakes as any other.
 """
 
-from fault_goals import AroundCorners, GOALS
-from fault_modes import OPEN, SERVO, SPLINE
-from fault_ways import Ways
+from fault_goals import BlendGoal, GOALS
+from fault_modes import APPEND, SERVO, SPLINE
+from joint_trace import JointTrace
 import pytest
 from robot_cell import run_cell
 
@@ -18,8 +18,8 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 pytestmark = pytest.mark.slow
 
 KINDS = {
-    'PRIMITIVES': AroundCorners,
-    **{mode.name: GOALS[mode.name] for mode in (SPLINE, SERVO, OPEN)},
+    'PRIMITIVES': BlendGoal,
+    **{mode.name: GOALS[mode.name] for mode in (SPLINE, SERVO, APPEND)},
 }
 #: What is done in the middle of a goal, and how long it lasts [s].
 DONE = {
@@ -51,17 +51,17 @@ MIDDLE = {
 @pytest.mark.parametrize('kind', KINDS)
 def test_a_tool_that_is_slowed_stays_on_its_path(kind, what):
     async def scenario(cell):
-        goal, ways = KINDS[kind](cell), Ways(cell)
+        goal, trace = KINDS[kind](cell), JointTrace(cell)
         goal.send()
-        await ways.until(lambda: goal.is_in(MIDDLE[kind]), 2.0)
+        await trace.until(lambda: goal.is_in(MIDDLE[kind]), 2.0)
         goal.follow_up(MIDDLE[kind])
         for fault, seconds in DONE[what]:
             cell.robot.inject(fault)
             over = cell.loop.time() + seconds
-            await ways.until(lambda over=over: cell.loop.time() >= over, 1.0)
-        await ways.until(lambda: goal.motion.outcome, 3.0)
+            await trace.until(lambda over=over: cell.loop.time() >= over, 1.0)
+        await trace.until(lambda: goal.motion.outcome, 3.0)
         assert goal.motion.outcome.succeeded, goal.motion.outcome
-        off, (_, strongest) = ways.farthest_off(goal), ways.fastest_and_strongest()
+        off, (_, strongest) = trace.max_path_deviation(goal), trace.max_speed_and_acceleration()
         farthest, most = BOUNDS[kind]
         assert off < farthest
         assert strongest < (PAUSED.get(kind, most) if what == 'pause and play' else most)
@@ -74,15 +74,15 @@ def test_a_tool_that_is_slowed_stays_on_its_path(kind, what):
 @pytest.mark.parametrize('kind', KINDS)
 def test_a_cancel_brakes_and_is_no_protective_stop(kind, slider):
     async def scenario(cell):
-        goal, ways = KINDS[kind](cell), Ways(cell)
+        goal, trace = KINDS[kind](cell), JointTrace(cell)
         cell.robot.inject(f'slider {slider}')
         goal.send()
-        await ways.until(lambda: goal.is_in(MIDDLE[kind]), 3.0)
+        await trace.until(lambda: goal.is_in(MIDDLE[kind]), 3.0)
         cell.owner.cancel()
-        await ways.until(lambda: goal.motion.outcome, 0.4)
+        await trace.until(lambda: goal.motion.outcome, 0.4)
         assert goal.motion.outcome.code is ErrorCode.CANCELLED
-        await ways.until(cell.at_rest, 0.05)
+        await trace.until(cell.at_rest, 0.05)
         assert cell.is_ready()
-        assert ways.fastest_and_strongest()[1] < BOUNDS[kind][1]
+        assert trace.max_speed_and_acceleration()[1] < BOUNDS[kind][1]
 
     run_cell(scenario)

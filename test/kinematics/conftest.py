@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import Geometry, MODELS
+from ur_cartesian_driver.kinematics.robots import DhTable, MODELS
 
 GOLDEN = Path(__file__).parent / 'golden'
 
@@ -94,7 +94,7 @@ def table_of(lines):
     flange_x, flange = lines.flange[:3, 0], lines.flange[:3, 3]
     rows.append((angle_about(z, x, flange_x), z @ (flange - origin), 0.0, 0.0))
     theta, d, a, alpha = (tuple(float(v) for v in column) for column in zip(*rows, strict=True))
-    return Geometry(theta=theta, d=d, a=a, alpha=alpha)
+    return DhTable(theta=theta, d=d, a=a, alpha=alpha)
 
 
 def angle_about(axis, start, end):

@@ -7,8 +7,13 @@ from math import pi
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.kinematics.bodies import Bodies, Link, PAIRS, segment_distance
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.collision_bodies import (
+    CollisionBodies,
+    Link,
+    PAIRS,
+    segment_distance,
+)
 from ur_cartesian_driver.kinematics.robots import MODELS
 from ur_cartesian_driver.motion.pose import Pose
 
@@ -94,7 +99,7 @@ def test_no_two_points_of_random_segments_are_nearer_than_their_distance(rng):
 @pytest.mark.parametrize('name', MODELS)
 def test_the_last_link_ends_in_the_flange_and_the_tool_in_the_tcp(name, rng):
     arm = Arm(MODELS[name])
-    bodies = Bodies(arm, TCP, tool_radius=0.02)
+    bodies = CollisionBodies(arm, TCP, tool_radius=0.02)
     q = random_joints(rng, 4)
     ends = bodies.cylinders(q)
     for row, joints in enumerate(q):
@@ -111,14 +116,16 @@ def test_a_calibrated_arm_is_within_millimetres_of_its_model(name, calibrated_ar
     q = random_joints(rng, 50)
     real, nominal = calibrated_arm(name), Arm(MODELS[name])
     assert max(map(abs, real.geometry.d)) > 1.0  # origins far from the arm
-    apart = np.abs(Bodies(real).cylinders(q) - Bodies(nominal).cylinders(q)).max()
+    apart = np.abs(
+        CollisionBodies(real).cylinders(q) - CollisionBodies(nominal).cylinders(q)
+    ).max()
     assert 1e-5 < apart < 0.015
 
 
 def test_tubes_join_the_housings_of_their_joints(rng):
     for model in MODELS.values():
-        ends = Bodies(Arm(model)).cylinders(random_joints(rng, 1))[0]
-        links = Bodies(Arm(model)).links
+        ends = CollisionBodies(Arm(model)).cylinders(random_joints(rng, 1))[0]
+        links = CollisionBodies(Arm(model)).links
         for link, length in (
             (Link.UPPER_ARM, model.geometry.a[1]),
             (Link.FOREARM, model.geometry.a[2]),
@@ -131,7 +138,7 @@ def test_tubes_join_the_housings_of_their_joints(rng):
 
 
 def test_capsules_contain_their_cylinders(rng):
-    bodies = Bodies(Arm(MODELS['ur3']), TCP, tool_radius=0.03)
+    bodies = CollisionBodies(Arm(MODELS['ur3']), TCP, tool_radius=0.03)
     q = random_joints(rng, 2)
     for ends, covers in zip(bodies.cylinders(q), bodies.capsules(q), strict=True):
         for (start, end), radius, cover, thick in zip(
@@ -150,7 +157,7 @@ def test_capsules_contain_their_cylinders(rng):
 
 @pytest.mark.parametrize('name', ['ur3e', 'ur10'])
 def test_distances_are_those_of_the_nearest_points_of_the_capsules(name, rng):
-    bodies = Bodies(Arm(MODELS[name]), TCP, tool_radius=0.03)
+    bodies = CollisionBodies(Arm(MODELS[name]), TCP, tool_radius=0.03)
     q = random_joints(rng, 3)
     lines = sampled(bodies.capsules(q))
     for row, distances in enumerate(bodies.distances(q)):
@@ -169,14 +176,14 @@ def test_distances_are_those_of_the_nearest_points_of_the_capsules(name, rng):
 
 @pytest.mark.parametrize('name', MODELS)
 def test_turning_joint_1_changes_no_distance(name, rng):
-    bodies = Bodies(Arm(MODELS[name]), TCP, tool_radius=0.03)
+    bodies = CollisionBodies(Arm(MODELS[name]), TCP, tool_radius=0.03)
     q = random_joints(rng, 20)
     turned = np.add(q, [0.7, 0, 0, 0, 0, 0])
     np.testing.assert_allclose(bodies.distances(turned), bodies.distances(q), atol=1e-12)
 
 
 def test_rows_do_not_know_of_each_other(rng):
-    bodies = Bodies(Arm(MODELS['ur5e']))
+    bodies = CollisionBodies(Arm(MODELS['ur5e']))
     q = random_joints(rng, 600)  # more than one block
     together = bodies.distances(q)
     for row in (0, 255, 256, 599):
@@ -185,7 +192,7 @@ def test_rows_do_not_know_of_each_other(rng):
 
 @pytest.mark.parametrize('name', MODELS)
 def test_everyday_poses_are_free(name):
-    bodies = Bodies(Arm(MODELS[name]))
+    bodies = CollisionBodies(Arm(MODELS[name]))
     distances = bodies.distances(np.array(list(EVERYDAY.values()), dtype=float))
     for pose, row in zip(EVERYDAY, distances, strict=True):
         a, b = bodies.pairs[int(row.argmin())]
@@ -196,15 +203,15 @@ def test_everyday_poses_are_free(name):
 @pytest.mark.parametrize('name', MODELS)
 def test_an_arm_folded_into_itself_is_found(name, case):
     q, pair = case
-    bodies = Bodies(Arm(MODELS[name]))
+    bodies = CollisionBodies(Arm(MODELS[name]))
     assert bodies.distances(np.array([q], dtype=float))[0, bodies.pairs.index(pair)] < 0.0
 
 
 def test_a_tool_counts_when_it_has_a_radius():
     arm = Arm(MODELS['ur5e'])
-    assert all(Link.TOOL not in pair for pair in Bodies(arm, TCP).pairs)
-    assert all(Link.TOOL not in pair for pair in Bodies(arm, tool_radius=0.1).pairs)
-    with_tool = Bodies(arm, TCP, tool_radius=0.03)
+    assert all(Link.TOOL not in pair for pair in CollisionBodies(arm, TCP).pairs)
+    assert all(Link.TOOL not in pair for pair in CollisionBodies(arm, tool_radius=0.1).pairs)
+    with_tool = CollisionBodies(arm, TCP, tool_radius=0.03)
     assert {a for a, b in with_tool.pairs if b == Link.TOOL} == {
         Link.BASE,
         Link.SHOULDER,
@@ -213,7 +220,7 @@ def test_a_tool_counts_when_it_has_a_radius():
         Link.WRIST_1,
     }
     # Turned back, a long tool lies in the upper arm while the arm itself is free.
-    long = Bodies(arm, Pose((0, 0, 0.6), (0, 0, 0, 1)), tool_radius=0.03)
+    long = CollisionBodies(arm, Pose((0, 0, 0.6), (0, 0, 0, 1)), tool_radius=0.03)
     q = np.array([[0, -2.2, 2.4, -0.2, -H, 0]])
     hits = [pair for pair, d in zip(long.pairs, long.distances(q)[0], strict=True) if d < 0.005]
     assert hits == [(Link.UPPER_ARM, Link.TOOL)]
@@ -225,7 +232,7 @@ def test_neighbours_share_a_joint_and_are_left_out():
 
 
 def test_the_height_of_a_cylinder_is_that_of_its_lowest_point(rng):
-    bodies = Bodies(Arm(MODELS['ur16e']), TCP, tool_radius=0.03)
+    bodies = CollisionBodies(Arm(MODELS['ur16e']), TCP, tool_radius=0.03)
     q, normal = random_joints(rng, 3), rng.normal(size=3)
     normal /= np.linalg.norm(normal)
     heights = bodies.heights(q, np.array([normal, -normal]))

@@ -170,13 +170,13 @@ def test_a_table_that_differs_is_a_calibration():
 
 def test_two_arms_are_as_far_apart_as_their_flanges():
     nominal = Arm(UR5E)
-    assert nominal.flange_apart(nominal) == 0.0
+    assert nominal.max_flange_distance(nominal) == 0.0
     longer = replace(UR5E.geometry, d=(UR5E.geometry.d[0] + 0.02, *UR5E.geometry.d[1:]))
-    assert Arm(UR5E, longer).flange_apart(nominal) == pytest.approx(0.02)
+    assert Arm(UR5E, longer).max_flange_distance(nominal) == pytest.approx(0.02)
 
 
 def test_parallel_axes_far_away_move_no_flange():
     # Axes 2 and 3 are parallel: d2 and d3 shift the same thing, and may cancel.
     d = UR5E.geometry.d
     shifted = replace(UR5E.geometry, d=(d[0], d[1] + 300.0, d[2] - 300.0, *d[3:]))
-    assert Arm(UR5E, shifted).flange_apart(Arm(UR5E)) < 1e-9
+    assert Arm(UR5E, shifted).max_flange_distance(Arm(UR5E)) < 1e-9

@@ -14,14 +14,14 @@ import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import (
+    explain_unreachable,
+    format_distinct,
     nearest,
-    nearest_in,
+    nearest_to_posture,
     solutions,
-    told_apart,
-    why_unreachable,
 )
+from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
 from ur_cartesian_driver.kinematics.robots import MODELS
-from ur_cartesian_driver.kinematics.rows import postures
 from ur_cartesian_driver.motion.pose import Pose
 
 UR5E = Arm(MODELS['ur5e'])
@@ -110,8 +110,8 @@ def test_an_everyday_pose_has_eight_solutions_also_when_calibrated(calibrated_ar
 @pytest.mark.parametrize('name', MODELS)
 def test_where_solutions_meet_the_source_is_found(name, singular_postures):
     nominal = Arm(MODELS[name])
-    postures = [*singular_postures.values(), above_the_shoulder(nominal)]
-    for q in postures:
+    branch_measures = [*singular_postures.values(), above_the_shoulder(nominal)]
+    for q in branch_measures:
         T_base_flange = nominal.forward(q)
         found = solutions(nominal, T_base_flange, seed=q)
         assert_all_solve(nominal, found, T_base_flange)
@@ -171,7 +171,7 @@ def test_a_pose_either_has_solutions_or_a_reason_why_not(x, y, z, rotation):
     found = solutions(UR5E, pose)
     for q in found:
         assert_reached(UR5E, q, pose, within=1e-8)
-    assert bool(found) != bool(why_unreachable(UR5E, pose))
+    assert bool(found) != bool(explain_unreachable(UR5E, pose))
 
 
 # --- The nearest -------------------------------------------------------------------------------
@@ -271,7 +271,7 @@ def test_out_of_reach_there_is_no_nearest(calibrated_arm):
     far = Pose((2.0, 0.0, 0.3), TOOL_DOWN)
     for arm in UR5E, calibrated_arm('ur5e'):
         assert nearest(arm, far, READY) is None
-        assert nearest_in(arm, far, {2: 1.0}, READY) is None
+        assert nearest_to_posture(arm, far, {2: 1.0}, READY) is None
         assert solutions(arm, far) == []
 
 
@@ -285,7 +285,7 @@ def next_to(singularity, arm, n):
         rows[:, 2] *= 0.03
     if singularity == 'wrist':
         rows[:, 4] *= 0.01
-    measures = postures(arm, rows)
+    measures = branch_measures(arm, rows)
     size = {
         'shoulder': np.abs(measures.shoulder) / 0.1,
         'elbow': np.abs(measures.elbow) / 0.3,
@@ -341,7 +341,7 @@ def test_of_twins_the_nearest_is_the_nearer(singularity, calibrated_arm):
 @pytest.mark.parametrize(('named', 'sign'), [({2: 1.5}, 1), ({2: -1.5}, -1), ({4: 1.0}, 1)])
 def test_a_named_joint_decides_the_branch(named, sign, is_calibrated, calibrated_arm):
     arm = calibrated_arm('ur5e') if is_calibrated else UR5E
-    found = nearest_in(arm, arm.forward(READY), named, READY)
+    found = nearest_to_posture(arm, arm.forward(READY), named, READY)
     assert_reached(arm, found, arm.forward(READY))
     for joint in named:
         assert found[joint] * sign > 0
@@ -353,19 +353,21 @@ def test_of_equally_near_solutions_the_one_near_to_before_is_taken(is_calibrated
     arm = calibrated_arm('ur5e') if is_calibrated else UR5E
     T_base_flange = arm.forward(READY)
     for before in solutions(arm, T_base_flange):
-        found = nearest_in(arm, T_base_flange, {0: before[0]}, before)
+        found = nearest_to_posture(arm, T_base_flange, {0: before[0]}, before)
         assert dist(found, before) < 1e-6
 
 
 def test_no_named_joint_means_the_nearest_to_before():
     T_base_flange = UR5E.forward(READY)
     for before in random_joints(5):
-        assert nearest_in(UR5E, T_base_flange, {}, before) == nearest(UR5E, T_base_flange, before)
+        assert nearest_to_posture(UR5E, T_base_flange, {}, before) == nearest(
+            UR5E, T_base_flange, before
+        )
 
 
 def test_turns_count_in_the_named_joints():
     wrist_3 = READY[5] - tau
-    found = nearest_in(UR5E, UR5E.forward(READY), {5: wrist_3, 2: READY[2]}, READY)
+    found = nearest_to_posture(UR5E, UR5E.forward(READY), {5: wrist_3, 2: READY[2]}, READY)
     assert found[5] == pytest.approx(wrist_3)
     assert dist(found[:5], READY[:5]) < 1e-9
 
@@ -374,7 +376,7 @@ def test_of_two_turns_equally_near_the_one_near_to_before_is_taken():
     q = (*READY[:5], pi)
     for before in (*READY[:5], 3.0), (*READY[:5], -3.0):
         named = {**dict(enumerate(READY)), 5: 0.0}
-        found = nearest_in(UR5E, UR5E.forward(q), named, before)
+        found = nearest_to_posture(UR5E, UR5E.forward(q), named, before)
         assert found[5] == pytest.approx(pi if before[5] > 0 else -pi)
 
 
@@ -397,7 +399,7 @@ def test_of_two_turns_equally_near_the_one_near_to_before_is_taken():
     ],
 )
 def test_the_reason_names_the_distance_and_the_bound(position, reason):
-    clause = why_unreachable(UR5E, Pose(position, TOOL_DOWN))
+    clause = explain_unreachable(UR5E, Pose(position, TOOL_DOWN))
     assert re.search(reason, clause), clause
 
 
@@ -411,17 +413,17 @@ def test_the_reason_names_the_distance_and_the_bound(position, reason):
     ],
 )
 def test_a_value_beyond_its_bound_reads_as_another_number(value, bound, texts):
-    assert told_apart(value, bound) == texts
+    assert format_distinct(value, bound) == texts
 
 
 def test_a_reachable_pose_has_no_reason(calibrated_arm):
     for arm in UR5E, calibrated_arm('ur5e'):
-        assert why_unreachable(arm, arm.forward(READY)) == ''
+        assert explain_unreachable(arm, arm.forward(READY)) == ''
 
 
 def test_the_reason_names_the_joint_and_its_limits():
     arm = limited(UR5E, 0, 1.0, 1.2)
-    clause = why_unreachable(arm, arm.forward(READY))
+    clause = explain_unreachable(arm, arm.forward(READY))
     assert clause == (
         'shoulder_pan_joint would be at 0.3000 rad, and its limits are 1.0000 to 1.2000 rad'
     )
@@ -430,7 +432,7 @@ def test_the_reason_names_the_joint_and_its_limits():
 def test_a_folded_arm_is_named_as_the_reason():
     # The only arm whose links differ by more than twice d5, so that no flip of the wrist helps.
     arm = Arm(MODELS['ur8long'])
-    clause = why_unreachable(arm, Pose((0.0, -0.1824, 0.35)))
+    clause = explain_unreachable(arm, Pose((0.0, -0.1824, 0.35)))
     assert clause == (
         'wrist 1 would be 0.1366 m from the shoulder, and the folded arm comes no '
         'nearer than 0.1840 m'

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.kinematics import meshes as module
-from ur_cartesian_driver.kinematics.bodies import Bodies, Link
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.meshes import Meshes, WITH_MESHES
+from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
+from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes, MODELS_WITH_MESHES
 from ur_cartesian_driver.kinematics.robots import MODELS
 
 FRAMES = (
@@ -29,7 +29,7 @@ FRAMES = (
 def pinocchio():
     found = pytest.importorskip('pinocchio')
     try:
-        module._share()
+        module._find_share()
     except FileNotFoundError as error:
         pytest.skip(str(error))
     return found
@@ -37,7 +37,7 @@ def pinocchio():
 
 @pytest.fixture(scope='module')
 def all_meshes(pinocchio):
-    return {name: Meshes(Arm(MODELS[name])) for name in WITH_MESHES}
+    return {name: CollisionMeshes(Arm(MODELS[name])) for name in MODELS_WITH_MESHES}
 
 
 def random_joints(n, seed=0):
@@ -49,10 +49,10 @@ def vertices(meshes, link):
     return meshes._geometry.geometryObjects[int(link)].geometry.vertices()
 
 
-@pytest.mark.parametrize('name', WITH_MESHES)
+@pytest.mark.parametrize('name', MODELS_WITH_MESHES)
 def test_meshes_are_where_the_robot_description_moves_them(name, all_meshes, pinocchio):
     """Pinocchio's model of the URDF, from ``base``, against our axes: all links, and tool0."""
-    urdf = module._share() / module._DESCRIPTION / f'{name}_robot.urdf'
+    urdf = module._find_share() / module._DESCRIPTION / f'{name}_robot.urdf'
     model = pinocchio.buildModelFromUrdf(str(urdf))
     data, arm = model.createData(), Arm(MODELS[name])
     for q in random_joints(10):
@@ -73,7 +73,7 @@ def test_meshes_are_where_the_robot_description_moves_them(name, all_meshes, pin
 
 def test_on_a_calibrated_arm_the_meshes_go_with_the_real_axes(calibrated_arm, pinocchio):
     arm = calibrated_arm('ur5')
-    real, nominal = Meshes(arm), Meshes(Arm(MODELS['ur5']))
+    real, nominal = CollisionMeshes(arm), CollisionMeshes(Arm(MODELS['ur5']))
     at_zero = np.linalg.inv(arm.forward((0,) * 6).matrix()) @ real.T_base_meshes(np.zeros(6))[6]
     for q in random_joints(5):
         T = real.T_base_meshes(q)
@@ -82,10 +82,10 @@ def test_on_a_calibrated_arm_the_meshes_go_with_the_real_axes(calibrated_arm, pi
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('name', WITH_MESHES)
+@pytest.mark.parametrize('name', MODELS_WITH_MESHES)
 def test_cylinders_and_capsules_contain_the_meshes(name, all_meshes):
     """All vertices; the base without the plug of its cable, which sticks out of it."""
-    bodies, q = Bodies(Arm(MODELS[name])), random_joints(1)
+    bodies, q = CollisionBodies(Arm(MODELS[name])), random_joints(1)
     cylinders, capsules = bodies.cylinders(q)[0], bodies.capsules(q)[0]
     for link, T in enumerate(all_meshes[name].T_base_meshes(q[0])):
         points = np.unique(vertices(all_meshes[name], link), axis=0)
@@ -117,18 +117,18 @@ def beyond_capsule(points, start, end, radius):
     return np.linalg.norm(points - start - place[:, None] * way, axis=1) - radius
 
 
-@pytest.mark.parametrize('name', WITH_MESHES)
+@pytest.mark.parametrize('name', MODELS_WITH_MESHES)
 def test_meshes_are_never_nearer_than_their_capsules(name, all_meshes):
-    bodies, q = Bodies(Arm(MODELS[name])), random_joints(5)
+    bodies, q = CollisionBodies(Arm(MODELS[name])), random_joints(5)
     for pair, least in zip(bodies.pairs, bodies.distances(q).T, strict=True):
         if pair[0] != Link.BASE:  # the plug
             assert (all_meshes[name].distances(pair, q) > np.maximum(least, 0.0) - 1e-6).all()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('name', WITH_MESHES)
+@pytest.mark.parametrize('name', MODELS_WITH_MESHES)
 def test_what_is_nearer_than_a_bound_is_what_has_a_smaller_distance(name, all_meshes):
-    bodies, q, bound = Bodies(Arm(MODELS[name])), random_joints(300, seed=1), 0.005
+    bodies, q, bound = CollisionBodies(Arm(MODELS[name])), random_joints(300, seed=1), 0.005
     counts = np.zeros(2, dtype=int)
     for pair, least in zip(bodies.pairs, bodies.distances(q).T, strict=True):
         rows = q[least < bound][:8]
@@ -144,7 +144,7 @@ def test_what_is_nearer_than_a_bound_is_what_has_a_smaller_distance(name, all_me
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('name', WITH_MESHES)
+@pytest.mark.parametrize('name', MODELS_WITH_MESHES)
 def test_pairs_that_are_left_out_never_meet_first(name, all_meshes):
     """
     Base and upper arm turn past each other, and so do wrist 1 and wrist 3.
@@ -169,9 +169,9 @@ def test_pairs_that_are_left_out_never_meet_first(name, all_meshes):
 
 
 def test_other_models_have_no_meshes():
-    assert Meshes.of(Arm(MODELS['ur5e'])) is None
+    assert CollisionMeshes.of(Arm(MODELS['ur5e'])) is None
 
 
 def test_without_pinocchio_there_are_no_meshes(monkeypatch):
     monkeypatch.setitem(sys.modules, 'pinocchio', None)
-    assert Meshes.of(Arm(MODELS['ur5'])) is None
+    assert CollisionMeshes.of(Arm(MODELS['ur5'])) is None

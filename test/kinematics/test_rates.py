@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.rates import joint_rates, tool_rates
+from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates, tool_rates
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 

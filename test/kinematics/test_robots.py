@@ -7,7 +7,7 @@ from math import inf, nan, pi, radians
 
 import pytest
 
-from ur_cartesian_driver.kinematics.robots import Geometry, MODELS, robot_model
+from ur_cartesian_driver.kinematics.robots import DhTable, MODELS, robot_model
 
 UR20_SPEED_DEG_S = [120, 120, 150, 210, 210, 210]
 
@@ -26,7 +26,7 @@ def test_the_table_equals_the_reference(name, golden_robots):
     torques = reference['max_joint_torque_nm']
     assert model.max_joint_torque == (tuple(torques) if torques else None)
     assert model.payload == reference['payload_kg']
-    assert model.reach == reference['reach_mm'] / 1000
+    assert model.max_reach == reference['reach_mm'] / 1000
     assert model.wire_type == reference['wire_robot_type']
     assert model.series == reference['series']
 
@@ -47,7 +47,7 @@ def test_an_unknown_model_is_refused_with_the_names_there_are():
 @pytest.mark.parametrize('column', [(0.0,) * 5, (0.0,) * 5 + (nan,), (0.0,) * 5 + (inf,)])
 def test_a_table_must_be_six_finite_numbers_wide(column):
     with pytest.raises(ValueError, match='column d of a DH table must hold six finite'):
-        Geometry(a=(0.0,) * 6, d=column)
+        DhTable(a=(0.0,) * 6, d=column)
 
 
 def test_the_difference_of_two_tables_is_that_of_their_worst_number():

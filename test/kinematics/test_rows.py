@@ -12,10 +12,15 @@ import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.closed_form import wrist_centre
+from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.inverse import nearest, solutions
+from ur_cartesian_driver.kinematics.inverse_rows import (
+    all_solutions,
+    branch_measures,
+    nearest_rows,
+    solve_path,
+)
 from ur_cartesian_driver.kinematics.robots import MODELS
-from ur_cartesian_driver.kinematics.rows import branches, follow, nearest_rows, postures
-from ur_cartesian_driver.kinematics.shape import shape_of
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row, pose_rows
 
 UR5E = Arm(MODELS['ur5e'])
@@ -62,7 +67,7 @@ def test_the_reference_is_among_the_branches_and_all_lead_to_it(
 ):
     arm, cases = Arm(MODELS[name]), golden_poses[name]['cases']
     poses = np.array([case['position'] + case['quaternion_xyzw'] for case in cases])
-    found = branches(arm, poses)
+    found = all_solutions(arm, poses)
     assert_lead_to(lambda q: matrix_product(arm.geometry, q), found, poses)
     for case, q, exists, pose in zip(cases, found.q, found.exists, poses, strict=True):
         single = solutions(arm, pose_from_row(pose))
@@ -76,7 +81,7 @@ def test_the_reference_is_among_the_branches_and_all_lead_to_it(
 def test_nominal_branches_are_the_solutions_of_each_pose(name):
     arm = Arm(MODELS[name])
     poses = arm.forward_rows(random_rows(60))
-    found = branches(arm, poses)
+    found = all_solutions(arm, poses)
     assert found.q.shape == (60, 8, 6)
     for q, exists, pose in zip(found.q, found.exists, poses, strict=True):
         single = solutions(arm, pose_from_row(pose))
@@ -93,7 +98,7 @@ def test_calibrated_branches_lead_to_the_pose_by_the_measured_axes(
     source = random_rows(60, seed=5)
     source = source[np.abs(np.sin(source[:, 4])) > 0.25][:25]
     poses = arm.forward_rows(source)
-    found = branches(arm, poses)
+    found = all_solutions(arm, poses)
     assert_lead_to(lines.forward, found, poses)
     missed = sum(
         miss(q[exists], joints).min() > 1e-6
@@ -105,7 +110,7 @@ def test_calibrated_branches_lead_to_the_pose_by_the_measured_axes(
 def test_calibrated_branches_are_the_solutions_of_each_pose(calibrated_arm):
     arm = calibrated_arm('ur10e')
     poses = arm.forward_rows(random_rows(40, seed=8))
-    found = branches(arm, poses)
+    found = all_solutions(arm, poses)
     for q, exists, pose in zip(found.q, found.exists, poses, strict=True):
         single = solutions(arm, pose_from_row(pose))
         assert len(single) == exists.sum()
@@ -121,29 +126,29 @@ def test_singular_and_stretched_poses_have_branches(
     arm = calibrated_arm(name) if is_calibrated else Arm(MODELS[name])
     source = np.array([*singular_postures.values(), above_the_shoulder(Arm(MODELS[name]))])
     poses = arm.forward_rows(source)
-    found = branches(arm, poses)
+    found = all_solutions(arm, poses)
     assert found.exists.any(axis=1).all()
     assert_lead_to(lambda q: arm.forward(q).matrix(), found, poses)
 
 
 def test_the_second_index_of_the_branches_is_their_number(calibrated_arm):
     for arm in UR5E, calibrated_arm('ur5e'):
-        found = branches(arm, arm.forward_rows(walk(20, READY, 0.01)))
+        found = all_solutions(arm, arm.forward_rows(walk(20, READY, 0.01)))
         assert found.exists.all()
         for place in range(8):
-            assert (postures(arm, found.q[:, place]).branch == place).all()
+            assert (branch_measures(arm, found.q[:, place]).branch == place).all()
 
 
 def test_where_there_is_no_branch_there_are_no_numbers(calibrated_arm):
     for arm in UR5E, calibrated_arm('ur5e'):
-        found = branches(arm, pose_rows([Pose((2.0, 0.0, 0.3)), Pose((0.0, 0.0, 0.5))]))
+        found = all_solutions(arm, pose_rows([Pose((2.0, 0.0, 0.3)), Pose((0.0, 0.0, 0.5))]))
         assert not found.exists.any()
         assert np.isnan(found.q).all()
 
 
 def test_with_a_straight_wrist_wrist_3_is_what_was_asked_for(singular_postures):
     poses = pose_rows([UR5E.forward(singular_postures['wrist straight'])])
-    found = branches(UR5E, poses, wrist_3=-2.5)
+    found = all_solutions(UR5E, poses, wrist_3=-2.5)
     straight = found.q[0][np.abs(found.q[0, :, 4]) < 1e-9]
     assert straight[:, 5] == pytest.approx([-2.5] * 2)
 
@@ -167,13 +172,13 @@ def test_a_path_is_followed_as_the_nearest_from_row_to_row(name, is_calibrated, 
     for seed in range(2):
         start = random_rows(1, seed=seed)[0]
         poses = arm.forward_rows(walk(120, start, 0.03, seed))
-        path = follow(arm, poses, tuple(start))
+        path = solve_path(arm, poses, tuple(start))
         np.testing.assert_allclose(path.q, one_by_one(arm, poses, tuple(start)), atol=1e-6)
 
 
 def test_poses_without_any_order_are_followed_as_the_nearest_too():
     poses = UR5E.forward_rows(random_rows(100, seed=3))
-    path = follow(UR5E, poses, READY)
+    path = solve_path(UR5E, poses, READY)
     np.testing.assert_allclose(path.q, one_by_one(UR5E, poses, READY), atol=1e-6)
 
 
@@ -198,7 +203,7 @@ def test_a_long_path_comes_back_in_its_turns(name, calibrated_arm_with_lines):
     end = np.array([4.0, -1.3, 2.0, 2.0, 2.3, 5.0])
     source = begin + np.linspace(0.0, 1.0, 1500)[:, None] * (end - begin)
     for arm_of_it in arm, Arm(MODELS[name]):
-        path = follow(arm_of_it, arm_of_it.forward_rows(source), tuple(begin))
+        path = solve_path(arm_of_it, arm_of_it.forward_rows(source), tuple(begin))
         assert np.abs(path.q - source).max() < 1e-8
         assert path.found.all()
         assert path.step.max() < 0.01
@@ -208,7 +213,7 @@ def test_a_long_path_comes_back_in_its_turns(name, calibrated_arm_with_lines):
 
 def test_at_a_limit_the_arm_jumps_and_the_step_tells():
     source = np.linspace((*READY[:5], 5.5), (*READY[:5], 7.0), 100)
-    path = follow(UR5E, UR5E.forward_rows(source), tuple(source[0]))
+    path = solve_path(UR5E, UR5E.forward_rows(source), tuple(source[0]))
     (row,) = np.flatnonzero(path.step > 1.0)
     assert source[row - 1, 5] <= tau < source[row, 5]
     assert path.step[row] > 2.0
@@ -222,13 +227,13 @@ def test_a_branch_that_the_limits_forbid_is_left():
         )
     )
     source = np.linspace(READY, (0.3, -1.6, 2.3, -1.8, -1.5, 0.4), 100)
-    path = follow(arm, arm.forward_rows(source), READY)
+    path = solve_path(arm, arm.forward_rows(source), READY)
     row = int(np.argmax(path.step))
     assert source[row - 1, 2] <= 2.1 < source[row, 2]
     assert path.found.all()
     assert (
-        postures(arm, path.q[[row - 1, row]]).branch[0]
-        != postures(arm, path.q[[row - 1, row]]).branch[1]
+        branch_measures(arm, path.q[[row - 1, row]]).branch[0]
+        != branch_measures(arm, path.q[[row - 1, row]]).branch[1]
     )
 
 
@@ -236,7 +241,7 @@ def test_rows_out_of_reach_are_passed_over(calibrated_arm):
     for arm in UR5E, calibrated_arm('ur5e'):
         poses = arm.forward_rows(walk(60, READY, 0.005))
         poses[20:30, 0] += 3.0
-        path = follow(arm, poses, READY)
+        path = solve_path(arm, poses, READY)
         assert np.flatnonzero(~path.found).tolist() == list(range(20, 30))
         assert np.isnan(path.q[20:30]).all()
         assert np.isnan(path.step[20:30]).all()
@@ -249,8 +254,8 @@ def test_a_line_beside_the_axis_of_a_straight_wrist_takes_large_steps():
     poses = UR5E.forward_rows(source)
     tilt = Pose(quaternion=(1e-4, 0.0, 0.0, 1.0)).inverse().quaternion
     poses = pose_rows([pose_from_row(row) @ Pose(quaternion=tilt) for row in poses])
-    path = follow(UR5E, poses, tuple(source[0]))
-    measures = postures(UR5E, path.q)
+    path = solve_path(UR5E, poses, tuple(source[0]))
+    measures = branch_measures(UR5E, path.q)
     assert np.abs(measures.wrist).min() < 3e-3
     assert path.step.max() > 0.5
     assert abs(int(np.argmax(path.step)) - 150) < 5
@@ -258,8 +263,8 @@ def test_a_line_beside_the_axis_of_a_straight_wrist_takes_large_steps():
 
 def test_no_rows_are_followed_to_no_rows(calibrated_arm):
     for arm in UR5E, calibrated_arm('ur5e'):
-        assert follow(arm, np.empty((0, 7)), READY).q.shape == (0, 6)
-        assert branches(arm, np.empty((0, 7))).q.shape == (0, 8, 6)
+        assert solve_path(arm, np.empty((0, 7)), READY).q.shape == (0, 6)
+        assert all_solutions(arm, np.empty((0, 7))).q.shape == (0, 8, 6)
 
 
 # --- Measures ----------------------------------------------------------------------------------
@@ -274,7 +279,7 @@ def test_measures_vanish_where_the_arm_is_singular(singular_postures):
             above_the_shoulder(UR5E),
         ]
     )
-    measures = postures(UR5E, rows)
+    measures = branch_measures(UR5E, rows)
     assert abs(measures.wrist[0]) < 1e-12
     assert np.abs(measures.elbow[[1, 2]]).max() < 1e-12
     assert abs(measures.shoulder[3]) < 1e-12
@@ -284,14 +289,14 @@ def test_measures_vanish_where_the_arm_is_singular(singular_postures):
 def test_the_shoulder_measure_is_a_leg_of_the_triangle_with_d4(name):
     arm = Arm(MODELS[name])
     rows = random_rows(20)
-    for q, outward in zip(rows, postures(arm, rows).shoulder, strict=True):
-        x, y, _ = wrist_centre(shape_of(arm), arm.forward(q))
+    for q, outward in zip(rows, branch_measures(arm, rows).shoulder, strict=True):
+        x, y, _ = wrist_centre(ideal_arm_of(arm), arm.forward(q))
         assert hypot(outward, arm.geometry.d[3]) == pytest.approx(hypot(x, y), abs=1e-12)
 
 
 def test_the_jacobian_loses_rank_where_a_measure_vanishes(singular_postures):
     for q in [*singular_postures.values(), above_the_shoulder(UR5E)]:
-        measures = postures(UR5E, np.array([q]))
+        measures = branch_measures(UR5E, np.array([q]))
         least = min(abs(float(m[0])) for m in (measures.shoulder, measures.elbow, measures.wrist))
         assert least < 1e-12
         assert np.linalg.svd(UR5E.jacobian(q))[1][-1] < 1e-12
@@ -300,7 +305,7 @@ def test_the_jacobian_loses_rank_where_a_measure_vanishes(singular_postures):
 @settings(max_examples=60)
 @given(q=st.tuples(*[st.floats(-pi, pi)] * 6))
 def test_the_product_of_the_measures_is_the_determinant_of_the_jacobian(q):
-    measures = postures(UR5E, np.array([q]))
+    measures = branch_measures(UR5E, np.array([q]))
     _, a2, a3, *_ = UR5E.geometry.a
     product = measures.shoulder[0] * measures.elbow[0] * measures.wrist[0] * a2 * a3
     assert np.linalg.det(UR5E.jacobian(q)) == pytest.approx(product, abs=1e-13) or (
@@ -328,7 +333,7 @@ def test_ten_thousand_poses_come_back(name):
     arm = Arm(MODELS[name])
     source = random_rows(10_000, seed=11)
     poses = arm.forward_rows(source)
-    found = branches(arm, poses)
+    found = all_solutions(arm, poses)
     row, place = np.nonzero(found.exists)
     back = arm.forward_rows(found.q[row, place])
     assert np.abs(back[:, :3] - poses[row, :3]).max() < 1e-9

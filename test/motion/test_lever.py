@@ -8,7 +8,6 @@ from math import cos, sin
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.motion.lever import acceleration_at, seen_at, twist_at
 from ur_cartesian_driver.motion.pose import (
     IDENTITY,
     Pose,
@@ -16,6 +15,7 @@ from ur_cartesian_driver.motion.pose import (
     rotate,
     rotation_vector_from_quaternion,
 )
+from ur_cartesian_driver.motion.rigid_body import acceleration_at, shift_reference_point, twist_at
 from ur_cartesian_driver.motion.state import RobotState
 
 FRAME = Pose((0.1, -0.2, 0.3), quaternion_from_rotation_vector((0.3, 0.2, -0.5)))
@@ -49,10 +49,10 @@ def frame(t):
 
 @pytest.mark.parametrize('t', [0.0, 0.4, 1.3])
 def test_twist_and_acceleration_are_those_of_the_other_point(t):
-    lever = rotate(body(t).quaternion, FRAME.position)
-    there = twist_at(twist(body, t), lever)
+    offset = rotate(body(t).quaternion, FRAME.position)
+    there = twist_at(twist(body, t), offset)
     assert there == pytest.approx(twist(frame, t), abs=1e-5)
-    assert acceleration_at(acceleration(body, t), twist(body, t), lever) == pytest.approx(
+    assert acceleration_at(acceleration(body, t), twist(body, t), offset) == pytest.approx(
         acceleration(frame, t), abs=1e-4
     )
 
@@ -68,12 +68,12 @@ def test_a_state_is_carried_to_a_frame_and_back():
         target_tcp_twist=twist(body, 0.41),
         actual_tcp_acceleration=acceleration(body, 0.4),
     )
-    there = seen_at(state, FRAME)
+    there = shift_reference_point(state, FRAME)
     assert there.actual_tcp_pose.distance_to(frame(0.4)) < 1e-12
     assert there.target_tcp_twist == pytest.approx(twist(frame, 0.41), abs=1e-5)
     assert there.actual_tcp_acceleration == pytest.approx(acceleration(frame, 0.4), abs=1e-4)
     assert there.target_tcp_acceleration is None
-    back = seen_at(there, FRAME.inverse())
+    back = shift_reference_point(there, FRAME.inverse())
     for field in fields(state):
         before, after = (getattr(s, field.name) for s in (state, back))
         if isinstance(before, Pose):
@@ -83,4 +83,4 @@ def test_a_state_is_carried_to_a_frame_and_back():
 
 def test_nothing_changes_at_the_tcp_itself():
     state = RobotState(timestamp=1.0, actual_q=(0.1,) * 6)
-    assert seen_at(state, IDENTITY) is state
+    assert shift_reference_point(state, IDENTITY) is state

@@ -9,16 +9,16 @@ import re
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.kinematics.bodies import Bodies, Link
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.meshes import Meshes
+from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
+from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, MODELS
 from ur_cartesian_driver.motion.errors import CODES, CollisionPredicted, ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
-from ur_cartesian_driver.planning.clearance import Clearance, remarks
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.plan import plan
+from ur_cartesian_driver.planning.planner import plan
+from ur_cartesian_driver.planning.preflight.clearance import Clearance, clearance_remarks
 
 H = pi / 2
 HOME = (0.0, -H, H, -H, -H, 0.0)
@@ -37,7 +37,7 @@ def check(q, start=HOME, model='ur5e', tcp=IDENTITY, **options):
 
 
 def needs_meshes(model='ur5'):
-    if Meshes.of(Arm(MODELS[model])) is None:
+    if CollisionMeshes.of(Arm(MODELS[model])) is None:
         pytest.skip('the meshes are not installed')
 
 
@@ -50,7 +50,7 @@ def test_capsules_warn_unless_they_are_told_to_refuse(choice):
     assert (clear.warning is not None) == (choice in ('warn', 'auto'))
     assert (clear.violation is not None) == (choice == 'refuse')
     if choice == 'off':
-        assert (clear.margin, clear.what) == (np.inf, '')
+        assert (clear.margin, clear.description) == (np.inf, '')
         return
     found = clear.violation or clear.warning
     assert found.text.startswith('upper arm and wrist 1 come within 0.00')
@@ -72,19 +72,19 @@ def test_meshes_refuse_unless_they_are_told_to_warn(choice):
 def test_the_first_row_too_near_is_named_and_the_smallest_distance():
     q = way(HOME, FOLDED, 5000)  # more than is judged at once
     clear = check(q)
-    bodies = Bodies(Arm(MODELS['ur5e']))
+    bodies = CollisionBodies(Arm(MODELS['ur5e']))
     distances = bodies.distances(q)
     assert clear.warning.row == np.flatnonzero(distances.min(axis=1) < 0.005)[0] > 4096
     assert clear.margin == distances.min()
     a, b = bodies.pairs[distances.min(axis=0).argmin()]
-    assert clear.what == f'{a} and {b}'
+    assert clear.description == f'{a} and {b}'
 
 
 def test_meshes_let_pass_what_only_capsules_refuse():
     """Of all configurations that capsules refuse meshes refuse those that are really too near."""
     needs_meshes()
     arm = Arm(MODELS['ur5'])
-    bodies, meshes = Bodies(arm), Meshes(arm)
+    bodies, meshes = CollisionBodies(arm), CollisionMeshes(arm)
     q = np.random.default_rng(7).uniform(-pi, pi, (60, 6))
     lower = bodies.distances(q)
     q, lower = q[lower.min(axis=1) < 0.005], lower[lower.min(axis=1) < 0.005]
@@ -120,7 +120,7 @@ def test_an_everyday_way_is_clear(model):
         assert clear.violation is None
         assert clear.warning is None
         assert clear.margin > 0.005
-        assert clear.what
+        assert clear.description
 
 
 def test_a_tool_is_checked_against_the_arm():
@@ -277,7 +277,7 @@ FRACTION = np.tile(np.arange(1, 31) / 30, 2)
 def test_a_refusal_names_segment_and_fraction():
     clear = check(way(HOME, FOLDED), self_collision='refuse')
     with pytest.raises(CollisionPredicted) as refusal:
-        remarks(clear, SEGMENT, FRACTION)
+        clearance_remarks(clear, SEGMENT, FRACTION)
     percent = 100 * FRACTION[clear.violation.row]
     assert clear.violation.row >= 30
     assert str(refusal.value) == (
@@ -287,14 +287,14 @@ def test_a_refusal_names_segment_and_fraction():
 
 
 def test_a_warning_goes_into_the_report_with_the_smallest_distance():
-    warned = remarks(check(way(HOME, FOLDED)), SEGMENT, FRACTION)
+    warned = clearance_remarks(check(way(HOME, FOLDED)), SEGMENT, FRACTION)
     assert warned[0].startswith('point 3: ')
     assert 'upper arm and wrist 1 come within' in warned[0]
     assert warned[1] == 'clearance: none between upper arm and wrist 1'
-    assert remarks(check(way(HOME, HOME)), SEGMENT, FRACTION) == [
+    assert clearance_remarks(check(way(HOME, HOME)), SEGMENT, FRACTION) == [
         'clearance: at least 0.043 m between forearm and wrist 3'
     ]
-    assert remarks(check(way(HOME, HOME), self_collision='off'), SEGMENT, FRACTION) == []
+    assert clearance_remarks(check(way(HOME, HOME), self_collision='off'), SEGMENT, FRACTION) == []
 
 
 # -- whole goals ----------------------------------------------------------------------------------

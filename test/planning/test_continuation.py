@@ -25,8 +25,8 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import SwitchOutput
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.continuation import following, opened
-from ur_cartesian_driver.planning.open_goal import Addition
+from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.protocol.dialects import DIALECTS
 
 ARM = Arm(robot_model('ur5e'))
@@ -120,22 +120,22 @@ def of(goal, begin, end, **changes):
 def in_parts(goal, sizes):
     """Plan a goal in parts of these sizes; return the instructions and rows that are final."""
     end = sizes[0]
-    part = opened(
+    part = plan_first_part(
         plan(replace(goal, **of(goal, 0, end), keep_open=True), STATE, ARM, OPTIONS), ARM, OPTIONS
     )
     wire, rows = [], None
     for size in (*sizes[1:], 0):
         made = list(part.plan.instructions)
-        del wire[part.behind :]
-        assert part.behind == len(wire), 'no record is left out'
+        del wire[part.records_before :]
+        assert part.records_before == len(wire), 'no record is left out'
         wire += made
         rows = part.plan.reference if rows is None else joined(rows, part)
-        assert part.then.records == len(wire)
+        assert part.next_goal.records == len(wire)
         if size:
-            assert part.then.firm == len(wire) - part.ending
-            part = following(
-                part.then,
-                Addition(**of(goal, end, end + size), last=end + size == COUNT),
+            assert part.next_goal.committed_records == len(wire) - part.ending_records
+            part = plan_append(
+                part.next_goal,
+                AppendedPoints(**of(goal, end, end + size), last=end + size == COUNT),
                 ARM,
                 OPTIONS,
                 from_rest=False,
@@ -146,14 +146,17 @@ def in_parts(goal, sizes):
 
 def joined(rows, part):
     """What the driver makes of a path and its continuation."""
-    kept, new = rows.time <= part.since + 5e-7, part.plan.reference.time > part.since + 5e-7
+    kept, new = (
+        rows.time <= part.start_time + 5e-7,
+        part.plan.reference.time > part.start_time + 5e-7,
+    )
     return replace(
         rows,
         **{
             name: np.concatenate(
                 [getattr(rows, name)[kept], getattr(part.plan.reference, name)[new]]
             )
-            for name in ('poses', 'point', 'time', 'room')
+            for name in ('poses', 'point', 'time', 'blend_tolerance')
         },
     )
 
@@ -186,8 +189,8 @@ def test_parts_become_what_the_whole_goal_is(goal, sizes):
     late = 0.03 if goal is GOALS['lines in time'] else 2e-6
     assert rows.time == pytest.approx(whole.reference.time, abs=late)
     assert unsigned(rows) == pytest.approx(unsigned(whole.reference), abs=1e-7)
-    assert part.then.points == COUNT
-    assert part.ending == 0
+    assert part.next_goal.points == COUNT
+    assert part.ending_records == 0
 
 
 def unsigned(path):
@@ -230,16 +233,20 @@ def test_a_goal_may_begin_with_the_point_at_which_the_arm_stands(known):
         execution=ExecutionMode.PRIMITIVES,
     )
     whole = list(plan(goal, STATE, ARM, OPTIONS).instructions)
-    part = opened(
+    part = plan_first_part(
         plan(replace(goal, **of(goal, 0, known), keep_open=True), STATE, ARM, OPTIONS),
         ARM,
         OPTIONS,
     )
     wire = list(part.plan.instructions)
-    part = following(
-        part.then, Addition(**of(goal, known, 5), last=True), ARM, OPTIONS, from_rest=False
+    part = plan_append(
+        part.next_goal,
+        AppendedPoints(**of(goal, known, 5), last=True),
+        ARM,
+        OPTIONS,
+        from_rest=False,
     )
-    wire[part.behind :] = part.plan.instructions
+    wire[part.records_before :] = part.plan.instructions
     assert len(wire) == len(whole)
     for one, other in zip(wire, whole, strict=True):
         assert_same(one, other)
@@ -247,23 +254,23 @@ def test_a_goal_may_begin_with_the_point_at_which_the_arm_stands(known):
 
 def test_points_of_a_refusal_are_numbered_from_the_start_of_the_goal():
     goal = moves(1)
-    part = opened(
+    part = plan_first_part(
         plan(replace(goal, **of(goal, 0, 6), keep_open=True), STATE, ARM, OPTIONS), ARM, OPTIONS
     )
     far = Waypoint(pose=Pose((3.0, 0.0, 0.0), HOME.quaternion))
     for from_rest in (False, True):
         with pytest.raises(GoalRefused, match=r'points\[7\]'):
-            following(
-                part.then,
-                Addition(waypoints=(goal.waypoints[6], far)),
+            plan_append(
+                part.next_goal,
+                AppendedPoints(waypoints=(goal.waypoints[6], far)),
                 ARM,
                 OPTIONS,
                 from_rest=from_rest,
             )
     with pytest.raises(GoalRefused, match=r'is 3, and the points of this request are 6 to 6'):
-        following(
-            part.then,
-            Addition(waypoints=goal.waypoints[6:7], io_commands=outputs((0.0,))[3:4]),
+        plan_append(
+            part.next_goal,
+            AppendedPoints(waypoints=goal.waypoints[6:7], io_commands=outputs((0.0,))[3:4]),
             ARM,
             OPTIONS,
             from_rest=False,
@@ -273,13 +280,13 @@ def test_points_of_a_refusal_are_numbered_from_the_start_of_the_goal():
 @pytest.mark.parametrize('from_rest', [False, True])
 def test_a_goal_of_speeds_takes_no_times(from_rest):
     goal = moves(1)
-    part = opened(
+    part = plan_first_part(
         plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS), ARM, OPTIONS
     )
     with pytest.raises(InvalidGoal, match=r'points\[3\].time_from_start is 9 s, .* no times'):
-        following(
-            part.then,
-            Addition(waypoints=(replace(goal.waypoints[3], time=9.0),)),
+        plan_append(
+            part.next_goal,
+            AppendedPoints(waypoints=(replace(goal.waypoints[3], time=9.0),)),
             ARM,
             OPTIONS,
             from_rest=from_rest,
@@ -290,7 +297,7 @@ def test_a_goal_of_speeds_takes_no_times(from_rest):
 @pytest.mark.parametrize('goal', [spline(), moves(1, timed=0.6)], ids=['spline', 'lines'])
 @pytest.mark.parametrize('times', [(-0.2, 0.4), (0.0, 0.4), (0.4, 0.4), (0.4, 0.2)], ids=str)
 def test_appended_times_go_on_increasing(times, goal, from_rest):
-    part = opened(
+    part = plan_first_part(
         plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS), ARM, OPTIONS
     )
     told = goal.waypoints[2].time
@@ -300,7 +307,9 @@ def test_appended_times_go_on_increasing(times, goal, from_rest):
     )
     wrong = 3 if times[0] <= 0.0 else 4
     with pytest.raises(InvalidGoal, match=rf'points\[{wrong}\].time_from_start .*must increase'):
-        following(part.then, Addition(waypoints=waypoints), ARM, OPTIONS, from_rest=from_rest)
+        plan_append(
+            part.next_goal, AppendedPoints(waypoints=waypoints), ARM, OPTIONS, from_rest=from_rest
+        )
 
 
 @pytest.mark.parametrize('from_rest', [False, True])
@@ -308,37 +317,37 @@ def test_appended_times_go_on_increasing(times, goal, from_rest):
     'goal', [spline(), moves(1, timed=0.6, radius=0.0)], ids=['spline', 'lines']
 )
 def test_a_goal_that_has_gone_on_for_hours_goes_on(goal, from_rest):
-    part = opened(
+    part = plan_first_part(
         plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS), ARM, OPTIONS
     )
-    on, late = part.then, 20_000.0
+    on, late = part.next_goal, 20_000.0
     on = replace(
         on,
-        told=on.told + late,
-        shift=on.shift - late,
-        tail=tuple(
+        last_client_time=on.last_client_time + late,
+        time_offset=on.time_offset - late,
+        replannable=tuple(
             replace(
                 known,
                 time_before=known.time_before + late,
                 waypoint=replace(known.waypoint, time=known.waypoint.time + late),
             )
-            for known in on.tail
+            for known in on.replannable
         ),
     )
     points = goal.waypoints[3:5]
     made = [
-        following(state, Addition(waypoints=waypoints), ARM, OPTIONS, from_rest=from_rest)
+        plan_append(state, AppendedPoints(waypoints=waypoints), ARM, OPTIONS, from_rest=from_rest)
         for state, waypoints in (
-            (part.then, points),
+            (part.next_goal, points),
             (on, tuple(replace(point, time=point.time + late) for point in points)),
         )
     ]
     early, later = ([segment.duration for segment in one.plan.segments] for one in made)
     assert later == pytest.approx(early, abs=2e-6)
     with pytest.raises(InvalidGoal, match=r'gives the segment 2200 s, more than 2147 s'):
-        following(
+        plan_append(
             on,
-            Addition(waypoints=(replace(points[0], time=on.told + 2200.0),)),
+            AppendedPoints(waypoints=(replace(points[0], time=on.last_client_time + 2200.0),)),
             ARM,
             OPTIONS,
             from_rest=from_rest,
@@ -347,7 +356,7 @@ def test_a_goal_that_has_gone_on_for_hours_goes_on(goal, from_rest):
 
 def test_what_appended_points_ask_for_in_vain_is_told():
     goal = moves(1, timed=0.6, radius=0.0)
-    part = opened(
+    part = plan_first_part(
         plan(replace(goal, **of(goal, 0, 3), keep_open=True), STATE, ARM, OPTIONS), ARM, OPTIONS
     )
     waypoints = tuple(replace(point, twist=(0.1, 0, 0, 0, 0, 0)) for point in goal.waypoints[3:5])
@@ -358,7 +367,9 @@ def test_what_appended_points_ask_for_in_vain_is_told():
         ),
         (goal.waypoints[3:5], ''),
     ):
-        text = following(part.then, Addition(waypoints=points), ARM, OPTIONS, from_rest=False).text
+        text = plan_append(
+            part.next_goal, AppendedPoints(waypoints=points), ARM, OPTIONS, from_rest=False
+        ).text
         assert text == f'2 points appended, the goal has 5.{told}'
 
 
@@ -366,15 +377,15 @@ def test_what_appended_points_ask_for_in_vain_is_told():
     'goal', [moves(1, offsets=(0.0, 0.3)), spline(offsets=(0.0, 0.3))], ids=['lines', 'spline']
 )
 def test_outputs_of_a_refusal_are_numbered_as_in_the_request(goal):
-    part = opened(
+    part = plan_first_part(
         plan(replace(goal, **of(goal, 0, 4), keep_open=True), STATE, ARM, OPTIONS), ARM, OPTIONS
     )
-    assert part.then.outputs, 'some of before may still be due'
+    assert part.next_goal.outputs, 'some of before may still be due'
     wrong = replace(goal.io_commands[8], pin=9)
     with pytest.raises(InvalidGoal, match=r'^io_commands\[0\]\.pin is 9'):
-        following(
-            part.then,
-            Addition(**of(goal, 4, 6, io_commands=(wrong,))),
+        plan_append(
+            part.next_goal,
+            AppendedPoints(**of(goal, 4, 6, io_commands=(wrong,))),
             ARM,
             OPTIONS,
             from_rest=False,
@@ -390,16 +401,17 @@ def test_older_robot_programs_have_to_know_the_number_of_points(name):
 
 def test_what_is_remembered_of_a_goal_does_not_grow():
     goal, held = moves(1, offsets=(0.1,)), []
-    part = opened(
+    part = plan_first_part(
         plan(replace(goal, **of(goal, 0, 4), keep_open=True), STATE, ARM, OPTIONS), ARM, OPTIONS
     )
     for _ in range(6):
         commands = tuple(
-            replace(c, waypoint=c.waypoint % 4 + part.then.points) for c in goal.io_commands[:4]
+            replace(c, waypoint=c.waypoint % 4 + part.next_goal.points)
+            for c in goal.io_commands[:4]
         )
-        part = following(
-            part.then,
-            Addition(
+        part = plan_append(
+            part.next_goal,
+            AppendedPoints(
                 waypoints=goal.waypoints[:4],
                 segments=(goal.segments[0],) * 4,
                 io_commands=commands,
@@ -408,5 +420,5 @@ def test_what_is_remembered_of_a_goal_does_not_grow():
             OPTIONS,
             from_rest=False,
         )
-        held.append((len(part.then.tail), len(part.then.outputs)))
+        held.append((len(part.next_goal.replannable), len(part.next_goal.outputs)))
     assert set(held) == {(2, 1)}, 'two points, and what stands behind the last of them'

@@ -16,9 +16,9 @@ import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.closed_form import closed_form, wrist_centre
+from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
-from ur_cartesian_driver.kinematics.shape import shape_of
 from ur_cartesian_driver.motion.errors import (
     GoalRefused,
     InvalidPosture,
@@ -31,11 +31,16 @@ from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType,
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveJ, MoveL
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.corner import corners, Meeting
-from ur_cartesian_driver.planning.lookahead import followed
-from ur_cartesian_driver.planning.path import Arc, JointLine, Line
-from ur_cartesian_driver.planning.postures import Reach
-from ur_cartesian_driver.planning.samples import Piece, places_on, STEP_ANGLE, STEP_LENGTH
+from ur_cartesian_driver.planning.geometry.blend import BlendInput, blends
+from ur_cartesian_driver.planning.geometry.curves import ArcCurve, JointLineCurve, LineCurve
+from ur_cartesian_driver.planning.geometry.samples import (
+    CurvePiece,
+    sample_poses,
+    STEP_ANGLE,
+    STEP_LENGTH,
+)
+from ur_cartesian_driver.planning.preflight.joint_path import solve_joint_path
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 
 TYPE = SegmentType
 #: Where only the way of the arm counts.
@@ -78,7 +83,7 @@ def across(make_cell, q_middle, aside, half=0.05):
 
 def least_on_line(cell, end, measure, low=0.0, high=1.0):
     """Return where on the line to a pose a measure of the flange is least, by golden section."""
-    line, back = Line.between(cell.home, end), cell.T_flange_tcp.inverse()
+    line, back = LineCurve.between(cell.home, end), cell.T_flange_tcp.inverse()
 
     def at(u):
         return measure(line.pose(u) @ back)
@@ -96,8 +101,8 @@ WRIST = (0.0, -1.2, 1.6, -0.4 - pi / 2, 1e-4, 0.4)
 
 def straightness(cell):
     """Return the least angle of wrist 2 among all solutions of a pose."""
-    shape = shape_of(cell.arm)
-    return lambda flange: min(abs(np.arcsin(np.sin(q[4]))) for q in closed_form(shape, flange))
+    ideal = ideal_arm_of(cell.arm)
+    return lambda flange: min(abs(np.arcsin(np.sin(q[4]))) for q in closed_form(ideal, flange))
 
 
 def test_a_line_past_a_straight_wrist_is_refused_by_name_where_it_is_nearest(make_cell):
@@ -112,9 +117,9 @@ def test_a_line_past_a_straight_wrist_is_refused_by_name_where_it_is_nearest(mak
 
 def elbow(cell):
     """Return the angle of the elbow of a pose without a turn of the base, -1 where none is."""
-    shape, pan = shape_of(cell.arm), cell.state.actual_q[0]
+    ideal, pan = ideal_arm_of(cell.arm), cell.state.actual_q[0]
     return lambda flange: min(
-        (abs(q[2]) for q in closed_form(shape, flange) if abs(q[0] - pan) < 0.5), default=-1.0
+        (abs(q[2]) for q in closed_form(ideal, flange) if abs(q[0] - pan) < 0.5), default=-1.0
     )
 
 
@@ -122,7 +127,7 @@ def stretching(make_cell, angle):
     """Return a robot and the pose straight away from its shoulder at which the elbow has it."""
     q = (0.4, -0.9, 0.4, -1.2, -1.3, 0.2)
     cell = make_cell(q)
-    away = np.array(wrist_centre(shape_of(cell.arm), cell.arm.forward(q)))
+    away = np.array(wrist_centre(ideal_arm_of(cell.arm), cell.arm.forward(q)))
     away /= np.linalg.norm(away)
     back, low, high = cell.T_flange_tcp.inverse(), 0.0, 0.05
     for _ in range(50):
@@ -142,7 +147,7 @@ def test_a_line_to_a_stretched_arm_is_refused_as_elbow_where_it_is_nearest(make_
 
 def test_a_line_beyond_the_stretched_arm_ends_where_it_is_stretched(make_cell):
     cell, stretched = stretching(make_cell, 0.0)
-    whole = Line.between(cell.home, stretched)
+    whole = LineCurve.between(cell.home, stretched)
     text = refusal(NearSingularity, cell, to(whole.pose(2.0)), NO_MARGINS)
     assert 'lies behind the elbow singularity' in text
     assert fraction_in(text) == pytest.approx(0.5, abs=0.001)
@@ -152,10 +157,10 @@ def column_line(make_cell, beside):
     """Return a robot and a line whose wrist centre passes the axis of the base at a distance."""
     q = (0.3, -1.4, 1.1, -1.0, -1.4, 0.3)
     cell = make_cell(q)
-    shape = shape_of(cell.arm)
-    x, y, _ = wrist_centre(shape, cell.arm.forward(q))
+    ideal = ideal_arm_of(cell.arm)
+    x, y, _ = wrist_centre(ideal, cell.arm.forward(q))
     # The tangent from there to the circle about the axis.
-    far, radius = hypot(x, y), abs(shape.d4) + beside
+    far, radius = hypot(x, y), abs(ideal.d4) + beside
     inwards = np.array((-x, -y)) / far
     angle = np.arcsin(radius / far)
     turned = np.array(
@@ -170,11 +175,11 @@ def column_line(make_cell, beside):
 
 def test_a_line_past_the_shoulder_is_refused_by_name_where_it_is_nearest(make_cell):
     cell, end = column_line(make_cell, 5e-4)
-    shape = shape_of(cell.arm)
+    ideal = ideal_arm_of(cell.arm)
     u, nearest_way = least_on_line(
-        cell, end, lambda flange: hypot(*wrist_centre(shape, flange)[:2])
+        cell, end, lambda flange: hypot(*wrist_centre(ideal, flange)[:2])
     )
-    assert nearest_way == pytest.approx(abs(shape.d4) + 5e-4, abs=1e-6)
+    assert nearest_way == pytest.approx(abs(ideal.d4) + 5e-4, abs=1e-6)
     text = refusal(NearSingularity, cell, to(end))
     assert 'of the shoulder singularity' in text
     assert fraction_in(text) == pytest.approx(u, abs=0.005)
@@ -182,12 +187,12 @@ def test_a_line_past_the_shoulder_is_refused_by_name_where_it_is_nearest(make_ce
 
 def test_a_line_through_the_column_over_the_base_is_out_of_reach_where_it_enters(make_cell):
     cell, end = column_line(make_cell, -0.02)
-    shape, line = shape_of(cell.arm), Line.between(cell.home, end)
+    ideal, line = ideal_arm_of(cell.arm), LineCurve.between(cell.home, end)
     back = cell.T_flange_tcp.inverse()
     low, high = 0.0, 0.5
     for _ in range(40):
         u = 0.5 * (low + high)
-        low, high = (u, high) if closed_form(shape, line.pose(u) @ back) else (low, u)
+        low, high = (u, high) if closed_form(ideal, line.pose(u) @ back) else (low, u)
     text = refusal(Unreachable, cell, to(end), NO_MARGINS)
     assert fraction_in(text) == pytest.approx(low, abs=0.001)
     assert 'from the axis of the base' in text
@@ -212,7 +217,7 @@ def test_joint_moves_pass_singularities_and_may_replace_the_line(make_cell, name
 
 def test_a_line_in_a_run_that_becomes_a_joint_move_leaves_the_others_as_they_were(make_cell):
     cell, end = across(make_cell, WRIST, (0.0, 1.0, 0.0), half=0.1)
-    line = Line.between(cell.home, end)
+    line = LineCurve.between(cell.home, end)
     poses = [line.pose(u) for u in (0.1, 0.2, 0.9, 1.0)]
     goal = Goal(
         waypoints=tuple(Waypoint(pose=pose) for pose in poses),
@@ -239,7 +244,7 @@ def test_a_posture_behind_a_flip_says_which(make_cell):
 
 def test_a_robot_that_stands_near_a_singularity_may_leave_it_and_not_come_back(make_cell):
     cell, end = across(make_cell, WRIST, (0.0, 1.0, 0.0))
-    line = Line.between(cell.home, end)
+    line = LineCurve.between(cell.home, end)
     near = line.pose(0.55) @ cell.T_flange_tcp.inverse()
     cell = make_cell(nearest(cell.arm, near, (0.0, -1.0, 1.0, -6.0, -0.01, 5.0)))
     assert 0.002 < abs(cell.state.actual_q[4]) < 0.02
@@ -251,10 +256,10 @@ def test_a_robot_that_stands_near_a_singularity_may_leave_it_and_not_come_back(m
 
 def test_the_first_millimetre_from_a_rest_does_not_count(make_cell):
     cell, end = across(make_cell, WRIST, (0.0, 1.0, 0.0))
-    line = Line.between(cell.home, end)
+    line = LineCurve.between(cell.home, end)
     near = line.pose(0.56) @ cell.T_flange_tcp.inverse()
     cell = make_cell(nearest(cell.arm, near, (0.0, -1.0, 1.0, -6.0, -0.01, 5.0)))
-    towards = Line.between(cell.home, line.pose(0.5))
+    towards = LineCurve.between(cell.home, line.pose(0.5))
     plan(to(towards.pose(0.0009 / towards.length)), cell.state, cell.arm, FREE)
     refusal(NearSingularity, cell, to(towards.pose(0.002 / towards.length)))
 
@@ -299,23 +304,23 @@ def test_a_joint_that_comes_to_the_end_of_its_range_is_named_with_the_place(make
 def test_a_blended_corner_is_looked_at_and_not_the_point_that_it_leaves_out(make_cell):
     """The point lies in the column over the base; the corner stays clear of it, or does not."""
     cell, end = column_line(make_cell, 0.03)
-    line = Line.between(cell.home, end)
-    shape = shape_of(cell.arm)
+    line = LineCurve.between(cell.home, end)
+    ideal = ideal_arm_of(cell.arm)
     middle = line.pose(0.5)
-    centre = np.array(wrist_centre(shape, middle @ cell.T_flange_tcp.inverse()))
+    centre = np.array(wrist_centre(ideal, middle @ cell.T_flange_tcp.inverse()))
     inwards = -centre[:2] / hypot(*centre[:2])
-    corner = Pose(
+    blend = Pose(
         tuple(np.array(middle.position) + np.append(0.035 * inwards, 0.0)), middle.quaternion
     )
 
     def goal(radius):
         return Goal(
-            waypoints=(Waypoint(pose=corner), Waypoint(pose=end)),
+            waypoints=(Waypoint(pose=blend), Waypoint(pose=end)),
             segments=(Segment(blend_radius=radius), Segment()),
         )
 
     assert 'points[0].pose' in refusal(Unreachable, cell, goal(0.0), NO_MARGINS)
-    wide = 0.9 * min(line.length, cell.home.distance_to(corner), corner.distance_to(end))
+    wide = 0.9 * min(line.length, cell.home.distance_to(blend), blend.distance_to(end))
     assert len(plan(goal(wide), cell.state, cell.arm, NO_MARGINS).segments) == 2
 
 
@@ -352,22 +357,22 @@ spots = st.tuples(*[st.floats(-0.1, 0.1)] * 3, *[st.floats(-0.3, 0.3)] * 3)
 @settings(max_examples=20, deadline=None)
 @given(a=spots, b=spots, radius=st.floats(0.001, 0.02), fillet=st.booleans())
 def test_places_are_dense_and_on_their_curves(cell, a, b, radius, fillet):
-    first = Line.between(cell.home, cell.pose(*a[:3], turn=a[3:]))
-    second = Line.between(first.end, cell.pose(*b[:3], turn=b[3:]))
+    first = LineCurve.between(cell.home, cell.pose(*a[:3], turn=a[3:]))
+    second = LineCurve.between(first.end, cell.pose(*b[:3], turn=b[3:]))
     if min(first.length, second.length) <= 2.5 * radius:
         return
-    (corner,) = corners([Meeting(first, second, radius, fillet)])
+    (blend,) = blends([BlendInput(first, second, radius, fillet)])
     pieces = [
-        Piece.part(0, first, 0.0, corner.leave),
-        Piece.corner(0, corner),
-        Piece.part(1, second, corner.join, 1.0),
+        CurvePiece.part(0, first, 0.0, blend.leave),
+        CurvePiece.blend(0, blend),
+        CurvePiece.part(1, second, blend.join, 1.0),
     ]
-    places = places_on(pieces)
-    rows = np.concatenate([[cell.home.row()], places.poses])
+    samples = sample_poses(pieces)
+    rows = np.concatenate([[cell.home.row()], samples.poses])
     assert np.linalg.norm(np.diff(rows[:, :3], axis=0), axis=1).max() <= 2.0 * STEP_LENGTH + 1e-9
     dots = np.abs(np.einsum('ij,ij->i', rows[1:, 3:], rows[:-1, 3:]))
     assert 2.0 * np.arccos(np.minimum(1.0, dots)).max() <= 2.5 * STEP_ANGLE
-    for k, t, pose in zip(places.piece, places.t, places.poses, strict=True):
+    for k, t, pose in zip(samples.piece, samples.t, samples.poses, strict=True):
         one = pieces[k].pose(float(t))
         assert np.allclose(one.row(), pose, atol=1e-9) or np.allclose(
             one.row()[3:], -pose[3:], atol=1e-9
@@ -378,13 +383,15 @@ def test_places_are_dense_and_on_their_curves(cell, a, b, radius, fillet):
 @given(a=spots, b=spots)
 def test_the_joints_of_many_places_are_those_of_each_after_the_other(cell, a, b):
     middle, end = (cell.pose(*spot[:3], turn=spot[3:]) for spot in (a, b))
-    paths = [Line.between(cell.home, middle)]
+    paths = [LineCurve.between(cell.home, middle)]
     try:
-        paths.append(Arc.through(middle, cell.pose(0.05, 0.02, 0.11).position, end, 0))
+        paths.append(ArcCurve.through(middle, cell.pose(0.05, 0.02, 0.11).position, end, 0))
     except ValueError:
-        paths.append(Line.between(middle, end))
-    pieces = [Piece.part(k, path, 0.0, 1.0) for k, path in enumerate(paths)]
-    found = followed(Reach(cell.arm, cell.T_flange_tcp), pieces, cell.state.actual_q)
+        paths.append(LineCurve.between(middle, end))
+    pieces = [CurvePiece.part(k, path, 0.0, 1.0) for k, path in enumerate(paths)]
+    found = solve_joint_path(
+        TcpKinematics(cell.arm, cell.T_flange_tcp), pieces, cell.state.actual_q
+    )
     if found.refusal is not None:
         return
     q, back = cell.state.actual_q, cell.T_flange_tcp.inverse()
@@ -395,18 +402,18 @@ def test_the_joints_of_many_places_are_those_of_each_after_the_other(cell, a, b)
 
 def test_a_corner_between_joint_moves_stays_in_joint_space(cell):
     q = np.array(cell.state.actual_q)
-    way = JointLine.between(cell.arm, cell.T_flange_tcp, tuple(q), tuple(q + 0.3))
-    back = JointLine.between(
+    way = JointLineCurve.between(cell.arm, cell.T_flange_tcp, tuple(q), tuple(q + 0.3))
+    back = JointLineCurve.between(
         cell.arm,
         cell.T_flange_tcp,
         tuple(q + 0.3),
         tuple(q + np.array((0.5, 0.3, 0.2, 0.3, 0.3, 0.1))),
     )
-    (corner,) = corners([Meeting(way, back, 0.02, False)])
-    rows = corner.joint_rows(np.array((0.0, 1.0)))
-    assert rows[0] == pytest.approx(way.joints(corner.leave))
-    assert rows[1] == pytest.approx(back.joints(corner.join))
-    assert 0.0 < corner.length < 0.05
+    (blend,) = blends([BlendInput(way, back, 0.02, False)])
+    rows = blend.joint_rows(np.array((0.0, 1.0)))
+    assert rows[0] == pytest.approx(way.joints(blend.leave))
+    assert rows[1] == pytest.approx(back.joints(blend.join))
+    assert 0.0 < blend.length < 0.05
 
 
 # -- the report -----------------------------------------------------------------------------------

@@ -20,9 +20,9 @@ from ur_cartesian_driver.motion.goal import (
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import SwitchOutput
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.outputs import LARGEST_OFFSET
+from ur_cartesian_driver.planning.output_placement import MAX_OUTPUT_OFFSET
 from ur_cartesian_driver.protocol.dialects import DIALECTS
-from ur_cartesian_driver.protocol.trajectory import encode_points, MOST_OUTPUTS
+from ur_cartesian_driver.protocol.trajectory import encode_points, MAX_PENDING_OUTPUTS
 
 OPTIONS = PlanningOptions(max_tool_speed=1.0)
 #: Three sides of a square.
@@ -57,8 +57,8 @@ def records(made):
 
 def base_direction(record):
     """The heading in the axes of base."""
-    turned = Pose((0.0, 0.0, 0.0), record.place.quaternion)
-    return np.array(turned.apply(record.heading[:3]))
+    turned = Pose((0.0, 0.0, 0.0), record.trigger_pose.quaternion)
+    return np.array(turned.apply(record.trigger_direction[:3]))
 
 
 def test_in_a_corner_the_place_is_that_of_the_path_nearest_to_the_point(cell):
@@ -66,12 +66,12 @@ def test_in_a_corner_the_place_is_that_of_the_path_nearest_to_the_point(cell):
     ((waypoint, record),) = records(made)
     assert waypoint == 0
     corner = np.array(cell.pose(*CORNERS[0]).position)
-    place = np.array(record.place.position)
+    place = np.array(record.trigger_pose.position)
     path = made.reference.poses[:, :3]
     assert np.linalg.norm(place - corner) <= np.linalg.norm(path - corner, axis=1).min() + 1e-9
     assert 0.001 < np.linalg.norm(place - corner) < 0.01
     assert base_direction(record) == pytest.approx([0.5**0.5, 0.5**0.5, 0.0], abs=1e-6)
-    assert not record.comes_round
+    assert not record.starts_beyond
     assert record.delay == 0.0
 
 
@@ -88,7 +88,7 @@ def test_a_time_after_a_point_is_a_place_on_the_way_behind_it(cell):
     made = planned(cell, square(cell, command(0, offset=0.2)))
     ((waypoint, record),) = records(made)
     assert waypoint == 0
-    x, y, _ = np.array(record.place.position) - np.array(cell.home.position)
+    x, y, _ = np.array(record.trigger_pose.position) - np.array(cell.home.position)
     assert x == pytest.approx(0.05, abs=1e-6)
     assert y == pytest.approx(0.02, abs=0.002)
     assert base_direction(record) == pytest.approx([0.0, 1.0, 0.0], abs=1e-6)
@@ -99,7 +99,8 @@ def test_a_time_in_a_later_corner_stands_behind_the_motion_that_returns_there(ce
     ((waypoint, record),) = records(made)
     assert waypoint == 1
     apart = [
-        a - b for a, b in zip(record.place.position, cell.pose(*CORNERS[1]).position, strict=True)
+        a - b
+        for a, b in zip(record.trigger_pose.position, cell.pose(*CORNERS[1]).position, strict=True)
     ]
     assert hypot(*apart) < 0.01
 
@@ -110,7 +111,7 @@ def test_what_lies_behind_the_end_is_a_delay(cell):
     assert [waypoint for waypoint, _ in found] == [2, 2]
     left = made.segments[-1].duration
     assert [record.delay for _, record in found] == pytest.approx([0.3, 1.0 - left])
-    assert [record.place for _, record in found] == [None, None]
+    assert [record.trigger_pose for _, record in found] == [None, None]
 
 
 def test_outputs_stand_in_the_order_of_their_times_and_else_as_they_were_given(cell):
@@ -170,8 +171,8 @@ def test_an_arc_that_begins_beyond_the_plane_of_a_place_comes_round_to_it(cell):
         io_commands=(command(1, offset=0.8), command(1, offset=1.8)),
     )
     early, late = (record for _, record in records(planned(cell, goal)))
-    assert not early.comes_round
-    assert late.comes_round
+    assert not early.starts_beyond
+    assert late.starts_beyond
 
 
 def test_a_turn_in_place_has_a_heading_about_its_axis(cell):
@@ -182,7 +183,7 @@ def test_a_turn_in_place_has_a_heading_about_its_axis(cell):
     )
     ((waypoint, record),) = records(planned(cell, goal))
     assert waypoint == 0
-    assert record.heading == pytest.approx((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), abs=1e-6)
+    assert record.trigger_direction == pytest.approx((0.0, 0.0, 0.0, 0.0, 0.0, 1.0), abs=1e-6)
 
 
 @pytest.mark.parametrize('offset', [0.0, 0.25])
@@ -208,7 +209,7 @@ def test_along_a_spline_the_place_is_where_the_tool_is_at_that_time(cell, offset
     assert before <= 2.0 + offset + 1e-6
     times, poses = made.reference.time, made.reference.poses
     there = [np.interp(2.0 + offset, times, poses[:, axis]) for axis in range(3)]
-    assert record.place.position == pytest.approx(there, abs=2e-5)
+    assert record.trigger_pose.position == pytest.approx(there, abs=2e-5)
     assert base_direction(record)[0] > 0.8
 
 
@@ -224,7 +225,7 @@ def test_where_a_spline_stops_it_is_switched_at_once(cell):
         io_commands=(command(1),),
     )
     ((_, record),) = records(planned(cell, goal))
-    assert record.place is None
+    assert record.trigger_pose is None
 
 
 REFUSED = [
@@ -240,7 +241,7 @@ REFUSED = [
     (command(output=OutputKind.STANDARD_ANALOG, value=-inf), r'\.value is -inf'),
     (command(offset=-0.001), r'\.offset is -0\.001 s; it is 0 to 60 s after the point; '),
     (command(offset=nan), r'\.offset is nan'),
-    (command(offset=LARGEST_OFFSET + 0.1), r'\.offset is 60\.1 s'),
+    (command(offset=MAX_OUTPUT_OFFSET + 0.1), r'\.offset is 60\.1 s'),
 ]
 
 
@@ -257,8 +258,8 @@ def test_older_robot_programs_switch_nothing(cell):
 
 
 def test_too_many_between_two_motions_are_refused(cell):
-    many = [command(0, value=float(k % 2)) for k in range(MOST_OUTPUTS)]
-    assert len(records(planned(cell, square(cell, *many)))) == MOST_OUTPUTS
+    many = [command(0, value=float(k % 2)) for k in range(MAX_PENDING_OUTPUTS)]
+    assert len(records(planned(cell, square(cell, *many)))) == MAX_PENDING_OUTPUTS
     with pytest.raises(
         InvalidGoal, match='more than 64 outputs between two motions, behind point 0'
     ):

@@ -8,8 +8,8 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.planning.rest import come_to_rest
-from ur_cartesian_driver.sim.motion.servo import JointStop
+from ur_cartesian_driver.planning.stop_prediction import predict_stop
+from ur_cartesian_driver.sim.motion.servo import JointStopMotion
 
 ARM = Arm(robot_model('ur5e'))
 Q = (0.3, -1.4, 1.6, -1.7, -1.5, 0.2)
@@ -34,10 +34,10 @@ def state(qd, **changes):
 @pytest.mark.parametrize('deceleration', [0.5, 4.0])
 @pytest.mark.parametrize('qd', [(0.5, 0.0, 0.0, 0.0, 0.0, 0.0), (0.1, -0.4, 0.9, -1.2, 0.3, 0.05)])
 def test_the_arm_rests_where_the_controller_brings_it_to_rest(qd, deceleration):
-    brakes = JointStop(Q, qd, deceleration)
+    brakes = JointStopMotion(Q, qd, deceleration)
     while not brakes.over:
         brakes.accept(brakes.preview(0.0005)[1])
-    rest = come_to_rest(state(qd), ARM, deceleration)
+    rest = predict_stop(state(qd), ARM, deceleration)
     assert rest.actual_q == pytest.approx(brakes.q, abs=1e-9)
     expected = ARM.forward(brakes.q) @ T_FLANGE_TCP
     assert rest.actual_tcp_pose.distance_to(expected) < 1e-9
@@ -47,11 +47,11 @@ def test_the_arm_rests_where_the_controller_brings_it_to_rest(qd, deceleration):
 
 def test_an_arm_at_rest_is_where_it_is():
     still = state((0.0,) * 6)
-    assert come_to_rest(still, ARM, 4.0) is still
+    assert predict_stop(still, ARM, 4.0) is still
 
 
 def test_what_an_unknown_calibration_adds_stays_where_it_is_on_the_arm():
     off = Pose((0.001, 0.002, 0.001))
     moving = state((0.5,) * 6, actual_tcp_pose=ARM.forward(Q) @ off @ T_FLANGE_TCP)
-    rest = come_to_rest(moving, ARM, 4.0)
+    rest = predict_stop(moving, ARM, 4.0)
     assert rest.actual_tcp_pose.distance_to(ARM.forward(rest.actual_q) @ off @ T_FLANGE_TCP) < 1e-9

@@ -5,9 +5,14 @@
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.motion.polynomials import evaluated, Rates
-from ur_cartesian_driver.planning.pose_rows import conjugate_rows, multiply_rows
-from ur_cartesian_driver.planning.rotation_rows import angular, exp_rows, log_rows, turn_of
+from ur_cartesian_driver.motion.polynomials import evaluate, MotionRows
+from ur_cartesian_driver.planning.geometry.pose_rows import conjugate_rows, multiply_rows
+from ur_cartesian_driver.planning.geometry.rotation_rows import (
+    angular_rates,
+    exp_rows,
+    log_rows,
+    rotation_rates,
+)
 
 N = 60
 TIMES = np.random.default_rng(1).uniform(0.2, 1.0, N)
@@ -20,12 +25,12 @@ def turns(size):
 @pytest.mark.parametrize('size', [0.0, 1e-6, 0.05, 0.7, 1.5])
 def test_angular_rates_are_the_derivatives_of_the_orientation(size):
     coefficients, h = turns(size), 1e-5
-    w, e = angular(evaluated(coefficients, TIMES))
-    before, after = (evaluated(coefficients, TIMES + k * h) for k in (-1, 1))
+    w, e = angular_rates(evaluate(coefficients, TIMES))
+    before, after = (evaluate(coefficients, TIMES + k * h) for k in (-1, 1))
     moved = log_rows(multiply_rows(exp_rows(after.x), conjugate_rows(exp_rows(before.x))))
     np.testing.assert_allclose(moved / (2.0 * h), w, atol=2e-7 * (1.0 + size) ** 3)
     np.testing.assert_allclose(
-        (angular(after)[0] - angular(before)[0]) / (2.0 * h), e, atol=1e-5 * size
+        (angular_rates(after)[0] - angular_rates(before)[0]) / (2.0 * h), e, atol=1e-5 * size
     )
 
 
@@ -43,8 +48,8 @@ def test_a_turn_has_the_angular_rates_that_it_was_made_for(angle):
     axes = random.normal(size=(N, 3))
     r = angle * axes / np.linalg.norm(axes, axis=1)[:, None]
     w, e = random.normal(size=(2, N, 3))
-    turn = turn_of(r, w, e)
-    assert isinstance(turn, Rates)
+    turn = rotation_rates(r, w, e)
+    assert isinstance(turn, MotionRows)
     np.testing.assert_array_equal(turn.x, r)
-    np.testing.assert_allclose(angular(turn)[0], w, atol=1e-12)
-    np.testing.assert_allclose(angular(turn)[1], e, atol=1e-11)
+    np.testing.assert_allclose(angular_rates(turn)[0], w, atol=1e-12)
+    np.testing.assert_allclose(angular_rates(turn)[1], e, atol=1e-11)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.rates import tool_rates
+from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import (
     CollisionPredicted,
@@ -31,17 +31,17 @@ from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vecto
 from ur_cartesian_driver.motion.primitive import Spline
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.path import tcp_rows
-from ur_cartesian_driver.planning.pose_rows import angle_rows
-from ur_cartesian_driver.planning.spline_plan import (
-    ANGLE_LEVER,
-    closing,
+from ur_cartesian_driver.planning.geometry.curves import tcp_rows
+from ur_cartesian_driver.planning.geometry.pose_rows import angle_rows
+from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline
+from ur_cartesian_driver.planning.spline.spline_planner import (
+    ANGLE_TOLERANCE_RADIUS,
     end_state,
-    plan_pieces,
+    plan_spline,
+    plan_stop,
     SplineState,
 )
-from ur_cartesian_driver.planning.spline_points import tool_points
-from ur_cartesian_driver.planning.tool_spline import ToolSpline
+from ur_cartesian_driver.planning.spline.spline_points import tool_points
 
 OPTIONS = PlanningOptions(self_collision='off')
 CHOOSE = (nan,) * 6
@@ -143,7 +143,7 @@ def test_the_tool_passes_each_point_in_time_with_its_twist_and_keeps_to_the_curv
         np.arange(0.0, joints.duration, 0.004),
     )
     assert distance < OPTIONS.spline_tolerance * 1.02
-    assert angle < OPTIONS.spline_tolerance / ANGLE_LEVER * 1.02
+    assert angle < OPTIONS.spline_tolerance / ANGLE_TOLERANCE_RADIUS * 1.02
     for point in goal.waypoints[:-1]:
         q, qd, qdd = joints.rows(np.array([point.time]))
         twist, acceleration = tool_rates(arm, cell.T_flange_tcp, q, qd, qdd)
@@ -590,7 +590,7 @@ def test_any_goal_is_refused_or_its_tool_keeps_to_the_curve_and_to_the_limits(
     times = np.arange(0.0, joints.duration, 0.01)
     distance, angle = off(cell.arm, cell.T_flange_tcp, joints, curve_of(cell, goal), times)
     assert distance < OPTIONS.spline_tolerance * 1.02
-    assert angle < OPTIONS.spline_tolerance / ANGLE_LEVER * 1.02
+    assert angle < OPTIONS.spline_tolerance / ANGLE_TOLERANCE_RADIUS * 1.02
     _, qd, _ = joints.rows(times)
     assert (np.abs(qd) < np.array(cell.arm.model.max_joint_speed) * 1.01).all()
 
@@ -611,13 +611,13 @@ def test_a_motion_in_two_parts_is_the_motion_in_one(cell, accelerations):
     goal = goal_of(cell, 14, n=6, accelerations=accelerations)
     whole = plan(goal, cell.state, cell.arm, OPTIONS)
     first, second = parts_of(goal, 3)
-    begun = plan_pieces(
+    begun = plan_spline(
         SplineState(q=cell.state.actual_q), first, cell.arm, cell.T_flange_tcp, OPTIONS
     )
-    assert begun.end.moves
+    assert begun.end.is_moving
     assert begun.end.time == pytest.approx(goal.waypoints[2].time)
-    rest = plan_pieces(begun.end, second, cell.arm, cell.T_flange_tcp, OPTIONS, first=3)
-    assert not rest.end.moves
+    rest = plan_spline(begun.end, second, cell.arm, cell.T_flange_tcp, OPTIONS, first=3)
+    assert not rest.end.is_moving
     assert [s.waypoint for s in rest.segments][0 :: len(rest.segments) - 1] == [3, 5]
     assert rest.reference.time[0] == begun.end.time
     assert rest.reference.point[0] == 3
@@ -630,7 +630,7 @@ def test_a_motion_in_two_parts_is_the_motion_in_one(cell, accelerations):
 
 def test_an_open_goal_may_be_planned_to_end_moving(cell):
     goal = goal_of(cell, 15, keep_open=True)
-    part = plan_pieces(
+    part = plan_spline(
         SplineState(q=cell.state.actual_q), goal, cell.arm, cell.T_flange_tcp, OPTIONS
     )
     q, qd, qdd = part.end.rows()
@@ -647,7 +647,7 @@ def test_what_is_planned_in_parts_is_not_slowed(cell):
     fast = replace(goal, waypoints=(replace(goal.waypoints[0], time=0.1),))
     text = r'give all points \d+\.\d+ times the time \(and twists and accelerations to match\)\.$'
     with pytest.raises(TooFast, match=text):
-        plan_pieces(start, fast, cell.arm, cell.T_flange_tcp, slow)
+        plan_spline(start, fast, cell.arm, cell.T_flange_tcp, slow)
     with pytest.raises(TooFast, match=text):
         plan(replace(fast, keep_open=True, execution=SPLINE), cell.state, cell.arm, slow)
 
@@ -656,7 +656,7 @@ def test_what_is_planned_in_parts_is_not_slowed(cell):
 def test_a_closing_piece_brakes_smoothly_and_no_harder_than_told(cell, qdd):
     qd = (0.5, -0.8, 0.3, 0.2, -0.1, 1.0)
     state = SplineState(time=3.0, q=cell.state.actual_q, qd=qd, qdd=qdd)
-    piece = closing(state, cell.arm, 2.0)
+    piece = plan_stop(state, cell.arm, 2.0)
     assert piece.velocities == piece.accelerations == (0.0,) * 6
     spline = JointSpline.of(state.q, [piece], velocities=qd, accelerations=qdd)
     _, speeds, accelerations = spline.rows(np.linspace(0.0, piece.duration, 100))
@@ -670,11 +670,11 @@ def test_a_closing_piece_brakes_smoothly_and_no_harder_than_told(cell, qdd):
 def test_a_closing_piece_keeps_to_the_range_of_a_joint_or_is_refused(cell):
     q = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 2.0 * pi - 0.05)
     state = SplineState(q=q, qd=(0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
-    piece = closing(state, cell.arm, 4.0)
+    piece = plan_stop(state, cell.arm, 4.0)
     assert piece.target[5] <= 2.0 * pi
     assert piece.duration < 1.5 / 4.0
     with pytest.raises(JointLimitExceeded, match='wrist_3_joint is so near to the end'):
-        closing(replace(state, q=(*q[:5], 2.0 * pi - 1e-4)), cell.arm, 4.0)
+        plan_stop(replace(state, q=(*q[:5], 2.0 * pi - 1e-4)), cell.arm, 4.0)
 
 
 def test_a_closing_piece_keeps_to_the_speed_of_a_joint_that_gets_faster_still(cell):
@@ -682,7 +682,7 @@ def test_a_closing_piece_keeps_to_the_speed_of_a_joint_that_gets_faster_still(ce
     state = SplineState(
         q=cell.state.actual_q, qd=(0.0,) * 5 + (0.98 * fastest,), qdd=(0.0,) * 5 + (8.0,)
     )
-    piece = closing(state, cell.arm, 1.0)
+    piece = plan_stop(state, cell.arm, 1.0)
     _, speeds, _ = JointSpline.of(
         state.q, [piece], velocities=state.qd, accelerations=state.qdd
     ).rows(np.linspace(0.0, piece.duration))
@@ -700,8 +700,8 @@ def test_the_way_to_rest_behind_an_open_end_is_checked_too(cell):
     options = replace(OPTIONS, workspace_planes=(f'table 0 0 {low} 0 0 1',))
     start = SplineState(q=cell.state.actual_q)
     with pytest.raises(CollisionPredicted, match='"table"'):
-        plan_pieces(start, goal, cell.arm, cell.T_flange_tcp, options)
-    plan_pieces(
+        plan_spline(start, goal, cell.arm, cell.T_flange_tcp, options)
+    plan_spline(
         start,
         replace(goal, waypoints=(replace(goal.waypoints[0], twist=(0.0,) * 6),)),
         cell.arm,
@@ -725,7 +725,7 @@ def test_the_state_at_the_end_of_a_plan_is_where_it_can_be_continued():
         OPTIONS,
     )
     end = end_state(made)
-    assert (end.time, end.moves) == (pytest.approx(2.0), False)
+    assert (end.time, end.is_moving) == (pytest.approx(2.0), False)
     assert isinstance(made.segments[-1].primitive, Spline)
     assert end.q == made.segments[-1].joints
     assert 'point 0: the acceleration of the segment is ignored: its time counts' in made.report

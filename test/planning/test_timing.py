@@ -22,7 +22,11 @@ from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.profile import cruise_for, timed, trapezoid
+from ur_cartesian_driver.planning.geometry.speed_profile import (
+    cruise_speed_for,
+    profile_for_time,
+    trapezoid,
+)
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
 TYPE = SegmentType
@@ -45,7 +49,7 @@ def test_a_trapezoid_takes_the_time_of_the_textbook(length, velocity, accelerati
 
 @given(length=positive, duration=positive, acceleration=positive)
 def test_the_derived_speed_takes_exactly_the_time(length, duration, acceleration):
-    speed = cruise_for(length, duration, acceleration, 2)
+    speed = cruise_speed_for(length, duration, acceleration, 2)
     if speed is None:
         assert acceleration * duration**2 < 4.0 * length * (1.0 + 1e-9)
     else:
@@ -54,7 +58,7 @@ def test_the_derived_speed_takes_exactly_the_time(length, duration, acceleration
 
 @given(length=positive, duration=positive, before=st.booleans(), after=st.booleans())
 def test_time_rises_with_the_way_from_nothing_to_the_duration(length, duration, before, after):
-    profile = timed(length, duration, before, after)
+    profile = profile_for_time(length, duration, before, after)
     assert profile.duration == pytest.approx(duration)
     times = [profile.time_at(length * k / 20) for k in range(21)]
     assert times == sorted(times)

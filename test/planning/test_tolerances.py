@@ -6,7 +6,7 @@ import pytest
 
 from ur_cartesian_driver.motion.goal import Goal, Tolerance
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.tolerances import with_default_tolerances
+from ur_cartesian_driver.planning.request.default_tolerances import apply_default_tolerances
 
 #: Parameter, field of the tolerance, its axes.
 WHERE = [
@@ -23,7 +23,7 @@ GOAL = Goal(waypoints=())
 @pytest.mark.parametrize('kind', ['path_tolerance', 'goal_tolerance'])
 @pytest.mark.parametrize(('quantity', 'field', 'axes'), WHERE)
 def test_a_parameter_is_the_limit_of_its_quantity_and_of_no_other(kind, quantity, field, axes):
-    filled = with_default_tolerances(GOAL, PlanningOptions(**{f'{kind}_{quantity}': 0.5}))
+    filled = apply_default_tolerances(GOAL, PlanningOptions(**{f'{kind}_{quantity}': 0.5}))
     for name in ('path_tolerance', 'goal_tolerance'):
         for which in ('position', 'orientation', 'twist', 'acceleration'):
             values = getattr(getattr(filled, name), which)
@@ -40,7 +40,7 @@ def test_what_the_goal_says_stands():
         path_tolerance_linear_velocity=0.6,
         path_tolerance_angular_velocity=0.7,
     )
-    filled = with_default_tolerances(Goal(waypoints=(), path_tolerance=given), options)
+    filled = apply_default_tolerances(Goal(waypoints=(), path_tolerance=given), options)
     assert filled.path_tolerance == Tolerance(
         position=(0.1, -1.0, 0.5), twist=(0.6, 2.0, -3.0, 0.7, 0.7, 4.0)
     )
@@ -48,4 +48,4 @@ def test_what_the_goal_says_stands():
 
 
 def test_without_parameters_the_goal_is_the_same():
-    assert with_default_tolerances(GOAL, PlanningOptions()) is GOAL
+    assert apply_default_tolerances(GOAL, PlanningOptions()) is GOAL

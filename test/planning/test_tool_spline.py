@@ -17,8 +17,8 @@ from ur_cartesian_driver.motion.pose import (
     quaternion_from_rotation_vector,
     rotate,
 )
-from ur_cartesian_driver.planning.spline_points import tool_points
-from ur_cartesian_driver.planning.tool_spline import ToolPoints, ToolSpline
+from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
+from ur_cartesian_driver.planning.spline.spline_points import tool_points
 
 CHOOSE = (nan,) * 6
 H = 1e-5
@@ -123,7 +123,7 @@ def test_without_accelerations_the_way_from_rest_to_rest_is_the_straight_line_of
 
 def test_a_stretched_curve_is_the_same_way_with_slower_rates():
     spline = ToolSpline.through(tool_points(random_goal(5, True), at_rest(time=0.5)))
-    slow = spline.stretched(1.7)
+    slow = spline.stretch_times(1.7)
     times = np.linspace(0.5, spline.times[-1] - 1e-9, 40)
     a, b = spline.at(times), slow.at(0.5 + 1.7 * (times - 0.5))
     np.testing.assert_allclose(b.poses, a.poses, atol=1e-10)

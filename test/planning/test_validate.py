@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.goal import (
 )
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import check, PlanningOptions
-from ur_cartesian_driver.planning.validate import RULES, way_of_execution
+from ur_cartesian_driver.planning.request.validate import resolve_execution_mode, RULES
 from ur_cartesian_driver.protocol.dialects import DIALECTS
 
 OPTIONS = PlanningOptions(max_points=10)
@@ -457,9 +457,9 @@ def test_a_spline_needs_a_robot_that_takes_joints_exactly(mode, options, text):
 
 def test_auto_is_a_spline_only_with_times_and_a_twist_or_acceleration_at_an_inner_point():
     for goal in (TIMED, with_point(TIMED, 2, twist=ONE), with_point(PLAIN, 1, twist=ONE)):
-        assert way_of_execution(goal) is ExecutionMode.PRIMITIVES
+        assert resolve_execution_mode(goal) is ExecutionMode.PRIMITIVES
     for field in ('twist', 'acceleration'):
-        assert way_of_execution(with_point(TIMED, 1, **{field: ONE})) is ExecutionMode.SPLINE
+        assert resolve_execution_mode(with_point(TIMED, 1, **{field: ONE})) is ExecutionMode.SPLINE
 
 
 @pytest.mark.parametrize('kind', [SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT])
@@ -564,7 +564,7 @@ def test_nonsense_of_any_kind_ends_in_a_refusal_or_passes_but_never_in_another_e
         ('max_points', 0),
         ('stamp_tolerance', nan),
         ('spline_tolerance', 0.0),
-        ('closing_deceleration', 0.0),
+        ('keep_open_deceleration', 0.0),
     ],
 )
 def test_options_out_of_their_range_are_named(field, value):

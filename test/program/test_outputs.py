@@ -19,8 +19,8 @@ from ur_cartesian_driver.motion.goal import OutputKind
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, Spline, SwitchOutput
 from ur_cartesian_driver.motion.signals import AnalogDomain
-from ur_cartesian_driver.program import as_program
-from ur_cartesian_driver.protocol.trajectory import MOST_OUTPUTS
+from ur_cartesian_driver.program import wrap_in_program
+from ur_cartesian_driver.protocol.trajectory import MAX_PENDING_OUTPUTS
 
 HOME = (0.3, -1.4, 1.5, -1.6, -1.5, 0.2)
 STEP = 0.002
@@ -36,7 +36,7 @@ class Watched:
     """What the outputs did, and where the tool was then."""
 
     def __init__(self, robot):
-        signals = robot.controller.signals
+        signals = robot.controller.io
         robot.place(HOME, IDENTITY)
         self.start = robot.controller.motion.T_base_tcp
         signals.digital_out.standard[:] = [False] * 8
@@ -109,7 +109,9 @@ def test_at_a_place_on_a_straight_line(robot):
             line(watched.at(y=-0.01)),
             line(watched.at()),
             *(
-                switch(k % 8, float(k < 8), place=place, heading=heading(place, 1, 0))
+                switch(
+                    k % 8, float(k < 8), trigger_pose=place, trigger_direction=heading(place, 1, 0)
+                )
                 for k, place in enumerate(places)
             ),
             line(watched.at(x=0.1)),
@@ -129,7 +131,7 @@ def test_in_the_middle_of_a_corner_without_stopping(robot):
     run = robot.run(
         [
             line(corner, 0.02),
-            switch(1, place=corner, heading=heading(corner, 0.5**0.5, 0.5**0.5)),
+            switch(1, trigger_pose=corner, trigger_direction=heading(corner, 0.5**0.5, 0.5**0.5)),
             line(watched.at(x=0.06, y=0.06)),
         ],
         on_cycle=watched,
@@ -152,12 +154,15 @@ def test_a_place_that_is_come_round_to_waits_for_the_second_time(robot):
     # Counterclockwise seen along +z the tool comes to (0.04, -0.04) from +x.
     place = watched.at(x=0.04 + 0.04 * 0.8, y=-0.04 * 0.6)
     way = heading(place, -0.6, -0.8)
-    early = robot.run([*moves, switch(0, place=place, heading=way), arc], on_cycle=watched)
+    early = robot.run(
+        [*moves, switch(0, trigger_pose=place, trigger_direction=way), arc], on_cycle=watched
+    )
     assert not early.trouble
     assert apart(watched.changes[0][2], place.position) > 0.03
     watched = Watched(robot)
     run = robot.run(
-        [*moves, switch(0, place=place, heading=way, comes_round=True), arc], on_cycle=watched
+        [*moves, switch(0, trigger_pose=place, trigger_direction=way, starts_beyond=True), arc],
+        on_cycle=watched,
     )
     assert not run.trouble
     assert apart(watched.changes[0][2], place.position) < 0.1 * STEP
@@ -178,7 +183,7 @@ def test_a_turn_in_place_has_a_heading_too(robot):
         [
             line(watched.at(x=0.01)),
             line(watched.at()),
-            switch(4, place=place, heading=(0.0, 0.0, 0.0, 0.0, 0.0, 1.0)),
+            switch(4, trigger_pose=place, trigger_direction=(0.0, 0.0, 0.0, 0.0, 0.0, 1.0)),
             MoveL(target=watched.start @ axis, velocity=0.5, acceleration=2.0),
         ],
         on_cycle=look,
@@ -201,7 +206,11 @@ def test_on_a_spline_between_two_of_its_pieces(robot):
     run = robot.run(
         [
             Spline(target=middle, velocities=speed, duration=0.7),
-            switch(5, place=place, heading=heading(place, *(x / hypot(*way) for x in way))),
+            switch(
+                5,
+                trigger_pose=place,
+                trigger_direction=heading(place, *(x / hypot(*way) for x in way)),
+            ),
             Spline(target=end, velocities=(0.0,) * 6, duration=0.7),
         ],
         on_cycle=watched,
@@ -218,7 +227,7 @@ def test_a_place_that_the_tool_never_gets_to_is_not_forgotten(robot):
     run = robot.run(
         [
             line(watched.at(x=0.02)),
-            switch(1, place=nowhere, heading=heading(nowhere, 1, 0)),
+            switch(1, trigger_pose=nowhere, trigger_direction=heading(nowhere, 1, 0)),
             line(watched.at(x=0.04)),
             line(watched.at(x=0.06)),
         ],
@@ -259,7 +268,7 @@ def test_a_changed_text_changes_the_place(text, changed, far):
 
     def edit(program):
         assert program.count(text) == 1
-        return as_program(program.replace(text, changed))
+        return wrap_in_program(program.replace(text, changed))
 
     robot = RobotInMemory('ur5e', edit=edit)
     watched = Watched(robot)
@@ -268,7 +277,7 @@ def test_a_changed_text_changes_the_place(text, changed, far):
         [
             line(watched.at(y=-0.01)),
             line(watched.at()),
-            switch(1, place=place, heading=heading(place, 1, 0)),
+            switch(1, trigger_pose=place, trigger_direction=heading(place, 1, 0)),
             line(watched.at(x=0.1)),
         ],
         on_cycle=watched,
@@ -307,16 +316,16 @@ def test_analog_outputs_in_both_domains(robot, domain, expected):
         on_cycle=watched,
     )
     assert not run.trouble
-    assert robot.controller.signals.analog_out[1] == pytest.approx(expected)
-    assert robot.controller.signals.analog_out_voltage[1] == (domain is AnalogDomain.VOLTAGE)
+    assert robot.controller.io.analog_out[1] == pytest.approx(expected)
+    assert robot.controller.io.analog_out_voltage[1] == (domain is AnalogDomain.VOLTAGE)
 
 
 def test_too_many_at_one_time_are_a_failure_and_the_arm_stands(robot):
     watched = Watched(robot)
     place = watched.at(x=0.05)
     many = [
-        switch(0, k % 2, place=place, heading=heading(place, 1, 0))
-        for k in range(MOST_OUTPUTS + 1)
+        switch(0, k % 2, trigger_pose=place, trigger_direction=heading(place, 1, 0))
+        for k in range(MAX_PENDING_OUTPUTS + 1)
     ]
     moves = [line(watched.at(x=0.02)), *many, line(watched.at(x=0.1))]
     run = robot.run(moves, on_cycle=watched)
@@ -328,7 +337,7 @@ def test_too_many_at_one_time_are_a_failure_and_the_arm_stands(robot):
 def test_what_ends_a_trajectory_forgets_what_waits(robot):
     watched = Watched(robot)
     place = watched.at(x=0.05)
-    late = switch(1, place=place, heading=heading(place, 1, 0))
+    late = switch(1, trigger_pose=place, trigger_direction=heading(place, 1, 0))
     bad = Spline(target=HOME, velocities=(0.0,) * 6, duration=0.0)
     run = robot.run([line(watched.at(x=0.02)), late, bad, MoveJ(target=HOME)], on_cycle=watched)
     assert run.result is TrajectoryResult.CANCELED

@@ -8,7 +8,7 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.program import as_program, ProgramSettings, render
+from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
 from ur_cartesian_driver.program.render import FEATURES, has_feature
 from ur_cartesian_driver.protocol.registers import (
     ExternalError,
@@ -21,7 +21,7 @@ from ur_cartesian_driver.protocol.registers import (
     SyncState,
 )
 from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
-from ur_cartesian_driver.protocol.script_command import ScriptCommand, TcpHold
+from ur_cartesian_driver.protocol.script_command import ScriptCommand, TcpPersistence
 from ur_cartesian_driver.protocol.trajectory import MotionType, SplineKind
 from ur_cartesian_driver.urscript import parse
 
@@ -39,7 +39,7 @@ def text(**changes):
 
 @pytest.mark.parametrize('version', [(3, 15, 8), (5, 4, 0), (5, 21, 0), (10, 7, 0), (10, 12, 1)])
 def test_the_program_can_be_parsed_for_every_software(version):
-    assert parse(as_program(text(version=version))).name == 'ur_cartesian_driver'
+    assert parse(wrap_in_program(text(version=version))).name == 'ur_cartesian_driver'
 
 
 def test_addresses_are_those_of_the_settings():
@@ -62,7 +62,7 @@ def test_addresses_are_those_of_the_settings():
         ('SPLINE', SplineKind),
         ('RESULT', TrajectoryResult),
         ('COMMAND', ScriptCommand),
-        ('TCP', TcpHold),
+        ('TCP', TcpPersistence),
     ],
 )
 def test_every_wire_constant_comes_from_its_enum(prefix, members):
@@ -106,15 +106,15 @@ def test_functions_are_named_only_where_the_controller_knows_them(feature, versi
 
 @pytest.mark.parametrize('allowed', [False, True])
 def test_the_functions_that_let_the_arm_go_are_named_only_where_that_is_allowed(allowed):
-    program = text(allow_teach=allowed)
+    program = text(allow_freedrive=allowed)
     assert (' teach_mode()' in program) is (' end_teach_mode()' in program) is allowed
-    assert parse(as_program(program))
+    assert parse(wrap_in_program(program))
 
 
 def test_nothing_inside_a_function_has_the_name_of_a_global():
     """Which of the two a controller means is written for assignments only."""
     everywhere, function, inside = set(), '', []
-    for line in text(allow_teach=True).splitlines():
+    for line in text(allow_freedrive=True).splitlines():
         if header := re.match(r'(?:def|thread) (\w+)\((.*)\):', line):
             function = header[1]
             inside += [(function, name) for name in re.findall(r'\w+', header[2])]
@@ -161,14 +161,14 @@ def test_the_urcap_finds_its_markers():
 
 
 def test_an_uploaded_program_is_one_indented_definition():
-    lines = as_program(text()).splitlines()
+    lines = wrap_in_program(text()).splitlines()
     assert lines[0] == 'def ur_cartesian_driver():'
     assert lines[-1] == 'end'
     assert all(not line or line.startswith('\t') for line in lines[1:-1])
 
 
 def test_an_include_stands_in_its_place_and_takes_its_settings():
-    lines = text(servoj_gain=300.0, servo_buffer_depth=3, allow_teach=True).splitlines()
+    lines = text(servoj_gain=300.0, servo_buffer_depth=3, allow_freedrive=True).splitlines()
     assert lines.count('thread servo_control():') == 1
     assert not [line for line in lines if line.startswith('#!')]
     for line in (

@@ -9,7 +9,7 @@ import pytest
 from robot_in_memory import REVERSE, RobotInMemory, TRAJECTORY
 
 from ur_cartesian_driver.motion.primitive import MoveJ
-from ur_cartesian_driver.program import as_program, ProgramSettings, render
+from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
 from ur_cartesian_driver.protocol.registers import (
     InputDouble,
     InputInteger,
@@ -25,7 +25,7 @@ from ur_cartesian_driver.protocol.reverse import (
     TrajectoryAction,
 )
 from ur_cartesian_driver.protocol.trajectory import encode_points
-from ur_cartesian_driver.sim.builtins.motion import HandGuided
+from ur_cartesian_driver.sim.builtins.motion import FreedriveState
 
 pytestmark = pytest.mark.slow
 
@@ -48,13 +48,13 @@ class Servo:
                     **settings,
                 )
             )
-            assert not self.robot.controller.programs.load('driver', as_program(program))
+            assert not self.robot.controller.programs.load('driver', wrap_in_program(program))
         self.robot._ready()
         self.controller = self.robot.controller
         self.home = self.controller.motion.q
         self.q, self.sequence, self.state_time, self.mode = self.home, 100, 5.0, ServoMode.IDLE
         self.error, self.threshold, self.stays = 0, FAR, True
-        self._inputs = self.controller.signals.inputs
+        self._inputs = self.controller.io.inputs
         self.say(buffered_servo(round(1000.0 * TIMEOUT)))
         self.cycle(3)
 
@@ -93,7 +93,7 @@ class Servo:
         self.say(keepalive(0))
 
     def __getitem__(self, register):
-        out = self.controller.signals.outputs
+        out = self.controller.io.outputs
         return (out.floats if isinstance(register, OutputDouble) else out.integers)[register]
 
     @property
@@ -106,7 +106,7 @@ class Servo:
 
     @property
     def log(self):
-        return ' '.join(self.controller.announcements.log)
+        return ' '.join(self.controller.messages.log)
 
     def swing(self, cycles, amplitude=0.2):
         """Stream a motion of the first joint, a set-point in each cycle."""
@@ -254,37 +254,37 @@ def test_a_driver_that_hangs_up_brakes_the_arm_too():
 
 @pytest.mark.parametrize('allowed', [pytest.param(False, marks=pytest.mark.exhaustive), True])
 def test_teaching_is_possible_where_it_is_allowed_and_from_idle(allowed):
-    servo = Servo(allow_teach=allowed)
+    servo = Servo(allow_freedrive=allowed)
     servo.enter(ServoMode.TEACH)
-    guided = HandGuided.TEACH if allowed else HandGuided.NOBODY
-    assert servo.controller.hand_guided is guided
+    guided = FreedriveState.TEACH if allowed else FreedriveState.OFF
+    assert servo.controller.freedrive is guided
     servo.enter(ServoMode.IDLE)
-    assert servo.controller.hand_guided is HandGuided.NOBODY
+    assert servo.controller.freedrive is FreedriveState.OFF
     servo.enter(ServoMode.SERVO)
     servo.enter(ServoMode.TEACH)
-    assert servo.controller.hand_guided is HandGuided.NOBODY
+    assert servo.controller.freedrive is FreedriveState.OFF
     assert servo.running
     servo.enter(ServoMode.IDLE)
     servo.enter(ServoMode.TEACH)
     servo.say(keepalive(200))
     servo.controller.step()
     servo.controller.step()
-    assert servo.controller.hand_guided is HandGuided.NOBODY, 'teaching ends with the mode'
+    assert servo.controller.freedrive is FreedriveState.OFF, 'teaching ends with the mode'
 
 
 def test_teaching_ends_before_the_arm_brakes_for_a_halt():
-    servo = Servo(allow_teach=True).enter(ServoMode.TEACH)
-    assert servo.controller.hand_guided is HandGuided.TEACH
+    servo = Servo(allow_freedrive=True).enter(ServoMode.TEACH)
+    assert servo.controller.freedrive is FreedriveState.TEACH
     servo.error = 1
     servo.cycle()
-    assert servo.controller.hand_guided is HandGuided.NOBODY
+    assert servo.controller.freedrive is FreedriveState.OFF
     while servo.running:
         servo.cycle()
     assert 'reports the error 1' in servo.log
 
 
 def test_a_refusal_of_teaching_is_told_once():
-    servo = Servo(allow_teach=False).enter(ServoMode.TEACH)
+    servo = Servo(allow_freedrive=False).enter(ServoMode.TEACH)
     servo.cycle(20)
     assert servo.log.count('teach mode is not allowed') == 1
     assert servo[OutputInteger.ACTUAL_MODE] == ServoMode.IDLE
@@ -302,7 +302,7 @@ def test_the_servo_waits_for_an_arm_that_another_thread_brakes():
         sockets[0].feed(trajectory(TrajectoryAction.NOOP, 0, timeout).encode())
         controller.step()
     assert max(map(abs, controller.qd)) > 0.1
-    inputs = controller.signals.inputs
+    inputs = controller.io.inputs
     inputs.integers[InputInteger.DESIRED_MODE] = int(ServoMode.SERVO)
     inputs.integers[InputInteger.EXTERNAL_SYNC_STATE] = int(SyncState.EXTERNAL_TO_ROBOT)
     for sequence in range(1, 400):
@@ -313,7 +313,7 @@ def test_the_servo_waits_for_an_arm_that_another_thread_brakes():
         inputs.floats[first : first + 6] = [FAR] * 6
         sockets[0].feed(buffered_servo(timeout).encode())
         controller.step()
-    out = controller.signals.outputs
-    assert controller.programs.running, controller.announcements.log
+    out = controller.io.outputs
+    assert controller.programs.running, controller.messages.log
     assert max(map(abs, controller.qd)) == 0.0
     assert out.integers[OutputInteger.ACTUAL_MODE] == ServoMode.SERVO

@@ -16,7 +16,7 @@ from robot_in_memory import RobotInMemory
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.pose import IDENTITY
 from ur_cartesian_driver.motion.primitive import MoveJ, Spline
-from ur_cartesian_driver.program import as_program
+from ur_cartesian_driver.program import wrap_in_program
 from ur_cartesian_driver.protocol.trajectory import encode_points
 
 START = np.array([0.3, -1.4, 1.5, -1.6, -1.5, 0.2])
@@ -303,7 +303,7 @@ def test_a_changed_law_changes_the_motion(line, replacement, size):
             row if row.startswith('SPLINE_') else row.replace(line, replacement)
             for row in statements.splitlines()
         ]
-        return as_program(head + '\n'.join(changed))
+        return wrap_in_program(head + '\n'.join(changed))
 
     splines = pieces([0.0603] * 20)
     robot = RobotInMemory('ur5e', edit=edit)

@@ -11,15 +11,15 @@ import pytest
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.protocol.dashboard import (
     BANNER,
-    DashboardClient,
-    DashboardServer,
+    COMMAND_SPECS,
+    DashboardClientCodec,
+    DashboardGreeting,
+    DashboardRequest,
+    DashboardServerCodec,
     encode_line,
-    Greeting,
     not_understood,
     parse_reply,
     parse_request,
-    Request,
-    SHAPES,
     success,
 )
 
@@ -54,13 +54,13 @@ ANSWERS = [
 
 @pytest.mark.parametrize(('name', 'argument', 'answer', 'value'), ANSWERS)
 def test_success_is_recognised_by_the_shape_of_the_answer(name, argument, answer, value):
-    client = DashboardClient()
-    assert client.feed(encode_line(BANNER)) == [Greeting(text=BANNER)]
+    client = DashboardClientCodec()
+    assert client.feed(encode_line(BANNER)) == [DashboardGreeting(text=BANNER)]
     line = client.send(name, argument)
     assert line == (f'{name} {argument}' if argument else name).encode() + b'\n'
     (reply,) = client.feed(encode_line(answer))
     assert (reply.ok, reply.value, reply.text) == (value is not None, value, answer)
-    assert reply.request == Request(name=name, argument=argument)
+    assert reply.request == DashboardRequest(name=name, argument=argument)
 
 
 TEXTS = {
@@ -92,26 +92,30 @@ VALUES = {
 }
 
 
-@pytest.mark.parametrize('name', SHAPES)
+@pytest.mark.parametrize('name', COMMAND_SPECS)
 def test_the_two_ends_understand_each_other(name):
-    client, server = DashboardClient(), DashboardServer()
+    client, server = DashboardClientCodec(), DashboardServerCodec()
     client.feed(encode_line(BANNER))
     (request,) = server.feed(client.send(name, TEXTS.get(name, '')))
-    assert request == Request(name=name, argument=TEXTS.get(name, ''))
+    assert request == DashboardRequest(name=name, argument=TEXTS.get(name, ''))
     (reply,) = client.feed(success(request, VALUES.get(name)))
     assert reply.ok
 
 
 def test_the_longer_of_two_commands_is_understood():
-    assert parse_request('load installation a') == Request(name='load installation', argument='a')
-    assert parse_request('load installations') == Request(name='load', argument='installations')
+    assert parse_request('load installation a') == DashboardRequest(
+        name='load installation', argument='a'
+    )
+    assert parse_request('load installations') == DashboardRequest(
+        name='load', argument='installations'
+    )
 
 
 @pytest.mark.parametrize('line', ['brake_release', 'play it', 'load', '', 'Play'])
 def test_a_line_that_is_no_command_is_returned_and_answered(line):
-    assert DashboardServer().feed(line.encode() + b'\r\n') == [line]
+    assert DashboardServerCodec().feed(line.encode() + b'\r\n') == [line]
     answer = not_understood(line).decode().rstrip('\n')
-    assert not parse_reply(Request(name='play'), answer).ok
+    assert not parse_reply(DashboardRequest(name='play'), answer).ok
 
 
 @pytest.mark.parametrize(
@@ -120,7 +124,7 @@ def test_a_line_that_is_no_command_is_returned_and_answered(line):
 )
 def test_what_is_no_command_cannot_be_sent(name, argument):
     with pytest.raises(LocalProtocolError):
-        DashboardClient().send(name, argument)
+        DashboardClientCodec().send(name, argument)
 
 
 @pytest.mark.parametrize(
@@ -137,11 +141,11 @@ def test_what_is_no_command_cannot_be_sent(name, argument):
     ],
 )
 def test_commands_have_a_first_version(name, version, available):
-    assert SHAPES[name].available(version) is available
+    assert COMMAND_SPECS[name].is_available(version) is available
 
 
 def test_answers_belong_to_commands_in_order_also_in_pieces():
-    client = DashboardClient()
+    client = DashboardClientCodec()
     client.send('robotmode')
     client.send('play')
     stream = encode_line(BANNER) + b'Robotmode: IDLE\r\n' + b'Starting program\n'
@@ -152,21 +156,21 @@ def test_answers_belong_to_commands_in_order_also_in_pieces():
 
 
 def test_an_answer_to_nothing_is_an_error():
-    client = DashboardClient()
+    client = DashboardClientCodec()
     client.feed(encode_line(BANNER))
     with pytest.raises(RemoteProtocolError, match='without being asked'):
         client.feed(b'Stopped\n')
 
 
 def test_an_end_instead_of_an_answer_is_an_error():
-    client = DashboardClient()
+    client = DashboardClientCodec()
     client.send('play')
     with pytest.raises(RemoteProtocolError, match='play'):
         client.feed(b'')
 
 
 def test_the_number_of_waiting_commands_is_bounded():
-    client = DashboardClient()
+    client = DashboardClientCodec()
     for _ in range(64):
         client.send('play')
     with pytest.raises(LocalProtocolError, match='wait for an answer'):
@@ -175,7 +179,7 @@ def test_the_number_of_waiting_commands_is_bounded():
 
 @given(st.lists(st.binary(min_size=1, max_size=30)))
 def test_random_bytes_raise_nothing_but_a_remote_error(chunks):
-    client, server = DashboardClient(), DashboardServer()
+    client, server = DashboardClientCodec(), DashboardServerCodec()
     client.send('programState')
     for end in (client, server):
         with suppress(RemoteProtocolError):

@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveL,
     Spline,
 )
-from ur_cartesian_driver.protocol.dialects import DIALECTS, NEWEST
+from ur_cartesian_driver.protocol.dialects import DIALECTS, NEWEST_DIALECT
 from ur_cartesian_driver.protocol.reverse import trajectory, TrajectoryAction
 from ur_cartesian_driver.protocol.trajectory import (
     decode_point,
@@ -84,8 +84,8 @@ def fields_of(case):
 
 def test_the_newest_is_the_last():
     assert list(DIALECTS) == ['2.0', '2.10', '2.12', '2.14']
-    assert list(DIALECTS.values())[-1] is NEWEST
-    assert set(MotionType) == NEWEST.motion_types
+    assert list(DIALECTS.values())[-1] is NEWEST_DIALECT
+    assert set(MotionType) == NEWEST_DIALECT.motion_types
 
 
 @pytest.mark.parametrize('case', READABLE, ids=lambda case: f'{case["name"]} {case["note"]}')
@@ -215,10 +215,10 @@ def test_reading_what_was_written_is_the_same_within_half_a_unit(name, duration,
 
 @given(st.floats(0.0, 2.0))
 def test_a_radius_that_the_wire_carries_is_never_larger(radius):
-    whole = DIALECTS['2.0'].whole_radius(radius)
+    whole = DIALECTS['2.0'].round_down_radius(radius)
     assert radius - 0.001 < whole <= radius + 1e-9
     assert words(MoveP(target=POSE, blend_radius=whole), '2.0')[19] == round(whole * 1000)
-    assert NEWEST.whole_radius(radius) == radius
+    assert NEWEST_DIALECT.round_down_radius(radius) == radius
 
 
 def test_splines_are_known_to_all():

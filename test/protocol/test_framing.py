@@ -15,8 +15,8 @@ from ur_cartesian_driver.protocol.framing import (
     FIXED_POINT,
     FrameBuffer,
     from_fixed,
+    hex_text,
     LineBuffer,
-    quote,
     RecordBuffer,
     to_fixed,
 )
@@ -110,8 +110,8 @@ def test_odd_bytes_in_a_text_are_shown_and_not_fatal():
 
 
 def test_a_long_quotation_is_cut():
-    assert len(quote(bytes(10_000))) < 130
-    assert '10000 bytes' in quote(bytes(10_000))
+    assert len(hex_text(bytes(10_000))) < 130
+    assert '10000 bytes' in hex_text(bytes(10_000))
 
 
 @given(st.lists(st.binary(max_size=200)))

@@ -16,36 +16,36 @@ from ur_cartesian_driver.protocol.primary import (
     AdditionalInfo,
     CalibrationData,
     CartesianInfo,
-    Command,
-    command,
     ConfigurationData,
     decode_frame,
+    encode_command,
     encode_message,
+    encode_program,
     encode_state,
     ErrorCodeMessage,
     ForceModeData,
-    Immi,
+    ImmiData,
     JointData,
     KeyMessage,
     KinematicsInfo,
     MasterboardData,
-    OtherFrame,
+    PrimaryCommand,
     PrimaryDecoder,
+    RawFrame,
     RawMessage,
-    RawState,
+    RawSubPackage,
     ReportLevel,
     RobotModeData,
-    RobotState,
+    RobotStateFrame,
     RobotType,
     RuntimeExceptionMessage,
     SAFETY_DATA,
     SafetyModeMessage,
-    ScriptDecoder,
+    ScriptUploadDecoder,
     TextMessage,
     ToolCommunication,
     ToolData,
     ToolModeInfo,
-    upload,
     VersionMessage,
 )
 
@@ -60,7 +60,7 @@ KINDS = {
     'kinematics_info': KinematicsInfo,
     'masterboard_data': MasterboardData,
     'configuration_data': ConfigurationData,
-    'raw_state': RawState,
+    'raw_state': RawSubPackage,
     'text_message': TextMessage,
     'version_message': VersionMessage,
     'safety_mode_message': SafetyModeMessage,
@@ -153,10 +153,10 @@ def test_frames_are_read_as_by_the_library(frame):
     content = decode_frame(bytes.fromhex(frame['hex']))
     assert frame['lenient']['parsed']
     if frame['frame_type'] not in (16, 20):
-        assert isinstance(content, OtherFrame)
+        assert isinstance(content, RawFrame)
         assert content.frame_type == frame['frame_type']
         return
-    packages = content.packages if isinstance(content, RobotState) else [content]
+    packages = content.packages if isinstance(content, RobotStateFrame) else [content]
     assert len(packages) == len(frame['decoded'])
     for package, entry in zip(packages, frame['decoded'], strict=True):
         assert type(package) is KINDS[entry['kind']]
@@ -186,7 +186,7 @@ def test_frames_are_written_as_they_came(frame):
     content = decode_frame(data)
     written = (
         encode_state(content.packages)
-        if isinstance(content, RobotState)
+        if isinstance(content, RobotStateFrame)
         else encode_message(content)
     )
     # What we do not keep: a surplus, or the reserved byte that older frames lack.
@@ -204,7 +204,7 @@ def test_frames_are_written_as_they_came(frame):
 def test_the_immi_interface_is_read():
     (frame,) = [f for f in FRAMES if f['name'] == 'masterboard_with_immi']
     (board,) = decode_frame(bytes.fromhex(frame['hex'])).packages
-    assert board.immi == Immi(
+    assert board.immi == ImmiData(
         input_bits=286335522, output_bits=858997828, voltage_24v=24.0, current=0.75
     )
 
@@ -301,7 +301,7 @@ def test_a_simulated_state_has_the_sizes_and_the_order_of_a_ur5e():
 
 @pytest.mark.parametrize('package', full_state(), ids=lambda p: type(p).__name__)
 def test_a_sub_package_comes_back_as_it_was_also_with_a_surplus(package):
-    if not isinstance(package, RawState):
+    if not isinstance(package, RawSubPackage):
         assert type(package).decode(package.encode()) == package
         if not isinstance(package, ConfigurationData):
             assert type(package).decode(package.encode() + b'more') == package
@@ -309,7 +309,7 @@ def test_a_sub_package_comes_back_as_it_was_also_with_a_surplus(package):
 
 @pytest.mark.parametrize('package', full_state(), ids=lambda p: type(p).__name__)
 def test_a_sub_package_that_is_too_short_is_refused_with_its_bytes(package):
-    if isinstance(package, RawState):
+    if isinstance(package, RawSubPackage):
         return
     optional = {RobotModeData: 1, MasterboardData: 3}.get(type(package), 0)
     body = package.encode()[: -1 - optional]
@@ -386,7 +386,7 @@ def test_an_end_inside_a_frame_is_an_error():
         lambda: encode_message(VersionMessage(major=5, minor=0, project='x' * 128)),
         lambda: encode_state([RobotModeData(robot_mode=200)]),
         lambda: encode_state([MasterboardData(temperature=1e300)]),
-        lambda: encode_state([RawState(sub_type=99, body=bytes(4091))]),
+        lambda: encode_state([RawSubPackage(sub_type=99, body=bytes(4091))]),
     ],
 )
 def test_what_clients_cannot_read_is_not_sent(make):
@@ -482,14 +482,14 @@ FLAT = 'def f():\nif True:\nend\nend\n'
 @pytest.mark.parametrize('end', [b'\n', b'\r\n'])
 def test_commands_and_programs_are_told_apart(end, in_pieces):
     stream = (
-        command(Command.STOP_PROGRAM)
-        + upload(PROGRAM)
+        encode_command(PrimaryCommand.STOP_PROGRAM)
+        + encode_program(PROGRAM)
         + b'movej([0,0,0,0,0,0])\n'
-        + upload(FLAT)
-        + upload('sec s():\n  set_digital_out(1, True)\nend')
+        + encode_program(FLAT)
+        + encode_program('sec s():\n  set_digital_out(1, True)\nend')
     )
     stream = stream.replace(b'\n', end)
-    decoder = ScriptDecoder()
+    decoder = ScriptUploadDecoder()
     pieces = [stream[i : i + 1] for i in range(len(stream))] if in_pieces else [stream]
     assert [text for piece in pieces for text in decoder.feed(piece)] == [
         'stop program',
@@ -502,19 +502,19 @@ def test_commands_and_programs_are_told_apart(end, in_pieces):
 
 
 def test_a_command_without_line_feed_is_complete_at_the_end():
-    decoder = ScriptDecoder()
+    decoder = ScriptUploadDecoder()
     assert decoder.feed(b'power on') == []
     assert decoder.feed(b'') == ['power on']
 
 
 def test_a_program_that_is_cut_off_is_passed_on_at_the_end():
-    decoder = ScriptDecoder()
+    decoder = ScriptUploadDecoder()
     assert decoder.feed(b'def f():\n  x = ') == []
     assert decoder.feed(b'') == ['def f():\n  x = \n']
 
 
 def test_a_program_without_end_is_refused():
-    decoder = ScriptDecoder()
+    decoder = ScriptUploadDecoder()
     lines = (b'#' * 1023 + b'\n') * 1024
     decoder.feed(b'def f():\n' + 3 * lines)
     with pytest.raises(RemoteProtocolError, match='longer than'):
@@ -523,7 +523,7 @@ def test_a_program_without_end_is_refused():
 
 @given(st.lists(st.binary(min_size=1, max_size=60)))
 def test_random_bytes_to_the_controller_raise_nothing_but_a_remote_error(chunks):
-    decoder = ScriptDecoder()
+    decoder = ScriptUploadDecoder()
     with suppress(RemoteProtocolError):
         for chunk in [*chunks, b'']:
             decoder.feed(chunk)

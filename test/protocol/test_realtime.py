@@ -13,9 +13,9 @@ from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocol
 from ur_cartesian_driver.protocol.realtime import (
     decode_packet,
     packet_size,
+    PACKET_SIZES,
     RealtimeData,
     RealtimeDecoder,
-    SIZES,
 )
 
 #: First byte of a field, from the manufacturer's tables.
@@ -109,7 +109,7 @@ def test_the_size_follows_from_the_version_of_the_software(version, size):
     assert struct.unpack_from('>i', packet) == (size,)
 
 
-@pytest.mark.parametrize('size', sorted(SIZES))
+@pytest.mark.parametrize('size', sorted(PACKET_SIZES))
 def test_an_older_packet_is_the_front_of_a_newer_one(size):
     packet = numbered().encode(size)
     assert packet[4:] == numbered().encode(1220)[4:size]

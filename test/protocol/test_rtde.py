@@ -15,25 +15,25 @@ from ur_cartesian_driver.protocol import registers
 from ur_cartesian_driver.protocol.rtde import (
     Acknowledgement,
     ControllerVersion,
-    Data,
+    DataPackage,
     DataReceived,
     DataType,
     decode_reply,
     FieldsNotFound,
-    ForeignPackage,
+    HandshakeDone,
     INPUT_TYPES,
     InputsInUse,
-    InputsReply,
     OUTPUT_TYPES,
-    OutputsReply,
     PackageType,
-    Ready,
     Recipe,
-    RtdeClient,
+    RtdeClientCodec,
     RtdeState,
-    TextMessage,
+    RtdeTextMessage,
+    SetupInputsReply,
+    SetupOutputsReply,
+    UnexpectedPackage,
 )
-from ur_cartesian_driver.protocol.rtde_server import InputReceived, RtdeServer
+from ur_cartesian_driver.protocol.rtde_server import InputReceived, RtdeServerCodec
 
 VERSION = ControllerVersion(major=5, minor=21, bugfix=0)
 
@@ -45,8 +45,8 @@ def test_the_tables_hold_all_names():
 
 
 def test_the_registers_of_the_servo_exist():
-    assert registers.field(registers.POINTS_BEGUN) == 'output_int_register_26'
-    assert registers.six_fields(registers.InputDouble.DESIRED_JOINT_POSITIONS) == tuple(
+    assert registers.register_name(registers.POINTS_BEGUN) == 'output_int_register_26'
+    assert registers.six_register_names(registers.InputDouble.DESIRED_JOINT_POSITIONS) == tuple(
         f'input_double_register_{i}' for i in range(24, 30)
     )
     assert all(name in INPUT_TYPES for name in registers.SERVO_INPUTS)
@@ -59,7 +59,7 @@ class Link:
 
     def __init__(self, client, *, taken=None, version=VERSION, **options):
         self.client = client
-        self.server = RtdeServer(version, set() if taken is None else taken, **options)
+        self.server = RtdeServerCodec(version, set() if taken is None else taken, **options)
         self.events = []
         self.received = []
         self.to_server(client.start())
@@ -77,7 +77,7 @@ class Link:
 
 def test_a_whole_connection():
     link = Link(
-        RtdeClient(
+        RtdeClientCodec(
             ['timestamp', 'actual_q'],
             ['input_int_register_24'],
             frequency=125.0,
@@ -85,7 +85,7 @@ def test_a_whole_connection():
         )
     )
     (ready,) = link.events
-    assert isinstance(ready, Ready)
+    assert isinstance(ready, HandshakeDone)
     assert (ready.protocol_version, ready.controller_version) == (2, VERSION)
     (output,) = link.server.outputs
     assert output.frequency == ready.frequency == 125.0
@@ -104,7 +104,7 @@ def test_a_whole_connection():
 
 
 def test_all_names_can_be_streamed_at_once():
-    link = Link(RtdeClient(list(OUTPUT_TYPES)))
+    link = Link(RtdeClientCodec(list(OUTPUT_TYPES)))
     (ready,) = link.events
     assert ready.frequency == 500.0
     recipe = link.server.outputs[0].recipe
@@ -120,7 +120,7 @@ def test_optional_outputs_that_are_unknown_are_left_out():
         if name not in ('payload', 'actual_current_as_torque')
     }
     link = Link(
-        RtdeClient(
+        RtdeClientCodec(
             ['timestamp', 'payload', 'actual_q', 'actual_current_as_torque'],
             optional_outputs=['payload', 'actual_current_as_torque', 'actual_q'],
         ),
@@ -134,31 +134,32 @@ def test_optional_outputs_that_are_unknown_are_left_out():
 
 def test_needed_outputs_that_are_unknown_are_named():
     with pytest.raises(FieldsNotFound, match=r'outputs payload_x.*5\.21\.0\.0') as error:
-        Link(RtdeClient(['timestamp', 'payload_x', 'payload'], optional_outputs=['payload']))
+        Link(RtdeClientCodec(['timestamp', 'payload_x', 'payload'], optional_outputs=['payload']))
     assert error.value.names == ('payload_x',)
 
 
 def test_a_recipe_of_nothing_but_unknown_optional_outputs_is_an_error():
     with pytest.raises(FieldsNotFound):
-        Link(RtdeClient(['x'], optional_outputs=['x']))
+        Link(RtdeClientCodec(['x'], optional_outputs=['x']))
 
 
 def test_unknown_inputs_are_named():
     with pytest.raises(FieldsNotFound, match='inputs input_x'):
-        Link(RtdeClient(['timestamp'], ['input_x']))
+        Link(RtdeClientCodec(['timestamp'], ['input_x']))
 
 
 def test_inputs_of_another_client_are_named_and_free_again_after_its_end():
     taken = set()
-    first = Link(RtdeClient(['timestamp'], ['speed_slider_mask']), taken=taken)
+    first = Link(RtdeClientCodec(['timestamp'], ['speed_slider_mask']), taken=taken)
     with pytest.raises(InputsInUse, match='speed_slider_mask') as error:
         Link(
-            RtdeClient(['timestamp'], ['input_int_register_24', 'speed_slider_mask']), taken=taken
+            RtdeClientCodec(['timestamp'], ['input_int_register_24', 'speed_slider_mask']),
+            taken=taken,
         )
     assert error.value.names == ('speed_slider_mask',)
     first.server.close()
     again = Link(
-        RtdeClient(['timestamp'], ['input_int_register_24', 'speed_slider_mask']), taken=taken
+        RtdeClientCodec(['timestamp'], ['input_int_register_24', 'speed_slider_mask']), taken=taken
     )
     assert again.client.state is RtdeState.READY
     assert not first.server.streaming
@@ -166,9 +167,9 @@ def test_inputs_of_another_client_are_named_and_free_again_after_its_end():
 
 def test_an_old_controller_is_asked_for_125_hz():
     old = ControllerVersion(major=3, minor=15, bugfix=8)
-    assert Link(RtdeClient(['timestamp']), version=old).events[0].frequency == 125.0
+    assert Link(RtdeClientCodec(['timestamp']), version=old).events[0].frequency == 125.0
     with pytest.raises(LocalProtocolError, match='125 Hz'):
-        Link(RtdeClient(['timestamp'], frequency=500.0), version=old)
+        Link(RtdeClientCodec(['timestamp'], frequency=500.0), version=old)
 
 
 @pytest.mark.parametrize(
@@ -184,30 +185,30 @@ def test_an_old_controller_is_asked_for_125_hz():
 )
 def test_an_impossible_wish_is_refused_at_once(options):
     with pytest.raises(LocalProtocolError):
-        RtdeClient(**options)
+        RtdeClientCodec(**options)
 
 
 def test_a_client_serves_one_connection():
-    client = RtdeClient(['timestamp'])
+    client = RtdeClientCodec(['timestamp'])
     client.start()
     with pytest.raises(LocalProtocolError):
         client.start()
 
 
-TEXT = TextMessage(text='Fieldbus', source='PROFINET', level=2)
+TEXT = RtdeTextMessage(text='Fieldbus', source='PROFINET', level=2)
 ACCEPTED = {
     k: Acknowledgement(type=k, accepted=True)
     for k in (PackageType.REQUEST_PROTOCOL_VERSION, PackageType.CONTROL_PACKAGE_START)
 }
 REFUSED = Acknowledgement(type=PackageType.REQUEST_PROTOCOL_VERSION, accepted=False)
 V, S = PackageType.REQUEST_PROTOCOL_VERSION, PackageType.CONTROL_PACKAGE_START
-OUTPUTS = OutputsReply(types=('DOUBLE',))
+OUTPUTS = SetupOutputsReply(types=('DOUBLE',))
 STEPS = [ACCEPTED[V], VERSION, OUTPUTS, ACCEPTED[S]]
 
 
 def started(steps, outputs=('timestamp',)):
     """Return a client that was fed some replies, and its events."""
-    client = RtdeClient(list(outputs))
+    client = RtdeClientCodec(list(outputs))
     client.start()
     return client, [event for step in steps for event in client.feed(step.encode())]
 
@@ -221,10 +222,10 @@ def test_text_messages_are_welcome_at_any_time(place):
 
 @pytest.mark.parametrize('place', range(4))
 def test_five_foreign_packages_are_borne_in_each_state_and_no_more(place):
-    foreign = InputsReply(types=('DOUBLE',))
+    foreign = SetupInputsReply(types=('DOUBLE',))
     client, events = started([*STEPS[:place], *[foreign] * 5, *STEPS[place:]])
     assert client.state is RtdeState.READY
-    assert events.count(ForeignPackage(package=foreign)) == 5
+    assert events.count(UnexpectedPackage(package=foreign)) == 5
     with pytest.raises(RemoteProtocolError, match='out of turn'):
         started([*STEPS[:place], *[foreign] * 6])
 
@@ -234,7 +235,7 @@ def test_data_before_the_reply_to_start_counts_as_reply():
     data = decode_reply(recipe.pack((40.0,)))
     client, events = started([*STEPS[:3], data, data, ACCEPTED[S], data])
     assert client.state is RtdeState.READY
-    assert [type(event) for event in events] == [Ready, *[DataReceived] * 3]
+    assert [type(event) for event in events] == [HandshakeDone, *[DataReceived] * 3]
 
 
 def test_a_controller_that_stops_short_is_an_error_that_says_where():
@@ -254,10 +255,10 @@ def test_the_end_of_the_data_is_no_error_between_packages():
     ('steps', 'text'),
     [
         ([REFUSED, REFUSED], 'neither version 2 nor version 1'),
-        ([*STEPS[:2], OutputsReply(types=('DOUBLE', 'DOUBLE'))], '2 types to 1'),
+        ([*STEPS[:2], SetupOutputsReply(types=('DOUBLE', 'DOUBLE'))], '2 types to 1'),
         ([*STEPS[:3], Acknowledgement(type=S, accepted=False)], 'refused to start'),
-        ([*STEPS, Data(payload=b'\1' + bytes(9))], '01000000000000000000'),
-        ([*STEPS, Data(payload=b'\1' + bytes(7))], 'has 9 bytes, but 8'),
+        ([*STEPS, DataPackage(payload=b'\1' + bytes(9))], '01000000000000000000'),
+        ([*STEPS, DataPackage(payload=b'\1' + bytes(7))], 'has 9 bytes, but 8'),
     ],
 )
 def test_what_a_controller_must_not_say(steps, text):
@@ -266,7 +267,7 @@ def test_what_a_controller_must_not_say(steps, text):
 
 
 def test_a_type_that_is_stated_is_believed_more_than_the_table():
-    _, events = started([*STEPS[:2], OutputsReply(types=('UINT32',)), ACCEPTED[S]])
+    _, events = started([*STEPS[:2], SetupOutputsReply(types=('UINT32',)), ACCEPTED[S]])
     assert events[0].outputs.types == (DataType.UINT32,)
 
 
@@ -274,13 +275,13 @@ def test_a_field_unknown_to_us_can_be_streamed_if_its_type_is_stated():
     _, events = started(STEPS, outputs=['brand_new'])
     assert events[0].outputs.types == (DataType.DOUBLE,)
     with pytest.raises(RemoteProtocolError, match='brand_new'):
-        started([*STEPS[:2], OutputsReply(types=('brand_new',))], outputs=['brand_new'])
+        started([*STEPS[:2], SetupOutputsReply(types=('brand_new',))], outputs=['brand_new'])
 
 
 def test_a_package_that_comes_alone_needs_no_feeding():
     names = ('timestamp', 'speed_scaling')
     client, _ = started(
-        [STEPS[0], VERSION, OutputsReply(types=('DOUBLE', 'DOUBLE')), STEPS[3]], names
+        [STEPS[0], VERSION, SetupOutputsReply(types=('DOUBLE', 'DOUBLE')), STEPS[3]], names
     )
     data = Recipe(names, [DataType.DOUBLE] * 2).pack((1.0, 2.0))
     assert client.values_in(data) == (1.0, 2.0)

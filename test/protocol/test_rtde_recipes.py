@@ -14,19 +14,19 @@ from ur_cartesian_driver.protocol.rtde import (
     DataType,
     decode_reply,
     decode_request,
-    InputsReply,
     Recipe,
     RequestProtocolVersion,
+    RtdeTextMessage,
     SetupInputs,
-    TextMessage,
+    SetupInputsReply,
 )
 
-TEXT = TextMessage(text='Fieldbus', source='PROFINET', level=2)
+TEXT = RtdeTextMessage(text='Fieldbus', source='PROFINET', level=2)
 
 
 @pytest.mark.parametrize('version', [1, 2])
 def test_text_messages_of_both_versions(version):
-    text = TEXT if version == 2 else TextMessage(text='Fieldbus', level=2)
+    text = TEXT if version == 2 else RtdeTextMessage(text='Fieldbus', level=2)
     assert decode_reply(text.encode(version), version) == text
     assert decode_request(text.encode(version), version) == text
     if version == 2:
@@ -38,14 +38,14 @@ def test_text_messages_of_both_versions(version):
 @pytest.mark.parametrize(
     'make',
     [
-        lambda: TextMessage(text='x' * 256).encode(),
+        lambda: RtdeTextMessage(text='x' * 256).encode(),
         lambda: SetupInputs(names=('a,b',)).encode(),
         lambda: SetupInputs(names=('',)).encode(),
         lambda: SetupInputs(names=('x' * 100,) * 700).encode(),
         lambda: RequestProtocolVersion(version=65536).encode(),
-        lambda: TextMessage(text='', level=256).encode(),
+        lambda: RtdeTextMessage(text='', level=256).encode(),
         lambda: ControllerVersion(major=-1, minor=0, bugfix=0).encode(),
-        lambda: InputsReply(types=('BOOL',), recipe_id=256).encode(),
+        lambda: SetupInputsReply(types=('BOOL',), recipe_id=256).encode(),
     ],
 )
 def test_what_does_not_fit_a_package_is_refused(make):

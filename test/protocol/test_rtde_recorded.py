@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from ur_cartesian_driver.protocol.rtde import (
-    Data,
+    DataPackage,
     DataType,
     decode_reply,
     decode_request,
@@ -16,7 +16,7 @@ from ur_cartesian_driver.protocol.rtde import (
     OUTPUT_TYPES,
     Recipe,
     RequestProtocolVersion,
-    RtdeClient,
+    RtdeClientCodec,
     RtdeState,
 )
 
@@ -49,7 +49,7 @@ def test_requests_of_the_library_are_read_and_written(frame, version):
     data = bytes.fromhex(frame['hex'])
     request = decode_request(data, version)
     assert request.encode() == data
-    if isinstance(request, Data):
+    if isinstance(request, DataPackage):
         assert request.recipe_id == frame['fields']['recipe_id']
     elif isinstance(request, RequestProtocolVersion):
         assert request.version == frame['fields']['protocol_version']
@@ -62,7 +62,7 @@ def test_replies_are_read_and_written(frame, version):
     data = bytes.fromhex(frame['hex'])
     reply = decode_reply(data, version)
     assert reply.encode() == data
-    if not isinstance(reply, Data):
+    if not isinstance(reply, DataPackage):
         assert meaning(reply) == frame['fields']
 
 
@@ -118,7 +118,7 @@ def test_every_package_of_the_librarys_writer_is_read():
 def run_recording(name, in_pieces, **options):
     """Play the controller of a recording to our client; return the events and what it sent."""
     connection = GOLDEN[name]
-    client = RtdeClient(
+    client = RtdeClientCodec(
         connection['output_recipe'],
         connection['input_recipe'],
         frequency=connection['frequency'],

@@ -13,20 +13,20 @@ from random_frames import RANDOM_FRAMES
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.protocol.rtde import (
     ControllerVersion,
-    Data,
+    DataPackage,
     decode_reply,
     RequestProtocolVersion,
     RtdeFrameBuffer,
     SetupInputs,
     SetupOutputs,
 )
-from ur_cartesian_driver.protocol.rtde_server import RtdeServer
+from ur_cartesian_driver.protocol.rtde_server import RtdeServerCodec
 
 VERSION = ControllerVersion(major=5, minor=21, bugfix=0)
 
 
 def server(**options):
-    return RtdeServer(VERSION, set(), **options)
+    return RtdeServerCodec(VERSION, set(), **options)
 
 
 def test_a_client_may_have_several_output_recipes_with_frequencies_of_their_own():
@@ -63,7 +63,7 @@ def test_a_client_with_one_recipe_may_give_it_any_id():
     controller = server()
     controller.feed(SetupInputs(names=('input_int_register_24',)).encode())
     for number in (0, 1, 200):
-        (event,) = controller.feed(Data(payload=bytes([number]) + b'\0\0\0\x05').encode())
+        (event,) = controller.feed(DataPackage(payload=bytes([number]) + b'\0\0\0\x05').encode())
         assert event.values == (5,)
 
 
@@ -71,10 +71,10 @@ def test_with_several_recipes_the_id_counts():
     controller = server()
     for number in (24, 25):
         controller.feed(SetupInputs(names=(f'input_int_register_{number}',)).encode())
-    (event,) = controller.feed(Data(payload=b'\2\0\0\0\x05').encode())
+    (event,) = controller.feed(DataPackage(payload=b'\2\0\0\0\x05').encode())
     assert event.recipe.names == ('input_int_register_25',)
     with pytest.raises(RemoteProtocolError, match='recipe 3'):
-        controller.feed(Data(payload=b'\3\0\0\0\x05').encode())
+        controller.feed(DataPackage(payload=b'\3\0\0\0\x05').encode())
 
 
 def test_start_and_pause():
@@ -94,7 +94,7 @@ def test_an_unknown_protocol_version_is_refused_and_nothing_changes():
 
 def test_inputs_before_their_recipe_are_an_error():
     with pytest.raises(RemoteProtocolError, match='before'):
-        server().feed(Data(payload=bytes(5)).encode())
+        server().feed(DataPackage(payload=bytes(5)).encode())
 
 
 def test_the_number_of_recipes_is_bounded():
@@ -107,7 +107,7 @@ def test_the_number_of_recipes_is_bounded():
 
 def test_a_client_may_write_an_input_through_several_recipes_but_two_clients_may_not():
     taken = set()
-    one, two = RtdeServer(VERSION, taken), RtdeServer(VERSION, taken)
+    one, two = RtdeServerCodec(VERSION, taken), RtdeServerCodec(VERSION, taken)
     both = ('input_int_register_1', 'input_int_register_2')
     for names in (both[:1], both):
         one.feed(SetupInputs(names=names).encode())

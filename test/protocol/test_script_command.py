@@ -14,46 +14,46 @@ import pytest
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.protocol.script_command import (
     COMMAND_SIZE,
-    CommandDecoder,
     decode,
     encode,
     encode_result,
-    EndForceMode,
-    EndToolContact,
-    FtRtdeInputEnable,
-    ResultDecoder,
+    EndForceModeCommand,
+    EndToolContactCommand,
+    FtRtdeInputEnableCommand,
     ScriptCommand,
-    SetFrictionCompensation,
-    SetFrictionScales,
-    SetGravity,
-    SetPayload,
-    SetTargetPayload,
-    SetTcpOffset,
-    SetToolVoltage,
-    StartForceMode,
-    StartToolContact,
-    TcpHold,
+    ScriptCommandDecoder,
+    SetFrictionCompensationCommand,
+    SetFrictionScalesCommand,
+    SetGravityCommand,
+    SetPayloadCommand,
+    SetTargetPayloadCommand,
+    SetTcpOffsetCommand,
+    SetToolVoltageCommand,
+    StartForceModeCommand,
+    StartToolContactCommand,
+    TcpPersistence,
     ToolContactResult,
-    ZeroFtSensor,
+    ToolContactResultDecoder,
+    ZeroFtSensorCommand,
 )
 
 GOLDEN = json.loads((Path(__file__).parent / 'golden' / 'script_commands.json').read_text())
 SENT = [case for case in GOLDEN['cases'] if not case['refused']]
 REFUSED = [case for case in GOLDEN['cases'] if case['refused']]
 CLASSES = {
-    'zero_ftsensor': ZeroFtSensor,
-    'set_payload': SetPayload,
-    'set_tool_voltage': SetToolVoltage,
-    'start_force_mode': StartForceMode,
-    'end_force_mode': EndForceMode,
-    'start_tool_contact': StartToolContact,
-    'end_tool_contact': EndToolContact,
-    'set_friction_compensation': SetFrictionCompensation,
-    'ft_rtde_input_enable': FtRtdeInputEnable,
-    'set_gravity': SetGravity,
-    'set_tcp_offset': SetTcpOffset,
-    'set_friction_scales': SetFrictionScales,
-    'set_target_payload': SetTargetPayload,
+    'zero_ftsensor': ZeroFtSensorCommand,
+    'set_payload': SetPayloadCommand,
+    'set_tool_voltage': SetToolVoltageCommand,
+    'start_force_mode': StartForceModeCommand,
+    'end_force_mode': EndForceModeCommand,
+    'start_tool_contact': StartToolContactCommand,
+    'end_tool_contact': EndToolContactCommand,
+    'set_friction_compensation': SetFrictionCompensationCommand,
+    'ft_rtde_input_enable': FtRtdeInputEnableCommand,
+    'set_gravity': SetGravityCommand,
+    'set_tcp_offset': SetTcpOffsetCommand,
+    'set_friction_scales': SetFrictionScalesCommand,
+    'set_target_payload': SetTargetPayloadCommand,
 }
 #: Our names where they differ from the recorded ones.
 NAMES = {
@@ -115,14 +115,14 @@ FORCE = {'task_frame': SIX, 'selection': (False,) * 6, 'wrench': SIX, 'type': 2,
 @pytest.mark.parametrize(
     ('make', 'text'),
     [
-        (lambda: SetToolVoltage(voltage=5), 'voltage is 5'),
-        (lambda: StartForceMode(**{**FORCE, 'type': 4}), 'type is 4'),
-        (lambda: StartForceMode(**FORCE, damping=1.1), 'damping is 1.1'),
-        (lambda: StartForceMode(**FORCE, gain_scaling=-0.1), 'gain_scaling is -0.1'),
-        (lambda: encode(SetPayload(mass=float('nan'))), 'mass is nan'),
-        (lambda: encode(SetPayload(mass=1.0, cog=(0.0, 3000.0, 0.0))), r'cog\[1\] is 3000'),
+        (lambda: SetToolVoltageCommand(voltage=5), 'voltage is 5'),
+        (lambda: StartForceModeCommand(**{**FORCE, 'type': 4}), 'type is 4'),
+        (lambda: StartForceModeCommand(**FORCE, damping=1.1), 'damping is 1.1'),
+        (lambda: StartForceModeCommand(**FORCE, gain_scaling=-0.1), 'gain_scaling is -0.1'),
+        (lambda: encode(SetPayloadCommand(mass=float('nan'))), 'mass is nan'),
+        (lambda: encode(SetPayloadCommand(mass=1.0, cog=(0.0, 3000.0, 0.0))), r'cog\[1\] is 3000'),
         (
-            lambda: encode(SetFrictionScales(viscous=SIX, coulomb=(float('nan'),) * 6)),
+            lambda: encode(SetFrictionScalesCommand(viscous=SIX, coulomb=(float('nan'),) * 6)),
             r'coulomb\[0\] is nan',
         ),
     ],
@@ -157,15 +157,15 @@ def test_another_size_is_refused(size):
 
 def test_commands_are_read_from_a_stream_in_pieces():
     stream = b''.join(bytes.fromhex(case['hex']) for case in SENT)
-    at_once = CommandDecoder().feed(stream)
-    decoder = CommandDecoder()
+    at_once = ScriptCommandDecoder().feed(stream)
+    decoder = ScriptCommandDecoder()
     assert [c for i in range(len(stream)) for c in decoder.feed(stream[i : i + 1])] == at_once
     assert len(at_once) == len(SENT)
 
 
 @given(st.tuples(*[st.floats(-2147, 2147)] * 6), st.floats(0, 100), st.floats(0, 2147))
 def test_values_come_back_within_half_a_unit(six, mass, time):
-    command = SetTargetPayload(mass=mass, cog=six[:3], inertia=six, transition_time=time)
+    command = SetTargetPayloadCommand(mass=mass, cog=six[:3], inertia=six, transition_time=time)
     back = decode(encode(command))
     assert (back.mass, *back.cog, *back.inertia, back.transition_time) == pytest.approx(
         (mass, *six[:3], *six, time), abs=0.5e-6 + 1e-9, rel=0.0
@@ -177,7 +177,7 @@ def test_random_bytes_raise_nothing_but_a_remote_error(data, command):
     with suppress(RemoteProtocolError):
         decode(struct.pack('>i', command) + data[4:])
     with suppress(RemoteProtocolError):
-        CommandDecoder().feed(data)
+        ScriptCommandDecoder().feed(data)
 
 
 @pytest.mark.parametrize(
@@ -186,16 +186,16 @@ def test_random_bytes_raise_nothing_but_a_remote_error(data, command):
 )
 def test_results_of_a_tool_contact(result, text):
     assert encode_result(result).hex() == text
-    assert ResultDecoder().feed(bytes.fromhex(text) * 2) == [result, result]
+    assert ToolContactResultDecoder().feed(bytes.fromhex(text) * 2) == [result, result]
     with pytest.raises(RemoteProtocolError, match='00000002'):
-        ResultDecoder().feed(b'\0\0\0\2')
+        ToolContactResultDecoder().feed(b'\0\0\0\2')
 
 
-@pytest.mark.parametrize('hold', list(TcpHold))
-def test_a_tcp_says_for_how_long_in_a_word_that_others_do_not_read(hold):
-    plain = encode(SetTcpOffset(offset=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6)))
-    command = SetTcpOffset(offset=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6), hold=hold)
+@pytest.mark.parametrize('persistence', list(TcpPersistence))
+def test_a_tcp_says_for_how_long_in_a_word_that_others_do_not_read(persistence):
+    plain = encode(SetTcpOffsetCommand(offset=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6)))
+    command = SetTcpOffsetCommand(offset=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6), persistence=persistence)
     sent = encode(command)
     assert decode(sent) == command
     assert sent[:28] == plain[:28]
-    assert struct.unpack('>21i', sent[28:]) == (hold, *(0,) * 20)
+    assert struct.unpack('>21i', sent[28:]) == (persistence, *(0,) * 20)

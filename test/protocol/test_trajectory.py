@@ -39,9 +39,9 @@ from ur_cartesian_driver.protocol.trajectory import (
     POINT_FIELDS,
     POINT_SIZE,
     PointField,
-    ResultDecoder,
     SplineKind,
     to_fields,
+    TrajectoryResultDecoder,
 )
 
 GOLDEN = json.loads((Path(__file__).parent / 'golden' / 'trajectory_points.json').read_text())
@@ -301,9 +301,9 @@ def test_the_fields_of_an_output_have_the_places_that_the_robot_program_reads():
                 pin=1,
                 value=0.25,
                 domain=AnalogDomain.VOLTAGE,
-                place=Pose((7.0, 0.0, 0.0)),
-                heading=(0.0, 0.6, 0.8, 0.0, 0.0, 0.0),
-                comes_round=True,
+                trigger_pose=Pose((7.0, 0.0, 0.0)),
+                trigger_direction=(0.0, 0.6, 0.8, 0.0, 0.0, 0.0),
+                starts_beyond=True,
                 delay=4.0,
             )
         ),
@@ -315,8 +315,8 @@ def test_the_fields_of_an_output_have_the_places_that_the_robot_program_reads():
         PointField.OUTPUT_PIN: 1.0,
         PointField.OUTPUT_VALUE: 0.25,
         PointField.OUTPUT_DOMAIN: 1.0,
-        PointField.HAS_PLACE: 1.0,
-        PointField.COMES_ROUND: 1.0,
+        PointField.HAS_TRIGGER_POSE: 1.0,
+        PointField.STARTS_BEYOND: 1.0,
         PointField.DURATION: 4.0,
     }
     assert {place: words[place] / 1e6 for place in places} == places
@@ -394,9 +394,9 @@ PRIMITIVES = st.one_of(
         pin=st.integers(0, 7),
         value=FRACTION,
         domain=st.sampled_from(AnalogDomain),
-        place=st.none() | POSES,
-        heading=vector(1.0),
-        comes_round=st.booleans(),
+        trigger_pose=st.none() | POSES,
+        trigger_direction=vector(1.0),
+        starts_beyond=st.booleans(),
         delay=DURATION,
     ),
 )
@@ -433,14 +433,14 @@ RESULTS = [
 @pytest.mark.parametrize(('result', 'text'), RESULTS)
 def test_results(result, text):
     assert encode_result(result).hex() == text
-    assert ResultDecoder().feed(bytes.fromhex(text)) == [result]
+    assert TrajectoryResultDecoder().feed(bytes.fromhex(text)) == [result]
 
 
 def test_results_glued_together_or_in_pieces_are_all_read():
     """The library loses two results in one segment; a stream has no segments."""
     stream = b''.join(bytes.fromhex(text) for _, text in RESULTS)
-    assert ResultDecoder().feed(stream) == [result for result, _ in RESULTS]
-    decoder = ResultDecoder()
+    assert TrajectoryResultDecoder().feed(stream) == [result for result, _ in RESULTS]
+    decoder = TrajectoryResultDecoder()
     assert [r for i in range(len(stream)) for r in decoder.feed(stream[i : i + 1])] == [
         result for result, _ in RESULTS
     ]
@@ -450,11 +450,11 @@ def test_results_glued_together_or_in_pieces_are_all_read():
 @pytest.mark.parametrize('text', ['00000003', 'ffffffff', '7fffffff'])
 def test_a_number_that_is_no_result_is_refused_with_its_bytes(text):
     with pytest.raises(RemoteProtocolError, match=text):
-        ResultDecoder().feed(bytes.fromhex(text))
+        TrajectoryResultDecoder().feed(bytes.fromhex(text))
 
 
 def test_an_end_inside_a_result_is_an_error():
-    decoder = ResultDecoder()
+    decoder = TrajectoryResultDecoder()
     decoder.feed(b'\x00')
     with pytest.raises(RemoteProtocolError):
         decoder.feed(b'')

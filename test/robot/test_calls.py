@@ -9,8 +9,10 @@ from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.goal import OutputKind
 from ur_cartesian_driver.motion.pose import normalize, Pose
 from ur_cartesian_driver.motion.signals import AnalogDomain
-from ur_cartesian_driver.protocol import dashboard, rtde, script_command
-from ur_cartesian_driver.robot import calls, rtde_inputs
+from ur_cartesian_driver.protocol import dashboard
+import ur_cartesian_driver.protocol.rtde as rtde
+import ur_cartesian_driver.protocol.script_command as script_command
+from ur_cartesian_driver.robot.services import rtde_input_writer, service_calls
 
 any_number = st.floats() | st.floats(-2.0, 2.0)
 three = st.tuples(*[any_number] * 3)
@@ -33,17 +35,17 @@ def frame(writing):
 
 @given(three, four | st.just((0.0, 0.0, 0.0, 1.0)))
 def test_a_tcp_can_be_sent_or_is_refused(position, quaternion):
-    call = made(calls.SetTcp, T_flange_tcp=Pose(position, quaternion))
+    call = made(service_calls.SetTcpCall, T_flange_tcp=Pose(position, quaternion))
     if call is not None:
         pose = Pose(position, normalize(quaternion))
-        script_command.encode(script_command.SetTcpOffset(offset=pose.rotation_vector()))
+        script_command.encode(script_command.SetTcpOffsetCommand(offset=pose.rotation_vector()))
 
 
 @given(any_number | st.floats(0.0, 100.0), three)
 def test_a_payload_can_be_sent_or_is_refused(mass, cog):
-    call = made(calls.SetPayload, mass=mass, cog=cog)
+    call = made(service_calls.SetPayloadCall, mass=mass, cog=cog)
     if call is not None:
-        script_command.encode(script_command.SetPayload(mass=call.mass, cog=call.cog))
+        script_command.encode(script_command.SetPayloadCommand(mass=call.mass, cog=call.cog))
 
 
 @given(
@@ -53,27 +55,27 @@ def test_a_payload_can_be_sent_or_is_refused(mass, cog):
     st.sampled_from(AnalogDomain),
 )
 def test_an_output_can_be_sent_or_is_refused(kind, pin, value, domain):
-    call = made(calls.SetOutput, kind=kind, pin=pin, value=value, domain=domain)
+    call = made(service_calls.SetOutputCall, kind=kind, pin=pin, value=value, domain=domain)
     if call is not None:
-        frame(rtde_inputs.output(call))
+        frame(rtde_input_writer.output_write(call))
 
 
 @given(any_number)
 def test_a_slider_can_be_sent_or_is_refused(fraction):
-    call = made(calls.SetSpeedSlider, fraction=fraction)
+    call = made(service_calls.SetSpeedSliderCall, fraction=fraction)
     assert (call is not None) == (0.0 <= fraction <= 1.0)
     if call is not None:
-        frame(rtde_inputs.speed_slider(call))
+        frame(rtde_input_writer.speed_slider_write(call))
 
 
 @given(st.text() | st.just('x' * 2000))
 def test_a_text_stays_one_line_or_is_refused(text):
     for call in (
-        made(calls.Dashboard, command='load', argument=text),
-        made(calls.DashboardLine, line=text),
+        made(service_calls.DashboardCall, command='load', argument=text),
+        made(service_calls.DashboardLineCall, line=text),
     ):
-        if isinstance(call, calls.Dashboard):
-            sent = dashboard.Request(name=call.command, argument=call.argument).encode()
+        if isinstance(call, service_calls.DashboardCall):
+            sent = dashboard.DashboardRequest(name=call.command, argument=call.argument).encode()
             assert sent.count(b'\n') == 1
         elif call is not None:
             assert dashboard.encode_line(call.line).count(b'\n') == 1

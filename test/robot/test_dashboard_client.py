@@ -9,15 +9,15 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
-from ur_cartesian_driver.protocol.dashboard import SHAPES
+from ur_cartesian_driver.protocol.dashboard import COMMAND_SPECS
 from ur_cartesian_driver.protocol.rtde import ControllerVersion
-from ur_cartesian_driver.robot import dashboard_client
-from ur_cartesian_driver.robot.dashboard_client import (
-    DashboardClient,
-    explain,
-    INSTEAD,
+from ur_cartesian_driver.robot.services import dashboard_connection
+from ur_cartesian_driver.robot.services.dashboard_connection import (
+    DashboardConnection,
+    explain_refusal,
+    REPLACEMENTS,
     TOO_EARLY,
-    why_not_available,
+    unavailable_reason,
 )
 
 
@@ -39,7 +39,7 @@ async def dashboard(*chunks, greeting=b'Connected\n', hang_up=False):
 
     server = await asyncio.start_server(serve, '127.0.0.1', 0)
     async with server:
-        client = DashboardClient('127.0.0.1', server.sockets[0].getsockname()[1])
+        client = DashboardConnection('127.0.0.1', server.sockets[0].getsockname()[1])
         client.asked = asked
         yield client
 
@@ -51,10 +51,10 @@ def run(test):
 def test_an_answer_is_told_from_a_refusal():
     async def test():
         async with dashboard(b'Powering on\n') as client:
-            assert (await client.ask('power on')).ok
+            assert (await client.request('power on')).ok
             assert client.asked == [b'power on\n']
         async with dashboard(b'Failed to execute: power on\n') as client:
-            reply = await client.ask('power on')
+            reply = await client.request('power on')
             assert not reply.ok
             assert reply.text == 'Failed to execute: power on'
 
@@ -64,9 +64,9 @@ def test_an_answer_is_told_from_a_refusal():
 def test_an_answer_in_pieces_is_one():
     async def test():
         async with dashboard(b'Robot', b'mode: RUN', b'NING\n') as client:
-            assert (await client.ask('robotmode')).value == 'RUNNING'
+            assert (await client.request('robotmode')).value == 'RUNNING'
         async with dashboard(b'what', b'ever\n') as client:
-            assert await client.ask_raw('anything') == 'whatever'
+            assert await client.request_raw('anything') == 'whatever'
 
     run(test)
 
@@ -75,18 +75,18 @@ def test_a_dashboard_that_hangs_up_is_named():
     async def test():
         async with dashboard(hang_up=True) as client:
             with pytest.raises(OSError, match=r'127\.0\.0\.1 port \d+ \(dashboard\): the other'):
-                await client.ask('play')
+                await client.request('play')
 
     run(test)
 
 
 def test_a_dashboard_that_says_nothing_does_not_hold_anybody(monkeypatch):
-    monkeypatch.setattr(dashboard_client, 'ANSWER_TIMEOUT', 0.05)
+    monkeypatch.setattr(dashboard_connection, 'ANSWER_TIMEOUT', 0.05)
 
     async def test():
         async with dashboard() as client:
             with pytest.raises(OSError, match='does not answer within'):
-                await client.ask('play')
+                await client.request('play')
 
     run(test)
 
@@ -98,7 +98,7 @@ def test_nobody_there_is_named():
         server.close()
         await server.wait_closed()
         with pytest.raises(OSError, match=f'127.0.0.1 port {port}'):
-            await DashboardClient('127.0.0.1', port).ask('play')
+            await DashboardConnection('127.0.0.1', port).request('play')
 
     run(test)
 
@@ -108,7 +108,7 @@ def test_a_line_without_end_is_an_error_and_not_kept(noise):
     async def test():
         async with dashboard(noise) as client:
             with pytest.raises(ProtocolError, match='longer than 8192'):
-                await client.ask_raw('anything')
+                await client.request_raw('anything')
 
     run(test)
 
@@ -116,7 +116,7 @@ def test_a_line_without_end_is_an_error_and_not_kept(noise):
 def test_requests_at_the_same_time_do_not_mix():
     async def test():
         async with dashboard(b'Robotmode: IDLE\n') as client:
-            replies = await asyncio.gather(*[client.ask('robotmode') for _ in range(5)])
+            replies = await asyncio.gather(*[client.request('robotmode') for _ in range(5)])
             assert [reply.value for reply in replies] == ['IDLE'] * 5
 
     run(test)
@@ -142,13 +142,13 @@ def version(text):
     ],
 )
 def test_software_without_a_command_is_explained(command, software, reason):
-    why = why_not_available(command, version(software))
+    why = unavailable_reason(command, version(software))
     assert bool(why) == bool(reason)
     assert reason in why
 
 
 def test_what_serves_instead_is_said_of_commands_that_exist():
-    assert set(INSTEAD) <= set(SHAPES)
+    assert set(REPLACEMENTS) <= set(COMMAND_SPECS)
 
 
 def robot(**fields):
@@ -174,6 +174,6 @@ STOPPED = robot(safety_mode=SafetyMode.ROBOT_EMERGENCY_STOP)
     ],
 )
 def test_a_refusal_is_explained(command, answer, state, remote, hint):
-    text = explain(command, answer, state, remote)
+    text = explain_refusal(command, answer, state, remote)
     assert answer in text
     assert hint in text

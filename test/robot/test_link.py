@@ -11,7 +11,7 @@ import pytest
 
 from ur_cartesian_driver.motion.state import RobotState, RuntimeState
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.link import NOTEWORTHY, RobotLink
+from ur_cartesian_driver.robot.link import LOG_DELAY, RobotLink
 from ur_cartesian_driver.robot.settings import LinkSettings
 from ur_cartesian_driver.robot.status import DriverStatus
 
@@ -99,9 +99,9 @@ def test_a_program_that_was_told_to_end_takes_no_goal_until_it_has(ur_sim):
     async def run():
         async with listening(ur_sim) as ear:
             await ear.ready()
-            ear.link.set_busy(True)
+            ear.link.set_executing(True)
             ear.link.stop_program('a test')
-            ear.link.set_busy(False)
+            ear.link.set_executing(False)
             assert ear.link.status.state is ConnectionState.CONNECTED
             assert 'told to end' in ear.link.not_ready()
 
@@ -121,7 +121,7 @@ def test_the_log_asks_for_nothing_while_the_program_is_on_its_way(ur_sim):
 def test_the_log_asks_for_a_program_that_does_not_come(ur_sim):
     async def run():
         async with listening(ur_sim, headless=False) as ear:
-            await asyncio.sleep(NOTEWORTHY + 1.0)
+            await asyncio.sleep(LOG_DELAY + 1.0)
         assert (
             logging.INFO,
             'The robot program does not run; play a program with the External '

@@ -9,7 +9,7 @@ from math import nan
 from virtual_network import HOST, VirtualLoop
 
 from ur_cartesian_driver.protocol import primary
-from ur_cartesian_driver.robot.primary_client import PrimaryClient, PrimaryListener
+from ur_cartesian_driver.robot.primary_client import PrimaryCallbacks, PrimaryClient
 
 PORT = 30001
 SIX = (0.0,) * 6
@@ -24,10 +24,10 @@ def told_by(*frames):
             return lambda value: news.append((kind, value))
 
         client = PrimaryClient(
-            PrimaryListener(
+            PrimaryCallbacks(
                 **{
                     kind: note(kind)
-                    for kind in ('configuration', 'geometry', 'error', 'trouble', 'text')
+                    for kind in ('configuration', 'geometry', 'error', 'connection_error', 'text')
                 }
             )
         )
@@ -41,7 +41,7 @@ def told_by(*frames):
             hung_up.set()
 
         await asyncio.start_server(serve, HOST, PORT)
-        holding = asyncio.create_task(client.hold(HOST, PORT))
+        holding = asyncio.create_task(client.stay_connected(HOST, PORT))
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(hung_up.wait(), 0.5)
         holding.cancel()
@@ -58,7 +58,7 @@ def test_kinematics_that_cannot_be_are_refused_with_the_numbers():
         [primary.KinematicsInfo(theta=SIX, a=(nan, *SIX[1:]), d=SIX, alpha=SIX)]
     )
     (kind, text), *_ = told_by(frame)
-    assert kind == 'trouble'
+    assert kind == 'connection_error'
     assert 'impossible kinematics: The column a of a DH table' in text
 
 

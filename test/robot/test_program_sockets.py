@@ -12,13 +12,13 @@ from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.protocol import reverse
 from ur_cartesian_driver.protocol.script_sender import REQUEST
 from ur_cartesian_driver.robot import transport
-from ur_cartesian_driver.robot.program_sockets import ProgramListener, ProgramSockets
+from ur_cartesian_driver.robot.program_sockets import ProgramCallbacks, ProgramSockets
 from ur_cartesian_driver.robot.settings import LinkSettings
 from ur_cartesian_driver.robot.transport import (
-    Complaints,
-    LINES_PERIOD,
-    MOST_LINES,
+    MAX_LINES,
     plain_address,
+    WARNING_PERIOD,
+    WarningLimiter,
 )
 
 HOST = '127.0.0.1'
@@ -35,7 +35,7 @@ class Cell:
             LinkSettings(
                 reverse_port=0, trajectory_port=0, script_command_port=0, script_sender_port=0
             ),
-            ProgramListener(
+            ProgramCallbacks(
                 connected=lambda: tell('connected'),
                 lost=lambda reason: tell(f'lost, {reason}'),
                 result=tell,
@@ -184,7 +184,7 @@ def test_a_flood_of_strangers_is_none_of_lines_and_keeps_the_program():
             for reader in readers:
                 with contextlib.suppress(ConnectionError):
                     assert await asyncio.wait_for(reader.read(), 5.0) == b''
-            assert here.news.qsize() == MOST_LINES
+            assert here.news.qsize() == MAX_LINES
             assert here.sockets._sender.connection is None
 
     asyncio.run(scene())
@@ -192,11 +192,11 @@ def test_a_flood_of_strangers_is_none_of_lines_and_keeps_the_program():
 
 def test_lines_that_were_left_out_are_counted():
     told = []
-    complaints = Complaints(told.append)
-    for i in range(MOST_LINES + 5):
+    complaints = WarningLimiter(told.append)
+    for i in range(MAX_LINES + 5):
         complaints.add(f'call {i}', 1.0)
-    complaints.add('one more', 1.0 + LINES_PERIOD)
-    assert told[:-1] == [f'call {i}' for i in range(MOST_LINES)]
+    complaints.add('one more', 1.0 + WARNING_PERIOD)
+    assert told[:-1] == [f'call {i}' for i in range(MAX_LINES)]
     assert told[-1] == 'one more (5 more lines like this were left out)'
 
 
@@ -241,7 +241,7 @@ def test_a_caller_that_asks_and_does_not_read_is_hung_up_on():
 
 
 def test_a_connection_that_is_closed_does_not_wait_for_a_side_that_does_not_read(monkeypatch):
-    monkeypatch.setattr(transport, 'LINGER', 0.05)
+    monkeypatch.setattr(transport, 'LINGER_TIMEOUT', 0.05)
 
     async def scene():
         async with cell() as here:
@@ -306,7 +306,7 @@ def test_keepalives_are_those_of_what_the_program_does(busy, mode):
     async def scene():
         async with cell() as here:
             reader, _ = (await here.connect())['reverse_port']
-            here.sockets.busy = busy
+            here.sockets.is_executing = busy
             keeping = asyncio.create_task(here.sockets.keep_alive())
             messages = [
                 reverse.ReverseMessage.decode(await reader.readexactly(reverse.MESSAGE_SIZE))
@@ -380,7 +380,7 @@ def test_a_port_that_is_taken_is_named_with_its_parameter():
                     script_command_port=0,
                     script_sender_port=0,
                 ),
-                ProgramListener(connected=list, lost=list, result=list, warning=list),
+                ProgramCallbacks(connected=list, lost=list, result=list, warning=list),
             )
             with pytest.raises(OSError, match='set reverse_port to a free port or to 0'):
                 await other.open(HOST, frozenset())

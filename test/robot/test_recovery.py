@@ -8,11 +8,18 @@ import pytest
 
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.recovery import next_step, POWER, SAFETY, Situation, Step, WORDS
-from ur_cartesian_driver.robot.way_back import COMMANDS
+from ur_cartesian_driver.robot.recovery import (
+    next_step,
+    POWER_STEPS,
+    RecoverySituation,
+    RecoveryStep,
+    SAFETY_STEPS,
+    STEP_NAMES,
+)
+from ur_cartesian_driver.robot.way_back import STEP_COMMANDS
 
 FREE = (SafetyMode.NORMAL, SafetyMode.REDUCED)
-ACTIONS = set(WORDS)
+ACTIONS = set(STEP_NAMES)
 EMERGENCY = [mode for mode in SafetyMode if 'EMERGENCY' in mode.name]
 
 
@@ -24,7 +31,7 @@ def situation(
     runtime=RuntimeState.STOPPED,
     **fields,
 ):
-    return Situation(
+    return RecoverySituation(
         connection=connection,
         message='what is needed',
         robot=RobotState(
@@ -46,7 +53,7 @@ def everything():
         for safety, power, runtime in product(SafetyMode, RobotMode, RuntimeState)
     ]
     situations = (
-        Situation(
+        RecoverySituation(
             connection=connection,
             message='what is needed',
             robot=robot,
@@ -64,8 +71,8 @@ def everything():
 @pytest.mark.slow
 def test_every_situation_has_a_step_and_an_end_has_a_sentence(everything):
     for _, following in everything:
-        assert following.step in Step
-        if following.step in (Step.PERSON, Step.DONE):
+        assert following.step in RecoveryStep
+        if following.step in (RecoveryStep.OPERATOR, RecoveryStep.DONE):
             assert following.text.endswith('.') or following.text == 'what is needed'
 
 
@@ -87,50 +94,59 @@ def test_in_local_control_everything_is_left_to_a_person(everything):
 @pytest.mark.slow
 def test_power_brakes_and_programs_wait_for_the_safety_system(everything):
     done = {following.step for at, following in everything if at.robot.safety_mode not in FREE}
-    assert done & ACTIONS == {Step.UNLOCK, Step.RESTART_SAFETY}
+    assert done & ACTIONS == {RecoveryStep.UNLOCK, RecoveryStep.RESTART_SAFETY}
 
 
 def test_the_tables_know_every_mode():
-    assert set(SAFETY) == set(SafetyMode)
-    assert set(POWER) == set(RobotMode)
+    assert set(SAFETY_STEPS) == set(SafetyMode)
+    assert set(POWER_STEPS) == set(RobotMode)
 
 
 def test_every_step_has_its_command():
-    assert set(COMMANDS) | {Step.SEND_PROGRAM} == ACTIONS
+    assert set(STEP_COMMANDS) | {RecoveryStep.SEND_PROGRAM} == ACTIONS
 
 
 @pytest.mark.parametrize('mode', EMERGENCY, ids=lambda mode: mode.name)
 def test_an_emergency_stop_is_for_a_person(mode):
     following = next_step(situation(safety=mode))
-    assert following.step is Step.PERSON
+    assert following.step is RecoveryStep.OPERATOR
     assert 'release the button' in following.text
 
 
 CASES = {
-    'protective stop': ({'safety': SafetyMode.PROTECTIVE_STOP}, Step.UNLOCK),
-    'violation': ({'safety': SafetyMode.VIOLATION}, Step.RESTART_SAFETY),
-    'fault': ({'safety': SafetyMode.FAULT, 'power': RobotMode.POWER_OFF}, Step.RESTART_SAFETY),
-    'safeguard': ({'safety': SafetyMode.SAFEGUARD_STOP}, Step.PERSON),
-    'power off': ({'power': RobotMode.POWER_OFF}, Step.POWER_ON),
-    'powering up': ({'power': RobotMode.POWER_ON}, Step.WAIT),
-    'idle': ({'power': RobotMode.IDLE}, Step.RELEASE_BRAKES),
-    'hand guided': ({'power': RobotMode.BACKDRIVE}, Step.PERSON),
-    'paused': ({'runtime': RuntimeState.PAUSED, 'program_connected': True}, Step.STOP_PROGRAM),
-    'stopping': ({'runtime': RuntimeState.STOPPING}, Step.WAIT),
-    'foreign program': ({'runtime': RuntimeState.PLAYING}, Step.PERSON),
-    'our program': ({'runtime': RuntimeState.PLAYING, 'program_connected': True}, Step.WAIT),
-    'no program': ({}, Step.SEND_PROGRAM),
-    'no program, not headless': ({'headless': False}, Step.PLAY),
+    'protective stop': ({'safety': SafetyMode.PROTECTIVE_STOP}, RecoveryStep.UNLOCK),
+    'violation': ({'safety': SafetyMode.VIOLATION}, RecoveryStep.RESTART_SAFETY),
+    'fault': (
+        {'safety': SafetyMode.FAULT, 'power': RobotMode.POWER_OFF},
+        RecoveryStep.RESTART_SAFETY,
+    ),
+    'safeguard': ({'safety': SafetyMode.SAFEGUARD_STOP}, RecoveryStep.OPERATOR),
+    'power off': ({'power': RobotMode.POWER_OFF}, RecoveryStep.POWER_ON),
+    'powering up': ({'power': RobotMode.POWER_ON}, RecoveryStep.WAIT),
+    'idle': ({'power': RobotMode.IDLE}, RecoveryStep.RELEASE_BRAKES),
+    'hand guided': ({'power': RobotMode.BACKDRIVE}, RecoveryStep.OPERATOR),
+    'paused': (
+        {'runtime': RuntimeState.PAUSED, 'program_connected': True},
+        RecoveryStep.STOP_PROGRAM,
+    ),
+    'stopping': ({'runtime': RuntimeState.STOPPING}, RecoveryStep.WAIT),
+    'foreign program': ({'runtime': RuntimeState.PLAYING}, RecoveryStep.OPERATOR),
+    'our program': (
+        {'runtime': RuntimeState.PLAYING, 'program_connected': True},
+        RecoveryStep.WAIT,
+    ),
+    'no program': ({}, RecoveryStep.SEND_PROGRAM),
+    'no program, not headless': ({'headless': False}, RecoveryStep.PLAY),
     'a paused goal': (
         {'connection': ConnectionState.EXECUTING, 'runtime': RuntimeState.PAUSED},
-        Step.PERSON,
+        RecoveryStep.OPERATOR,
     ),
     'a goal': (
         {'connection': ConnectionState.EXECUTING, 'runtime': RuntimeState.PLAYING},
-        Step.DONE,
+        RecoveryStep.DONE,
     ),
-    'ready': ({'connection': ConnectionState.READY}, Step.DONE),
-    'a wrong robot': ({'connection': ConnectionState.REFUSED}, Step.PERSON),
+    'ready': ({'connection': ConnectionState.READY}, RecoveryStep.DONE),
+    'a wrong robot': ({'connection': ConnectionState.REFUSED}, RecoveryStep.OPERATOR),
 }
 
 
@@ -141,7 +157,7 @@ def test_the_way_back_step_by_step(fields, step):
 
 @pytest.mark.parametrize('connection', [ConnectionState.DISCONNECTED, ConnectionState.CONNECTING])
 def test_a_robot_that_is_away_is_waited_for(connection):
-    assert next_step(Situation(connection=connection)).step is Step.WAIT
+    assert next_step(RecoverySituation(connection=connection)).step is RecoveryStep.WAIT
 
 
 @pytest.mark.parametrize(
@@ -156,17 +172,17 @@ def test_a_robot_that_is_away_is_waited_for(connection):
 def test_a_robot_that_obeys_gets_there(start):
     """What each step leads to; the way is no longer than the list of all steps."""
     effects = {
-        Step.UNLOCK: {'safety': SafetyMode.NORMAL},
-        Step.RESTART_SAFETY: {'safety': SafetyMode.NORMAL},
-        Step.POWER_ON: {'power': RobotMode.IDLE},
-        Step.RELEASE_BRAKES: {'power': RobotMode.RUNNING},
-        Step.STOP_PROGRAM: {'runtime': RuntimeState.STOPPED},
-        Step.SEND_PROGRAM: {'connection': ConnectionState.READY},
+        RecoveryStep.UNLOCK: {'safety': SafetyMode.NORMAL},
+        RecoveryStep.RESTART_SAFETY: {'safety': SafetyMode.NORMAL},
+        RecoveryStep.POWER_ON: {'power': RobotMode.IDLE},
+        RecoveryStep.RELEASE_BRAKES: {'power': RobotMode.RUNNING},
+        RecoveryStep.STOP_PROGRAM: {'runtime': RuntimeState.STOPPED},
+        RecoveryStep.SEND_PROGRAM: {'connection': ConnectionState.READY},
     }
     now = dict(start)
     for _ in range(len(effects) + 1):
         step = next_step(situation(**now)).step
-        if step is Step.DONE:
+        if step is RecoveryStep.DONE:
             return
         now |= effects[step]
     pytest.fail(f'it goes round in circles at {now}')

@@ -6,22 +6,27 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
-from ur_cartesian_driver.robot.state_recipe import in_order, OPTIONAL, REQUIRED, robot_state
+from ur_cartesian_driver.robot.state_recipe import (
+    in_recipe_order,
+    OPTIONAL_FIELDS,
+    REQUIRED_FIELDS,
+    robot_state_from_rtde,
+)
 
-VECTORS = REQUIRED[1:9]
+VECTORS = REQUIRED_FIELDS[1:9]
 
 
-def values(**changes):
-    found = {name: (0.0,) * 6 for name in REQUIRED[1:10]}
+def values(**mode_changes):
+    found = {name: (0.0,) * 6 for name in REQUIRED_FIELDS[1:10]}
     found |= dict.fromkeys(('timestamp', 'speed_scaling', 'target_speed_fraction'), 1.0)
-    found |= {name: 7 for name in REQUIRED if name not in found}
-    found |= dict.fromkeys(OPTIONAL)
-    found |= changes
-    return in_order(tuple(found), tuple(found.values()))
+    found |= {name: 7 for name in REQUIRED_FIELDS if name not in found}
+    found |= dict.fromkeys(OPTIONAL_FIELDS)
+    found |= mode_changes
+    return in_recipe_order(tuple(found), tuple(found.values()))
 
 
 def test_unknown_modes_are_the_most_careful_ones():
-    state = robot_state(values(robot_mode=99, safety_mode=99, runtime_state=99))
+    state = robot_state_from_rtde(values(robot_mode=99, safety_mode=99, runtime_state=99))
     assert state.robot_mode is RobotMode.NO_CONTROLLER
     assert state.safety_mode is SafetyMode.UNDEFINED_SAFETY_MODE
     assert state.runtime_state is RuntimeState.STOPPED
@@ -33,4 +38,4 @@ def test_a_number_that_is_not_finite_is_nonsense_and_named(name, number):
     """Compared with it no tolerance would ever be violated."""
     wrong = number if name in ('timestamp', 'speed_scaling') else (0.0, number, *(0.0,) * 4)
     with pytest.raises(RemoteProtocolError, match=f'not finite: {name}.'):
-        robot_state(values(**{name: wrong}))
+        robot_state_from_rtde(values(**{name: wrong}))

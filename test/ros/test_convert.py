@@ -26,8 +26,8 @@ from ur_cartesian_driver.msg import (
     MotionSegment,
 )
 from ur_cartesian_driver.planning import check, PlanningOptions
-from ur_cartesian_driver.ros.convert import goal_from_message, placed, seconds
-from ur_cartesian_driver.ros.frames import Frames, Stand
+from ur_cartesian_driver.ros.convert import goal_from_message, resolve_frames, seconds
+from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames
 
 NOW = 1_800_000_000_123_456_789
 
@@ -192,10 +192,10 @@ def test_the_controlled_frame_is_where_its_name_says():
 def test_a_goal_on_the_arm_goes_with_it_until_it_is_planned():
     message = goal(point())
     message.trajectory.header.frame_id = 'tool0'
-    first, then = (Stand(Pose((0.1, 0.2, z)), IDENTITY) for z in (0.3, 0.4))
-    before = converted(message, stand=first)
+    first, then = (ArmSnapshot(Pose((0.1, 0.2, z)), IDENTITY) for z in (0.3, 0.4))
+    before = converted(message, snapshot=first)
     assert before.T_base_frame == first.T_base_flange
-    after = placed(before, message.trajectory, Frames(), now=NOW, stand=then)
+    after = resolve_frames(before, message.trajectory, Frames(), now=NOW, snapshot=then)
     assert after == replace(before, T_base_frame=then.T_base_flange)
 
 

@@ -14,7 +14,7 @@ from ur_cartesian_driver.planning import check, plan, PlanningOptions
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.convert import goal_from_message
-from ur_cartesian_driver.ros.frames import Frames, Stand
+from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames
 
 FOLDER = share_path() / 'config' / 'examples'
 NAMES = sorted(path.stem for path in FOLDER.glob('*.yaml'))
@@ -34,7 +34,7 @@ STATE = RobotState(
 
 def goal_of(name):
     return goal_from_message(
-        load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0, stand=Stand.of(STATE)
+        load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0, snapshot=ArmSnapshot.of(STATE)
     )
 
 
@@ -116,7 +116,7 @@ def test_the_timed_seam_stops_only_above_it_behind_it_and_at_home():
 def test_the_valve_is_open_along_the_bead_and_the_light_comes_at_the_end():
     result = planned('glue')
     outputs = [
-        (segment.waypoint, output.pin, output.value, output.place is not None, output.delay)
+        (segment.waypoint, output.pin, output.value, output.trigger_pose is not None, output.delay)
         for segment in result.segments
         for output in segment.outputs
     ]

@@ -7,11 +7,11 @@ import pytest
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.ros.frames import Frames, Stand, StaticFrame, T_TOOL0_FLANGE
+from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames, StaticFrame, T_TOOL0_FLANGE
 
 T_BASE_FLANGE = Pose((0.4, 0.1, 0.5), quaternion_from_rotation_vector((1.0, 2.0, 0.5)))
 T_FLANGE_TCP = Pose((0.0, 0.02, 0.1), quaternion_from_rotation_vector((0.0, 0.3, 0.0)))
-STAND = Stand(T_BASE_FLANGE, T_FLANGE_TCP)
+SNAPSHOT = ArmSnapshot(T_BASE_FLANGE, T_FLANGE_TCP)
 TOOLS = [
     StaticFrame.parse('tip nozzle 0 0 0.02 0 0 0 1'),
     StaticFrame.parse('nozzle flange 0.1 0 0 0 0 0 1'),
@@ -93,7 +93,7 @@ def test_malformed_static_frames_say_what_is_wrong(texts, sentence):
     ],
 )
 def test_frames_on_the_arm_are_where_it_stands(name, expected):
-    assert_same(Frames('', TOOLS).T_base_frame(name, STAND), expected)
+    assert_same(Frames('', TOOLS).T_base_frame(name, SNAPSHOT), expected)
 
 
 @pytest.mark.parametrize('name', ['tool0', 'flange', 'tool0_controller', 'tip', 'drop'])
@@ -109,7 +109,7 @@ def test_the_stand_is_the_robot_s_own_report():
         T_flange_tcp=T_FLANGE_TCP,
         actual_tcp_pose=T_BASE_FLANGE @ T_FLANGE_TCP,
     )
-    assert_same(Stand.of(state).T_base_flange, T_BASE_FLANGE)
+    assert_same(ArmSnapshot.of(state).T_base_flange, T_BASE_FLANGE)
 
 
 @pytest.mark.parametrize(
@@ -129,7 +129,7 @@ def test_the_active_tcp_is_a_controlled_frame_whatever_it_is(prefix, name):
     ],
 )
 def test_what_is_fixed_behind_the_flange_can_be_controlled(name, expected):
-    T = Frames('', TOOLS).T_flange_frame(name, STAND)
+    T = Frames('', TOOLS).T_flange_frame(name, SNAPSHOT)
     assert T is not None
     assert_same(T, expected)
 
@@ -153,7 +153,7 @@ def test_what_is_behind_a_tcp_that_nobody_knows_is_waited_for():
 )
 def test_what_is_not_behind_the_flange_is_refused_with_the_known_frames(name, sentence):
     with pytest.raises(InvalidGoal, match=sentence):
-        Frames('', TOOLS).T_flange_frame(name, STAND)
+        Frames('', TOOLS).T_flange_frame(name, SNAPSHOT)
 
 
 def test_flange_has_the_axes_of_rep_103():

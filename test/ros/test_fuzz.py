@@ -27,9 +27,14 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.trajectory import encode_points
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.convert import goal_from_message
-from ur_cartesian_driver.ros.frames import Frames, Stand
-from ur_cartesian_driver.ros.parameters import checked, DECLARATIONS, defaults, ParameterError
-from ur_cartesian_driver.ros.services import OTHERS
+from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames
+from ur_cartesian_driver.ros.parameters import (
+    DECLARATIONS,
+    defaults,
+    ParameterError,
+    settings_from,
+)
+from ur_cartesian_driver.ros.services import REQUEST_SERVICES
 from ur_cartesian_driver.sim.config import HOME
 
 ARM = Arm(robot_model('ur5e'))
@@ -118,7 +123,7 @@ def refusal():
 
 
 def test_the_goal_that_is_spoiled_is_sound():
-    goal = goal_from_message(load_goal(GOAL), Frames(), now=NOW, stand=Stand.of(STATE))
+    goal = goal_from_message(load_goal(GOAL), Frames(), now=NOW, snapshot=ArmSnapshot.of(STATE))
     assert len(plan(goal, STATE, ARM, PlanningOptions()).segments) == 2
 
 
@@ -130,7 +135,7 @@ def test_any_goal_is_planned_and_can_be_sent_or_is_refused_with_a_sentence(data)
     message = load_goal(GOAL)
     spoil(message, data)
     with refusal() as refused:
-        goal = goal_from_message(message, Frames(), now=NOW, stand=Stand.of(STATE))
+        goal = goal_from_message(message, Frames(), now=NOW, snapshot=ArmSnapshot.of(STATE))
         made = plan(goal, STATE, ARM, PlanningOptions())
         encode_points(segment.primitive for segment in made.segments)
     if refused:
@@ -142,11 +147,11 @@ def test_any_goal_is_planned_and_can_be_sent_or_is_refused_with_a_sentence(data)
             assert end.distance_to(wanted) < 1e-5, 'not where it was sent to'
 
 
-@pytest.mark.parametrize('name', OTHERS)
+@pytest.mark.parametrize('name', REQUEST_SERVICES)
 @settings(max_examples=15, deadline=None, derandomize=True)
 @given(data=st.data())
 def test_any_request_becomes_a_call_or_is_refused_with_a_sentence(name, data):
-    kind, call_of = OTHERS[name]
+    kind, call_of = REQUEST_SERVICES[name]
     request = kind.Request()
     spoil(request, data)
     with refusal():
@@ -168,5 +173,5 @@ def test_any_parameter_is_taken_or_refused_with_its_name(data):
     }
     value = data.draw(right[kind] | st.one_of(*right.values()))
     with refusal() as refused:
-        checked({declaration.name: value})
+        settings_from({declaration.name: value})
     assert not refused or declaration.name in str(refused[0]), (value, refused)

@@ -13,7 +13,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 from ur_cartesian_driver.ros.reports import duration_message, pose_message
-from ur_cartesian_driver.ros.transforms import Transforms
+from ur_cartesian_driver.ros.transforms import TransformLookup
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 pytestmark = pytest.mark.slow
@@ -50,10 +50,10 @@ class Cell:
         wait_for(lambda: driver.state.T_flange_tcp.distance_to(TCP) < 1e-9)
         server = cell.node.action_server
         server._frames = server._frames.with_transforms(
-            Transforms(StandInBuffer(), LookupError, now=lambda: 0, max_age=1.0)
+            TransformLookup(StandInBuffer(), LookupError, now=lambda: 0, max_age=1.0)
         )
 
-    def stand(self, T_flange_frame):
+    def snapshot(self, T_flange_frame):
         """Return where a frame behind the flange is in base."""
         state = self.cell.sim.state()
         return state.T_base_tcp @ TCP.inverse() @ T_flange_frame
@@ -104,11 +104,11 @@ def test_goals_go_to_where_their_frames_say(named):
         ('table', 'tool0', IDENTITY),
         ('camera', '', TCP),
     ):
-        start, T_base_frame = named.stand(T_flange_frame), frames[frame_id]
+        start, T_base_frame = named.snapshot(T_flange_frame), frames[frame_id]
         x, y, z = start.position
         target = Pose((x, y + 0.02, z), start.quaternion)
         result = named.run(frame_id, controlled, T_base_frame.inverse() @ target)
-        assert same(named.stand(T_flange_frame), target)
+        assert same(named.snapshot(T_flange_frame), target)
         assert any('put back' in line for line in result.report) == bool(controlled)
         last = named.cell.feedback[-1]
         assert last.header.frame_id == frame_id
@@ -135,17 +135,17 @@ def test_a_goal_in_a_frame_of_the_arm_is_a_relative_motion_from_where_it_starts(
         ('tool0', 'tool0', IDENTITY),
         ('tool0_controller', '', TCP),
     ):
-        start = named.stand(T_flange_frame)
+        start = named.snapshot(T_flange_frame)
         named.run(frame_id, controlled, step)
-        assert same(named.stand(T_flange_frame), start @ step)
+        assert same(named.snapshot(T_flange_frame), start @ step)
     # One for later starts from where another one has brought the arm.
     handle = named.cell.send(named.goal('tool0', 'tool0', step, 1.5))
-    start = named.stand(IDENTITY)
+    start = named.snapshot(IDENTITY)
     named.run('base', 'tool0', start @ Pose((0.01, 0.0, 0.0)))
-    start = named.stand(IDENTITY)
+    start = named.snapshot(IDENTITY)
     status, result = named.cell.result(handle)
     assert status == GoalStatus.STATUS_SUCCEEDED, result.error_string
-    assert same(named.stand(IDENTITY), start @ step)
+    assert same(named.snapshot(IDENTITY), start @ step)
 
 
 def test_frames_that_nobody_knows_refuse_and_move_nothing(named):

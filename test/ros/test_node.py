@@ -29,23 +29,23 @@ from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros.client import GoalClient, load_goal
 from ur_cartesian_driver.ros.parameters import ParameterError
-from ur_cartesian_driver.ros.state_publisher import LATCHED, STATE
+from ur_cartesian_driver.ros.state_publisher import LATCHED_QOS, STATE_QOS
 
 pytestmark = pytest.mark.slow
 
 ABORTED = GoalStatus.STATUS_ABORTED
 TOPICS = {
-    'joint_states': (JointState, STATE),
-    'ur_cartesian_driver/tcp_pose': (PoseStamped, STATE),
-    'ur_cartesian_driver/wrench': (WrenchStamped, STATE),
-    'ur_cartesian_driver/io_states': (IOStates, LATCHED),
-    'ur_cartesian_driver/tool_data': (ToolData, LATCHED),
-    'diagnostics': (DiagnosticArray, STATE),
-    'ur_cartesian_driver/speed_scaling': (Float64, STATE),
-    'ur_cartesian_driver/robot_mode': (RobotMode, LATCHED),
-    'ur_cartesian_driver/safety_mode': (SafetyMode, LATCHED),
-    'ur_cartesian_driver/robot_program_running': (Bool, LATCHED),
-    'ur_cartesian_driver/status': (DriverStatus, LATCHED),
+    'joint_states': (JointState, STATE_QOS),
+    'ur_cartesian_driver/tcp_pose': (PoseStamped, STATE_QOS),
+    'ur_cartesian_driver/wrench': (WrenchStamped, STATE_QOS),
+    'ur_cartesian_driver/io_states': (IOStates, LATCHED_QOS),
+    'ur_cartesian_driver/tool_data': (ToolData, LATCHED_QOS),
+    'diagnostics': (DiagnosticArray, STATE_QOS),
+    'ur_cartesian_driver/speed_scaling': (Float64, STATE_QOS),
+    'ur_cartesian_driver/robot_mode': (RobotMode, LATCHED_QOS),
+    'ur_cartesian_driver/safety_mode': (SafetyMode, LATCHED_QOS),
+    'ur_cartesian_driver/robot_program_running': (Bool, LATCHED_QOS),
+    'ur_cartesian_driver/status': (DriverStatus, LATCHED_QOS),
 }
 
 
@@ -146,7 +146,7 @@ def test_prefix_and_namespace_are_in_all_names(no_thread_left, sim, make_cell):
     cell = make_cell(sim, tf_prefix='left_')
     names = []
     cell.client_node.create_subscription(
-        JointState, '/joint_states', lambda message: names.append(list(message.name)), STATE
+        JointState, '/joint_states', lambda message: names.append(list(message.name)), STATE_QOS
     )
     cell.spin_until(lambda: names)
     assert names[0] == [f'left_{name}' for name in JOINT_NAMES]

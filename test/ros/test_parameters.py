@@ -14,11 +14,11 @@ from ur_cartesian_driver.driver import DriverConfig
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.parameters import (
+    as_overrides,
     DECLARATIONS,
-    declare,
+    declare_parameters,
     defaults,
     NodeSettings,
-    overrides,
     ParameterError,
 )
 
@@ -36,11 +36,13 @@ def declared():
             'parameters',
             context=context,
             cli_args=list(arguments),
-            parameter_overrides=overrides(values),
+            parameter_overrides=as_overrides(values),
             automatically_declare_parameters_from_overrides=True,
         )
         try:
-            return declare(node), {name: node.describe_parameter(name) for name in defaults()}
+            return declare_parameters(node), {
+                name: node.describe_parameter(name) for name in defaults()
+            }
         finally:
             node.destroy_node()
 

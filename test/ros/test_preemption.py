@@ -88,7 +88,7 @@ def name(handle):
 
 
 def log(cell):
-    return ' '.join(map(str, cell.sim.controller.announcements.log))
+    return ' '.join(map(str, cell.sim.controller.messages.log))
 
 
 def test_a_newer_goal_takes_the_place_of_the_running_one(cell):

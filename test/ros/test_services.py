@@ -12,7 +12,7 @@ from std_srvs.srv import Trigger
 from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.state import RobotMode
-from ur_cartesian_driver.ros.services import OTHERS
+from ur_cartesian_driver.ros.services import REQUEST_SERVICES
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.srv import (
     Load,
@@ -163,7 +163,7 @@ def test_recover_says_what_it_did_or_what_a_person_must_do(single_cell):
     ],
 )
 def test_nonsense_is_refused_by_a_sentence(name, request_, sentence):
-    _, call_of = OTHERS[name]
+    _, call_of = REQUEST_SERVICES[name]
     with pytest.raises(LocalProtocolError, match=re.escape(sentence)):
         call_of(request_)
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of ``~/servo_target`` and ``~/servo_state``: what they mean, or why not."""
+"""Messages of ``~/live_target`` and ``~/servo_state``: what they mean, or why not."""
 
 from dataclasses import fields, replace
 from math import inf, isfinite, nan
@@ -19,11 +19,11 @@ from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.servo import ServoActivity, ServoReport
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.ros.frames import Frames, Stand, StaticFrame
+from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames, StaticFrame
 from ur_cartesian_driver.ros.servo_topics import (
-    Restraint,
     servo_state_message,
     target_from_message,
+    TargetInhibitor,
 )
 from ur_cartesian_driver.sim.config import HOME
 
@@ -31,7 +31,7 @@ HERE = Arm(robot_model('ur5e')).forward(HOME)
 STATE = RobotState(
     timestamp=0.0, actual_q=HOME, target_q=HOME, actual_tcp_pose=HERE, target_tcp_pose=HERE
 )
-STAND = Stand.of(STATE)
+SNAPSHOT = ArmSnapshot.of(STATE)
 NOW = 1_800_000_000_000_000_000
 FRAMES = Frames('', [StaticFrame.parse('camera tool0 0 0 0.1 0 0 0 1')])
 
@@ -49,8 +49,8 @@ def message(pose=HERE, frame='base', age=None):
     return made
 
 
-def target(made, stand=STAND):
-    return target_from_message(made, FRAMES, stand=stand, now=NOW, max_age=0.2)
+def target(made, snapshot=SNAPSHOT):
+    return target_from_message(made, FRAMES, snapshot=snapshot, now=NOW, max_age=0.2)
 
 
 def test_without_a_stamp_it_is_as_new_as_it_can_be():
@@ -94,7 +94,7 @@ def test_what_is_malformed_is_refused_in_words(what):
 
 def test_a_frame_on_the_arm_needs_the_arm():
     with pytest.raises(RobotNotReady, match='camera'):
-        target(message(frame='camera'), stand=None)
+        target(message(frame='camera'), snapshot=None)
 
 
 def test_what_is_far_away_is_refused_with_the_distance():
@@ -105,12 +105,12 @@ def test_what_is_far_away_is_refused_with_the_distance():
 
 
 def test_after_a_stop_targets_have_to_pause_before_they_are_followed():
-    restraint = Restraint(pause=2.0)
-    assert not restraint.holds(0.0)
-    restraint.impose()
-    assert [restraint.holds(0.1 + i) for i in range(5)] == [True] * 5
-    assert not restraint.holds(6.2), 'none had come for 2 s'
-    assert not restraint.holds(6.3)
+    inhibitor = TargetInhibitor(pause=2.0)
+    assert not inhibitor.blocks(0.0)
+    inhibitor.activate()
+    assert [inhibitor.blocks(0.1 + i) for i in range(5)] == [True] * 5
+    assert not inhibitor.blocks(6.2), 'none had come for 2 s'
+    assert not inhibitor.blocks(6.3)
 
 
 FLOATS = st.sampled_from([nan, inf, -inf, 0.0, -0.0, 1.0, -1.0, 1e-320, 1e-9, 0.7071068, 1e300])

@@ -14,7 +14,11 @@ from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector, rotate
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, SafetyMode
 from ur_cartesian_driver.msg import IOStates, ToolData
-from ur_cartesian_driver.robot.signal_stream import OPTIONAL, REQUIRED, signals
+from ur_cartesian_driver.robot.signal_stream import (
+    OPTIONAL_FIELDS,
+    REQUIRED_FIELDS,
+    signals_from_rtde,
+)
 from ur_cartesian_driver.ros.diagnostics import LEVELS
 from ur_cartesian_driver.ros.reports import joint_state_message
 from ur_cartesian_driver.ros.state_messages import (
@@ -79,20 +83,20 @@ def test_efforts_are_torques_or_missing():
 
 
 def values(**known):
-    return dict.fromkeys(REQUIRED, 0) | known
+    return dict.fromkeys(REQUIRED_FIELDS, 0) | known
 
 
 def test_old_software_reports_what_it_has():
-    message = io_states_message(signals(values()), STAMP)
+    message = io_states_message(signals_from_rtde(values()), STAMP)
     assert not any(message.standard_digital_inputs)
     assert all(map(isnan, message.analog_inputs))
-    assert not set(OPTIONAL) & set(values())
+    assert not set(OPTIONAL_FIELDS) & set(values())
 
 
 @pytest.mark.parametrize('bit', range(18))
 def test_every_digital_channel_has_its_place(bit):
     message = io_states_message(
-        signals(
+        signals_from_rtde(
             values(
                 actual_digital_input_bits=1 << bit,
                 actual_digital_output_bits=(1 << 18) - 1 - (1 << bit),
@@ -117,7 +121,7 @@ def test_every_digital_channel_has_its_place(bit):
 @pytest.mark.parametrize('types', range(16))
 def test_every_analog_channel_has_its_domain(types):
     message = io_states_message(
-        signals(
+        signals_from_rtde(
             values(
                 analog_io_types=types,
                 standard_analog_input0=1.0,
@@ -136,7 +140,7 @@ def test_every_analog_channel_has_its_domain(types):
 
 def test_tool_data_say_what_is_not_known():
     message = tool_data_message(
-        signals(
+        signals_from_rtde(
             values(
                 tool_analog_input_types=2,
                 tool_output_voltage=24,
@@ -152,7 +156,9 @@ def test_tool_data_say_what_is_not_known():
     assert (message.temperature, message.mode) == (31.5, 253)
     assert isnan(message.payload)
     assert isnan(message.payload_center_of_gravity.x)
-    known = tool_data_message(signals(values(payload=1.5, payload_cog=(0.0, 0.0, 0.1))), STAMP)
+    known = tool_data_message(
+        signals_from_rtde(values(payload=1.5, payload_cog=(0.0, 0.0, 0.1))), STAMP
+    )
     assert (known.payload, known.payload_center_of_gravity.z) == (1.5, 0.1)
 
 

@@ -12,11 +12,11 @@ from rclpy.duration import Duration
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.ros import transforms
-from ur_cartesian_driver.ros.frames import Frames, Stand
-from ur_cartesian_driver.ros.transforms import Transforms
+from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames
+from ur_cartesian_driver.ros.transforms import TransformLookup
 
 NOW = 1_800_000_000_000_000_000
-STAND = Stand(Pose((0.4, 0.1, 0.5)), Pose((0.0, 0.0, 0.1)))
+SNAPSHOT = ArmSnapshot(Pose((0.4, 0.1, 0.5)), Pose((0.0, 0.0, 0.1)))
 
 
 class LookupFailed(Exception):
@@ -48,7 +48,7 @@ class StandInBuffer:
 
 def frames(prefix='', **known):
     buffer = StandInBuffer(**known)
-    made = Transforms(buffer, LookupFailed, now=lambda: NOW, max_age=1.0)
+    made = TransformLookup(buffer, LookupFailed, now=lambda: NOW, max_age=1.0)
     return Frames(prefix).with_transforms(made), buffer
 
 
@@ -60,7 +60,7 @@ def test_an_unknown_frame_is_looked_up_from_the_base(prefix, base):
     assert sum(x * x for x in T.quaternion) == pytest.approx(1.0, abs=1e-12)
     ((target, source, at, timeout),) = buffer.asked
     assert (target, source, at) == (base, 'camera', 0)
-    assert timeout == Duration(seconds=transforms.PATIENCE)
+    assert timeout == Duration(seconds=transforms.LOOKUP_TIMEOUT)
 
 
 def test_a_stamp_is_passed_on():
@@ -72,9 +72,9 @@ def test_a_stamp_is_passed_on():
 def test_frames_that_the_driver_knows_are_not_asked_for():
     made, buffer = frames()
     for name in ('', 'base', 'base_link', 'tool0', 'flange', 'tool0_controller'):
-        made.T_base_frame(name, STAND)
+        made.T_base_frame(name, SNAPSHOT)
         if not name.startswith('base'):
-            made.T_flange_frame(name, STAND)
+            made.T_flange_frame(name, SNAPSHOT)
     assert not buffer.asked
 
 
@@ -89,7 +89,7 @@ def test_a_missing_transform_refuses_with_name_reason_and_remedy():
     ):
         made.T_base_frame('moon')
     with pytest.raises(InvalidGoal, match=r'controlled_frame is "moon", and tf2 has no transform'):
-        made.T_flange_frame('moon', STAND)
+        made.T_flange_frame('moon', SNAPSHOT)
 
 
 def test_a_stamp_beyond_what_was_published_refuses():
@@ -121,7 +121,7 @@ def test_a_static_transform_is_never_old():
 
 def test_a_tool_is_fixed_to_the_flange_by_static_transforms():
     made, buffer = frames(gripper=0)
-    T = made.T_flange_frame('gripper', STAND)
+    T = made.T_flange_frame('gripper', SNAPSHOT)
     assert T.position == (0.1, 0.2, 0.3)
     assert buffer.asked[0][:3] == ('tool0', 'gripper', 0)
 
@@ -131,12 +131,12 @@ def test_a_frame_that_moves_against_the_flange_cannot_be_controlled():
     with pytest.raises(
         InvalidGoal, match=(r'controlled_frame is "camera", which is not fixed to "tool0".*static')
     ):
-        made.T_flange_frame('camera', STAND)
+        made.T_flange_frame('camera', SNAPSHOT)
 
 
 def test_without_tf2_nothing_is_listened_to(monkeypatch):
     monkeypatch.setitem(sys.modules, 'tf2_ros', None)  # as if it were not there
-    assert transforms.listen(None, 1.0) is None
+    assert transforms.listen_to_tf(None, 1.0) is None
 
 
 def test_where_tf2_is_installed_it_is_listened_to(monkeypatch):
@@ -154,7 +154,7 @@ def test_where_tf2_is_installed_it_is_listened_to(monkeypatch):
                 type(self).unregistered = True
 
     monkeypatch.setitem(sys.modules, 'tf2_ros', Tf2Ros)
-    made = transforms.listen(None, 1.0)
+    made = transforms.listen_to_tf(None, 1.0)
     made.T_target_source('trajectory.header.frame_id', 'base', 'camera', at=NOW)
     with pytest.raises(InvalidGoal):
         made.T_target_source('trajectory.header.frame_id', 'base', 'moon')

@@ -19,9 +19,9 @@ from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 from ur_cartesian_driver.ros import CartesianDriverNode
-from ur_cartesian_driver.ros.client import load_goal, with_prefix
+from ur_cartesian_driver.ros.client import add_tf_prefix, load_goal
 from ur_cartesian_driver.ros.reports import duration_message, pose_message
-from ur_cartesian_driver.ros.state_publisher import STATE
+from ur_cartesian_driver.ros.state_publisher import STATE_QOS
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 #: The arms, and how far each goes along y [m].
@@ -162,7 +162,7 @@ def check_names(cell):
             JointState,
             f'/{name}/joint_states',
             lambda message, name=name: joints.update({name: message.name}),
-            STATE,
+            STATE_QOS,
         )
     cell.spin_until(lambda: len(joints) == 2)
     assert not set(joints['left']) & set(joints['right'])
@@ -210,9 +210,9 @@ def test_a_goal_file_is_used_for_an_arm_with_a_prefix():
         '{posture_joint_names: [elbow_joint]}}]}, segments: [{via_posture: '
         '{posture_joint_names: [elbow_joint]}}]}'
     )
-    goal = with_prefix(load_goal(text), 'left_')
+    goal = add_tf_prefix(load_goal(text), 'left_')
     assert goal.trajectory.header.frame_id == 'left_base'
     assert goal.trajectory.controlled_frame == 'left_tool0'
     assert goal.trajectory.points[0].posture.posture_joint_names == ['left_elbow_joint']
     assert goal.segments[0].via_posture.posture_joint_names == ['left_elbow_joint']
-    assert with_prefix(load_goal('{}'), 'left_').trajectory.header.frame_id == ''
+    assert add_tf_prefix(load_goal('{}'), 'left_').trajectory.header.frame_id == ''

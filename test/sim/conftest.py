@@ -25,7 +25,7 @@ class Bench:
 
     @property
     def log(self) -> list[str]:
-        return list(self.controller.announcements.log)
+        return list(self.controller.messages.log)
 
     def step(self, cycles: int = 1) -> None:
         for _ in range(cycles):

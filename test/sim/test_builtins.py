@@ -16,9 +16,9 @@ import pytest
 
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.sim.builtins import builtins_of, timeless
+from ur_cartesian_driver.sim.builtins import controller_builtins, refuse_timed_functions
 from ur_cartesian_driver.sim.modes import SafetyEvent
-from ur_cartesian_driver.urscript.values import Pose as ScriptPose
+from ur_cartesian_driver.urscript.values import ScriptPose
 
 HERE = Path(__file__).parent
 PROGRAMS = sorted((HERE / 'programs').rglob('*.script'))
@@ -54,7 +54,7 @@ class World:
         self.bench = bench
         self.peers = bench.controller.sockets.listen(1)
         bench.controller.sockets.poll = self.echo
-        signals = bench.controller.signals
+        signals = bench.controller.io
         signals.digital_in.standard[3] = True
         signals.digital_in.configurable[2] = True
         signals.digital_in.tool[1] = True
@@ -101,7 +101,7 @@ def as_expected(line):
 def test_every_function_is_called_by_a_program_that_says_what_it_does(bench):
     text = ''.join(re.sub(r'#.*', '', path.read_text()) for path in PROGRAMS + CASES)
     called = set(re.findall(r'\b([a-z]\w*)\s*\(', text))
-    assert set(builtins_of(bench.controller)) - called == set()
+    assert set(controller_builtins(bench.controller)) - called == set()
 
 
 def test_there_are_many_programs():
@@ -109,12 +109,12 @@ def test_there_are_many_programs():
 
 
 def test_every_function_that_well_known_programs_call_exists(bench):
-    assert set(USED_BY_OTHERS) - set(builtins_of(bench.controller)) == set()
+    assert set(USED_BY_OTHERS) - set(controller_builtins(bench.controller)) == set()
 
 
 def test_in_a_secondary_program_no_function_takes_time_and_all_keep_their_parameters(bench):
-    primary = builtins_of(bench.controller)
-    secondary = timeless(primary)
+    primary = controller_builtins(bench.controller)
+    secondary = refuse_timed_functions(primary)
     assert set(primary) == set(secondary)
     for name, function in secondary.items():
         assert not inspect.isgeneratorfunction(function)
@@ -142,7 +142,7 @@ def rotation(function, numbers):
 def test_pose_arithmetic_agrees_with_independent_values(bench, case):
     function, expected = case['function'], case['expected']
     arguments = [value(function, i, item) for i, item in enumerate(case['args'])]
-    result = builtins_of(bench.controller)[function](*arguments)
+    result = controller_builtins(bench.controller)[function](*arguments)
     tolerance = case.get('tolerance', 1e-6 if case.get('near_pi') else 1e-8)
     if case.get('near_pi') or case.get('near_gimbal_lock'):
         assert list(result)[:-3] == pytest.approx(expected[:-3], abs=tolerance)

@@ -13,7 +13,7 @@ import time
 import pytest
 
 from ur_cartesian_driver.motion.state import RobotMode, RuntimeState
-from ur_cartesian_driver.protocol.primary import PrimaryDecoder, RobotState, VersionMessage
+from ur_cartesian_driver.protocol.primary import PrimaryDecoder, RobotStateFrame, VersionMessage
 from ur_cartesian_driver.protocol.realtime import RealtimeData, RealtimeDecoder
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.config import HOME
@@ -94,7 +94,7 @@ def test_the_secondary_interface_sends_version_and_states_but_no_messages(robot)
         while len(frames) < 6:
             frames += decoder.feed(connection.recv(65536))
     assert isinstance(frames[0], VersionMessage)
-    assert {type(frame) for frame in frames[1:]} == {RobotState}
+    assert {type(frame) for frame in frames[1:]} == {RobotStateFrame}
     assert 'hello' in robot.state().messages
 
 

@@ -13,7 +13,7 @@ from ur_cartesian_driver.sim.config import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.dashboard_session import COMMANDS, DashboardSession
 from ur_cartesian_driver.sim.modes import SafetyEvent
-from ur_cartesian_driver.sim.server import Hangup
+from ur_cartesian_driver.sim.server import HangUp
 
 #: Command, the answer that the manufacturer's client library wants, and the minor versions of
 #: PolyScope 3 and 5 from which on that library sends it; None: in none.
@@ -77,7 +77,7 @@ class Desk:
     def ask(self, line: str) -> str:
         try:
             answer = self.session.feed(line.encode() + b'\n').decode()
-        except Hangup as hangup:
+        except HangUp as hangup:
             answer = hangup.farewell.decode()
         assert answer.count('\n') == 1
         return answer.removesuffix('\n')

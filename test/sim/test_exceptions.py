@@ -85,7 +85,7 @@ RUNTIME_EXCEPTIONS = {
 def messages(bench, program):
     bench.programs.submit(program)
     bench.step(30)
-    return bench.controller.announcements.take()
+    return bench.controller.messages.take()
 
 
 @pytest.mark.parametrize('case', COMPILE_ERRORS)
@@ -112,7 +112,7 @@ def test_a_runtime_exception_stands_between_start_and_stop(bench, case):
 def test_an_exception_of_a_secondary_program_leaves_the_primary_one_running(bench):
     bench.start('while True:\nsync()\nend')
     bench.step(2)
-    bench.controller.announcements.take()
+    bench.controller.messages.take()
     (message,) = messages(bench, 'sec s():\n  a = 1 / 0\nend\n')
     assert isinstance(message, KeyMessage)
     assert message.title == 'SECONDARY_PROGRAM_EXCEPTION_XXX'

@@ -9,69 +9,85 @@ import pytest
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.fault_text import parse_fault
 from ur_cartesian_driver.sim.faults import (
-    Action,
-    After,
-    Crossing,
-    Delay,
-    Deviation,
-    Drop,
-    Event,
-    ForeignMotion,
-    Garbage,
-    HalfOpen,
-    Silence,
-    Slider,
-    Throttle,
-    Travelled,
+    AfterDistance,
+    AfterTime,
+    DelayFault,
+    DeviationFault,
+    DropFault,
+    EventFault,
+    FaultEvent,
+    ForeignMotionFault,
+    GarbageFault,
+    HalfOpenFault,
+    PlaneCrossing,
+    SilenceFault,
+    SpeedSliderFault,
+    ThrottleFault,
 )
 
 
 @pytest.mark.parametrize(
     ('text', 'fault'),
     [
-        ('protective_stop at 2 s', Event(action=Action.PROTECTIVE_STOP, when=After(2.0))),
-        ('protective_stop at 0.35 m', Event(action=Action.PROTECTIVE_STOP, when=Travelled(0.35))),
+        (
+            'protective_stop at 2 s',
+            EventFault(action=FaultEvent.PROTECTIVE_STOP, trigger=AfterTime(2.0)),
+        ),
+        (
+            'protective_stop at 0.35 m',
+            EventFault(action=FaultEvent.PROTECTIVE_STOP, trigger=AfterDistance(0.35)),
+        ),
         (
             'emergency_stop at z = -0.3 m',
-            Event(action=Action.EMERGENCY_STOP, when=Crossing('z', -0.3)),
+            EventFault(action=FaultEvent.EMERGENCY_STOP, trigger=PlaneCrossing('z', -0.3)),
         ),
-        ('stop', Event(action=Action.STOP)),
-        ('unlock at 7s', Event(action=Action.UNLOCK, when=After(7.0))),
-        ('play at x=.5', Event(action=Action.PLAY, when=Crossing('x', 0.5))),
-        ('slider 0.3 at 1 s', Slider(fraction=0.3, when=After(1.0))),
-        ('foreign_motion z 0.05 at 1 s', ForeignMotion(axis='z', distance=0.05, when=After(1.0))),
+        ('stop', EventFault(action=FaultEvent.STOP)),
+        ('unlock at 7s', EventFault(action=FaultEvent.UNLOCK, trigger=AfterTime(7.0))),
+        ('play at x=.5', EventFault(action=FaultEvent.PLAY, trigger=PlaneCrossing('x', 0.5))),
+        ('slider 0.3 at 1 s', SpeedSliderFault(fraction=0.3, trigger=AfterTime(1.0))),
+        (
+            'foreign_motion z 0.05 at 1 s',
+            ForeignMotionFault(axis='z', distance=0.05, trigger=AfterTime(1.0)),
+        ),
         (
             'offset pose x 0.002 at 1 s for 2 s',
-            Deviation(
+            DeviationFault(
                 quantity='pose',
                 axis='x',
                 shape='offset',
                 amount=0.002,
-                when=After(1.0),
+                trigger=AfterTime(1.0),
                 duration=2.0,
             ),
         ),
         (
             'ramp twist rz -1e-3',
-            Deviation(quantity='twist', axis='rz', shape='ramp', amount=-1e-3),
+            DeviationFault(quantity='twist', axis='rz', shape='ramp', amount=-1e-3),
         ),
         (
             'noise acceleration y 0.1 at 0.2 m',
-            Deviation(
-                quantity='acceleration', axis='y', shape='noise', amount=0.1, when=Travelled(0.2)
+            DeviationFault(
+                quantity='acceleration',
+                axis='y',
+                shape='noise',
+                amount=0.1,
+                trigger=AfterDistance(0.2),
             ),
         ),
-        ('drop rtde at 5 s', Drop(interface='rtde', when=After(5.0))),
-        ('drop rtde at 5 s for 2 s', Drop(interface='rtde', when=After(5.0), duration=2.0)),
-        ('half_open primary', HalfOpen(interface='primary')),
-        ('silence dashboard for 1.5 s', Silence(interface='dashboard', duration=1.5)),
-        ('delay sockets 0.1 s', Delay(interface='sockets', seconds=0.1)),
+        ('drop rtde at 5 s', DropFault(interface='rtde', trigger=AfterTime(5.0))),
+        (
+            'drop rtde at 5 s for 2 s',
+            DropFault(interface='rtde', trigger=AfterTime(5.0), duration=2.0),
+        ),
+        ('half_open primary', HalfOpenFault(interface='primary')),
+        ('silence dashboard for 1.5 s', SilenceFault(interface='dashboard', duration=1.5)),
+        ('delay sockets 0.1 s', DelayFault(interface='sockets', seconds=0.1)),
         (
             'throttle primary 1000 at 1 s',
-            Throttle(interface='primary', rate=1000.0, when=After(1.0)),
+            ThrottleFault(interface='primary', rate=1000.0, trigger=AfterTime(1.0)),
         ),
-        ('garbage rtde', Garbage(interface='rtde')),
-        ('garbage rtde 8 at 1 s', Garbage(interface='rtde', size=8, when=After(1.0))),
+        ('garbage rtde', GarbageFault(interface='rtde')),
+        ('garbage rtde 8 at 1 s', GarbageFault(interface='rtde', size=8, trigger=AfterTime(1.0))),
     ],
 )
 def test_a_fault_can_be_written_in_words(text, fault):

@@ -14,12 +14,12 @@ from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.sim import Controller, MemorySockets, SimulatorConfig
 from ur_cartesian_driver.sim.fault_text import parse_fault
 from ur_cartesian_driver.sim.faults import (
-    AXES,
-    Deviation,
+    DEVIATION_AXES,
+    DeviationFault,
 )
-from ur_cartesian_driver.sim.faulty_sockets import FaultySockets
-from ur_cartesian_driver.sim.impairment import Hampered, Impairment, Line
-from ur_cartesian_driver.sim.outputs import getter
+from ur_cartesian_driver.sim.faulty_sockets import ImpairedSockets
+from ur_cartesian_driver.sim.impairment import DelayLine, ImpairedConnection, Impairment
+from ur_cartesian_driver.sim.outputs import output_getter
 from ur_cartesian_driver.sim.rtde_session import RtdeSession
 
 UP = 'movel(pose_add(get_target_tcp_pose(), p[0, 0, 0.2, 0, 0, 0]), a=1, v=0.1)'
@@ -164,7 +164,7 @@ def test_a_foreign_motion_takes_the_arm_away_and_replaces_the_program(bench, axi
 
 
 def read(bench, output):
-    return getter(output, 0)(bench.controller)
+    return output_getter(output, 0)(bench.controller)
 
 
 def error_of_pose(bench):
@@ -186,7 +186,7 @@ def error_of(bench, quantity):
     ]
 
 
-@pytest.mark.parametrize('axis', AXES)
+@pytest.mark.parametrize('axis', DEVIATION_AXES)
 @pytest.mark.parametrize('quantity', ['pose', 'twist', 'acceleration'])
 def test_an_offset_shows_on_its_axis_alone_while_the_arm_moves(bench, quantity, axis):
     bench.start(UP)
@@ -195,7 +195,7 @@ def test_an_offset_shows_on_its_axis_alone_while_the_arm_moves(bench, quantity, 
     assert error_of(bench, quantity) == pytest.approx([0.0] * 6, abs=1e-12)
     bench.wait(0.2)
     assert error_of(bench, quantity) == pytest.approx(
-        [0.003 if other == axis else 0.0 for other in AXES], abs=1e-9
+        [0.003 if other == axis else 0.0 for other in DEVIATION_AXES], abs=1e-9
     )
     bench.wait(0.2)
     assert error_of(bench, quantity) == pytest.approx([0.0] * 6, abs=1e-12)
@@ -257,7 +257,7 @@ def noisy_packages(seed=0, cycles=200):
     """The bytes that an RTDE client gets from a robot with noise."""
     controller = Controller(SimulatorConfig())
     controller.faults.add(
-        Deviation(quantity='pose', axis='x', shape='noise', amount=1e-3, seed=seed)
+        DeviationFault(quantity='pose', axis='x', shape='noise', amount=1e-3, seed=seed)
     )
     session = RtdeSession(controller, set())
     for request in (VERSION_2, setup_outputs('actual_TCP_pose', 'actual_q'), START):
@@ -288,32 +288,36 @@ def test_noise_has_the_deviation_that_was_asked_for(bench):
 
 
 def test_a_line_lets_a_piece_go_when_it_is_due_and_keeps_the_order():
-    line = Line(0.0)
+    line = DelayLine(0.0)
     line.put(b'late', 2.0)
     line.put(b'early', 1.0)
     assert [line.take(t) for t in (0.5, 1.5, 2.0, 3.0)] == [b'', b'', b'lateearly', b'']
 
 
 def test_a_throttled_line_trickles_at_its_rate():
-    line = Line(0.0)
+    line = DelayLine(0.0)
     line.put(bytes(100), 0.0)
     sizes = [len(line.take(0.125 * i, rate=40.0)) for i in range(1, 31)]
     assert sizes == [5] * 20 + [0] * 10
 
 
 def test_what_was_not_used_of_a_rate_is_not_saved():
-    line = Line(0.0)
+    line = DelayLine(0.0)
     line.take(10.0, rate=40.0)
     line.put(bytes(100), 10.0)
     assert len(line.take(10.125, rate=40.0)) == 5
 
 
 def test_a_cured_connection_lets_everything_go_at_once():
-    hampered = Hampered(Impairment(delay=5.0), now=0.0)
-    hampered.say(b'out', 0.0)
-    hampered.hear(b'in', 0.0)
-    hampered.impairment = None
-    assert (hampered.said(0.1), hampered.heard(0.1), hampered.over) == (b'out', b'in', True)
+    impaired = ImpairedConnection(Impairment(delay=5.0), now=0.0)
+    impaired.queue_outgoing(b'out', 0.0)
+    impaired.queue_incoming(b'in', 0.0)
+    impaired.impairment = None
+    assert (impaired.due_outgoing(0.1), impaired.due_incoming(0.1), impaired.is_over) == (
+        b'out',
+        b'in',
+        True,
+    )
 
 
 # --- Sockets of programs, in memory ----------------------------------------------------------
@@ -335,7 +339,7 @@ ECHO = """
 def talk(bench):
     """A program that talks to us, in memory: the bench and our end of the connection."""
     memory = MemorySockets()
-    bench.controller = controller = Controller(SimulatorConfig(), FaultySockets(memory))
+    bench.controller = controller = Controller(SimulatorConfig(), ImpairedSockets(memory))
     bench.programs = controller.programs
     controller.faults.interfaces['sockets'] = controller.sockets
     accepted = memory.listen(50001)

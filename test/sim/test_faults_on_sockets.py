@@ -14,9 +14,9 @@ from rtde_requests import setup_outputs, START, VERSION_2
 from ur_cartesian_driver.motion.state import SafetyMode
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.faults import (
-    Garbage,
-    HalfOpen,
-    Slider,
+    GarbageFault,
+    HalfOpenFault,
+    SpeedSliderFault,
 )
 
 
@@ -109,7 +109,7 @@ def test_a_port_that_is_dropped_for_a_time_hangs_up_on_callers(robot, connect):
 def test_a_half_open_connection_is_silent_and_open_while_new_ones_work(robot, connect):
     old = connect(robot.ports.dashboard)
     old.line()
-    robot.inject(HalfOpen(interface='dashboard'))
+    robot.inject(HalfOpenFault(interface='dashboard'))
     passes(robot, 0.1)
     old.socket.sendall(b'robotmode\n')
     assert connect(robot.ports.dashboard).line()
@@ -177,7 +177,7 @@ def test_garbage_comes_out_of_every_port(robot, connect, interface):
     if interface == 'rtde':
         client.socket.sendall(VERSION_2)
     client.some()  # it has been accepted
-    robot.inject(Garbage(interface=interface, size=3000, seed=1))
+    robot.inject(GarbageFault(interface=interface, size=3000, seed=1))
     wanted, data = Random(1).randbytes(3000), b''
     while wanted not in data:
         data += client.some()
@@ -188,7 +188,7 @@ def test_a_client_of_a_throttled_port_that_gets_too_far_behind_is_dropped(robot,
     client.some()
     robot.inject('throttle primary 1')
     for _ in range(3):
-        robot.inject(Garbage(interface='primary', size=500_000))
+        robot.inject(GarbageFault(interface='primary', size=500_000))
         passes(robot, 0.01)
     assert client.is_closed()
 
@@ -208,7 +208,9 @@ def test_a_flood_into_a_throttled_port_is_left_to_the_client(robot, connect):
         flood()
 
 
-@pytest.mark.ur_sim(rate=20.0, faults=['protective_stop at 0.5 s', Slider(fraction=0.25)])
+@pytest.mark.ur_sim(
+    rate=20.0, faults=['protective_stop at 0.5 s', SpeedSliderFault(fraction=0.25)]
+)
 def test_the_fixture_takes_faults(ur_sim):
     while ur_sim.state().safety_mode is not SafetyMode.PROTECTIVE_STOP:
         pass

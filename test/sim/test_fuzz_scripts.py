@@ -20,7 +20,7 @@ from typing import Any
 import pytest
 
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.sim.builtins import builtins_of
+from ur_cartesian_driver.sim.builtins import controller_builtins
 
 HERE = Path(__file__).parent
 REAL = sorted(
@@ -179,7 +179,7 @@ def mutated(random: Random, text: str) -> str:
 
 def answers(bench, text):
     """Run a program for a while; return what the controller said about it."""
-    bench.controller.announcements.take()
+    bench.controller.messages.take()
     said = len(bench.log)
     begin = time.monotonic()
     bench.programs.submit(text)
@@ -189,7 +189,7 @@ def answers(bench, text):
         bench.step()
         assert time.monotonic() - begin < HUNG, f'a cycle hung:\n{text}'
     bench.programs.stop()
-    frames = list(bench.controller.announcements.take())
+    frames = list(bench.controller.messages.take())
     bench.until(lambda: bench.programs.state is RuntimeState.STOPPED)
     return bench.log[said:], frames
 
@@ -205,7 +205,7 @@ def check(bench, text):
 @pytest.mark.parametrize('seed', SEEDS)
 def test_a_random_program_gets_an_answer(make_bench, seed):
     random, bench = Random(seed), make_bench()
-    grammar = Grammar(random, builtins_of(bench.controller))
+    grammar = Grammar(random, controller_builtins(bench.controller))
     for _ in range(10):
         check(bench, grammar.program())
 
@@ -245,7 +245,7 @@ def test_a_program_that_wants_too_much_gets_an_answer(bench, body):
 @pytest.mark.parametrize('seed', SEEDS)
 def test_a_function_with_odd_arguments_gets_an_answer(make_bench, seed):
     random, bench = Random(seed), make_bench()
-    grammar = Grammar(random, builtins_of(bench.controller))
+    grammar = Grammar(random, controller_builtins(bench.controller))
     for name in random.sample(grammar.names, 40):
         count = random.randint(*number_of_arguments(grammar.functions[name]))
         arguments = ', '.join(random.choice(CONSTANTS) for _ in range(count))

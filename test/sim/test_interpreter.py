@@ -8,7 +8,7 @@ import pytest
 
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.sim.config import SimulatorConfig
-from ur_cartesian_driver.sim.interpreter import MOST_WAITING
+from ur_cartesian_driver.sim.interpreter import MAX_QUEUED_STATEMENTS
 from ur_cartesian_driver.sim.interpreter_session import InterpreterSession
 from ur_cartesian_driver.sim.robot import SimulatedRobot
 
@@ -256,9 +256,11 @@ def test_numbers_begin_again_with_the_next_program(bench, client):
 
 
 def test_too_many_statements_are_discarded(client):
-    answers = client.say('sleep(10)', *['n = 1'] * MOST_WAITING)
-    assert answers[-2].startswith(f'ack: {MOST_WAITING}:')
-    assert answers[-1].startswith(f'discard: more than {MOST_WAITING} statements are waiting')
+    answers = client.say('sleep(10)', *['n = 1'] * MAX_QUEUED_STATEMENTS)
+    assert answers[-2].startswith(f'ack: {MAX_QUEUED_STATEMENTS}:')
+    assert answers[-1].startswith(
+        f'discard: more than {MAX_QUEUED_STATEMENTS} statements are waiting'
+    )
 
 
 def test_empty_lines_are_no_statements(client):

@@ -14,9 +14,7 @@ LONG_LINE = 'movel(pose_trans(get_actual_tcp_pose(), p[0, 0, 0.1, 0, 0, 0]), a=0
 
 
 def keys(bench):
-    return [
-        (m.title, m.text) for m in bench.controller.announcements.pending if hasattr(m, 'title')
-    ]
+    return [(m.title, m.text) for m in bench.controller.messages.pending if hasattr(m, 'title')]
 
 
 def test_a_program_announces_its_start_and_its_end_by_name(bench):

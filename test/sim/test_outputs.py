@@ -12,7 +12,7 @@ import pytest
 
 from ur_cartesian_driver.protocol.rtde_fields import DataType
 from ur_cartesian_driver.sim.modes import SafetyEvent
-from ur_cartesian_driver.sim.outputs import getter
+from ur_cartesian_driver.sim.outputs import output_getter
 
 #: All names with their types, from the manufacturer's client library.
 NAMES = json.loads((Path(__file__).parent / 'golden' / 'rtde_outputs.json').read_text())
@@ -24,7 +24,7 @@ def zero(name):
 
 
 def read(bench, name):
-    value = getter(name, zero(name))(bench.controller)
+    value = output_getter(name, zero(name))(bench.controller)
     return np.array(value) if isinstance(value, tuple) else value
 
 

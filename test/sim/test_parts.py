@@ -13,9 +13,20 @@ import pytest
 from ur_cartesian_driver.motion.state import RobotMode, SafetyMode
 from ur_cartesian_driver.sim.clock import RealClock
 from ur_cartesian_driver.sim.config import SimulatorConfig
-from ur_cartesian_driver.sim.modes import Power, SAFETY, Safety, SafetyEvent, STATUS_BITS
-from ur_cartesian_driver.sim.script_commands import execute
-from ur_cartesian_driver.sim.uploads import Line, ProgramText, TooLong, Uploads
+from ur_cartesian_driver.sim.modes import (
+    ArmPower,
+    SAFETY_TRANSITIONS,
+    SafetyEvent,
+    SafetySystem,
+    STATUS_BITS,
+)
+from ur_cartesian_driver.sim.script_commands import execute_command
+from ur_cartesian_driver.sim.uploads import (
+    UploadDecoder,
+    UploadedLine,
+    UploadedProgram,
+    UploadTooLong,
+)
 from ur_cartesian_driver.sim.watchdog import Watchdogs
 
 STREAM = (
@@ -23,16 +34,16 @@ STREAM = (
     b'sec s():\n  sync()\nend\nset speed 0.5\n'
 )
 ITEMS = [
-    Line('power on'),
-    ProgramText('def a():\n\tif True:\n\t\tb = "end"\n\tend\n# c\nend\n'),
-    ProgramText('sec s():\n  sync()\nend\n'),
-    Line('set speed 0.5'),
+    UploadedLine('power on'),
+    UploadedProgram('def a():\n\tif True:\n\t\tb = "end"\n\tend\n# c\nend\n'),
+    UploadedProgram('sec s():\n  sync()\nend\n'),
+    UploadedLine('set speed 0.5'),
 ]
 
 
 @given(st.lists(st.integers(0, len(STREAM)), max_size=8))
 def test_it_does_not_matter_how_a_stream_is_cut(cuts):
-    uploads, items = Uploads(), []
+    uploads, items = UploadDecoder(), []
     edges = [0, *sorted(cuts), len(STREAM)]
     for start, end in itertools.pairwise(edges):
         items += uploads.feed(STREAM[start:end])
@@ -40,34 +51,36 @@ def test_it_does_not_matter_how_a_stream_is_cut(cuts):
 
 
 def test_a_program_without_end_is_not_collected_for_ever():
-    uploads = Uploads()
+    uploads = UploadDecoder()
     uploads.feed(b'def a():\n' + (b'  ' + b'x' * 2**20 + b'\n') * 15)
-    with pytest.raises(TooLong):
+    with pytest.raises(UploadTooLong):
         uploads.feed(b'x' * 2**20)
 
 
 def test_one_line_blocks_in_a_program_count_once():
     text = b'def a():\n  if True: sync() end\n  while False: sync() end\nend\n'
-    assert Uploads().feed(text) == [ProgramText(text.decode())]
+    assert UploadDecoder().feed(text) == [UploadedProgram(text.decode())]
 
 
 @pytest.mark.parametrize('mode', list(SafetyMode))
 @pytest.mark.parametrize('event', list(SafetyEvent))
 def test_each_safety_event_in_each_mode_is_in_the_table_or_refused(mode, event):
-    safety = Safety(unlock_delay=0.0)
+    safety = SafetySystem(unlock_delay=0.0)
     safety.mode = mode
     refusal = safety.step(event, now=100.0)
-    target = SAFETY.get(mode, {}).get(event)
+    target = SAFETY_TRANSITIONS.get(mode, {}).get(event)
     assert bool(refusal) is (target is None)
     assert safety.mode is (target or mode)
 
 
 def test_every_mode_that_can_be_reached_has_status_bits():
-    assert {mode for row in SAFETY.values() for mode in row.values()} <= set(STATUS_BITS)
+    assert {mode for row in SAFETY_TRANSITIONS.values() for mode in row.values()} <= set(
+        STATUS_BITS
+    )
 
 
 def test_unlocking_is_refused_for_the_delay_exactly():
-    safety = Safety(unlock_delay=5.0)
+    safety = SafetySystem(unlock_delay=5.0)
     safety.step(SafetyEvent.PROTECTIVE_STOP, now=10.0)
     assert 'wait another 0.1 s' in safety.step(SafetyEvent.UNLOCK, now=14.9)
     assert safety.step(SafetyEvent.UNLOCK, now=15.0) == ''
@@ -84,7 +97,7 @@ def test_unlocking_is_refused_for_the_delay_exactly():
     ],
 )
 def test_power_goes_as_far_as_the_command_says_and_no_farther(command, before, after):
-    power = Power(before, power_on_time=1.0, brake_release_time=1.0)
+    power = ArmPower(before, power_on_time=1.0, brake_release_time=1.0)
     getattr(power, command)(now=100.0)
     for now in range(100, 120):
         power.step(float(now))
@@ -92,7 +105,7 @@ def test_power_goes_as_far_as_the_command_says_and_no_farther(command, before, a
 
 
 def test_a_second_command_does_not_begin_the_way_again():
-    power = Power(RobotMode.POWER_OFF, power_on_time=1.0, brake_release_time=1.0)
+    power = ArmPower(RobotMode.POWER_OFF, power_on_time=1.0, brake_release_time=1.0)
     for tenth in range(25):  # a client repeats its command until it sees the effect
         power.on(tenth / 10)
         power.step(tenth / 10)
@@ -151,7 +164,7 @@ def test_the_generation_decides_the_cycle_and_the_software(model, cycle, version
     ],
 )
 def test_the_script_port_takes_commands(bench, line, mode):
-    execute(bench.controller, Line(line))
+    execute_command(bench.controller, UploadedLine(line))
     bench.wait(2.0)
     assert bench.controller.power.mode is mode
 
@@ -160,14 +173,14 @@ def test_the_script_port_can_stop_pause_and_resume(bench):
     bench.start('while True:\n  sync()\nend')
     states = []
     for line in ('pause program', 'resume program', 'stop program', 'halt'):
-        execute(bench.controller, Line(line))
+        execute_command(bench.controller, UploadedLine(line))
         bench.wait(0.1)
         states.append(bench.programs.state.name)
     assert states == ['PAUSED', 'PLAYING', 'STOPPED', 'STOPPED']
 
 
 def test_an_error_in_a_bare_line_is_in_its_first_line(bench):
-    execute(bench.controller, Line('nonsense(1)'))
+    execute_command(bench.controller, UploadedLine('nonsense(1)'))
     assert bench.log == ['1:1: compile_error_name_not_found:nonsense:']
 
 

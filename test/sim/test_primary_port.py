@@ -17,7 +17,7 @@ from ur_cartesian_driver.protocol.primary import (
     KeyMessage,
     KinematicsInfo,
     RobotModeData,
-    RobotState,
+    RobotStateFrame,
     RuntimeExceptionMessage,
     SafetyModeMessage,
     TextMessage,
@@ -32,7 +32,7 @@ def test_each_primary_client_gets_the_version_first_then_states(robot):
             version = wire.next()
             assert isinstance(version, VersionMessage)
             assert (version.major, version.minor) == (5, 21)
-            packages = {type(p): p for p in wire.await_(RobotState).packages}
+            packages = {type(p): p for p in wire.await_(RobotStateFrame).packages}
     assert packages[RobotModeData].robot_mode == 7
     assert packages[ConfigurationData].robot_type == 1
     assert packages[KinematicsInfo].a == pytest.approx((0, -0.425, -0.3922, 0, 0, 0))

@@ -14,7 +14,7 @@ import re
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.inverse import nearest, nearest_in
+from ur_cartesian_driver.kinematics.inverse import nearest, nearest_to_posture
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import (
     GoalRefused,
@@ -219,7 +219,9 @@ def blind(case, point, q, arm):
     # What a posture means is no question of looking ahead.
     near = (
         waypoint.posture
-        and nearest_in(arm, waypoint.pose @ case.T_flange_tcp.inverse(), _named(waypoint), q)
+        and nearest_to_posture(
+            arm, waypoint.pose @ case.T_flange_tcp.inverse(), _named(waypoint), q
+        )
     ) or q
     match segment.type:
         case SegmentType.JOINT:
@@ -255,7 +257,7 @@ def _missed(case, point, q, arm, run) -> str:
     if not named:
         return ''
     end = run.pose @ case.T_flange_tcp.inverse()
-    chosen = nearest_in(arm, end, named, q)
+    chosen = nearest_to_posture(arm, end, named, q)
     off = {JOINT_NAMES[i]: abs(run.q[i] - chosen[i]) for i in named}
     return ''.join(
         f'arrives {value:.4f} rad beside the posture of {name}'

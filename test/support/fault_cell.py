@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One cell of the fault matrix: a goal is brought to its phase, it goes wrong, people act."""
 
-from fault_goals import AroundCorners, planned
+from fault_goals import BlendGoal, planned
 from fault_table import BEFORE, Row
 import robot_cell
 from robot_cell import CYCLE, RobotCell
@@ -11,7 +11,7 @@ from virtual_network import HOST
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.protocol.registers import SERVO_INPUTS
-from ur_cartesian_driver.protocol.rtde import RtdeClient
+from ur_cartesian_driver.protocol.rtde import RtdeClientCodec
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.rtde_connection import RtdeConnection
 from ur_cartesian_driver.sim.modes import OPERATIONAL
@@ -73,7 +73,7 @@ def setpoint_connections(cell: RobotCell):
 async def take_inputs():
     """Be another client that wants to write the inputs which set-points need."""
     guest = RtdeConnection(
-        RtdeClient(outputs=('timestamp',), inputs=SERVO_INPUTS), lambda *_: None
+        RtdeClientCodec(outputs=('timestamp',), inputs=SERVO_INPUTS), lambda *_: None
     )
     await guest.open(HOST, robot_cell.RTDE)
     return guest
@@ -144,7 +144,7 @@ async def recover(cell: RobotCell, steps):
     return farthest
 
 
-async def scenario(cell: RobotCell, row: Row, phase: str, kind=AroundCorners):
+async def scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
     """
     Run one cell of the matrix; the robot cell is ready before and afterwards.
 

@@ -15,9 +15,9 @@ from fault_table import BEFORE
 import robot_cell
 from robot_cell import CYCLE, RobotCell
 
-from ur_cartesian_driver.driver.continuing import encoded
-from ur_cartesian_driver.driver.live import standing_order, standing_plan
-from ur_cartesian_driver.execution import Extension
+from ur_cartesian_driver.driver.appender import encode_plan
+from ur_cartesian_driver.driver.live import stationary_job, stationary_plan
+from ur_cartesian_driver.execution import AppendJob
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -33,11 +33,11 @@ from ur_cartesian_driver.motion.goal import (
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.continuation import following, opened
-from ur_cartesian_driver.planning.open_goal import Addition
-from ur_cartesian_driver.protocol.dialects import NEWEST
+from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
+from ur_cartesian_driver.protocol.dialects import NEWEST_DIALECT
 from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
-from ur_cartesian_driver.sim.builtins.motion import HandGuided
+from ur_cartesian_driver.sim.builtins.motion import FreedriveState
 
 #: Side of the way around two corners, and size of the blends there [m].
 SIDE, BLEND = 0.05, 0.015
@@ -75,7 +75,7 @@ class StartingPoint:
         return hash(self._key)
 
 
-class GoalInTrouble:
+class FaultGoal:
     """
     A goal to which something happens; its way of execution is that of a subclass.
 
@@ -88,7 +88,7 @@ class GoalInTrouble:
         self.cell = cell
         self.start = cell.robot.controller.motion.T_base_tcp.position
         self.plan = self.plan_from(StartingPoint(cell.memory.read()))
-        self._said_before = len(cell.control_messages())
+        self._messages_before = len(cell.control_messages())
         (end,) = cell.loop.open_ends(robot_cell.TRAJECTORY)
         self._results, self._results_before = end.peer.received, len(end.peer.received)
         self.motion = None
@@ -112,7 +112,7 @@ class GoalInTrouble:
     async def cancel(self):
         """Cancel it, and return when the robot program is about to hear of it."""
         self.cell.owner.cancel()
-        await self.cell.until(lambda: self.said(TrajectoryAction.CANCEL))
+        await self.cell.until(lambda: self.was_action_sent(TrajectoryAction.CANCEL))
         assert not self.cell.at_rest()
 
     def paths(self):
@@ -141,17 +141,17 @@ class GoalInTrouble:
         here = self.cell.robot.controller.motion.T_base_tcp.position
         return here[0] - self.start[0], here[1] - self.start[1]
 
-    def said(self, action):
+    def was_action_sent(self, action):
         """Tell whether an action of this goal was sent."""
         return any(
             message.mode is ControlMode.FORWARD and message.payload[0] == action
-            for message in self.cell.control_messages(self._said_before)
+            for message in self.cell.control_messages(self._messages_before)
         )
 
-    def wanted(self, mode):
+    def was_mode_sent(self, mode):
         """Tell whether a control mode was asked for by this goal."""
         return any(
-            message.mode is mode for message in self.cell.control_messages(self._said_before)
+            message.mode is mode for message in self.cell.control_messages(self._messages_before)
         )
 
     def has_result(self):
@@ -181,7 +181,7 @@ def around_corners(start):
     return around_square(start.state)
 
 
-class AroundCorners(GoalInTrouble):
+class BlendGoal(FaultGoal):
     """Three sides of a square, as motions of the robot."""
 
     def plan_from(self, start):
@@ -191,7 +191,7 @@ class AroundCorners(GoalInTrouble):
         x, y = self.moved()
         match phase:
             case 'arming':
-                return self.said(TrajectoryAction.START) and self.begun() == 0
+                return self.was_action_sent(TrajectoryAction.START) and self.begun() == 0
             case 'first point':
                 return self.begun() == 1 and y > 0.2 * SIDE
             case 'in a blend':
@@ -258,7 +258,7 @@ def half_circle(start, execution):
     return plan(half_circle_goal(start.state, execution), start.state, ARM, OPTIONS)
 
 
-class AlongSpline(GoalInTrouble):
+class SplineGoal(FaultGoal):
     """A half circle, as splines that the robot program interpolates."""
 
     execution = ExecutionMode.SPLINE
@@ -266,7 +266,7 @@ class AlongSpline(GoalInTrouble):
     def plan_from(self, start):
         return half_circle(start, self.execution)
 
-    def way(self):
+    def fraction(self):
         """Return which part of the half circle the tool has gone."""
         x, y = self.moved()
         return atan2(x, RADIUS - y) / pi
@@ -274,20 +274,20 @@ class AlongSpline(GoalInTrouble):
     def is_in(self, phase):
         match phase:
             case 'between points' | 'cancelling':
-                return 0.55 < self.way() < 0.8
+                return 0.55 < self.fraction() < 0.8
             case 'slowing down':
-                return self.way() > 0.985
+                return self.fraction() > 0.985
         raise AssertionError(phase)
 
 
-class Servoed(AlongSpline):
+class ServoGoal(SplineGoal):
     """The same half circle, as set-points through RTDE that the robot program buffers."""
 
     execution = ExecutionMode.SERVO
 
     def is_in(self, phase):
         if phase == 'entering':
-            return self.wanted(ControlMode.BUFFERED_SERVO) and self.cell.at_rest()
+            return self.was_mode_sent(ControlMode.BUFFERED_SERVO) and self.cell.at_rest()
         return super().is_in(phase)
 
     async def cancel(self):
@@ -320,7 +320,7 @@ def around_corners_with_outputs(start, values):
     return around_square(start.state, io_commands=commands)
 
 
-class WithOutputs(AroundCorners):
+class OutputGoal(BlendGoal):
     """Three sides of a square, and outputs that wait to be switched."""
 
     def __init__(self, cell):
@@ -363,45 +363,45 @@ class WithOutputs(AroundCorners):
 
     @staticmethod
     def _outputs(cell):
-        outputs = cell.robot.controller.signals.digital_out.standard
+        outputs = cell.robot.controller.io.digital_out.standard
         return [outputs[AT_CORNER], outputs[AFTER_END]]
 
 
 @lru_cache
-def open_half_circle(start):
+def half_circle_to_append(start):
     """Return the first three points of a half circle, and the last one as what is appended."""
     whole = half_circle_goal(start.state, ExecutionMode.SPLINE)
     goal = replace(whole, waypoints=whole.waypoints[:-1], keep_open=True)
-    part = opened(plan(goal, start.state, ARM, OPTIONS), ARM, OPTIONS)
-    return part, Addition(waypoints=whole.waypoints[-1:], last=True)
+    part = plan_first_part(plan(goal, start.state, ARM, OPTIONS), ARM, OPTIONS)
+    return part, AppendedPoints(waypoints=whole.waypoints[-1:], last=True)
 
 
 @lru_cache
 def rest_of_half_circle(start, *, from_rest):
     """Return the last point of a half circle, planned behind what was sent before."""
-    part, addition = open_half_circle(start)
-    return following(part.then, addition, ARM, OPTIONS, from_rest=from_rest)
+    part, addition = half_circle_to_append(start)
+    return plan_append(part.next_goal, addition, ARM, OPTIONS, from_rest=from_rest)
 
 
-class Continued(AlongSpline):
+class AppendGoal(SplineGoal):
     """The half circle as an open goal, whose last point is appended when the fault is there."""
 
     def plan_from(self, start):
         self._beginning = start
-        return open_half_circle(start)[0].plan
+        return half_circle_to_append(start)[0].plan
 
     def send(self):
-        part, _ = open_half_circle(self._beginning)
-        self.motion = self.cell.owner.run(*encoded(part, NEWEST))
+        part, _ = half_circle_to_append(self._beginning)
+        self.motion = self.cell.owner.run(*encode_plan(part, NEWEST_DIALECT))
 
     def is_in(self, phase):
         match phase:
             case 'moving' | 'cancelling':
-                return 0.1 < self.way() < 0.4
+                return 0.1 < self.fraction() < 0.4
             case 'closing':
-                return self.said(TrajectoryAction.STREAM_END) and self.way() > 0.7
+                return self.was_action_sent(TrajectoryAction.STREAM_END) and self.fraction() > 0.7
             case 'waiting':
-                return self.motion.progress and self.motion.progress[-1].waits
+                return self.motion.progress and self.motion.progress[-1].awaiting_points
         return super().is_in(phase)
 
     def paths(self):
@@ -410,39 +410,41 @@ class Continued(AlongSpline):
 
     def follow_up(self, phase):
         part = rest_of_half_circle(self._beginning, from_rest=phase in ('closing', 'waiting'))
-        points, order = encoded(part, NEWEST)
-        self.cell.owner.extend(points, Extension(number=1, behind=part.behind, order=order))
+        points, job = encode_plan(part, NEWEST_DIALECT)
+        self.cell.owner.extend(
+            points, AppendJob(number=1, records_before=part.records_before, job=job)
+        )
 
 
-class Guided(GoalInTrouble):
+class FreedriveGoal(FaultGoal):
     """No goal but the same machinery: a person may push the arm, until that is cancelled."""
 
     def plan_from(self, start):
-        return standing_plan(start.state)
+        return stationary_plan(start.state)
 
     def send(self):
-        self.motion = self.cell.owner.run(b'', standing_order(self.plan), teach=True)
+        self.motion = self.cell.owner.run(b'', stationary_job(self.plan), freedrive=True)
 
     def is_in(self, phase):
-        return self._is_guided() and self.motion.progress
+        return self._is_freedrive_active() and self.motion.progress
 
     def is_over(self):
         # A paused program cannot end it; the safety system holds the arm.
         paused = self.cell.robot.controller.programs.state is RuntimeState.PAUSED
-        return paused or not self._is_guided()
+        return paused or not self._is_freedrive_active()
 
     def judge(self, row, phase):
-        assert not self._is_guided(), (row.fault, phase)
+        assert not self._is_freedrive_active(), (row.fault, phase)
 
-    def _is_guided(self):
-        return self.cell.robot.controller.hand_guided is HandGuided.TEACH
+    def _is_freedrive_active(self):
+        return self.cell.robot.controller.freedrive is FreedriveState.TEACH
 
 
 #: The goals of the ways of execution.
 GOALS = {
-    'SPLINE': AlongSpline,
-    'SERVO': Servoed,
-    'Open goals': Continued,
-    'Outputs': WithOutputs,
-    'Guided by hand': Guided,
+    'SPLINE': SplineGoal,
+    'SERVO': ServoGoal,
+    'Open goals': AppendGoal,
+    'Outputs': OutputGoal,
+    'Guided by hand': FreedriveGoal,
 }

@@ -81,7 +81,7 @@ ON_THE_PENDANT = (
 CONTINUES = ('protective stop',)
 
 
-def chosen(
+def select_rows(
     rows: Iterable[Row],
     names: Iterable[str],
     phases: Iterable[str],
@@ -97,12 +97,12 @@ def chosen(
     """
     by_name = {row.fault: row for row in rows}
     return tuple(
-        _adapted(by_name[name], tuple(phases), undisturbed, changes.get(name, {}))
+        _adapt_row(by_name[name], tuple(phases), undisturbed, changes.get(name, {}))
         for name in names
     )
 
 
-def _adapted(
+def _adapt_row(
     row: Row, phases: tuple[str, ...], undisturbed: float, changes: dict[str, dict[str, object]]
 ) -> Row:
     """Return a row whose differences are those of other phases, and the changes."""
@@ -161,21 +161,21 @@ def _mode(
         phases=phases,
         undisturbed=undisturbed,
         headless=(
-            *chosen(HEADLESS, faults, phases, undisturbed, changes),
+            *select_rows(HEADLESS, faults, phases, undisturbed, changes),
             *more,
             *(
                 replace(row, phases=once[:1])
-                for row in chosen(HEADLESS, once[1], phases, undisturbed, changes)
+                for row in select_rows(HEADLESS, once[1], phases, undisturbed, changes)
             ),
         ),
-        local=chosen(
+        local=select_rows(
             LOCAL,
             pendant,
             phases,
             undisturbed,
             changes if changes_there is None else changes_there,
         ),
-        continued=chosen(CONTINUED, continued, phases, undisturbed, changes),
+        continued=select_rows(CONTINUED, continued, phases, undisturbed, changes),
     )
 
 
@@ -239,7 +239,7 @@ SETPOINTS = (
 #: Nothing has moved yet, and the goal ends because the robot does not answer.
 _NOT_ENTERED = {'entering': {'code': E.ROBOT_NOT_READY}}
 #: The program has read that it is to leave, and the arm stands: it is over.
-_LEFT_PAUSED = {'cancelling': {'bound': 0.7, 'steps': ('play',)}}
+_STAYS_PAUSED = {'cancelling': {'bound': 0.7, 'steps': ('play',)}}
 #: Set-points stay away, so the robot program brakes and ends; then the driver finds that the
 #: robot is silent.
 _DEAF = {
@@ -265,7 +265,7 @@ SERVO = _mode(
     },
     1.8,
     {
-        'somebody pauses the program': _LEFT_PAUSED,
+        'somebody pauses the program': _STAYS_PAUSED,
         'the network cable is cut': _NOT_ENTERED
         | {'': {'steps': ('wait until it is over', 'resend')}},
         'protective stop that the driver does not see': _NOT_ENTERED,
@@ -287,7 +287,7 @@ SERVO = _mode(
     once=('between points', FAULTS_OF_RTDE),
     more=SETPOINTS,
     changes_there={
-        'somebody pauses the program': _LEFT_PAUSED,
+        'somebody pauses the program': _STAYS_PAUSED,
         'the network cable is cut': _NOT_ENTERED
         | {'': {'steps': ('wait until it is over', 'play')}},
         'protective stop that the driver does not see': _NOT_ENTERED,
@@ -318,7 +318,7 @@ OUTPUTS = _mode(
     pendant=('protective stop', 'somebody pauses the program'),
 )
 
-OPEN = _mode(
+APPEND = _mode(
     'Open goals',
     'A goal that is continued while it runs (`keep_open`); the last points are '
     'appended when the fault is there.',
@@ -343,10 +343,10 @@ OPEN = _mode(
     ),
 )
 
-GUIDED = replace(
+FREEDRIVE = replace(
     _mode(
         'Guided by hand',
-        'No goal, but ended by the same things: `~/teach_mode` lets a person push '
+        'No goal, but ended by the same things: `~/freedrive_mode` lets a person push '
         'the arm. When it "stands" it cannot be pushed any more.',
         {'guided': 'a person may push the arm'},
         0.0,
@@ -366,7 +366,7 @@ GUIDED = replace(
         continued=(),
         more=tuple(row for row in SETPOINTS if not row.phases and row.code is not E.SUCCESSFUL),
     ),
-    settings={'allow_teach': True},
+    settings={'allow_freedrive': True},
 )
 
-MODES = (SPLINE, SERVO, OPEN, OUTPUTS, GUIDED)
+MODES = (SPLINE, SERVO, APPEND, OUTPUTS, FREEDRIVE)

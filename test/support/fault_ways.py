@@ -11,7 +11,7 @@ from robot_cell import CYCLE
 from ur_cartesian_driver.motion.pose import pose_from_row
 
 
-class Ways:
+class JointTrace:
     """The joints in every cycle."""
 
     def __init__(self, cell):
@@ -25,7 +25,7 @@ class Ways:
             self.rows.append(self.cell.q)
             await self.cell.sleep(CYCLE)
 
-    def fastest_and_strongest(self):
+    def max_speed_and_acceleration(self):
         """Return the largest speed and acceleration of a joint [rad/s], [rad/s^2]."""
         speeds = [
             [(b - a) / CYCLE for a, b in zip(*pair, strict=True)] for pair in pairwise(self.rows)
@@ -35,7 +35,7 @@ class Ways:
         ]
         return max(abs(v) for row in speeds for v in row), max(changes)
 
-    def farthest_off(self, goal):
+    def max_path_deviation(self, goal):
         """Return how far the tool was off the planned paths of a goal [m]."""
         flange = ARM.forward_rows(np.array(self.rows))
         tool = np.array(
@@ -46,8 +46,8 @@ class Ways:
             np.concatenate([path[part] for path in paths])
             for part in (slice(None, -1), slice(1, None))
         )
-        way = end - begin
-        square = np.maximum((way**2).sum(axis=1), 1e-18)
-        at = np.clip(((tool[:, None] - begin) * way).sum(axis=2) / square, 0.0, 1.0)
-        off = tool[:, None] - begin - at[..., None] * way
+        segment = end - begin
+        square = np.maximum((segment**2).sum(axis=1), 1e-18)
+        at = np.clip(((tool[:, None] - begin) * segment).sum(axis=2) / square, 0.0, 1.0)
+        off = tool[:, None] - begin - at[..., None] * segment
         return float(np.sqrt((off**2).sum(axis=2).min(axis=1)).max())

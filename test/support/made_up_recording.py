@@ -8,8 +8,8 @@ import os
 import numpy as np
 
 from ur_cartesian_driver.driver import DriverConfig
-from ur_cartesian_driver.driver.recorder import head_of, Recorder
-from ur_cartesian_driver.execution import Order
+from ur_cartesian_driver.driver.recorder import motion_metadata, Recorder
+from ur_cartesian_driver.execution import MotionJob
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.plan import ReferencePath
@@ -39,7 +39,7 @@ def path(first, last, point):
     )
 
 
-ORDER = Order(
+ORDER = MotionJob(
     points=2,
     duration=4.0,
     reference=ReferencePath(
@@ -51,11 +51,11 @@ ORDER = Order(
         }
     ),
 )
-HEAD = head_of(
+METADATA = motion_metadata(
     ORDER,
     robot={'model': 'ur5e'},
     parameters=DriverConfig(),
-    of_owner=json.dumps({'report': ['point 0: there'], 'planning': {'x': 1}}),
+    plan_metadata_json=json.dumps({'report': ['point 0: there'], 'planning': {'x': 1}}),
 )
 
 
@@ -86,7 +86,7 @@ def outputs(bits):
     )
 
 
-class Said(list):
+class Warnings(list):
     """Takes warnings."""
 
     def __call__(self, text):
@@ -95,7 +95,7 @@ class Said(list):
 
 def keep_pace(recorder):
     """Wait for the writer: packets come much faster here than from a robot."""
-    while recorder._directory and recorder._free.empty():
+    while recorder._directory and recorder._free_buffers.empty():
         os.sched_yield()
 
 
@@ -103,26 +103,26 @@ def record(
     directory,
     packets,
     *,
-    head=HEAD,
+    metadata=METADATA,
     outcome=DONE,
     max_size=100.0,
     between=lambda recorder, i: None,
     where=lambda i: (0, 0.0),
 ):
     """Record packets, and what is done between them; return the warnings."""
-    said = Said()
-    recorder = Recorder(str(directory), max_size, said)
+    warnings = Warnings()
+    recorder = Recorder(str(directory), max_size, warnings)
     for i, state in enumerate(packets):
         if i == 0:
-            recorder.start(ORDER, dict(head), state)
+            recorder.start(ORDER, dict(metadata), state)
         else:
             keep_pace(recorder)
-            recorder.take(state, *where(i))
+            recorder.add_state(state, *where(i))
         between(recorder, i)
     if outcome is not None:
         recorder.end(outcome)
     recorder.close(10.0)
-    return said
+    return warnings
 
 
 def only_file(directory):

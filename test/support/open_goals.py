@@ -4,15 +4,15 @@
 
 from math import cos, pi, sin
 
-from ur_cartesian_driver.driver.continuing import Continuing, encoded
+from ur_cartesian_driver.driver.appender import Appender, encode_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robots import robot_model
 from ur_cartesian_driver.motion.goal import Segment, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.continuation import opened
-from ur_cartesian_driver.planning.open_goal import Addition
-from ur_cartesian_driver.protocol.dialects import NEWEST
+from ur_cartesian_driver.planning.append.append_planner import plan_first_part
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
+from ur_cartesian_driver.protocol.dialects import NEWEST_DIALECT
 
 BLEND = Segment(blend_radius=0.01, velocity=0.2, acceleration=1.0)
 
@@ -55,34 +55,34 @@ def circle(home, first, count, *, step=0.1, radius=0.05, round_in=4.0):
     return points
 
 
-class OpenMotion:
+class AppendMotion:
     """A goal with an open end on its way, and who appends to it."""
 
     def __init__(self, cell, goal, **options):
         self._cell, self._owner = cell, cell.owner
         self._arm = Arm(robot_model(cell.robot.config.model))
         self._options = PlanningOptions(**{'max_tool_speed': 1.0, 'max_points': 5000} | options)
-        part = opened(
+        part = plan_first_part(
             plan(goal, cell.memory.read(), self._arm, self._options), self._arm, self._options
         )
         self.home = cell.memory.read().actual_tcp_pose
-        self.continuing = Continuing(
+        self.appender = Appender(
             len(self._owner.motions) + 1,
             part,
-            dialect=NEWEST,
+            dialect=NEWEST_DIALECT,
             send=self._owner.send,
             progress=self._newest,
-            arm_and_options=lambda: (self._arm, self._options),
+            planning_inputs=lambda: (self._arm, self._options),
         )
-        points, order = encoded(part, NEWEST)
-        self.motion = self._owner.run(points, order)
+        points, job = encode_plan(part, NEWEST_DIALECT)
+        self.motion = self._owner.run(points, job)
 
     def _newest(self):
         return self.motion.progress[-1] if self.motion.progress else None
 
     @property
     def points(self):
-        return self.continuing.points
+        return self.appender.points
 
     @property
     def outcome(self):
@@ -99,8 +99,8 @@ class OpenMotion:
 
     async def append(self, waypoints=(), segments=(), io_commands=(), *, last=False):
         """Append as the Python API does, but wait as a coroutine."""
-        offers = self.continuing.offers(
-            Addition(
+        offers = self.appender.offers(
+            AppendedPoints(
                 waypoints=tuple(waypoints),
                 segments=tuple(segments),
                 io_commands=tuple(io_commands),
@@ -126,14 +126,14 @@ class OpenMotion:
         return self.outcome
 
 
-def forget(cell):
+def clear_network_log(cell):
     """Let the network in memory forget what was sent on it, which tests can look at."""
     for end in cell.loop.ends:
         end.received.clear()
         end.peer.received.clear()
 
 
-def kept(cell):
+def retained_sizes(cell):
     """Return what the robot loop keeps of the goal that runs: records, rows of path, messages."""
     loop = cell.loop_task.get_coro().cr_frame.f_locals['self']
     observer = loop._machine._observer

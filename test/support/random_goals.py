@@ -60,7 +60,7 @@ class _Draw:
 
     def __init__(self, arm: Arm, rng: np.random.Generator) -> None:
         self.arm, self.rng = arm, rng
-        self.size = arm.model.reach
+        self.size = arm.model.max_reach
         self.tool = (
             IDENTITY
             if rng.random() < 0.3
@@ -68,7 +68,7 @@ class _Draw:
                 tuple(rng.uniform((-0.05, -0.05, 0.0), (0.05, 0.05, 0.2)).tolist()), self.turn(1.0)
             )
         )
-        self.stand(self.anywhere())
+        self.place_arm(self.anywhere())
         self.waypoints: list[Waypoint] = []
         self.segments: list[Segment] = []
 
@@ -81,15 +81,15 @@ class _Draw:
         q[4] = self.sign() * self.rng.uniform(0.5, 2.6)
         return q
 
-    def stand(self, q) -> None:
+    def place_arm(self, q) -> None:
         """Let the arm stand there at the start."""
         self.q = self.last = tuple(float(x) for x in q)
 
-    def stand_at(self, T_base_tcp: Pose, q) -> None:
+    def place_arm_at(self, T_base_tcp: Pose, q) -> None:
         """Let it stand where the tool is there, near to a configuration; anywhere if nowhere."""
         near = tuple(float(x) for x in q)
         found = nearest(self.arm, T_base_tcp @ self.tool.inverse(), near)
-        self.stand(self.anywhere() if found is None else found)
+        self.place_arm(self.anywhere() if found is None else found)
 
     def moved(self, size: float) -> np.ndarray:
         """Return the last configuration with all joints moved a little [rad]."""
@@ -141,8 +141,8 @@ class _Draw:
         v = self.rng.normal(size=3)
         return v / np.linalg.norm(v)
 
-    def turn(self, most: float, before=IDENTITY.quaternion):
-        vector = self.direction() * self.rng.uniform(0.0, most)
+    def turn(self, max_angle: float, before=IDENTITY.quaternion):
+        vector = self.direction() * self.rng.uniform(0.0, max_angle)
         return (
             Pose((0.0,) * 3, before)
             @ Pose((0.0,) * 3, quaternion_from_rotation_vector(tuple(vector)))
@@ -220,7 +220,7 @@ def _reach(draw: _Draw) -> None:
     """From a nearly stretched arm outwards, beyond the reach or not."""
     q = draw.anywhere()
     q[2] = draw.sign() * draw.rng.uniform(0.1, 0.8)
-    draw.stand(q)
+    draw.place_arm(q)
     if draw.rng.random() < 0.4:
         draw.add(draw.shifted(0.05 * draw.size), LINEAR)
     x, y, z = draw.pose.position
@@ -245,7 +245,7 @@ def _range(draw: _Draw) -> None:
     q[joint] = end - side * draw.rng.uniform(0.02, 0.3)
     if joint == 2:  # a stretched arm next to the end of the elbow's range
         q[joint] = end - side * draw.rng.uniform(0.2, 0.5)
-    draw.stand(q)
+    draw.place_arm(q)
     target = draw.moved(0.1)
     target[joint] = end + side * draw.rng.uniform(-0.15, 0.2)
     draw.add_at(target, None, draw.posture(target) if draw.rng.random() < 0.2 else ANY)
@@ -259,7 +259,7 @@ def _wrist(draw: _Draw) -> None:
     side = draw.sign()
     straight = draw.rng.choice((0.0, pi * draw.sign()))
     q[4] = straight + side * draw.rng.uniform(0.05, 0.4)
-    draw.stand(q)
+    draw.place_arm(q)
     target = draw.moved(0.2)
     target[4] = straight - side * draw.rng.uniform(-0.1, 0.3)
     some = draw.posture(target, draw.rng.integers(3, 7))
@@ -280,7 +280,7 @@ def _through_the_wrist(draw: _Draw) -> None:
     )
     tilted = multiply(tilt, middle.quaternion)
     way = draw.rng.uniform(0.04, 0.15) * draw.size * draw.direction()
-    draw.stand_at(Pose(tuple(np.array(middle.position) - way), tilted), q)
+    draw.place_arm_at(Pose(tuple(np.array(middle.position) - way), tilted), q)
     draw.add(Pose(tuple(np.array(middle.position) + way), tilted))
 
 
@@ -304,7 +304,7 @@ def _column(draw: _Draw) -> None:
         x, y = aside * normal + sign * half * along
         centre = Pose((x, y, height), T_base_flange.quaternion)
         ends.append(centre @ Pose((0.0, 0.0, arm.geometry.d[5])))
-    draw.stand_at(ends[0], q)
+    draw.place_arm_at(ends[0], q)
     draw.add(ends[1])
 
 
@@ -359,7 +359,7 @@ def _corners(draw: _Draw) -> None:
     """Blends where corners are near to something: a stretched arm, a straight wrist."""
     q = draw.anywhere()
     q[draw.rng.choice((2, 4))] = draw.sign() * draw.rng.uniform(0.05, 0.5)
-    draw.stand(q)
+    draw.place_arm(q)
     for _ in range(draw.rng.integers(2, 4)):
         draw.add_at(draw.moved(0.4), (LINEAR, JOINT, PROCESS)[draw.rng.integers(3)])
 

@@ -15,17 +15,16 @@ import os
 
 from virtual_network import HOST, LoopClock, ProgramNetwork, VirtualLoop
 
-from ur_cartesian_driver.driver import snapshot
 from ur_cartesian_driver.driver.channel import (
+    AppendAnswered,
+    AppendToMotion,
     CancelMotion,
     Configure,
-    ExtendMotion,
-    Heartbeat,
     LENGTH,
-    LogLine,
+    LogMessage,
     MotionEnded,
-    MotionExtended,
     MotionProgress,
+    OwnerHeartbeat,
     pack,
     ResendProgram,
     StartMotion,
@@ -33,8 +32,9 @@ from ur_cartesian_driver.driver.channel import (
     unpack,
 )
 from ur_cartesian_driver.driver.config import DriverConfig
+from ur_cartesian_driver.driver.ipc import state_memory
 from ur_cartesian_driver.driver.robot_loop import RobotLoop
-from ur_cartesian_driver.execution import order_of
+from ur_cartesian_driver.execution import job_from_plan
 from ur_cartesian_driver.protocol.reverse import MESSAGE_SIZE, ReverseMessage
 from ur_cartesian_driver.protocol.script_sender import REQUEST
 from ur_cartesian_driver.protocol.trajectory import encode_points
@@ -52,7 +52,7 @@ RTDE, PRIMARY, DASHBOARD = 30004, 30001, 29999
 PENDANT_PROGRAM = 'external_control.urp'
 
 
-class Motion:
+class CellMotion:
     """A goal on its way, as its owner sees it."""
 
     def __init__(self):
@@ -89,23 +89,23 @@ class Owner:
     async def _beat(self):
         while True:
             if not self.silent:
-                self.send(Heartbeat())
+                self.send(OwnerHeartbeat())
             await asyncio.sleep(NODE_TIMEOUT / 3.0)
 
     def send(self, request):
         self._writer.write(pack(request))
 
     def start(self, plan):
-        return self.run(encode_points(plan.instructions), order_of(plan))
+        return self.run(encode_points(plan.instructions), job_from_plan(plan))
 
-    def run(self, points, order, **more):
+    def run(self, points, job, **more):
         number = len(self.motions) + 1
-        motion = self.motions[number] = Motion()
-        self.send(StartMotion(motion=number, order=order, points=points, **more))
+        motion = self.motions[number] = CellMotion()
+        self.send(StartMotion(motion=number, job=job, points=points, **more))
         return motion
 
-    def extend(self, points, extension):
-        self.send(ExtendMotion(motion=len(self.motions), points=points, extension=extension))
+    def extend(self, points, append_job):
+        self.send(AppendToMotion(motion=len(self.motions), points=points, append_job=append_job))
 
     def cancel(self):
         self.send(CancelMotion(motion=len(self.motions)))
@@ -113,20 +113,20 @@ class Owner:
     def hang_up(self):
         self._writer.close()
 
-    def _take(self, notice):
-        match notice:
+    def _take(self, notification):
+        match notification:
             case StatusChanged(status=status):
                 self.status = status
                 self.statuses.append(status)
             case MotionProgress(motion=number, progress=progress):
                 self.motions[number].progress.append(progress)
-            case MotionExtended(answer=answer):
+            case AppendAnswered(answer=answer):
                 self.answers.append(answer)
             case MotionEnded(motion=number, outcome=outcome):
                 motion = self.motions[number]
                 assert motion.outcome is None, 'a goal ends once'
                 motion.outcome, motion.ended_at = outcome, asyncio.get_running_loop().time()
-            case LogLine(text=text):
+            case LogMessage(text=text):
                 self.log.append(text)
 
 
@@ -168,8 +168,8 @@ class RobotCell:
         )
         await asyncio.start_server(self.owner.serve, HOST, OWNER_PORT)
         reader, self._pipe = await asyncio.open_connection(HOST, OWNER_PORT)
-        descriptor = snapshot.create()
-        self.memory = snapshot.StateMemory(descriptor)
+        descriptor = state_memory.create()
+        self.memory = state_memory.StateMemory(descriptor)
         os.close(descriptor)
         self.loop_task = asyncio.create_task(
             RobotLoop(Configure(config=self.config), self.memory, self._pipe).run(reader)
@@ -249,7 +249,7 @@ class RobotCell:
         while not condition():
             assert self.loop.time() - begin < bound, (
                 f'{purpose}: waited {bound} s in vain; {self.status}; {self.owner.log}; '
-                f'{list(self.robot.controller.announcements.log)}'
+                f'{list(self.robot.controller.messages.log)}'
             )
             await asyncio.sleep(0.5 * CYCLE)
         return self.loop.time() - begin

@@ -16,9 +16,9 @@ import numpy as np
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState, RuntimeState
-from ur_cartesian_driver.program import as_program, ProgramSettings, render
+from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
 from ur_cartesian_driver.protocol.reverse import keepalive, trajectory, TrajectoryAction
-from ur_cartesian_driver.protocol.trajectory import encode_points, ResultDecoder
+from ur_cartesian_driver.protocol.trajectory import encode_points, TrajectoryResultDecoder
 from ur_cartesian_driver.sim.config import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.modes import OPERATIONAL, SafetyEvent
@@ -28,11 +28,11 @@ REVERSE, TRAJECTORY, COMMAND = 1, 2, 3
 #: What the controller may say while all is well: that a movep is slower than asked for.
 HARMLESS = 'C196A0:'
 #: No motion of a test takes longer [s].
-PATIENCE = 5000.0
+MAX_MOTION_TIME = 5000.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class ProgramRun:
     """How a trajectory ended."""
 
     #: What the controller said when it stopped; empty if the trajectory was run to its end.
@@ -52,7 +52,7 @@ class Run:
 class RobotInMemory:
     """One robot, on which trajectories are run one after the other from anywhere."""
 
-    def __init__(self, model, frequency=None, geometry=None, edit=as_program):
+    def __init__(self, model, frequency=None, geometry=None, edit=wrap_in_program):
         """
         Start it.
 
@@ -114,9 +114,9 @@ class RobotInMemory:
                 read_timeout=0,
             )
         )
-        results, motion = ResultDecoder(), self.controller.motion
+        results, motion = TrajectoryResultDecoder(), self.controller.motion
         joints, poses = [], []
-        self.controller.announcements.log.clear()
+        self.controller.messages.log.clear()
         begun = self.controller.time
         while True:
             self.controller.step()
@@ -127,10 +127,10 @@ class RobotInMemory:
             ended = results.feed(said) if said else []
             if ended or motion.fault is not None or not self.controller.programs.running:
                 break
-            assert self.controller.time - begun < PATIENCE, f'{primitives} do not end'
-        log = [line for line in self.controller.announcements.log if not line.startswith(HARMLESS)]
+            assert self.controller.time - begun < MAX_MOTION_TIME, f'{primitives} do not end'
+        log = [line for line in self.controller.messages.log if not line.startswith(HARMLESS)]
         failed = ended != [TrajectoryResult.SUCCESS] or log
-        return Run(
+        return ProgramRun(
             trouble='; '.join(log) or str(ended) if failed else '',
             q=motion.q,
             result=ended[0] if ended else None,

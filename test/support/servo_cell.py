@@ -14,11 +14,11 @@ from ur_cartesian_driver.execution.servo_stream import ServoSettings
 from ur_cartesian_driver.motion.servo import ServoFeedback
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.protocol import registers
-from ur_cartesian_driver.protocol.rtde import DataReceived, Ready, RtdeClient
+from ur_cartesian_driver.protocol.rtde import DataReceived, HandshakeDone, RtdeClientCodec
 from ur_cartesian_driver.sim import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.rtde_session import RtdeSession
-from ur_cartesian_driver.sim.uploads import Uploads
+from ur_cartesian_driver.sim.uploads import UploadDecoder
 
 GUIDE = Path(__file__).parents[1] / 'acceptance' / 'programs' / 'servoj_guide.script'
 CYCLE = 0.002
@@ -32,20 +32,20 @@ class GuideCell:
     def __init__(self, program=GUIDE):
         self.controller = Controller(SimulatorConfig())
         self._session = RtdeSession(self.controller, set())
-        self._client = RtdeClient(OUTPUTS, registers.SERVO_INPUTS)
+        self._client = RtdeClientCodec(OUTPUTS, registers.SERVO_INPUTS)
         data, ready = self._client.start(), []
         while not ready:
             ready = [
                 event
                 for event in self._client.feed(self._session.feed(data))
-                if isinstance(event, Ready)
+                if isinstance(event, HandshakeDone)
             ]
             data = self._client.data_to_send()
         self._inputs = ready[0].inputs[0]
         self._inbox, self._outbox = deque(), deque()
         #: Where the arm was in each cycle.
         self.joints = []
-        (text,) = Uploads().feed(program.read_bytes())
+        (text,) = UploadDecoder().feed(program.read_bytes())
         self.controller.programs.submit(text.text)
 
     @property
@@ -54,7 +54,7 @@ class GuideCell:
 
     @property
     def log(self):
-        return list(self.controller.announcements.log)
+        return list(self.controller.messages.log)
 
     def cycle(self, take, *, delay=0):
         """

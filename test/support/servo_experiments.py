@@ -16,7 +16,7 @@ from math import pi, sin
 import numpy as np
 from servo_cell import CYCLE, GUIDE, GuideCell
 
-from ur_cartesian_driver.execution.servo_stream import Phase, ServoSettings, ServoStream
+from ur_cartesian_driver.execution.servo_stream import ServoPhase, ServoSettings, ServoStream
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robots import robot_model
@@ -89,7 +89,7 @@ class Experiment:
     def __init__(self, program):
         self.cell = GuideCell(program)
         self.rows = up_and_down(self.cell.q)
-        self.now, self.under_way = self.cell.q, lambda: 0.0
+        self.now, self.in_flight = self.cell.q, lambda: 0.0
         self.wanted, self.lag, self.written, self._told = [], [], [], []
         motion = self.cell.controller.motion
         carry_out = motion.servoj
@@ -110,7 +110,7 @@ class Experiment:
         for i in range(round(seconds / CYCLE)):
             self.cell.cycle(take, delay=int(late > 0 and i % late == 0))
             self.wanted.append(self.now)
-            self.lag.append(self.under_way())
+            self.lag.append(self.in_flight())
 
     def result(self):
         actual = np.array(self.cell.joints)
@@ -162,21 +162,21 @@ def buffered(slider, seconds, late=0, *, closed_loop=True):
         ServoSettings(
             closed_loop=closed_loop,
             lookahead_time=0.06,
-            **({} if closed_loop else {'most_lag': 10.0, 'buffer_depth': 5000}),
+            **({} if closed_loop else {'max_lag': 10.0, 'buffer_depth': 5000}),
         ),
     )
     experiment.cell.controller.set_slider(slider)
 
     def take(feedback):
-        row = stream.take(feedback, experiment.cell.time)
-        if stream.phase is Phase.READY:
+        row = stream.on_feedback(feedback, experiment.cell.time)
+        if stream.phase is ServoPhase.READY:
             stream.begin()
         experiment.now = source.now
         return row
 
-    experiment.under_way = lambda: stream.under_way
+    experiment.in_flight = lambda: stream.in_flight
     experiment.run(take, seconds, late)
     # What is still under way is not skipped.
-    left = round(stream.under_way / CYCLE) + 2
+    left = round(stream.in_flight / CYCLE) + 2
     experiment.written = source.given[:-left]
     return experiment.result()

@@ -24,7 +24,7 @@ _FIRST_FREE_PORT = 40_001
 _FIRST_CLIENT_PORT = 60_001
 
 
-class _Jumping(selectors.DefaultSelector):
+class _SkippingSelector(selectors.DefaultSelector):
     """Waits for nobody: what it was to wait for passes at once."""
 
     loop = None
@@ -42,7 +42,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     """The loop; one test, one loop."""
 
     def __init__(self):
-        selector = _Jumping()
+        selector = _SkippingSelector()
         self.now = 0.0
         super().__init__(selector)
         selector.loop = self
@@ -103,7 +103,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         for end in self.open_ends(port):
             end.frozen = end.peer.frozen = True
 
-    def say(self, port, data):
+    def inject_data(self, port, data):
         """Let whoever dialled a port say something that he did not say."""
         for end in self.open_ends(port):
             end.write(data)

@@ -21,10 +21,10 @@ import pytest
 from ur_cartesian_driver.urscript import (
     CompileError,
     core_builtins,
-    Machine,
     parse,
     RemoteObject,
     RuntimeException,
+    ScriptInterpreter,
     to_text,
 )
 
@@ -98,7 +98,7 @@ def standard_builtins(output: list[str]) -> dict[str, Any]:
 def run(text: str) -> Outcome:
     outcome = Outcome()
     try:
-        machine = Machine(parse(text), standard_builtins(outcome.output))
+        machine = ScriptInterpreter(parse(text), standard_builtins(outcome.output))
     except CompileError as error:
         outcome.compile_error = f'{error.line}:{error.column} {error.text}'
         return outcome

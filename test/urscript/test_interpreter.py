@@ -14,27 +14,27 @@ import pytest
 from ur_cartesian_driver.urscript import (
     CompileError,
     core_builtins,
-    Machine,
     parse,
-    Pose,
     RuntimeException,
+    ScriptInterpreter,
+    ScriptPose,
     Struct,
     to_text,
 )
-from ur_cartesian_driver.urscript.interpreter import TOO_MUCH_TIME
+from ur_cartesian_driver.urscript.interpreter import BUDGET_EXCEEDED
 
 
 def sync() -> Generator[None, None, None]:
     yield
 
 
-def machine(body: str, *, kind: str = 'def', **builtins: Callable[..., Any]) -> Machine:
-    return Machine(
+def machine(body: str, *, kind: str = 'def', **builtins: Callable[..., Any]) -> ScriptInterpreter:
+    return ScriptInterpreter(
         parse(f'{kind} f():\n{body}\nend\n'), {**core_builtins(), 'sync': sync, **builtins}
     )
 
 
-def frames_until_the_end(running: Machine, limit: int = 1000) -> int:
+def frames_until_the_end(running: ScriptInterpreter, limit: int = 1000) -> int:
     for frame in range(limit):
         if not running.running:
             return frame
@@ -86,7 +86,7 @@ def test_builtins_get_and_give_values_of_the_language() -> None:
     seen: list[Any] = []
 
     def give() -> Struct:
-        return Struct({'sec': 1, 'where': Pose(1, 2, 3, 4, 5, 6)})
+        return Struct({'sec': 1, 'where': ScriptPose(1, 2, 3, 4, 5, 6)})
 
     running = machine(
         's = give()\nsee(s.where, [1, 2.5], [[1], [2]], "t", None, s.sec == 1)',
@@ -94,7 +94,7 @@ def test_builtins_get_and_give_values_of_the_language() -> None:
         see=lambda *values: seen.extend(values),
     )
     frames_until_the_end(running)
-    assert seen[0] == Pose(1, 2, 3, 4, 5, 6)
+    assert seen[0] == ScriptPose(1, 2, 3, 4, 5, 6)
     assert seen[1] == [1, 2.5]
     assert seen[2].rows == [[1], [2]]
     assert seen[3:] == ['t', None, True]
@@ -267,29 +267,29 @@ def test_a_paused_program_stays_until_it_is_resumed() -> None:
 
 def test_a_thread_that_exceeds_its_budget_ends_the_program_with_a_place() -> None:
     body = parse('def f():\n  i = 0\n  while True:\n    i = i + 1\n  end\nend')
-    running = Machine(body, {}, instruction_budget=1000)
+    running = ScriptInterpreter(body, {}, instruction_budget=1000)
     running.step()
     assert not running.running
     assert running.error is not None
     assert (running.error.line, running.error.column) == (4, 5)
-    assert running.error.text == TOO_MUCH_TIME
+    assert running.error.text == BUDGET_EXCEEDED
     assert 100 <= running.variables['i'] <= 250
 
 
 def test_the_budget_is_fresh_in_every_frame_and_for_every_thread() -> None:
     loop = 'i = 0\nwhile i < 50:\ni = i + 1\nend\nsync()\n'
     text = f'def f():\nthread t():\n{loop * 5}end\nrun t()\n{loop * 5}end'
-    running = Machine(parse(text), {'sync': sync}, instruction_budget=600)
+    running = ScriptInterpreter(parse(text), {'sync': sync}, instruction_budget=600)
     frames_until_the_end(running)
     assert running.error is None
 
 
 def test_recursion_without_loops_costs_budget_too() -> None:
     text = 'def f():\ndef g(n):\nif n > 0:\ng(n - 1)\ng(n - 1)\nend\nend\ng(60)\nend'
-    running = Machine(parse(text), {}, instruction_budget=10_000)
+    running = ScriptInterpreter(parse(text), {}, instruction_budget=10_000)
     running.step()
     assert running.error is not None
-    assert running.error.text == TOO_MUCH_TIME
+    assert running.error.text == BUDGET_EXCEEDED
 
 
 # Errors
@@ -362,7 +362,7 @@ def test_the_first_unknown_name_in_the_text_is_reported() -> None:
 
 def transcript(text: str) -> list[str]:
     output: list[str] = []
-    running = Machine(
+    running = ScriptInterpreter(
         parse(text),
         {**core_builtins(), 'sync': sync, 'say': lambda value: output.append(to_text(value))},
     )

@@ -20,11 +20,11 @@ def program(body: str) -> str:
 
 def first_value(expression: str) -> tree.Expression:
     statement = parse(program(f'x = {expression}')).body[0]
-    assert isinstance(statement, tree.Assign)
+    assert isinstance(statement, tree.AssignStatement)
     return statement.value
 
 
-def walk(node: tree.Node) -> list[tree.Node]:
+def walk(node: tree.SyntaxNode) -> list[tree.SyntaxNode]:
     return [node, *(below for child in tree.children(node) for below in walk(child))]
 
 
@@ -49,27 +49,27 @@ def test_nodes_stand_where_a_reader_would_point() -> None:
     text = program('  total = first + second(3, k=4)[5].six')
     places = {(type(node).__name__, node.line, node.column) for node in walk(parse(text).body[0])}
     assert {
-        ('Assign', 2, 3),
-        ('Name', 2, 3),
-        ('Binary', 2, 17),
-        ('Name', 2, 11),
-        ('Call', 2, 19),
-        ('Argument', 2, 29),
-        ('Index', 2, 33),
-        ('Field', 2, 37),
+        ('AssignStatement', 2, 3),
+        ('NameExpression', 2, 3),
+        ('BinaryExpression', 2, 17),
+        ('NameExpression', 2, 11),
+        ('CallExpression', 2, 19),
+        ('CallArgument', 2, 29),
+        ('IndexExpression', 2, 33),
+        ('FieldExpression', 2, 37),
     } <= places
 
 
 def test_binding_strength_orders_the_operators() -> None:
     value = first_value('not a or b and c == d + e * -f')
-    assert isinstance(value, tree.Logical)
+    assert isinstance(value, tree.LogicalExpression)
     assert value.operator == 'or'
-    assert isinstance(value.left, tree.Unary)
-    assert isinstance(value.right, tree.Logical)
+    assert isinstance(value.left, tree.UnaryExpression)
+    assert isinstance(value.right, tree.LogicalExpression)
     comparison = value.right.right
-    assert isinstance(comparison, tree.Binary)
+    assert isinstance(comparison, tree.BinaryExpression)
     assert comparison.operator == '=='
-    assert isinstance(comparison.right, tree.Binary)
+    assert isinstance(comparison.right, tree.BinaryExpression)
     assert comparison.right.operator == '+'
 
 
@@ -79,7 +79,7 @@ def test_binding_strength_orders_the_operators() -> None:
 )
 def test_literals_that_fit_into_32_bits_are_ints(text: str, value: float) -> None:
     constant = first_value(text)
-    assert isinstance(constant, tree.Constant)
+    assert isinstance(constant, tree.ConstantExpression)
     assert (constant.value, type(constant.value)) == (value, type(value))
 
 
@@ -112,7 +112,7 @@ def test_too_deep_a_program_is_a_syntax_error(body: str) -> None:
 
 def test_nesting_up_to_the_bound_is_fine() -> None:
     depth = MAX_NESTING - 1
-    assert isinstance(first_value('(' * depth + '1' + ')' * depth), tree.Constant)
+    assert isinstance(first_value('(' * depth + '1' + ')' * depth), tree.ConstantExpression)
 
 
 def test_a_syntax_error_quotes_the_line_and_says_what_is_missing() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from ur_cartesian_driver.urscript import core_builtins, Machine, parse, to_text
+from ur_cartesian_driver.urscript import core_builtins, parse, ScriptInterpreter, to_text
 
 PROGRAMS = Path(__file__).parent / 'programs'
 STEP = 0.002  # [s]
@@ -83,12 +83,12 @@ def robot() -> Robot:
 
 
 @pytest.fixture
-def sample(robot: Robot) -> Machine:
+def sample(robot: Robot) -> ScriptInterpreter:
     text = (PROGRAMS / 'servoj_guide.script').read_text()
-    return Machine(parse(text), robot.builtins())
+    return ScriptInterpreter(parse(text), robot.builtins())
 
 
-def stream(sample: Machine, robot: Robot, frames: int) -> list[float]:
+def stream(sample: ScriptInterpreter, robot: Robot, frames: int) -> list[float]:
     """Send one way-point per frame, as the planner of the guide does."""
     sent = []
     for frame in range(1, frames + 1):
@@ -101,7 +101,9 @@ def stream(sample: Machine, robot: Robot, frames: int) -> list[float]:
 
 
 @pytest.mark.slow
-def test_the_servoj_sample_moves_through_every_way_point(sample: Machine, robot: Robot) -> None:
+def test_the_servoj_sample_moves_through_every_way_point(
+    sample: ScriptInterpreter, robot: Robot
+) -> None:
     robot.integers[DESIRED_MODE] = MODE_SERVO
     robot.integers[SYNC_STATE] = EXTERNAL_TO_ROBOT
     sent = stream(sample, robot, 500)
@@ -114,7 +116,9 @@ def test_the_servoj_sample_moves_through_every_way_point(sample: Machine, robot:
     assert abs(robot.output_floats[LAG_TIME]) < 3 * STEP
 
 
-def test_the_servoj_sample_halts_when_it_is_told_to(sample: Machine, robot: Robot) -> None:
+def test_the_servoj_sample_halts_when_it_is_told_to(
+    sample: ScriptInterpreter, robot: Robot
+) -> None:
     stream(sample, robot, 3)
     assert sample.running
     robot.integers[EXTERNAL_ERROR] = ERROR_HALT
@@ -125,7 +129,7 @@ def test_the_servoj_sample_halts_when_it_is_told_to(sample: Machine, robot: Robo
 
 
 def test_the_servoj_sample_halts_when_its_planner_falls_silent(
-    sample: Machine, robot: Robot
+    sample: ScriptInterpreter, robot: Robot
 ) -> None:
     for _ in range(2002):
         sample.step()

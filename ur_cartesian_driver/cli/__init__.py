@@ -17,7 +17,7 @@ import re
 import signal
 import sys
 
-from ur_cartesian_driver.cli import commands, plans, plot
+from ur_cartesian_driver.cli import commands, recording_plot, validate_command
 from ur_cartesian_driver.kinematics.robots import MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.sim.fault_text import parse_fault
@@ -209,7 +209,7 @@ def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
     validate = _add(
         sub,
         'validate',
-        plans.validate,
+        validate_command.validate,
         'check and plan a goal with neither motion nor robot, and print the plan',
     )
     _add_goal(validate)
@@ -268,7 +268,7 @@ def _add_plot(sub: Commands[argparse.ArgumentParser]) -> None:
     draw = _add(
         sub,
         'plot',
-        plot.plot,
+        recording_plot.plot,
         'draw a recorded motion: path, deviation, speed, lag, outputs and events',
     )
     draw.add_argument('file', help='a recording, or a directory of recordings: its newest one')

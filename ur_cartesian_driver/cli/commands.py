@@ -14,7 +14,7 @@ from time import monotonic
 from typing import Any
 
 from ur_cartesian_driver.kinematics.robots import (
-    Geometry,
+    DhTable,
     JOINT_NAMES,
     robot_model,
     RobotModel,
@@ -30,15 +30,15 @@ from ur_cartesian_driver.sim.calibration import random_calibration, read_calibra
 
 def demo(arguments: argparse.Namespace) -> int:
     """Run all the processes, a goal for each arm, and draw the pictures."""
-    from ur_cartesian_driver.cli.demo import Arm, run
+    from ur_cartesian_driver.cli.demo import DemoArm, run
 
     picture = Path(arguments.picture)
     goal = goal_file(arguments.goal)
     if arguments.arms == 1:
-        return run([Arm(goal=goal, model=arguments.model, drawing=picture)])
+        return run([DemoArm(goal=goal, model=arguments.model, drawing=picture)])
     return run(
         [
-            Arm(
+            DemoArm(
                 name=name,
                 goal=its_goal,
                 model=arguments.model,
@@ -81,7 +81,7 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
     )
 
 
-def calibration(arguments: argparse.Namespace, model: RobotModel) -> Geometry | None:
+def calibration(arguments: argparse.Namespace, model: RobotModel) -> DhTable | None:
     """Return the table of the arm that is asked for; None = that of the model."""
     if arguments.calibration is not None:
         return read_calibration(Path(arguments.calibration), model)
@@ -122,10 +122,13 @@ def send(arguments: argparse.Namespace) -> int:
 
     goal = read_goal(arguments)
     goal.validate_only = goal.validate_only or arguments.validate_only
-    with Recorder(arguments.record) as recorder, client.GoalClient(arguments.driver) as sender:
+    with (
+        FeedbackLog(arguments.record) as feedback_log,
+        client.GoalClient(arguments.driver) as sender,
+    ):
         if arguments.wait > 0.0:
             sender.wait_ready(arguments.wait)
-        code, result = sender.send(goal, recorder.take)
+        code, result = sender.send(goal, feedback_log.take)
     status = client.STATUS_NAMES[code]
     clear_line()
     if (goal.validate_only or arguments.report) and result.report:
@@ -140,7 +143,7 @@ def read_goal(arguments: argparse.Namespace) -> Any:
     """Return the goal of a file, an example or standard input, as a message."""
     from ur_cartesian_driver.ros import client
 
-    return client.with_prefix(
+    return client.add_tf_prefix(
         client.load_goal(sys.stdin.read() if arguments.file == '-' else goal_file(arguments.file)),
         arguments.tf_prefix,
     )
@@ -158,7 +161,7 @@ def clear_line() -> None:
         print('\r\033[K', end='')
 
 
-class Recorder:
+class FeedbackLog:
     """Shows feedback on the terminal and writes it to a file, one JSON object a line."""
 
     def __init__(self, path: str | None) -> None:
@@ -167,7 +170,7 @@ class Recorder:
         self._file: Any = None
         self._next_line = 0.0
 
-    def __enter__(self) -> Recorder:
+    def __enter__(self) -> FeedbackLog:
         """Open the file."""
         if self._path:
             self._file = open(self._path, 'w', encoding='utf-8')

@@ -22,7 +22,7 @@ import sys
 import tempfile
 import threading
 
-from ur_cartesian_driver.cli import picture
+from ur_cartesian_driver.cli import feedback_plot
 
 #: How long a process may take to say that it is there, and to end [s].
 START_TIMEOUT = 30.0
@@ -31,7 +31,7 @@ _PORTS = re.compile(r'RTDE (\d+), primary (\d+), dashboard (\d+)')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Arm:
+class DemoArm:
     """
     One of the arms.
 
@@ -59,7 +59,7 @@ class Arm:
         return f'{self.name}: ' if self.name else ''
 
 
-def run(arms: Sequence[Arm]) -> int:
+def run(arms: Sequence[DemoArm]) -> int:
     """
     Run the demo; all arms move at the same time.
 
@@ -91,14 +91,14 @@ def run(arms: Sequence[Arm]) -> int:
         return status
 
 
-def _start(arm: Arm, environment: dict[str, str], stack: ExitStack) -> None:
+def _start(arm: DemoArm, environment: dict[str, str], stack: ExitStack) -> None:
     """Start the simulated robot of an arm, and its driver."""
     simulator = stack.enter_context(
         process(
             'sim',
             '--model',
             arm.model,
-            *_any_ports('rtde', 'primary', 'dashboard'),
+            *_free_port_options('rtde', 'primary', 'dashboard'),
             environment=environment,
             stdout=subprocess.PIPE,
         )
@@ -134,11 +134,11 @@ def _start(arm: Arm, environment: dict[str, str], stack: ExitStack) -> None:
     )
 
 
-def _clients(options: Mapping[Arm, Sequence[str]], environment: dict[str, str]) -> int:
+def _clients(options: Mapping[DemoArm, Sequence[str]], environment: dict[str, str]) -> int:
     """Send the goals of all arms at once; return the first exit status that is not 0, or 0."""
     with ExitStack() as stack:
         clients = []
-        for arm, more in options.items():
+        for arm, extra_options in options.items():
             client = stack.enter_context(
                 process(
                     'send',
@@ -147,7 +147,7 @@ def _clients(options: Mapping[Arm, Sequence[str]], environment: dict[str, str]) 
                     arm.driver,
                     '--tf-prefix',
                     arm.tf_prefix,
-                    *more,
+                    *extra_options,
                     environment=environment,
                     # A terminal shows the progress of one client in one line.
                     stdout=subprocess.PIPE if arm.label else None,
@@ -155,20 +155,22 @@ def _clients(options: Mapping[Arm, Sequence[str]], environment: dict[str, str]) 
             )
             clients.append(client)
             if arm.label:
-                threading.Thread(target=_pass_on, args=(client, arm.label), daemon=True).start()
+                threading.Thread(
+                    target=_forward_output, args=(client, arm.label), daemon=True
+                ).start()
         return next((status for client in clients if (status := client.wait()) != 0), 0)
 
 
-def _pass_on(client: subprocess.Popen[str], label: str) -> None:
+def _forward_output(client: subprocess.Popen[str], label: str) -> None:
     """Print what a client says, each line behind the name of its arm."""
     assert client.stdout is not None
     for line in client.stdout:
         print(f'{label}{line}', end='', flush=True)
 
 
-def _draw(arm: Arm, record: Path) -> None:
+def _draw(arm: DemoArm, record: Path) -> None:
     if record.is_file() and record.stat().st_size:
-        picture.draw(record, arm.drawing, title=f'{arm.label}{arm.model}: {arm.goal.stem}')
+        feedback_plot.draw(record, arm.drawing, title=f'{arm.label}{arm.model}: {arm.goal.stem}')
         print(f'picture of planned and executed path: {arm.drawing}')
 
 
@@ -219,7 +221,7 @@ def _ports(simulator: subprocess.Popen[str]) -> tuple[int, int, int]:
     return rtde, primary, dashboard
 
 
-def _any_ports(*names: str) -> Sequence[str]:
+def _free_port_options(*names: str) -> Sequence[str]:
     return [word for name in names for word in (f'--{name}-port', '0')]
 
 

@@ -36,8 +36,8 @@ def draw(record: Path, drawing: Path, title: str) -> None:
     figure = pyplot.figure(figsize=(11.0, 5.0), layout='constrained')
     figure.suptitle(title)
     _path(figure.add_subplot(1, 2, 1, projection='3d'), planned, actual)
-    off = 1000.0 * np.linalg.norm(planned - actual, axis=1)
-    _over_time(figure, time, np.array([row['speed'] for row in rows]), off)
+    deviation = 1000.0 * np.linalg.norm(planned - actual, axis=1)
+    _over_time(figure, time, np.array([row['speed'] for row in rows]), deviation)
     figure.savefig(drawing, dpi=110)
     pyplot.close(figure)
 
@@ -52,11 +52,11 @@ def _path(axes: Any, planned: Floats, actual: Floats) -> None:
     axes.legend(loc='upper left')
 
 
-def _over_time(figure: Any, time: Floats, speed: Floats, off: Floats) -> None:
+def _over_time(figure: Any, time: Floats, speed: Floats, deviation: Floats) -> None:
     upper, lower = figure.add_subplot(2, 2, 2), figure.add_subplot(2, 2, 4)
     upper.plot(time, speed, color='tab:blue')
     upper.set(ylabel='tool speed [m/s]')
-    lower.plot(time, off, color='tab:red')
+    lower.plot(time, deviation, color='tab:red')
     lower.set(xlabel='time [s]', ylabel='distance from the plan [mm]')
     for axes in (upper, lower):
         axes.grid(alpha=0.3)

@@ -35,12 +35,12 @@ def validate(arguments: argparse.Namespace) -> int:
     model = robot_model(arguments.ur_type or settings.driver.ur_type)
     arm = Arm(model, calibration(arguments, model))
     T_flange_tcp = Pose.from_rotation_vector(arguments.tcp) if arguments.tcp else IDENTITY
-    state = standing_at(arm, arguments.joints or SimulatorConfig().q, T_flange_tcp)
+    state = stationary_state(arm, arguments.joints or SimulatorConfig().q, T_flange_tcp)
     dialect = settings.driver.dialect
     options = replace(
         settings.planning,
         dialect=dialect,
-        allow_tcp_change=settings.planning.allow_tcp_change and dialect.sets_tcp,
+        allow_tcp_change=settings.planning.allow_tcp_change and dialect.supports_tcp_change,
     )
     message = read_goal(arguments)
     try:
@@ -48,7 +48,7 @@ def validate(arguments: argparse.Namespace) -> int:
             message,
             settings.frames,
             now=time_ns(),
-            stand=frames.Stand.of(state),
+            snapshot=frames.ArmSnapshot.of(state),
             time_tolerance=settings.node.goal_time_tolerance,
         )
         found = plan(goal, state, arm, options)
@@ -66,7 +66,7 @@ def validate(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def standing_at(arm: Arm, q: tuple[float, ...], T_flange_tcp: Pose = IDENTITY) -> RobotState:
+def stationary_state(arm: Arm, q: tuple[float, ...], T_flange_tcp: Pose = IDENTITY) -> RobotState:
     """Return the state of an arm that stands still."""
     a, b, c, d, e, f = q
     joints = (a, b, c, d, e, f)

@@ -18,42 +18,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.driver.recording import Recording
-from ur_cartesian_driver.driver.recording_format import OUTPUT_NAMES, PART
+from ur_cartesian_driver.driver.recording_format import OUTPUT_NAMES, PART_SUFFIX
 from ur_cartesian_driver.motion.state import RuntimeState
 
 #: No picture shows more packets.
-MOST_ROWS = 6000
+MAX_ROWS = 6000
 #: More points than that are not numbered.
-MOST_NUMBERS = 12
+MAX_NUMBERED_POINTS = 12
 _AXES = 'xyz'
 #: From above, unless the height is that much more than the smaller width.
-_SHOWN = np.array([1.0, 1.0, 0.4])
+_VIEW_WEIGHTS = np.array([1.0, 1.0, 0.4])
 _PLANNED, _TARGET, _ACTUAL, _MARK = '#9aa5b1', '#1f77b4', '#c8372d', '#2a9d5c'
 #: Events that are marked in all charts.
-_STRIKING = {'cancel': '#e08a00', 'safety': '#c8372d', 'robot': '#c8372d', 'end': '#333333'}
+_MARKED_EVENTS = {'cancel': '#e08a00', 'safety': '#c8372d', 'robot': '#c8372d', 'end': '#333333'}
 
 
 def plot(arguments: argparse.Namespace) -> int:
     """Draw a recording, or write its table."""
-    file = newest(Path(arguments.file))
+    file = newest_recording(Path(arguments.file))
     if arguments.csv:
         write_table(Recording.load(file), Path(arguments.csv))
         print(f'table: {arguments.csv}')
     if arguments.output or not arguments.csv:
         picture = Path(arguments.output or file.with_suffix('.png'))
-        draw(Recording.load(file, MOST_ROWS), picture)
+        draw(Recording.load(file, MAX_ROWS), picture)
         print(f'picture: {picture}')
     return 0
 
 
-def newest(path: Path) -> Path:
+def newest_recording(path: Path) -> Path:
     """
     Return a recording: the path, or the newest one in a directory of recordings.
 
     :raises OSError: there is none.
     """
-    if path.is_dir() and path.suffix != PART:
-        found = sorted(path.glob('*_points*.npz')) or sorted(path.glob(f'*_points*{PART}'))
+    if path.is_dir() and path.suffix != PART_SUFFIX:
+        found = sorted(path.glob('*_points*.npz')) or sorted(path.glob(f'*_points*{PART_SUFFIX}'))
         if not found:
             raise OSError(f'there is no recording in {path}; see the parameter record_directory')
         return found[-1]
@@ -65,7 +65,7 @@ def newest(path: Path) -> Path:
 
 def write_table(recording: Recording, file: Path) -> None:
     """Write all packets as comma-separated values, and the deviation from the plan."""
-    off = recording.deviation()
+    deviation = recording.deviation()
     columns: dict[str, NDArray[Any]] = {'time': recording.time}
     for name, axes in (
         ('actual_pose', _POSE),
@@ -94,9 +94,9 @@ def write_table(recording: Recording, file: Path) -> None:
     ):
         columns[name] = getattr(recording, name)
     columns |= {
-        'deviation_position': off.position,
-        'deviation_angle': off.angle,
-        'planned_time': off.planned_time,
+        'deviation_position': deviation.position,
+        'deviation_angle': deviation.angle,
+        'planned_time': deviation.planned_time,
     }
     with open(file, 'w', newline='', encoding='utf-8') as opened:
         writer = csv.writer(opened)
@@ -150,13 +150,13 @@ def draw(recording: Recording, picture: Path, title: str = '') -> None:
 
 
 def _title(recording: Recording) -> str:
-    head = recording.metadata
-    outcome = head['outcome']
+    metadata = recording.metadata
+    outcome = metadata['outcome']
     ended = f'{outcome["name"]}: {outcome["text"]}' if outcome else 'the recording was cut off'
     return (
-        f'{head["robot"].get("model") or "robot"}, {head["execution"]}, '
-        f'{head["points"]} point{"" if head["points"] == 1 else "s"}, '
-        f'{head["created"][:19].replace("T", " ")} UTC\n{ended[:150]}'
+        f'{metadata["robot"].get("model") or "robot"}, {metadata["execution"]}, '
+        f'{metadata["points"]} point{"" if metadata["points"] == 1 else "s"}, '
+        f'{metadata["created"][:19].replace("T", " ")} UTC\n{ended[:150]}'
     )
 
 
@@ -166,7 +166,7 @@ def _draw_path(figure: Any, recording: Recording) -> None:
     space, flat = figure.add_subplot(2, 1, 1, projection='3d'), figure.add_subplot(2, 1, 2)
     low, high = (side(np.vstack((planned, actual)), axis=0) for side in (np.min, np.max))
     extent = high - low
-    a, b = sorted(np.argsort(extent * _SHOWN)[1:].tolist())
+    a, b = sorted(np.argsort(extent * _VIEW_WEIGHTS)[1:].tolist())
     for axes, columns in ((space, [0, 1, 2]), (flat, [a, b])):
         axes.plot(
             *planned[:, columns].T,
@@ -188,7 +188,7 @@ def _draw_path(figure: Any, recording: Recording) -> None:
         zorder=4,
         label='an output switched',
     )
-    if len(recording.points) <= MOST_NUMBERS:
+    if len(recording.points) <= MAX_NUMBERED_POINTS:
         for number, point in enumerate(recording.points):
             flat.annotate(str(number), point[[a, b]], xytext=(4, 4), textcoords='offset points')
     space.set(xlabel='x [m]', ylabel='y [m]', zlabel='z [m]')
@@ -217,11 +217,11 @@ def _switch_places(recording: Recording) -> NDArray[np.float64]:
 def _draw_time(figure: Any, recording: Recording) -> None:
     """Draw what there is over time."""
     rows = _timeline(recording)
-    off, speed, scaling, line = figure.subplots(
+    deviation, speed, scaling, line = figure.subplots(
         4, 1, sharex=True, height_ratios=(1.0, 1.0, 0.8, 0.35 + 0.16 * len(rows))
     )
     time = recording.time
-    _draw_deviation(off, recording)
+    _draw_deviation(deviation, recording)
     speed.plot(
         time,
         np.linalg.norm(recording.target_twist[:, :3], axis=1),
@@ -236,25 +236,25 @@ def _draw_time(figure: Any, recording: Recording) -> None:
     _draw_scaling(scaling, recording)
     _draw_timeline(line, recording, rows)
     line.set_xlabel('time [s]')
-    for axes in (off, speed, scaling):
+    for axes in (deviation, speed, scaling):
         for at, kind, _ in recording.events:
-            if kind in _STRIKING:
-                axes.axvline(at, color=_STRIKING[kind], linewidth=0.8, linestyle=':')
+            if kind in _MARKED_EVENTS:
+                axes.axvline(at, color=_MARKED_EVENTS[kind], linewidth=0.8, linestyle=':')
 
 
 def _draw_deviation(axes: Any, recording: Recording) -> None:
-    off = recording.deviation()
+    deviation = recording.deviation()
     axes.plot(
         recording.time,
-        1e3 * off.target_position,
+        1e3 * deviation.target_position,
         color=_TARGET,
         linewidth=2.4,
         alpha=0.5,
         label="controller's target",
     )
-    axes.plot(recording.time, 1e3 * off.position, color=_ACTUAL, linewidth=0.9, label='tool')
+    axes.plot(recording.time, 1e3 * deviation.position, color=_ACTUAL, linewidth=0.9, label='tool')
     axes.set_ylabel('distance from\nthe plan [mm]')
-    axes.set_ylim(0.0, 1.15 * max(0.05, 1e3 * np.nan_to_num(off.position).max()))
+    axes.set_ylim(0.0, 1.15 * max(0.05, 1e3 * np.nan_to_num(deviation.position).max()))
     axes.legend(loc='upper right', ncols=2)
 
 
@@ -309,7 +309,7 @@ def _draw_timeline(
         [(at, text.rsplit(' ', 1)[-1]) for at, kind, text in recording.events if kind == 'point'],
     )
     axes.plot([at for at, _ in points], [0.0] * len(points), '|', color='#333333', markersize=9.0)
-    if len(points) <= MOST_NUMBERS:
+    if len(points) <= MAX_NUMBERED_POINTS:
         for at, number in points:
             axes.annotate(
                 number, (at, 0.0), xytext=(3, 2), textcoords='offset points', fontsize=7.0
@@ -326,8 +326,8 @@ def _draw_timeline(
     axes.set_yticks(range(len(rows) + 1), ['to point', *(name for name, _ in rows)])
     axes.set_ylim(-0.6, len(rows) + 0.6)
     for at, kind, text in recording.events:
-        if kind in _STRIKING:
-            axes.axvline(at, color=_STRIKING[kind], linewidth=0.8, linestyle=':')
+        if kind in _MARKED_EVENTS:
+            axes.axvline(at, color=_MARKED_EVENTS[kind], linewidth=0.8, linestyle=':')
             if kind != 'end':
                 axes.annotate(
                     text[:60] or kind,
@@ -335,5 +335,5 @@ def _draw_timeline(
                     xytext=(3, 0),
                     textcoords='offset points',
                     fontsize=7.0,
-                    color=_STRIKING[kind],
+                    color=_MARKED_EVENTS[kind],
                 )

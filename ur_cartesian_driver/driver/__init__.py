@@ -13,8 +13,8 @@ Plan, execute and stop Cartesian motions of one robot, from plain Python.
 
 from ur_cartesian_driver.driver.api import Driver
 from ur_cartesian_driver.driver.config import DriverConfig
-from ur_cartesian_driver.driver.motion import Motion
+from ur_cartesian_driver.driver.motion import MotionHandle
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.status import DriverStatus
 
-__all__ = ['ConnectionState', 'Driver', 'DriverConfig', 'DriverStatus', 'Motion']
+__all__ = ['ConnectionState', 'Driver', 'DriverConfig', 'DriverStatus', 'MotionHandle']

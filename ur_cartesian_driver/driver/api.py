@@ -13,45 +13,45 @@ import threading
 from types import TracebackType
 
 from ur_cartesian_driver.driver import channel, host
-from ur_cartesian_driver.driver.callbacks import call_back, LOG
+from ur_cartesian_driver.driver.appender import Appender, encode_plan
+from ur_cartesian_driver.driver.callbacks import LOG, run_callback
 from ur_cartesian_driver.driver.channel import (
-    AimMotion,
-    Alive,
+    AppendAnswered,
     CallAnswered,
     CallRobot,
     Configure,
-    GeometryKnown,
-    Heartbeat,
-    LiveOrder,
-    LogLine,
+    GeometryReceived,
+    LiveSetup,
+    LogMessage,
+    LoopHeartbeat,
     MotionEnded,
-    MotionExtended,
     MotionProgress,
-    Notice,
+    Notification,
+    OwnerHeartbeat,
     Request,
     ResendProgram,
-    ServoChanged,
+    ServoProgress,
+    SetLiveTarget,
     Shutdown,
     SignalsChanged,
     StartMotion,
     StatusChanged,
-    TcpLent,
-    TcpReturned,
+    TemporaryTcpRestored,
+    TemporaryTcpSet,
 )
 from ur_cartesian_driver.driver.config import DriverConfig
-from ur_cartesian_driver.driver.continuing import Continuing, encoded
 from ur_cartesian_driver.driver.live import (
     check_target,
-    LiveMotions,
-    standing_order,
+    InteractiveMotions,
+    stationary_job,
 )
-from ur_cartesian_driver.driver.motion import Motion, OnProgress, Run
-from ur_cartesian_driver.driver.recorder import about
+from ur_cartesian_driver.driver.motion import ActiveMotion, MotionHandle, OnProgress
+from ur_cartesian_driver.driver.recorder import plan_metadata
 from ur_cartesian_driver.driver.services import RobotServices
-from ur_cartesian_driver.execution import AnswerExtension, Order, order_of, same_tcp
-from ur_cartesian_driver.execution.trajectory import STOP_BOUND
+from ur_cartesian_driver.execution import AnswerAppend, job_from_plan, MotionJob, same_tcp
+from ur_cartesian_driver.execution.trajectory import STOP_TIMEOUT
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import Geometry, robot_model
+from ur_cartesian_driver.kinematics.robots import DhTable, robot_model
 from ur_cartesian_driver.motion.errors import (
     code_of,
     ErrorCode,
@@ -60,20 +60,26 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.goal import Goal
-from ur_cartesian_driver.motion.lever import seen_at
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.servo import ServoReport
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.planning.continuation import opened, Part
-from ur_cartesian_driver.planning.rest import come_to_rest
+from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_first_part
+from ur_cartesian_driver.planning.stop_prediction import predict_stop
 from ur_cartesian_driver.program.render import has_feature
 from ur_cartesian_driver.protocol.trajectory import encode_points
-from ur_cartesian_driver.robot.calls import Answer, Call
+from ur_cartesian_driver.robot.calls import ServiceAnswer, ServiceCall
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.status import DriverStatus, Gaps, is_paused, is_stopped, stamped
+from ur_cartesian_driver.robot.status import (
+    DriverStatus,
+    is_paused,
+    is_stopped,
+    LinkGaps,
+    timestamped,
+)
 
 #: Pause before a robot loop that died is replaced [s]: what ends it may end the next one too.
 RESTART_PAUSE = 0.5
@@ -81,10 +87,10 @@ RESTART_PAUSE = 0.5
 NO_STATE = 'The robot does not report its state.'
 
 #: How long a cancelled motion may need to its outcome [s], whatever the robot does.
-STOP_PATIENCE = 2.0 * STOP_BOUND + 1.0
+CANCEL_TIMEOUT = 2.0 * STOP_TIMEOUT + 1.0
 
 
-class Driver(RobotServices, LiveMotions):
+class Driver(RobotServices, InteractiveMotions):
     """
     One robot. Thread-safe; open it, or use it as a context manager.
 
@@ -109,17 +115,17 @@ class Driver(RobotServices, LiveMotions):
         self.options = options if options is not None else PlanningOptions()
         self._arm = Arm(robot_model(config.ur_type))
         self._auto_heartbeat = auto_heartbeat
-        self._host: host.Host | None = None
+        self._host: host.LoopHost | None = None
         self._status = DriverStatus()
         self._status_listeners: list[Callable[[DriverStatus], None]] = []
         self._ready = threading.Event()
-        self._runs: dict[int, Run] = {}
+        self._active_motions: dict[int, ActiveMotion] = {}
         #: The TCP that a goal has set and that is not back yet.
-        self._loan: TcpLent | None = None
-        self._calls: dict[int, Future[Answer]] = {}
+        self._temporary_tcp: TemporaryTcpSet | None = None
+        self._calls: dict[int, Future[ServiceAnswer]] = {}
         self._signals: Signals | None = None
         self._servo_listeners: list[Callable[[ServoReport], None]] = []
-        self._gaps = Gaps()
+        self._gaps = LinkGaps()
         self._numbers = itertools.count(1)
         # Guards the pipe (several threads send), the running motions and opening and closing.
         self._lock = threading.RLock()
@@ -152,7 +158,7 @@ class Driver(RobotServices, LiveMotions):
             self._send(Configure(config=self.config))
             self._start_thread('driver reader', self._read)
             if self._auto_heartbeat:
-                self._start_thread('driver heartbeat', self._beat)
+                self._start_thread('driver heartbeat', self._send_heartbeats)
 
     def close(self) -> None:
         """Stop a running motion and end the robot loop and all threads. May be called twice."""
@@ -169,11 +175,11 @@ class Driver(RobotServices, LiveMotions):
             self._host, self._threads = None, []
         # First the status, so that no motion can begin that nobody would end.
         self._set_status(DriverStatus(message='The driver is closed; open it.'))
-        self._abandon('The driver was closed.')
+        self._abort_all('The driver was closed.')
 
     def heartbeat(self) -> None:
         """Say that the owner is alive; see ``node_timeout``."""
-        self._send(Heartbeat())
+        self._send(OwnerHeartbeat())
 
     # ---- what is known ------------------------------------------------------------------------
 
@@ -204,13 +210,20 @@ class Driver(RobotServices, LiveMotions):
         if state is None:
             return None
         with self._lock:
-            loan = next((run.loan for run in self._runs.values()), self._loan)
-        state = come_to_rest(state, self._arm, self.config.stop_deceleration)
-        if loan is None or not same_tcp(state.T_flange_tcp, loan.T_flange_lent):
+            temporary_tcp = next(
+                (active.temporary_tcp for active in self._active_motions.values()),
+                self._temporary_tcp,
+            )
+        state = predict_stop(state, self._arm, self.config.stop_deceleration)
+        if temporary_tcp is None or not same_tcp(
+            state.T_flange_tcp, temporary_tcp.T_flange_temporary
+        ):
             return state
         return replace(
-            seen_at(state, state.T_flange_tcp.inverse() @ loan.T_flange_before),
-            T_flange_tcp=loan.T_flange_before,
+            shift_reference_point(
+                state, state.T_flange_tcp.inverse() @ temporary_tcp.T_flange_original
+            ),
+            T_flange_tcp=temporary_tcp.T_flange_original,
         )
 
     @property
@@ -219,7 +232,7 @@ class Driver(RobotServices, LiveMotions):
         return self._signals
 
     @property
-    def gaps(self) -> Gaps:
+    def gaps(self) -> LinkGaps:
         """How steady the connection was lately."""
         return self._gaps
 
@@ -269,13 +282,14 @@ class Driver(RobotServices, LiveMotions):
             calibration_known=status.calibration_known,
             dialect=self.config.dialect,
             # Another program may skip the command, and move the TCP that is there.
-            allow_tcp_change=self.options.allow_tcp_change and self.config.dialect.sets_tcp,
+            allow_tcp_change=self.options.allow_tcp_change
+            and self.config.dialect.supports_tcp_change,
             optimove_known=has_feature('optimove', status.software()),
             acceleration_known=state.actual_tcp_acceleration is not None
             and state.target_tcp_acceleration is not None,
         )
 
-    def start(self, plan: Plan, on_progress: OnProgress | None = None) -> Motion:
+    def start(self, plan: Plan, on_progress: OnProgress | None = None) -> MotionHandle:
         """
         Execute a plan and return at once.
 
@@ -286,82 +300,88 @@ class Driver(RobotServices, LiveMotions):
             state = self.state
             if state is None:
                 raise RobotNotReady(self._status.message or NO_STATE)
-            part = opened(plan, self.arm, self._options(state))
-            points, order = encoded(part, self.config.dialect)
-            return self._launch(plan, points, order, on_progress, part=part)
+            part = plan_first_part(plan, self.arm, self._options(state))
+            points, job = encode_plan(part, self.config.dialect)
+            return self._start_motion(plan, points, job, on_progress, part=part)
         points = encode_points(plan.instructions, self.config.dialect)
-        return self._launch(plan, points, order_of(plan, self.config.dialect), on_progress)
+        return self._start_motion(
+            plan, points, job_from_plan(plan, self.config.dialect), on_progress
+        )
 
-    def _launch(
+    def _start_motion(
         self,
         plan: Plan,
         points: bytes,
-        order: Order,
+        job: MotionJob,
         on_progress: OnProgress | None,
-        live: LiveOrder | None = None,
-        teach: bool = False,
-        part: Part | None = None,
-    ) -> Motion:
+        live: LiveSetup | None = None,
+        freedrive: bool = False,
+        part: AppendPlan | None = None,
+    ) -> MotionHandle:
         """Have the robot loop begin a motion, if nothing else moves."""
         with self._lock:
-            if self._runs:
+            if self._active_motions:
                 raise RobotNotReady('A motion is running; wait for its end or cancel it.')
             if reason := self._status.not_ready():
                 raise RobotNotReady(reason)
-            run = Run(next(self._numbers), plan, on_progress, self._send)
-            motion = run.motion
+            active = ActiveMotion(next(self._numbers), plan, on_progress, self._send)
+            motion = active.motion
             if part is not None:
-                motion.continuing = self._continuing(motion, part)
-            self._runs[motion.number] = run
+                motion.appender = self._make_appender(motion, part)
+            self._active_motions[motion.number] = active
             # Still under the lock: whoever finds the motion may cancel it, and that has to come
             # behind its start.
             self._send(
                 StartMotion(
                     motion=motion.number,
                     points=points,
-                    order=order,
+                    job=job,
                     live=live,
-                    teach=teach,
-                    about=about(plan, self.options) if self.config.record_directory else '',
+                    freedrive=freedrive,
+                    plan_metadata=plan_metadata(plan, self.options)
+                    if self.config.record_directory
+                    else '',
                 )
             )
         return motion
 
-    def _continuing(self, motion: Motion, part: Part) -> Continuing:
+    def _make_appender(self, motion: MotionHandle, part: AppendPlan) -> Appender:
         """Return the owner's side of a goal with an open end."""
 
-        def arm_and_options() -> tuple[Arm, PlanningOptions]:
+        def planning_inputs() -> tuple[Arm, PlanningOptions]:
             state = self.state
             if state is None:
                 raise RobotNotReady(self._status.message or NO_STATE)
             return self.arm, self._options(state)
 
-        return Continuing(
+        return Appender(
             motion.number,
             part,
             dialect=self.config.dialect,
             send=self._send,
-            arm_and_options=arm_and_options,
+            planning_inputs=planning_inputs,
             progress=lambda: motion.progress,
         )
 
-    def _launch_standing(
+    def _start_stationary(
         self,
         plan: Plan,
         on_progress: OnProgress | None,
         *,
-        live: LiveOrder | None = None,
-        teach: bool = False,
-    ) -> Motion:
-        return self._launch(plan, b'', standing_order(plan), on_progress, live=live, teach=teach)
+        live: LiveSetup | None = None,
+        freedrive: bool = False,
+    ) -> MotionHandle:
+        return self._start_motion(
+            plan, b'', stationary_job(plan), on_progress, live=live, freedrive=freedrive
+        )
 
-    def _aim(self, number: int, T_base_tcp: Pose, age: float) -> None:
+    def _send_target(self, number: int, T_base_tcp: Pose, age: float) -> None:
         state = self.state
-        if state is not None and number in self._runs:
+        if state is not None and number in self._active_motions:
             check_target(T_base_tcp, state, self.options)
-            self._send(AimMotion(motion=number, T_base_tcp=T_base_tcp, age=age))
+            self._send(SetLiveTarget(motion=number, T_base_tcp=T_base_tcp, age=age))
 
-    def make_way(self, by: str = 'a newer motion') -> bool:
+    def preempt_motion(self, by: str = 'a newer motion') -> bool:
         """
         Stop the running motion for another one; it ends PREEMPTED. Wait until its end.
 
@@ -370,18 +390,18 @@ class Driver(RobotServices, LiveMotions):
             on; or its end did not come.
         """
         with self._lock:
-            motions = [run.motion for run in self._runs.values()]
+            motions = [active.motion for active in self._active_motions.values()]
         if motions:
-            self.check_can_make_way()
+            self.check_can_preempt()
         for motion in motions:
             motion.preempt(by)
             try:
-                motion.result(STOP_PATIENCE)
+                motion.result(CANCEL_TIMEOUT)
             except TimeoutError:
                 raise RobotNotReady('The motion before this one did not end.') from None
         return bool(motions)
 
-    def check_can_make_way(self) -> None:
+    def check_can_preempt(self) -> None:
         """
         See that a motion that runs can be stopped for another one.
 
@@ -391,7 +411,7 @@ class Driver(RobotServices, LiveMotions):
         state = self.state
         if state is None:
             raise RobotNotReady(self._status.message or NO_STATE)
-        if self.is_guided:
+        if self.is_freedrive_active:
             raise RobotNotReady('Somebody guides the arm by hand; end that first.')
         if is_paused(state) or is_stopped(state):
             raise RobotNotReady(
@@ -417,7 +437,7 @@ class Driver(RobotServices, LiveMotions):
         """
         try:
             planned = self.plan(goal)
-            if preempt and self.make_way():
+            if preempt and self.preempt_motion():
                 planned = self.plan(goal)
             motion = self.start(planned, on_progress)
         except GoalRefused as refusal:
@@ -427,21 +447,21 @@ class Driver(RobotServices, LiveMotions):
         except BaseException:  # also Ctrl-C: nobody waits for this motion any more
             motion.cancel()
             with contextlib.suppress(TimeoutError):
-                motion.result(STOP_PATIENCE)  # so that the next goal finds the arm free
+                motion.result(CANCEL_TIMEOUT)  # so that the next goal finds the arm free
             raise
 
     def stop(self) -> None:
         """Stop whatever moves."""
-        for run in list(self._runs.values()):
-            run.motion.cancel()
+        for active in list(self._active_motions.values()):
+            active.motion.cancel()
 
     def resend_robot_program(self) -> None:
         """Upload the robot program again; the way on after somebody stopped it."""
         self._send(ResendProgram())
 
-    def call(self, call: Call) -> Future[Answer]:
+    def call(self, call: ServiceCall) -> Future[ServiceAnswer]:
         """Ask the robot for something and return at once; the answer comes in any case."""
-        future: Future[Answer] = Future()
+        future: Future[ServiceAnswer] = Future()
         future.set_running_or_notify_cancel()
         with self._lock:
             if self._host is not None and not self._closed.is_set():
@@ -449,7 +469,7 @@ class Driver(RobotServices, LiveMotions):
                 self._calls[number] = future
                 self._send(CallRobot(number=number, call=call))
                 return future
-        future.set_result(Answer(ok=False, text='The driver is closed; open it.'))
+        future.set_result(ServiceAnswer(ok=False, text='The driver is closed; open it.'))
         return future
 
     # ---- inside -------------------------------------------------------------------------------
@@ -466,16 +486,16 @@ class Driver(RobotServices, LiveMotions):
             if self._host is not None:
                 self._host.pipe.sendall(data)
 
-    def _beat(self) -> None:
+    def _send_heartbeats(self) -> None:
         while not self._closed.wait(self.config.node_timeout / 4.0):
             self.heartbeat()
 
     def _read(self) -> None:
         """Serve notices; when the loop dies or hangs, tell everybody and start another one."""
         while (running := self._host) is not None:  # None: closed by a callback of ours
-            notice = channel.receive(running.pipe)
-            if notice is not None:
-                self._handle(notice)
+            notification = channel.receive(running.pipe)
+            if notification is not None:
+                self._handle(notification)
             elif self._closed.is_set():
                 return
             else:
@@ -491,94 +511,101 @@ class Driver(RobotServices, LiveMotions):
         text = 'The robot loop ended unexpectedly, or hangs; the robot program stops the arm.'
         # A program that somebody stopped stays stopped.
         may_upload = self._status.program_running
-        self._set_status(DriverStatus(message=text, last_error=stamped(text)))
-        self._abandon(text)
+        self._set_status(DriverStatus(message=text, last_error=timestamped(text)))
+        self._abort_all(text)
         if self._closed.wait(RESTART_PAUSE):
             return
         with self._lock:
             if self._host is None or self._closed.is_set():
                 return
-            self._abandon_calls(text)  # also those that were sent since
+            self._abort_calls(text)  # also those that were sent since
             self._host.join()
             self._host = host.start(self.config.robot_loop)
-            self._send(Configure(config=self.config, may_upload=may_upload, loan=self._loan))
+            self._send(
+                Configure(
+                    config=self.config, may_upload=may_upload, temporary_tcp=self._temporary_tcp
+                )
+            )
 
-    def _handle(self, notice: Notice | Request) -> None:
-        match notice:
+    def _handle(self, notification: Notification | Request) -> None:
+        match notification:
             case MotionProgress(motion=number, progress=progress):
-                if number in self._runs:
-                    self._runs[number].report(progress)
-            case MotionExtended(motion=number, answer=answer):
-                self._tell_extended(number, answer)
+                if number in self._active_motions:
+                    self._active_motions[number].report(progress)
+            case AppendAnswered(motion=number, answer=answer):
+                self._handle_append_answer(number, answer)
             case MotionEnded(motion=number, outcome=outcome):
                 with self._lock:
-                    run = self._runs.pop(number, None)
-                if run is not None:
-                    run.end(outcome)
+                    active = self._active_motions.pop(number, None)
+                if active is not None:
+                    active.end(outcome)
             case CallAnswered(number=number, answer=answer):
                 with self._lock:
                     call = self._calls.pop(number, None)
                 if call is not None:
                     call.set_result(answer)
-            case ServoChanged(report=report):
+            case ServoProgress(report=report):
                 for listener in list(self._servo_listeners):
-                    call_back(listener, report)
+                    run_callback(listener, report)
             case StatusChanged(status=status):
                 self._set_status(status)
             case SignalsChanged(signals=signals):
                 self._signals = signals
-            case Alive(gaps=gaps):
+            case LoopHeartbeat(gaps=gaps):
                 self._gaps = gaps
-            case GeometryKnown(geometry=geometry):
-                self._take_geometry(geometry)
-            case TcpLent():
-                self._loan = notice
-            case TcpReturned():
-                self._loan = None
-            case LogLine(level=level, text=text):
+            case GeometryReceived(geometry=geometry):
+                self._update_geometry(geometry)
+            case TemporaryTcpSet():
+                self._temporary_tcp = notification
+            case TemporaryTcpRestored():
+                self._temporary_tcp = None
+            case LogMessage(level=level, text=text):
                 LOG.log(level, text)
 
-    def _tell_extended(self, number: int, answer: AnswerExtension) -> None:
-        run = self._runs.get(number)
-        if run is not None and run.motion.continuing is not None:
-            run.motion.continuing.answer(answer)
+    def _handle_append_answer(self, number: int, answer: AnswerAppend) -> None:
+        active = self._active_motions.get(number)
+        if active is not None and active.motion.appender is not None:
+            active.motion.appender.answer(answer)
 
-    def _take_geometry(self, geometry: Geometry) -> None:
+    def _update_geometry(self, geometry: DhTable) -> None:
         """Plan with the robot's own kinematics from now on; warn of one that is far off."""
         model = self._arm.model
         self._arm = Arm(model, geometry)
-        apart, bound = self._arm.flange_apart(Arm(model)), self.config.max_calibration_difference
-        if 0.0 < bound < apart:
+        deviation, limit = (
+            self._arm.max_flange_distance(Arm(model)),
+            self.config.max_calibration_difference,
+        )
+        if 0.0 < limit < deviation:
             LOG.warning(
                 'the calibration of the robot moves the flange by up to %.1f mm from where the '
                 'model %s has it, max_calibration_difference is %.1f mm: check ur_type, and '
                 'whether the arm was repaired and calibrated since',
-                1e3 * apart,
+                1e3 * deviation,
                 model.name,
-                1e3 * bound,
+                1e3 * limit,
             )
 
     def _set_status(self, status: DriverStatus) -> None:
         self._status = status
         if status.state is ConnectionState.DISCONNECTED:
-            self._signals, self._gaps = None, Gaps()
+            self._signals, self._gaps = None, LinkGaps()
         if status.state is ConnectionState.READY:
             self._ready.set()
         else:
             self._ready.clear()
         for listener in list(self._status_listeners):
-            call_back(listener, status)
+            run_callback(listener, status)
 
-    def _abandon(self, text: str) -> None:
+    def _abort_all(self, text: str) -> None:
         """End all motions and calls of a robot loop that cannot tell their ends any more."""
-        self._abandon_calls(text)
+        self._abort_calls(text)
         with self._lock:
-            runs, self._runs = self._runs, {}
-        for run in runs.values():
-            run.end(Outcome(code=ErrorCode.CONNECTION_LOST, text=text))
+            active_motions, self._active_motions = self._active_motions, {}
+        for active in active_motions.values():
+            active.end(Outcome(code=ErrorCode.CONNECTION_LOST, text=text))
 
-    def _abandon_calls(self, text: str) -> None:
+    def _abort_calls(self, text: str) -> None:
         with self._lock:
             calls, self._calls = self._calls, {}
         for call in calls.values():
-            call.set_result(Answer(ok=False, text=text))
+            call.set_result(ServiceAnswer(ok=False, text=text))

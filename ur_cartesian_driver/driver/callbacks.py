@@ -13,7 +13,7 @@ LOG = logging.getLogger('ur_cartesian_driver')
 T = TypeVar('T')
 
 
-def call_back(callback: Callable[[T], None], argument: T) -> None:
+def run_callback(callback: Callable[[T], None], argument: T) -> None:
     """Call somebody else's code; what it raises must not end the thread that serves all."""
     try:
         callback(argument)

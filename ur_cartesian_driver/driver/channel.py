@@ -17,30 +17,30 @@ import struct
 from typing import TypeAlias
 
 from ur_cartesian_driver.driver.config import DriverConfig
-from ur_cartesian_driver.execution import AnswerExtension, Extension, Order
+from ur_cartesian_driver.execution import AnswerAppend, AppendJob, MotionJob
 from ur_cartesian_driver.execution.live_targets import LiveSettings
-from ur_cartesian_driver.kinematics.robots import Geometry
+from ur_cartesian_driver.kinematics.robots import DhTable
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.servo import ServoReport
 from ur_cartesian_driver.motion.signals import Signals
-from ur_cartesian_driver.robot.calls import Answer, Call
-from ur_cartesian_driver.robot.status import DriverStatus, Gaps
+from ur_cartesian_driver.robot.calls import ServiceAnswer, ServiceCall
+from ur_cartesian_driver.robot.status import DriverStatus, LinkGaps
 
 LENGTH = struct.Struct('>I')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TcpLent:
+class TemporaryTcpSet:
     """The robot's TCP is set for a goal."""
 
-    T_flange_before: Pose
-    T_flange_lent: Pose
+    T_flange_original: Pose
+    T_flange_temporary: Pose
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TcpReturned:
+class TemporaryTcpRestored:
     """It is what it was before, or somebody has set another one."""
 
 
@@ -53,17 +53,17 @@ class Configure:
     #: the same owner has seen somebody stop it.
     may_upload: bool = True
     #: A TCP that an earlier loop of the same owner had set for a goal, and may not have put back.
-    loan: TcpLent | None = None
+    temporary_tcp: TemporaryTcpSet | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LiveOrder:
+class LiveSetup:
     """What it takes to follow live targets, beside the order of a motion that stands."""
 
     settings: LiveSettings
     #: The arm, as the owner knows it.
     ur_type: str
-    geometry: Geometry
+    geometry: DhTable
     #: Where the arm stands [rad].
     start: Joints
 
@@ -73,18 +73,18 @@ class StartMotion:
     """Run these points (84 bytes each)."""
 
     motion: int
-    order: Order
+    job: MotionJob
     points: bytes
     #: What the recording is to say of the plan, as JSON; empty = nothing.
-    about: str = ''
+    plan_metadata: str = ''
     #: A session of live targets; None = a goal.
-    live: LiveOrder | None = None
+    live: LiveSetup | None = None
     #: Whether the arm is to be guided by hand; else it is a goal, or a session.
-    teach: bool = False
+    freedrive: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AimMotion:
+class SetLiveTarget:
     """A session of live targets has another target."""
 
     motion: int
@@ -94,11 +94,11 @@ class AimMotion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ExtendMotion:
+class AppendToMotion:
     """Let records follow (84 bytes each) in a motion with an open end; answered in any case."""
 
     motion: int
-    extension: Extension
+    append_job: AppendJob
     points: bytes
 
 
@@ -121,11 +121,11 @@ class CallRobot:
     """Ask the robot for something beside motions."""
 
     number: int
-    call: Call
+    call: ServiceCall
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Heartbeat:
+class OwnerHeartbeat:
     """The owner is alive."""
 
 
@@ -142,10 +142,10 @@ class StatusChanged:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GeometryKnown:
+class GeometryReceived:
     """The robot told its calibrated geometry."""
 
-    geometry: Geometry
+    geometry: DhTable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,15 +157,15 @@ class MotionProgress:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MotionExtended:
+class AppendAnswered:
     """Whether a motion has taken what was to follow."""
 
     motion: int
-    answer: AnswerExtension
+    answer: AnswerAppend
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ServoChanged:
+class ServoProgress:
     """How the streaming of a motion's set-points is going."""
 
     motion: int
@@ -185,7 +185,7 @@ class CallAnswered:
     """How a call ended."""
 
     number: int
-    answer: Answer
+    answer: ServiceAnswer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,14 +196,14 @@ class SignalsChanged:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Alive:
+class LoopHeartbeat:
     """The robot loop is alive; how steady it was since the last time."""
 
-    gaps: Gaps = field(default_factory=Gaps)
+    gaps: LinkGaps = field(default_factory=LinkGaps)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LogLine:
+class LogMessage:
     """Something worth a line in the owner's log; the levels are those of ``logging``."""
 
     level: int
@@ -213,43 +213,43 @@ class LogLine:
 Request: TypeAlias = (
     Configure
     | StartMotion
-    | ExtendMotion
-    | AimMotion
+    | AppendToMotion
+    | SetLiveTarget
     | CancelMotion
     | ResendProgram
     | CallRobot
-    | Heartbeat
+    | OwnerHeartbeat
     | Shutdown
 )
-Notice: TypeAlias = (
-    Alive
+Notification: TypeAlias = (
+    LoopHeartbeat
     | StatusChanged
     | SignalsChanged
-    | GeometryKnown
+    | GeometryReceived
     | MotionProgress
-    | ServoChanged
-    | MotionExtended
+    | ServoProgress
+    | AppendAnswered
     | MotionEnded
     | CallAnswered
-    | TcpLent
-    | TcpReturned
-    | LogLine
+    | TemporaryTcpSet
+    | TemporaryTcpRestored
+    | LogMessage
 )
 
 
-def pack(message: Request | Notice) -> bytes:
+def pack(message: Request | Notification) -> bytes:
     """Return a message as bytes, its length first."""
     body = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
     return LENGTH.pack(len(body)) + body
 
 
-def unpack(body: bytes) -> Request | Notice:
+def unpack(body: bytes) -> Request | Notification:
     """Return the message of the bytes behind a length."""
-    message: Request | Notice = pickle.loads(body)
+    message: Request | Notification = pickle.loads(body)
     return message
 
 
-def receive(pipe: socket.socket) -> Request | Notice | None:
+def receive(pipe: socket.socket) -> Request | Notification | None:
     """
     Wait for the next message.
 

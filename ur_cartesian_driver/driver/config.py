@@ -25,9 +25,9 @@ class DriverConfig(LinkSettings):
     #: ``continue`` when somebody has unlocked the robot and plays its program.
     after_robot_stop: str = 'abort'
     #: Of goals with keep_open: planned time of the motion that the robot is given ahead [s]; ...
-    stream_horizon: float = 1.0
+    keep_open_horizon: float = 1.0
     #: ... how long before it runs out the motion is brought to rest if nothing else comes [s]; ...
-    stream_margin: float = 0.2
+    keep_open_margin: float = 0.2
     #: ... and how long the goal then waits for more points until it ends [s]; 0 = without end.
     keep_open_timeout: float = 30.0
     #: SERVO: motion time that is under way to the arm, so how long nothing may come through [s].
@@ -61,11 +61,13 @@ class DriverConfig(LinkSettings):
                 f'after_robot_stop is {self.after_robot_stop!r}, it has to be '
                 "'abort' or 'continue'."
             )
-        self._require_positive('feedback_rate', 'node_timeout', 'stream_margin', 'record_max_size')
-        if not self.stream_horizon >= 2.0 * self.stream_margin:
+        self._require_positive(
+            'feedback_rate', 'node_timeout', 'keep_open_margin', 'record_max_size'
+        )
+        if not self.keep_open_horizon >= 2.0 * self.keep_open_margin:
             raise ValueError(
-                f'stream_horizon is {self.stream_horizon}, it has to be at least '
-                f'twice stream_margin = {self.stream_margin}.'
+                f'keep_open_horizon is {self.keep_open_horizon}, it has to be at least '
+                f'twice keep_open_margin = {self.keep_open_margin}.'
             )
         self._require_within('servo_target_lag', 0.008, 0.2)
         self._require_within('servo_max_divergence', 0.01, 3.0)

@@ -19,30 +19,30 @@ import sys
 import threading
 from typing import Protocol
 
-from ur_cartesian_driver.driver import snapshot
+from ur_cartesian_driver.driver.ipc import state_memory
 from ur_cartesian_driver.driver.robot_loop import serve
 
 #: The module that the process runs.
 MODULE = 'ur_cartesian_driver.driver'
 #: A robot loop that says nothing for that long hangs [s]; it says something every 0.5 s.
-SILENCE = 5.0
+SILENCE_TIMEOUT = 5.0
 #: How long the robot loop may need to stop the arm and end, before it is ended [s].
-PATIENCE = 2.0
+JOIN_TIMEOUT = 2.0
 
 
-class Host(Protocol):
+class LoopHost(Protocol):
     """Something that runs a robot loop."""
 
-    #: The owner's end of the pipe, blocking; it times out after :data:`SILENCE`.
+    #: The owner's end of the pipe, blocking; it times out after :data:`SILENCE_TIMEOUT`.
     pipe: socket.socket
     #: The owner's view of the newest robot state.
-    memory: snapshot.StateMemory
+    memory: state_memory.StateMemory
 
     def join(self) -> None:
         """End the loop, if need be by force, and release everything."""
 
 
-def start(robot_loop: str) -> Host:
+def start(robot_loop: str) -> LoopHost:
     """Start a robot loop in a ``process`` or a ``thread``."""
     return ProcessHost() if robot_loop == 'process' else ThreadHost()
 
@@ -52,21 +52,21 @@ class ProcessHost:
 
     def __init__(self) -> None:
         """Start the process."""
-        self.pipe, theirs = socket.socketpair()
-        self.pipe.settimeout(SILENCE)
-        descriptor = snapshot.create()
+        self.pipe, loop_end = socket.socketpair()
+        self.pipe.settimeout(SILENCE_TIMEOUT)
+        descriptor = state_memory.create()
         try:
             self._process = subprocess.Popen(
-                [sys.executable, '-m', MODULE, str(theirs.fileno()), str(descriptor)],
-                pass_fds=(theirs.fileno(), descriptor),
+                [sys.executable, '-m', MODULE, str(loop_end.fileno()), str(descriptor)],
+                pass_fds=(loop_end.fileno(), descriptor),
                 env=_environment(),
                 stdin=subprocess.DEVNULL,
                 # Ctrl-C is for the owner, which then ends us in order.
                 start_new_session=True,
             )
-            self.memory = snapshot.StateMemory(descriptor)
+            self.memory = state_memory.StateMemory(descriptor)
         finally:
-            theirs.close()
+            loop_end.close()
             os.close(descriptor)
 
     @property
@@ -78,7 +78,7 @@ class ProcessHost:
         """End the process."""
         self.pipe.close()
         try:
-            self._process.wait(PATIENCE)
+            self._process.wait(JOIN_TIMEOUT)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
@@ -90,12 +90,12 @@ class ThreadHost:
 
     def __init__(self) -> None:
         """Start the thread."""
-        self.pipe, theirs = socket.socketpair()
-        self.pipe.settimeout(SILENCE)
-        descriptor = snapshot.create()
-        self.memory = snapshot.StateMemory(descriptor)
+        self.pipe, loop_end = socket.socketpair()
+        self.pipe.settimeout(SILENCE_TIMEOUT)
+        descriptor = state_memory.create()
+        self.memory = state_memory.StateMemory(descriptor)
         self._thread = threading.Thread(
-            target=self._run, args=(theirs, descriptor), name='robot loop', daemon=True
+            target=self._run, args=(loop_end, descriptor), name='robot loop', daemon=True
         )
         self._thread.start()
 
@@ -109,7 +109,7 @@ class ThreadHost:
     def join(self) -> None:
         """End the thread; one that hangs ends when it comes to itself, as the pipe is closed."""
         self.pipe.close()
-        self._thread.join(PATIENCE)
+        self._thread.join(JOIN_TIMEOUT)
         self.memory.close()
 
 

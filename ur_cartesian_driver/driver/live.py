@@ -15,13 +15,13 @@ from math import isfinite, sqrt
 
 import numpy as np
 
-from ur_cartesian_driver.driver.channel import LiveOrder
+from ur_cartesian_driver.driver.channel import LiveSetup
 from ur_cartesian_driver.driver.config import DriverConfig
-from ur_cartesian_driver.driver.motion import Motion, OnProgress
-from ur_cartesian_driver.execution import Order
+from ur_cartesian_driver.driver.motion import MotionHandle, OnProgress
+from ur_cartesian_driver.execution import MotionJob
+from ur_cartesian_driver.execution.live.workspace_guard import KeepOutPlane, LiveWorkspace
 from ur_cartesian_driver.execution.live_targets import LiveSettings
-from ur_cartesian_driver.execution.surroundings import KeepOut, Surroundings
-from ur_cartesian_driver.execution.target_follower import FollowLimits
+from ur_cartesian_driver.execution.target_follower import LiveLimits
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
@@ -31,7 +31,7 @@ from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.workspace import parse_planes
-from ur_cartesian_driver.protocol.dialects import NEWEST
+from ur_cartesian_driver.protocol.dialects import NEWEST_DIALECT
 
 #: How far the square of a quaternion's length may be from 1.
 UNIT_TOLERANCE = 1e-3
@@ -40,13 +40,13 @@ UNIT_TOLERANCE = 1e-3
 class LiveSession:
     """A session that runs."""
 
-    def __init__(self, motion: Motion, send: Callable[[int, Pose, float], None]) -> None:
-        """Be made by :meth:`~.api.Driver.follow_targets`."""
+    def __init__(self, motion: MotionHandle, send: Callable[[int, Pose, float], None]) -> None:
+        """Be made by :meth:`~.api.Driver.start_live_session`."""
         #: To wait for its end, or to cancel it.
         self.motion = motion
         self._send = send
 
-    def aim(self, T_base_tcp: Pose, *, age: float = 0.0) -> None:
+    def set_target(self, T_base_tcp: Pose, *, age: float = 0.0) -> None:
         """
         Go to another target from now on; in a session that has ended it means nothing.
 
@@ -57,13 +57,13 @@ class LiveSession:
         self._send(self.motion.number, T_base_tcp, age)
 
 
-class LiveMotions(ABC):
+class InteractiveMotions(ABC):
     """Motions that are led while they run, as methods of a driver."""
 
     config: DriverConfig
     options: PlanningOptions
     _live: LiveSession | None = None
-    _guided: Motion | None = None
+    _freedrive: MotionHandle | None = None
 
     @property
     @abstractmethod
@@ -76,25 +76,25 @@ class LiveMotions(ABC):
         """The newest robot state."""
 
     @abstractmethod
-    def _launch_standing(
+    def _start_stationary(
         self,
         plan: Plan,
         on_progress: OnProgress | None,
         *,
-        live: LiveOrder | None = None,
-        teach: bool = False,
-    ) -> Motion:
+        live: LiveSetup | None = None,
+        freedrive: bool = False,
+    ) -> MotionHandle:
         """Begin a motion that goes nowhere by itself."""
 
     @abstractmethod
-    def _aim(self, number: int, T_base_tcp: Pose, age: float) -> None:
+    def _send_target(self, number: int, T_base_tcp: Pose, age: float) -> None:
         """Check a target, and send it to a session."""
 
-    def follow_targets(self, T_base_tcp: Pose, *, age: float = 0.0) -> LiveSession:
+    def start_live_session(self, T_base_tcp: Pose, *, age: float = 0.0) -> LiveSession:
         """
         Go to a target, and to others that are told while the arm moves; return at once.
 
-        The tool goes straight, with bounded speed and acceleration (``servo_target_*`` of the
+        The tool goes straight, with bounded speed and acceleration (``live_target_*`` of the
         options), to the newest target that is not too old.
 
         :param T_base_tcp: where the active TCP is to be, in the robot's base.
@@ -104,49 +104,49 @@ class LiveMotions(ABC):
         """
         state = self._state_for('follow live targets')
         check_target(T_base_tcp, state, self.options)
-        motion = self._launch_standing(
-            standing_plan(state), None, live=live_order(self.arm, state.target_q, self.options)
+        motion = self._start_stationary(
+            stationary_plan(state), None, live=live_setup(self.arm, state.target_q, self.options)
         )
-        self._live = LiveSession(motion, self._aim)
-        self._live.aim(T_base_tcp, age=age)
+        self._live = LiveSession(motion, self._send_target)
+        self._live.set_target(T_base_tcp, age=age)
         return self._live
 
-    def servo_to(self, T_base_tcp: Pose, *, age: float = 0.0) -> Motion:
+    def send_live_target(self, T_base_tcp: Pose, *, age: float = 0.0) -> MotionHandle:
         """
         Go to a target: the next one of the session that runs, or the first of a new one.
 
-        :returns: the session, as a motion; it ends ``servo_target_timeout`` after the last target.
-        :raises GoalRefused: as of :meth:`follow_targets`.
+        :returns: the session, as a motion; it ends ``live_target_timeout`` after the last target.
+        :raises GoalRefused: as of :meth:`start_live_session`.
         """
         if self._live is None or self._live.motion.done():
-            return self.follow_targets(T_base_tcp, age=age).motion
-        self._live.aim(T_base_tcp, age=age)
+            return self.start_live_session(T_base_tcp, age=age).motion
+        self._live.set_target(T_base_tcp, age=age)
         return self._live.motion
 
-    def teach(self, on_guided: Callable[[], None] = lambda: None) -> Motion:
+    def start_freedrive(self, on_active: Callable[[], None] = lambda: None) -> MotionHandle:
         """
         Let a person guide the arm by hand, until the motion that is returned is cancelled.
 
-        Only where ``allow_teach`` of the configuration was set when the robot program began.
+        Only where ``allow_freedrive`` of the configuration was set when the robot program began.
 
-        :param on_guided: called, now and then, from when the arm can be guided.
+        :param on_active: called, now and then, from when the arm can be guided.
         :raises RobotNotReady: it is not allowed, or something else has the arm.
         """
         state = self._state_for('let the arm be guided')
-        if not self.config.allow_teach:
+        if not self.config.allow_freedrive:
             raise RobotNotReady(
-                'Nobody may guide the arm: allow_teach is false; set it to true, '
+                'Nobody may guide the arm: allow_freedrive is false; set it to true, '
                 'and start the driver again.'
             )
-        self._guided = self._launch_standing(
-            standing_plan(state), lambda _: on_guided(), teach=True
+        self._freedrive = self._start_stationary(
+            stationary_plan(state), lambda _: on_active(), freedrive=True
         )
-        return self._guided
+        return self._freedrive
 
     @property
-    def is_guided(self) -> bool:
+    def is_freedrive_active(self) -> bool:
         """Tell whether a person guides the arm."""
-        return self._guided is not None and not self._guided.done()
+        return self._freedrive is not None and not self._freedrive.done()
 
     def _state_for(self, what: str) -> RobotState:
         """
@@ -154,7 +154,7 @@ class LiveMotions(ABC):
 
         :raises RobotNotReady: there is none, or the robot program cannot do this.
         """
-        if self.config.dialect is not NEWEST:
+        if self.config.dialect is not NEWEST_DIALECT:
             raise RobotNotReady(
                 f'Only the robot program of this driver can {what}; wire_dialect '
                 f'says that another one, {self.config.wire_dialect}, runs.'
@@ -174,11 +174,11 @@ def check_pose(pose: Pose) -> None:
     for name, values in (('position', pose.position), ('orientation', pose.quaternion)):
         if not all(map(isfinite, values)):
             raise InvalidGoal(f'The {name} of the target', f'is {values}, which is not finite')
-    square = sum(v * v for v in pose.quaternion)
-    if abs(square - 1.0) > UNIT_TOLERANCE:
+    squared_norm = sum(v * v for v in pose.quaternion)
+    if abs(squared_norm - 1.0) > UNIT_TOLERANCE:
         raise InvalidGoal(
             'The orientation of the target',
-            f'has length {sqrt(square):.6g}; a unit quaternion is needed',
+            f'has length {sqrt(squared_norm):.6g}; a unit quaternion is needed',
             'divide it by its length',
         )
 
@@ -190,41 +190,44 @@ def check_target(T_base_tcp: Pose, state: RobotState, options: PlanningOptions) 
     :raises InvalidGoal: it is malformed, or farther than ``max_approach_distance`` from the tool.
     """
     check_pose(T_base_tcp)
-    far, most = T_base_tcp.distance_to(state.actual_tcp_pose), options.max_approach_distance
-    if 0.0 < most < far:
+    distance, max_distance = (
+        T_base_tcp.distance_to(state.actual_tcp_pose),
+        options.max_approach_distance,
+    )
+    if 0.0 < max_distance < distance:
         raise InvalidGoal(
             'The target',
-            f'is {far:.4g} m away from the tool, max_approach_distance is {most:g} m',
+            f'is {distance:.4g} m away from the tool, max_approach_distance is {max_distance:g} m',
             'approach it by a goal, or raise the parameter',
         )
 
 
-def live_order(arm: Arm, start: Joints, options: PlanningOptions) -> LiveOrder:
+def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
     """
     Return how targets are followed by the parameters.
 
     :param start: where the arm stands [rad].
     """
-    fastest = options.servo_target_linear_velocity
+    max_speed = options.live_target_linear_velocity
     if options.max_tool_speed > 0.0:
-        fastest = min(fastest, options.max_tool_speed)
+        max_speed = min(max_speed, options.max_tool_speed)
     a, b, c, d, e, f = (
-        min(speed, options.servo_target_joint_velocity) for speed in arm.model.max_joint_speed
+        min(speed, options.live_target_joint_velocity) for speed in arm.model.max_joint_speed
     )
-    limits = FollowLimits(
-        linear_velocity=fastest,
-        linear_acceleration=options.servo_target_linear_acceleration,
-        angular_velocity=options.servo_target_angular_velocity,
-        angular_acceleration=options.servo_target_angular_acceleration,
+    limits = LiveLimits(
+        linear_velocity=max_speed,
+        linear_acceleration=options.live_target_linear_acceleration,
+        angular_velocity=options.live_target_angular_velocity,
+        angular_acceleration=options.live_target_angular_acceleration,
         joint_velocity=(a, b, c, d, e, f),
         singularity_margins=(
             options.singularity_margin_wrist,
             options.singularity_margin_elbow,
             options.singularity_margin_shoulder,
         ),
-        surroundings=Surroundings(
+        workspace=LiveWorkspace(
             planes=tuple(
-                KeepOut(
+                KeepOutPlane(
                     name=plane.name, point=plane.point, normal=plane.normal, margin=plane.margin
                 )
                 for plane in parse_planes(options.workspace_planes)
@@ -234,11 +237,11 @@ def live_order(arm: Arm, start: Joints, options: PlanningOptions) -> LiveOrder:
             tool_radius=options.tool_radius,
         ),
     )
-    return LiveOrder(
+    return LiveSetup(
         settings=LiveSettings(
             limits=limits,
-            max_age=options.servo_target_max_age,
-            timeout=options.servo_target_timeout,
+            max_age=options.live_target_max_age,
+            timeout=options.live_target_timeout,
         ),
         ur_type=arm.model.name,
         geometry=arm.geometry,
@@ -246,7 +249,7 @@ def live_order(arm: Arm, start: Joints, options: PlanningOptions) -> LiveOrder:
     )
 
 
-def standing_plan(state: RobotState) -> Plan:
+def stationary_plan(state: RobotState) -> Plan:
     """Return the plan of a motion that goes nowhere by itself."""
     here = state.target_tcp_pose
     return Plan(
@@ -261,9 +264,9 @@ def standing_plan(state: RobotState) -> Plan:
     )
 
 
-def standing_order(plan: Plan) -> Order:
+def stationary_job(plan: Plan) -> MotionJob:
     """Return the order of such a plan: there is nothing on the wire."""
-    return Order(
+    return MotionJob(
         points=1,
         reference=plan.reference,
         duration=0.0,

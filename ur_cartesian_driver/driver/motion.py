@@ -8,19 +8,19 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import replace
 
-from ur_cartesian_driver.driver.callbacks import call_back
-from ur_cartesian_driver.driver.channel import CancelMotion, Request, TcpLent
-from ur_cartesian_driver.driver.continuing import Appended, Continuing
+from ur_cartesian_driver.driver.appender import Appender, AppendResult
+from ur_cartesian_driver.driver.callbacks import run_callback
+from ur_cartesian_driver.driver.channel import CancelMotion, Request, TemporaryTcpSet
 from ur_cartesian_driver.motion.errors import RobotNotReady
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.goal import IOCommand, Segment, Waypoint
 from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.planning.open_goal import Addition
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 
 OnProgress = Callable[[Progress], None]
 
 
-class Motion:
+class MotionHandle:
     """A running motion; its outcome comes whatever happens to the robot."""
 
     def __init__(
@@ -30,7 +30,7 @@ class Motion:
         self.number = number
         self._outcome, self._send = outcome, send
         #: How it is continued; None = it is as long as it is. Set by the driver.
-        self.continuing: Continuing | None = None
+        self.appender: Appender | None = None
         #: The newest report, None before the first.
         self.progress: Progress | None = None
 
@@ -53,7 +53,7 @@ class Motion:
         io_commands: Sequence[IOCommand] = (),
         *,
         last: bool = False,
-    ) -> Appended:
+    ) -> AppendResult:
         """
         Let points follow while the goal runs; it was started with ``keep_open``.
 
@@ -65,10 +65,10 @@ class Motion:
         :param last: nothing follows; without points: the goal ends where it is known to end.
         :raises GoalRefused: nothing was taken, and the goal is as it was; the text says why.
         """
-        if self.continuing is None:
+        if self.appender is None:
             raise RobotNotReady('The goal was sent without keep_open: nothing can be appended.')
-        return self.continuing.append(
-            Addition(
+        return self.appender.append(
+            AppendedPoints(
                 waypoints=tuple(waypoints),
                 segments=tuple(segments),
                 io_commands=tuple(io_commands),
@@ -93,7 +93,7 @@ class Motion:
         self._outcome.add_done_callback(lambda future: callback(future.result()))
 
 
-class Run:
+class ActiveMotion:
     """The driver's side of a motion: its progress, and its only end."""
 
     def __init__(
@@ -112,24 +112,26 @@ class Run:
         self._on_progress = on_progress
         self._plan_report = plan.report
         #: What the owner holds.
-        self.motion = Motion(number, self._outcome, send)
+        self.motion = MotionHandle(number, self._outcome, send)
         #: The TCP that the robot has as long as this motion runs.
-        self.loan = (
+        self.temporary_tcp = (
             None
             if plan.T_flange_tcp is None
-            else TcpLent(T_flange_before=plan.T_flange_active, T_flange_lent=plan.T_flange_tcp)
+            else TemporaryTcpSet(
+                T_flange_original=plan.T_flange_active, T_flange_temporary=plan.T_flange_tcp
+            )
         )
 
     def report(self, progress: Progress) -> None:
         """Take a report of the robot loop."""
         self.motion.progress = progress
         if self._on_progress is not None:
-            call_back(self._on_progress, progress)
+            run_callback(self._on_progress, progress)
 
     def end(self, outcome: Outcome) -> None:
         """Give the outcome; only the first one counts."""
-        if self.motion.continuing is not None:
-            self.motion.continuing.end()
+        if self.motion.appender is not None:
+            self.motion.appender.end()
         if not self._outcome.done():
             self._outcome.set_result(
                 replace(outcome, report=(*self._plan_report, *outcome.report))

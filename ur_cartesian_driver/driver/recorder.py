@@ -27,8 +27,8 @@ import numpy as np
 
 from ur_cartesian_driver.driver import recording_format as disk
 from ur_cartesian_driver.driver.config import DriverConfig
-from ur_cartesian_driver.driver.recording_folder import Folder
-from ur_cartesian_driver.execution import Order
+from ur_cartesian_driver.driver.recording_folder import RecordingFolder
+from ur_cartesian_driver.execution import MotionJob
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.signals import Signals
@@ -37,22 +37,22 @@ from ur_cartesian_driver.planning import PlanningOptions
 
 #: Rows of a piece of memory, how many there are, and the longest time until one is written [s]:
 #: what a killed process loses.
-PIECE, PIECES, PERIOD = 256, 8, 0.5
+BUFFER_ROWS, BUFFER_COUNT, FLUSH_PERIOD = 256, 8, 0.5
 #: So much may wait for the disk; notes and pieces of the plan beyond are left out.
-MOST_WAITING = 1000
+MAX_PENDING_JOBS = 1000
 #: How long whoever makes a file pauses behind each small part of it [s]: a thread that wants the
 #: interpreter from one that never pauses waits 5 ms and more for it.
-BREATH = 0.0002
+YIELD_PAUSE = 0.0002
 #: Lines of a plan's report that are kept.
-MOST_LINES = 1000
+MAX_REPORT_LINES = 1000
 MEGABYTE = 1_000_000
 
 
-def about(plan: Plan, options: PlanningOptions) -> str:
+def plan_metadata(plan: Plan, options: PlanningOptions) -> str:
     """Return what only the owner of the plan knows of it, as JSON: its report, the options."""
     lines = plan.report
-    if len(lines) > MOST_LINES:
-        lines = (*lines[:MOST_LINES], f'... and {len(lines) - MOST_LINES} more lines')
+    if len(lines) > MAX_REPORT_LINES:
+        lines = (*lines[:MAX_REPORT_LINES], f'... and {len(lines) - MAX_REPORT_LINES} more lines')
     return json.dumps(
         {
             'report': lines,
@@ -64,38 +64,38 @@ def about(plan: Plan, options: PlanningOptions) -> str:
     )
 
 
-def head_of(
-    order: Order,
+def motion_metadata(
+    job: MotionJob,
     *,
     robot: Mapping[str, str],
     parameters: DriverConfig,
-    of_owner: str = '',
-    led_by: str = '',
+    plan_metadata_json: str = '',
+    mode: str = '',
 ) -> dict[str, Any]:
     """
     Return the metadata of a motion that begins now.
 
     :param robot: what is known of the robot.
     :param parameters: those of the driver, a dataclass.
-    :param of_owner: what :func:`about` has said.
-    :param led_by: what leads the arm, where that is no plan.
+    :param plan_metadata_json: what :func:`plan_metadata` has said.
+    :param mode: what leads the arm, where that is no plan.
     """
-    known = json.loads(of_owner) if of_owner else {}
+    known = json.loads(plan_metadata_json) if plan_metadata_json else {}
     planning = known.pop('planning', {})
     return {
         'format': disk.FORMAT,
         'created': datetime.now(UTC).isoformat(timespec='milliseconds'),
         'robot': dict(robot),
-        'execution': led_by or order.execution.name,
-        'points': 0 if led_by else int(order.reference.point[-1]) + 1,
-        'duration': order.duration,
-        'due': order.due,
-        'keep_open': order.open_end,
-        'T_base_frame': order.T_base_frame.row(),
-        'T_flange_tcp': (order.T_flange_tcp or order.T_flange_active).row(),
-        'T_tcp_controlled': order.T_tcp_controlled.row(),
-        'path_tolerance': asdict(order.path_tolerance),
-        'goal_tolerance': asdict(order.goal_tolerance),
+        'execution': mode or job.execution.name,
+        'points': 0 if mode else int(job.reference.point[-1]) + 1,
+        'duration': job.duration,
+        'due': job.due,
+        'keep_open': job.keep_open,
+        'T_base_frame': job.T_base_frame.row(),
+        'T_flange_tcp': (job.T_flange_tcp or job.T_flange_active).row(),
+        'T_tcp_controlled': job.T_tcp_controlled.row(),
+        'path_tolerance': asdict(job.path_tolerance),
+        'goal_tolerance': asdict(job.goal_tolerance),
         **known,
         'parameters': {**_parameters(parameters), **planning},
         'outcome': None,
@@ -116,22 +116,22 @@ class Recorder:
         :param warn: takes a sentence, on the writer's thread.
         """
         self._directory, self._max_size, self._warn = directory, max_size * MEGABYTE, warn
-        self._said = ''
+        self._last_warning = ''
         #: Who writes while a motion runs, and who makes a file of it afterwards, slowly.
         self._writer: _Worker | None = None
         self._finisher: _Worker | None = None
-        self._is_in_hurry = False
+        self._is_closing = False
         #: The motion that runs: its folder, belonging to the writer but for ``left_out``.
-        self._folder: Folder | None = None
+        self._folder: RecordingFolder | None = None
         # Memory for rows: the piece that is being filled, how far, and those that are free.
-        self._piece, self._at = bytearray(), 0
-        self._free: SimpleQueue[bytearray] = SimpleQueue()
+        self._buffer, self._used = bytearray(), 0
+        self._free_buffers: SimpleQueue[bytearray] = SimpleQueue()
         #: Of the motion: when it began by the controller's clock, the newest packet from then on,
         #: and when the piece is handed over at the latest [s].
-        self._begin = self._time = self._due = 0.0
+        self._start_time = self._time = self._flush_due = 0.0
         self._digital, self._analog = -1, (nan, nan)
         #: The count of the goal before, as long as the robot reports it.
-        self._stale_begun: int | None = None
+        self._stale_points_begun: int | None = None
 
     @property
     def is_recording(self) -> bool:
@@ -140,30 +140,37 @@ class Recorder:
 
     # ---- what happens -------------------------------------------------------------------------
 
-    def start(self, order: Order, head: dict[str, Any], state: RobotState) -> None:
+    def start(self, job: MotionJob, metadata: dict[str, Any], state: RobotState) -> None:
         """
         Begin the recording of a motion.
 
-        :param head: the metadata, see :func:`head_of`.
+        :param metadata: the metadata, see :func:`motion_metadata`.
         :param state: the newest packet: time 0 is its time.
         """
         if not self._directory:
             return
         if self._writer is None:
-            self._begin_writing()
-        self._folder = folder = Folder(
-            Path(self._directory).expanduser(), head, self._max_size, self._say
+            self._start_workers()
+        self._folder = folder = RecordingFolder(
+            Path(self._directory).expanduser(), metadata, self._max_size, self._warn_once
         )
-        self._begin, self._time, self._due, self._at = state.timestamp, 0.0, PERIOD, 0
-        self._stale_begun = state.points_begun
-        self._do(folder, folder.open)
-        if head['points']:
-            self.extend(order.reference, -inf)
-        count = head['points']
-        self.note('start', f'{head["execution"]}, {count} point{"" if count == 1 else "s"}')
-        self.take(state)
+        self._start_time, self._time, self._flush_due, self._used = (
+            state.timestamp,
+            0.0,
+            FLUSH_PERIOD,
+            0,
+        )
+        self._stale_points_begun = state.points_begun
+        self._submit(folder, folder.open)
+        if metadata['points']:
+            self.add_plan(job.reference, -inf)
+        count = metadata['points']
+        self.add_event(
+            'start', f'{metadata["execution"]}, {count} point{"" if count == 1 else "s"}'
+        )
+        self.add_state(state)
 
-    def extend(self, reference: ReferencePath, since: float) -> None:
+    def add_plan(self, reference: ReferencePath, since: float) -> None:
         """
         Take the planned path, or a piece that takes the place of its end.
 
@@ -171,12 +178,12 @@ class Recorder:
         """
         if (folder := self._folder) is None:
             return
-        rows = np.empty(len(reference.time), dtype=disk.PLANNED)
+        rows = np.empty(len(reference.time), dtype=disk.PLANNED_DTYPE)
         rows['time'], rows['pose'] = reference.time, reference.poses
         rows['point'] = reference.point
-        self._do(folder, lambda: folder.write_plan(rows, since))
+        self._submit(folder, lambda: folder.write_plan(rows, since))
 
-    def take(
+    def add_state(
         self, state: RobotState, waypoint: int = -1, buffered: float = nan, lag: float = nan
     ) -> None:
         """
@@ -188,15 +195,15 @@ class Recorder:
         """
         if (folder := self._folder) is None:
             return
-        begun = state.points_begun
-        if begun == self._stale_begun:
-            begun = 0
+        points_begun = state.points_begun
+        if points_begun == self._stale_points_begun:
+            points_begun = 0
         else:
-            self._stale_begun = None
-        self._time = time = state.timestamp - self._begin
-        disk.ROW.pack_into(
-            self._piece,
-            self._at,
+            self._stale_points_begun = None
+        self._time = time = state.timestamp - self._start_time
+        disk.EXECUTED_STRUCT.pack_into(
+            self._buffer,
+            self._used,
             time,
             *state.actual_tcp_pose.row(),
             *state.target_tcp_pose.row(),
@@ -212,35 +219,35 @@ class Recorder:
             state.target_speed_fraction,
             *self._analog,
             self._digital,
-            begun,
+            points_begun,
             waypoint,
             state.robot_mode,
             state.safety_mode,
             state.runtime_state,
         )
-        self._at += disk.ROW.size
-        if self._at == len(self._piece) or time >= self._due:
-            self._hand_over(folder)
+        self._used += disk.EXECUTED_STRUCT.size
+        if self._used == len(self._buffer) or time >= self._flush_due:
+            self._flush(folder)
 
-    def take_signals(self, signals: Signals) -> None:
+    def add_signals(self, signals: Signals) -> None:
         """Take the newest outputs."""
         out = signals.outputs
         flags = (*out.standard, *out.configurable, *out.tool)
         self._digital = sum(1 << i for i, flag in enumerate(flags) if flag)
         self._analog = (signals.analog_outputs[0].value, signals.analog_outputs[1].value)
 
-    def note(self, kind: str, text: str) -> None:
+    def add_event(self, kind: str, text: str) -> None:
         """Take an event that no column shows."""
         if (folder := self._folder) is not None:
             event = self._time, kind, text
-            self._do(folder, lambda: folder.write_note(event))
+            self._submit(folder, lambda: folder.write_event(event))
 
     def end(self, outcome: Outcome) -> None:
         """End the recording; its file is there soon after."""
         if (folder := self._folder) is None:
             return
-        self._hand_over(folder)
-        self.note('end', f'{outcome.code.name}: {outcome.text}')
+        self._flush(folder)
+        self.add_event('end', f'{outcome.code.name}: {outcome.text}')
         self._folder = None
         known = {
             'code': outcome.code.value,
@@ -248,17 +255,21 @@ class Recorder:
             'text': outcome.text,
             'report': outcome.report,
         }
-        self._do(folder, lambda: folder.close(known), is_last=True)
+        self._submit(folder, lambda: folder.close(known), is_last=True)
         if (writer := self._writer) is not None and (finisher := self._finisher) is not None:
-            writer.do(lambda: finisher.do(lambda: folder.do(lambda: folder.finish(self._breathe))))
+            writer.submit(
+                lambda: finisher.submit(
+                    lambda: folder.run_guarded(lambda: folder.finish(self._yield_cpu))
+                )
+            )
 
     def close(self, timeout: float) -> None:
         """Wait until everything is written, so long [s]; what has not ended stays a folder."""
         if (folder := self._folder) is not None:
-            self._hand_over(folder)
+            self._flush(folder)
             self._folder = None
-            self._do(folder, folder.leave, is_last=True)
-        self._is_in_hurry = True
+            self._submit(folder, folder.abandon, is_last=True)
+        self._is_closing = True
         if self._writer is not None and self._finisher is not None:
             self._writer.end(timeout)
             self._finisher.end(timeout)
@@ -266,46 +277,48 @@ class Recorder:
 
     # ---- inside -------------------------------------------------------------------------------
 
-    def _hand_over(self, folder: Folder) -> None:
+    def _flush(self, folder: RecordingFolder) -> None:
         """Have the rows written, and go on in another piece of memory."""
-        piece, used = self._piece, self._at
-        self._at, self._due = 0, self._time + PERIOD
+        buffer, used = self._buffer, self._used
+        self._used, self._flush_due = 0, self._time + FLUSH_PERIOD
         try:
-            self._piece = self._free.get_nowait()
+            self._buffer = self._free_buffers.get_nowait()
         except Empty:  # all wait for the disk: these rows are lost
-            folder.left_out += used // disk.ROW.size
+            folder.lost_rows += used // disk.EXECUTED_STRUCT.size
             return
 
         def write() -> None:
-            folder.do(lambda: folder.write_rows(memoryview(piece)[:used]))
-            self._free.put(piece)
+            folder.run_guarded(lambda: folder.write_rows(memoryview(buffer)[:used]))
+            self._free_buffers.put(buffer)
 
         if self._writer is not None:
-            self._writer.do(write)  # of these there are no more than pieces
+            self._writer.submit(write)  # of these there are no more than pieces
 
-    def _do(self, folder: Folder, work: Callable[[], None], is_last: bool = False) -> None:
+    def _submit(
+        self, folder: RecordingFolder, work: Callable[[], None], is_last: bool = False
+    ) -> None:
         """Have something done by the writer, unless too much waits already."""
         writer = self._writer
-        if writer is not None and (is_last or writer.jobs.qsize() < MOST_WAITING):
-            writer.do(lambda: folder.do(work))
+        if writer is not None and (is_last or writer.jobs.qsize() < MAX_PENDING_JOBS):
+            writer.submit(lambda: folder.run_guarded(work))
 
-    def _begin_writing(self) -> None:
-        size = PIECE * disk.ROW.size
-        self._piece = bytearray(size)
-        for _ in range(PIECES - 1):
-            self._free.put(bytearray(size))
-        self._is_in_hurry = False
+    def _start_workers(self) -> None:
+        size = BUFFER_ROWS * disk.EXECUTED_STRUCT.size
+        self._buffer = bytearray(size)
+        for _ in range(BUFFER_COUNT - 1):
+            self._free_buffers.put(bytearray(size))
+        self._is_closing = False
         self._writer, self._finisher = _Worker('recorder'), _Worker('recorder, finishing')
 
-    def _breathe(self) -> None:
+    def _yield_cpu(self) -> None:
         """Let the robot loop have the interpreter at once, should it want it."""
-        if not self._is_in_hurry:
-            sleep(BREATH)
+        if not self._is_closing:
+            sleep(YIELD_PAUSE)
 
-    def _say(self, sentence: str) -> None:
+    def _warn_once(self, sentence: str) -> None:
         """Say what is wrong; once, not with each motion."""
-        if sentence != self._said:
-            self._said = sentence
+        if sentence != self._last_warning:
+            self._last_warning = sentence
             self._warn(sentence)
 
 
@@ -317,7 +330,7 @@ class _Worker:
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self._thread.start()
 
-    def do(self, job: Callable[[], None]) -> None:
+    def submit(self, job: Callable[[], None]) -> None:
         """Have something done."""
         self.jobs.put(job)
 

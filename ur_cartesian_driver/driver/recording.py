@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.driver import recording_format as disk
 from ur_cartesian_driver.driver.recording_format import Event
-from ur_cartesian_driver.execution.monitor import PathTracker, speed
+from ur_cartesian_driver.execution.monitor import PathTracker, tracker_speed
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import pose_from_row
 
@@ -31,7 +31,7 @@ Integers: TypeAlias = NDArray[np.int32]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Deviation:
+class RecordedDeviation:
     """How far the tool was from the planned path; n rows, as the recording has."""
 
     #: (n,) of the measured pose, [m] and [rad].
@@ -95,18 +95,18 @@ class Recording:
     planned_point: Integers = field(repr=False)
 
     @classmethod
-    def load(cls, path: str | Path, most_rows: int = 0) -> Recording:
+    def load(cls, path: str | Path, max_rows: int = 0) -> Recording:
         """
         Read a recording.
 
         :param path: a file ``.npz``, or the folder ``.part`` of a motion that runs, or whose
             process was killed.
-        :param most_rows: read every second, third, ... packet of a longer one; 0 = all.
+        :param max_rows: read every second, third, ... packet of a longer one; 0 = all.
         :raises OSError: it is not there.
         :raises ValueError: it is no recording.
         """
         path = Path(path)
-        return _from_folder(path, most_rows) if path.is_dir() else _from_file(path, most_rows)
+        return _from_folder(path, max_rows) if path.is_dir() else _from_file(path, max_rows)
 
     @property
     def tool_speed(self) -> Floats:
@@ -126,7 +126,7 @@ class Recording:
         last = np.flatnonzero(np.diff(self.planned_point, append=-1))
         return np.asarray(self.planned_pose[last])
 
-    def deviation(self) -> Deviation:
+    def deviation(self) -> RecordedDeviation:
         """
         Compare with the plan, packet by packet.
 
@@ -139,7 +139,7 @@ class Recording:
         if len(self.planned_time) > 1:
             self._compare(PathTracker(self.reference), rows)
         position, angle, target_position, target_angle, time, waypoint = rows.T
-        return Deviation(
+        return RecordedDeviation(
             position=position,
             angle=angle,
             target_position=target_position,
@@ -150,17 +150,17 @@ class Recording:
 
     def _compare(self, tracker: PathTracker, rows: Floats) -> None:
         """Fill in the columns of a deviation."""
-        passed, fastest_before = 0.0, 0.0
+        elapsed, max_speed_before = 0.0, 0.0
         for i in range(len(rows)):
             twist = tuple(self.target_twist[i].tolist())
-            fastest = speed(twist)
+            max_speed = tracker_speed(twist)
             if i:
-                passed = float(self.time[i] - self.time[i - 1])
+                elapsed = float(self.time[i] - self.time[i - 1])
             target, actual = (
                 pose_from_row(poses[i]) for poses in (self.target_pose, self.actual_pose)
             )
-            tracker.update(target, 2.0 * passed * max(fastest, fastest_before))
-            fastest_before = fastest
+            tracker.update(target, 2.0 * elapsed * max(max_speed, max_speed_before))
+            max_speed_before = max_speed
             desired, reached = tracker.desired(actual, twist), tracker.pose()
             rows[i] = (
                 desired.distance_to(actual),
@@ -172,15 +172,15 @@ class Recording:
             )
 
 
-def _from_file(path: Path, most_rows: int) -> Recording:
+def _from_file(path: Path, max_rows: int) -> Recording:
     if path.is_file() and not zipfile.is_zipfile(path):
         raise ValueError(f'{path} is no recording: it is no file of NumPy arrays (.npz)')
     try:
         with np.load(path) as file:
-            head, times, kinds, texts = (
+            metadata, times, kinds, texts = (
                 file[name] for name in ('metadata', 'event_time', 'event_kind', 'event_text')
             )
-            step = _step(len(file['time']), most_rows)
+            step = _step(len(file['time']), max_rows)
             columns = {
                 name: file[name] if name.startswith('planned_') else file[name][::step]
                 for name in _COLUMNS
@@ -191,20 +191,24 @@ def _from_file(path: Path, most_rows: int) -> Recording:
         (float(time), str(kind), str(text))
         for time, kind, text in zip(times, kinds, texts, strict=True)
     ]
-    return Recording(metadata=json.loads(head.item()), events=events, **columns)
+    return Recording(metadata=json.loads(metadata.item()), events=events, **columns)
 
 
-def _from_folder(path: Path, most_rows: int) -> Recording:
-    rows, plan = (np.load(path / name, mmap_mode='r') for name in (disk.ROWS, disk.PLAN))
-    head = json.loads((path / disk.HEAD).read_text(encoding='utf-8'))
-    step = _step(len(rows), most_rows)
-    columns = {name: np.array(rows[name][::step]) for name in disk.EXECUTED.names or ()}
-    columns |= {f'planned_{name}': np.array(plan[name]) for name in disk.PLANNED.names or ()}
-    return Recording(metadata=head, events=disk.all_events(disk.read_notes(path), rows), **columns)
+def _from_folder(path: Path, max_rows: int) -> Recording:
+    rows, plan = (
+        np.load(path / name, mmap_mode='r') for name in (disk.EXECUTED_FILE, disk.PLANNED_FILE)
+    )
+    metadata = json.loads((path / disk.METADATA_FILE).read_text(encoding='utf-8'))
+    step = _step(len(rows), max_rows)
+    columns = {name: np.array(rows[name][::step]) for name in disk.EXECUTED_DTYPE.names or ()}
+    columns |= {f'planned_{name}': np.array(plan[name]) for name in disk.PLANNED_DTYPE.names or ()}
+    return Recording(
+        metadata=metadata, events=disk.merge_events(disk.read_events(path), rows), **columns
+    )
 
 
-def _step(rows: int, most: int) -> int:
-    return max(1, -(-rows // most)) if most else 1
+def _step(rows: int, max_rows: int) -> int:
+    return max(1, -(-rows // max_rows)) if max_rows else 1
 
 
 _COLUMNS = tuple(f.name for f in fields(Recording) if f.name not in ('metadata', 'events'))

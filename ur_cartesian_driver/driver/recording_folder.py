@@ -23,63 +23,72 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.driver import recording_format as disk
 
 #: Names of recordings; other files in the directory are nobody's business.
-_OURS = re.compile(r'\d{8}-\d{6}-\d{3}_[a-z_]+_\d+_points(_\d+)?\.(npz|part)')
+_RECORDING_NAME = re.compile(r'\d{8}-\d{6}-\d{3}_[a-z_]+_\d+_points(_\d+)?\.(npz|part)')
 
 #: Times nearer to each other than this are one [s].
 SAME_TIME = 5e-7
 
 
-def name_of(head: dict[str, Any]) -> str:
+def recording_name(metadata: dict[str, Any]) -> str:
     """Return the name of a recording, from when and what it is: they sort by time."""
-    begun = datetime.fromisoformat(head['created'])
+    begun = datetime.fromisoformat(metadata['created'])
     return (
         f'{begun:%Y%m%d-%H%M%S}-{begun.microsecond // 1000:03d}_'
-        f'{head["execution"].lower()}_{head["points"]}_points'
+        f'{metadata["execution"].lower()}_{metadata["points"]}_points'
     )
 
 
-class Folder:
+class RecordingFolder:
     """One motion on its way to the disk; once something failed it only forgets what it is told."""
 
     def __init__(
-        self, directory: Path, head: dict[str, Any], max_size: float, say: Callable[[str], None]
+        self,
+        directory: Path,
+        metadata: dict[str, Any],
+        max_size: float,
+        warn: Callable[[str], None],
     ) -> None:
         """
         Prepare; nothing is written before :meth:`open`.
 
         :param max_size: of all recordings together [bytes]; a motion may take half of it.
-        :param say: takes a sentence when something is wrong.
+        :param warn: takes a sentence when something is wrong.
         """
-        self._directory, self._head, self._max_size, self._say = directory, head, max_size, say
+        self._directory, self._metadata, self._max_size, self._warn = (
+            directory,
+            metadata,
+            max_size,
+            warn,
+        )
         self._is_broken = False
         #: When the samples of the plan that came last are due.
         self._last_times: NDArray[np.float64] = np.empty(0)
         #: How many rows were lost because the disk was too slow.
-        self.left_out = 0
+        self.lost_rows = 0
 
     def open(self) -> None:
         """Make the files."""
         self._directory.mkdir(parents=True, exist_ok=True)
-        self._path = _new(self._directory / f'{name_of(self._head)}{disk.PART}')
-        self._rows = disk.GrowingArray(self._path / disk.ROWS, disk.EXECUTED)
+        self._path = _new(self._directory / f'{recording_name(self._metadata)}{disk.PART_SUFFIX}')
+        self._rows = disk.GrowingArray(self._path / disk.EXECUTED_FILE, disk.EXECUTED_DTYPE)
         # Says that we live; it goes with the process, however that ends.
         fcntl.flock(self._rows.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        self._plan = disk.GrowingArray(self._path / disk.PLAN, disk.PLANNED)
-        self._notes = open(self._path / disk.NOTES, 'xb', buffering=0)  # noqa: SIM115  # open until close()
-        self._write_head()
+        self._plan = disk.GrowingArray(self._path / disk.PLANNED_FILE, disk.PLANNED_DTYPE)
+        self._events = open(self._path / disk.EVENTS_FILE, 'xb', buffering=0)  # noqa: SIM115  # open until close()
+        self._write_metadata()
 
     def write_rows(self, rows: memoryview) -> None:
         """Append packets, until there is no room for more."""
-        if self._head['trouble']:
+        if self._metadata['trouble']:
             return
-        if (self._rows.count + 1) * disk.ROW.size > self._max_size / 2.0:
-            self._head['trouble'] = (
+        if (self._rows.count + 1) * disk.EXECUTED_STRUCT.size > self._max_size / 2.0:
+            self._metadata['trouble'] = (
                 f'The recording of this motion ends after {self._rows.count} packets, half of '
                 f'record_max_size = {self._max_size / 1e6:g} MB.'
             )
-            self._say(self._head['trouble'])
+            self._warn(self._metadata['trouble'])
             return
-        self._rows.append(rows, len(rows) // disk.ROW.size)
+        self._rows.append(rows, len(rows) // disk.EXECUTED_STRUCT.size)
 
     def write_plan(self, rows: NDArray[np.void], since: float) -> None:
         """
@@ -87,37 +96,37 @@ class Folder:
 
         These are among the samples that came last: a goal with an open end gives up its ending.
         """
-        kept = int(np.searchsorted(self._last_times, since + SAME_TIME, side='right'))
+        kept_samples = int(np.searchsorted(self._last_times, since + SAME_TIME, side='right'))
         rows = rows[np.searchsorted(rows['time'], since + SAME_TIME, side='right') :]
-        self._plan.count -= len(self._last_times) - kept
+        self._plan.count -= len(self._last_times) - kept_samples
         self._plan.append(rows.tobytes(), len(rows))
         self._last_times = rows['time']
 
-    def write_note(self, event: disk.Event) -> None:
+    def write_event(self, event: disk.Event) -> None:
         """Append a note."""
         time, kind, text = event
-        self._notes.write(json.dumps([time, kind, text[: disk.MOST_TEXT]]).encode() + b'\n')
+        self._events.write(json.dumps([time, kind, text[: disk.MAX_EVENT_TEXT]]).encode() + b'\n')
 
     def close(self, outcome: dict[str, Any]) -> None:
         """Write what is only known at the end."""
-        self._head.update(outcome=outcome, rows_left_out=self.left_out)
-        self._write_head()
+        self._metadata.update(outcome=outcome, rows_left_out=self.lost_rows)
+        self._write_metadata()
 
-    def finish(self, breathe: Callable[[], None]) -> None:
+    def finish(self, yield_cpu: Callable[[], None]) -> None:
         """
         Make one file out of all this, and room for the next.
 
-        :param breathe: called often, to let others work.
+        :param yield_cpu: called often, to let others work.
         """
-        disk.finish(self._path, breathe)
+        disk.finish(self._path, yield_cpu)
         self._close_files()  # not before: till then it is ours
-        keep_within(self._directory, self._max_size, breathe)
+        enforce_quota(self._directory, self._max_size, yield_cpu)
 
-    def leave(self) -> None:
+    def abandon(self) -> None:
         """Leave it as it is."""
         self._close_files()
 
-    def do(self, work: Callable[[], None]) -> None:
+    def run_guarded(self, work: Callable[[], None]) -> None:
         """Do one of the above, and say so if it fails."""
         if self._is_broken:
             return
@@ -127,16 +136,16 @@ class Folder:
             self._is_broken = True
             self._close_files()
             reason = error.strerror if isinstance(error, OSError) else error
-            self._say(
+            self._warn(
                 f'A motion is not recorded, or not to its end: {reason} '
                 f'({self._directory}); see to record_directory.'
             )
 
-    def _write_head(self) -> None:
-        (self._path / disk.HEAD).write_text(json.dumps(self._head), encoding='utf-8')
+    def _write_metadata(self) -> None:
+        (self._path / disk.METADATA_FILE).write_text(json.dumps(self._metadata), encoding='utf-8')
 
     def _close_files(self) -> None:
-        for name in ('_rows', '_plan', '_notes'):
+        for name in ('_rows', '_plan', '_events'):
             if hasattr(self, name):
                 getattr(self, name).close()
 
@@ -156,29 +165,35 @@ def _new(path: Path) -> Path:
 # ---- what is there already ------------------------------------------------------------------
 
 
-def keep_within(directory: Path, room: float, breathe: Callable[[], None] = lambda: None) -> None:
+def enforce_quota(
+    directory: Path, max_size: float, yield_cpu: Callable[[], None] = lambda: None
+) -> None:
     """
     Finish what a process that was killed has left, then remove the oldest recordings.
 
-    :param room: what they may take together [bytes].
-    :param breathe: called often, to let others work.
+    :param max_size: what they may take together [bytes].
+    :param yield_cpu: called often, to let others work.
     """
-    ours = sorted(path for path in directory.iterdir() if _OURS.fullmatch(path.name))
-    for path in ours:
-        if path.suffix == disk.PART and not _is_written(path):
+    recordings = sorted(
+        path for path in directory.iterdir() if _RECORDING_NAME.fullmatch(path.name)
+    )
+    for path in recordings:
+        if path.suffix == disk.PART_SUFFIX and not _is_written(path):
             with suppress(OSError, ValueError):
-                disk.finish(path, breathe)
-    ours = [path for path in sorted(directory.glob('*.npz')) if _OURS.fullmatch(path.name)]
-    sizes = [path.stat().st_size for path in ours]
-    while ours and sum(sizes) > room:
-        ours.pop(0).unlink(missing_ok=True)
+                disk.finish(path, yield_cpu)
+    recordings = [
+        path for path in sorted(directory.glob('*.npz')) if _RECORDING_NAME.fullmatch(path.name)
+    ]
+    sizes = [path.stat().st_size for path in recordings]
+    while recordings and sum(sizes) > max_size:
+        recordings.pop(0).unlink(missing_ok=True)
         sizes.pop(0)
 
 
 def _is_written(folder: Path) -> bool:
     """Tell whether somebody is writing it, or nobody can tell."""
     try:
-        with open(folder / disk.ROWS, 'rb') as rows:
+        with open(folder / disk.EXECUTED_FILE, 'rb') as rows:
             fcntl.flock(rows, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except OSError:
         return True

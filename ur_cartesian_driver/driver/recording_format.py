@@ -30,7 +30,7 @@ FORMAT = 1
 
 #: One packet of the robot: names, shapes and order of the columns. Units and frames:
 #: doc/recordings.md.
-EXECUTED = np.dtype(
+EXECUTED_DTYPE = np.dtype(
     [
         ('time', '<f8'),
         ('actual_pose', '<f8', 7),
@@ -55,20 +55,25 @@ EXECUTED = np.dtype(
     ]
 )
 #: The same for :mod:`struct`, which fills a row faster than numpy does.
-ROW = struct.Struct('<57d6i')
+EXECUTED_STRUCT = struct.Struct('<57d6i')
 #: One sample of the planned path.
-PLANNED = np.dtype([('time', '<f8'), ('pose', '<f8', 7), ('point', '<i4')])
+PLANNED_DTYPE = np.dtype([('time', '<f8'), ('pose', '<f8', 7), ('point', '<i4')])
 
 #: Files of a folder, and the end of its name.
-PART = '.part'
-HEAD, ROWS, PLAN, NOTES = 'metadata.json', 'executed.npy', 'planned.npy', 'events.jsonl'
+PART_SUFFIX = '.part'
+METADATA_FILE, EXECUTED_FILE, PLANNED_FILE, EVENTS_FILE = (
+    'metadata.json',
+    'executed.npy',
+    'planned.npy',
+    'events.jsonl',
+)
 #: So many rows are looked at together: for as long nobody else has the interpreter, 0.1 ms.
 CHUNK = 512
 #: So many events are kept. A path of a million points begins a million of them; the column
 #: ``waypoint`` has them all.
-MOST_EVENTS = 10_000
+MAX_EVENTS = 10_000
 #: Longest text of an event; whole sentences are in the metadata.
-MOST_TEXT = 120
+MAX_EVENT_TEXT = 120
 
 #: Time since the start [s], what kind of event, and a few words.
 Event: TypeAlias = tuple[float, str, str]
@@ -134,32 +139,34 @@ def _npy_header(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
 # ---- events ---------------------------------------------------------------------------------
 
 
-def events_of(rows: NDArray[np.void], breathe: Callable[[], None] = lambda: None) -> list[Event]:
+def detect_events(
+    rows: NDArray[np.void], yield_cpu: Callable[[], None] = lambda: None
+) -> list[Event]:
     """
     Return what changed from packet to packet: points begun, outputs, slider, program, modes.
 
-    :param rows: of the type :data:`EXECUTED`, may be a file in memory.
-    :param breathe: called often, to let others work.
+    :param rows: of the type :data:`EXECUTED_DTYPE`, may be a file in memory.
+    :param yield_cpu: called often, to let others work.
     """
     found: list[Event] = []
     for first in range(0, len(rows), CHUNK):
         part = rows[max(0, first - 1) : first + CHUNK]
         found += sorted(_changes(part), key=lambda event: event[0])
-        breathe()
-        if len(found) > MOST_EVENTS:
-            last = found[MOST_EVENTS - 1][0]
+        yield_cpu()
+        if len(found) > MAX_EVENTS:
+            last = found[MAX_EVENTS - 1][0]
             return [
-                *found[: MOST_EVENTS - 1],
+                *found[: MAX_EVENTS - 1],
                 (last, 'more', 'more events follow, which the columns show'),
             ]
     return found
 
 
 def _changes(part: NDArray[np.void]) -> Iterator[Event]:
-    for name, says in _SAYINGS.items():
+    for name, describe in _EVENT_TEXTS.items():
         values = part[name]
         for i in np.flatnonzero(values[1:] != values[:-1]) + 1:
-            for kind, text in says(values[i - 1].item(), values[i].item()):
+            for kind, text in describe(values[i - 1].item(), values[i].item()):
                 yield float(part['time'][i]), kind, text
     analog = part['analog_output']
     for i, channel in np.argwhere(analog[1:] != analog[:-1]):
@@ -184,7 +191,7 @@ def _waypoint(_: int, now: int) -> Iterator[tuple[str, str]]:
         yield 'point', f'on the way to point {now}'
 
 
-_SAYINGS: Mapping[str, Any] = {
+_EVENT_TEXTS: Mapping[str, Any] = {
     'waypoint': _waypoint,
     'digital_output': _outputs,
     'slider': lambda _, now: [('slider', f'speed slider at {100.0 * now:.0f} %')],
@@ -197,20 +204,20 @@ _SAYINGS: Mapping[str, Any] = {
 # ---- from the folder to the file ------------------------------------------------------------
 
 
-def read_notes(folder: Path) -> list[Event]:
+def read_events(folder: Path) -> list[Event]:
     """Return the notes of a folder; a last line that was not finished does not count."""
-    notes = []
-    for line in (folder / NOTES).read_text(encoding='utf-8').split('\n')[:-1]:
+    events = []
+    for line in (folder / EVENTS_FILE).read_text(encoding='utf-8').split('\n')[:-1]:
         time, kind, text = json.loads(line)
-        notes.append((float(time), str(kind), str(text)))
-    return notes
+        events.append((float(time), str(kind), str(text)))
+    return events
 
 
-def all_events(
-    notes: Iterable[Event], rows: NDArray[np.void], breathe: Callable[[], None] = lambda: None
+def merge_events(
+    events: Iterable[Event], rows: NDArray[np.void], yield_cpu: Callable[[], None] = lambda: None
 ) -> list[Event]:
     """Return notes and changes in the order of time."""
-    return sorted([*notes, *events_of(rows, breathe)], key=lambda event: event[0])
+    return sorted([*events, *detect_events(rows, yield_cpu)], key=lambda event: event[0])
 
 
 def event_arrays(events: list[Event]) -> dict[str, NDArray[Any]]:
@@ -218,34 +225,36 @@ def event_arrays(events: list[Event]) -> dict[str, NDArray[Any]]:
     return {
         'event_time': np.array([time for time, _, _ in events], dtype='<f8'),
         'event_kind': np.array([kind for _, kind, _ in events], dtype='<U16'),
-        'event_text': np.array([text for _, _, text in events], dtype=f'<U{MOST_TEXT}'),
+        'event_text': np.array([text for _, _, text in events], dtype=f'<U{MAX_EVENT_TEXT}'),
     }
 
 
-def finish(folder: Path, breathe: Callable[[], None] = lambda: None) -> Path:
+def finish(folder: Path, yield_cpu: Callable[[], None] = lambda: None) -> Path:
     """
     Make one file out of a folder, and remove the folder.
 
-    :param breathe: called often, to let others work.
+    :param yield_cpu: called often, to let others work.
     :returns: the file.
     :raises OSError: it cannot be written; the folder stays as it was.
     """
     file = folder.with_suffix('.npz')
     unfinished = folder / file.name
     # Plain arrays: those of a file make an object of their own for each look at a part of them.
-    rows, plan = (np.asarray(np.load(folder / name, mmap_mode='r')) for name in (ROWS, PLAN))
+    rows, plan = (
+        np.asarray(np.load(folder / name, mmap_mode='r')) for name in (EXECUTED_FILE, PLANNED_FILE)
+    )
     try:
         with zipfile.ZipFile(unfinished, 'w', zipfile.ZIP_STORED) as archive:
-            head = (folder / HEAD).read_text(encoding='utf-8')
+            metadata = (folder / METADATA_FILE).read_text(encoding='utf-8')
             members = {
-                'metadata': np.array(head),
-                **event_arrays(all_events(read_notes(folder), rows, breathe)),
+                'metadata': np.array(metadata),
+                **event_arrays(merge_events(read_events(folder), rows, yield_cpu)),
             }
             for name, values in members.items():
                 _write_member(archive, name, values.dtype, values.shape, [values])
             for prefix, table in (('', rows), ('planned_', plan)):
                 for name in table.dtype.names or ():
-                    _write_column(archive, prefix + name, table[name], breathe)
+                    _write_column(archive, prefix + name, table[name], yield_cpu)
     except OSError:
         unfinished.unlink(missing_ok=True)
         raise
@@ -255,14 +264,14 @@ def finish(folder: Path, breathe: Callable[[], None] = lambda: None) -> Path:
 
 
 def _write_column(
-    archive: zipfile.ZipFile, name: str, column: NDArray[Any], breathe: Callable[[], None]
+    archive: zipfile.ZipFile, name: str, column: NDArray[Any], yield_cpu: Callable[[], None]
 ) -> None:
     """Write a column of a table, a part after the other."""
 
     def parts() -> Iterator[NDArray[Any]]:
         for first in range(0, len(column), CHUNK):
             yield column[first : first + CHUNK]
-            breathe()
+            yield_cpu()
 
     _write_member(archive, name, column.dtype, column.shape, parts())
 

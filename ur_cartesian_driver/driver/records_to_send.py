@@ -7,7 +7,7 @@ from __future__ import annotations
 from ur_cartesian_driver.protocol.trajectory import POINT_SIZE
 
 
-class RecordsToSend:
+class PointBuffer:
     """Records by their number in the goal; each is taken once, in order."""
 
     def __init__(self, data: bytes = b'') -> None:

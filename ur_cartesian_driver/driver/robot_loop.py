@@ -25,62 +25,62 @@ import socket
 from typing import TypeVar
 
 from ur_cartesian_driver.driver.channel import (
-    AimMotion,
-    Alive,
+    AppendAnswered,
+    AppendToMotion,
     CallAnswered,
     CallRobot,
     CancelMotion,
     Configure,
-    ExtendMotion,
-    GeometryKnown,
-    Heartbeat,
+    GeometryReceived,
     LENGTH,
-    LogLine,
+    LogMessage,
+    LoopHeartbeat,
     MotionEnded,
-    MotionExtended,
     MotionProgress,
-    Notice,
+    Notification,
+    OwnerHeartbeat,
     pack,
     Request,
     ResendProgram,
-    ServoChanged,
+    ServoProgress,
+    SetLiveTarget,
     Shutdown,
     SignalsChanged,
     StartMotion,
     StatusChanged,
-    TcpLent,
-    TcpReturned,
+    TemporaryTcpRestored,
+    TemporaryTcpSet,
     unpack,
 )
-from ur_cartesian_driver.driver.machines import is_slow, machine_of
-from ur_cartesian_driver.driver.recorder import head_of, Recorder
-from ur_cartesian_driver.driver.records_to_send import RecordsToSend
+from ur_cartesian_driver.driver.machines import is_slow_to_make, make_machine
+from ur_cartesian_driver.driver.recorder import motion_metadata, Recorder
+from ur_cartesian_driver.driver.records_to_send import PointBuffer
 from ur_cartesian_driver.driver.snapshot import StateMemory
 from ur_cartesian_driver.execution import (
-    AnswerExtension,
-    Command,
+    AnswerAppend,
+    AppendMachine,
     EnterServo,
     Finish,
+    GoalCommand,
+    GoalMachine,
     LeaveServo,
-    LendTcp,
+    LogWarning,
+    MotionJob,
     OpenServo,
-    Order,
-    Remark,
-    Report,
+    ReportProgress,
     ReportServo,
-    ReturnTcp,
+    RestoreTcp,
     same_tcp,
     SendControl,
     SendPoints,
     SERVO_LINK,
+    SetTemporaryTcp,
     StopProgram,
-    StreamMachine,
-    TcpLoan,
-    TrajectoryMachine,
+    TemporaryTcp,
     WriteServo,
 )
 from ur_cartesian_driver.execution.live_machine import LiveMachine
-from ur_cartesian_driver.kinematics.robots import Geometry
+from ur_cartesian_driver.kinematics.robots import DhTable
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
@@ -95,21 +95,21 @@ from ur_cartesian_driver.motion.events import (
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.robot.call_desk import CallDesk
-from ur_cartesian_driver.robot.calls import Answer, Dashboard
+from ur_cartesian_driver.robot.call_desk import ServiceDispatcher
+from ur_cartesian_driver.robot.calls import DashboardCall, ServiceAnswer
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.servo_connection import ServoConnection
-from ur_cartesian_driver.robot.status import DriverStatus, Gaps
+from ur_cartesian_driver.robot.status import DriverStatus, LinkGaps
 
 #: How often time alone is looked at [s].
-TICK = 0.02
+TICK_PERIOD = 0.02
 #: How often the owner hears that we live [s].
-SIGN_OF_LIFE = 0.5
+HEARTBEAT_PERIOD = 0.5
 #: What takes longer than a few milliseconds to unpack or prepare [bytes].
-LARGE = 1 << 18
+MIN_THREAD_SIZE = 1 << 18
 #: How a goal can end that wants an explanation beyond its sentence.
-EXPLAINED = frozenset(
+CODES_WITH_CAUSE = frozenset(
     {
         ErrorCode.PROTECTIVE_STOP,
         ErrorCode.EMERGENCY_STOP,
@@ -120,16 +120,16 @@ EXPLAINED = frozenset(
 )
 #: Of these the robot tells the reason, on another connection, in the same cycle or the next ones;
 #: so long it is waited for [s].
-REASONED = frozenset({ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP})
-REASON_TIMEOUT = 0.05
+CODES_WITH_LATE_CAUSE = frozenset({ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP})
+CAUSE_TIMEOUT = 0.05
 #: How long the end waits until the recording of the last motion is a file [s].
 RECORD_TIMEOUT = 1.0
 #: How many calls are carried out at a time.
-MOST_CALLS = 32
+MAX_CALLS = 32
 #: What is out of date soon is left out while so much waits for an owner that does not read
 #: [bytes]: it may hang for days.
-PASSING = (Alive, LogLine, MotionProgress, ServoChanged, SignalsChanged)
-MOST_UNREAD = 1 << 20
+DROPPABLE = (LoopHeartbeat, LogMessage, MotionProgress, ServoProgress, SignalsChanged)
+MAX_UNREAD = 1 << 20
 T = TypeVar('T')
 
 
@@ -143,18 +143,18 @@ class RobotLoop:
         self._config = config = configure.config
         self._memory = memory
         self._pipe = notify
-        self._machine: TrajectoryMachine | None = None
+        self._machine: GoalMachine | None = None
         self._motion = 0
         self._latest: RobotState | None = None
         #: Whether it is in the shared memory.
-        self._is_shared = True
-        self._points = RecordsToSend()
+        self._is_published = True
+        self._points = PointBuffer()
         #: The inputs of a motion that is streamed as set-points.
         self._servo: ServoConnection | None = None
         #: What is offered to the machine at this moment.
-        self._offered: ExtendMotion | None = None
+        self._pending_append: AppendToMotion | None = None
         #: The TCP that an ended goal had set, until it is back.
-        self._loan: TcpLoan | None = None
+        self._temporary_tcp: TemporaryTcp | None = None
         self._last_heartbeat = 0.0
         self._link = RobotLink(
             config,
@@ -169,20 +169,25 @@ class RobotLoop:
         self._recorder = Recorder(
             config.record_directory,
             config.record_max_size,
-            partial(_later, asyncio.get_running_loop(), self._log, logging.WARNING),
+            partial(_call_soon, asyncio.get_running_loop(), self._log, logging.WARNING),
         )
-        self._desk = CallDesk(config, config.dashboard_port, self._link)
+        self._dispatcher = ServiceDispatcher(config, config.dashboard_port, self._link)
         self._calls: set[asyncio.Task[None]] = set()
         self._connection = ConnectionState.DISCONNECTED
         self._program_running = False
         self._last_report = inf
         self._longest_gap = 0.0
         #: The newest inputs and outputs, if the owner did not read when they were to be told.
-        self._untold: SignalsChanged | None = None
+        self._withheld_signals: SignalsChanged | None = None
         #: The end of a motion, until its reason is there.
-        self._unexplained: MotionEnded | None = None
-        if configure.loan is not None:
-            self._owe(TcpLoan(configure.loan.T_flange_before, configure.loan.T_flange_lent))
+        self._pending_end: MotionEnded | None = None
+        if configure.temporary_tcp is not None:
+            self._restore_tcp_later(
+                TemporaryTcp(
+                    configure.temporary_tcp.T_flange_original,
+                    configure.temporary_tcp.T_flange_temporary,
+                )
+            )
 
     async def run(self, requests: asyncio.StreamReader) -> None:
         """Serve until the owner shuts down, hangs up or falls silent."""
@@ -191,24 +196,24 @@ class RobotLoop:
             async with asyncio.TaskGroup() as tasks:
                 link = tasks.create_task(self._link.run())
                 ticks = tasks.create_task(self._tick())
-                await self._serve(requests)
+                await self._serve_requests(requests)
                 for task in (link, ticks, *self._calls):
                     task.cancel()
         finally:
             self._end_motion('The driver was shut down.')
-            self._tell_unexplained()
+            self._send_pending_end()
             if (
-                self._loan is not None
+                self._temporary_tcp is not None
                 and self._latest is not None
-                and self._loan.is_due(self._latest, self._now())
+                and self._temporary_tcp.is_restore_due(self._latest, self._now())
             ):
                 # Ours does it by itself, but this may be another robot program.
-                self._link.return_tcp(self._loan.T_flange_before)
+                self._link.restore_tcp(self._temporary_tcp.T_flange_original)
             self._link.close()
             self._memory.clear()
             self._recorder.close(RECORD_TIMEOUT)  # the arm must not wait for a disk
 
-    async def _serve(self, requests: asyncio.StreamReader) -> None:
+    async def _serve_requests(self, requests: asyncio.StreamReader) -> None:
         """Handle requests until there are no more."""
         while True:
             try:
@@ -216,30 +221,30 @@ class RobotLoop:
                 body = await requests.readexactly(size)
             except (asyncio.IncompleteReadError, ConnectionError):
                 return
-            request = await _apart(size, unpack, body)
+            request = await _run_in_thread_if_large(size, unpack, body)
             if isinstance(request, Shutdown) or not await self._handle_request(request):
                 return
 
-    async def _handle_request(self, request: Request | Notice) -> bool:
+    async def _handle_request(self, request: Request | Notification) -> bool:
         """Carry out a request; False for one that makes no sense here."""
         self._last_heartbeat = self._now()
         match request:
             case StartMotion():
                 await self._start(request)
-            case ExtendMotion():
-                self._extend(request)
-            case AimMotion(motion=motion, T_base_tcp=T_base_tcp, age=age):
+            case AppendToMotion():
+                self._append(request)
+            case SetLiveTarget(motion=motion, T_base_tcp=T_base_tcp, age=age):
                 if motion == self._motion and isinstance(self._machine, LiveMachine):
-                    self._machine.aim(T_base_tcp, age, self._now())
+                    self._machine.set_target(T_base_tcp, age, self._now())
             case CancelMotion(motion=motion, preempted_by=by):
                 if motion == self._motion:
-                    self._recorder.note('cancel', by and f'preempted by {by}')
+                    self._recorder.add_event('cancel', by and f'preempted by {by}')
                     self._handle_event(PreemptRequested(by=by) if by else CancelRequested())
             case ResendProgram():
                 self._link.upload_program()
             case CallRobot():
                 self._call(request)
-            case Heartbeat():
+            case OwnerHeartbeat():
                 pass
             case _:
                 return False
@@ -247,63 +252,66 @@ class RobotLoop:
 
     async def _start(self, request: StartMotion) -> None:
         """Start a motion, or refuse it with the reason."""
-        machine = await _apart(
-            LARGE if is_slow(request) else len(request.points), machine_of, request, self._config
+        machine = await _run_in_thread_if_large(
+            MIN_THREAD_SIZE if is_slow_to_make(request) else len(request.points),
+            make_machine,
+            request,
+            self._config,
         )
         reason = self._link.not_ready()
-        if self._machine is not None or self._unexplained is not None:
+        if self._machine is not None or self._pending_end is not None:
             reason = 'Another motion is running; wait for its end or cancel it.'
-        elif self._desk.is_setting:
+        elif self._dispatcher.is_changing_settings:
             reason = 'TCP or payload are being set at this moment; send the goal again.'
         elif not reason:
-            reason = self._tcp_changed(request.order)
+            reason = self._tcp_changed(request.job)
         if reason:
-            self._notify(
+            self._send(
                 MotionEnded(
                     motion=request.motion,
                     outcome=Outcome(code=ErrorCode.ROBOT_NOT_READY, text=reason),
                 )
             )
             return
-        self._motion, self._points = request.motion, RecordsToSend(request.points)
+        self._motion, self._points = request.motion, PointBuffer(request.points)
         self._machine = machine
-        self._link.set_busy(True)
+        self._link.set_executing(True)
         assert self._latest is not None  # else the link is not ready
         self._record(request)
-        self._carry_out(machine.start(self._latest))
+        self._execute_commands(machine.start(self._latest))
 
-    def _extend(self, request: ExtendMotion) -> None:
+    def _append(self, request: AppendToMotion) -> None:
         """Offer points to the motion that runs, if it is theirs."""
-        if request.motion == self._motion and isinstance(self._machine, StreamMachine):
-            self._offered = request
-            self._carry_out(self._machine.step(request.extension, self._now()))
+        if request.motion == self._motion and isinstance(self._machine, AppendMachine):
+            self._pending_append = request
+            self._execute_commands(self._machine.step(request.append_job, self._now()))
         else:
-            self._notify(
-                MotionExtended(
+            self._send(
+                AppendAnswered(
                     motion=request.motion,
-                    answer=AnswerExtension(
-                        number=request.extension.number, refusal='The goal has ended.'
+                    answer=AnswerAppend(
+                        number=request.append_job.number, refusal='The goal has ended.'
                     ),
                 )
             )
 
-    def _answer_extension(self, answer: AnswerExtension) -> None:
+    def _answer_append(self, answer: AnswerAppend) -> None:
         """Keep the points that the machine has taken, and tell their owner."""
-        offered, self._offered = self._offered, None
-        assert offered is not None
-        if not answer.refusal and offered.points:
-            self._points.put(offered.extension.behind, offered.points)
-            if offered.extension.order is not None and self._machine is not None:
-                self._recorder.extend(
-                    offered.extension.order.reference,
-                    self._machine.time_behind(offered.extension.behind),
+        pending, self._pending_append = self._pending_append, None
+        assert pending is not None
+        if not answer.refusal and pending.points:
+            self._points.put(pending.append_job.records_before, pending.points)
+            if pending.append_job.job is not None and self._machine is not None:
+                self._recorder.add_plan(
+                    pending.append_job.job.reference,
+                    self._machine.end_time_of(pending.append_job.records_before),
                 )
-        self._notify(MotionExtended(motion=self._motion, answer=answer))
+        self._send(AppendAnswered(motion=self._motion, answer=answer))
 
-    def _tcp_changed(self, order: Order) -> str:
+    def _tcp_changed(self, job: MotionJob) -> str:
         """Return that the plan was made for another TCP than the robot has; empty if not."""
         state = self._latest
-        if state is None or same_tcp(state.T_flange_tcp, order.T_flange_active):
+        if state is None or same_tcp(state.T_flange_tcp, job.T_flange_active):
             return ''
         return (
             'The TCP of the robot was changed after the goal had been planned; send the goal '
@@ -315,14 +323,20 @@ class RobotLoop:
         if not self._config.record_directory or self._latest is None:
             return
         status = self._link.status
-        led_by = 'LIVE_TARGETS' if request.live is not None else 'TEACH' if request.teach else ''
+        mode = (
+            'LIVE_TARGETS'
+            if request.live is not None
+            else 'FREEDRIVE'
+            if request.freedrive
+            else ''
+        )
         self._recorder.start(
-            request.order,
-            head_of(
-                request.order,
-                of_owner=request.about,
+            request.job,
+            motion_metadata(
+                request.job,
+                plan_metadata_json=request.plan_metadata,
                 parameters=self._config,
-                led_by=led_by,
+                mode=mode,
                 robot={
                     'model': status.robot_model,
                     'polyscope_version': status.polyscope_version,
@@ -333,37 +347,37 @@ class RobotLoop:
         )
 
     def _signals_changed(self, signals: Signals) -> None:
-        self._recorder.take_signals(signals)
-        self._notify(SignalsChanged(signals=signals))
+        self._recorder.add_signals(signals)
+        self._send(SignalsChanged(signals=signals))
 
     # ---- calls --------------------------------------------------------------------------------
 
     def _call(self, request: CallRobot) -> None:
         """Carry out a call beside everything else."""
-        if len(self._calls) < MOST_CALLS:
-            self._spawn(self._answer(request))
+        if len(self._calls) < MAX_CALLS:
+            self._spawn(self._answer_call(request))
         else:
-            self._notify(
+            self._send(
                 CallAnswered(
                     number=request.number,
-                    answer=Answer(
-                        ok=False, text=f'{MOST_CALLS} calls are being carried out; wait for some.'
+                    answer=ServiceAnswer(
+                        ok=False, text=f'{MAX_CALLS} calls are being carried out; wait for some.'
                     ),
                 )
             )
 
-    async def _answer(self, request: CallRobot) -> None:
+    async def _answer_call(self, request: CallRobot) -> None:
         try:
-            answer = await self._desk.answer(request.call)
+            answer = await self._dispatcher.dispatch(request.call)
         except Exception as error:  # who called waits for an answer
             text = f'The driver has a defect, {type(error).__name__}: {error}.'
             self._log(logging.ERROR, f'{text} It was asked for {request.call}.')
-            answer = Answer(ok=False, text=text)
-        self._notify(CallAnswered(number=request.number, answer=answer))
+            answer = ServiceAnswer(ok=False, text=text)
+        self._send(CallAnswered(number=request.number, answer=answer))
 
     async def _ask_serial_number(self) -> None:
         """Fetch the serial number; a robot without a dashboard does not tell it."""
-        answer = await self._desk.answer(Dashboard(command='get serial number'))
+        answer = await self._dispatcher.dispatch(DashboardCall(command='get serial number'))
         if answer.ok:
             self._link.set_serial_number(answer.text)
 
@@ -375,20 +389,20 @@ class RobotLoop:
     # ---- events of the robot ------------------------------------------------------------------
 
     def _keep_state(self, state: RobotState) -> None:
-        self._latest, self._is_shared = state, False
+        self._latest, self._is_published = state, False
 
-    def _share_state(self) -> None:
+    def _publish_state(self) -> None:
         """
         Write the newest state into the shared memory, if it is not there yet.
 
         That comes behind what a packet leads to, as a CANCEL must not wait for it; but before
         anything is told, so that who hears of it finds the state that belongs to it.
         """
-        if not self._is_shared and self._latest is not None:
-            self._is_shared = True
+        if not self._is_published and self._latest is not None:
+            self._is_published = True
             self._memory.write(self._latest)
             if self._recorder.is_recording and self._machine is not None:
-                self._recorder.take(self._latest, *self._machine.where())
+                self._recorder.add_state(self._latest, *self._machine.motion_status())
             now = self._now()
             self._longest_gap = max(self._longest_gap, now - self._last_report)
             self._last_report = now
@@ -396,26 +410,26 @@ class RobotLoop:
     def _handle_event(self, event: Event) -> None:
         """Feed the machine, and do what it answers."""
         if self._machine is not None:
-            self._carry_out(self._machine.step(event, self._now()))
-        elif self._loan is not None and isinstance(event, StateReceived):
-            self._pursue(self._loan, event.state)
-        self._share_state()
+            self._execute_commands(self._machine.step(event, self._now()))
+        elif self._temporary_tcp is not None and isinstance(event, StateReceived):
+            self._restore_tcp(self._temporary_tcp, event.state)
+        self._publish_state()
 
-    def _carry_out(self, commands: list[Command]) -> None:
+    def _execute_commands(self, commands: list[GoalCommand]) -> None:
         for command in commands:
             match command:
                 case SendControl(action=action, count=count):
                     self._link.send_control(action, count)
                 case SendPoints(first=first, end=end):
                     self._link.send_points(self._points.take(first, end))
-                case LendTcp(T_flange_tcp=T_flange_tcp):
-                    self._lend(T_flange_tcp)
-                case ReturnTcp(T_flange_tcp=T_flange_tcp):
-                    self._link.return_tcp(T_flange_tcp)
+                case SetTemporaryTcp(T_flange_tcp=T_flange_tcp):
+                    self._set_temporary_tcp(T_flange_tcp)
+                case RestoreTcp(T_flange_tcp=T_flange_tcp):
+                    self._link.restore_tcp(T_flange_tcp)
                 case StopProgram(reason=reason):
                     self._link.stop_program(reason)
-                case Report(progress=progress):
-                    self._notify(MotionProgress(motion=self._motion, progress=progress))
+                case ReportProgress(progress=progress):
+                    self._send(MotionProgress(motion=self._motion, progress=progress))
                 case WriteServo(values=values):
                     if self._servo is not None:
                         self._servo.write_row(values)
@@ -426,11 +440,11 @@ class RobotLoop:
                 case LeaveServo():
                     self._leave_servo()
                 case ReportServo(report=report):
-                    self._notify(ServoChanged(motion=self._motion, report=report))
-                case Remark(text=text):
+                    self._send(ServoProgress(motion=self._motion, report=report))
+                case LogWarning(text=text):
                     self._log(logging.WARNING, text)
-                case AnswerExtension():
-                    self._answer_extension(command)
+                case AnswerAppend():
+                    self._answer_append(command)
                 case Finish(outcome=outcome):
                     self._finish(outcome)
 
@@ -458,29 +472,29 @@ class RobotLoop:
         self._leave_servo()
         machine, motion = self._machine, self._motion
         self._motion, self._machine = 0, None
-        self._points = RecordsToSend()
-        if machine is not None and machine.loan is not None:
-            if machine.loan.returned:
-                self._notify(TcpReturned())
+        self._points = PointBuffer()
+        if machine is not None and machine.temporary_tcp is not None:
+            if machine.temporary_tcp.is_restored:
+                self._send(TemporaryTcpRestored())
             else:
-                self._owe(machine.loan)
-        self._link.set_busy(False)
-        if outcome.code in REASONED and not self._link.robot_error():
-            self._unexplained = MotionEnded(motion=motion, outcome=outcome)
-            asyncio.get_running_loop().call_later(REASON_TIMEOUT, self._tell_unexplained)
+                self._restore_tcp_later(machine.temporary_tcp)
+        self._link.set_executing(False)
+        if outcome.code in CODES_WITH_LATE_CAUSE and not self._link.robot_error():
+            self._pending_end = MotionEnded(motion=motion, outcome=outcome)
+            asyncio.get_running_loop().call_later(CAUSE_TIMEOUT, self._send_pending_end)
         else:
-            self._tell_end(MotionEnded(motion=motion, outcome=outcome))
+            self._send_end(MotionEnded(motion=motion, outcome=outcome))
 
-    def _tell_unexplained(self) -> None:
+    def _send_pending_end(self) -> None:
         """Tell the end of a motion, whose reason has come meanwhile or will not come."""
-        ended, self._unexplained = self._unexplained, None
+        ended, self._pending_end = self._pending_end, None
         if ended is not None:
-            self._tell_end(ended)
+            self._send_end(ended)
 
-    def _tell_end(self, ended: MotionEnded) -> None:
+    def _send_end(self, ended: MotionEnded) -> None:
         """Tell the end of a motion, with what led to it where that is not in its sentence."""
         outcome = ended.outcome
-        if outcome.code in EXPLAINED:
+        if outcome.code in CODES_WITH_CAUSE:
             error = self._link.robot_error()
             text = (
                 f'{outcome.text} {error[:1].upper()}{error[1:].rstrip(".")}.'
@@ -490,11 +504,11 @@ class RobotLoop:
             outcome = replace(
                 outcome,
                 text=text,
-                report=(*outcome.report, *(f'why: {line}' for line in self._link.chain())),
+                report=(*outcome.report, *(f'why: {line}' for line in self._link.event_chain())),
             )
             self._link.explain(text)
         self._recorder.end(outcome)
-        self._notify(replace(ended, outcome=outcome))
+        self._send(replace(ended, outcome=outcome))
 
     def _end_motion(self, text: str) -> None:
         if self._machine is not None:
@@ -502,46 +516,51 @@ class RobotLoop:
 
     # ---- the TCP of a goal --------------------------------------------------------------------
 
-    def _lend(self, T_flange_tcp: Pose) -> None:
+    def _set_temporary_tcp(self, T_flange_tcp: Pose) -> None:
         """Set the TCP for a goal; the owner hears of it and remembers it, should we die."""
         assert self._machine is not None
-        assert self._machine.loan is not None
-        loan = self._machine.loan
-        self._notify(
-            TcpLent(T_flange_before=loan.T_flange_before, T_flange_lent=loan.T_flange_lent)
+        assert self._machine.temporary_tcp is not None
+        temporary_tcp = self._machine.temporary_tcp
+        self._send(
+            TemporaryTcpSet(
+                T_flange_original=temporary_tcp.T_flange_original,
+                T_flange_temporary=temporary_tcp.T_flange_temporary,
+            )
         )
-        self._link.lend_tcp(T_flange_tcp)
+        self._link.set_temporary_tcp(T_flange_tcp)
 
-    def _owe(self, loan: TcpLoan) -> None:
+    def _restore_tcp_later(self, temporary_tcp: TemporaryTcp) -> None:
         """See to it that the TCP of an ended goal is put back, before another one runs."""
-        self._loan = loan
-        self._link.owe_tcp(True)
+        self._temporary_tcp = temporary_tcp
+        self._link.set_tcp_restore_pending(True)
 
-    def _pursue(self, loan: TcpLoan, state: RobotState) -> None:
+    def _restore_tcp(self, temporary_tcp: TemporaryTcp, state: RobotState) -> None:
         """Put the TCP back when that is possible, again and again, until the robot has it."""
         now = self._now()
-        loan.observe(state, now)
-        if loan.returned:
-            self._loan = None
-            self._link.owe_tcp(False)
-            self._notify(TcpReturned())
+        temporary_tcp.observe(state, now)
+        if temporary_tcp.is_restored:
+            self._temporary_tcp = None
+            self._link.set_tcp_restore_pending(False)
+            self._send(TemporaryTcpRestored())
             self._log(logging.INFO, 'the TCP that the last goal had set is not set any more')
-        elif loan.is_due(state, now):
-            self._link.return_tcp(loan.T_flange_before)
+        elif temporary_tcp.is_restore_due(state, now):
+            self._link.restore_tcp(temporary_tcp.T_flange_original)
 
     async def _tick(self) -> None:
         """Let time pass where nothing else happens, and watch the owner."""
-        last_sign = self._now()
+        last_heartbeat = self._now()
         while True:
-            await asyncio.sleep(TICK)
+            await asyncio.sleep(TICK_PERIOD)
             self._handle_event(Tick())
-            if self._now() - last_sign >= SIGN_OF_LIFE:
-                last_sign = self._now()
-                if self._untold is not None:
-                    self._notify(self._untold)
-                self._notify(
-                    Alive(
-                        gaps=Gaps(reports=self._longest_gap, keepalives=self._link.keepalive_gap())
+            if self._now() - last_heartbeat >= HEARTBEAT_PERIOD:
+                last_heartbeat = self._now()
+                if self._withheld_signals is not None:
+                    self._send(self._withheld_signals)
+                self._send(
+                    LoopHeartbeat(
+                        gaps=LinkGaps(
+                            reports=self._longest_gap, keepalives=self._link.keepalive_gap()
+                        )
                     )
                 )
                 self._longest_gap = 0.0
@@ -561,8 +580,8 @@ class RobotLoop:
         if status.state is ConnectionState.DISCONNECTED:
             self._memory.clear()
             self._last_report = inf
-        if self._loan is not None and status.program_running != self._program_running:
-            self._loan.hurry()
+        if self._temporary_tcp is not None and status.program_running != self._program_running:
+            self._temporary_tcp.retry_now()
         self._program_running = status.program_running
         before, self._connection = self._connection, status.state
         if (before, status.state) == (
@@ -570,32 +589,32 @@ class RobotLoop:
             ConnectionState.CONNECTED,
         ) and not status.serial_number:
             self._spawn(self._ask_serial_number())
-        self._notify(StatusChanged(status=status))
+        self._send(StatusChanged(status=status))
 
-    def _geometry_known(self, geometry: Geometry) -> None:
-        self._notify(GeometryKnown(geometry=geometry))
+    def _geometry_known(self, geometry: DhTable) -> None:
+        self._send(GeometryReceived(geometry=geometry))
 
     def _log(self, level: int, text: str) -> None:
-        self._notify(LogLine(level=level, text=text))
+        self._send(LogMessage(level=level, text=text))
 
-    def _notify(self, notice: Notice) -> None:
-        self._share_state()
+    def _send(self, notification: Notification) -> None:
+        self._publish_state()
         if self._pipe.is_closing():
             return
-        left_out = (
-            isinstance(notice, PASSING)
-            and self._pipe.transport.get_write_buffer_size() > MOST_UNREAD
+        is_dropped = (
+            isinstance(notification, DROPPABLE)
+            and self._pipe.transport.get_write_buffer_size() > MAX_UNREAD
         )
-        if isinstance(notice, SignalsChanged):
-            self._untold = notice if left_out else None
-        if not left_out:
-            self._pipe.write(pack(notice))
+        if isinstance(notification, SignalsChanged):
+            self._withheld_signals = notification if is_dropped else None
+        if not is_dropped:
+            self._pipe.write(pack(notification))
 
     def _now(self) -> float:
         return asyncio.get_running_loop().time()
 
 
-def _later(
+def _call_soon(
     loop: asyncio.AbstractEventLoop, function: Callable[..., None], *arguments: object
 ) -> None:
     """Have the loop call a function, from another thread; nothing, if the loop has ended."""
@@ -603,13 +622,13 @@ def _later(
         loop.call_soon_threadsafe(function, *arguments)
 
 
-async def _apart(size: int, function: Callable[..., T], *arguments: object) -> T:
+async def _run_in_thread_if_large(size: int, function: Callable[..., T], *arguments: object) -> T:
     """
     Call a function; in a thread when it has much to do, because keepalives cannot wait.
 
     :param size: how much it has to do [bytes].
     """
-    if size < LARGE:
+    if size < MIN_THREAD_SIZE:
         return function(*arguments)
     return await asyncio.to_thread(function, *arguments)
 

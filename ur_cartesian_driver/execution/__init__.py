@@ -3,56 +3,56 @@
 """What to do next: pure state machines, fed with events and the time, answering with commands."""
 
 from ur_cartesian_driver.execution.commands import (
-    AnswerExtension,
-    Command,
+    AnswerAppend,
     EnterServo,
     Finish,
+    GoalCommand,
     LeaveServo,
-    LendTcp,
+    LogWarning,
     OpenServo,
-    Remark,
-    Report,
+    ReportProgress,
     ReportServo,
-    ReturnTcp,
+    RestoreTcp,
     SendControl,
     SendPoints,
+    SetTemporaryTcp,
     StopProgram,
     WriteServo,
 )
-from ur_cartesian_driver.execution.order import Extension, Order, order_of
+from ur_cartesian_driver.execution.goal.motion_job import AppendJob, job_from_plan, MotionJob
 from ur_cartesian_driver.execution.servo import SERVO_LINK, ServoMachine
-from ur_cartesian_driver.execution.servo_source import Setpoints
+from ur_cartesian_driver.execution.servo_source import SetpointSource
 from ur_cartesian_driver.execution.servo_stream import ServoSettings
-from ur_cartesian_driver.execution.stream import StreamMachine, StreamSettings
-from ur_cartesian_driver.execution.tcp_loan import same_tcp, TcpLoan
-from ur_cartesian_driver.execution.trajectory import TrajectoryMachine
+from ur_cartesian_driver.execution.stream import AppendMachine, AppendSettings
+from ur_cartesian_driver.execution.tcp_loan import same_tcp, TemporaryTcp
+from ur_cartesian_driver.execution.trajectory import GoalMachine
 
 __all__ = [
     'SERVO_LINK',
-    'AnswerExtension',
-    'Command',
+    'AnswerAppend',
+    'AppendJob',
+    'AppendMachine',
+    'AppendSettings',
     'EnterServo',
-    'Extension',
     'Finish',
+    'GoalCommand',
+    'GoalMachine',
     'LeaveServo',
-    'LendTcp',
+    'LogWarning',
+    'MotionJob',
     'OpenServo',
-    'Order',
-    'Remark',
-    'Report',
+    'ReportProgress',
     'ReportServo',
-    'ReturnTcp',
+    'RestoreTcp',
     'SendControl',
     'SendPoints',
     'ServoMachine',
     'ServoSettings',
-    'Setpoints',
+    'SetTemporaryTcp',
+    'SetpointSource',
     'StopProgram',
-    'StreamMachine',
-    'StreamSettings',
-    'TcpLoan',
-    'TrajectoryMachine',
+    'TemporaryTcp',
     'WriteServo',
-    'order_of',
+    'job_from_plan',
     'same_tcp',
 ]

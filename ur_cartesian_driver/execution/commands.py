@@ -30,15 +30,15 @@ class SendPoints:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LendTcp:
+class SetTemporaryTcp:
     """Set the robot's TCP for the time of a goal."""
 
     T_flange_tcp: Pose
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ReturnTcp:
-    """Put back the TCP that the robot had before :class:`LendTcp`."""
+class RestoreTcp:
+    """Put back the TCP that the robot had before :class:`SetTemporaryTcp`."""
 
     T_flange_tcp: Pose
 
@@ -51,21 +51,21 @@ class StopProgram:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Report:
+class ReportProgress:
     """Tell where the motion is."""
 
     progress: Progress
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AnswerExtension:
+class AnswerAppend:
     """Tell whether points are taken; either they all are, or the goal is as it was."""
 
     number: int
     #: Why not; empty = they are.
     refusal: str = ''
     #: Plan them from where the arm is going to rest, and they are taken: the goal has been closed.
-    from_rest: bool = False
+    replan_from_rest: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +98,7 @@ class ReportServo:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Remark:
+class LogWarning:
     """Write a sentence into the log: something a person may want to look at."""
 
     text: str
@@ -111,19 +111,19 @@ class Finish:
     outcome: Outcome
 
 
-Command: TypeAlias = (
+GoalCommand: TypeAlias = (
     SendControl
     | SendPoints
-    | LendTcp
-    | ReturnTcp
+    | SetTemporaryTcp
+    | RestoreTcp
     | StopProgram
-    | Report
-    | AnswerExtension
+    | ReportProgress
+    | AnswerAppend
     | OpenServo
     | EnterServo
     | WriteServo
     | LeaveServo
     | ReportServo
-    | Remark
+    | LogWarning
     | Finish
 )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 
 @dataclass(slots=True)
-class Window:
+class SendWindow:
     """
     Hands out records so that at most ``size`` are sent and not yet begun.
 

@@ -3,7 +3,7 @@
 """
 The machine of a session of live targets, and the one that lets a person guide the arm.
 
-Both are goals of the buffered servo that go nowhere by themselves (:mod:`~.servo`): they begin,
+Both are goals of the buffered servo that go nowhere by themselves (:mod:`~.servo_machine`): they begin,
 are cancelled and end as any other, so nothing that can happen to a goal has to be thought of
 again.
 """
@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from ur_cartesian_driver.execution.commands import Command, Remark
+from ur_cartesian_driver.execution.commands import GoalCommand, LogWarning
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.live_targets import LiveSettings, LiveTargets
-from ur_cartesian_driver.execution.order import Order
 from ur_cartesian_driver.execution.servo import ServoMachine
-from ur_cartesian_driver.execution.servo_stream import Phase, ServoSettings, ServoStream
-from ur_cartesian_driver.execution.states import Signal
-from ur_cartesian_driver.execution.target_follower import TargetFollower
+from ur_cartesian_driver.execution.servo_stream import ServoPhase, ServoSettings, ServoStream
+from ur_cartesian_driver.execution.states import GoalSignal
+from ur_cartesian_driver.execution.target_follower import OnlineTrajectoryGenerator
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Event
@@ -30,11 +30,11 @@ from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.protocol.registers import ServoMode
 
 #: The arm goes where it is led: no plan is there that it could leave.
-ANY_WAY = (0.0, 0.0)
+ANY_DEVIATION = (0.0, 0.0)
 #: How often it is said why the arm stands, at most [s].
-REMARK_PERIOD = 2.0
+WARNING_PERIOD = 2.0
 #: How long the robot program may take to let the arm be guided [s].
-TEACH_BOUND = 1.0
+FREEDRIVE_TIMEOUT = 1.0
 
 
 class LiveMachine(ServoMachine):
@@ -47,7 +47,7 @@ class LiveMachine(ServoMachine):
 
     def __init__(
         self,
-        order: Order,
+        job: MotionJob,
         live: LiveSettings,
         arm: Arm,
         start: Joints,
@@ -56,45 +56,50 @@ class LiveMachine(ServoMachine):
         **more: Any,
     ) -> None:
         """Take an order to stand; nothing happens before :meth:`start`."""
-        self._follower = TargetFollower(arm, order.T_flange_active, start, live.limits)
+        self._generator = OnlineTrajectoryGenerator(arm, job.T_flange_active, start, live.limits)
         self._timeout = live.timeout
-        self.live = LiveTargets(self._follower, live)
-        self._blocked, self._next_remark = '', 0.0
+        self.live = LiveTargets(self._generator, live)
+        self._blocked_reason, self._next_remark = '', 0.0
         super().__init__(
-            order, settings=settings, source=self.live, **more | {'max_plan_deviation': ANY_WAY}
+            job,
+            settings=settings,
+            source=self.live,
+            **more | {'max_plan_deviation': ANY_DEVIATION},
         )
 
-    def aim(self, T_base_tcp: Pose, age: float, now: float) -> None:
-        """Take a target; see :meth:`LiveTargets.take`."""
-        self.live.take(T_base_tcp, age, now)
+    def set_target(self, T_base_tcp: Pose, age: float, now: float) -> None:
+        """Take a target; see :meth:`LiveTargets.add`."""
+        self.live.add(T_base_tcp, age, now)
 
-    def step(self, event: Event, now: float) -> list[Command]:
+    def step(self, event: Event, now: float) -> list[GoalCommand]:
         """Return what to do after an event; also why the arm stops, where it does."""
-        self.live.look(now)
+        self.live.update(now)
         commands = super().step(event, now)
-        before, self._blocked = self._blocked, self.live.blocked
-        if self._blocked and not before and now >= self._next_remark:
-            self._next_remark = now + REMARK_PERIOD
-            commands.append(Remark(text=f'the live target is not gone to: {self._blocked}'))
+        before, self._blocked_reason = self._blocked_reason, self.live.blocked
+        if self._blocked_reason and not before and now >= self._next_remark:
+            self._next_remark = now + WARNING_PERIOD
+            commands.append(
+                LogWarning(text=f'the live target is not gone to: {self._blocked_reason}')
+            )
         return commands
 
-    def _begin(self, state: RobotState) -> list[Command]:
-        self._follower.stand_at(state.target_q)
-        return super()._begin(state)
+    def _start_motion(self, state: RobotState) -> list[GoalCommand]:
+        self._generator.reset(state.target_q)
+        return super()._start_motion(state)
 
-    def _report(self) -> tuple[str, ...]:
-        return (*super()._report(), *self.live.report)
+    def _outcome_report(self) -> tuple[str, ...]:
+        return (*super()._outcome_report(), *self.live.report)
 
-    def _sentence(self, code: ErrorCode) -> str:
+    def _outcome_text(self, code: ErrorCode) -> str:
         if code is ErrorCode.SUCCESSFUL:
             return f'No live targets came for {self._timeout:g} s: the session is over.'
-        return super()._sentence(code)
+        return super()._outcome_text(code)
 
-    def _where(self) -> str:
+    def _location_clause(self) -> str:
         return 'following live targets' if self._started else 'before anything moved'
 
 
-class _NoSetpoints:
+class _IdleSetpoints:
     """What an arm that is guided by hand gets; in the mode TEACH nobody reads it."""
 
     done = False
@@ -104,68 +109,68 @@ class _NoSetpoints:
         return ZERO6
 
 
-class TeachMachine(ServoMachine):
+class FreedriveMachine(ServoMachine):
     """The robot program lets the arm be guided by hand, until it is told to end that."""
 
-    def __init__(self, order: Order, *, settings: ServoSettings, **more: Any) -> None:
+    def __init__(self, job: MotionJob, *, settings: ServoSettings, **more: Any) -> None:
         """Take an order to stand; nothing happens before :meth:`start`."""
         super().__init__(
-            order,
+            job,
             settings=settings,
-            source=_NoSetpoints(),
-            **more | {'max_plan_deviation': ANY_WAY},
+            source=_IdleSetpoints(),
+            **more | {'max_plan_deviation': ANY_DEVIATION},
         )
-        self.stream: TeachStream = TeachStream(settings)
+        self.stream: FreedriveStream = FreedriveStream(settings)
 
-    def _progress_of_stream(self) -> tuple[Signal | None, str]:
-        if self.stream.trouble:
+    def _stream_signal(self) -> tuple[GoalSignal | None, str]:
+        if self.stream.failure:
             # A program ends the guiding by itself where it is about to end.
-            signal = Signal.PROGRAM_STOPPED if self.stream.is_guided else Signal.FAILURE
-            return signal, self.stream.trouble
-        return super()._progress_of_stream()
+            signal = GoalSignal.PROGRAM_STOPPED if self.stream.is_free else GoalSignal.FAILURE
+            return signal, self.stream.failure
+        return super()._stream_signal()
 
-    def _shows_goal(self) -> bool:
+    def _has_goal_tcp(self) -> bool:
         """Report once the arm is let go, and not before: that is how its owner knows."""
-        return self.stream.is_guided and super()._shows_goal()
+        return self.stream.is_free and super()._has_goal_tcp()
 
-    def _where(self) -> str:
+    def _location_clause(self) -> str:
         return 'while the arm was guided' if self._started else 'before the arm was let go'
 
 
-class TeachStream(ServoStream):
+class FreedriveStream(ServoStream):
     """The registers of an arm that is guided: the mode TEACH in the place of set-points."""
 
     def __init__(self, settings: ServoSettings) -> None:
         """Wait for the first packet."""
-        super().__init__(_NoSetpoints(), settings)
+        super().__init__(_IdleSetpoints(), settings)
         self._begun = False
-        self._asked_at = 0.0
+        self._requested_at = 0.0
         #: Whether the robot program has let the arm go.
-        self.is_guided = False
+        self.is_free = False
         #: Why it does not (any more), as a clause.
-        self.trouble = ''
+        self.failure = ''
 
     def begin(self) -> None:
         """Let the arm be guided from now on."""
         self._begun = True
 
-    def take(self, feedback: ServoFeedback, now: float) -> tuple[float, ...] | None:
+    def on_feedback(self, feedback: ServoFeedback, now: float) -> tuple[float, ...] | None:
         """Take a packet; return what is to be written, None = nothing."""
-        if self._begun and self._asked_at == 0.0:
-            self._asked_at = now
-        teaches = feedback.mode == ServoMode.TEACH
-        if self._begun and self.phase is Phase.READY and not teaches:
-            if self.is_guided:
-                self.trouble = 'the robot program has ended the guiding by itself'
-            elif now > self._asked_at + TEACH_BOUND:
-                self.trouble = (
+        if self._begun and self._requested_at == 0.0:
+            self._requested_at = now
+        is_teaching = feedback.mode == ServoMode.TEACH
+        if self._begun and self.phase is ServoPhase.READY and not is_teaching:
+            if self.is_free:
+                self.failure = 'the robot program has ended the guiding by itself'
+            elif now > self._requested_at + FREEDRIVE_TIMEOUT:
+                self.failure = (
                     'the robot program does not let the arm be guided: it is paused, '
-                    'or was started without allow_teach'
+                    'or was started without allow_freedrive'
                 )
-        self.is_guided = self.is_guided or teaches
-        return super().take(feedback, now)
+        self.is_free = self.is_free or is_teaching
+        return super().on_feedback(feedback, now)
 
     def _row(self) -> tuple[float, ...]:
         mode, *rest = super()._row()
-        guided = self._begun and self.phase is Phase.READY
-        return (ServoMode.TEACH if guided else mode, *rest)
+        freedrive = self._begun and self.phase is ServoPhase.READY
+        return (ServoMode.TEACH if freedrive else mode, *rest)

@@ -14,7 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import inf
 
-from ur_cartesian_driver.execution.target_follower import FollowLimits, TargetFollower
+from ur_cartesian_driver.execution.target_follower import LiveLimits, OnlineTrajectoryGenerator
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 
@@ -27,7 +27,7 @@ class LiveSettings:
     :raises ValueError: a time is not positive.
     """
 
-    limits: FollowLimits = field(default_factory=FollowLimits)
+    limits: LiveLimits = field(default_factory=LiveLimits)
     #: How old a target may be that is followed [s].
     max_age: float = 0.2
     #: The session is over when no target has come for so long [s].
@@ -43,11 +43,11 @@ class LiveSettings:
 class LiveTargets:
     """The source of the set-points of a session."""
 
-    def __init__(self, follower: TargetFollower, settings: LiveSettings) -> None:
+    def __init__(self, generator: OnlineTrajectoryGenerator, settings: LiveSettings) -> None:
         """Begin with no target."""
-        self.follower = follower
+        self.generator = generator
         #: How many targets were followed, and how many came in after a newer one or too old.
-        self.taken = self.left_out = 0
+        self.accepted = self.dropped = 0
         #: How often the arm was stopped because the newest target was too old.
         self.pauses = 0
         self._settings = settings
@@ -57,7 +57,7 @@ class LiveTargets:
         # The first wording of each reason.
         self._reasons: dict[str, str] = {}
 
-    def take(self, T_base_tcp: Pose, age: float, now: float) -> None:
+    def add(self, T_base_tcp: Pose, age: float, now: float) -> None:
         """
         Take a target.
 
@@ -66,51 +66,53 @@ class LiveTargets:
         stamp = now - max(0.0, age)
         self._last_came = now
         if stamp <= self._stamp or not age <= self._settings.max_age:  # NaN is no age
-            self.left_out += 1
+            self.dropped += 1
             return
         self._stamp = stamp
-        self.taken += 1
+        self.accepted += 1
         self._is_over = False
-        self.follower.aim(T_base_tcp)
+        self.generator.set_target(T_base_tcp)
 
-    def look(self, now: float) -> None:
+    def update(self, now: float) -> None:
         """Let time pass: see whether the newest target is too old, and whether it was the last."""
-        follower = self.follower
-        if follower.target is not None and now - self._stamp > self._settings.max_age:
+        generator = self.generator
+        if generator.target is not None and now - self._stamp > self._settings.max_age:
             # An arm that rests where it was to be is not stopped by that.
-            self.pauses += not follower.arrived
-            follower.release()
+            self.pauses += not generator.arrived
+            generator.clear_target()
         self._last_came = min(self._last_came, now)
         self._is_over = now - self._last_came > self._settings.timeout
 
     def next(self, dt: float) -> Joints:
         """Return the set-point [rad] that follows ``dt`` [s] of nominal time after the last."""
         if dt <= 0.0:
-            return self.follower.q
-        q = self.follower.step(dt)
-        if reason := self.follower.blocked:
+            return self.generator.q
+        q = self.generator.step(dt)
+        if reason := self.generator.blocked:
             self._reasons.setdefault(_without_numbers(reason), reason)
         return q
 
     @property
     def done(self) -> bool:
         """Tell whether the session is over: no targets any more, and the arm stands."""
-        return self._is_over and self.follower.at_rest
+        return self._is_over and self.generator.at_rest
 
     @property
     def blocked(self) -> str:
         """Why the arm does not go to the newest target, as a clause; empty: it does."""
-        return self.follower.blocked
+        return self.generator.blocked
 
     @property
     def report(self) -> tuple[str, ...]:
         """What the session was, in lines for people."""
         lines = [
-            '1 target was followed' if self.taken == 1 else f'{self.taken} targets were followed'
+            '1 target was followed'
+            if self.accepted == 1
+            else f'{self.accepted} targets were followed'
         ]
-        if self.left_out:
+        if self.dropped:
             lines.append(
-                f'{self.left_out} came after a newer one or were older than '
+                f'{self.dropped} came after a newer one or were older than '
                 f'{self._settings.max_age:g} s, and were left out'
             )
         if self.pauses:

@@ -30,28 +30,28 @@ from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row, Vector6
 
 #: How much a radian counts in the distance that decides which place is the nearest [m/rad].
-RADIAN = 0.1
+METRES_PER_RADIAN = 0.1
 #: How far the target may be from the place found before, beyond what its speed explains [m].
-SLACK = 0.005
+SEARCH_MARGIN = 0.005
 #: How far the tool may be before or behind its target and be on time: this long at the speed of
 #: the target [s], and this far [m]. Position controllers of arms lag by some cycles.
 LAG_TIME = 0.02
-LAG_WAY = 0.0005
+LAG_DISTANCE = 0.0005
 #: Times nearer to each other than this are one [s]; the wire counts in microseconds.
 SAME_TIME = 5e-7
 #: How long ago a place may be that the tool still lags behind at [s].
-MEMORY = 1.0
+HISTORY_TIME = 1.0
 #: Up to so many edges are looked at one by one.
-FEW = 8
+MAX_SCALAR_EDGES = 8
 #: So many edges are kept in plain floats.
-KEPT = 256
+MAX_CACHED_EDGES = 256
 
 #: A pose in the coordinates of :class:`PathTracker`.
-Point: TypeAlias = tuple[float, float, float, float, float, float, float]
+TrackerPoint: TypeAlias = tuple[float, float, float, float, float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class PathPosition:
     """A place on the reference path: between row ``row`` and the next, at ``fraction``."""
 
     row: int
@@ -64,20 +64,22 @@ class Edge:
 
     start: Pose
     end: Pose
-    origin: Point
-    vector: Point
+    origin: TrackerPoint
+    vector: TrackerPoint
     #: Of the length.
-    square: float
+    length_squared: float
 
-    def nearest(self, point: Point, lowest: float, highest: float) -> tuple[float, float]:
+    def nearest(self, point: TrackerPoint, lowest: float, highest: float) -> tuple[float, float]:
         """Return the fraction of the way that is nearest, and the square of the distance there."""
         px, py, pz, pa, pb, pc, pd = point
         ox, oy, oz, oa, ob, oc, od = self.origin
         ex, ey, ez, ea, eb, ec, ed = self.vector
         x, y, z, a, b, c, d = px - ox, py - oy, pz - oz, pa - oa, pb - ob, pc - oc, pd - od
         at = 1.0
-        if self.square > 0.0:
-            at = (x * ex + y * ey + z * ez + a * ea + b * eb + c * ec + d * ed) / self.square
+        if self.length_squared > 0.0:
+            at = (
+                x * ex + y * ey + z * ez + a * ea + b * eb + c * ec + d * ed
+            ) / self.length_squared
             at = 0.0 if at < 0.0 else 1.0 if at > 1.0 else at
         at = max(lowest, min(at, highest))
         return at, (
@@ -96,7 +98,7 @@ class PathTracker:
     Follows the controller's target along the reference path, only ever forwards.
 
     Poses are compared as points of seven dimensions, position and twice the quaternion times
-    :data:`RADIAN`: for small angles the distance of two quaternions is half the angle, so a
+    :data:`METRES_PER_RADIAN`: for small angles the distance of two quaternions is half the angle, so a
     straight line in these coordinates is a straight line of the tool with a steady turn. The
     search reaches as far as the target can have come since the last packet, and, where the robot
     program reports it, not beyond the point that it is running; so a path that crosses itself or
@@ -110,19 +112,21 @@ class PathTracker:
         :param path: the plan's reference; it is not changed.
         """
         self._load(path)
-        self.place = Place(0, 0.0)
+        self.path_position = PathPosition(0, 0.0)
         #: How far the target was from its place at the last update, in the coordinates of above.
-        self.miss = inf
+        self.residual = inf
 
     def _load(self, path: ReferencePath) -> None:
         """Prepare the arrays that are searched."""
         self.path = path
         self._rows = np.array(path.poses)
-        self._rows[:, 3:] *= 2.0 * RADIAN * _continuous_signs(path.poses[:, 3:])[:, None]
+        self._rows[:, 3:] *= (
+            2.0 * METRES_PER_RADIAN * _continuous_signs(path.poses[:, 3:])[:, None]
+        )
         steps = np.linalg.norm(np.diff(self._rows, axis=0), axis=1)
-        self._arc = _plain(np.concatenate(([0.0], np.cumsum(steps))))
-        self._time, self._points = _plain(path.time), array('i', path.point.tobytes())
-        self._is_roomy = bool(path.room.any())
+        self._arc = _float_array(np.concatenate(([0.0], np.cumsum(steps))))
+        self._time, self._points = _float_array(path.time), array('i', path.point.tobytes())
+        self._has_blend_tolerance = bool(path.blend_tolerance.any())
         self._edges: dict[int, Edge] = {}
         self._end = pose_from_row(path.poses[-1])
 
@@ -131,24 +135,26 @@ class PathTracker:
         """The row of the end of the path."""
         return len(self._rows) - 1
 
-    def update(self, target: Pose, reach: float, running: tuple[int, int] | None = None) -> Place:
+    def update(
+        self, target: Pose, max_advance: float, running: tuple[int, int] | None = None
+    ) -> PathPosition:
         """
         Move on to the place nearest to the controller's target.
 
         :param target: pose of the TCP in base.
-        :param reach: the longest way that the target can have come since the last call [m].
+        :param max_advance: the longest way that the target can have come since the last call [m].
         :param running: the points to which the motion leads that the robot program has begun
             last, and the one before it (-1 = there was none); None = unknown.
         :returns: the new place, never behind the one before.
         """
-        first, end = self._window(reach, running)
-        self.miss = inf
+        first, end = self._window(max_advance, running)
+        self.residual = inf
         if end > first:
-            lowest = self.place.fraction if first == self.place.row else 0.0
-            self.place, self.miss = self._nearest(
+            lowest = self.path_position.fraction if first == self.path_position.row else 0.0
+            self.path_position, self.residual = self._nearest(
                 self._coordinates(target, first), first, end, lowest
             )
-        return self.place
+        return self.path_position
 
     def desired(self, actual: Pose, twist: Vector6) -> Pose:
         """
@@ -157,19 +163,19 @@ class PathTracker:
         :param actual: pose of the TCP in base.
         :param twist: of the target, which says how far a lag may reach.
         """
-        here, lag = self._way(), LAG_WAY + LAG_TIME * speed(twist)
+        here, lag = self._arc_length(), LAG_DISTANCE + LAG_TIME * tracker_speed(twist)
         first = max(bisect_right(self._arc, here - lag) - 1, 0)
         end = min(bisect_left(self._arc, here + lag), self.last_row)
         if end <= first:
             return self.pose()
-        place, _ = self._nearest(
+        path_position, _ = self._nearest(
             self._coordinates(actual, first),
             first,
             end,
             self._fraction(first, here - lag),
             self._fraction(end - 1, here + lag),
         )
-        return self.pose(place)
+        return self.pose(path_position)
 
     def deviation(self, target: Pose) -> tuple[float, float]:
         """
@@ -178,36 +184,38 @@ class PathTracker:
         In a corner whose shape only the robot knows, the room for that shape is taken off.
         """
         here = self.pose()
-        way, angle = here.distance_to(target), here.angle_to(target)
-        if not self._is_roomy:
-            return way, angle
-        row, fraction = self.place.row, self.place.fraction
-        room = self.path.room[row : row + (2 if fraction > 0.0 else 1)].max(axis=0)
-        return max(0.0, way - float(room[0])), max(0.0, angle - float(room[1]))
+        distance, angle = here.distance_to(target), here.angle_to(target)
+        if not self._has_blend_tolerance:
+            return distance, angle
+        row, fraction = self.path_position.row, self.path_position.fraction
+        tolerance = self.path.blend_tolerance[row : row + (2 if fraction > 0.0 else 1)].max(axis=0)
+        return max(0.0, distance - float(tolerance[0])), max(0.0, angle - float(tolerance[1]))
 
-    def is_within(self, way: float, angle: float) -> bool:
+    def is_within(self, distance: float, angle: float) -> bool:
         """
         Tell whether the target is surely no farther from its place than that [m], [rad].
 
-        A radian counts as :data:`RADIAN` in :attr:`miss`. Half of it is given away, because the
+        A radian counts as :data:`METRES_PER_RADIAN` in :attr:`residual`. Half of it is given away, because the
         straight line between two quaternions is not quite the turn from one to the other; where
         they are so far apart that this matters, the line is farther from the target than that.
         """
-        return self.miss <= 0.5 * min(way, RADIAN * angle)
+        return self.residual <= 0.5 * min(distance, METRES_PER_RADIAN * angle)
 
-    def finish(self, time: float = inf) -> Place:
+    def finish(self, time: float = inf) -> PathPosition:
         """Move on to the end of the path, or to where it is at a time [s]."""
-        self.place = Place(max(bisect_right(self._time, time + SAME_TIME) - 1, 0), 0.0)
-        return self.place
+        self.path_position = PathPosition(
+            max(bisect_right(self._time, time + SAME_TIME) - 1, 0), 0.0
+        )
+        return self.path_position
 
-    def extend(self, path: ReferencePath, since: float) -> None:
+    def append(self, path: ReferencePath, since: float) -> None:
         """
         Let a path follow from a time on [s], and forget what lies far behind.
 
         The time is that of a place at which both paths are the same, and which is still ahead.
         """
-        old, row = self.path, self.place.row
-        first = max(0, min(bisect_left(self._time, self._time[row] - MEMORY), row))
+        old, row = self.path, self.path_position.row
+        first = max(0, min(bisect_left(self._time, self._time[row] - HISTORY_TIME), row))
         end = max(bisect_right(self._time, since + SAME_TIME), row + 1)
         new = bisect_right(path.time, since + SAME_TIME)
         self._load(
@@ -216,15 +224,17 @@ class PathTracker:
                     name: np.concatenate(
                         [getattr(old, name)[first:end], getattr(path, name)[new:]]
                     )
-                    for name in ('poses', 'point', 'time', 'room')
+                    for name in ('poses', 'point', 'time', 'blend_tolerance')
                 }
             )
         )
-        self.place = Place(row - first, self.place.fraction if row + 1 < end else 0.0)
+        self.path_position = PathPosition(
+            row - first, self.path_position.fraction if row + 1 < end else 0.0
+        )
 
-    def pose(self, place: Place | None = None) -> Pose:
+    def pose(self, path_position: PathPosition | None = None) -> Pose:
         """Return the planned pose at a place, the present one if none is given."""
-        at = self.place if place is None else place
+        at = self.path_position if path_position is None else path_position
         if at.row == self.last_row:
             return self._end
         edge = self._edge(at.row)
@@ -232,47 +242,47 @@ class PathTracker:
 
     def time(self) -> float:
         """Return the planned time at the place [s]."""
-        row, fraction = self.place.row, self.place.fraction
+        row, fraction = self.path_position.row, self.path_position.fraction
         here = self._time[row]
         return here + fraction * (self._time[row + 1] - here) if fraction else here
 
     def waypoint(self) -> int:
         """Return the index of the goal's point that the place leads to."""
-        row = self.place.row + (1 if self.place.fraction > 0.0 else 0)
+        row = self.path_position.row + (1 if self.path_position.fraction > 0.0 else 0)
         return self._points[min(row, self.last_row)]
 
-    def _window(self, reach: float, running: tuple[int, int] | None) -> tuple[int, int]:
+    def _window(self, max_advance: float, running: tuple[int, int] | None) -> tuple[int, int]:
         """Return the rows between which the tool may be."""
         points = self._points
         if running is not None:
             # The program runs that motion, or is in the blend that leads to it: what comes before
             # was passed, perhaps between two packets.
             passed = bisect_left(points, running[1]) - 1
-            if passed > self.place.row:
-                self.place = Place(passed, 0.0)
-        first = self.place.row
-        end = bisect_left(self._arc, self._way() + reach + SLACK)
+            if passed > self.path_position.row:
+                self.path_position = PathPosition(passed, 0.0)
+        first = self.path_position.row
+        end = bisect_left(self._arc, self._arc_length() + max_advance + SEARCH_MARGIN)
         end = min(max(end, first + 1), self.last_row)
         if running is not None:
             end = min(end, bisect_right(points, running[0]) - 1)
         return first, max(end, first)
 
-    def _way(self) -> float:
+    def _arc_length(self) -> float:
         """Return the length of the path up to the place [m]."""
-        row, fraction = self.place.row, self.place.fraction
+        row, fraction = self.path_position.row, self.path_position.fraction
         here = self._arc[row]
         return here + fraction * (self._arc[row + 1] - here) if fraction else here
 
-    def _fraction(self, row: int, way: float) -> float:
+    def _fraction(self, row: int, distance: float) -> float:
         """Return where an edge has that much of the path behind it, within 0 to 1."""
         start, end = self._arc[row], self._arc[row + 1]
-        return min(1.0, max(0.0, (way - start) / (end - start))) if end > start else 1.0
+        return min(1.0, max(0.0, (distance - start) / (end - start))) if end > start else 1.0
 
     def _edge(self, row: int) -> Edge:
         """Return the edge that begins at a row."""
         edge = self._edges.get(row)
         if edge is None:
-            if len(self._edges) >= KEPT:
+            if len(self._edges) >= MAX_CACHED_EDGES:
                 self._edges.clear()
             start, end = self._rows[row : row + 2]
             vector = end - start
@@ -285,16 +295,20 @@ class PathTracker:
             )
         return edge
 
-    def _coordinates(self, pose: Pose, row: int) -> Point:
+    def _coordinates(self, pose: Pose, row: int) -> TrackerPoint:
         """Return the pose in the seven coordinates, its quaternion's sign as at the row."""
         (x, y, z), (a, b, c, d) = pose.position, pose.quaternion
         _, _, _, ra, rb, rc, rd = self._edge(row).origin
-        scale = 2.0 * RADIAN if a * ra + b * rb + c * rc + d * rd >= 0.0 else -2.0 * RADIAN
+        scale = (
+            2.0 * METRES_PER_RADIAN
+            if a * ra + b * rb + c * rc + d * rd >= 0.0
+            else -2.0 * METRES_PER_RADIAN
+        )
         return x, y, z, scale * a, scale * b, scale * c, scale * d
 
     def _nearest(
-        self, point: Point, first: int, end: int, lowest: float, highest: float = 1.0
-    ) -> tuple[Place, float]:
+        self, point: TrackerPoint, first: int, end: int, lowest: float, highest: float = 1.0
+    ) -> tuple[PathPosition, float]:
         """
         Return the nearest place on the edges ``first`` to ``end``, and how far it is.
 
@@ -303,41 +317,47 @@ class PathTracker:
         :param lowest: where it may be on the first edge at the earliest.
         :param highest: where it may be on the last edge at the latest.
         """
-        if end - first > FEW:
+        if end - first > MAX_SCALAR_EDGES:
             return self._nearest_of_many(point, first, end, lowest, highest)
         nearest, best, fraction = inf, first, 0.0
         for row in range(first, end):
-            at, miss = self._edge(row).nearest(
+            at, residual = self._edge(row).nearest(
                 point, lowest if row == first else 0.0, highest if row == end - 1 else 1.0
             )
-            if miss < nearest:
-                nearest, best, fraction = miss, row, at
-        place = Place(best + 1, 0.0) if fraction >= 1.0 else Place(best, fraction)
-        return place, sqrt(nearest)
+            if residual < nearest:
+                nearest, best, fraction = residual, row, at
+        path_position = (
+            PathPosition(best + 1, 0.0) if fraction >= 1.0 else PathPosition(best, fraction)
+        )
+        return path_position, sqrt(nearest)
 
     def _nearest_of_many(
-        self, point: Point, first: int, end: int, lowest: float, highest: float
-    ) -> tuple[Place, float]:
+        self, point: TrackerPoint, first: int, end: int, lowest: float, highest: float
+    ) -> tuple[PathPosition, float]:
         """Return the same by arrays, whose overhead is nothing beside so many edges."""
         start = self._rows[first:end]
         edge = self._rows[first + 1 : end + 1] - start
         away = np.array(point) - start
-        square = np.einsum('ij,ij->i', edge, edge)
+        length_squared = np.einsum('ij,ij->i', edge, edge)
         along = np.einsum('ij,ij->i', away, edge)
         with np.errstate(over='ignore'):  # a robot may say that it is anywhere; then it is an end
-            fraction = np.divide(along, square, out=np.ones_like(along), where=square > 0.0)
+            fraction = np.divide(
+                along, length_squared, out=np.ones_like(along), where=length_squared > 0.0
+            )
         np.minimum(np.maximum(fraction, 0.0, out=fraction), 1.0, out=fraction)
         fraction[-1] = min(fraction[-1], highest)
         fraction[0] = max(fraction[0], lowest)
-        miss = away - fraction[:, None] * edge
-        squares = np.einsum('ij,ij->i', miss, miss)
+        residual = away - fraction[:, None] * edge
+        squares = np.einsum('ij,ij->i', residual, residual)
         best = int(np.argmin(squares))
         at = float(fraction[best])
-        place = Place(first + best + 1, 0.0) if at >= 1.0 else Place(first + best, at)
-        return place, sqrt(float(squares[best]))
+        path_position = (
+            PathPosition(first + best + 1, 0.0) if at >= 1.0 else PathPosition(first + best, at)
+        )
+        return path_position, sqrt(float(squares[best]))
 
 
-def _plain(values: NDArray[np.float64]) -> array[float]:
+def _float_array(values: NDArray[np.float64]) -> array[float]:
     """Return an array that can be searched without making arrays of its numbers."""
     return array('d', np.ascontiguousarray(values, dtype=np.float64).tobytes())
 
@@ -348,7 +368,9 @@ def _continuous_signs(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate(([1.0], np.cumprod(np.where(dots < 0.0, -1.0, 1.0))))
 
 
-def speed(twist: Vector6) -> float:
+def tracker_speed(twist: Vector6) -> float:
     """Return how fast a twist moves in the coordinates of :class:`PathTracker` [m/s]."""
     x, y, z, rx, ry, rz = twist
-    return float((x * x + y * y + z * z) ** 0.5 + RADIAN * (rx * rx + ry * ry + rz * rz) ** 0.5)
+    return float(
+        (x * x + y * y + z * z) ** 0.5 + METRES_PER_RADIAN * (rx * rx + ry * ry + rz * rz) ** 0.5
+    )

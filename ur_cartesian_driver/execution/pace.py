@@ -21,31 +21,31 @@ from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Vector6
 
 #: The peak of a motion from rest to rest is at most twice its average.
-PEAK = 2.0
+PEAK_TO_MEAN = 2.0
 #: Speeds that harm nobody [m/s], [rad/s].
-HARMLESS = (0.02, 0.1)
+MIN_SPEED_LIMITS = (0.02, 0.1)
 #: So many times longer than planned, beyond the time that a program may need to begin [s].
-SLOW, BEGIN = 20.0, 3.0
-_BLAME = (
+MAX_SLOWDOWN, MAX_START_DELAY = 20.0, 3.0
+_CAUSE = (
     'the robot program reads the points in another way than they were meant; set '
     'wire_dialect to the version of that program'
 )
 
 
-class Pace:
+class SpeedCheck:
     """The speeds that a plan leads to."""
 
     def __init__(self, path: ReferencePath) -> None:
         """Find the largest speeds of the planned path."""
         passed = np.diff(path.time)
-        ways = np.linalg.norm(np.diff(path.poses[:, :3], axis=0), axis=1)
+        distances = np.linalg.norm(np.diff(path.poses[:, :3], axis=0), axis=1)
         # Twice the arcsine of half the chord, whose end is the nearer one of q and -q.
         a, b = path.poses[:-1, 3:], path.poses[1:, 3:]
         chords = np.minimum(np.linalg.norm(b - a, axis=1), np.linalg.norm(b + a, axis=1))
         turns = 4.0 * np.arcsin(np.minimum(0.5 * chords, 1.0))
         self._limits = tuple(
-            PEAK * _fastest(lengths, passed) + harmless
-            for lengths, harmless in zip((ways, turns), HARMLESS, strict=True)
+            PEAK_TO_MEAN * _max_speed(lengths, passed) + min_limit
+            for lengths, min_limit in zip((distances, turns), MIN_SPEED_LIMITS, strict=True)
         )
 
     def violation(self, twist: Vector6, elapsed: float, planned: float) -> str | None:
@@ -61,17 +61,17 @@ class Pace:
             if speed > limit:
                 return (
                     f'the controller moves the tool with {speed:.3f} {unit}, and the plan '
-                    f'with no more than {limit:.3f} {unit}: {_BLAME}'
+                    f'with no more than {limit:.3f} {unit}: {_CAUSE}'
                 )
-        if elapsed > BEGIN + SLOW * planned:
+        if elapsed > MAX_START_DELAY + MAX_SLOWDOWN * planned:
             return (
                 f'after {elapsed:.1f} s the controller is where the plan is after '
-                f'{planned:.2f} s: {_BLAME}'
+                f'{planned:.2f} s: {_CAUSE}'
             )
         return None
 
 
-def _fastest(lengths: NDArray[np.float64], times: NDArray[np.float64]) -> float:
+def _max_speed(lengths: NDArray[np.float64], times: NDArray[np.float64]) -> float:
     """Return the largest average speed of the edges; infinite where one takes no time."""
     moving = lengths > 1e-9
     if not moving.any():

@@ -13,19 +13,19 @@ from __future__ import annotations
 from array import array
 from bisect import bisect_left
 
-from ur_cartesian_driver.execution.order import Order
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 
 
-class Records:
+class WireRecords:
     """What is known of each record; they are numbered from the start of the goal."""
 
-    def __init__(self, order: Order) -> None:
+    def __init__(self, job: MotionJob) -> None:
         """Take the records of an order."""
-        self._waypoints = array('i', order.waypoint.tobytes())
-        self._ends = array('d', order.ends.tobytes())
-        self._asks = array('d', order.asks.tobytes())
+        self._waypoints = array('i', job.waypoint.tobytes())
+        self._end_times = array('d', job.end_times.tobytes())
+        self._request_times = array('d', job.request_times.tobytes())
         #: The numbers of those that are motions.
-        self._motions = _motions(order, 0)
+        self._motions = _motions(job, 0)
         #: How many records, and motions, are forgotten.
         self._first = self._first_motion = 0
 
@@ -44,29 +44,29 @@ class Records:
         """How many points the goal has."""
         return self._waypoints[-1] + 1
 
-    def begun(self, motions: int) -> int:
+    def begun_records(self, motions: int) -> int:
         """Return how many records are begun when so many motions are."""
         if motions <= self._first_motion:
             return self._first
         return self._motions[self._index(motions)] + 1
 
-    def running(self, motions: int, trail: int = 0) -> tuple[int, int] | None:
+    def running_waypoints(self, motions: int, lag_motions: int = 0) -> tuple[int, int] | None:
         """
         Return to which points the motion that was begun last and the one before it lead.
 
         :param motions: how many are begun; None is returned for 0.
-        :param trail: so many motions earlier is the one before it, because the arm may be there.
+        :param lag_motions: so many motions earlier is the one before it, because the arm may be there.
         """
         if motions <= self._first_motion:
             return None
         last = self._index(motions)
-        before = last - 1 - trail
+        before = last - 1 - lag_motions
         return (
             self._waypoints[self._motions[last] - self._first],
             self._waypoints[self._motions[before] - self._first] if before >= 0 else -1,
         )
 
-    def before(self, waypoint: int) -> int:
+    def count_before_waypoint(self, waypoint: int) -> int:
         """Return how many records stand before those of a point."""
         return self._first + bisect_left(self._waypoints, waypoint)
 
@@ -74,32 +74,32 @@ class Records:
         """Return how many motions stand before a record."""
         return self._first_motion + bisect_left(self._motions, record)
 
-    def end(self, records: int) -> float:
+    def end_time(self, records: int) -> float:
         """Return when the last one of so many is planned to end [s]."""
-        return self._ends[records - 1 - self._first] if records > 0 else 0.0
+        return self._end_times[records - 1 - self._first] if records > 0 else 0.0
 
-    def asked(self, records: int) -> float:
+    def request_time(self, records: int) -> float:
         """Return when the robot program asks for the one behind so many [s]."""
-        return self._asks[records - 1 - self._first] if records > 0 else 0.0
+        return self._request_times[records - 1 - self._first] if records > 0 else 0.0
 
-    def until(self, time: float) -> int:
+    def count_until(self, time: float) -> int:
         """Return how many it takes for the last one to end at a time [s] or later."""
-        return min(self.total, self._first + bisect_left(self._ends, time) + 1)
+        return min(self.total, self._first + bisect_left(self._end_times, time) + 1)
 
     # ---- goals that go on ---------------------------------------------------------------------
 
-    def extend(self, order: Order, behind: int) -> None:
+    def append(self, job: MotionJob, records_before: int) -> None:
         """Put those of an order behind the first so many, in the place of what is there."""
-        kept = behind - self._first
+        kept = records_before - self._first
         for values, new in (
-            (self._waypoints, order.waypoint),
-            (self._ends, order.ends),
-            (self._asks, order.asks),
+            (self._waypoints, job.waypoint),
+            (self._end_times, job.end_times),
+            (self._request_times, job.request_times),
         ):
             del values[kept:]
             values.frombytes(new.tobytes())
-        del self._motions[bisect_left(self._motions, behind) :]
-        self._motions.extend(_motions(order, behind))
+        del self._motions[bisect_left(self._motions, records_before) :]
+        self._motions.extend(_motions(job, records_before))
 
     def forget(self, records: int) -> None:
         """Forget the first so many; nobody asks for them any more."""
@@ -107,7 +107,7 @@ class Records:
         if gone <= 0:
             return
         motions = bisect_left(self._motions, records)
-        for values in (self._waypoints, self._ends, self._asks):
+        for values in (self._waypoints, self._end_times, self._request_times):
             del values[:gone]
         del self._motions[:motions]
         self._first += gone
@@ -117,6 +117,6 @@ class Records:
         return min(motions - self._first_motion, len(self._motions)) - 1
 
 
-def _motions(order: Order, first: int) -> array[int]:
+def _motions(job: MotionJob, first: int) -> array[int]:
     """Return the numbers of an order's motions, its records numbered from ``first``."""
-    return array('q', (order.is_motion.nonzero()[0] + first).astype('int64').tobytes())
+    return array('q', (job.is_motion.nonzero()[0] + first).astype('int64').tobytes())

@@ -4,7 +4,7 @@
 The machine that takes one goal through the buffered servo.
 
 Its states are those of any goal (:mod:`~.states`), and what the packets of the robot show of it
-is seen by the same observer; only what goes to the robot differs. Not points and a number of them
+is seen by the same monitor; only what goes to the robot differs. Not points and a number of them
 go there but set-points, from a source, one for each packet of the robot (:mod:`~.servo_stream`):
 
 * in ARMING the inputs of the robot are taken, the divergence thresholds are written and the
@@ -12,7 +12,7 @@ go there but set-points, from a source, one for each packet of the robot (:mod:`
   somebody else has, or a program that does not answer, end the goal before anything moves;
 * MOVING begins with a full buffer and ends when the last set-point was carried out;
 * SETTLING holds that set-point until the arm is there and at rest;
-* in STOPPING the mode IDLE is written instead of a CANCEL, and the program's leaving of the servo
+* in CANCELLING the mode IDLE is written instead of a CANCEL, and the program's leaving of the servo
   is the answer.
 
 However the goal ends, the robot program is told to brake and listen no more, and the inputs are
@@ -27,22 +27,22 @@ from math import inf
 import numpy as np
 
 from ur_cartesian_driver.execution.commands import (
-    Command,
     EnterServo,
+    GoalCommand,
     LeaveServo,
-    LendTcp,
     OpenServo,
-    Report,
+    ReportProgress,
     ReportServo,
+    SetTemporaryTcp,
     WriteServo,
 )
-from ur_cartesian_driver.execution.observer import MAX_PLAN_DEVIATION, START_ANGLE
-from ur_cartesian_driver.execution.order import Order
-from ur_cartesian_driver.execution.servo_source import Setpoints, SplineSetpoints
-from ur_cartesian_driver.execution.servo_stream import Phase, ServoSettings, ServoStream
-from ur_cartesian_driver.execution.states import Signal, State, UNDER_WAY
-from ur_cartesian_driver.execution.tcp_loan import TcpLoan
-from ur_cartesian_driver.execution.trajectory import STOP_BOUND, TCP_BOUND, TrajectoryMachine
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
+from ur_cartesian_driver.execution.observer import MAX_PLAN_DEVIATION, START_ANGLE_TOLERANCE
+from ur_cartesian_driver.execution.servo_source import SetpointSource, SplineSetpoints
+from ur_cartesian_driver.execution.servo_stream import ServoPhase, ServoSettings, ServoStream
+from ur_cartesian_driver.execution.states import GoalSignal, GoalState, RUNNING_STATES
+from ur_cartesian_driver.execution.tcp_loan import TemporaryTcp
+from ur_cartesian_driver.execution.trajectory import GoalMachine, STOP_TIMEOUT, TCP_TIMEOUT
 from ur_cartesian_driver.motion.events import (
     Event,
     LinkLost,
@@ -58,24 +58,24 @@ from ur_cartesian_driver.motion.state import RobotState
 SERVO_LINK = 'RTDE inputs'
 #: A robot program that reads our sequence numbers is not stalled, wherever the arm stands: so
 #: lately has it to have read one [s].
-ANSWERS_WITHIN = 1.0
+ANSWER_TIMEOUT = 1.0
 #: The controller's target is behind the set-point that the arm is led to by about the lookahead
 #: time of ``servoj``, by more with a low gain: so many lookahead times at most.
-TRAIL = 4.0
+MAX_LAG_LOOKAHEADS = 4.0
 
 
-class ServoMachine(TrajectoryMachine):
+class ServoMachine(GoalMachine):
     """One goal on its way through the buffered servo; see the module's description."""
 
     def __init__(
         self,
-        order: Order,
+        job: MotionJob,
         *,
         settings: ServoSettings,
-        source: Setpoints | None = None,
+        source: SetpointSource | None = None,
         feedback_period: float = 0.04,
         max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION,
-        continues: bool = False,
+        resume_after_stop: bool = False,
     ) -> None:
         """
         Take an order; nothing happens before :meth:`start`.
@@ -85,204 +85,206 @@ class ServoMachine(TrajectoryMachine):
         """
         # How far it is, the set-points tell; how fast they go, nobody else does.
         super().__init__(
-            replace(order, knows_pace=False, reports_begun=order.spline is not None),
+            replace(job, has_speed_profile=False, reports_points_begun=job.spline is not None),
             feedback_period=feedback_period,
             max_plan_deviation=max_plan_deviation,
-            continues=continues,
+            resume_after_stop=resume_after_stop,
         )
         if source is None:
-            if order.spline is None:
+            if job.spline is None:
                 raise ValueError('An order for the servo needs a spline or another source.')
-            source = SplineSetpoints(order.spline)
-        self.state = State.ARMING
+            source = SplineSetpoints(job.spline)
+        self.state = GoalState.ARMING
         self.stream = ServoStream(source, settings)
-        self._trail = TRAIL * settings.lookahead_time
+        self._max_servo_lag = MAX_LAG_LOOKAHEADS * settings.lookahead_time
         self._read = -1
         self._last_answer = -inf
-        self._is_timed = False
+        self._is_due_shifted = False
 
-    def start(self, state: RobotState) -> list[Command]:
+    def start(self, state: RobotState) -> list[GoalCommand]:
         """
         Return the commands that prepare the motion: take the inputs, lend the TCP.
 
         :param state: the robot's newest packet.
         """
-        lent = self.order.T_flange_tcp
+        lent = self.job.T_flange_tcp
         if lent is None:
             return [OpenServo()]
-        self.loan = TcpLoan(self.order.T_flange_active, lent)
-        return [OpenServo(), LendTcp(T_flange_tcp=lent)]
+        self.temporary_tcp = TemporaryTcp(self.job.T_flange_active, lent)
+        return [OpenServo(), SetTemporaryTcp(T_flange_tcp=lent)]
 
-    def step(self, event: Event, now: float) -> list[Command]:
+    def step(self, event: Event, now: float) -> list[GoalCommand]:
         """
         Return what to do after an event.
 
         :param now: time of a steady clock [s].
         """
-        if self.state is State.ENDED:
+        if self.state is GoalState.ENDED:
             return []
-        commands: list[Command] = []
+        commands: list[GoalCommand] = []
         if isinstance(event, ServoReceived):
-            commands = self._stream_on(event.feedback, now)
+            commands = self._answer_feedback(event.feedback, now)
         elif isinstance(event, StateReceived):
             begun = self._begun(self.stream.motion_time)
-            self._observer.trail = begun - self._begun(self.stream.motion_time - self._trail)
+            self._monitor.lag_motions = begun - self._begun(
+                self.stream.motion_time - self._max_servo_lag
+            )
             event = StateReceived(state=replace(event.state, points_begun=begun))
         return commands + super().step(event, now)
 
     def _begun(self, time: float) -> int:
         """Return how many pieces of the spline begin until a time [s]; 0 = none, or unknown."""
-        spline = self.order.spline
+        spline = self.job.spline
         if spline is None or time <= 0.0:
             return 0
         return spline.piece(time) + 1
 
-    def _stream_on(self, feedback: ServoFeedback, now: float) -> list[Command]:
+    def _answer_feedback(self, feedback: ServoFeedback, now: float) -> list[GoalCommand]:
         """Answer a packet of the servo's registers with a write."""
         if feedback.last_sequence != self._read:
             self._read, self._last_answer = feedback.last_sequence, now
-        opening = self.stream.phase is Phase.OPENING
-        row = self.stream.take(feedback, now)
-        if self.stream.phase is Phase.SERVOING and not self._is_timed:
-            self._is_timed = True
-            self._put_off()
-        commands: list[Command] = [] if row is None else [WriteServo(values=row)]
-        if opening and self.stream.phase is Phase.ENTERING:
+        opening = self.stream.phase is ServoPhase.OPENING
+        row = self.stream.on_feedback(feedback, now)
+        if self.stream.phase is ServoPhase.SERVOING and not self._is_due_shifted:
+            self._is_due_shifted = True
+            self._shift_due_time()
+        commands: list[GoalCommand] = [] if row is None else [WriteServo(values=row)]
+        if opening and self.stream.phase is ServoPhase.ENTERING:
             commands.append(EnterServo())
         return commands
 
-    def _put_off(self) -> None:
+    def _shift_due_time(self) -> None:
         """Let the time of the goal begin with its motion: not with the filling of the buffer."""
-        if self.order.due is not None:
-            self.order = replace(
-                self.order, due=(self.order.due + self._observer.scaled_time + self.stream.lag)
+        if self.job.due is not None:
+            self.job = replace(
+                self.job, due=(self.job.due + self._monitor.scaled_time + self.stream.lag)
             )
 
     # ---- from events to signals ---------------------------------------------------------------
 
-    def _signal(self, event: Event, now: float) -> tuple[Signal | None, str]:
+    def _signal(self, event: Event, now: float) -> tuple[GoalSignal | None, str]:
         match event:
             case ServoReceived():
-                return self._progress_of_stream()
+                return self._stream_signal()
             case TrajectoryEnded():  # of a goal before this one
                 return None, ''
             case LinkLost(link=link, reason=reason) if (
-                link == SERVO_LINK and self.state is State.ARMING
+                link == SERVO_LINK and self.state is GoalState.ARMING
             ):
-                return Signal.LATE, (f'the robot does not take set-points: {reason}'.rstrip('.'))
+                return GoalSignal.TIMEOUT, (
+                    f'the robot does not take set-points: {reason}'.rstrip('.')
+                )
         return super()._signal(event, now)
 
-    def _progress_of_stream(self) -> tuple[Signal | None, str]:
+    def _stream_signal(self) -> tuple[GoalSignal | None, str]:
         """Return what the phase of the streaming means to the goal."""
-        if self.stream.phase is Phase.ARRIVED and self.state is State.MOVING:
-            return Signal.SUCCESS, ''
-        if self.stream.phase is not Phase.LEFT:
+        if self.stream.phase is ServoPhase.ARRIVED and self.state is GoalState.MOVING:
+            return GoalSignal.SUCCESS, ''
+        if self.stream.phase is not ServoPhase.LEFT:
             return None, ''
-        if self.state is State.STOPPING:
-            return Signal.CANCELED, ''
-        if self.state in (State.MOVING, State.SETTLING):
+        if self.state is GoalState.CANCELLING:
+            return GoalSignal.CANCELED, ''
+        if self.state in (GoalState.MOVING, GoalState.SETTLING):
             # It does so where it is about to end, for a reason that we may hear of in a moment.
-            return Signal.PROGRAM_STOPPED, (
+            return GoalSignal.PROGRAM_STOPPED, (
                 'the robot program left the servo by itself; its log on the pendant says why'
             )
         return None, ''
 
-    def _judge(self, state: RobotState, now: float) -> tuple[Signal | None, str]:
-        if self.state in UNDER_WAY:
-            answers = now - self._last_answer < ANSWERS_WITHIN
-            return self._observer.fault(state, may_stand=answers) or (None, '')
-        return super()._judge(state, now)
+    def _check_packet(self, state: RobotState, now: float) -> tuple[GoalSignal | None, str]:
+        if self.state in RUNNING_STATES:
+            answers = now - self._last_answer < ANSWER_TIMEOUT
+            return self._monitor.find_fault(state, may_stand_still=answers) or (None, '')
+        return super()._check_packet(state, now)
 
     def _is_armed(self, state: RobotState) -> bool:
         return (
-            self.stream.phase is Phase.READY
-            and self._off_start(state) <= START_ANGLE
-            and (self.loan is None or super()._is_armed(state))
+            self.stream.phase is ServoPhase.READY
+            and self._start_joint_error(state) <= START_ANGLE_TOLERANCE
+            and (self.temporary_tcp is None or super()._is_armed(state))
         )
 
-    def _off_start(self, state: RobotState) -> float:
+    def _start_joint_error(self, state: RobotState) -> float:
         """
         Return how far a joint is from the first set-point of a plan [rad].
 
         An arm that was moved since it was planned would be torn there.
         """
-        spline = self.order.spline
+        spline = self.job.spline
         if spline is None:
             return 0.0
         return float(np.abs(spline.at(float(spline.times[0]))[0] - state.target_q).max())
 
-    def _why_not_armed(self) -> str:
-        if self.stream.phase is Phase.READY:
-            state = self._observer.latest
-            off = 0.0 if state is None else self._off_start(state)
+    def _arming_failure(self) -> str:
+        if self.stream.phase is ServoPhase.READY:
+            state = self._monitor.latest
+            off = 0.0 if state is None else self._start_joint_error(state)
             return (
-                super()._why_not_armed()
-                if off <= START_ANGLE
+                super()._arming_failure()
+                if off <= START_ANGLE_TOLERANCE
                 else (
                     f'a joint is {off:.4f} rad away from where the set-points begin: the arm was '
                     'moved meanwhile'
                 )
             )
-        if self.stream.phase is Phase.OPENING:
-            return (
-                f'the robot did not give its RTDE inputs within {TCP_BOUND:g} s; nothing was moved'
-            )
+        if self.stream.phase is ServoPhase.OPENING:
+            return f'the robot did not give its RTDE inputs within {TCP_TIMEOUT:g} s; nothing was moved'
         return (
-            f'the robot program did not answer through its registers within {TCP_BOUND:g} s: '
+            f'the robot program did not answer through its registers within {TCP_TIMEOUT:g} s: '
             'it is paused, or knows no buffered servo; nothing was moved'
         )
 
     # ---- from signals to commands -------------------------------------------------------------
 
-    def _begin(self, state: RobotState) -> list[Command]:
+    def _start_motion(self, state: RobotState) -> list[GoalCommand]:
         self._deadline = inf
         self._started = True
-        self._observer.start(replace(state, points_begun=0))
+        self._monitor.start(replace(state, points_begun=0))
         self.stream.begin()
         return []  # the next packet is answered with the first set-point
 
-    def _enter_stopping(self, signal: Signal, now: float) -> list[Command]:
-        self._deadline = now + STOP_BOUND
+    def _enter_cancelling(self, signal: GoalSignal, now: float) -> list[GoalCommand]:
+        self._deadline = now + STOP_TIMEOUT
         return self._stop_streaming()
 
-    def _enter_restoring(self, signal: Signal, now: float) -> list[Command]:
+    def _enter_restoring(self, signal: GoalSignal, now: float) -> list[GoalCommand]:
         return [*self._stop_streaming(), *super()._enter_restoring(signal, now)]
 
-    def _enter_ending(self, signal: Signal, now: float) -> list[Command]:
+    def _enter_program_lost(self, signal: GoalSignal, now: float) -> list[GoalCommand]:
         # A program that begins now must not find set-points in the inputs.
-        return [*self._stop_streaming(), *super()._enter_ending(signal, now)]
+        return [*self._stop_streaming(), *super()._enter_program_lost(signal, now)]
 
-    def _enter_ended(self, signal: Signal, now: float) -> list[Command]:
+    def _enter_ended(self, signal: GoalSignal, now: float) -> list[GoalCommand]:
         return [
             *self._stop_streaming(),
             LeaveServo(),
-            *self._about_stream(),
+            *self._servo_report(),
             *super()._enter_ended(signal, now),
         ]
 
-    def _stop_streaming(self) -> list[Command]:
+    def _stop_streaming(self) -> list[GoalCommand]:
         row = self.stream.stop()
         return [] if row is None else [WriteServo(values=row)]
 
-    def where(self) -> tuple[int, float, float]:
+    def motion_status(self) -> tuple[int, float, float]:
         """Return where the arm is, as any machine does."""
-        return self._observer.waypoint(), self.stream.buffered, self.stream.lag
+        return self._monitor.waypoint(), self.stream.buffered, self.stream.lag
 
-    def _release(self, begun: int) -> list[Command]:
+    def _release_points(self, begun: int) -> list[GoalCommand]:
         return []
 
-    def _inform(self, state: RobotState, now: float) -> list[Command]:
-        commands = super()._inform(state, now)
-        if any(isinstance(command, Report) for command in commands):
-            commands += self._about_stream()
+    def _after_packet(self, state: RobotState, now: float) -> list[GoalCommand]:
+        commands = super()._after_packet(state, now)
+        if any(isinstance(command, ReportProgress) for command in commands):
+            commands += self._servo_report()
         return commands
 
-    def _about_stream(self) -> list[Command]:
+    def _servo_report(self) -> list[GoalCommand]:
         report = self.stream.report(self._joint_error())
         return [] if report is None else [ReportServo(report=report)]
 
     def _joint_error(self) -> Vector6:
-        state = self._observer.latest
+        state = self._monitor.latest
         if state is None:
             return UNKNOWN6
         a, b, c, d, e, f = (
@@ -290,8 +292,8 @@ class ServoMachine(TrajectoryMachine):
         )
         return a, b, c, d, e, f
 
-    def _progress_report(self) -> Report:
+    def _progress_report(self) -> ReportProgress:
         progress = super()._progress_report().progress
-        return Report(
+        return ReportProgress(
             progress=replace(progress, lag=self.stream.lag, buffered=self.stream.buffered)
         )

@@ -14,10 +14,10 @@ from ur_cartesian_driver.motion.pose import Vector6
 #: So many set-points of a spline are computed at a time: a row of an array costs a fiftieth of
 #: what it costs alone.
 BATCH = 128
-_SAME = 1e-12
+_TIME_TOLERANCE = 1e-12
 
 
-class Setpoints(Protocol):
+class SetpointSource(Protocol):
     """Joint positions, one after the other; the streaming decides how fast time passes."""
 
     def next(self, dt: float) -> Vector6:
@@ -43,27 +43,27 @@ class SplineSetpoints:
         self._row = 0
         self._step = 0.0
         self._rows: list[Vector6] = []
-        self._now = self._at(self._time)
+        self._current = self._at(self._time)
 
     @property
     def done(self) -> bool:
         """Whether the end of the curve is reached."""
-        return self._time >= self._end - _SAME
+        return self._time >= self._end - _TIME_TOLERANCE
 
     def next(self, dt: float) -> Vector6:
         """Return the joint positions so much later."""
         if dt <= 0.0:
-            return self._now
-        if abs(dt - self._step) > _SAME or self._row >= len(self._rows):
-            self._look_ahead(dt)
+            return self._current
+        if abs(dt - self._step) > _TIME_TOLERANCE or self._row >= len(self._rows):
+            self._compute_batch(dt)
         self._time = min(self._time + dt, self._end)
-        self._now = self._rows[self._row]
+        self._current = self._rows[self._row]
         self._row += 1
-        return self._now
+        return self._current
 
-    def _look_ahead(self, dt: float) -> None:
+    def _compute_batch(self, dt: float) -> None:
         """Compute what comes next, if the steps stay as they are."""
-        count = BATCH if abs(dt - self._step) <= _SAME else 1
+        count = BATCH if abs(dt - self._step) <= _TIME_TOLERANCE else 1
         self._step, self._row = dt, 0
         times = self._time + dt * np.arange(1, count + 1, dtype=np.float64)
         q, _, _ = self._spline.rows(times.astype(np.float64))

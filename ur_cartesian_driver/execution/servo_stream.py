@@ -39,29 +39,29 @@ from math import ceil, inf
 from types import MappingProxyType
 
 from ur_cartesian_driver.execution.servo_clock import ServoClock
-from ur_cartesian_driver.execution.servo_source import Setpoints
+from ur_cartesian_driver.execution.servo_source import SetpointSource
 from ur_cartesian_driver.motion.pose import Vector6
 from ur_cartesian_driver.motion.servo import ServoActivity, ServoFeedback, ServoReport, UNKNOWN6
 from ur_cartesian_driver.protocol.registers import ExternalError, ServoMode, SyncState
 
 #: The part of a control step that lies between two writes at least: of two in one step the robot
 #: would see the second one only.
-LEAST_PAUSE = 0.5
+MIN_WRITE_PERIOD = 0.5
 #: The part of the wanted motion time that is under way when the arm starts.
-FULL = 0.75
+START_FILL = 0.75
 #: How much faster the motion gets in a second, once it goes on after the buffer was empty [1/s].
-RESTART = 2.0
+RESTART_ACCELERATION = 2.0
 #: Behind this number sequences begin again: long before the register is at its end.
-LAST_SEQUENCE = 2**30
+MAX_SEQUENCE = 2**30
 #: A clock that jumps by more, or backwards, has not run [s].
-LONGEST_GAP = 1.0
+MAX_CLOCK_GAP = 1.0
 #: Control steps of the robots that there are [s].
-SHORTEST_STEP, LONGEST_STEP = 0.002, 0.008
+MIN_STEP, MAX_STEP = 0.002, 0.008
 #: So many packets show how long the robot's control step is.
-FIRST_PACKETS = 4
+STEP_SAMPLES = 4
 
 
-class Phase(Enum):
+class ServoPhase(Enum):
     """Where the streaming is."""
 
     OPENING = auto()
@@ -76,7 +76,7 @@ class Phase(Enum):
     LEFT = auto()
 
 
-class Change(Enum):
+class ServoEvent(Enum):
     """What leads from one phase to another."""
 
     OPENED = auto()
@@ -90,35 +90,54 @@ class Change(Enum):
     PROGRAM_LEFT = auto()
 
 
-_STOPS = {Change.STOP: Phase.LEAVING, Change.PROGRAM_LEFT: Phase.LEFT}
+_STOPS = {ServoEvent.STOP: ServoPhase.LEAVING, ServoEvent.PROGRAM_LEFT: ServoPhase.LEFT}
 
 #: What is not named leaves the phase as it is.
-TRANSITIONS: Mapping[Phase, Mapping[Change, Phase]] = MappingProxyType(
+TRANSITIONS: Mapping[ServoPhase, Mapping[ServoEvent, ServoPhase]] = MappingProxyType(
     {
-        Phase.OPENING: {Change.OPENED: Phase.ENTERING, Change.STOP: Phase.LEFT},
-        Phase.ENTERING: {Change.ANSWERED: Phase.READY, Change.STOP: Phase.LEAVING},
-        Phase.READY: {Change.BEGUN: Phase.FILLING, Change.STOP: Phase.LEAVING},
-        Phase.FILLING: {Change.FILLED: Phase.SERVOING, **_STOPS},
-        Phase.SERVOING: {Change.AT_END: Phase.DRAINING, Change.EMPTY: Phase.HOLDING, **_STOPS},
-        Phase.HOLDING: {Change.FILLED: Phase.SERVOING, **_STOPS},
-        Phase.DRAINING: {Change.DONE: Phase.ARRIVED, **_STOPS},
-        Phase.ARRIVED: {**_STOPS},
-        Phase.LEAVING: {Change.PROGRAM_LEFT: Phase.LEFT},
-        Phase.LEFT: {},
+        ServoPhase.OPENING: {
+            ServoEvent.OPENED: ServoPhase.ENTERING,
+            ServoEvent.STOP: ServoPhase.LEFT,
+        },
+        ServoPhase.ENTERING: {
+            ServoEvent.ANSWERED: ServoPhase.READY,
+            ServoEvent.STOP: ServoPhase.LEAVING,
+        },
+        ServoPhase.READY: {
+            ServoEvent.BEGUN: ServoPhase.FILLING,
+            ServoEvent.STOP: ServoPhase.LEAVING,
+        },
+        ServoPhase.FILLING: {ServoEvent.FILLED: ServoPhase.SERVOING, **_STOPS},
+        ServoPhase.SERVOING: {
+            ServoEvent.AT_END: ServoPhase.DRAINING,
+            ServoEvent.EMPTY: ServoPhase.HOLDING,
+            **_STOPS,
+        },
+        ServoPhase.HOLDING: {ServoEvent.FILLED: ServoPhase.SERVOING, **_STOPS},
+        ServoPhase.DRAINING: {ServoEvent.DONE: ServoPhase.ARRIVED, **_STOPS},
+        ServoPhase.ARRIVED: {**_STOPS},
+        ServoPhase.LEAVING: {ServoEvent.PROGRAM_LEFT: ServoPhase.LEFT},
+        ServoPhase.LEFT: {},
     }
 )
 
 #: Phases in which the arm belongs to the set-points.
 STREAMING = frozenset(
-    {Phase.FILLING, Phase.SERVOING, Phase.HOLDING, Phase.DRAINING, Phase.ARRIVED}
-)
-_ACTIVITIES: Mapping[Phase, ServoActivity] = MappingProxyType(
     {
-        Phase.FILLING: ServoActivity.FILLING,
-        Phase.SERVOING: ServoActivity.SERVOING,
-        Phase.HOLDING: ServoActivity.HOLDING,
-        Phase.DRAINING: ServoActivity.DRAINING,
-        Phase.ARRIVED: ServoActivity.DRAINING,
+        ServoPhase.FILLING,
+        ServoPhase.SERVOING,
+        ServoPhase.HOLDING,
+        ServoPhase.DRAINING,
+        ServoPhase.ARRIVED,
+    }
+)
+_ACTIVITIES: Mapping[ServoPhase, ServoActivity] = MappingProxyType(
+    {
+        ServoPhase.FILLING: ServoActivity.FILLING,
+        ServoPhase.SERVOING: ServoActivity.SERVOING,
+        ServoPhase.HOLDING: ServoActivity.HOLDING,
+        ServoPhase.DRAINING: ServoActivity.DRAINING,
+        ServoPhase.ARRIVED: ServoActivity.DRAINING,
     }
 )
 
@@ -134,7 +153,7 @@ class ServoSettings:
     #: Motion time that is to be under way to the arm [s]: so long may nothing come through.
     target_lag: float = 0.04
     #: Motion time that may be under way [s].
-    most_lag: float = 0.2
+    max_lag: float = 0.2
     #: How many set-points the robot's buffer holds.
     buffer_depth: int = 250
     #: How far each joint may be from its set-point [rad]: beyond, the robot program stops the arm.
@@ -146,28 +165,28 @@ class ServoSettings:
 
     def __post_init__(self) -> None:
         """Refuse what lets the buffer overflow."""
-        if not LONGEST_STEP <= self.target_lag <= self.most_lag:
+        if not MAX_STEP <= self.target_lag <= self.max_lag:
             raise ValueError(
                 f'servo_target_lag is {self.target_lag:g} s, it has to be within '
-                f'{LONGEST_STEP:g} and {self.most_lag:g} s.'
+                f'{MAX_STEP:g} and {self.max_lag:g} s.'
             )
-        if self.target_lag > SHORTEST_STEP * self.buffer_depth:
+        if self.target_lag > MIN_STEP * self.buffer_depth:
             raise ValueError(
                 f'servo_buffer_depth is {self.buffer_depth}, but servo_target_lag of '
                 f'{self.target_lag:g} s needs room for '
-                f'{ceil(self.target_lag / SHORTEST_STEP)} set-points.'
+                f'{ceil(self.target_lag / MIN_STEP)} set-points.'
             )
 
 
 class ServoStream:
     """The streaming of one source's set-points; see the module's description."""
 
-    def __init__(self, source: Setpoints, settings: ServoSettings) -> None:
+    def __init__(self, source: SetpointSource, settings: ServoSettings) -> None:
         """Wait for the first packet."""
-        self.phase = Phase.OPENING
+        self.phase = ServoPhase.OPENING
         self._source = source
         self._settings = settings
-        self._clock = self._clock_of(SHORTEST_STEP)
+        self._clock = self._make_clock(MIN_STEP)
         self._times: list[float] = []
         self._latest: ServoFeedback | None = None
         self._sequence = 0
@@ -175,33 +194,33 @@ class ServoStream:
         self._first = self._first_servo = self._first_idle = 0
         self._state_time = 0.0
         self._joints: Vector6 = source.next(0.0)
-        self._enough = FULL * settings.target_lag if settings.closed_loop else 0.0
+        self._fill_target = START_FILL * settings.target_lag if settings.closed_loop else 0.0
         #: Set-points that the robot has not read yet: sequence number and state time.
         self._unread: deque[tuple[int, float]] = deque()
         self._read_time = 0.0
         #: How far the source was asked [s]; of what is under way: state time, time of the source.
-        self._asked = 0.0
-        self._behind: deque[tuple[float, float]] = deque()
+        self._source_time = 0.0
+        self._unfinished: deque[tuple[float, float]] = deque()
         #: The time of the source that the arm was led to last [s].
         self.motion_time = 0.0
         #: How fast the motion runs in the time of the set-points, 0 to 1.
-        self._pace = 1.0
+        self._motion_rate = 1.0
         self._last_write = -inf
         self._sent = self._underruns = 0
 
-    def _clock_of(self, step: float) -> ServoClock:
+    def _make_clock(self, step: float) -> ServoClock:
         settings = self._settings
         return ServoClock(
             step=step,
             target=settings.target_lag,
             closed=settings.closed_loop,
-            most=min(settings.most_lag, settings.buffer_depth * step),
+            max_lag=min(settings.max_lag, settings.buffer_depth * step),
         )
 
     # ---- what is known ------------------------------------------------------------------------
 
     @property
-    def under_way(self) -> float:
+    def in_flight(self) -> float:
         """Motion time that was sent and not carried out yet [s]."""
         reported = 0.0 if self._latest is None else self._latest.lag
         return self._state_time - self._read_time + reported
@@ -209,7 +228,7 @@ class ServoStream:
     @property
     def lag(self) -> float:
         """How far the arm is behind the newest set-point [s], that of ``servoj`` included."""
-        return self.under_way + self._settings.lookahead_time
+        return self.in_flight + self._settings.lookahead_time
 
     @property
     def buffered(self) -> float:
@@ -246,7 +265,7 @@ class ServoStream:
 
     def begin(self) -> None:
         """Let the arm follow the set-points from now on."""
-        self._change(Change.BEGUN)
+        self._apply(ServoEvent.BEGUN)
         self._first_servo = self._sequence + 1
         # What the source says now, as the first write may come before its first set-point.
         self._joints = self._source.next(0.0)
@@ -254,83 +273,89 @@ class ServoStream:
     def stop(self) -> tuple[float, ...] | None:
         """Leave the servo; return what is to be written at once, if anything can be."""
         before = self.phase
-        self._change(Change.STOP)
-        if self.phase is before or self.phase is Phase.LEFT:
+        self._apply(ServoEvent.STOP)
+        if self.phase is before or self.phase is ServoPhase.LEFT:
             return None
         self._sequence += 1
         self._first_idle = self._sequence
         return self._row()
 
-    def take(self, feedback: ServoFeedback, now: float) -> tuple[float, ...] | None:
+    def on_feedback(self, feedback: ServoFeedback, now: float) -> tuple[float, ...] | None:
         """
         Take a packet; return what is to be written, None = nothing.
 
         :param now: time of a steady clock [s].
         """
         before, self._latest = self._latest, feedback
-        if self.phase is Phase.OPENING and not self._open(feedback):
+        if self.phase is ServoPhase.OPENING and not self._open(feedback):
             return None
-        self._note_read(feedback)
-        self._note_done()
-        self._look(feedback)
+        self._update_read(feedback)
+        self._update_motion_time()
+        self._update_phase(feedback)
         if before is not None:
-            self._pass(feedback.timestamp - before.timestamp, feedback)
-        if self.phase is Phase.LEFT or now < self._last_write + LEAST_PAUSE * self._clock.step:
+            self._advance_clock(feedback.timestamp - before.timestamp, feedback)
+        if (
+            self.phase is ServoPhase.LEFT
+            or now < self._last_write + MIN_WRITE_PERIOD * self._clock.step
+        ):
             return None
         self._last_write = now
-        self._advance()
+        self._next_write()
         return self._row()
 
     def _open(self, feedback: ServoFeedback) -> bool:
         """Learn from the first packets; return whether they were enough."""
         self._times.append(feedback.timestamp)
-        if len(self._times) < FIRST_PACKETS:
+        if len(self._times) < STEP_SAMPLES:
             return False
         step = min(b - a for a, b in pairwise(self._times))
         if step > 0.0:
-            self._clock = self._clock_of(1.0 / round(1.0 / step))
+            self._clock = self._make_clock(1.0 / round(1.0 / step))
         last = feedback.last_sequence
-        self._sequence = last if 0 <= last < LAST_SEQUENCE else 0
+        self._sequence = last if 0 <= last < MAX_SEQUENCE else 0
         self._first = self._sequence + 1
-        self._change(Change.OPENED)
+        self._apply(ServoEvent.OPENED)
         return True
 
-    def _note_read(self, feedback: ServoFeedback) -> None:
+    def _update_read(self, feedback: ServoFeedback) -> None:
         """Forget what the robot has read."""
         if feedback.last_sequence <= self._sequence:  # else it is not about ours
             while self._unread and self._unread[0][0] <= feedback.last_sequence:
                 self._read_time = self._unread.popleft()[1]
 
-    def _note_done(self) -> None:
+    def _update_motion_time(self) -> None:
         """Find how far the arm was led."""
-        done = self._state_time - self.under_way + 0.5 * self._clock.step
-        while self._behind and self._behind[0][0] <= done:
-            self.motion_time = self._behind.popleft()[1]
+        done = self._state_time - self.in_flight + 0.5 * self._clock.step
+        while self._unfinished and self._unfinished[0][0] <= done:
+            self.motion_time = self._unfinished.popleft()[1]
 
-    def _look(self, feedback: ServoFeedback) -> None:
+    def _update_phase(self, feedback: ServoFeedback) -> None:
         """Find what the packet changes."""
         phase = self.phase
-        if phase is Phase.ENTERING and self._has_read(self._first):
-            self._change(Change.ANSWERED)
-        elif self._is_left(feedback):
-            self._change(Change.PROGRAM_LEFT)
-        elif phase in (Phase.FILLING, Phase.HOLDING) and self.under_way >= self._enough:
-            self._change(Change.FILLED)
+        if phase is ServoPhase.ENTERING and self._has_read(self._first):
+            self._apply(ServoEvent.ANSWERED)
+        elif self._has_left(feedback):
+            self._apply(ServoEvent.PROGRAM_LEFT)
         elif (
-            phase is Phase.SERVOING
+            phase in (ServoPhase.FILLING, ServoPhase.HOLDING)
+            and self.in_flight >= self._fill_target
+        ):
+            self._apply(ServoEvent.FILLED)
+        elif (
+            phase is ServoPhase.SERVOING
             and feedback.lag <= 0.0
             and feedback.playing
-            and self.under_way <= 0.5 * self._clock.step
+            and self.in_flight <= 0.5 * self._clock.step
         ):
             self._underruns += 1
-            self._pace = 0.0
-            self._change(Change.EMPTY)
-        elif phase is Phase.DRAINING and self.under_way <= 0.5 * self._clock.step:
-            self._change(Change.DONE)
+            self._motion_rate = 0.0
+            self._apply(ServoEvent.EMPTY)
+        elif phase is ServoPhase.DRAINING and self.in_flight <= 0.5 * self._clock.step:
+            self._apply(ServoEvent.DONE)
 
-    def _is_left(self, feedback: ServoFeedback) -> bool:
+    def _has_left(self, feedback: ServoFeedback) -> bool:
         """Tell whether the program is not in SERVO, after it was told to be or not to be."""
-        if self.phase is Phase.LEAVING:
+        if self.phase is ServoPhase.LEAVING:
             return self._has_read(self._first_idle) and feedback.mode != ServoMode.SERVO
         return (
             self.phase in STREAMING
@@ -338,20 +363,20 @@ class ServoStream:
             and feedback.mode != ServoMode.SERVO
         )
 
-    def _pass(self, passed: float, feedback: ServoFeedback) -> None:
+    def _advance_clock(self, passed: float, feedback: ServoFeedback) -> None:
         """Let the robot's time pass."""
-        passed = passed if 0.0 <= passed <= LONGEST_GAP else 0.0
+        passed = passed if 0.0 <= passed <= MAX_CLOCK_GAP else 0.0
         if self.phase in STREAMING:
             scaling = feedback.speed_scaling if feedback.playing else 0.0
-            self._clock.advance(passed, scaling, self.under_way)
-        if self.phase is Phase.SERVOING:
-            self._pace = min(1.0, self._pace + RESTART * passed)
+            self._clock.advance(passed, scaling, self.in_flight)
+        if self.phase is ServoPhase.SERVOING:
+            self._motion_rate = min(1.0, self._motion_rate + RESTART_ACCELERATION * passed)
 
-    def _advance(self) -> None:
+    def _next_write(self) -> None:
         """Give the next write a number, and make a set-point of it if one is due."""
         self._sequence += 1
-        if self.phase in (Phase.FILLING, Phase.SERVOING, Phase.HOLDING):
-            steps = self._clock.take(self.under_way)
+        if self.phase in (ServoPhase.FILLING, ServoPhase.SERVOING, ServoPhase.HOLDING):
+            steps = self._clock.take_steps(self.in_flight)
             if steps:
                 self._sent += steps
                 self._send(steps * self._clock.step)
@@ -359,16 +384,16 @@ class ServoStream:
 
     def _send(self, time: float) -> None:
         """Make the next set-point."""
-        moves = self.phase is Phase.SERVOING
-        passed = self._pace * time if moves else 0.0
+        moves = self.phase is ServoPhase.SERVOING
+        passed = self._motion_rate * time if moves else 0.0
         self._joints = self._source.next(passed)
-        self._asked += passed
+        self._source_time += passed
         self._state_time += time
-        self._behind.append((self._state_time, self._asked))
+        self._unfinished.append((self._state_time, self._source_time))
         if moves and self._source.done:
-            self._change(Change.AT_END)
+            self._apply(ServoEvent.AT_END)
 
-    def _change(self, change: Change) -> None:
+    def _apply(self, change: ServoEvent) -> None:
         self.phase = TRANSITIONS[self.phase].get(change, self.phase)
 
     def _has_read(self, sequence: int) -> bool:

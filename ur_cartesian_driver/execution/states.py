@@ -3,7 +3,7 @@
 """
 The states of a goal on its way through the robot program, and what leads from one to another.
 
-Events are first turned into signals (:class:`Signal`); :data:`TRANSITIONS` says what a signal
+Events are first turned into signals (:class:`GoalSignal`); :data:`TRANSITIONS` says what a signal
 means in the present state: the next state and how the goal ends, if it does.
 
 * **ARMING**: the goal moves another frame than the robot's TCP, and the message that sets the TCP
@@ -12,35 +12,35 @@ means in the present state: the next state and how the goal ends, if it does.
 * **MOVING**: the robot program runs points. The result SUCCESS leads to SETTLING; whatever stops
   the arm by itself (safety, connection) ends the goal at once, because nothing that we could send
   would be read; a reason of ours to stop (cancel, preemption, tolerance)
-  leads to STOPPING.
-* **CLOSING**: of a goal that can be continued (keep_open) no more points came in time. What takes
+  leads to CANCELLING.
+* **RUNNING_OUT**: of a goal that can be continued (keep_open) no more points came in time. What takes
   the arm to rest at the last known point, or behind it, is on the wire, and the number of its
   records. Points that come now wait for the SUCCESS of the program: they go on from rest.
-* **WAITING**: the arm is at rest there, and the program has no trajectory. EXTENDED starts the
-  next one; LAST, the word that no points will come, leads to SETTLING. Without either the goal
-  ends after ``keep_open_timeout`` (LATE), as CANCELLED: it was given up, and nothing failed.
+* **AWAITING_POINTS**: the arm is at rest there, and the program has no trajectory. APPENDED starts the
+  next one; NO_MORE_POINTS, the word that no points will come, leads to SETTLING. Without either the goal
+  ends after ``keep_open_timeout`` (TIMEOUT), as CANCELLED: it was given up, and nothing failed.
 * **SETTLING**: the program says that the last point is reached. The arm has to be inside the goal
   tolerance and at rest, within the goal's time tolerance. Where the controller's own target is
   elsewhere, the program left something out (DEVIATION).
-* **STOPPING**: CANCEL is on the wire. The program brakes, discards the points that it has not run
+* **CANCELLING**: CANCEL is on the wire. The program brakes, discards the points that it has not run
   and answers CANCELED. A SUCCESS in this state means that the last point was reached before the
   program read the CANCEL; it is no answer, CANCELED still follows.
-* **HALTING**: the program has answered; the arm is coming to rest.
+* **COMING_TO_REST**: the program has answered; the arm is coming to rest.
 * **RESTORING**: how the goal ends is decided, and nothing moves; the TCP of before is on the wire.
   The outcome waits until the robot reports it, so the next goal finds it. Goals that changed no
   TCP pass through at once.
-* **ENDING**: the robot program is gone. Programs end because the safety system, the power or the
+* **PROGRAM_LOST**: the robot program is gone. Programs end because the safety system, the power or the
   whole controller has gone as well, and which of them we hear of first is chance: so for a
   moment a deeper reason still counts.
 * **ENDED**: the outcome is out. Later events mean nothing.
 
-Everything has a bound: an answer that does not come in STOPPING or HALTING ends the goal after
-``STOP_BOUND`` by ending the robot program. A program that somebody has paused reads nothing: the
+Everything has a bound: an answer that does not come in CANCELLING or COMING_TO_REST ends the goal after
+``STOP_TIMEOUT`` by ending the robot program. A program that somebody has paused reads nothing: the
 arm stands, and the goal ends as it was to end (UNANSWERED); an arm that still moves is a failure
-(LATE). A TCP that is not set in time ends the goal before it began; one that is not back in time,
+(TIMEOUT). A TCP that is not set in time ends the goal before it began; one that is not back in time,
 or not at the end because the robot stopped, is the business of whoever carries out the commands
-(the ``loan`` of the machine). MOVING and CLOSING have none, because a speed slider at zero is no
-error; but an arm that stands for ``STALL_BOUND`` while nothing holds it waits for something that
+(the ``temporary_tcp`` of the machine). MOVING and RUNNING_OUT have none, because a speed slider at zero is no
+error; but an arm that stands for ``STALL_TIMEOUT`` while nothing holds it waits for something that
 will not come: a command or a result was lost (STALLED). RTDE packets that stop coming are a lost
 connection.
 """
@@ -57,22 +57,22 @@ from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyStatus
 
 
-class State(Enum):
+class GoalState(Enum):
     """Where a goal is."""
 
     ARMING = auto()
     MOVING = auto()
-    CLOSING = auto()
-    WAITING = auto()
+    RUNNING_OUT = auto()
+    AWAITING_POINTS = auto()
     SETTLING = auto()
-    STOPPING = auto()
-    HALTING = auto()
+    CANCELLING = auto()
+    COMING_TO_REST = auto()
     RESTORING = auto()
-    ENDING = auto()
+    PROGRAM_LOST = auto()
     ENDED = auto()
 
 
-class Signal(Enum):
+class GoalSignal(Enum):
     """What an event means to a goal."""
 
     SUCCESS = auto()
@@ -88,179 +88,205 @@ class Signal(Enum):
     PROGRAM_STOPPED = auto()
     CONNECTION_LOST = auto()
     STARVING = auto()
-    EXTENDED = auto()
-    LAST = auto()
+    APPENDED = auto()
+    NO_MORE_POINTS = auto()
     ARMED = auto()
     SETTLED = auto()
     RESTORED = auto()
     AT_REST = auto()
-    LATE = auto()
+    TIMEOUT = auto()
     UNANSWERED = auto()
 
 
 #: In these the robot program runs points of the goal.
-UNDER_WAY = frozenset({State.MOVING, State.CLOSING})
+RUNNING_STATES = frozenset({GoalState.MOVING, GoalState.RUNNING_OUT})
 
 #: What stops the arm in every state but ENDED, and the code that the goal ends with where none is
 #: decided yet.
-STOPS: Mapping[Signal, ErrorCode] = MappingProxyType(
+STOP_SIGNALS: Mapping[GoalSignal, ErrorCode] = MappingProxyType(
     {
-        Signal.PROTECTIVE_STOP: ErrorCode.PROTECTIVE_STOP,
-        Signal.EMERGENCY_STOP: ErrorCode.EMERGENCY_STOP,
-        Signal.PROGRAM_STOPPED: ErrorCode.PROGRAM_STOPPED,
-        Signal.CONNECTION_LOST: ErrorCode.CONNECTION_LOST,
+        GoalSignal.PROTECTIVE_STOP: ErrorCode.PROTECTIVE_STOP,
+        GoalSignal.EMERGENCY_STOP: ErrorCode.EMERGENCY_STOP,
+        GoalSignal.PROGRAM_STOPPED: ErrorCode.PROGRAM_STOPPED,
+        GoalSignal.CONNECTION_LOST: ErrorCode.CONNECTION_LOST,
     }
 )
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class Transition:
     """The next state, and the code of the outcome where it is decided here."""
 
-    state: State
+    state: GoalState
     code: ErrorCode | None = None
 
 
 #: After these the robot program is paused or deaf, and not ended.
-PAUSES = frozenset(
-    {Signal.PROTECTIVE_STOP, Signal.EMERGENCY_STOP, Signal.UNANSWERED, Signal.STALLED}
-)
-
-
-def _ends(code: ErrorCode) -> Step:
-    return Step(State.ENDED, code)
-
-
-def _judged(code: ErrorCode) -> Step:
-    return Step(State.RESTORING, code)
-
-
-_STOPS = {signal: _ends(code) for signal, code in STOPS.items()} | {
-    Signal.PROGRAM_STOPPED: Step(State.ENDING, ErrorCode.PROGRAM_STOPPED)
-}
-
-
-def _stays(state: State, *signals: Signal) -> dict[Signal, Step]:
-    return {signal: Step(state) for signal in signals}
-
-
-#: What people ask for; the first of them says how the goal ends.
-_WISHES = (Signal.CANCEL, Signal.PREEMPT)
-
-#: What a trajectory that runs is stopped by, or ends by itself with.
-_RUNS: Mapping[Signal, Step] = MappingProxyType(
+STOP_PROGRAM_AFTER = frozenset(
     {
-        **_STOPS,
-        Signal.CANCELED: _judged(ErrorCode.EXECUTION_FAILED),
-        Signal.FAILURE: _judged(ErrorCode.EXECUTION_FAILED),
-        Signal.CANCEL: Step(State.STOPPING, ErrorCode.CANCELLED),
-        Signal.PREEMPT: Step(State.STOPPING, ErrorCode.PREEMPTED),
-        Signal.VIOLATION: Step(State.STOPPING, ErrorCode.PATH_TOLERANCE_VIOLATED),
-        Signal.DEVIATION: Step(State.STOPPING, ErrorCode.EXECUTION_FAILED),
-        Signal.STALLED: _ends(ErrorCode.EXECUTION_FAILED),
+        GoalSignal.PROTECTIVE_STOP,
+        GoalSignal.EMERGENCY_STOP,
+        GoalSignal.UNANSWERED,
+        GoalSignal.STALLED,
     }
 )
 
-#: What each signal means in each state. STARVING, EXTENDED, LAST, ARMED, SETTLED, RESTORED,
-#: AT_REST, LATE and UNANSWERED are about the state they are given for: not possible in the others.
-TRANSITIONS: Mapping[State, Mapping[Signal, Step]] = MappingProxyType(
+
+def _end(code: ErrorCode) -> Transition:
+    return Transition(GoalState.ENDED, code)
+
+
+def _decide(code: ErrorCode) -> Transition:
+    return Transition(GoalState.RESTORING, code)
+
+
+_ON_STOP = {signal: _end(code) for signal, code in STOP_SIGNALS.items()} | {
+    GoalSignal.PROGRAM_STOPPED: Transition(GoalState.PROGRAM_LOST, ErrorCode.PROGRAM_STOPPED)
+}
+
+
+def _ignore(state: GoalState, *signals: GoalSignal) -> dict[GoalSignal, Transition]:
+    return {signal: Transition(state) for signal in signals}
+
+
+#: What people ask for; the first of them says how the goal ends.
+_USER_STOPS = (GoalSignal.CANCEL, GoalSignal.PREEMPT)
+
+#: What a trajectory that runs is stopped by, or ends by itself with.
+_WHILE_RUNNING: Mapping[GoalSignal, Transition] = MappingProxyType(
     {
-        State.ARMING: {
-            **_STOPS,
+        **_ON_STOP,
+        GoalSignal.CANCELED: _decide(ErrorCode.EXECUTION_FAILED),
+        GoalSignal.FAILURE: _decide(ErrorCode.EXECUTION_FAILED),
+        GoalSignal.CANCEL: Transition(GoalState.CANCELLING, ErrorCode.CANCELLED),
+        GoalSignal.PREEMPT: Transition(GoalState.CANCELLING, ErrorCode.PREEMPTED),
+        GoalSignal.VIOLATION: Transition(GoalState.CANCELLING, ErrorCode.PATH_TOLERANCE_VIOLATED),
+        GoalSignal.DEVIATION: Transition(GoalState.CANCELLING, ErrorCode.EXECUTION_FAILED),
+        GoalSignal.STALLED: _end(ErrorCode.EXECUTION_FAILED),
+    }
+)
+
+#: What each signal means in each state. STARVING, APPENDED, NO_MORE_POINTS, ARMED, SETTLED, RESTORED,
+#: AT_REST, TIMEOUT and UNANSWERED are about the state they are given for: not possible in the others.
+TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = MappingProxyType(
+    {
+        GoalState.ARMING: {
+            **_ON_STOP,
             # Of a goal before this one.
-            **_stays(State.ARMING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
-            Signal.ARMED: Step(State.MOVING),
-            Signal.CANCEL: _judged(ErrorCode.CANCELLED),
-            Signal.PREEMPT: _judged(ErrorCode.PREEMPTED),
-            Signal.LATE: _judged(ErrorCode.ROBOT_NOT_READY),
-        },
-        State.MOVING: {
-            **_RUNS,
-            Signal.SUCCESS: Step(State.SETTLING),
-            Signal.STARVING: Step(State.CLOSING),
-        },
-        State.CLOSING: {
-            **_RUNS,
-            Signal.SUCCESS: Step(State.WAITING),
-        },
-        State.WAITING: {
-            **_STOPS,
-            **_stays(State.WAITING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
-            Signal.EXTENDED: Step(State.MOVING),
-            Signal.LAST: Step(State.SETTLING),
-            Signal.CANCEL: _judged(ErrorCode.CANCELLED),
-            Signal.PREEMPT: _judged(ErrorCode.PREEMPTED),
-            Signal.DEVIATION: _judged(ErrorCode.EXECUTION_FAILED),
-            Signal.LATE: _judged(ErrorCode.CANCELLED),
-        },
-        State.SETTLING: {
-            **_STOPS,
-            **_stays(State.SETTLING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE),
-            Signal.CANCEL: _judged(ErrorCode.CANCELLED),
-            Signal.PREEMPT: _judged(ErrorCode.PREEMPTED),
-            Signal.DEVIATION: _judged(ErrorCode.EXECUTION_FAILED),
-            Signal.SETTLED: _judged(ErrorCode.SUCCESSFUL),
-            Signal.LATE: _judged(ErrorCode.GOAL_TOLERANCE_VIOLATED),
-        },
-        State.STOPPING: {
-            **_STOPS,
-            **_stays(State.STOPPING, Signal.SUCCESS, Signal.FAILURE, *_WISHES),
-            Signal.CANCELED: Step(State.HALTING),
-            Signal.UNANSWERED: Step(State.ENDED),
-            Signal.LATE: _ends(ErrorCode.EXECUTION_FAILED),
-        },
-        State.HALTING: {
-            **_STOPS,
-            **_stays(State.HALTING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, *_WISHES),
-            Signal.AT_REST: Step(State.RESTORING),
-            Signal.LATE: _ends(ErrorCode.EXECUTION_FAILED),
-        },
-        State.RESTORING: {
-            **{signal: Step(State.ENDED) for signal in STOPS},
-            **_stays(State.RESTORING, Signal.SUCCESS, Signal.CANCELED, Signal.FAILURE, *_WISHES),
-            Signal.RESTORED: Step(State.ENDED),
-            Signal.LATE: Step(State.ENDED),
-        },
-        State.ENDING: {
-            **_STOPS,
-            **_stays(
-                State.ENDING,
-                Signal.SUCCESS,
-                Signal.CANCELED,
-                Signal.FAILURE,
-                *_WISHES,
-                Signal.PROGRAM_STOPPED,
+            **_ignore(
+                GoalState.ARMING, GoalSignal.SUCCESS, GoalSignal.CANCELED, GoalSignal.FAILURE
             ),
-            Signal.LATE: Step(State.ENDED),
+            GoalSignal.ARMED: Transition(GoalState.MOVING),
+            GoalSignal.CANCEL: _decide(ErrorCode.CANCELLED),
+            GoalSignal.PREEMPT: _decide(ErrorCode.PREEMPTED),
+            GoalSignal.TIMEOUT: _decide(ErrorCode.ROBOT_NOT_READY),
         },
-        State.ENDED: {},
+        GoalState.MOVING: {
+            **_WHILE_RUNNING,
+            GoalSignal.SUCCESS: Transition(GoalState.SETTLING),
+            GoalSignal.STARVING: Transition(GoalState.RUNNING_OUT),
+        },
+        GoalState.RUNNING_OUT: {
+            **_WHILE_RUNNING,
+            GoalSignal.SUCCESS: Transition(GoalState.AWAITING_POINTS),
+        },
+        GoalState.AWAITING_POINTS: {
+            **_ON_STOP,
+            **_ignore(
+                GoalState.AWAITING_POINTS,
+                GoalSignal.SUCCESS,
+                GoalSignal.CANCELED,
+                GoalSignal.FAILURE,
+            ),
+            GoalSignal.APPENDED: Transition(GoalState.MOVING),
+            GoalSignal.NO_MORE_POINTS: Transition(GoalState.SETTLING),
+            GoalSignal.CANCEL: _decide(ErrorCode.CANCELLED),
+            GoalSignal.PREEMPT: _decide(ErrorCode.PREEMPTED),
+            GoalSignal.DEVIATION: _decide(ErrorCode.EXECUTION_FAILED),
+            GoalSignal.TIMEOUT: _decide(ErrorCode.CANCELLED),
+        },
+        GoalState.SETTLING: {
+            **_ON_STOP,
+            **_ignore(
+                GoalState.SETTLING, GoalSignal.SUCCESS, GoalSignal.CANCELED, GoalSignal.FAILURE
+            ),
+            GoalSignal.CANCEL: _decide(ErrorCode.CANCELLED),
+            GoalSignal.PREEMPT: _decide(ErrorCode.PREEMPTED),
+            GoalSignal.DEVIATION: _decide(ErrorCode.EXECUTION_FAILED),
+            GoalSignal.SETTLED: _decide(ErrorCode.SUCCESSFUL),
+            GoalSignal.TIMEOUT: _decide(ErrorCode.GOAL_TOLERANCE_VIOLATED),
+        },
+        GoalState.CANCELLING: {
+            **_ON_STOP,
+            **_ignore(GoalState.CANCELLING, GoalSignal.SUCCESS, GoalSignal.FAILURE, *_USER_STOPS),
+            GoalSignal.CANCELED: Transition(GoalState.COMING_TO_REST),
+            GoalSignal.UNANSWERED: Transition(GoalState.ENDED),
+            GoalSignal.TIMEOUT: _end(ErrorCode.EXECUTION_FAILED),
+        },
+        GoalState.COMING_TO_REST: {
+            **_ON_STOP,
+            **_ignore(
+                GoalState.COMING_TO_REST,
+                GoalSignal.SUCCESS,
+                GoalSignal.CANCELED,
+                GoalSignal.FAILURE,
+                *_USER_STOPS,
+            ),
+            GoalSignal.AT_REST: Transition(GoalState.RESTORING),
+            GoalSignal.TIMEOUT: _end(ErrorCode.EXECUTION_FAILED),
+        },
+        GoalState.RESTORING: {
+            **{signal: Transition(GoalState.ENDED) for signal in STOP_SIGNALS},
+            **_ignore(
+                GoalState.RESTORING,
+                GoalSignal.SUCCESS,
+                GoalSignal.CANCELED,
+                GoalSignal.FAILURE,
+                *_USER_STOPS,
+            ),
+            GoalSignal.RESTORED: Transition(GoalState.ENDED),
+            GoalSignal.TIMEOUT: Transition(GoalState.ENDED),
+        },
+        GoalState.PROGRAM_LOST: {
+            **_ON_STOP,
+            **_ignore(
+                GoalState.PROGRAM_LOST,
+                GoalSignal.SUCCESS,
+                GoalSignal.CANCELED,
+                GoalSignal.FAILURE,
+                *_USER_STOPS,
+                GoalSignal.PROGRAM_STOPPED,
+            ),
+            GoalSignal.TIMEOUT: Transition(GoalState.ENDED),
+        },
+        GoalState.ENDED: {},
     }
 )
 
 
 #: What the robot program says of a trajectory, with a clause for the outcome's text.
-RESULTS: Mapping[TrajectoryResult, tuple[Signal, str]] = MappingProxyType(
+RESULT_SIGNALS: Mapping[TrajectoryResult, tuple[GoalSignal, str]] = MappingProxyType(
     {
-        TrajectoryResult.SUCCESS: (Signal.SUCCESS, ''),
+        TrajectoryResult.SUCCESS: (GoalSignal.SUCCESS, ''),
         TrajectoryResult.CANCELED: (
-            Signal.CANCELED,
+            GoalSignal.CANCELED,
             'the robot program cancelled the trajectory by itself',
         ),
         TrajectoryResult.FAILURE: (
-            Signal.FAILURE,
+            GoalSignal.FAILURE,
             'the robot program reported a failure; its log on the pendant says why',
         ),
     }
 )
 
 
-_EMERGENCY = int(
+_EMERGENCY_STOPS = int(
     SafetyStatus.EMERGENCY_STOPPED
     | SafetyStatus.ROBOT_EMERGENCY_STOPPED
     | SafetyStatus.SYSTEM_EMERGENCY_STOPPED
 )
 #: In plain numbers, as this is looked at in every packet and operations on flags are slow.
-_STOPPED = _EMERGENCY | int(
+_SAFETY_STOPS = _EMERGENCY_STOPS | int(
     SafetyStatus.PROTECTIVE_STOPPED
     | SafetyStatus.SAFEGUARD_STOPPED
     | SafetyStatus.VIOLATION
@@ -268,33 +294,38 @@ _STOPPED = _EMERGENCY | int(
 )
 NO_STOP = SafetyStatus(0)
 #: Stops after which a robot goes on with its program, where somebody unlocks and plays it.
-HOLDS = SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED
+RESUMABLE_STOPS = SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED
 
 
-def stop_in(state: RobotState, borne: SafetyStatus = NO_STOP) -> tuple[Signal, str] | None:
+def detect_stop(
+    state: RobotState, ignored_stops: SafetyStatus = NO_STOP
+) -> tuple[GoalSignal, str] | None:
     """
     Return why the robot cannot go on by itself, or None when it can.
 
-    :param borne: stops of the safety system that are not taken for a reason.
+    :param ignored_stops: stops of the safety system that are not taken for a reason.
     """
-    safety = int(state.safety_status) & _STOPPED & ~int(borne)
+    safety = int(state.safety_status) & _SAFETY_STOPS & ~int(ignored_stops)
     if safety:
         return _safety_stop(safety, state)
     if state.robot_mode is not RobotMode.RUNNING:
-        return Signal.PROGRAM_STOPPED, (
+        return GoalSignal.PROGRAM_STOPPED, (
             f'the arm left the mode RUNNING and is in {state.robot_mode.name}'
         )
     if state.runtime_state in (RuntimeState.STOPPING, RuntimeState.STOPPED):
-        return Signal.PROGRAM_STOPPED, 'the robot program was stopped'
+        return GoalSignal.PROGRAM_STOPPED, 'the robot program was stopped'
     return None
 
 
-def _safety_stop(safety: int, state: RobotState) -> tuple[Signal, str]:
+def _safety_stop(safety: int, state: RobotState) -> tuple[GoalSignal, str]:
     """Return what a stop of the safety system means."""
-    if safety & _EMERGENCY:
-        return Signal.EMERGENCY_STOP, 'an emergency stop cut the power of the arm'
+    if safety & _EMERGENCY_STOPS:
+        return GoalSignal.EMERGENCY_STOP, 'an emergency stop cut the power of the arm'
     if safety & SafetyStatus.PROTECTIVE_STOPPED:
-        return Signal.PROTECTIVE_STOP, 'the robot made a protective stop'
+        return GoalSignal.PROTECTIVE_STOP, 'the robot made a protective stop'
     if safety & SafetyStatus.SAFEGUARD_STOPPED:
-        return Signal.PROTECTIVE_STOP, 'the robot made a safeguard stop'
-    return Signal.PROTECTIVE_STOP, f'the safety system reports {state.safety_mode.name.lower()}'
+        return GoalSignal.PROTECTIVE_STOP, 'the robot made a safeguard stop'
+    return (
+        GoalSignal.PROTECTIVE_STOP,
+        f'the safety system reports {state.safety_mode.name.lower()}',
+    )

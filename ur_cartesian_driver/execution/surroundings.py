@@ -16,8 +16,8 @@ from math import hypot, inf
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.bodies import Bodies, Link
 from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
 from ur_cartesian_driver.motion.pose import Pose, Vector3
 from ur_cartesian_driver.motion.primitive import Joints
 
@@ -28,7 +28,7 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class KeepOut:
+class KeepOutPlane:
     """A workspace plane: what moves stays on the side to which its normal points."""
 
     name: str
@@ -38,10 +38,10 @@ class KeepOut:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Surroundings:
+class LiveWorkspace:
     """What there is to keep away from."""
 
-    planes: tuple[KeepOut, ...] = ()
+    planes: tuple[KeepOutPlane, ...] = ()
     #: How near the capsules around links may come to each other [m]; None = nobody looks.
     min_clearance: float | None = None
     #: Radius of the tool between flange and TCP [m]; 0 = no tool.
@@ -52,16 +52,16 @@ class Surroundings:
         return bool(self.planes) or self.min_clearance is not None
 
 
-class Watch:
+class WorkspaceGuard:
     """Sees to it that one arm with one tool keeps away."""
 
-    def __init__(self, arm: Arm, T_flange_tcp: Pose, surroundings: Surroundings) -> None:
+    def __init__(self, arm: Arm, T_flange_tcp: Pose, workspace: LiveWorkspace) -> None:
         """Prepare bodies and planes."""
-        self._arm, self._tcp, self._where = arm, T_flange_tcp, surroundings
-        self._bodies = bodies = Bodies(arm, T_flange_tcp, surroundings.tool_radius)
-        planes = surroundings.planes
+        self._arm, self._tcp, self._workspace = arm, T_flange_tcp, workspace
+        self._bodies = bodies = CollisionBodies(arm, T_flange_tcp, workspace.tool_radius)
+        planes = workspace.planes
         self._normals = np.array([plane.normal for plane in planes]).reshape(-1, 3)
-        self._least = np.array(
+        self._min_heights = np.array(
             [
                 sum(n * p for n, p in zip(plane.normal, plane.point, strict=True)) + plane.margin
                 for plane in planes
@@ -70,16 +70,16 @@ class Watch:
         self._moving = [k for k, link in enumerate(bodies.links) if link != Link.BASE]
         self._names = [str(bodies.links[k]) for k in self._moving] + ['the TCP']
         # Nothing is farther from an axis [m].
-        self._lever = (
-            arm.model.reach
+        self._max_lever_arm = (
+            arm.model.max_reach
             + sum(map(abs, arm.model.geometry.d[3:]))
             + hypot(*T_flange_tcp.position)
-            + surroundings.tool_radius
+            + workspace.tool_radius
             + _THICKNESS
         )
-        self._seen: tuple[Joints, float] | None = None
+        self._last_check: tuple[Joints, float] | None = None
 
-    def why_not(self, q: Joints, q_now: Joints) -> str:
+    def violation(self, q: Joints, q_now: Joints) -> str:
         """
         Return what would be too near to what, as a clause; empty: nothing.
 
@@ -88,40 +88,45 @@ class Watch:
         :param q: where the arm would be [rad].
         :param q_now: where it is.
         """
-        if self._seen is not None:
-            q_seen, room = self._seen
-            if self._lever * sum([abs(a - b) for a, b in zip(q, q_seen, strict=True)]) < room:
+        if self._last_check is not None:
+            q_checked, slack = self._last_check
+            if (
+                self._max_lever_arm * sum([abs(a - b) for a, b in zip(q, q_checked, strict=True)])
+                < slack
+            ):
                 return ''
-        rooms = self._rooms(q)
-        least = float(rooms.min())
-        self._seen = (q, least)
-        if least >= 0.0:
+        slacks = self._clearance_slacks(q)
+        min_slack = float(slacks.min())
+        self._last_check = (q, min_slack)
+        if min_slack >= 0.0:
             return ''
-        worse = rooms < np.minimum(0.0, self._rooms(q_now) - _ROUNDING)
+        worse = slacks < np.minimum(0.0, self._clearance_slacks(q_now) - _ROUNDING)
         if not worse.any():
             return ''
-        index = int(np.where(worse, rooms, inf).argmin())
-        return self._clause(index, float(rooms[index]))
+        index = int(np.where(worse, slacks, inf).argmin())
+        return self._clause(index, float(slacks[index]))
 
-    def _rooms(self, q: Joints) -> NDArray[np.float64]:
+    def _clearance_slacks(self, q: Joints) -> NDArray[np.float64]:
         """Return how far everything is from what it keeps away from, less what is asked [m]."""
         row = np.array([q])
-        rooms = np.empty(0)
-        if self._where.planes:
+        slacks = np.empty(0)
+        if self._workspace.planes:
             low = self._bodies.heights(row, self._normals)[0][:, self._moving]
             tcp = self._normals @ np.array((self._arm.forward(q) @ self._tcp).position)
-            rooms = (np.concatenate([low, tcp[:, None]], axis=1) - self._least[:, None]).ravel()
-        if self._where.min_clearance is not None:
-            apart = self._bodies.distances(row)[0] - self._where.min_clearance
-            rooms = np.concatenate([rooms, apart])
-        return rooms
+            slacks = (
+                np.concatenate([low, tcp[:, None]], axis=1) - self._min_heights[:, None]
+            ).ravel()
+        if self._workspace.min_clearance is not None:
+            link_slacks = self._bodies.distances(row)[0] - self._workspace.min_clearance
+            slacks = np.concatenate([slacks, link_slacks])
+        return slacks
 
-    def _clause(self, index: int, room: float) -> str:
-        planes = self._where.planes
-        number, which = divmod(index, len(self._names))
+    def _clause(self, index: int, slack: float) -> str:
+        planes = self._workspace.planes
+        number, body = divmod(index, len(self._names))
         if number < len(planes):
-            plane, name = planes[number], self._names[which]
-            height = plane.margin + room
+            plane, name = planes[number], self._names[body]
+            height = plane.margin + slack
             near = (
                 f'come within {height:.4f} m of'
                 if height >= 0.0
@@ -130,9 +135,9 @@ class Watch:
             return f'{name} would {near} the workspace plane "{plane.name}"' + (
                 f', {plane.margin:.4f} m is asked for' if plane.margin else ''
             )
-        clearance = self._where.min_clearance or 0.0
+        clearance = self._workspace.min_clearance or 0.0
         a, b = self._bodies.pairs[index - len(planes) * len(self._names)]
         return (
-            f'{a} and {b} would come within {max(0.0, clearance + room):.4f} m of each other '
+            f'{a} and {b} would come within {max(0.0, clearance + slack):.4f} m of each other '
             f'(measured between capsules), min_clearance is {clearance:.4f} m'
         )

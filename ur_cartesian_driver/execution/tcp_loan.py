@@ -20,11 +20,11 @@ from ur_cartesian_driver.motion.state import RobotState
 TCP_RESOLUTION = 2e-6
 #: How long the robot may take from a message that sets a TCP to reporting it [s]; after that a
 #: message that nobody has carried out is taken for lost.
-CARRIED_OUT = 0.5
+SET_TIMEOUT = 0.5
 #: Below this joint speed the arm stands, and its TCP may be changed [rad/s].
 REST_SPEED = 1e-3
 #: The first and the longest pause before the TCP is put back once more [s].
-FIRST_PAUSE, LONGEST_PAUSE = 0.2, 10.0
+MIN_RETRY_PERIOD, MAX_RETRY_PERIOD = 0.2, 10.0
 
 
 def same_tcp(a: Pose, b: Pose) -> bool:
@@ -32,23 +32,23 @@ def same_tcp(a: Pose, b: Pose) -> bool:
     return a.distance_to(b) <= TCP_RESOLUTION and a.angle_to(b) <= TCP_RESOLUTION
 
 
-class TcpLoan:
+class TemporaryTcp:
     """One TCP that was set for a goal, until it is back."""
 
-    def __init__(self, T_flange_before: Pose, T_flange_lent: Pose) -> None:
+    def __init__(self, T_flange_original: Pose, T_flange_temporary: Pose) -> None:
         """
         Take note of a loan; the message that sets the TCP is on its way.
 
-        :param T_flange_before: what has to be put back.
+        :param T_flange_original: what has to be put back.
         """
-        self.T_flange_before = T_flange_before
-        self.T_flange_lent = T_flange_lent
+        self.T_flange_original = T_flange_original
+        self.T_flange_temporary = T_flange_temporary
         #: Whether the robot does not have the TCP any more, or never had it.
-        self.returned = False
+        self.is_restored = False
         #: Whether the robot has reported it.
-        self._seen = False
-        self._since = inf
-        self._pause, self._next_try = FIRST_PAUSE, -inf
+        self._was_reported = False
+        self._first_observed = inf
+        self._retry_period, self._next_retry = MIN_RETRY_PERIOD, -inf
 
     def observe(self, state: RobotState, now: float) -> None:
         """
@@ -56,33 +56,33 @@ class TcpLoan:
 
         :param now: time of a steady clock [s].
         """
-        self._since = min(self._since, now)
-        if self.has_robot(state):
-            self._seen, self.returned = True, False
-        elif self._seen or now - self._since >= CARRIED_OUT:
-            self.returned = True
+        self._first_observed = min(self._first_observed, now)
+        if self.is_active(state):
+            self._was_reported, self.is_restored = True, False
+        elif self._was_reported or now - self._first_observed >= SET_TIMEOUT:
+            self.is_restored = True
 
-    def has_robot(self, state: RobotState) -> bool:
+    def is_active(self, state: RobotState) -> bool:
         """Tell whether the robot's TCP is the one that was lent."""
-        return same_tcp(state.T_flange_tcp, self.T_flange_lent)
+        return same_tcp(state.T_flange_tcp, self.T_flange_temporary)
 
-    def is_due(self, state: RobotState, now: float) -> bool:
+    def is_restore_due(self, state: RobotState, now: float) -> bool:
         """
         Tell whether it is time to put the TCP back, again: ever more seldom, and at rest only.
 
         :returns: True once for each try.
         """
         if (
-            self.returned
-            or not self.has_robot(state)
-            or now < self._next_try
+            self.is_restored
+            or not self.is_active(state)
+            or now < self._next_retry
             or max(map(abs, state.actual_qd)) >= REST_SPEED
         ):
             return False
-        self._next_try = now + self._pause
-        self._pause = min(2.0 * self._pause, LONGEST_PAUSE)
+        self._next_retry = now + self._retry_period
+        self._retry_period = min(2.0 * self._retry_period, MAX_RETRY_PERIOD)
         return True
 
-    def hurry(self) -> None:
+    def retry_now(self) -> None:
         """Try again at once: something has changed that may let the next try succeed."""
-        self._pause, self._next_try = FIRST_PAUSE, -inf
+        self._retry_period, self._next_retry = MIN_RETRY_PERIOD, -inf

@@ -33,7 +33,7 @@ _UNKNOWN: Vector6 = (nan,) * 6
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class ToleranceQuantity:
     """Three axes that are measured alike."""
 
     name: str
@@ -43,7 +43,7 @@ class Quantity:
     error: Callable[[Pose, RobotState, Quaternion], Vector3]
 
 
-class Watch:
+class ToleranceCheck:
     """A tolerance that packets are held against; it costs nothing for what has no limit."""
 
     def __init__(self, tolerance: Tolerance, T_base_frame: Pose) -> None:
@@ -54,8 +54,8 @@ class Watch:
         :param T_base_frame: the frame of the goal, along whose axes all but the orientation is
             compared.
         """
-        self._turn = conjugate(T_base_frame.quaternion)
-        self._watched = tuple(
+        self._q_frame_base = conjugate(T_base_frame.quaternion)
+        self._limited = tuple(
             (quantity, quantity.limits(tolerance))
             for quantity in QUANTITIES
             if max(quantity.limits(tolerance)) > 0.0
@@ -63,7 +63,7 @@ class Watch:
 
     def __bool__(self) -> bool:
         """Tell whether there is any limit."""
-        return bool(self._watched)
+        return bool(self._limited)
 
     def violation(self, desired: Pose, state: RobotState) -> str | None:
         """
@@ -75,47 +75,47 @@ class Watch:
         :param desired: planned pose of the TCP in base.
         """
         worst, found = 1.0, None
-        for quantity, limits in self._watched:
-            errors = quantity.error(desired, state, self._turn)
+        for quantity, limits in self._limited:
+            errors = quantity.error(desired, state, self._q_frame_base)
             for axis, error, limit in zip(_AXES, errors, limits, strict=True):
                 if limit > 0.0 and not abs(error) <= worst * limit:
                     worst, found = abs(error) / limit, (quantity, axis, abs(error), limit)
         return None if found is None else _clause(*found)
 
 
-def _clause(quantity: Quantity, axis: str, error: float, limit: float) -> str:
+def _clause(quantity: ToleranceQuantity, axis: str, error: float, limit: float) -> str:
     return (
         f'{quantity.name} {axis} is off by {error:.6f} {quantity.unit}, the tolerance is '
         f'{limit:.6f} {quantity.unit}'
     )
 
 
-def _position(desired: Pose, state: RobotState, turn: Quaternion) -> Vector3:
-    return rotate(turn, _minus(desired.position, state.actual_tcp_pose.position))
+def _position(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
+    return rotate(q_frame_base, _minus(desired.position, state.actual_tcp_pose.position))
 
 
-def _orientation(desired: Pose, state: RobotState, turn: Quaternion) -> Vector3:
+def _orientation(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
     """Return the rotation vector of q_actual^-1 q_desired, in the axes of the tool."""
     actual = conjugate(state.actual_tcp_pose.quaternion)
     return rotation_vector_from_quaternion(multiply(actual, desired.quaternion))
 
 
-def _linear_velocity(desired: Pose, state: RobotState, turn: Quaternion) -> Vector3:
-    return rotate(turn, _minus(state.target_tcp_twist[:3], state.actual_tcp_twist[:3]))
+def _linear_velocity(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
+    return rotate(q_frame_base, _minus(state.target_tcp_twist[:3], state.actual_tcp_twist[:3]))
 
 
-def _angular_velocity(desired: Pose, state: RobotState, turn: Quaternion) -> Vector3:
-    return rotate(turn, _minus(state.target_tcp_twist[3:], state.actual_tcp_twist[3:]))
+def _angular_velocity(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
+    return rotate(q_frame_base, _minus(state.target_tcp_twist[3:], state.actual_tcp_twist[3:]))
 
 
-def _linear_acceleration(desired: Pose, state: RobotState, turn: Quaternion) -> Vector3:
+def _linear_acceleration(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
     target, actual = _accelerations(state)
-    return rotate(turn, _minus(target[:3], actual[:3]))
+    return rotate(q_frame_base, _minus(target[:3], actual[:3]))
 
 
-def _angular_acceleration(desired: Pose, state: RobotState, turn: Quaternion) -> Vector3:
+def _angular_acceleration(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
     target, actual = _accelerations(state)
-    return rotate(turn, _minus(target[3:], actual[3:]))
+    return rotate(q_frame_base, _minus(target[3:], actual[3:]))
 
 
 def _accelerations(state: RobotState) -> tuple[Vector6, Vector6]:
@@ -128,13 +128,15 @@ def _minus(a: Vector3, b: Vector3) -> Vector3:
 
 
 #: Everything that has a tolerance.
-QUANTITIES: tuple[Quantity, ...] = (
-    Quantity('position', 'm', lambda t: t.position, _position),
-    Quantity('orientation', 'rad', lambda t: t.orientation, _orientation),
-    Quantity('linear velocity', 'm/s', lambda t: t.twist[:3], _linear_velocity),
-    Quantity('angular velocity', 'rad/s', lambda t: t.twist[3:], _angular_velocity),
-    Quantity('linear acceleration', 'm/s^2', lambda t: t.acceleration[:3], _linear_acceleration),
-    Quantity(
+QUANTITIES: tuple[ToleranceQuantity, ...] = (
+    ToleranceQuantity('position', 'm', lambda t: t.position, _position),
+    ToleranceQuantity('orientation', 'rad', lambda t: t.orientation, _orientation),
+    ToleranceQuantity('linear velocity', 'm/s', lambda t: t.twist[:3], _linear_velocity),
+    ToleranceQuantity('angular velocity', 'rad/s', lambda t: t.twist[3:], _angular_velocity),
+    ToleranceQuantity(
+        'linear acceleration', 'm/s^2', lambda t: t.acceleration[:3], _linear_acceleration
+    ),
+    ToleranceQuantity(
         'angular acceleration', 'rad/s^2', lambda t: t.acceleration[3:], _angular_acceleration
     ),
 )

@@ -6,7 +6,7 @@ How much room the arm takes: every link as a few cylinders, for many configurati
 A look ahead asks tens of thousands of configurations whether the arm meets itself or a plane.
 Cylinders in capsules (all points within a radius of a segment) answer that in numpy for every
 model. They contain the true shape, so what they clear is clear; what they do not clear may still
-be, and :mod:`~.meshes` tells exactly for the models whose meshes there are.
+be, and :mod:`~.collision_meshes` tells exactly for the models whose meshes there are.
 
 The DH table has one lateral length, d4, which is the sum of three: the upper arm lies beside the
 axis of joint 1 by the *shoulder offset* s, the forearm by the *elbow offset* e, and wrist 1 ends
@@ -35,7 +35,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.chain import Arm, FramesOf
+from ur_cartesian_driver.kinematics.chain import Arm, ChainFramesOf
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -59,7 +59,7 @@ class Link(IntEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Size:
+class HousingSizes:
     """
     The housings of one size of arm [m].
 
@@ -94,9 +94,9 @@ class Size:
     wrist_front: float
     tool_flange_radius: float
 
-    def scaled(self, factor: float) -> Size:
+    def scaled(self, factor: float) -> HousingSizes:
         """Return the housings of a larger or smaller arm."""
-        return Size(
+        return HousingSizes(
             **{
                 name: factor * value
                 for name, value in zip(self.__slots__, astuple(self), strict=True)
@@ -104,7 +104,7 @@ class Size:
         )
 
 
-_UR3 = Size(
+_UR3 = HousingSizes(
     base_radius=0.0645,
     shoulder_radius=0.0468,
     shoulder_below=0.0665,
@@ -128,7 +128,7 @@ _UR3 = Size(
     wrist_front=0.0425,
     tool_flange_radius=0.0385,
 )
-_UR5 = Size(
+_UR5 = HousingSizes(
     base_radius=0.0745,
     shoulder_radius=0.0608,
     shoulder_below=0.0655,
@@ -152,7 +152,7 @@ _UR5 = Size(
     wrist_front=0.048,
     tool_flange_radius=0.0444,
 )
-_UR10 = Size(
+_UR10 = HousingSizes(
     base_radius=0.0952,
     shoulder_radius=0.0772,
     shoulder_below=0.0895,
@@ -180,7 +180,7 @@ _UR15 = _UR10.scaled(204 / 190)
 _UR20 = _UR10.scaled(245 / 190)
 
 #: Of each model: its housings, shoulder offset and elbow offset [m].
-_SIZES: Mapping[str, tuple[Size, float, float]] = MappingProxyType(
+_SIZES: Mapping[str, tuple[HousingSizes, float, float]] = MappingProxyType(
     {
         'ur3': (_UR3, 0.1198, 0.0273),
         'ur5': (_UR5, 0.13585, 0.01615),
@@ -205,8 +205,8 @@ _BASE_BOTTOM = -0.0035
 _OVERLAP = 0.002
 # A capsule with the axis of a cylinder sticks out by its radius at both ends. One that is 1.1
 # times as thick may be shorter, and sticks out by 0.64 of it.
-_WIDER = 1.1
-_SHORTER = (_WIDER**2 - 1.0) ** 0.5
+_RADIUS_FACTOR = 1.1
+_END_FACTOR = (_RADIUS_FACTOR**2 - 1.0) ** 0.5
 # Rows whose distances are computed together: their numbers stay in the cache.
 _BLOCK = 256
 # Squared sine of the angle below which segments count as parallel: an error of 1e-6 of a length.
@@ -234,7 +234,7 @@ PAIRS: tuple[tuple[Link, Link], ...] = tuple(
 
 
 @dataclass(frozen=True, slots=True)
-class _Body:
+class _LinkCylinder:
     """A cylinder between two places on axes: the axis (0..5) and how far along it [m]."""
 
     link: Link
@@ -245,7 +245,7 @@ class _Body:
     tube: bool = False
 
 
-class Bodies:
+class CollisionBodies:
     """
     The cylinders of one arm and its tool. Immutable.
 
@@ -257,20 +257,20 @@ class Bodies:
     def __init__(self, arm: Arm, T_flange_tcp: Pose = IDENTITY, tool_radius: float = 0.0) -> None:
         """Prepare the places of all ends on their axes."""
         self.arm, self._tcp = arm, T_flange_tcp.position
-        bodies = _bodies(arm)
-        self._places = _places(arm, bodies)
+        bodies = _link_cylinders(arm)
+        self._ends_on_axes = _ends_on_axes(arm, bodies)
         links, radii = [body.link for body in bodies], [body.radius for body in bodies]
-        covers = [_cover(arm, body) for body in bodies]
+        capsules_of = [_capsule_of(arm, body) for body in bodies]
         self._has_tool = tool_radius > 0.0 and hypot(*self._tcp) > 0.0
         if self._has_tool:
             links.append(Link.TOOL)
             radii.append(tool_radius)
-            covers.append((0.0, tool_radius))
+            capsules_of.append((0.0, tool_radius))
         #: The link and the radius [m] of each cylinder.
         self.links, self.radii = tuple(links), np.array(radii)
-        self._cut, self.capsule_radii = np.array(covers).T
+        self._cut, self.capsule_radii = np.array(capsules_of).T
         self.pairs = tuple(pair for pair in PAIRS if Link.TOOL not in pair or self._has_tool)
-        self._first, self._second, self._begins = _combined(self.links, self.pairs)
+        self._first, self._second, self._begins = _pair_indices(self.links, self.pairs)
 
     def cylinders(self, q: Floats) -> Floats:
         """Return both ends of every cylinder (n, k, 2, 3) in base [m], at joints (n, 6)."""
@@ -279,8 +279,8 @@ class Bodies:
 
     def capsules(self, q: Floats) -> Floats:
         """Return the ends (n, k, 2, 3) [m] of capsules that contain the cylinders."""
-        start, way = self._capsules(self._ends(self.arm.frames_rows(q)))
-        ends: Floats = np.stack([start, start + way]).transpose(3, 2, 0, 1)
+        start, vector = self._capsules(self._ends(self.arm.frames_rows(q)))
+        ends: Floats = np.stack([start, start + vector]).transpose(3, 2, 0, 1)
         return ends
 
     def distances(self, q: Floats) -> Floats:
@@ -294,14 +294,14 @@ class Bodies:
         sums = (self.capsule_radii[self._first] + self.capsule_radii[self._second])[:, None]
         for begin in range(0, len(q), _BLOCK):
             rows = slice(begin, begin + _BLOCK)
-            start, way = self._capsules(self._ends(self.arm.frames_rows(q[rows])))
-            apart = segment_distance(
+            start, vector = self._capsules(self._ends(self.arm.frames_rows(q[rows])))
+            distances = segment_distance(
                 start[:, self._first],
-                way[:, self._first],
+                vector[:, self._first],
                 start[:, self._second],
-                way[:, self._second],
+                vector[:, self._second],
             )
-            result[rows] = np.minimum.reduceat(apart - sums, self._begins).T
+            result[rows] = np.minimum.reduceat(distances - sums, self._begins).T
         return result
 
     def heights(self, q: Floats, normals: Floats) -> Floats:
@@ -316,19 +316,19 @@ class Bodies:
         for begin in range(0, len(q), _BLOCK):
             rows = slice(begin, begin + _BLOCK)
             start, end = self._ends(self.arm.frames_rows(q[rows]))
-            way = end - start
-            square = np.maximum(np.einsum('ckn,ckn->kn', way, way), _TINY)
+            vector = end - start
+            square = np.maximum(np.einsum('ckn,ckn->kn', vector, vector), _TINY)
             for m, normal in enumerate(normals):
-                low, rise = (np.tensordot(normal, v, axes=1) for v in (start, way))
+                low, rise = (np.tensordot(normal, v, axes=1) for v in (start, vector))
                 # A disc across the unit vector u reaches r sqrt(1 - (n u)^2) down.
                 disc = np.sqrt(np.maximum(0.0, 1.0 - rise**2 / square))
                 result[rows, m] = (low + np.minimum(rise, 0.0) - self.radii[:, None] * disc).T
         return result
 
-    def _ends(self, frames: FramesOf[Floats]) -> Floats:
+    def _ends(self, frames: ChainFramesOf[Floats]) -> Floats:
         """Return both ends of every cylinder, coordinates and rows last: (2, 3, k, n)."""
         origins, axes = np.array(frames.origins), np.array(frames.axes)  # (6, 3, n)
-        index, along = self._places
+        index, along = self._ends_on_axes
         ends = origins[index] + along[:, :, None, None] * axes[index]  # (2, k, 3, n)
         if self._has_tool:
             flange = np.array(frames.position)
@@ -343,12 +343,14 @@ class Bodies:
     def _capsules(self, ends: Floats) -> tuple[Floats, Floats]:
         """Return the start of each capsule's segment and the way to its end, each (3, k, n)."""
         start, end = ends
-        way = end - start
+        vector = end - start
         cut = self._cut[:, None]
-        return start + cut * way, (1.0 - 2.0 * cut) * way
+        return start + cut * vector, (1.0 - 2.0 * cut) * vector
 
 
-def segment_distance(start_1: Floats, way_1: Floats, start_2: Floats, way_2: Floats) -> Floats:
+def segment_distance(
+    start_1: Floats, vector_1: Floats, start_2: Floats, vector_2: Floats
+) -> Floats:
     """
     Return the distance of segments; parallel ones and points are segments too.
 
@@ -358,14 +360,14 @@ def segment_distance(start_1: Floats, way_1: Floats, start_2: Floats, way_2: Flo
     :param start_1: (3, ...) [m]; the segment goes from there by ``way_1``.
     """
     r = start_1 - start_2
-    a, e = _dot(way_1, way_1), _dot(way_2, way_2)
-    b, c, f = _dot(way_1, way_2), _dot(way_1, r), _dot(way_2, r)
+    a, e = _dot(vector_1, vector_1), _dot(vector_2, vector_2)
+    b, c, f = _dot(vector_1, vector_2), _dot(vector_1, r), _dot(vector_2, r)
     denominator = a * e - b * b
     crossing = denominator > _PARALLEL * a * e
     s = np.where(crossing, (b * f - c * e) / np.where(crossing, denominator, 1.0), 0.0)
     t = np.clip((b * np.clip(s, 0.0, 1.0) + f) / np.maximum(e, _TINY), 0.0, 1.0)
     s = np.clip((b * t - c) / np.maximum(a, _TINY), 0.0, 1.0)
-    gap = r + s * way_1 - t * way_2
+    gap = r + s * vector_1 - t * vector_2
     distance: Floats = np.sqrt(_dot(gap, gap))
     return distance
 
@@ -375,7 +377,7 @@ def _dot(u: Floats, v: Floats) -> Floats:
     return product
 
 
-def _bodies(arm: Arm) -> list[_Body]:
+def _link_cylinders(arm: Arm) -> list[_LinkCylinder]:
     """Return the cylinders of a model, by the joint axes that they lie on."""
     g = arm.model.geometry
     d1, d4, d5, d6 = g.d[0], *g.d[3:]
@@ -383,34 +385,42 @@ def _bodies(arm: Arm) -> list[_Body]:
     # The upper arm begins where the forearm ends.
     elbow = min(s - z.upper_elbow_in, e + z.elbow_in)
     return [
-        _Body(Link.BASE, (0, _BASE_BOTTOM), (0, d1 - z.shoulder_below + _OVERLAP), z.base_radius),
-        _Body(
+        _LinkCylinder(
+            Link.BASE, (0, _BASE_BOTTOM), (0, d1 - z.shoulder_below + _OVERLAP), z.base_radius
+        ),
+        _LinkCylinder(
             Link.SHOULDER,
             (0, d1 - z.shoulder_below),
             (0, d1 + z.shoulder_above),
             z.shoulder_radius,
         ),
-        _Body(Link.SHOULDER, (1, 0.0), (1, s - z.upper_shoulder_in + _OVERLAP), z.shoulder_radius),
-        _Body(
+        _LinkCylinder(
+            Link.SHOULDER, (1, 0.0), (1, s - z.upper_shoulder_in + _OVERLAP), z.shoulder_radius
+        ),
+        _LinkCylinder(
             Link.UPPER_ARM,
             (1, s - z.upper_shoulder_in),
             (1, s + z.upper_shoulder_out),
             z.shoulder_radius,
         ),
-        _Body(Link.UPPER_ARM, (1, s), (2, s), z.upper_tube, tube=True),
-        _Body(Link.UPPER_ARM, (2, elbow), (2, s + z.upper_elbow_out), z.upper_elbow_radius),
-        _Body(Link.FOREARM, (2, e - z.elbow_out), (2, e + z.elbow_in), z.elbow_radius),
-        _Body(Link.FOREARM, (2, e), (3, e), z.fore_tube, tube=True),
-        _Body(Link.FOREARM, (3, e - z.fore_wrist_out), (3, d4 - z.fore_wrist_in), z.wrist_radius),
-        _Body(Link.WRIST_1, (3, d4 - z.wrist_in), (3, d4 + z.wrist_out), z.wrist_radius),
-        _Body(Link.WRIST_1, (4, -z.wrist_back), (4, z.wrist_front), z.wrist_radius),
-        _Body(Link.WRIST_2, (4, d5 - z.wrist_in), (4, d5 + z.wrist_out), z.wrist_radius),
-        _Body(Link.WRIST_2, (5, -z.wrist_back), (5, z.wrist_front), z.wrist_radius),
-        _Body(Link.WRIST_3, (5, z.wrist_front - _OVERLAP), (5, d6), z.tool_flange_radius),
+        _LinkCylinder(Link.UPPER_ARM, (1, s), (2, s), z.upper_tube, tube=True),
+        _LinkCylinder(
+            Link.UPPER_ARM, (2, elbow), (2, s + z.upper_elbow_out), z.upper_elbow_radius
+        ),
+        _LinkCylinder(Link.FOREARM, (2, e - z.elbow_out), (2, e + z.elbow_in), z.elbow_radius),
+        _LinkCylinder(Link.FOREARM, (2, e), (3, e), z.fore_tube, tube=True),
+        _LinkCylinder(
+            Link.FOREARM, (3, e - z.fore_wrist_out), (3, d4 - z.fore_wrist_in), z.wrist_radius
+        ),
+        _LinkCylinder(Link.WRIST_1, (3, d4 - z.wrist_in), (3, d4 + z.wrist_out), z.wrist_radius),
+        _LinkCylinder(Link.WRIST_1, (4, -z.wrist_back), (4, z.wrist_front), z.wrist_radius),
+        _LinkCylinder(Link.WRIST_2, (4, d5 - z.wrist_in), (4, d5 + z.wrist_out), z.wrist_radius),
+        _LinkCylinder(Link.WRIST_2, (5, -z.wrist_back), (5, z.wrist_front), z.wrist_radius),
+        _LinkCylinder(Link.WRIST_3, (5, z.wrist_front - _OVERLAP), (5, d6), z.tool_flange_radius),
     ]
 
 
-def _places(arm: Arm, bodies: list[_Body]) -> tuple[NDArray[np.intp], Floats]:
+def _ends_on_axes(arm: Arm, bodies: list[_LinkCylinder]) -> tuple[NDArray[np.intp], Floats]:
     """
     Return axis and place of both ends of each body, (2, k) each.
 
@@ -420,24 +430,24 @@ def _places(arm: Arm, bodies: list[_Body]) -> tuple[NDArray[np.intp], Floats]:
     """
     ends = [[body.start for body in bodies], [body.end for body in bodies]]
     index = np.array([[axis for axis, _ in row] for row in ends], dtype=np.intp)
-    along = np.array([[place for _, place in row] for row in ends])
+    along = np.array([[position for _, position in row] for row in ends])
     true, nominal = arm.frames((0.0,) * 6), Arm(arm.model).frames((0.0,) * 6)
     shift = np.einsum('ic,ic->i', np.subtract(nominal.origins, true.origins), np.array(true.axes))
     return index, along + shift[index]
 
 
-def _cover(arm: Arm, body: _Body) -> tuple[float, float]:
+def _capsule_of(arm: Arm, body: _LinkCylinder) -> tuple[float, float]:
     """Return the part of a cylinder's axis to cut off at each end, and its capsule's radius."""
     (axis, begin), (other, end) = body.start, body.end
     if body.tube or axis != other:
         return 0.0, body.radius
     length = end - begin
-    if length <= 2.0 * _SHORTER * body.radius:
+    if length <= 2.0 * _END_FACTOR * body.radius:
         return 0.5, hypot(body.radius, 0.5 * length)
-    return _SHORTER * body.radius / length, _WIDER * body.radius
+    return _END_FACTOR * body.radius / length, _RADIUS_FACTOR * body.radius
 
 
-def _combined(
+def _pair_indices(
     links: tuple[Link, ...], pairs: tuple[tuple[Link, Link], ...]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
     """Return the bodies to compare, first and second, and where each pair of links begins."""

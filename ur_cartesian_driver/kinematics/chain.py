@@ -19,7 +19,7 @@ from typing import Any, Generic, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.robots import Geometry, JOINT_NAMES, RobotModel
+from ur_cartesian_driver.kinematics.robots import DhTable, JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 
 #: A number: one pose's, or one for each pose of a batch.
@@ -29,7 +29,7 @@ N = TypeVar('N', float, NDArray[np.float64])
 # alone (here: less than a nanometre at the flange) are the nominal one.
 _ROUNDING = 1e-9
 # Configurations in which two arms are compared.
-_DRAWN = 500
+_COMPARED_SAMPLES = 500
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class _Link:
 
 
 @dataclass(frozen=True, slots=True)
-class FramesOf(Generic[N]):
+class ChainFramesOf(Generic[N]):
     """Where the joints and the flange are, in base axes: of one row or of each of a batch."""
 
     #: Origin [m] and direction of each joint's axis.
@@ -59,7 +59,7 @@ class FramesOf(Generic[N]):
     z: tuple[N, N, N]
 
 
-Frames: TypeAlias = FramesOf[float]
+ChainFrames: TypeAlias = ChainFramesOf[float]
 
 
 class Arm:
@@ -71,7 +71,7 @@ class Arm:
         one.
     """
 
-    def __init__(self, model: RobotModel, geometry: Geometry | None = None) -> None:
+    def __init__(self, model: RobotModel, geometry: DhTable | None = None) -> None:
         """Prepare the links."""
         if geometry is None or geometry.difference(model.geometry) < _ROUNDING:
             geometry = model.geometry
@@ -93,7 +93,9 @@ class Arm:
         qw = 1.0
         for link, angle in zip(self._links_from_flange, reversed(q), strict=True):
             half = 0.5 * (angle + link.theta)
-            x, y, z, qx, qy, qz, qw = _before(link, sin(half), cos(half), x, y, z, qx, qy, qz, qw)
+            x, y, z, qx, qy, qz, qw = _prepend_link(
+                link, sin(half), cos(half), x, y, z, qx, qy, qz, qw
+            )
         if qw < 0.0:
             return Pose((x, y, z), (-qx, -qy, -qz, -qw))
         return Pose((x, y, z), (qx, qy, qz, qw))
@@ -109,21 +111,21 @@ class Arm:
         state = (zero, zero, zero, zero, zero, zero, np.ones(len(q)))
         for link, angle in zip(self._links_from_flange, q.T[::-1], strict=True):
             half = 0.5 * (angle + link.theta)
-            state = _before(link, np.sin(half), np.cos(half), *state)
+            state = _prepend_link(link, np.sin(half), np.cos(half), *state)
         rows = np.stack(state, axis=1)
         rows[rows[:, 6] < 0.0, 3:] *= -1.0
         return rows
 
-    def flange_apart(self, other: Arm) -> float:
+    def max_flange_distance(self, other: Arm) -> float:
         """
         Return the largest distance of the two flanges at the same joint positions [m].
 
         Of many drawn configurations, always the same ones. The tables themselves cannot be
         compared: lengths of a calibrated arm may be off by metres that cancel each other.
         """
-        q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_DRAWN, 6))
-        apart = self.forward_rows(q)[:, :3] - other.forward_rows(q)[:, :3]
-        return float(np.linalg.norm(apart, axis=1).max())
+        q = np.random.default_rng(0).uniform(-np.pi, np.pi, (_COMPARED_SAMPLES, 6))
+        distances = self.forward_rows(q)[:, :3] - other.forward_rows(q)[:, :3]
+        return float(np.linalg.norm(distances, axis=1).max())
 
     def jacobian(self, q: Sequence[float], T_flange_tcp: Pose = IDENTITY) -> NDArray[np.float64]:
         """
@@ -141,7 +143,7 @@ class Arm:
         frames = self.frames_rows(q)
         return jacobian_at(frames, frames.position)
 
-    def frames(self, q: Sequence[float]) -> Frames:
+    def frames(self, q: Sequence[float]) -> ChainFrames:
         """Return the places and directions of all joints and of the flange [m]."""
         return self._frames(
             [
@@ -152,7 +154,7 @@ class Arm:
             1.0,
         )
 
-    def frames_rows(self, q: NDArray[np.float64]) -> FramesOf[NDArray[np.float64]]:
+    def frames_rows(self, q: NDArray[np.float64]) -> ChainFramesOf[NDArray[np.float64]]:
         """Return the same for many joint positions (n, 6); each number is an array (n,)."""
         angles = np.ascontiguousarray(q.T) + np.array(self.geometry.theta)[:, None]
         return self._frames(
@@ -161,7 +163,7 @@ class Arm:
             np.ones(len(q)),
         )
 
-    def _frames(self, turns: list[tuple[N, N]], zero: N, one: N) -> FramesOf[N]:
+    def _frames(self, turns: list[tuple[N, N]], zero: N, one: N) -> ChainFramesOf[N]:
         """Walk along the links, from the cosine and the sine of each joint."""
         px = py = pz = zero
         xx, xy, xz = one, zero, zero
@@ -182,12 +184,12 @@ class Arm:
             ca, sa = link.cos_alpha, link.sin_alpha
             yx, yy, yz = ca * ux + sa * zx, ca * uy + sa * zy, ca * uz + sa * zz
             zx, zy, zz = ca * zx - sa * ux, ca * zy - sa * uy, ca * zz - sa * uz
-        return FramesOf(
+        return ChainFramesOf(
             tuple(origins), tuple(axes), (px, py, pz), (xx, xy, xz), (yx, yy, yz), (zx, zy, zz)
         )
 
 
-def jacobian_at(frames: FramesOf[N], point: tuple[N, N, N]) -> NDArray[np.float64]:
+def jacobian_at(frames: ChainFramesOf[N], point: tuple[N, N, N]) -> NDArray[np.float64]:
     """
     Return the Jacobian (6, 6) of a point of the last link [m], all in base axes.
 
@@ -245,7 +247,7 @@ def _turn_z(pinocchio: Any, angle: float) -> Any:
     return pinocchio.SE3(pinocchio.utils.rotate('z', angle), np.zeros(3))
 
 
-def _links(geometry: Geometry) -> tuple[_Link, ...]:
+def _links(geometry: DhTable) -> tuple[_Link, ...]:
     return tuple(
         _Link(theta, d, a, sin(alpha), cos(alpha), sin(0.5 * alpha), cos(0.5 * alpha))
         for theta, d, a, alpha in zip(
@@ -257,7 +259,9 @@ def _links(geometry: Geometry) -> tuple[_Link, ...]:
 _State: TypeAlias = tuple[N, N, N, N, N, N, N]
 
 
-def _before(link: _Link, s: N, c: N, x: N, y: N, z: N, qx: N, qy: N, qz: N, qw: N) -> _State[N]:
+def _prepend_link(
+    link: _Link, s: N, c: N, x: N, y: N, z: N, qx: N, qy: N, qz: N, qw: N
+) -> _State[N]:
     """
     Put a link before a pose: Rz(theta + q) Tz(d) Tx(a) Rx(alpha) * pose.
 

@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from math import atan2, cos, hypot, pi, remainder, sin, sqrt, tau
 from typing import NamedTuple
 
-from ur_cartesian_driver.kinematics.shape import Shape
+from ur_cartesian_driver.kinematics.ideal_arm import IdealArm
 from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion, Vector3
 from ur_cartesian_driver.motion.primitive import Joints
 
@@ -30,10 +30,10 @@ MERGED_ROOTS = 1e-13
 # Sine of wrist 2 below which the axes 4 and 6 are one line and only their sum counts.
 WRIST_SINGULAR = 2e-10
 # How many times the misfit wrist 3 must be off the axis of wrist 1 for its direction to count.
-_WRIST_DOUBT = 10.0
+_MAX_WRIST_MISFIT = 10.0
 
 
-class Wrist(NamedTuple):
+class WristSolution(NamedTuple):
     """A shoulder and a wrist that fit the pose; the elbow is still open."""
 
     theta1: float
@@ -47,7 +47,7 @@ class Wrist(NamedTuple):
 
 
 def closed_form(
-    shape: Shape, T_base_flange: Pose, wrist_3: float = 0.0, doubt: float = 0.0
+    ideal: IdealArm, T_base_flange: Pose, wrist_3: float = 0.0, misfit_factor: float = 0.0
 ) -> list[Joints]:
     """
     Return every joint solution [rad], each angle within (-pi, pi].
@@ -56,8 +56,8 @@ def closed_form(
     :param doubt: how many times its misfit the shape may be wrong. The real arm may reach where
         the ideal one does not; there both roots are returned, as guesses.
     """
-    o1, o2, o3, o4, o5, o6 = shape.offsets
-    slack = root_slack(shape, doubt)
+    o1, o2, o3, o4, o5, o6 = ideal.offsets
+    slack = root_slack(ideal, misfit_factor)
     return [
         (
             wrap(wrist.theta1 - o1),
@@ -67,36 +67,36 @@ def closed_form(
             wrap(wrist.theta5 - o5),
             wrap(wrist.theta6 - o6),
         )
-        for wrist in wrists(shape, T_base_flange, wrist_3 + o6, slack)
-        for theta2, theta3 in _elbows(shape, wrist.outward, wrist.up, slack)
+        for wrist in wrist_solutions(ideal, T_base_flange, wrist_3 + o6, slack)
+        for theta2, theta3 in _elbow_angles(ideal, wrist.outward, wrist.up, slack)
     ]
 
 
-def root_slack(shape: Shape, doubt: float) -> float:
+def root_slack(ideal: IdealArm, misfit_factor: float) -> float:
     """Return by how much a square in the roots is uncertain [m^2]."""
     # (r + dr)^2 - r^2 is about 2 r dr.
-    return doubt * 2.0 * shape.misfit * abs(shape.a2 + shape.a3)
+    return misfit_factor * 2.0 * ideal.misfit * abs(ideal.a2 + ideal.a3)
 
 
-def wrist_centre(shape: Shape, T_base_flange: Pose) -> Vector3:
+def wrist_centre(ideal: IdealArm, T_base_flange: Pose) -> Vector3:
     """Return the point where the axes 5 and 6 meet, from the shoulder [m]."""
     x, y, z, w = T_base_flange.quaternion
     px, py, pz = T_base_flange.position
-    d6 = shape.d6
+    d6 = ideal.d6
     return (
         px - d6 * 2.0 * (x * z + y * w),
         py - d6 * 2.0 * (y * z - x * w),
-        pz - shape.d1 - d6 * (1.0 - 2.0 * (x * x + y * y)),
+        pz - ideal.d1 - d6 * (1.0 - 2.0 * (x * x + y * y)),
     )
 
 
-def wrists(
-    shape: Shape, T_base_flange: Pose, theta6_if_singular: float = 0.0, slack: float = 0.0
-) -> Iterator[Wrist]:
+def wrist_solutions(
+    ideal: IdealArm, T_base_flange: Pose, theta6_if_singular: float = 0.0, slack: float = 0.0
+) -> Iterator[WristSolution]:
     """Solve for all but the elbow: two shoulders, each with two wrists."""
     r11, r12, r13, r21, r22, r23, r31, r32, _ = rotation_from_quaternion(T_base_flange.quaternion)
-    px, py, pz = wrist_centre(shape, T_base_flange)
-    d4, d5 = shape.d4, shape.d5
+    px, py, pz = wrist_centre(ideal, T_base_flange)
+    d4, d5 = ideal.d4, ideal.d5
     for outward in _roots(px * px + py * py - d4 * d4, slack):
         # px s1 - py c1 = d4 and px c1 + py s1 = outward, solved for s1 and c1.
         s1, c1 = d4 * px + outward * py, outward * px - d4 * py
@@ -104,18 +104,18 @@ def wrists(
         theta1, s1, c1 = atan2(s1, c1), s1 / length, c1 / length
         # The axes of the flange along axis 2, which is (s1, -c1, 0).
         along_x, along_y, c5 = s1 * r11 - c1 * r21, s1 * r12 - c1 * r22, s1 * r13 - c1 * r23
-        for theta5, theta6 in _flips(shape, along_x, along_y, c5, theta6_if_singular):
+        for theta5, theta6 in _wrist_angles(ideal, along_x, along_y, c5, theta6_if_singular):
             # The axis y of frame 5 is that of the flange before theta6; axis 5 is opposite to it.
             s6, c6 = sin(theta6), cos(theta6)
             s234 = -(c1 * (s6 * r11 + c6 * r12) + s1 * (s6 * r21 + c6 * r22))
             c234 = s6 * r31 + c6 * r32
-            yield Wrist(
+            yield WristSolution(
                 theta1, theta5, theta6, atan2(s234, c234), outward - d5 * s234, pz + d5 * c234
             )
 
 
-def _flips(
-    shape: Shape, along_x: float, along_y: float, c5: float, theta6_if_singular: float
+def _wrist_angles(
+    ideal: IdealArm, along_x: float, along_y: float, c5: float, theta6_if_singular: float
 ) -> Iterator[tuple[float, float]]:
     """Solve the wrist, from the flange's axes along axis 2: theta5, theta6."""
     s5 = hypot(along_x, along_y)
@@ -125,16 +125,16 @@ def _flips(
         return
     yield theta5, theta6
     yield -theta5, theta6 + pi
-    if s5 * shape.d5 < _WRIST_DOUBT * shape.misfit:  # then theta6 may be anything
+    if s5 * ideal.d5 < _MAX_WRIST_MISFIT * ideal.misfit:  # then theta6 may be anything
         yield theta5, theta6 + 0.5 * pi
         yield theta5, theta6 - 0.5 * pi
 
 
-def _elbows(
-    shape: Shape, outward: float, up: float, slack: float
+def _elbow_angles(
+    ideal: IdealArm, outward: float, up: float, slack: float
 ) -> Iterator[tuple[float, float]]:
     """Solve the triangle of upper arm, forearm and the way to wrist 1: theta2, theta3."""
-    a2, a3 = shape.a2, shape.a3
+    a2, a3 = ideal.a2, ideal.a3
     square = outward * outward + up * up
     direction = atan2(up, outward)
     # The law of cosines for half the angle, tan(theta3 / 2)^2 = (1 - cos) / (1 + cos): what the

@@ -23,7 +23,7 @@ from ur_cartesian_driver.kinematics.closed_form import (
     MERGED_ROOTS,
     WRIST_SINGULAR,
 )
-from ur_cartesian_driver.kinematics.shape import Shape
+from ur_cartesian_driver.kinematics.ideal_arm import IdealArm
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -35,7 +35,7 @@ BRANCHES = tuple(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Posture:
+class BranchMeasures:
     """
     Of each row, three signed measures: the sign is the branch, 0 is the singularity.
 
@@ -58,14 +58,14 @@ class Posture:
 
 
 @dataclass(frozen=True, slots=True)
-class Targets:
+class TargetPoses:
     """Poses as columns: positions, and rotation matrices row by row, each an array (n,)."""
 
     position: tuple[Floats, Floats, Floats]
     rotation: tuple[Floats, ...]
 
     @classmethod
-    def of(cls, poses: Floats) -> Targets:
+    def of(cls, poses: Floats) -> TargetPoses:
         """Take rows (n, 7): x y z [m], unit quaternion x y z w."""
         px, py, pz, x, y, z, w = np.ascontiguousarray(poses.T, dtype=np.float64)
         return cls(
@@ -83,14 +83,14 @@ class Targets:
             ),
         )
 
-    def rows(self, index: NDArray[np.int64]) -> Targets:
+    def rows(self, index: NDArray[np.int64]) -> TargetPoses:
         """Return some of the rows."""
         px, py, pz = (p[index] for p in self.position)
-        return Targets((px, py, pz), tuple(r[index] for r in self.rotation))
+        return TargetPoses((px, py, pz), tuple(r[index] for r in self.rotation))
 
 
 @dataclass(frozen=True, slots=True)
-class Branch:
+class BranchSolution:
     """One branch of many poses."""
 
     #: (6, n) angles [rad], not wrapped; meaningless where it does not exist.
@@ -98,20 +98,20 @@ class Branch:
     #: (n,) whether the pose has this branch; of two that meet it has both.
     exists: Flags
     #: (n,) whether it is the same as the branch of the other sign, which comes first.
-    repeats: Flags
+    is_duplicate: Flags
     #: (n,) no other branch is nearer than this [rad], full turns not counted.
-    apart: Floats
+    separation: Floats
 
 
-def posture(shape: Shape, q: Floats) -> Posture:
+def ideal_branch_measures(ideal: IdealArm, q: Floats) -> BranchMeasures:
     """Return the measures of joint positions (n, 6) [rad]."""
-    theta = q.T + np.array(shape.offsets)[:, None]
+    theta = q.T + np.array(ideal.offsets)[:, None]
     theta23 = theta[1] + theta[2]
-    return Posture(
+    return BranchMeasures(
         shoulder=(
-            shape.a2 * np.cos(theta[1])
-            + shape.a3 * np.cos(theta23)
-            + shape.d5 * np.sin(theta23 + theta[3])
+            ideal.a2 * np.cos(theta[1])
+            + ideal.a3 * np.cos(theta23)
+            + ideal.d5 * np.sin(theta23 + theta[3])
         ),
         elbow=np.sin(theta[2]),
         wrist=np.sin(theta[4]),
@@ -119,12 +119,12 @@ def posture(shape: Shape, q: Floats) -> Posture:
 
 
 def branch_rows(
-    shape: Shape,
-    targets: Targets,
+    ideal: IdealArm,
+    targets: TargetPoses,
     signs: tuple[int, int, int],
     wrist_3: float = 0.0,
     slack: float = 0.0,
-) -> Branch:
+) -> BranchSolution:
     """
     Solve all poses for one branch.
 
@@ -133,9 +133,9 @@ def branch_rows(
     :param slack: as of the roots in :mod:`~.closed_form` [m^2].
     """
     shoulder, elbow, wrist = signs
-    pan = _pan(shape, targets, shoulder, slack)
-    flip = _flip(shape, targets, pan, wrist, wrist_3)
-    lift = _lift(shape, flip, elbow, slack)
+    pan = _pan(ideal, targets, shoulder, slack)
+    flip = _flip(ideal, targets, pan, wrist, wrist_3)
+    lift = _lift(ideal, flip, elbow, slack)
     theta = np.stack(
         [
             pan.theta1,
@@ -146,22 +146,24 @@ def branch_rows(
             flip.theta6,
         ]
     )
-    elbow_apart = 2.0 * np.abs(lift.theta3)
-    return Branch(
-        theta - np.array(shape.offsets)[:, None],
+    elbow_separation = 2.0 * np.abs(lift.theta3)
+    return BranchSolution(
+        theta - np.array(ideal.offsets)[:, None],
         pan.exists & lift.exists,
-        _second(shoulder, pan.outward) | _second(elbow, lift.smaller) | flip.repeats,
+        _is_second_root(shoulder, pan.outward)
+        | _is_second_root(elbow, lift.smaller)
+        | flip.is_duplicate,
         # The twin of the wrist has theta6 + pi, whatever its elbow and if its shoulder is this.
-        np.minimum(np.minimum(elbow_apart, tau - elbow_apart), pan.apart),
+        np.minimum(np.minimum(elbow_separation, tau - elbow_separation), pan.separation),
     )
 
 
 def all_branch_rows(
-    shape: Shape, targets: Targets, wrist_3: float = 0.0, slack: float = 0.0
-) -> Iterator[Branch]:
+    ideal: IdealArm, targets: TargetPoses, wrist_3: float = 0.0, slack: float = 0.0
+) -> Iterator[BranchSolution]:
     """Solve for the eight branches in the order of :data:`BRANCHES`."""
     for signs in BRANCHES:
-        yield branch_rows(shape, targets, signs, wrist_3, slack)
+        yield branch_rows(ideal, targets, signs, wrist_3, slack)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +174,7 @@ class _Pan:
     outward: Floats
     up: Floats
     exists: Flags
-    apart: Floats
+    separation: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +184,7 @@ class _Flip:
     theta234: Floats
     outward: Floats
     up: Floats
-    repeats: Flags
+    is_duplicate: Flags
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,10 +196,10 @@ class _Lift:
     smaller: Floats
 
 
-def _pan(shape: Shape, targets: Targets, sign: int, slack: float) -> _Pan:
+def _pan(ideal: IdealArm, targets: TargetPoses, sign: int, slack: float) -> _Pan:
     r = targets.rotation
-    px, py, pz = (p - shape.d6 * z for p, z in zip(targets.position, r[2::3], strict=True))
-    d4 = shape.d4
+    px, py, pz = (p - ideal.d6 * z for p, z in zip(targets.position, r[2::3], strict=True))
+    d4 = ideal.d4
     root, exists = _root(px * px + py * py - d4 * d4, slack)
     outward = sign * root
     s1, c1 = d4 * px + outward * py, outward * px - d4 * py
@@ -207,19 +209,19 @@ def _pan(shape: Shape, targets: Targets, sign: int, slack: float) -> _Pan:
         s1 / length,
         c1 / length,
         outward,
-        pz - shape.d1,
+        pz - ideal.d1,
         exists,
         2.0 * np.arctan2(root, abs(d4)),
     )
 
 
-def _flip(shape: Shape, targets: Targets, pan: _Pan, sign: int, wrist_3: float) -> _Flip:
+def _flip(ideal: IdealArm, targets: TargetPoses, pan: _Pan, sign: int, wrist_3: float) -> _Flip:
     r11, r12, r13, r21, r22, r23, r31, r32, _ = targets.rotation
     s1, c1 = pan.sin, pan.cos
     along_x, along_y, c5 = s1 * r11 - c1 * r21, s1 * r12 - c1 * r22, s1 * r13 - c1 * r23
     s5 = np.sqrt(along_x * along_x + along_y * along_y)
     straight = s5 < WRIST_SINGULAR
-    theta6_straight = wrist_3 + shape.offsets[5]
+    theta6_straight = wrist_3 + ideal.offsets[5]
     safe = np.where(straight, 1.0, s5)
     s6 = np.where(straight, np.sin(theta6_straight), -sign * along_y / safe)
     c6 = np.where(straight, np.cos(theta6_straight), sign * along_x / safe)
@@ -230,14 +232,14 @@ def _flip(shape: Shape, targets: Targets, pan: _Pan, sign: int, wrist_3: float) 
         np.arctan2(sign * s5, c5),
         theta6,
         np.arctan2(s234, c234),
-        pan.outward - shape.d5 * s234,
-        pan.up + shape.d5 * c234,
+        pan.outward - ideal.d5 * s234,
+        pan.up + ideal.d5 * c234,
         straight & (sign < 0),
     )
 
 
-def _lift(shape: Shape, flip: _Flip, sign: int, slack: float) -> _Lift:
-    a2, a3 = shape.a2, shape.a3
+def _lift(ideal: IdealArm, flip: _Flip, sign: int, slack: float) -> _Lift:
+    a2, a3 = ideal.a2, ideal.a3
     square = flip.outward * flip.outward + flip.up * flip.up
     folded, not_too_near = _root(square - (a2 - a3) ** 2, slack)
     stretched, not_too_far = _root((a2 + a3) ** 2 - square, slack)
@@ -262,12 +264,12 @@ def _root(square: Floats, slack: float) -> tuple[Floats, Flags]:
     return np.sqrt(np.where(square < MERGED_ROOTS, 0.0, square)), exists
 
 
-def _second(sign: int, root: Floats) -> Flags:
+def _is_second_root(sign: int, root: Floats) -> Flags:
     """Tell where both signs are the same root and this is the second."""
     return root == 0.0 if sign < 0 else np.zeros(len(root), dtype=np.bool_)
 
 
-def wrapped(angles: Floats) -> Floats:
+def wrap_rows(angles: Floats) -> Floats:
     """Return the angles within (-pi, pi]."""
     angles = angles - tau * np.rint(angles / tau)
     return np.where(angles <= -pi, pi, angles)

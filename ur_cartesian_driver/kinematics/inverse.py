@@ -16,10 +16,15 @@ from math import ceil, copysign, dist, hypot, inf, pi, remainder, sin, tau
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.chain import Arm, Frames, jacobian_at
-from ur_cartesian_driver.kinematics.closed_form import closed_form, wrap, wrist_centre, wrists
-from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, Limits
-from ur_cartesian_driver.kinematics.shape import Shape, shape_of
+from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames, jacobian_at
+from ur_cartesian_driver.kinematics.closed_form import (
+    closed_form,
+    wrap,
+    wrist_centre,
+    wrist_solutions,
+)
+from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of, IdealArm
+from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, PositionLimits
 from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion, Vector3
 from ur_cartesian_driver.motion.primitive import Joints
 
@@ -28,32 +33,32 @@ _LIMIT_ROUNDING = 1e-9
 
 # How many times its misfit, a mean, the ideal arm is taken to be wrong; the second if the first
 # leads to nothing, which happens where two singularities meet.
-DOUBTS = (3.0, 30.0)
+MISFIT_FACTORS = (3.0, 30.0)
 
 # Newton: the sum of the squares of metres and radians that counts as exact; the number of steps,
 # of steps that may fail to halve the error, and the longest of a joint [rad].
 _EXACT = 1e-24
 _MAX_STEPS = 40
 _MAX_FAILURES = 12
-_LONGEST_STEP = 0.5
+_MAX_JOINT_STEP = 0.5
 #: The least damping, which keeps the normal equations of a singular arm solvable and slows no
 #: other down.
-LEAST_DAMPING = 1e-14
+MIN_DAMPING = 1e-14
 # A least singular value of the Jacobian below which solutions may meet close by, the sine of
 # theta5 the same, the farthest twin that is looked for [rad], and the step of a derivative [rad].
 _NEARLY_SINGULAR = 0.05
 _NEARLY_STRAIGHT = 0.1
-_FARTHEST_TWIN = 0.6
+_MAX_TWIN_DISTANCE = 0.6
 _DIFFERENCE = 1e-4
 # Two refined solutions closer than this are one [rad].
 _SAME = 1e-5
 # How near to the pose a seed must be to be a start of its own [m, rad].
-_TRACKING = 0.1
+_NEAR_POSE = 0.1
 # With a solution this near [rad] no other one is looked for around the seed.
-_CLOSE = 0.02
+_CLOSE_TO_SEED = 0.02
 # A start that is farther by this than the best refined solution cannot win [rad]: refinement
 # moves it by the calibration, some hundredths, unless the arm is singular there.
-_HOPELESS = 0.5
+_PRUNING_MARGIN = 0.5
 
 # Solutions this close in the named joints are equally near [rad]: branches that agree in a joint
 # of the ideal arm differ by a few milliradians in it in a calibrated one.
@@ -73,10 +78,10 @@ def solutions(arm: Arm, T_base_flange: Pose, seed: Joints | None = None) -> list
     """
     wrist_3 = 0.0 if seed is None else seed[5]
     if not arm.calibrated:
-        return closed_form(shape_of(arm), T_base_flange, wrist_3)
+        return closed_form(ideal_arm_of(arm), T_base_flange, wrist_3)
     more = [seed] if seed is not None and _is_near(arm.forward(seed), T_base_flange) else []
-    for doubt in DOUBTS:
-        starts = closed_form(shape_of(arm), T_base_flange, wrist_3, doubt)
+    for misfit_factor in MISFIT_FACTORS:
+        starts = closed_form(ideal_arm_of(arm), T_base_flange, wrist_3, misfit_factor)
         found = _refined(arm, T_base_flange, starts + more)
         if found:
             return found
@@ -90,24 +95,24 @@ def nearest(arm: Arm, T_base_flange: Pose, q_near: Joints) -> Joints | None:
     Nearest of all branches and of all full turns of each joint, by the sum of squares.
     """
     best = None
-    for doubt in DOUBTS if arm.calibrated else (0.0,):
-        starts = closed_form(shape_of(arm), T_base_flange, q_near[5], doubt)
+    for misfit_factor in MISFIT_FACTORS if arm.calibrated else (0.0,):
+        starts = closed_form(ideal_arm_of(arm), T_base_flange, q_near[5], misfit_factor)
         best = _nearest_of(arm, T_base_flange, starts, q_near)
         if best is not None:
             break
-    is_close = best is not None and dist(best, q_near) < _CLOSE
+    is_close = best is not None and dist(best, q_near) < _CLOSE_TO_SEED
     if arm.calibrated and not is_close:
         # Near a singularity the starts may have missed the one that is next to q_near.
         more = [] if best is None else _twins(arm, best)
         if _is_near(arm.forward(q_near), T_base_flange):
             more.append(q_near)
         best = _closest(
-            [best, *(_settle(arm, T_base_flange, start, q_near) for start in more)], q_near
+            [best, *(_solve_from(arm, T_base_flange, start, q_near) for start in more)], q_near
         )
     return best
 
 
-def nearest_in(
+def nearest_to_posture(
     arm: Arm, T_base_flange: Pose, named: Mapping[int, float], q_before: Joints
 ) -> Joints | None:
     """
@@ -123,7 +128,7 @@ def nearest_in(
     candidates = [
         q
         for solution in solutions(arm, T_base_flange, wanted)
-        if (q := _turned(solution, wanted, arm.model.position_limits, q_before)) is not None
+        if (q := _nearest_turns(solution, wanted, arm.model.position_limits, q_before)) is not None
     ]
     misses = [hypot(*(q[i] - named[i] for i in named)) for q in candidates]
     bound = min(misses, default=0.0) + _EQUALLY_NEAR
@@ -132,7 +137,7 @@ def nearest_in(
     )
 
 
-def why_unreachable(arm: Arm, T_base_flange: Pose) -> str:
+def explain_unreachable(arm: Arm, T_base_flange: Pose) -> str:
     """
     Return a clause that says why no solution lies within the limits; empty if one does.
 
@@ -140,16 +145,16 @@ def why_unreachable(arm: Arm, T_base_flange: Pose) -> str:
     """
     found = solutions(arm, T_base_flange)
     if found:
-        return _why_outside_limits(found, arm.model.position_limits)
-    shape = shape_of(arm)
-    px, py, _ = wrist_centre(shape, T_base_flange)
-    if hypot(px, py) < shape.d4:
-        value, bound = told_apart(hypot(px, py), shape.d4)
+        return _explain_outside_limits(found, arm.model.position_limits)
+    ideal = ideal_arm_of(arm)
+    px, py, _ = wrist_centre(ideal, T_base_flange)
+    if hypot(px, py) < ideal.d4:
+        value, bound = format_distinct(hypot(px, py), ideal.d4)
         return (
             f'the centre of the wrist would be {value} m from the axis of the base, and it '
             f'cannot come nearer than {bound} m'
         )
-    return _why_no_elbow(shape, T_base_flange)
+    return _explain_no_elbow(ideal, T_base_flange)
 
 
 # --- The calibrated arm ----------------------------------------------------------------------
@@ -181,18 +186,18 @@ def _twins(arm: Arm, q: Joints) -> list[Joints]:
     if sigma[-1] > _NEARLY_SINGULAR:
         return []
     twins = []
-    change = arm.jacobian(_moved(q, v[-1], _DIFFERENCE)) - jacobian
+    change = arm.jacobian(_step_along(q, v[-1], _DIFFERENCE)) - jacobian
     curvature = float(u[:, -1] @ change @ v[-1]) / _DIFFERENCE
-    if 2.0 * sigma[-1] < _FARTHEST_TWIN * abs(curvature):
-        twins.append(_moved(q, v[-1], -2.0 * float(sigma[-1]) / curvature))
-    o5 = shape_of(arm).offsets[4]
+    if 2.0 * sigma[-1] < _MAX_TWIN_DISTANCE * abs(curvature):
+        twins.append(_step_along(q, v[-1], -2.0 * float(sigma[-1]) / curvature))
+    o5 = ideal_arm_of(arm).offsets[4]
     if abs(sin(q[4] + o5)) < _NEARLY_STRAIGHT:
         twins.append((q[0], q[1], q[2], q[3] + pi, -q[4] - 2.0 * o5, q[5] + pi))
     return twins
 
 
-def _moved(q: Joints, direction: NDArray[np.float64], way: float) -> Joints:
-    return _six(a + way * float(b) for a, b in zip(q, direction, strict=True))
+def _step_along(q: Joints, direction: NDArray[np.float64], distance: float) -> Joints:
+    return _six(a + distance * float(b) for a, b in zip(q, direction, strict=True))
 
 
 def _nearest_of(
@@ -201,21 +206,21 @@ def _nearest_of(
     """Return the nearest of the solutions that the starts lead to, refining only the promising."""
     # By the distance without limits, which is never longer than that within them.
     ranked = sorted((_distance_by_turns(q, q_near), q) for q in starts)
-    allowance = _HOPELESS if arm.calibrated else 0.0
-    best, least = None, inf
+    allowance = _PRUNING_MARGIN if arm.calibrated else 0.0
+    best, min_distance = None, inf
     for distance, start in ranked:
-        if distance > least + allowance:
+        if distance > min_distance + allowance:
             break
-        q = _settle(arm, T_base_flange, start, q_near)
-        if q is not None and dist(q, q_near) < least:
-            best, least = q, dist(q, q_near)
+        q = _solve_from(arm, T_base_flange, start, q_near)
+        if q is not None and dist(q, q_near) < min_distance:
+            best, min_distance = q, dist(q, q_near)
     return best
 
 
-def _settle(arm: Arm, T_base_flange: Pose, start: Joints, q_near: Joints) -> Joints | None:
+def _solve_from(arm: Arm, T_base_flange: Pose, start: Joints, q_near: Joints) -> Joints | None:
     """Return the solution that a start leads to, turned towards q_near within the limits."""
     q = _refine(arm, T_base_flange, start) if arm.calibrated else start
-    return None if q is None else _turned(q, q_near, arm.model.position_limits)
+    return None if q is None else _nearest_turns(q, q_near, arm.model.position_limits)
 
 
 def _refine(arm: Arm, T_base_flange: Pose, start: Joints) -> Joints | None:
@@ -254,7 +259,7 @@ def _columns(T_base_flange: Pose) -> tuple[Vector3, Vector3, Vector3]:
 
 
 def _error(
-    frames: Frames, position: Vector3, target: tuple[Vector3, Vector3, Vector3]
+    frames: ChainFrames, position: Vector3, target: tuple[Vector3, Vector3, Vector3]
 ) -> list[float]:
     """Return what lacks to the target: translation [m], and half the sum of axis x target axis."""
     ex = ey = ez = 0.0
@@ -266,18 +271,18 @@ def _error(
     return [x - px, y - py, z - pz, 0.5 * ex, 0.5 * ey, 0.5 * ez]
 
 
-def _step(q: Joints, frames: Frames, error: list[float], square: float) -> Joints:
+def _step(q: Joints, frames: ChainFrames, error: list[float], square: float) -> Joints:
     """Return q + (J'J + square I)^-1 J' error, the largest change limited."""
     jacobian = jacobian_at(frames, frames.position)
     normal = jacobian.T @ jacobian
-    normal.flat[::7] += max(square, LEAST_DAMPING)
+    normal.flat[::7] += max(square, MIN_DAMPING)
     step: list[float] = np.linalg.solve(normal, jacobian.T @ np.array(error)).tolist()
-    scale = min(1.0, _LONGEST_STEP / max(max(step), -min(step), 1e-300))
+    scale = min(1.0, _MAX_JOINT_STEP / max(max(step), -min(step), 1e-300))
     return _six(angle + scale * change for angle, change in zip(q, step, strict=True))
 
 
 def _is_near(T_base_a: Pose, T_base_b: Pose) -> bool:
-    return T_base_a.distance_to(T_base_b) < _TRACKING and T_base_a.angle_to(T_base_b) < _TRACKING
+    return T_base_a.distance_to(T_base_b) < _NEAR_POSE and T_base_a.angle_to(T_base_b) < _NEAR_POSE
 
 
 # --- Angles, turns and distances -------------------------------------------------------------
@@ -302,8 +307,8 @@ def _closest(candidates: Sequence[Joints | None], q_near: Joints) -> Joints | No
     return min(possible, key=lambda q: dist(q, q_near), default=None)
 
 
-def _turned(
-    q: Joints, wanted: Joints, limits: Limits, q_before: Joints | None = None
+def _nearest_turns(
+    q: Joints, wanted: Joints, limits: PositionLimits, q_before: Joints | None = None
 ) -> Joints | None:
     """
     Return q with each joint turned as near to ``wanted`` as its limits allow, or None.
@@ -312,7 +317,7 @@ def _turned(
     """
     turned = []
     for joint, (angle, target, (low, high)) in enumerate(zip(q, wanted, limits, strict=True)):
-        best = _turn(angle, target, low, high)
+        best = _nearest_turn(angle, target, low, high)
         if best is None:
             return None
         if q_before is not None and abs(abs(best - target) - pi) < _EQUALLY_NEAR:
@@ -324,7 +329,7 @@ def _turned(
     return _six(iter(turned))
 
 
-def _turn(angle: float, target: float, low: float, high: float) -> float | None:
+def _nearest_turn(angle: float, target: float, low: float, high: float) -> float | None:
     """Return the angle plus the full turns that bring it nearest to the target, or None."""
     turned = angle + tau * round((target - angle) / tau)
     if turned > high + _LIMIT_ROUNDING:
@@ -341,7 +346,7 @@ def _turn(angle: float, target: float, low: float, high: float) -> float | None:
 # --- Reasons ---------------------------------------------------------------------------------
 
 
-def told_apart(value: float, bound: float) -> tuple[str, str]:
+def format_distinct(value: float, bound: float) -> tuple[str, str]:
     """Return both numbers with as few digits, four at the least, as tell one from the other."""
     if abs(value) >= 1e4:
         return f'{value:.4g}', f'{bound:.4f}'
@@ -349,43 +354,43 @@ def told_apart(value: float, bound: float) -> tuple[str, str]:
     return f'{value:.{digits}f}', f'{bound:.{digits}f}'
 
 
-def _why_no_elbow(shape: Shape, T_base_flange: Pose) -> str:
-    distances = [hypot(wrist.outward, wrist.up) for wrist in wrists(shape, T_base_flange)]
+def _explain_no_elbow(ideal: IdealArm, T_base_flange: Pose) -> str:
+    distances = [hypot(wrist.outward, wrist.up) for wrist in wrist_solutions(ideal, T_base_flange)]
     if not distances:  # a calibrated arm within its misfit of the inner cylinder
-        return f'the centre of the wrist cannot come nearer than {shape.d4:.4f} m to the base axis'
-    longest, shortest = abs(shape.a2 + shape.a3), abs(shape.a2 - shape.a3)
+        return f'the centre of the wrist cannot come nearer than {ideal.d4:.4f} m to the base axis'
+    longest, shortest = abs(ideal.a2 + ideal.a3), abs(ideal.a2 - ideal.a3)
     nearest_to_reach = min(distances, key=lambda r: max(r - longest, shortest - r))
     if nearest_to_reach < 0.5 * (longest + shortest):
-        value, bound = told_apart(nearest_to_reach, shortest)
+        value, bound = format_distinct(nearest_to_reach, shortest)
         return (
             f'wrist 1 would be {value} m from the shoulder, and the folded arm comes no '
             f'nearer than {bound} m'
         )
-    value, bound = told_apart(nearest_to_reach, longest)
+    value, bound = format_distinct(nearest_to_reach, longest)
     return (
         f'wrist 1 would be {value} m from the shoulder, and upper arm and forearm together '
         f'reach {bound} m'
     )
 
 
-def _why_outside_limits(found: list[Joints], limits: Limits) -> str:
+def _explain_outside_limits(found: list[Joints], limits: PositionLimits) -> str:
     """Name the joint of the solution that misses its limits least, or return nothing."""
     worst = [max(_outside(q, limits)) for q in found]
     excess, joint, angle = min(worst)
     if excess <= 0.0:
         return ''
     low, high = limits[joint]
-    value, _ = told_apart(angle, low if angle < low else high)
+    value, _ = format_distinct(angle, low if angle < low else high)
     return (
         f'{JOINT_NAMES[joint]} would be at {value} rad, and its limits are {low:.4f} to '
         f'{high:.4f} rad'
     )
 
 
-def _outside(q: Joints, limits: Limits) -> Iterator[tuple[float, int, float]]:
+def _outside(q: Joints, limits: PositionLimits) -> Iterator[tuple[float, int, float]]:
     """Give for each joint how far it is outside its limits at the best turn [rad], and where."""
     for joint, (angle, (low, high)) in enumerate(zip(q, limits, strict=True)):
-        if _turn(angle, 0.0, low, high) is not None:
+        if _nearest_turn(angle, 0.0, low, high) is not None:
             yield 0.0, joint, angle
         else:
             middle = 0.5 * (low + high)

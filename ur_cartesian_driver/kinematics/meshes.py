@@ -4,7 +4,7 @@
 Exact distances between the links of a UR3, UR5 or UR10, from the manufacturer's meshes.
 
 The meshes are those of the package example-robot-data, pinocchio measures between them. Both are
-optional; without them the capsules of :mod:`~.bodies` have the last word. e-Series arms have
+optional; without them the capsules of :mod:`~.collision_bodies` decide. e-Series arms have
 another shape, so they have no meshes here.
 
 The meshes are put on the axes of our own kinematics, so that a calibrated arm carries them where
@@ -23,14 +23,14 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.bodies import Link
 from ur_cartesian_driver.kinematics.chain import Arm, pinocchio_model
+from ur_cartesian_driver.kinematics.collision_bodies import Link
 
 Floats: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
 
 #: The models that have meshes.
-WITH_MESHES = ('ur3', 'ur5', 'ur10')
+MODELS_WITH_MESHES = ('ur3', 'ur5', 'ur10')
 
 _DESCRIPTION = Path('example-robot-data', 'robots', 'ur_description', 'urdf')
 #: In the robot description, by link.
@@ -45,7 +45,7 @@ _FRAMES = (
 )
 
 
-class Meshes:
+class CollisionMeshes:
     """The meshes of one arm, on its axes. Not for two threads at once."""
 
     def __init__(self, arm: Arm) -> None:
@@ -56,7 +56,7 @@ class Meshes:
         :raises ImportError: pinocchio is not installed.
         :raises FileNotFoundError: example-robot-data is not installed.
         """
-        if arm.model.name not in WITH_MESHES:
+        if arm.model.name not in MODELS_WITH_MESHES:
             raise ValueError(f'There are no meshes of a {arm.model.name}.')
         self._model = pinocchio_model(arm)
         import pinocchio
@@ -65,7 +65,7 @@ class Meshes:
         self._geometry = pinocchio.GeometryModel()
         zero = np.zeros(6)
         pinocchio.forwardKinematics(self._model, self._data, zero)
-        for link, (shape, T_base_link) in enumerate(_described(arm.model.name)):
+        for link, (shape, T_base_link) in enumerate(_load_meshes(arm.model.name)):
             T_base_joint = self._data.oMi[link]
             self._geometry.addGeometryObject(
                 pinocchio.GeometryObject(
@@ -77,12 +77,12 @@ class Meshes:
             for b in range(a + 1, len(_FRAMES)):
                 self._pairs[Link(a), Link(b)] = len(self._pairs)
                 self._geometry.addCollisionPair(pinocchio.CollisionPair(a, b))
-        self._placed = pinocchio.GeometryData(self._geometry)
+        self._placement = pinocchio.GeometryData(self._geometry)
 
     @classmethod
-    def of(cls, arm: Arm) -> Meshes | None:
+    def of(cls, arm: Arm) -> CollisionMeshes | None:
         """Return the meshes of an arm, None where there are none or what they need is missing."""
-        if arm.model.name not in WITH_MESHES:
+        if arm.model.name not in MODELS_WITH_MESHES:
             return None
         try:
             return cls(arm)
@@ -100,8 +100,8 @@ class Meshes:
         index = self._pairs[pair]
         result = np.empty(len(q))
         for row, joints in enumerate(q):
-            self._place(joints)
-            found = self._pinocchio.computeDistance(self._geometry, self._placed, index)
+            self._update_placement(joints)
+            found = self._pinocchio.computeDistance(self._geometry, self._placement, index)
             result[row] = max(0.0, found.min_distance)
         return result
 
@@ -114,59 +114,62 @@ class Meshes:
         :returns: (n,) whether they are, and (n,) a lower bound of the distance where not [m].
         """
         index = self._pairs[pair]
-        self._placed.collisionRequests[index].security_margin = bound
-        near, least = np.zeros(len(q), dtype=np.bool_), np.zeros(len(q))
+        self._placement.collisionRequests[index].security_margin = bound
+        near, lower_bounds = np.zeros(len(q), dtype=np.bool_), np.zeros(len(q))
         for row, joints in enumerate(q):
-            self._place(joints)
-            near[row] = self._pinocchio.computeCollision(self._geometry, self._placed, index)
+            self._update_placement(joints)
+            near[row] = self._pinocchio.computeCollision(self._geometry, self._placement, index)
             # It counts from the bound.
-            least[row] = bound + max(
-                0.0, self._placed.collisionResults[index].distance_lower_bound
+            lower_bounds[row] = bound + max(
+                0.0, self._placement.collisionResults[index].distance_lower_bound
             )
-        return near, least
+        return near, lower_bounds
 
     def T_base_meshes(self, q: Floats) -> Floats:
         """Return where the meshes of all links are at joints (6,) [rad]: matrices (7, 4, 4)."""
-        self._place(q)
-        return np.array([T.homogeneous for T in self._placed.oMg])
+        self._update_placement(q)
+        return np.array([T.homogeneous for T in self._placement.oMg])
 
-    def _place(self, q: Floats) -> None:
+    def _update_placement(self, q: Floats) -> None:
         self._pinocchio.updateGeometryPlacements(
-            self._model, self._data, self._geometry, self._placed, q
+            self._model, self._data, self._geometry, self._placement, q
         )
 
 
 @lru_cache
-def _described(name: str) -> list[tuple[Any, Any]]:
+def _load_meshes(name: str) -> list[tuple[Any, Any]]:
     """Return shape and place (in base, all joints at 0) of each link's mesh."""
     import pinocchio
 
-    share = _share()
+    share = _find_share()
     urdf = str(share / _DESCRIPTION / f'{name}_robot.urdf')
     model = pinocchio.buildModelFromUrdf(urdf)
     geometry = pinocchio.buildGeomFromUrdf(
         model, urdf, pinocchio.GeometryType.COLLISION, package_dirs=[str(share)]
     )
-    data, placed = model.createData(), pinocchio.GeometryData(geometry)
-    pinocchio.updateGeometryPlacements(model, data, geometry, placed, np.zeros(6))
+    data, placement = model.createData(), pinocchio.GeometryData(geometry)
+    pinocchio.updateGeometryPlacements(model, data, geometry, placement, np.zeros(6))
     pinocchio.updateFramePlacements(model, data)
     T_world_base = data.oMf[model.getFrameId('base')]
     found = []
     for frame in _FRAMES:
         index = geometry.getGeometryId(f'{frame}_0')
         found.append(
-            (geometry.geometryObjects[index].geometry, T_world_base.inverse() * placed.oMg[index])
+            (
+                geometry.geometryObjects[index].geometry,
+                T_world_base.inverse() * placement.oMg[index],
+            )
         )
     return found
 
 
-def _share() -> Path:
+def _find_share() -> Path:
     """
     Return the directory that holds example-robot-data.
 
     :raises FileNotFoundError: there is none.
     """
-    for share in _candidates():
+    for share in _share_candidates():
         if (share / _DESCRIPTION).is_dir():
             return share
     raise FileNotFoundError(
@@ -174,7 +177,7 @@ def _share() -> Path:
     )
 
 
-def _candidates() -> Iterator[Path]:
+def _share_candidates() -> Iterator[Path]:
     """Return where wheels and ROS installations keep shared files."""
     import pinocchio
 

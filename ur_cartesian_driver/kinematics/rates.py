@@ -14,19 +14,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.chain import Arm, FramesOf, jacobian_at
+from ur_cartesian_driver.kinematics.chain import Arm, ChainFramesOf, jacobian_at
 from ur_cartesian_driver.motion.pose import Pose
 
 Floats = NDArray[np.float64]
 
 # Far below the least singular value of an arm that may move.
-_LEAST = 1e-12
+_MIN_SINGULAR_VALUE = 1e-12
 
 
-class _Motion(NamedTuple):
+class _Jacobians(NamedTuple):
     """Of rows of joint positions: frames, Jacobians (n, 6, 6), and the TCP (3, n) [m]."""
 
-    frames: FramesOf[Floats]
+    frames: ChainFramesOf[Floats]
     jacobian: Floats
     tcp: Floats
 
@@ -41,11 +41,11 @@ def joint_rates(
     :param twist: (n, 6) of the TCP in base axes [m/s], [rad/s].
     :param acceleration: (n, 6) [m/s^2], [rad/s^2].
     """
-    at = _motion(arm, T_flange_tcp, q)
+    at = _jacobians(arm, T_flange_tcp, q)
     # An arm that leaves a singularity at rest shall not be divided by zero.
-    inverse = np.linalg.inv(at.jacobian + _LEAST * np.eye(6))
+    inverse = np.linalg.inv(at.jacobian + _MIN_SINGULAR_VALUE * np.eye(6))
     qd: Floats = (inverse @ twist[:, :, None])[:, :, 0]
-    rest = acceleration - _even(at, qd)
+    rest = acceleration - _bias_acceleration(at, qd)
     return qd, (inverse @ rest[:, :, None])[:, :, 0]
 
 
@@ -53,12 +53,12 @@ def tool_rates(
     arm: Arm, T_flange_tcp: Pose, q: Floats, qd: Floats, qdd: Floats
 ) -> tuple[Floats, Floats]:
     """Return twist and acceleration (n, 6) of the TCP in base axes; as :func:`joint_rates`."""
-    at = _motion(arm, T_flange_tcp, q)
+    at = _jacobians(arm, T_flange_tcp, q)
     twist: Floats = (at.jacobian @ qd[:, :, None])[:, :, 0]
-    return twist, (at.jacobian @ qdd[:, :, None])[:, :, 0] + _even(at, qd)
+    return twist, (at.jacobian @ qdd[:, :, None])[:, :, 0] + _bias_acceleration(at, qd)
 
 
-def _motion(arm: Arm, T_flange_tcp: Pose, q: Floats) -> _Motion:
+def _jacobians(arm: Arm, T_flange_tcp: Pose, q: Floats) -> _Jacobians:
     frames = arm.frames_rows(q)
     x, y, z = T_flange_tcp.position
     tcp = (
@@ -68,10 +68,10 @@ def _motion(arm: Arm, T_flange_tcp: Pose, q: Floats) -> _Motion:
         + z * np.array(frames.z)
     )
     jacobian = jacobian_at(frames, (tcp[0], tcp[1], tcp[2]))
-    return _Motion(frames, jacobian, tcp)
+    return _Jacobians(frames, jacobian, tcp)
 
 
-def _even(at: _Motion, qd: Floats) -> Floats:
+def _bias_acceleration(at: _Jacobians, qd: Floats) -> Floats:
     """
     Return J' q' (n, 6): the acceleration of the TCP while the joint velocities stay.
 

@@ -33,7 +33,7 @@ from typing import TypeAlias
 
 from ur_cartesian_driver.motion.pose import Vector6
 
-Limits: TypeAlias = tuple[tuple[float, float], ...]
+PositionLimits: TypeAlias = tuple[tuple[float, float], ...]
 
 #: The joints in the order of the kinematic chain, named as the UR ROS 2 driver names them.
 JOINT_NAMES = (
@@ -50,7 +50,7 @@ _ALPHA: Vector6 = (pi / 2, 0.0, 0.0, pi / 2, -pi / 2, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Geometry:
+class DhTable:
     """
     A Denavit-Hartenberg table: a, d [m], alpha, theta [rad], one number for each joint.
 
@@ -75,7 +75,7 @@ class Geometry:
         """Return the four columns by name."""
         return {'a': self.a, 'd': self.d, 'alpha': self.alpha, 'theta': self.theta}
 
-    def difference(self, other: Geometry) -> float:
+    def difference(self, other: DhTable) -> float:
         """Return the largest difference of any number of the two tables [m or rad]."""
         return max(
             abs(mine - theirs)
@@ -92,9 +92,9 @@ class RobotModel:
     #: Generation of the controller: ``CB3``, ``e`` or ``UR``.
     series: str
     #: The nominal table.
-    geometry: Geometry
+    geometry: DhTable
     #: Lowest and highest position of each joint [rad], infinite where it turns without end.
-    position_limits: Limits
+    position_limits: PositionLimits
     #: [rad/s]. For ur15, ur18 and ur8long nothing is published: they are given the values of the
     #: ur20, which are the lowest of the series.
     max_joint_speed: Vector6
@@ -103,13 +103,13 @@ class RobotModel:
     #: [kg]
     payload: float
     #: As in the data sheet, from the shoulder to the centre of the wrist [m].
-    reach: float
+    max_reach: float
     #: The robot type in the configuration data of the primary interface.
     wire_type: int
 
 
-def _lengths(d1: float, a2: float, a3: float, d4: float, d5: float, d6: float) -> Geometry:
-    return Geometry(a=(0.0, a2, a3, 0.0, 0.0, 0.0), d=(d1, 0.0, 0.0, d4, d5, d6))
+def _lengths(d1: float, a2: float, a3: float, d4: float, d5: float, d6: float) -> DhTable:
+    return DhTable(a=(0.0, a2, a3, 0.0, 0.0, 0.0), d=(d1, 0.0, 0.0, d4, d5, d6))
 
 
 def _degrees(j1: float, j2: float, j3: float, wrist: float) -> Vector6:
@@ -121,8 +121,8 @@ def _torques(j1: float, j2: float, j3: float, wrist: float) -> Vector6:
 
 
 _TURN = (-2 * pi, 2 * pi)
-_LIMITS: Limits = (_TURN,) * 6
-_ENDLESS_WRIST: Limits = (_TURN,) * 5 + ((-inf, inf),)
+_LIMITS: PositionLimits = (_TURN,) * 6
+_ENDLESS_WRIST: PositionLimits = (_TURN,) * 5 + ((-inf, inf),)
 
 # Joint speeds: shoulder pan, shoulder lift, elbow, each wrist joint [degrees/s].
 _SPEED_3 = _degrees(180, 180, 180, 360)
@@ -190,10 +190,10 @@ MODELS: Mapping[str, RobotModel] = MappingProxyType(
             max_joint_speed=speed,
             max_joint_torque=torque,
             payload=payload,
-            reach=reach,
+            max_reach=max_reach,
             wire_type=wire_type,
         )
-        for name, series, geometry, limits, speed, torque, payload, reach, wire_type in _TABLE
+        for name, series, geometry, limits, speed, torque, payload, max_reach, wire_type in _TABLE
     }
 )
 

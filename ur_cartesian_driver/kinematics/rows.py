@@ -20,44 +20,44 @@ from math import tau
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.chain import Arm, FramesOf, jacobian_at
+from ur_cartesian_driver.kinematics.chain import Arm, ChainFramesOf, jacobian_at
 from ur_cartesian_driver.kinematics.closed_form import root_slack
 from ur_cartesian_driver.kinematics.closed_form_rows import (
     all_branch_rows,
-    Branch,
     branch_rows,
     BRANCHES,
+    BranchMeasures,
+    BranchSolution,
     Flags,
     Floats,
-    Posture,
-    posture,
-    Targets,
-    wrapped,
+    ideal_branch_measures,
+    TargetPoses,
+    wrap_rows,
 )
-from ur_cartesian_driver.kinematics.inverse import DOUBTS, LEAST_DAMPING, nearest, solutions
-from ur_cartesian_driver.kinematics.shape import shape_of
+from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
+from ur_cartesian_driver.kinematics.inverse import MIN_DAMPING, MISFIT_FACTORS, nearest, solutions
 from ur_cartesian_driver.motion.pose import pose_from_row
 from ur_cartesian_driver.motion.primitive import Joints
 
 # Rows solved together: as many as have their numbers in the cache of a core.
 _BLOCK = 1024
 # Rows that are tried after one at which the branch had to be searched for; then ever more.
-_FIRST_BLOCK = 16
+_MIN_BLOCK = 16
 
 # Newton: the sum of the squares of metres and radians that counts as exact.
 _EXACT = 1e-21
-_LONGEST_STEP = 0.5
+_MAX_JOINT_STEP = 0.5
 # Steps from a solution of the ideal arm: two suffice but next to singularities.
 _STEPS = 3
 # A solution of the real arm this far from that of the ideal one [rad] may belong to another.
-_MOVED = 0.05
+_MAX_CALIBRATION_SHIFT = 0.05
 # Branches of the ideal arm this close may be exchanged in the real one [rad].
-_CONFUSED = 4.0 * _MOVED
+_AMBIGUOUS_SEPARATION = 4.0 * _MAX_CALIBRATION_SHIFT
 _LIMIT_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Branches:
+class BranchSolutions:
     """All solutions of many poses."""
 
     #: (n, 8, 6) [rad], within (-pi, pi]; NaN where there is none. The second index is the branch
@@ -68,7 +68,7 @@ class Branches:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class JointPath:
+class PathSolution:
     """The joint positions of an arm that follows a path."""
 
     #: (n, 6) [rad], NaN where no solution lies within the limits.
@@ -80,15 +80,15 @@ class JointPath:
     step: Floats
 
 
-def postures(arm: Arm, q: Floats) -> Posture:
+def branch_measures(arm: Arm, q: Floats) -> BranchMeasures:
     """Return the branch, and the distance from each singularity, of joint rows (n, 6)."""
-    return posture(shape_of(arm), q)
+    return ideal_branch_measures(ideal_arm_of(arm), q)
 
 
 # --- All branches ----------------------------------------------------------------------------
 
 
-def branches(arm: Arm, poses: Floats, wrist_3: float = 0.0) -> Branches:
+def all_solutions(arm: Arm, poses: Floats, wrist_3: float = 0.0) -> BranchSolutions:
     """
     Return all solutions of each pose, whatever the limits are: those of ``solutions``.
 
@@ -103,53 +103,57 @@ def branches(arm: Arm, poses: Floats, wrist_3: float = 0.0) -> Branches:
         rows = slice(begin, begin + _BLOCK)
         q[rows], exists[rows] = _branches(arm, poses[rows], wrist_3)
     q[~exists] = np.nan
-    return Branches(q=q, exists=exists)
+    return BranchSolutions(q=q, exists=exists)
 
 
 def _branches(arm: Arm, poses: Floats, wrist_3: float) -> tuple[Floats, Flags]:
-    targets = Targets.of(poses)
-    found = list(all_branch_rows(shape_of(arm), targets, wrist_3))
+    targets = TargetPoses.of(poses)
+    found = list(all_branch_rows(ideal_arm_of(arm), targets, wrist_3))
     q = np.stack([branch.q.T for branch in found], axis=1)
-    exists = np.stack([branch.exists & ~branch.repeats for branch in found], axis=1)
+    exists = np.stack([branch.exists & ~branch.is_duplicate for branch in found], axis=1)
     if arm.calibrated:
-        sound = _sound(arm, targets, q, found)
+        sound = _is_reliable(arm, targets, q, found)
         for i in range(len(BRANCHES)):
             rows = np.flatnonzero(sound & exists[:, i])
             refined, exact = refine(arm, targets.rows(rows), q[rows, i])
-            sound[rows] &= exact & (_largest(refined - q[rows, i]) < _MOVED)
+            sound[rows] &= exact & (
+                _max_joint_change(refined - q[rows, i]) < _MAX_CALIBRATION_SHIFT
+            )
             q[rows, i] = refined
         for row in np.flatnonzero(~sound):
-            q[row], exists[row] = _searched(arm, poses[row], wrist_3)
-    return wrapped(q), exists
+            q[row], exists[row] = _search_single(arm, poses[row], wrist_3)
+    return wrap_rows(q), exists
 
 
-def _sound(arm: Arm, targets: Targets, q: Floats, found: list[Branch]) -> Flags:
+def _is_reliable(arm: Arm, targets: TargetPoses, q: Floats, found: list[BranchSolution]) -> Flags:
     """Tell of which poses the ideal arm's branches are certain to be the real one's."""
-    shape = shape_of(arm)
+    ideal = ideal_arm_of(arm)
     sound: Flags = np.logical_or.reduce([branch.exists for branch in found])
-    possible = all_branch_rows(shape, targets, slack=root_slack(shape, DOUBTS[0]))
+    possible = all_branch_rows(ideal, targets, slack=root_slack(ideal, MISFIT_FACTORS[0]))
     for i, (branch, doubtful) in enumerate(zip(found, possible, strict=True)):
-        straight = np.abs(posture(shape, q[:, i]).wrist) < _CONFUSED
-        certain = branch.exists & (branch.apart > _CONFUSED) & ~straight
+        straight = np.abs(ideal_branch_measures(ideal, q[:, i]).wrist) < _AMBIGUOUS_SEPARATION
+        certain = branch.exists & (branch.separation > _AMBIGUOUS_SEPARATION) & ~straight
         sound = sound & (certain | ~doubtful.exists)
     return sound
 
 
-def _searched(arm: Arm, pose: Floats, wrist_3: float) -> tuple[Floats, Flags]:
+def _search_single(arm: Arm, pose: Floats, wrist_3: float) -> tuple[Floats, Flags]:
     """Put the solutions of a single pose into the places of their branches, if these are free."""
     q, exists = np.full((len(BRANCHES), 6), np.nan), np.zeros(len(BRANCHES), dtype=np.bool_)
     single = solutions(arm, pose_from_row(pose), (0.0,) * 5 + (wrist_3,))[: len(BRANCHES)]
     found = np.array(single).reshape(-1, 6)
-    for solution, branch in zip(found, postures(arm, found).branch, strict=True):
-        place = int(branch) if not exists[branch] else int(np.flatnonzero(~exists)[0])
-        q[place], exists[place] = solution, True
+    for solution, branch in zip(found, branch_measures(arm, found).branch, strict=True):
+        slot = int(branch) if not exists[branch] else int(np.flatnonzero(~exists)[0])
+        q[slot], exists[slot] = solution, True
     return q, exists
 
 
 # --- Along a path ----------------------------------------------------------------------------
 
 
-def follow(arm: Arm, poses: Floats, q_start: Joints, *, over_gaps: bool = True) -> JointPath:
+def solve_path(
+    arm: Arm, poses: Floats, q_start: Joints, *, skip_gaps: bool = True
+) -> PathSolution:
     """
     Return the joint positions along a path, each the nearest to those of the row before.
 
@@ -162,39 +166,45 @@ def follow(arm: Arm, poses: Floats, q_start: Joints, *, over_gaps: bool = True) 
         each such row takes some milliseconds.
     """
     q = np.full((len(poses), 6), np.nan)
-    before, row, block, singly = q_start, 0, _BLOCK, 1
+    before, row, block, single_count = q_start, 0, _BLOCK, 1
     while row < len(poses):
-        ahead = _ahead(arm, poses[row : row + block], before)
-        if len(ahead):
-            q[row : row + len(ahead)] = ahead
-            row, before, singly = row + len(ahead), _joints(ahead[-1]), 1
-        if len(ahead) == block:
+        solved = _solve_certain(arm, poses[row : row + block], before)
+        if len(solved):
+            q[row : row + len(solved)] = solved
+            row, before, single_count = row + len(solved), _joints(solved[-1]), 1
+        if len(solved) == block:
             block = min(2 * block, _BLOCK)
             continue
-        for index in range(row, min(row + singly, len(poses))):
+        for index in range(row, min(row + single_count, len(poses))):
             solution = nearest(arm, pose_from_row(poses[index]), before)
             if solution is not None:
                 q[index] = before = solution
-            elif not over_gaps:
-                return _path(q, q_start)
+            elif not skip_gaps:
+                return _path_solution(q, q_start)
         # Of a long stretch that is not certain few rows are tried in vain.
-        row, block, singly = row + singly, _FIRST_BLOCK, min(2 * singly, _FIRST_BLOCK)
-    return _path(q, q_start)
+        row, block, single_count = (
+            row + single_count,
+            _MIN_BLOCK,
+            min(2 * single_count, _MIN_BLOCK),
+        )
+    return _path_solution(q, q_start)
 
 
-def _path(q: Floats, q_start: Joints) -> JointPath:
+def _path_solution(q: Floats, q_start: Joints) -> PathSolution:
     found = ~np.isnan(q[:, 0])
-    return JointPath(q=q, found=found, step=_steps(q, found, q_start))
+    return PathSolution(q=q, found=found, step=_steps(q, found, q_start))
 
 
-def _ahead(arm: Arm, poses: Floats, before: Joints) -> Floats:
+def _solve_certain(arm: Arm, poses: Floats, before: Joints) -> Floats:
     """Return the joints of the rows that are certain to stay on the branch they are on."""
     start = np.array([before])
-    signs = BRANCHES[int(postures(arm, start).branch[0])]
-    q, room = _on_branch(arm, Targets.of(poses), signs)
-    way = np.concatenate([start, q])
-    way = way - tau * np.cumsum(np.rint(np.diff(way, axis=0, prepend=start) / tau), axis=0)
-    q, certain = _certain(arm, way[1:], way[:-1], room)
+    signs = BRANCHES[int(branch_measures(arm, start).branch[0])]
+    q, max_step = _on_branch(arm, TargetPoses.of(poses), signs)
+    unwrapped = np.concatenate([start, q])
+    unwrapped = unwrapped - tau * np.cumsum(
+        np.rint(np.diff(unwrapped, axis=0, prepend=start) / tau), axis=0
+    )
+    q, certain = _within_limits(arm, unwrapped[1:], unwrapped[:-1], max_step)
     return q if certain.all() else q[: int(np.argmin(certain))]
 
 
@@ -210,36 +220,38 @@ def nearest_rows(arm: Arm, poses: Floats, q_near: Floats) -> Floats:
     """
     found = np.full((len(poses), 6), np.nan)
     certain = np.zeros(len(poses), dtype=np.bool_)
-    numbers = postures(arm, q_near).branch
+    numbers = branch_measures(arm, q_near).branch
     for number in np.unique(numbers):
         rows = np.flatnonzero(numbers == number)
-        q, room = _on_branch(arm, Targets.of(poses[rows]), BRANCHES[int(number)])
+        q, max_step = _on_branch(arm, TargetPoses.of(poses[rows]), BRANCHES[int(number)])
         q = q - tau * np.rint((q - q_near[rows]) / tau)
-        found[rows], certain[rows] = _certain(arm, q, q_near[rows], room)
+        found[rows], certain[rows] = _within_limits(arm, q, q_near[rows], max_step)
     for row in np.flatnonzero(~certain):
         solution = nearest(arm, pose_from_row(poses[row]), _joints(q_near[row]))
         found[row] = np.nan if solution is None else solution
     return found
 
 
-def _on_branch(arm: Arm, targets: Targets, signs: tuple[int, int, int]) -> tuple[Floats, Floats]:
+def _on_branch(
+    arm: Arm, targets: TargetPoses, signs: tuple[int, int, int]
+) -> tuple[Floats, Floats]:
     """Return one branch (n, 6) and half its distance to the next (n,), negative if unsure."""
-    branch = branch_rows(shape_of(arm), targets, signs)
-    q, room = branch.q.T, 0.5 * branch.apart
+    branch = branch_rows(ideal_arm_of(arm), targets, signs)
+    q, max_step = branch.q.T, 0.5 * branch.separation
     sound = branch.exists
     if arm.calibrated:
         refined, exact = refine(arm, targets, q)
-        sound = sound & exact & (_largest(refined - q) < _MOVED)
-        q, room = refined, room - 0.5 * _CONFUSED
-    return q, np.where(sound, room, -1.0)
+        sound = sound & exact & (_max_joint_change(refined - q) < _MAX_CALIBRATION_SHIFT)
+        q, max_step = refined, max_step - 0.5 * _AMBIGUOUS_SEPARATION
+    return q, np.where(sound, max_step, -1.0)
 
 
-def _certain(arm: Arm, q: Floats, q_near: Floats, room: Floats) -> tuple[Floats, Flags]:
+def _within_limits(arm: Arm, q: Floats, q_near: Floats, max_step: Floats) -> tuple[Floats, Flags]:
     """Return the rows put within the limits, and which are certain to be the nearest ones."""
     # Triangle inequality: of two branches that are `apart` now, the one within half of that from
     # where the arm was is the nearer one.
     change = q - q_near
-    certain = np.einsum('ij,ij->i', change, change) < np.copysign(room * room, room)
+    certain = np.einsum('ij,ij->i', change, change) < np.copysign(max_step * max_step, max_step)
     low, high = np.array(arm.model.position_limits).T
     inside = (q >= low - _LIMIT_ROUNDING) & (q <= high + _LIMIT_ROUNDING)
     clipped: Floats = np.clip(q, low, high)
@@ -248,11 +260,11 @@ def _certain(arm: Arm, q: Floats, q_near: Floats, room: Floats) -> tuple[Floats,
 
 def _steps(q: Floats, found: Flags, q_start: Joints) -> Floats:
     steps = np.full(len(q), np.nan)
-    steps[found] = _largest(np.diff(q[found], axis=0, prepend=np.array([q_start])))
+    steps[found] = _max_joint_change(np.diff(q[found], axis=0, prepend=np.array([q_start])))
     return steps
 
 
-def _largest(changes: Floats) -> Floats:
+def _max_joint_change(changes: Floats) -> Floats:
     largest: Floats = np.abs(changes).max(axis=1, initial=0.0)
     return largest
 
@@ -265,7 +277,7 @@ def _joints(row: Floats) -> Joints:
 # --- The calibrated arm ----------------------------------------------------------------------
 
 
-def refine(arm: Arm, targets: Targets, q: Floats, steps: int = _STEPS) -> tuple[Floats, Flags]:
+def refine(arm: Arm, targets: TargetPoses, q: Floats, steps: int = _STEPS) -> tuple[Floats, Flags]:
     """
     Return the joint positions that Newton's method finds from ``q``, and which are exact.
 
@@ -292,7 +304,7 @@ def refine(arm: Arm, targets: Targets, q: Floats, steps: int = _STEPS) -> tuple[
     return q, exact
 
 
-def _errors(frames: FramesOf[Floats], targets: Targets) -> tuple[Floats, Flags]:
+def _errors(frames: ChainFramesOf[Floats], targets: TargetPoses) -> tuple[Floats, Flags]:
     """Return what lacks to the targets (6, n), as for a single pose, and whether they face it."""
     r = targets.rotation
     turn, cosines = np.zeros((3, len(r[0]))), np.zeros(len(r[0]))
@@ -306,13 +318,15 @@ def _errors(frames: FramesOf[Floats], targets: Targets) -> tuple[Floats, Flags]:
     return np.concatenate([shift, 0.5 * turn]), cosines > 1.0
 
 
-def _newton(frames: FramesOf[Floats], errors: Floats, squares: Floats) -> Floats:
+def _newton(frames: ChainFramesOf[Floats], errors: Floats, squares: Floats) -> Floats:
     """Return (J'J + square I)^-1 J' error (n, 6), the largest change of each row limited."""
     jacobian = jacobian_at(frames, frames.position)
     transposed = jacobian.transpose(0, 2, 1)
     normal = transposed @ jacobian
-    normal[:, range(6), range(6)] += np.maximum(squares, LEAST_DAMPING)[:, None]
+    normal[:, range(6), range(6)] += np.maximum(squares, MIN_DAMPING)[:, None]
     gradient = transposed @ errors.T[:, :, None]
     change: Floats = np.linalg.solve(normal, gradient)[:, :, 0].astype(np.float64)
-    change *= np.minimum(1.0, _LONGEST_STEP / np.maximum(_largest(change), 1e-300))[:, None]
+    change *= np.minimum(1.0, _MAX_JOINT_STEP / np.maximum(_max_joint_change(change), 1e-300))[
+        :, None
+    ]
     return change

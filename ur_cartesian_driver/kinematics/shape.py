@@ -20,8 +20,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.chain import Arm, Frames
-from ur_cartesian_driver.kinematics.robots import Geometry
+from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames
+from ur_cartesian_driver.kinematics.robots import DhTable
 from ur_cartesian_driver.motion.pose import (
     conjugate,
     multiply,
@@ -35,7 +35,7 @@ _ITERATIONS = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class IdealArm:
     """Lengths [m] of an ideal arm, and what its joints show more than the real ones [rad]."""
 
     d1: float
@@ -50,7 +50,7 @@ class Shape:
 
 
 @lru_cache(maxsize=64)
-def shape_of(arm: Arm) -> Shape:
+def ideal_arm_of(arm: Arm) -> IdealArm:
     """Return the ideal arm most like this one; for a nominal arm that is the arm itself."""
     lengths = _nominal_lengths(arm)
     offsets = np.zeros(6)
@@ -59,7 +59,7 @@ def shape_of(arm: Arm) -> Shape:
         lengths, offsets, misfit = _fit(arm, lengths)
     d1, a2, a3, d4, d5, d6 = (float(v) for v in lengths)
     o1, o2, o3, o4, o5, o6 = (float(v) for v in offsets)
-    return Shape(d1, a2, a3, d4, d5, d6, (o1, o2, o3, o4, o5, o6), misfit)
+    return IdealArm(d1, a2, a3, d4, d5, d6, (o1, o2, o3, o4, o5, o6), misfit)
 
 
 def _nominal_lengths(arm: Arm) -> NDArray[np.float64]:
@@ -76,7 +76,7 @@ def _fit(
     offsets = np.zeros(6)
     misfit = 0.0
     for _ in range(_ITERATIONS):
-        ideal = _ideal_arm(arm, lengths)
+        ideal = _arm_with_lengths(arm, lengths)
         frames = [ideal.frames(q + offsets) for q in samples]
         rows = np.concatenate([_derivatives(f) for f in frames])
         errors = np.concatenate(
@@ -92,12 +92,12 @@ def _fit(
     return lengths, offsets, misfit
 
 
-def _ideal_arm(arm: Arm, lengths: NDArray[np.float64]) -> Arm:
+def _arm_with_lengths(arm: Arm, lengths: NDArray[np.float64]) -> Arm:
     d1, a2, a3, d4, d5, d6 = (float(v) for v in lengths)
-    return Arm(arm.model, Geometry(a=(0.0, a2, a3, 0.0, 0.0, 0.0), d=(d1, 0.0, 0.0, d4, d5, d6)))
+    return Arm(arm.model, DhTable(a=(0.0, a2, a3, 0.0, 0.0, 0.0), d=(d1, 0.0, 0.0, d4, d5, d6)))
 
 
-def _derivatives(frames: Frames) -> NDArray[np.float64]:
+def _derivatives(frames: ChainFrames) -> NDArray[np.float64]:
     """
     Return the derivatives (6, 12) of the flange by d1 a2 a3 d4 d5 d6 and the six joint positions.
 

@@ -15,22 +15,22 @@ from math import asin, cos, sin
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.chain import Arm, Frames, jacobian_at
-from ur_cartesian_driver.kinematics.shape import shape_of
+from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames, jacobian_at
+from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion, Vector3
 from ur_cartesian_driver.motion.primitive import Joints
 
 #: An error of metres and radians whose square is below this leaves one of 1e-10 after the next
 #: step, as long as the arm is not singular to the same degree.
 _ONE_STEP_LEFT = 1e-12
-_MOST_STEPS = 8
+_MAX_STEPS = 8
 #: A joint that would move farther than this is on its way to another solution [rad].
-_FARTHEST = 0.5
+_MAX_JOINT_CHANGE = 0.5
 #: Keeps the normal equations of an arm solvable that is singular to the last digit.
 _DAMPING = 1e-14
 
 
-def track(arm: Arm, T_base_flange: Pose, q_before: Joints) -> Joints | None:
+def track_pose(arm: Arm, T_base_flange: Pose, q_before: Joints) -> Joints | None:
     """
     Return the joint positions of a pose next to those of one close by [rad].
 
@@ -42,14 +42,14 @@ def track(arm: Arm, T_base_flange: Pose, q_before: Joints) -> Joints | None:
     )
     axes = ((r11, r21, r31), (r12, r22, r32), (r13, r23, r33))
     q = q_before
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         frames = arm.frames(q)
         error, facing = _error(frames, T_base_flange.position, axes)
         square = sum([e * e for e in error])
         if facing <= 0.0:
             return None
-        q = _stepped(q, frames, error)
-        if max([abs(a - b) for a, b in zip(q, q_before, strict=True)]) > _FARTHEST:
+        q = _newton_step(q, frames, error)
+        if max([abs(a - b) for a, b in zip(q, q_before, strict=True)]) > _MAX_JOINT_CHANGE:
             return None
         if square < _ONE_STEP_LEFT:
             return q
@@ -63,14 +63,14 @@ def singularity_distances(arm: Arm, q: Joints) -> Vector3:
     All >= 0: the angle of wrist 2 and of the elbow, and how far the centre of the wrist is in
     front of the plane of the axes 1 and 2.
     """
-    shape = shape_of(arm)
-    _, t2, t3, t4, t5, _ = (a + b for a, b in zip(q, shape.offsets, strict=True))
-    shoulder = shape.a2 * cos(t2) + shape.a3 * cos(t2 + t3) + shape.d5 * sin(t2 + t3 + t4)
+    ideal = ideal_arm_of(arm)
+    _, t2, t3, t4, t5, _ = (a + b for a, b in zip(q, ideal.offsets, strict=True))
+    shoulder = ideal.a2 * cos(t2) + ideal.a3 * cos(t2 + t3) + ideal.d5 * sin(t2 + t3 + t4)
     return (asin(min(1.0, abs(sin(t5)))), asin(min(1.0, abs(sin(t3)))), abs(shoulder))
 
 
 def _error(
-    frames: Frames, position: Vector3, axes: tuple[Vector3, Vector3, Vector3]
+    frames: ChainFrames, position: Vector3, axes: tuple[Vector3, Vector3, Vector3]
 ) -> tuple[list[float], float]:
     """
     Return what lacks to a pose: translation [m], sine of the turn (base axes), and 1 + 2 cos.
@@ -87,7 +87,7 @@ def _error(
     return [x - px, y - py, z - pz, 0.5 * ex, 0.5 * ey, 0.5 * ez], facing
 
 
-def _stepped(q: Joints, frames: Frames, error: list[float]) -> Joints:
+def _newton_step(q: Joints, frames: ChainFrames, error: list[float]) -> Joints:
     """Return q + (J'J + tiny I)^-1 J' error."""
     jacobian = jacobian_at(frames, frames.position)
     normal = jacobian.T @ jacobian

@@ -117,7 +117,7 @@ class Progress:
     #: The controller's clock [s].
     timestamp: float = 0.0
     #: Whether the arm rests and the goal waits for more points (keep_open).
-    waits: bool = False
+    awaiting_points: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.goal import ZERO6
-from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluated, quintic_rows, Rates
+from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluate, MotionRows, quintic_rows
 from ur_cartesian_driver.motion.pose import Vector6
 from ur_cartesian_driver.motion.primitive import Joints, Spline
 
@@ -54,7 +54,7 @@ class JointSpline:
             *((piece.target, piece.velocities, piece.accelerations or ZERO6) for piece in pieces),
         ]
         x, v, a = np.array(ends).transpose(1, 0, 2)
-        before, after = (Rates(x[k], v[k], a[k]) for k in (slice(None, -1), slice(1, None)))
+        before, after = (MotionRows(x[k], v[k], a[k]) for k in (slice(None, -1), slice(1, None)))
         durations = np.array([piece.duration for piece in pieces])
         is_cubic = np.array([piece.accelerations is None for piece in pieces], dtype=np.bool_)
         coefficients = np.where(
@@ -80,7 +80,7 @@ class JointSpline:
         k = np.clip(
             np.searchsorted(self.times, inside, side='right') - 1, 0, len(self.coefficients) - 1
         )
-        q, qd, qdd = evaluated(self.coefficients[k], inside - self.times[k])
+        q, qd, qdd = evaluate(self.coefficients[k], inside - self.times[k])
         outside = ((times < self.times[0]) | (times > self.times[-1]))[:, None]
         return q, np.where(outside, 0.0, qd), np.where(outside, 0.0, qdd)
 

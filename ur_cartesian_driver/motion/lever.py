@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.pose import IDENTITY, Pose, rotate, Vector3, Vec
 from ur_cartesian_driver.motion.state import RobotState
 
 
-def twist_at(twist: Vector6, lever: Vector3) -> Vector6:
+def twist_at(twist: Vector6, offset: Vector3) -> Vector6:
     """
     Return the twist of a body at another point of it: v + w x r.
 
@@ -24,10 +24,10 @@ def twist_at(twist: Vector6, lever: Vector3) -> Vector6:
     :param lever: from the first point to the other one [m], in the axes of the twist.
     """
     v, w = twist[:3], twist[3:]
-    return (*_sum(v, _cross(w, lever)), *w)
+    return (*_sum(v, _cross(w, offset)), *w)
 
 
-def acceleration_at(acceleration: Vector6, twist: Vector6, lever: Vector3) -> Vector6:
+def acceleration_at(acceleration: Vector6, twist: Vector6, offset: Vector3) -> Vector6:
     """
     Return the acceleration of a body at another point of it: a + e x r + w x (w x r).
 
@@ -36,10 +36,10 @@ def acceleration_at(acceleration: Vector6, twist: Vector6, lever: Vector3) -> Ve
     :param lever: from the first point to the other one [m], in the axes of both.
     """
     a, e, w = acceleration[:3], acceleration[3:], twist[3:]
-    return (*_sum(_sum(a, _cross(e, lever)), _cross(w, _cross(w, lever))), *e)
+    return (*_sum(_sum(a, _cross(e, offset)), _cross(w, _cross(w, offset))), *e)
 
 
-def seen_at(state: RobotState, T_tcp_frame: Pose) -> RobotState:
+def shift_reference_point(state: RobotState, T_tcp_frame: Pose) -> RobotState:
     """
     Return the state as if a frame behind the TCP were the active TCP.
 
@@ -65,8 +65,8 @@ def seen_at(state: RobotState, T_tcp_frame: Pose) -> RobotState:
     )
 
 
-def _known(acceleration: Vector6 | None, twist: Vector6, lever: Vector3) -> Vector6 | None:
-    return None if acceleration is None else acceleration_at(acceleration, twist, lever)
+def _known(acceleration: Vector6 | None, twist: Vector6, offset: Vector3) -> Vector6 | None:
+    return None if acceleration is None else acceleration_at(acceleration, twist, offset)
 
 
 def _cross(a: Vector3, b: Vector3) -> Vector3:

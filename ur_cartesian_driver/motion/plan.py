@@ -36,14 +36,14 @@ class ReferencePath:
     time: NDArray[np.float64]
     #: (m, 2) [m], [rad] how far the robot's own way may lie beside the sample: 0 but for corners,
     #: of which the robot's maker publishes the size and not the shape. Empty = 0 everywhere.
-    room: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    blend_tolerance: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
 
     def __post_init__(self) -> None:
         """Check the shapes and make the arrays read-only."""
         m = len(self.poses)
-        if not len(self.room):
-            object.__setattr__(self, 'room', np.zeros((m, 2)))
-        arrays = (self.poses, self.point, self.time, self.room)
+        if not len(self.blend_tolerance):
+            object.__setattr__(self, 'blend_tolerance', np.zeros((m, 2)))
+        arrays = (self.poses, self.point, self.time, self.blend_tolerance)
         if [array.shape for array in arrays] != [(m, 7), (m,), (m,), (m, 2)]:
             raise ValueError(
                 'reference path shapes differ: ' + ', '.join(str(array.shape) for array in arrays)

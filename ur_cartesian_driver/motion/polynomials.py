@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-class Rates(NamedTuple):
+class MotionRows(NamedTuple):
     """A quantity and its first and second derivative by time, each (n, k)."""
 
     x: Floats
@@ -24,7 +24,7 @@ class Rates(NamedTuple):
     a: Floats
 
 
-def cubic_rows(duration: Floats, start: Rates, end: Rates) -> Floats:
+def cubic_rows(duration: Floats, start: MotionRows, end: MotionRows) -> Floats:
     """
     Return the cubics (n, 6, k) with these positions and velocities at their ends.
 
@@ -46,7 +46,7 @@ def cubic_rows(duration: Floats, start: Rates, end: Rates) -> Floats:
     )
 
 
-def quintic_rows(duration: Floats, start: Rates, end: Rates) -> Floats:
+def quintic_rows(duration: Floats, start: MotionRows, end: MotionRows) -> Floats:
     """Return the quintics (n, 6, k) that have all three at both ends."""
     T = duration[:, None]
     d, v, w, a, b = end.x - start.x, start.v, end.v, start.a, end.a
@@ -63,7 +63,7 @@ def quintic_rows(duration: Floats, start: Rates, end: Rates) -> Floats:
     )
 
 
-def evaluated(coefficients: Floats, t: Floats) -> Rates:
+def evaluate(coefficients: Floats, t: Floats) -> MotionRows:
     """
     Return the values of polynomials, one for each row.
 
@@ -77,4 +77,4 @@ def evaluated(coefficients: Floats, t: Floats) -> Rates:
         a = a * t + 2.0 * v
         v = v * t + x
         x = x * t + coefficients[:, power]
-    return Rates(x, v, a)
+    return MotionRows(x, v, a)

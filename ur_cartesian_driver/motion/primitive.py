@@ -135,12 +135,12 @@ class SwitchOutput:
     domain: AnalogDomain = AnalogDomain.CURRENT
     #: Where the tool (TCP, base) is when it is time; None = where the motion before this one has
     #: ended, so at once.
-    place: Pose | None = None
+    trigger_pose: Pose | None = None
     #: The direction of the motion there, linear or angular, of length 1 and in the axes of the
     #: place. It is time when the tool gets to its side of the plane through the place.
-    heading: Vector6 = ZERO6
+    trigger_direction: Vector6 = ZERO6
     #: Whether the tool is on that side when the record is read, and comes round once more.
-    comes_round: bool = False
+    starts_beyond: bool = False
     #: After the end of the last motion: so much later than that [s].
     delay: float = 0.0
 

@@ -9,7 +9,7 @@ From what was asked to what is done: check a goal, choose primitives, times and 
 """
 
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.plan import plan
-from ur_cartesian_driver.planning.validate import check
+from ur_cartesian_driver.planning.planner import plan
+from ur_cartesian_driver.planning.request.validate import check
 
 __all__ = ['PlanningOptions', 'check', 'plan']

@@ -4,7 +4,7 @@
 Whether the arm stays clear of itself and of the workspace planes on its whole way.
 
 Capsules tell it for every row; where they come near, the meshes tell exactly, for the models
-that have them (:mod:`~ur_cartesian_driver.kinematics.meshes`). The arm shall be able to leave a
+that have them (:mod:`~.collision_meshes`). The arm shall be able to leave a
 place where it is too near already: rows are let pass as long as what is too near at the start only
 goes away from it, until it is free; from then on the rule is the same as for all else.
 """
@@ -19,14 +19,14 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.bodies import Bodies, Link
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.meshes import Meshes
+from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
+from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes
 from ur_cartesian_driver.motion.errors import CollisionPredicted
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.validate import point_field
+from ur_cartesian_driver.planning.request.validate import point_field
 from ur_cartesian_driver.planning.workspace import parse_planes, Plane
 
 Floats: TypeAlias = NDArray[np.float64]
@@ -35,7 +35,7 @@ Flags: TypeAlias = NDArray[np.bool_]
 # Rows that are judged together: bounds memory, and ends early where the way is refused.
 _BLOCK = 4096
 # What counts as not coming nearer [m]: samples of a way are not exact.
-_STEADY = 1e-4
+_RECEDING_TOLERANCE = 1e-4
 # Rounding of a tool that works on a plane with no margin [m].
 _ON_PLANE = 1e-6
 
@@ -53,7 +53,7 @@ class Violation:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Clear:
+class ClearanceResult:
     """How clear a way is."""
 
     #: What refuses the goal ...
@@ -64,7 +64,7 @@ class Clear:
     #: crossed, infinite where nothing is checked; between capsules it is a lower bound.
     margin: float
     #: Between what it is.
-    what: str
+    description: str
 
 
 class Clearance:
@@ -77,14 +77,14 @@ class Clearance:
 
     def __init__(self, arm: Arm, T_flange_tcp: Pose, options: PlanningOptions) -> None:
         """Prepare bodies and planes, and load the meshes where they are asked for."""
-        bodies = Bodies(arm, T_flange_tcp, options.tool_radius)
-        self._watches: list[_Pairs | _Planes] = []
+        bodies = CollisionBodies(arm, T_flange_tcp, options.tool_radius)
+        self._checkers: list[_SelfCollisionChecker | _PlaneChecker] = []
         if options.self_collision != 'off':
-            self._watches.append(_Pairs(bodies, options))
+            self._checkers.append(_SelfCollisionChecker(bodies, options))
         if planes := parse_planes(options.workspace_planes):
-            self._watches.append(_Planes(bodies, arm, T_flange_tcp, planes))
+            self._checkers.append(_PlaneChecker(bodies, arm, T_flange_tcp, planes))
 
-    def check(self, q: Floats, q_start: Joints) -> Clear:
+    def check(self, q: Floats, q_start: Joints) -> ClearanceResult:
         """
         Return the first row that is too near, and the smallest distance.
 
@@ -93,27 +93,34 @@ class Clearance:
         """
         violation: Violation | None = None
         warning: Violation | None = None
-        margin, what = inf, ''
+        margin, description = inf, ''
         start = np.array([q_start])
-        paces = [_Pace(watch, start) for watch in self._watches]
+        initials = [_InitialViolations(checker, start) for checker in self._checkers]
         for begin in range(0, len(q), _BLOCK):
-            for watch, pace in zip(self._watches, paces, strict=True):
-                lower, distances = watch.measure(q[begin : begin + _BLOCK], pace.held)
+            for checker, initial in zip(self._checkers, initials, strict=True):
+                lower, distances = checker.measure(q[begin : begin + _BLOCK], initial.pending)
                 row, column = np.unravel_index(np.argmin(distances), distances.shape)
                 if distances[row, column] < margin:
-                    margin, what = float(distances[row, column]), watch.what[column]
-                refused = pace.refused(lower, distances)
+                    margin, description = (
+                        float(distances[row, column]),
+                        checker.description[column],
+                    )
+                refused = initial.refused(lower, distances)
                 found, remark = (
-                    _first(watch, refused & columns, distances, q[begin:], begin)
-                    for columns in (watch.refuses, ~watch.refuses)
+                    _first(checker, refused & columns, distances, q[begin:], begin)
+                    for columns in (checker.refuses, ~checker.refuses)
                 )
                 violation, warning = _earlier(violation, found), _earlier(warning, remark)
             if violation is not None:
                 break
-        return Clear(violation=violation, warning=warning, margin=margin, what=what)
+        return ClearanceResult(
+            violation=violation, warning=warning, margin=margin, description=description
+        )
 
 
-def remarks(clear: Clear, segment: NDArray[np.int32], fraction: Floats) -> list[str]:
+def clearance_remarks(
+    clear: ClearanceResult, segment: NDArray[np.int32], fraction: Floats
+) -> list[str]:
     """
     Return what the report says of the clearance.
 
@@ -127,27 +134,27 @@ def remarks(clear: Clear, segment: NDArray[np.int32], fraction: Floats) -> list[
             f'{point_field(int(segment[row]), "pose")}, {100.0 * fraction[row]:.1f} % of the way '
             f'to it: {clear.violation.text}; {clear.violation.help}.'
         )
-    said = []
+    lines = []
     if clear.warning is not None:
         row = clear.warning.row
-        said.append(
+        lines.append(
             f'point {segment[row]}: {100.0 * fraction[row]:.1f} % of the way to it, '
             f'{clear.warning.text}'
         )
-    if clear.what:
-        least = f'at least {clear.margin:.3f} m' if clear.margin > 0.0 else 'none'
-        said.append(f'clearance: {least} between {clear.what}')
-    return said
+    if clear.description:
+        smallest_distance = f'at least {clear.margin:.3f} m' if clear.margin > 0.0 else 'none'
+        lines.append(f'clearance: {smallest_distance} between {clear.description}')
+    return lines
 
 
-class _Pace:
+class _InitialViolations:
     """What was too near at the start and is not free yet; one column for each thing watched."""
 
-    def __init__(self, watch: _Pairs | _Planes, start: Floats) -> None:
-        lower, distances = watch.measure(start, np.ones(len(watch.bounds), dtype=np.bool_))
-        self._bounds = watch.bounds
+    def __init__(self, checker: _SelfCollisionChecker | _PlaneChecker, start: Floats) -> None:
+        lower, distances = checker.measure(start, np.ones(len(checker.bounds), dtype=np.bool_))
+        self._bounds = checker.bounds
         #: What is still too near, by column.
-        self.held: Flags = distances[0] < watch.bounds
+        self.pending: Flags = distances[0] < checker.bounds
         self._lower, self._reached = lower[0], distances[0]
 
     def refused(self, lower: Floats, distances: Floats) -> Flags:
@@ -158,28 +165,28 @@ class _Pace:
         :param distances: those that count.
         """
         near = distances < self._bounds
-        free = np.logical_or.accumulate(np.vstack([~self.held, ~near]))
-        self._lower, of_capsules = _steady(lower, self._lower)
-        self._reached, exact = _steady(distances, self._reached)
+        free = np.logical_or.accumulate(np.vstack([~self.pending, ~near]))
+        self._lower, of_capsules = _is_receding(lower, self._lower)
+        self._reached, exact = _is_receding(distances, self._reached)
         leaving = ~free[:-1] & np.where(distances > 0.0, exact, of_capsules)
-        self.held = ~free[-1]
+        self.pending = ~free[-1]
         refused: Flags = near & ~leaving
         return refused
 
 
-def _steady(values: Floats, reached: Floats) -> tuple[Floats, Flags]:
+def _is_receding(values: Floats, reached: Floats) -> tuple[Floats, Flags]:
     """Return the largest values, and where one is not below all before it; by columns."""
     largest = np.maximum.accumulate(np.vstack([reached, values]))
-    steady: Flags = values >= largest[:-1] - _STEADY
-    return largest[-1], steady
+    receding: Flags = values >= largest[:-1] - _RECEDING_TOLERANCE
+    return largest[-1], receding
 
 
-class _Pairs:
+class _SelfCollisionChecker:
     """The links of the arm, and the tool, against each other."""
 
-    def __init__(self, bodies: Bodies, options: PlanningOptions) -> None:
+    def __init__(self, bodies: CollisionBodies, options: PlanningOptions) -> None:
         self._bodies = bodies
-        self._meshes = Meshes.of(bodies.arm)
+        self._meshes = CollisionMeshes.of(bodies.arm)
         self._bound = options.min_clearance
         exact = np.array([self._has_mesh(pair) for pair in bodies.pairs], dtype=np.bool_)
         choice = options.self_collision
@@ -188,12 +195,12 @@ class _Pairs:
         self.refuses: Flags = (
             exact if choice == 'auto' else np.full(len(exact), choice == 'refuse')
         )
-        self.what = [f'{a} and {b}' for a, b in bodies.pairs]
+        self.description = [f'{a} and {b}' for a, b in bodies.pairs]
 
     def _has_mesh(self, pair: tuple[Link, Link]) -> bool:
         return self._meshes is not None and Link.TOOL not in pair
 
-    def measure(self, q: Floats, held: Flags) -> tuple[Floats, Floats]:
+    def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
         """
         Return distances (n, columns) of the capsules, and those that count.
 
@@ -208,11 +215,11 @@ class _Pairs:
             rows = np.flatnonzero(lower[:, column] < self._bound)
             if not len(rows) or Link.TOOL in pair:
                 continue
-            if held[column]:
+            if pending[column]:
                 distances[rows, column] = self._meshes.distances(pair, q[rows])
             else:
-                near, least = self._meshes.nearer_than(self._bound, pair, q[rows])
-                distances[rows, column] = np.where(near, 0.0, least)
+                near, lower_bounds = self._meshes.nearer_than(self._bound, pair, q[rows])
+                distances[rows, column] = np.where(near, 0.0, lower_bounds)
         return lower, distances
 
     def violation(self, row: int, column: int, distance: float, q: Floats) -> Violation:
@@ -232,11 +239,11 @@ class _Pairs:
         )
 
 
-class _Planes:
+class _PlaneChecker:
     """All of the arm beyond its base, the tool and the TCP against the workspace planes."""
 
     def __init__(
-        self, bodies: Bodies, arm: Arm, T_flange_tcp: Pose, planes: Sequence[Plane]
+        self, bodies: CollisionBodies, arm: Arm, T_flange_tcp: Pose, planes: Sequence[Plane]
     ) -> None:
         self._bodies, self._arm, self._planes = bodies, arm, planes
         self._tcp = T_flange_tcp.position
@@ -245,16 +252,16 @@ class _Planes:
         moving = [k for k, link in enumerate(bodies.links) if link != Link.BASE]
         links = [bodies.links[k] for k in moving]
         self._moving = slice(moving[0], None)
-        # Bodies of one link follow each other.
+        # CollisionBodies of one link follow each other.
         self._begins = [i for i, link in enumerate(links) if i == 0 or links[i - 1] != link]
         self._names = [str(links[i]) for i in self._begins] + ['TCP']
-        self.what = [
+        self.description = [
             f'{name} and the plane "{plane.name}"' for plane in planes for name in self._names
         ]
         self.bounds = np.repeat([plane.margin - _ON_PLANE for plane in planes], len(self._names))
-        self.refuses: Flags = np.ones(len(self.what), dtype=np.bool_)
+        self.refuses: Flags = np.ones(len(self.description), dtype=np.bool_)
 
-    def measure(self, q: Floats, held: Flags) -> tuple[Floats, Floats]:
+    def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
         """Return how far above the planes all links and the TCP are, (n, columns), twice."""
         low = self._bodies.heights(q, self._normals)[:, :, self._moving]
         links = np.minimum.reduceat(low, self._begins, axis=2)
@@ -289,15 +296,19 @@ class _Planes:
 
 
 def _first(
-    watch: _Pairs | _Planes, refused: Flags, distances: Floats, q: Floats, begin: int
+    checker: _SelfCollisionChecker | _PlaneChecker,
+    refused: Flags,
+    distances: Floats,
+    q: Floats,
+    begin: int,
 ) -> Violation | None:
     """Return the nearest thing in the first row that is refused."""
     rows = np.flatnonzero(refused.any(axis=1))
     if not len(rows):
         return None
     row = int(rows[0])
-    column = int(np.argmin(np.where(refused[row], distances[row] - watch.bounds, inf)))
-    return watch.violation(begin + row, column, float(distances[row, column]), q[row : row + 1])
+    column = int(np.argmin(np.where(refused[row], distances[row] - checker.bounds, inf)))
+    return checker.violation(begin + row, column, float(distances[row, column]), q[row : row + 1])
 
 
 def _earlier(one: Violation | None, other: Violation | None) -> Violation | None:

@@ -10,7 +10,7 @@ was sent, the arm rests behind it, and the next part begins there.
 
 A straight motion is planned again with the two before it as context: its corner depends on them.
 A spline needs none, for its state at a point is position, velocity and acceleration; its ending
-is a piece that brakes behind the last point (:func:`~.spline_plan.closing`).
+is a piece that brakes behind the last point (:func:`~.spline_planner.plan_stop`).
 """
 
 from __future__ import annotations
@@ -29,33 +29,38 @@ from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.primitive import Joints, SwitchOutput
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.planning.controlled import carried, tools
-from ur_cartesian_driver.planning.open_goal import (
-    Addition,
-    check_addition,
-    Known,
+from ur_cartesian_driver.planning.append.appendable_goal import (
+    AppendableGoal,
+    AppendedPoints,
+    check_appended_points,
     numbered,
-    OpenGoal,
+    ReplannablePoint,
 )
+from ur_cartesian_driver.planning.geometry.curves import tcp_rows
+from ur_cartesian_driver.planning.moves.plan_report import ignored_remarks
+from ur_cartesian_driver.planning.moves.reference_path import keep_hemisphere
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.outputs import with_outputs
-from ur_cartesian_driver.planning.path import tcp_rows
-from ur_cartesian_driver.planning.plan import plan as plan_goal
-from ur_cartesian_driver.planning.reference import keep_hemisphere
-from ur_cartesian_driver.planning.report import ignored
-from ur_cartesian_driver.planning.spline_plan import closing, end_state, plan_pieces, SplineState
-from ur_cartesian_driver.planning.spline_points import remarks as point_remarks
-from ur_cartesian_driver.planning.validate import check
+from ur_cartesian_driver.planning.output_placement import place_outputs
+from ur_cartesian_driver.planning.planner import plan as plan_goal
+from ur_cartesian_driver.planning.request.controlled_frame import retarget_to_tcp, tool_tips
+from ur_cartesian_driver.planning.request.validate import check
+from ur_cartesian_driver.planning.spline.spline_planner import (
+    end_state,
+    plan_spline,
+    plan_stop,
+    SplineState,
+)
+from ur_cartesian_driver.planning.spline.spline_points import point_remarks
 
 #: So many of the last points are planned again with the next ones: the one that is kept back, and
 #: one whose corner leads into its motion.
-CONTEXT = 2
+REPLANNED_POINTS = 2
 #: Two times nearer than this are one [s].
 SAME_TIME = 1e-6
 #: How much later than at once a spline may begin again from rest [s]: the first that is possible.
-LEADS = (0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+START_DELAYS = (0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 #: Rows of the reference along a closing piece.
-_CLOSING_ROWS = 16
+_STOP_ROWS = 16
 # Digits of a time that a client says [s]: nanoseconds.
 _DIGITS = 9
 #: What counts points in a sentence of the planner.
@@ -63,28 +68,28 @@ _NUMBER = re.compile(r'\b(point |points\[|segments\[)(\d+)')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Part:
+class AppendPlan:
     """A part of an open goal that has passed all checks."""
 
     #: Its segments, the ending among them, and its reference in the time of the whole motion.
     plan: Plan
     #: How many records stay in front of it, and when they end [s].
-    behind: int
-    since: float
+    records_before: int
+    start_time: float
     #: How many of its records are the ending.
-    ending: int
+    ending_records: int
     #: When it ends, where the goal says times [s].
-    due: float | None
+    end_time: float | None
     #: What the client is told.
     text: str
     #: For the next part.
-    then: OpenGoal
+    next_goal: AppendableGoal
 
 
-def opened(plan: Plan, arm: Arm, options: PlanningOptions) -> Part:
+def plan_first_part(plan: Plan, arm: Arm, options: PlanningOptions) -> AppendPlan:
     """Return the first part of a goal: its plan, and how it ends for now."""
     goal = plan.goal
-    base = OpenGoal(
+    base = AppendableGoal(
         goal=replace(
             goal, waypoints=(), segments=(), io_commands=(), age=None, execution=plan.execution
         ),
@@ -92,162 +97,204 @@ def opened(plan: Plan, arm: Arm, options: PlanningOptions) -> Part:
         T_flange_tcp=plan.T_flange_tcp,
         points=0,
         records=0,
-        firm=0,
+        committed_records=0,
         time=0.0,
         rest_time=0.0,
-        shift=0.0,
-        told=0.0,
+        time_offset=0.0,
+        last_client_time=0.0,
         q_rest=plan.start,
     )
-    addition = Addition(
+    appended = AppendedPoints(
         waypoints=goal.waypoints, segments=goal.segments, io_commands=goal.io_commands
     )
     if plan.execution is ExecutionMode.SPLINE:
-        return _spline_part(base, addition, plan, end_state(plan), 0, 0.0, arm, options)
-    return _moves_part(base, addition, plan, 0.0, 0)
+        return _spline_append_plan(base, appended, plan, end_state(plan), 0, 0.0, arm, options)
+    return _moves_append_plan(base, appended, plan, 0.0, 0)
 
 
-def following(
-    open_goal: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptions, *, from_rest: bool
-) -> Part:
+def plan_append(
+    appendable: AppendableGoal,
+    appended: AppendedPoints,
+    arm: Arm,
+    options: PlanningOptions,
+    *,
+    from_rest: bool,
+) -> AppendPlan:
     """
     Return the part of a goal that goes on with an addition.
 
     :param from_rest: whether the ending was sent, so that the arm stands, or is about to.
     :raises GoalRefused: with the reason; points are numbered from the start of the goal.
     """
-    check_addition(open_goal, addition, options)
-    options = replace(options, max_approach_distance=0.0, max_points=options.max_points + CONTEXT)
-    if open_goal.goal.execution is ExecutionMode.SPLINE:
-        return _spline_on(open_goal, addition, arm, options, from_rest)
-    return _moves_on(open_goal, addition, arm, options, from_rest)
+    check_appended_points(appendable, appended, options)
+    options = replace(
+        options, max_approach_distance=0.0, max_points=options.max_points + REPLANNED_POINTS
+    )
+    if appendable.goal.execution is ExecutionMode.SPLINE:
+        return _append_spline(appendable, appended, arm, options, from_rest)
+    return _append_moves(appendable, appended, arm, options, from_rest)
 
 
 # ---- motions of the robot -----------------------------------------------------------------------
 
 
-def _moves_on(
-    on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptions, from_rest: bool
-) -> Part:
+def _append_moves(
+    appendable: AppendableGoal,
+    appended: AppendedPoints,
+    arm: Arm,
+    options: PlanningOptions,
+    from_rest: bool,
+) -> AppendPlan:
     if from_rest:
-        on = replace(on, tail=(), outputs=())
-    tail, since = on.tail, on.rest_time if from_rest else on.time
-    q_start, told = (tail[0].q_before, tail[0].time_before) if tail else (on.q_rest, on.told)
-    waypoints = (*(known.waypoint for known in tail), *addition.waypoints)
-    segments = addition.segments or (Segment(),) * len(addition.waypoints)
-    first = on.points - len(tail)
+        appendable = replace(appendable, replannable=(), outputs=())
+    replannable, start_time = (
+        appendable.replannable,
+        appendable.rest_time if from_rest else appendable.time,
+    )
+    q_start, last_client_time = (
+        (replannable[0].q_before, replannable[0].time_before)
+        if replannable
+        else (appendable.q_rest, appendable.last_client_time)
+    )
+    waypoints = (*(points_known.waypoint for points_known in replannable), *appended.waypoints)
+    segments = appended.segments or (Segment(),) * len(appended.waypoints)
+    first = appendable.points - len(replannable)
     timed = any(point.time != 0.0 for point in waypoints)
     if timed:
-        waypoints = tuple(replace(point, time=point.time - told) for point in waypoints)
-    pending = max(len(tail) - 1, 0)
+        waypoints = tuple(
+            replace(point, time=point.time - last_client_time) for point in waypoints
+        )
+    pending = max(len(replannable) - 1, 0)
     goal = replace(
-        on.goal,
+        appendable.goal,
         waypoints=waypoints,
-        segments=(*(k.segment for k in tail), *segments),
-        io_commands=_outputs_due(on, addition, first, pending, since),
-        keep_open=not addition.last,
+        segments=(*(k.segment for k in replannable), *segments),
+        io_commands=_pending_commands(appendable, appended, first, pending, start_time),
+        keep_open=not appended.last,
     )
     try:
-        made = plan_goal(goal, _standing(on, q_start, arm), arm, options)
+        new_plan = plan_goal(goal, _state_at_rest(appendable, q_start, arm), arm, options)
     except GoalRefused as refusal:
         raise _renumbered(refusal, first) from None
-    return _moves_part(
-        on,
-        addition,
-        _moved(made, first, on.points - 1 if tail else on.points, since),
-        since,
-        on.records if from_rest else on.firm,
+    return _moves_append_plan(
+        appendable,
+        appended,
+        _renumber_plan(
+            new_plan,
+            first,
+            appendable.points - 1 if replannable else appendable.points,
+            start_time,
+        ),
+        start_time,
+        appendable.records if from_rest else appendable.committed_records,
     )
 
 
-def _outputs_due(
-    on: OpenGoal, addition: Addition, first: int, pending: int, since: float
+def _pending_commands(
+    appendable: AppendableGoal,
+    appended: AppendedPoints,
+    first: int,
+    pending: int,
+    start_time: float,
 ) -> tuple[IOCommand, ...]:
     """Return the commands of a part; those before it that are still due count from its start."""
     old = []
-    for due, command in on.outputs:
-        if command.waypoint == on.points - 1:
+    for end_time, command in appendable.outputs:
+        if command.waypoint == appendable.points - 1:
             old.append(replace(command, waypoint=command.waypoint - first))
-        elif due > since and pending:
-            old.append(replace(command, waypoint=pending - 1, offset=due - since))
-    return (*old, *numbered(addition, first))
+        elif end_time > start_time and pending:
+            old.append(replace(command, waypoint=pending - 1, offset=end_time - start_time))
+    return (*old, *numbered(appended, first))
 
 
-def _moved(made: Plan, first: int, waypoint: int, since: float) -> Plan:
+def _renumber_plan(new_plan: Plan, first: int, waypoint: int, start_time: float) -> Plan:
     """Return a plan without what leads to points before a waypoint, numbers and times shifted."""
-    left_out = [s for s in made.segments if s.waypoint + first < waypoint]
+    left_out = [s for s in new_plan.segments if s.waypoint + first < waypoint]
     begin = sum(segment.duration for segment in left_out)
-    path = made.reference
-    time = path.time + (since - begin)
-    row = max(int(np.searchsorted(time, since + 5e-7, side='right')) - 1, 0)
+    path = new_plan.reference
+    time = path.time + (start_time - begin)
+    row = max(int(np.searchsorted(time, start_time + 5e-7, side='right')) - 1, 0)
     return replace(
-        made,
+        new_plan,
         segments=tuple(
-            replace(s, waypoint=s.waypoint + first, note=_shifted(s.note, first))
-            for s in made.segments[len(left_out) :]
+            replace(s, waypoint=s.waypoint + first, note=_renumber_text(s.note, first))
+            for s in new_plan.segments[len(left_out) :]
         ),
         reference=ReferencePath(
             poses=path.poses[row:].copy(),
             time=time[row:].copy(),
             point=(path.point[row:] + first).astype(np.int32),
-            room=path.room[row:].copy(),
+            blend_tolerance=path.blend_tolerance[row:].copy(),
         ),
     )
 
 
-def _moves_part(on: OpenGoal, addition: Addition, made: Plan, since: float, behind: int) -> Part:
+def _moves_append_plan(
+    appendable: AppendableGoal,
+    appended: AppendedPoints,
+    new_plan: Plan,
+    start_time: float,
+    records_before: int,
+) -> AppendPlan:
     """Return a part whose last motion is its ending."""
-    *before, last = made.segments
-    count, ending = _records(made.segments), _records((last,))
-    time = since + sum(segment.duration for segment in before)
+    *before, last = new_plan.segments
+    count, ending_records = _record_count(new_plan.segments), _record_count((last,))
+    time = start_time + sum(segment.duration for segment in before)
     end = time + last.duration
-    segments = addition.segments or (Segment(),) * len(addition.waypoints)
-    points = on.points + len(addition.waypoints)
-    known = list(on.tail) + [
-        Known(waypoint=waypoint, segment=segment, q_before=on.q_rest, time_before=on.told)
-        for waypoint, segment in zip(addition.waypoints, segments, strict=True)
+    segments = appended.segments or (Segment(),) * len(appended.waypoints)
+    points = appendable.points + len(appended.waypoints)
+    points_known = list(appendable.replannable) + [
+        ReplannablePoint(
+            waypoint=waypoint,
+            segment=segment,
+            q_before=appendable.q_rest,
+            time_before=appendable.last_client_time,
+        )
+        for waypoint, segment in zip(appended.waypoints, segments, strict=True)
     ]
-    arrived = {segment.waypoint: segment.joints for segment in made.segments}
-    tail = [
-        _seen(known, k - len(known), arrived, points)
-        for k in range(max(0, len(known) - CONTEXT), len(known))
+    arrived = {segment.waypoint: segment.joints for segment in new_plan.segments}
+    replannable = [
+        _with_start(points_known, k - len(points_known), arrived, points)
+        for k in range(max(0, len(points_known) - REPLANNED_POINTS), len(points_known))
     ]
-    told = addition.waypoints[-1].time
-    timed = any(known.waypoint.time != 0.0 for known in tail)
-    then = replace(
-        on,
+    last_client_time = appended.waypoints[-1].time
+    timed = any(points_known.waypoint.time != 0.0 for points_known in replannable)
+    next_goal = replace(
+        appendable,
         points=points,
-        records=behind + count,
-        firm=behind + count - ending,
+        records=records_before + count,
+        committed_records=records_before + count - ending_records,
         time=time,
         rest_time=end,
-        told=told,
+        last_client_time=last_client_time,
         q_rest=last.joints,
-        tail=tuple(tail),
-        outputs=_still_due(on, addition, made, since),
+        replannable=tuple(replannable),
+        outputs=_commands_of_ending(appendable, appended, new_plan, start_time),
     )
-    return Part(
-        plan=replace(made, goal=replace(made.goal, keep_open=not addition.last)),
-        behind=behind,
-        since=since,
-        ending=0 if addition.last else ending,
-        due=end + _waits(last) if timed else None,
-        text=_text(on, addition),
-        then=then,
+    return AppendPlan(
+        plan=replace(new_plan, goal=replace(new_plan.goal, keep_open=not appended.last)),
+        records_before=records_before,
+        start_time=start_time,
+        ending_records=0 if appended.last else ending_records,
+        end_time=end + _output_delay(last) if timed else None,
+        text=_text(appendable, appended),
+        next_goal=next_goal,
     )
 
 
-def _seen(known: Sequence[Known], k: int, arrived: dict[int, Joints], points: int) -> Known:
+def _with_start(
+    points_known: Sequence[ReplannablePoint], k: int, arrived: dict[int, Joints], points: int
+) -> ReplannablePoint:
     """Return a point (counted from the end) with where the arm was before it, if that is new."""
-    here = known[k]
+    here = points_known[k]
     q = arrived.get(points + k - 1)
     if q is None:
         return here
-    return replace(here, q_before=q, time_before=known[k - 1].waypoint.time)
+    return replace(here, q_before=q, time_before=points_known[k - 1].waypoint.time)
 
 
-def _still_due(
-    on: OpenGoal, addition: Addition, made: Plan, since: float
+def _commands_of_ending(
+    appendable: AppendableGoal, appended: AppendedPoints, new_plan: Plan, start_time: float
 ) -> tuple[tuple[float, IOCommand], ...]:
     """
     Return the commands whose records belong to the ending: the next part looks at them again.
@@ -256,225 +303,261 @@ def _still_due(
     behind it returns stands in front of that, and is firm. The earlier ones of the same kind are
     those with the earlier records.
     """
-    ends, now = {}, since
-    for segment in made.segments:
+    ends, now = {}, start_time
+    for segment in new_plan.segments:
         now += segment.duration
         ends[segment.waypoint] = now
     commands = [
         *(
-            (ends[c.waypoint] + c.offset if c.waypoint in ends else due, c)
-            for due, c in on.outputs
+            (ends[c.waypoint] + c.offset if c.waypoint in ends else end_time, c)
+            for end_time, c in appendable.outputs
         ),
-        *((ends.get(c.waypoint, since) + c.offset, c) for c in addition.io_commands),
+        *((ends.get(c.waypoint, start_time) + c.offset, c) for c in appended.io_commands),
     ]
-    firm = Counter(_kind(record) for segment in made.segments[:-1] for record in segment.outputs)
+    committed_records = Counter(
+        _output_key(record) for segment in new_plan.segments[:-1] for record in segment.outputs
+    )
     still = []
-    for due, command in sorted(commands, key=lambda one: one[0]):
-        kind = _kind(command)
-        if firm[kind]:
-            firm[kind] -= 1
+    for end_time, command in sorted(commands, key=lambda one: one[0]):
+        kind = _output_key(command)
+        if committed_records[kind]:
+            committed_records[kind] -= 1
         else:
-            still.append((due, command))
+            still.append((end_time, command))
     return tuple(still)
 
 
-def _kind(output: IOCommand | SwitchOutput) -> tuple[object, ...]:
+def _output_key(output: IOCommand | SwitchOutput) -> tuple[object, ...]:
     return output.output, output.pin, output.value, output.domain
 
 
 # ---- splines ------------------------------------------------------------------------------------
 
 
-def _spline_on(
-    on: OpenGoal, addition: Addition, arm: Arm, options: PlanningOptions, from_rest: bool
-) -> Part:
+def _append_spline(
+    appendable: AppendableGoal,
+    appended: AppendedPoints,
+    arm: Arm,
+    options: PlanningOptions,
+    from_rest: bool,
+) -> AppendPlan:
     """Return the part behind the end of a spline; from rest as soon as the limits allow."""
-    assert on.state is not None
+    assert appendable.state is not None
     if not from_rest:
-        return _spline_behind(on, addition, on.state, on.firm, on.shift, arm, options)
-    start = SplineState(time=on.rest_time, q=on.q_rest)
-    on = replace(on, again=None, outputs=())
+        return _append_spline_from(
+            appendable,
+            appended,
+            appendable.state,
+            appendable.committed_records,
+            appendable.time_offset,
+            arm,
+            options,
+        )
+    start = SplineState(time=appendable.rest_time, q=appendable.q_rest)
+    appendable = replace(appendable, replanned_piece=None, outputs=())
     refusals = []
-    for lead in LEADS:
+    for delay in START_DELAYS:
         try:
-            return _spline_behind(
-                on, addition, start, on.records, on.rest_time + lead - on.told, arm, options
+            return _append_spline_from(
+                appendable,
+                appended,
+                start,
+                appendable.records,
+                appendable.rest_time + delay - appendable.last_client_time,
+                arm,
+                options,
             )
         except GoalRefused as refusal:
             refusals.append(refusal)
     raise refusals[-1]
 
 
-def _spline_behind(
-    on: OpenGoal,
-    addition: Addition,
+def _append_spline_from(
+    appendable: AppendableGoal,
+    appended: AppendedPoints,
     start: SplineState,
-    behind: int,
-    shift: float,
+    records_before: int,
+    time_offset: float,
     arm: Arm,
     options: PlanningOptions,
-) -> Part:
+) -> AppendPlan:
     # Times count from the last point, so that they say how long the first segment is.
     waypoints = tuple(
-        replace(point, time=round(point.time - on.told, _DIGITS)) for point in addition.waypoints
+        replace(point, time=round(point.time - appendable.last_client_time, _DIGITS))
+        for point in appended.waypoints
     )
     goal = replace(
-        on.goal,
+        appendable.goal,
         waypoints=waypoints,
-        segments=addition.segments,
-        io_commands=numbered(addition, on.points),
-        keep_open=not addition.last,
+        segments=appended.segments,
+        io_commands=numbered(appended, appendable.points),
+        keep_open=not appended.last,
     )
-    standing = _standing(on, start.q, arm)
+    standing = _state_at_rest(appendable, start.q, arm)
     try:
         check(goal, options)
-        about = carried(goal, standing, options).goal
+        retargeted = retarget_to_tcp(goal, standing, options).goal
         later = replace(
-            about,
+            retargeted,
             waypoints=tuple(
-                replace(point, time=point.time + on.told + shift) for point in about.waypoints
+                replace(point, time=point.time + appendable.last_client_time + time_offset)
+                for point in retargeted.waypoints
             ),
         )
     except GoalRefused as refusal:
-        raise _renumbered(refusal, on.points) from None
-    found = plan_pieces(
+        raise _renumbered(refusal, appendable.points) from None
+    found = plan_spline(
         start,
         later,
         arm,
-        on.T_flange_tcp or on.T_flange_active,
+        appendable.T_flange_tcp or appendable.T_flange_active,
         options,
-        first=on.points,
-        tools=tools(goal, on.T_flange_active),
+        first=appendable.points,
+        tool_tips=tool_tips(goal, appendable.T_flange_active),
     )
-    segments, reference, since = found.segments, found.reference, start.time
-    if on.again is not None:
-        again, way = on.again
-        segments, since = (again, *segments), start.time - again.duration
-        reference = _joined(way, reference)
-    made = Plan(
+    segments, reference, start_time = found.segments, found.reference, start.time
+    if appendable.replanned_piece is not None:
+        replanned_piece, pending_path = appendable.replanned_piece
+        segments, start_time = (replanned_piece, *segments), start.time - replanned_piece.duration
+        reference = _join_paths(pending_path, reference)
+    new_plan = Plan(
         goal=later,
         segments=segments,
         reference=reference,
         start=start.q,
-        T_flange_active=on.T_flange_active,
-        T_flange_tcp=on.T_flange_tcp,
+        T_flange_active=appendable.T_flange_active,
+        T_flange_tcp=appendable.T_flange_tcp,
         execution=ExecutionMode.SPLINE,
         remarks=found.remarks,
     )
-    return _spline_part(
-        replace(on, shift=shift), addition, made, found.end, behind, since, arm, options
+    return _spline_append_plan(
+        replace(appendable, time_offset=time_offset),
+        appended,
+        new_plan,
+        found.end,
+        records_before,
+        start_time,
+        arm,
+        options,
     )
 
 
-def _spline_part(
-    on: OpenGoal,
-    addition: Addition,
-    made: Plan,
+def _spline_append_plan(
+    appendable: AppendableGoal,
+    appended: AppendedPoints,
+    new_plan: Plan,
     end: SplineState,
-    behind: int,
-    since: float,
+    records_before: int,
+    start_time: float,
     arm: Arm,
     options: PlanningOptions,
-) -> Part:
+) -> AppendPlan:
     """
     Return a part whose ending is a piece to rest, where its last point moves.
 
     Where outputs are due at the last point or later, the piece to that point belongs to the ending
     too: they stand behind it on the wire, and where each of them is depends on what comes.
     """
-    point, known = on.points + len(addition.waypoints) - 1, made
+    point, points_known = appendable.points + len(appended.waypoints) - 1, new_plan
     rest_time, q_rest = end.time, end.q
-    if end.moves and not addition.last:
-        made = _closed(made, end, point, arm, on, options)
-        rest_time, q_rest = end.time + made.segments[-1].duration, made.segments[-1].joints
-    made, due = _with_outputs(on, addition, made, since)
+    if end.is_moving and not appended.last:
+        new_plan = _with_stop(new_plan, end, point, arm, appendable, options)
+        rest_time, q_rest = end.time + new_plan.segments[-1].duration, new_plan.segments[-1].joints
+    new_plan, end_time = _place_outputs(appendable, appended, new_plan, start_time)
     pending = tuple(
         (time, command)
-        for time, command in due
-        if time >= end.time - SAME_TIME and not addition.last
+        for time, command in end_time
+        if time >= end.time - SAME_TIME and not appended.last
     )
-    firm = len(known.segments) - (1 if pending else 0)
-    count, ending = _records(made.segments), _records(made.segments[firm:])
-    if addition.last:
-        ending = 0
-    again = (known.segments[-1], known.reference) if pending else None
-    then = replace(
-        on,
+    committed_records = len(points_known.segments) - (1 if pending else 0)
+    count, ending_records = (
+        _record_count(new_plan.segments),
+        _record_count(new_plan.segments[committed_records:]),
+    )
+    if appended.last:
+        ending_records = 0
+    replanned_piece = (points_known.segments[-1], points_known.reference) if pending else None
+    next_goal = replace(
+        appendable,
         points=point + 1,
-        records=behind + count,
-        firm=behind + count - ending,
-        time=end.time - (again[0].duration if again else 0.0),
+        records=records_before + count,
+        committed_records=records_before + count - ending_records,
+        time=end.time - (replanned_piece[0].duration if replanned_piece else 0.0),
         rest_time=rest_time,
-        told=addition.waypoints[-1].time,
+        last_client_time=appended.waypoints[-1].time,
         q_rest=q_rest,
         state=end,
         outputs=pending,
-        again=again and (again[0], _tail_of(again[1], end.time - again[0].duration)),
+        replanned_piece=replanned_piece
+        and (
+            replanned_piece[0],
+            _path_from(replanned_piece[1], end.time - replanned_piece[0].duration),
+        ),
     )
-    return Part(
-        plan=replace(made, goal=replace(made.goal, keep_open=not addition.last)),
-        behind=behind,
-        since=since,
-        ending=ending,
-        due=rest_time + _waits(made.segments[-1]),
-        text=_text(on, addition),
-        then=then,
+    return AppendPlan(
+        plan=replace(new_plan, goal=replace(new_plan.goal, keep_open=not appended.last)),
+        records_before=records_before,
+        start_time=start_time,
+        ending_records=ending_records,
+        end_time=rest_time + _output_delay(new_plan.segments[-1]),
+        text=_text(appendable, appended),
+        next_goal=next_goal,
     )
 
 
-def _with_outputs(
-    on: OpenGoal, addition: Addition, made: Plan, since: float
+def _place_outputs(
+    appendable: AppendableGoal, appended: AppendedPoints, new_plan: Plan, start_time: float
 ) -> tuple[Plan, list[tuple[float, IOCommand]]]:
     """Return a plan of pieces with the outputs on its way, and when each command is due [s]."""
-    ends, now = {}, since
+    ends, now = {}, start_time
     # A piece to rest leads to no point: what is due on it is due behind the last one.
-    last = made.segments[-1]
+    last = new_plan.segments[-1]
     closes = not last.note and last.length == 0.0
-    segments = [replace(segment, outputs=()) for segment in made.segments]
+    segments = [replace(segment, outputs=()) for segment in new_plan.segments]
     if closes:
         segments[-1] = replace(segments[-1], waypoint=last.waypoint + 1)
     for segment in segments:
         now += segment.duration
         ends[segment.waypoint] = now
     first = segments[0].waypoint
-    due = [
-        *on.outputs,
-        *((ends[command.waypoint] + command.offset, command) for command in addition.io_commands),
+    end_time = [
+        *appendable.outputs,
+        *((ends[command.waypoint] + command.offset, command) for command in appended.io_commands),
     ]
-    found = with_outputs(
+    found = place_outputs(
         segments,
-        made.reference,
+        new_plan.reference,
         [
             replace(
                 command,
                 waypoint=max(command.waypoint, first),
                 offset=max(0.0, time - ends[max(command.waypoint, first)]),
             )
-            for time, command in due
+            for time, command in end_time
         ],
-        since=since,
+        start_time=start_time,
     )
     return replace(
-        made,
+        new_plan,
         segments=tuple(
             replace(segment, waypoint=old.waypoint, note=old.note)
-            for segment, old in zip(found, made.segments, strict=True)
+            for segment, old in zip(found, new_plan.segments, strict=True)
         ),
-    ), due
+    ), end_time
 
 
-def _tail_of(path: ReferencePath, since: float) -> ReferencePath:
+def _path_from(path: ReferencePath, start_time: float) -> ReferencePath:
     """Return the rows of a path from a time on [s]."""
-    row = max(int(np.searchsorted(path.time, since + SAME_TIME, side='right')) - 1, 0)
+    row = max(int(np.searchsorted(path.time, start_time + SAME_TIME, side='right')) - 1, 0)
     return ReferencePath(
         poses=path.poses[row:].copy(),
         time=path.time[row:].copy(),
         point=path.point[row:].copy(),
-        room=path.room[row:].copy(),
+        blend_tolerance=path.blend_tolerance[row:].copy(),
     )
 
 
-def _joined(first: ReferencePath, second: ReferencePath) -> ReferencePath:
+def _join_paths(first: ReferencePath, second: ReferencePath) -> ReferencePath:
     """Return two paths as one; the second begins where the first ends."""
     poses = np.concatenate([first.poses, second.poses[1:]])
     keep_hemisphere(poses)
@@ -482,24 +565,31 @@ def _joined(first: ReferencePath, second: ReferencePath) -> ReferencePath:
         poses=poses,
         time=np.concatenate([first.time, second.time[1:]]),
         point=np.concatenate([first.point, second.point[1:]]),
-        room=np.concatenate([first.room, second.room[1:]]),
+        blend_tolerance=np.concatenate([first.blend_tolerance, second.blend_tolerance[1:]]),
     )
 
 
-def _closed(
-    made: Plan, end: SplineState, point: int, arm: Arm, on: OpenGoal, options: PlanningOptions
+def _with_stop(
+    new_plan: Plan,
+    end: SplineState,
+    point: int,
+    arm: Arm,
+    appendable: AppendableGoal,
+    options: PlanningOptions,
 ) -> Plan:
     """Return a plan with the piece that brings it to rest."""
-    piece = closing(end, arm, options.closing_deceleration)
-    times = np.linspace(0.0, piece.duration, _CLOSING_ROWS + 1)[1:]
+    piece = plan_stop(end, arm, options.keep_open_deceleration)
+    times = np.linspace(0.0, piece.duration, _STOP_ROWS + 1)[1:]
     q, _, _ = JointSpline.of(end.q, [piece], velocities=end.qd, accelerations=end.qdd).rows(times)
-    path = made.reference
-    poses = np.concatenate([path.poses, tcp_rows(arm, on.T_flange_tcp or on.T_flange_active, q)])
+    path = new_plan.reference
+    poses = np.concatenate(
+        [path.poses, tcp_rows(arm, appendable.T_flange_tcp or appendable.T_flange_active, q)]
+    )
     keep_hemisphere(poses)
     return replace(
-        made,
+        new_plan,
         segments=(
-            *made.segments,
+            *new_plan.segments,
             PlannedSegment(
                 primitive=piece,
                 waypoint=point,
@@ -521,57 +611,62 @@ def _closed(
 # ---- both ---------------------------------------------------------------------------------------
 
 
-def _standing(on: OpenGoal, q: Joints, arm: Arm) -> RobotState:
+def _state_at_rest(appendable: AppendableGoal, q: Joints, arm: Arm) -> RobotState:
     """Return the state of a robot that rests somewhere on the way."""
-    pose = arm.forward(q) @ on.T_flange_active
+    pose = arm.forward(q) @ appendable.T_flange_active
     return RobotState(
         timestamp=0.0,
         actual_q=q,
         target_q=q,
         actual_tcp_pose=pose,
         target_tcp_pose=pose,
-        T_flange_tcp=on.T_flange_active,
+        T_flange_tcp=appendable.T_flange_active,
     )
 
 
-def _waits(last: PlannedSegment) -> float:
+def _output_delay(last: PlannedSegment) -> float:
     """Return how long the robot program waits behind a motion for its outputs [s]."""
     return max((output.delay for output in last.outputs), default=0.0)
 
 
-def _records(segments: Sequence[PlannedSegment]) -> int:
+def _record_count(segments: Sequence[PlannedSegment]) -> int:
     return sum(1 + len(segment.outputs) for segment in segments)
 
 
 def _renumbered(refusal: GoalRefused, first: int) -> GoalRefused:
     """Return a refusal whose points are numbered from the start of the goal."""
     error = type(refusal).__new__(type(refusal))
-    Exception.__init__(error, _shifted(str(refusal), first))
+    Exception.__init__(error, _renumber_text(str(refusal), first))
     return error
 
 
-def _shifted(text: str, first: int) -> str:
+def _renumber_text(text: str, first: int) -> str:
     return _NUMBER.sub(lambda found: f'{found[1]}{int(found[2]) + first}', text)
 
 
-def _text(on: OpenGoal, addition: Addition) -> str:
-    count = len(addition.waypoints)
+def _text(appendable: AppendableGoal, appended: AppendedPoints) -> str:
+    count = len(appended.waypoints)
     points = 'point' if count == 1 else 'points'
-    end = ', these are the last' if addition.last else ''
+    end = ', these are the last' if appended.last else ''
     return ' '.join(
         [
-            f'{count} {points} appended, the goal has {on.points + count}{end}.',
-            *(f'{remark[:1].upper()}{remark[1:]}.' for remark in _ignored(on, addition)),
+            f'{count} {points} appended, the goal has {appendable.points + count}{end}.',
+            *(
+                f'{remark[:1].upper()}{remark[1:]}.'
+                for remark in _append_remarks(appendable, appended)
+            ),
         ]
     )
 
 
-def _ignored(on: OpenGoal, addition: Addition) -> list[str]:
+def _append_remarks(appendable: AppendableGoal, appended: AppendedPoints) -> list[str]:
     """Return what is to be said of points that ask for what is not done."""
     goal = replace(
-        on.goal,
-        waypoints=addition.waypoints,
-        segments=addition.segments,
-        keep_open=not addition.last,
+        appendable.goal,
+        waypoints=appended.waypoints,
+        segments=appended.segments,
+        keep_open=not appended.last,
     )
-    return (point_remarks if goal.execution is ExecutionMode.SPLINE else ignored)(goal, on.points)
+    return (point_remarks if goal.execution is ExecutionMode.SPLINE else ignored_remarks)(
+        goal, appendable.points
+    )

@@ -16,11 +16,11 @@ from math import degrees, isnan
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
-from ur_cartesian_driver.motion.lever import acceleration_at, seen_at, twist_at
 from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose, rotate, Vector6
+from ur_cartesian_driver.motion.rigid_body import acceleration_at, shift_reference_point, twist_at
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.validate import (
+from ur_cartesian_driver.planning.request.validate import (
     is_spline,
     is_timed,
     point_field,
@@ -30,7 +30,7 @@ from ur_cartesian_driver.planning.validate import (
 
 #: How far the tool may turn on a straight or circular segment that counts as one without a turn
 #: [rad]: a frame r away from the TCP leaves its line by r angle^2 / 8, 5 um at 0.4 m.
-KEPT_ANGLE = 0.01
+MAX_FIXED_ANGLE = 0.01
 
 #: How near the controlled frame is to the TCP for being it [m], [rad]: some steps of the wire, so
 #: that a TCP that is set and the one before it can be told apart.
@@ -40,7 +40,7 @@ _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Carried:
+class RetargetedGoal:
     """A goal and the state of its robot, both about the TCP that the motion will have."""
 
     goal: Goal
@@ -51,30 +51,30 @@ class Carried:
     remarks: tuple[str, ...] = ()
 
 
-def carried(goal: Goal, state: RobotState, options: PlanningOptions) -> Carried:
+def retarget_to_tcp(goal: Goal, state: RobotState, options: PlanningOptions) -> RetargetedGoal:
     """
     Return a checked goal about the TCP with which it is going to be executed.
 
     :raises InvalidGoal: the TCP must not change, and the tool turns on the way.
     """
     T_flange_controlled = goal.T_flange_controlled
-    if T_flange_controlled is None or _same(T_flange_controlled, state.T_flange_tcp):
-        return Carried(goal=goal, state=state)
+    if T_flange_controlled is None or _is_same_tcp(T_flange_controlled, state.T_flange_tcp):
+        return RetargetedGoal(goal=goal, state=state)
     T_tcp_controlled = state.T_flange_tcp.inverse() @ T_flange_controlled
     if options.allow_tcp_change:
         x, y, z, rx, ry, rz = T_flange_controlled.rotation_vector()
-        return Carried(
+        return RetargetedGoal(
             goal=goal,
-            state=seen_at(state, T_tcp_controlled),
+            state=shift_reference_point(state, T_tcp_controlled),
             T_flange_tcp=T_flange_controlled,
             remarks=(
                 f'the TCP of the robot is set to {_name(goal)}, p[{x:.6f}, {y:.6f}, {z:.6f}, '
                 f'{rx:.6f}, {ry:.6f}, {rz:.6f}], for this goal, and put back at its end',
             ),
         )
-    _check_turns(goal, state.actual_tcp_pose @ T_tcp_controlled)
-    return Carried(
-        goal=_about_tcp(goal, T_tcp_controlled.inverse()),
+    _check_no_rotation(goal, state.actual_tcp_pose @ T_tcp_controlled)
+    return RetargetedGoal(
+        goal=_retarget_goal(goal, T_tcp_controlled.inverse()),
         state=state,
         T_tcp_controlled=T_tcp_controlled,
         remarks=(
@@ -84,19 +84,19 @@ def carried(goal: Goal, state: RobotState, options: PlanningOptions) -> Carried:
     )
 
 
-def tools(goal: Goal, T_flange_active: Pose) -> tuple[Pose, ...]:
+def tool_tips(goal: Goal, T_flange_active: Pose) -> tuple[Pose, ...]:
     """
     Return to where tools reach behind the flange: the active TCP, and the controlled frame.
 
     What is mounted there stays mounted when a goal is about the bare flange.
     """
     T_flange_controlled = goal.T_flange_controlled
-    if T_flange_controlled is None or _same(T_flange_controlled, T_flange_active):
+    if T_flange_controlled is None or _is_same_tcp(T_flange_controlled, T_flange_active):
         return (T_flange_active,)
     return T_flange_active, T_flange_controlled
 
 
-def _same(a: Pose, b: Pose) -> bool:
+def _is_same_tcp(a: Pose, b: Pose) -> bool:
     return a.distance_to(b) <= SAME_TCP and a.angle_to(b) <= SAME_TCP
 
 
@@ -104,23 +104,23 @@ def _name(goal: Goal) -> str:
     return goal.controlled_frame or 'the controlled frame'
 
 
-def _check_turns(goal: Goal, T_base_start: Pose) -> None:
+def _check_no_rotation(goal: Goal, T_base_start: Pose) -> None:
     """
     Refuse straight and circular segments that turn the tool.
 
     :param T_base_start: where the controlled frame is.
     """
     before = goal.T_base_frame.inverse() @ T_base_start
-    stands = is_timed(goal) and goal.waypoints[0].time == 0.0
+    starts_at_rest = is_timed(goal) and goal.waypoints[0].time == 0.0
     for i, point in enumerate(goal.waypoints):
         segment = segment_of(goal, i)
         angle = before.angle_to(point.pose)
         before = point.pose
-        if segment.type in _JOINT_TYPES or (i == 0 and stands):
+        if segment.type in _JOINT_TYPES or (i == 0 and starts_at_rest):
             continue
         joint = '' if is_spline(goal) else 'use JOINT for that segment, '
         remedy = f'keep the orientation, {joint}or set allow_tcp_change to true'
-        if angle > KEPT_ANGLE:
+        if angle > MAX_FIXED_ANGLE:
             raise InvalidGoal(
                 point_field(i, 'pose.orientation'),
                 f'turns {_name(goal)} by {degrees(angle):.2f} '
@@ -129,7 +129,7 @@ def _check_turns(goal: Goal, T_base_start: Pose) -> None:
                 remedy,
             )
         if is_spline(goal):
-            _check_rates(goal, i, remedy)
+            _check_no_angular_rates(goal, i, remedy)
         if segment.type == SegmentType.CIRCULAR and segment.arc_mode == ArcMode.FIXED:
             raise InvalidGoal(
                 segment_field(i, 'arc_mode'),
@@ -139,7 +139,7 @@ def _check_turns(goal: Goal, T_base_start: Pose) -> None:
             )
 
 
-def _check_rates(goal: Goal, index: int, remedy: str) -> None:
+def _check_no_angular_rates(goal: Goal, index: int, remedy: str) -> None:
     """Refuse a point of a spline at which the tool turns; NaN chooses that it does not."""
     point = goal.waypoints[index]
     for field, values in (('twist', point.twist), ('acceleration', point.acceleration)):
@@ -153,12 +153,12 @@ def _check_rates(goal: Goal, index: int, remedy: str) -> None:
             )
 
 
-def _about_tcp(goal: Goal, T_controlled_tcp: Pose) -> Goal:
+def _retarget_goal(goal: Goal, T_controlled_tcp: Pose) -> Goal:
     return replace(
         goal,
-        waypoints=tuple(_waypoint(point, T_controlled_tcp) for point in goal.waypoints),
+        waypoints=tuple(_retarget_waypoint(point, T_controlled_tcp) for point in goal.waypoints),
         segments=tuple(
-            _segment(segment, point, T_controlled_tcp)
+            _retarget_segment(segment, point, T_controlled_tcp)
             for segment, point in zip(goal.segments, goal.waypoints, strict=True)
         )
         if goal.segments
@@ -166,32 +166,35 @@ def _about_tcp(goal: Goal, T_controlled_tcp: Pose) -> Goal:
     )
 
 
-def _waypoint(point: Waypoint, T_controlled_tcp: Pose) -> Waypoint:
+def _retarget_waypoint(point: Waypoint, T_controlled_tcp: Pose) -> Waypoint:
     pose = Pose(point.pose.position, normalize(point.pose.quaternion))
-    lever = rotate(pose.quaternion, T_controlled_tcp.position)
-    twist, acceleration = _steady(point.twist), _steady(point.acceleration)
+    offset = rotate(pose.quaternion, T_controlled_tcp.position)
+    twist, acceleration = (
+        _without_angular_nan(point.twist),
+        _without_angular_nan(point.acceleration),
+    )
     return replace(
         point,
         pose=pose @ T_controlled_tcp,
-        twist=twist_at(twist, lever),
-        acceleration=acceleration_at(acceleration, twist, lever),
+        twist=twist_at(twist, offset),
+        acceleration=acceleration_at(acceleration, twist, offset),
     )
 
 
-def _steady(rates: Vector6) -> Vector6:
+def _without_angular_nan(rates: Vector6) -> Vector6:
     """Return rates whose angular part is 0 where it may be chosen."""
     x, y, z, *angular = rates
     a, b, c = (0.0 if isnan(value) else value for value in angular)
     return (x, y, z, a, b, c)
 
 
-def _segment(segment: Segment, point: Waypoint, T_controlled_tcp: Pose) -> Segment:
+def _retarget_segment(segment: Segment, point: Waypoint, T_controlled_tcp: Pose) -> Segment:
     """Return the segment to a point; the orientation of a via does not shape its arc."""
     if segment.via is None:
         return segment
-    lever = rotate(normalize(point.pose.quaternion), T_controlled_tcp.position)
+    offset = rotate(normalize(point.pose.quaternion), T_controlled_tcp.position)
     x, y, z = segment.via.position
     via = Pose(
-        (x + lever[0], y + lever[1], z + lever[2]), (segment.via @ T_controlled_tcp).quaternion
+        (x + offset[0], y + offset[1], z + offset[2]), (segment.via @ T_controlled_tcp).quaternion
     )
     return replace(segment, via=via)

@@ -19,17 +19,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.planning.path import (
+from ur_cartesian_driver.planning.geometry.curves import (
     ARC_CHORD_ERROR,
     CURVE_CHORD_ERROR,
-    JointLine,
-    Line,
-    Path,
+    JointLineCurve,
+    LineCurve,
+    MAX_TURN_PER_SAMPLE,
+    SegmentCurve,
     tcp_rows,
     trim_end,
-    TURN_PER_SAMPLE,
 )
-from ur_cartesian_driver.planning.pose_rows import (
+from ur_cartesian_driver.planning.geometry.pose_rows import (
     angle_rows,
     conjugate_rows,
     Floats,
@@ -37,7 +37,7 @@ from ur_cartesian_driver.planning.pose_rows import (
     multiply_rows,
     normalized_rows,
 )
-from ur_cartesian_driver.planning.tool_spline import ToolCurve
+from ur_cartesian_driver.planning.geometry.tool_spline import ToolCurve
 
 # Chords that measure the length of a corner without a formula.
 _CHORDS = 16
@@ -46,11 +46,11 @@ _STRAIGHT = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Meeting:
+class BlendInput:
     """Where two paths meet, and how: what a corner is made of."""
 
-    first: Path
-    second: Path
+    first: SegmentCurve
+    second: SegmentCurve
     #: Distance from the waypoint at which both paths are left [m].
     radius: float
     #: A circular arc (``movep``); both paths must be lines.
@@ -58,15 +58,15 @@ class Meeting:
 
 
 @dataclass(frozen=True, slots=True)
-class Corner:
+class Blend:
     """
     The blend between two paths.
 
     ``leave`` is where it leaves the first path, ``join`` where it joins the second (their ``u``).
     """
 
-    first: Path
-    second: Path
+    first: SegmentCurve
+    second: SegmentCurve
     radius: float
     fillet: bool
     leave: float
@@ -79,18 +79,18 @@ class Corner:
     #: How far the robot's own corner may lie beside this one, [m] and [rad]. It may come as near
     #: to the waypoint as it likes, or cut the corner straight: this one is half-way between. The
     #: turn of the tool may run ahead of its way, or behind it.
-    room: tuple[float, float]
+    blend_tolerance: tuple[float, float]
 
     @property
-    def in_joints(self) -> bool:
+    def in_joint_space(self) -> bool:
         """Whether the joints cross over, and not the poses of the tool."""
-        return isinstance(self.first, JointLine) and isinstance(self.second, JointLine)
+        return isinstance(self.first, JointLineCurve) and isinstance(self.second, JointLineCurve)
 
     def joint_rows(self, s: Floats) -> Floats:
         """Return the joint positions (n, 6) [rad] at ``s`` (n,) of a corner in joint space."""
-        assert isinstance(self.first, JointLine)
-        assert isinstance(self.second, JointLine)
-        a, b = crossing(self.leave, self.join, s)
+        assert isinstance(self.first, JointLineCurve)
+        assert isinstance(self.second, JointLineCurve)
+        a, b = crossfade(self.leave, self.join, s)
         rows: Floats = (
             self.first.joint_rows(a) + self.second.joint_rows(b) - np.array(self.second.q_start)
         )
@@ -98,97 +98,101 @@ class Corner:
 
     def rows(self, s: Floats) -> Floats:
         """Return the poses (n, 7) at ``s`` (n,) in [0, 1]."""
-        if isinstance(self.first, JointLine) and self.in_joints:
+        if isinstance(self.first, JointLineCurve) and self.in_joint_space:
             return tcp_rows(self.first.arm, self.first.T_flange_tcp, self.joint_rows(s))
-        return _crossing_rows([self], np.zeros(len(s), dtype=np.intp), s)
+        return _crossfade_rows([self], np.zeros(len(s), dtype=np.intp), s)
 
 
-def crossing(leave: float | Floats, join: float | Floats, s: Floats) -> tuple[Floats, Floats]:
+def crossfade(leave: float | Floats, join: float | Floats, s: Floats) -> tuple[Floats, Floats]:
     """Return the ``u`` of the first path and that of the second at ``s`` of corners."""
     return leave + (1.0 - leave) * s * (2.0 - s), join * s * s
 
 
-def corners(meetings: Sequence[Meeting]) -> list[Corner]:
+def blends(inputs: Sequence[BlendInput]) -> list[Blend]:
     """Return the corners of many pairs of paths."""
-    if not meetings:
+    if not inputs:
         return []
-    ends = [(trim_end(m.first, m.radius), m.second.trim(m.radius)) for m in meetings]
-    start = _places((m.first for m in meetings), [leave for leave, _ in ends])
-    end = _places((m.second for m in meetings), [join for _, join in ends])
-    middle = _starts([m.second for m in meetings])
-    shapes = _Shapes(
+    ends = [(trim_end(m.first, m.radius), m.second.trim(m.radius)) for m in inputs]
+    start = _poses_at((m.first for m in inputs), [leave for leave, _ in ends])
+    end = _poses_at((m.second for m in inputs), [join for _, join in ends])
+    middle = _starts([m.second for m in inputs])
+    shapes = _BlendShapes(
         start,
         middle,
         end,
-        np.array([m.radius for m in meetings]),
-        np.array([m.fillet for m in meetings]),
+        np.array([m.radius for m in inputs]),
+        np.array([m.fillet for m in inputs]),
     )
-    lengths, samples, rooms = shapes.lengths(), shapes.samples(), shapes.rooms()
-    found = [
-        Corner(m.first, m.second, m.radius, m.fillet, leave, join, length, angle, n, (near, turn))
+    lengths, samples, blend_tolerances = (
+        shapes.lengths(),
+        shapes.samples(),
+        shapes.blend_tolerances(),
+    )
+    blends_made = [
+        Blend(m.first, m.second, m.radius, m.fillet, leave, join, length, angle, n, (near, turn))
         for m, (leave, join), length, angle, n, (near, turn) in zip(
-            meetings,
+            inputs,
             ends,
             lengths.tolist(),
             shapes.turns.tolist(),
             samples.tolist(),
-            rooms.tolist(),
+            blend_tolerances.tolist(),
             strict=True,
         )
     ]
     return [
-        corner
-        if isinstance(corner.first, Line) and isinstance(corner.second, Line)
-        else _measured(corner)
-        for corner in found
+        blend
+        if isinstance(blend.first, LineCurve) and isinstance(blend.second, LineCurve)
+        else _with_measured_length(blend)
+        for blend in blends_made
     ]
 
 
-def _measured(corner: Corner) -> Corner:
+def _with_measured_length(blend: Blend) -> Blend:
     """Return a corner that is no parabola with its length measured along chords."""
-    positions = corner.rows(np.linspace(0.0, 1.0, _CHORDS + 1))[:, :3]
+    positions = blend.rows(np.linspace(0.0, 1.0, _CHORDS + 1))[:, :3]
     length = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
-    return Corner(
-        corner.first,
-        corner.second,
-        corner.radius,
-        corner.fillet,
-        corner.leave,
-        corner.join,
+    return Blend(
+        blend.first,
+        blend.second,
+        blend.radius,
+        blend.fillet,
+        blend.leave,
+        blend.join,
         length,
-        corner.angle,
-        corner.samples,
-        corner.room,
+        blend.angle,
+        blend.samples,
+        blend.blend_tolerance,
     )
 
 
-def _places(paths: Iterable[Path], u: Sequence[float]) -> Floats:
+def _poses_at(paths: Iterable[SegmentCurve], u: Sequence[float]) -> Floats:
     """Return one pose (n, 7) of each path."""
     every = list(paths)
     rows = np.empty((len(every), 7))
-    lines = [k for k, path in enumerate(every) if isinstance(path, Line)]
+    lines = [k for k, path in enumerate(every) if isinstance(path, LineCurve)]
     if lines:
-        ends = _ends([path for path in every if isinstance(path, Line)])
+        ends = _ends([path for path in every if isinstance(path, LineCurve)])
         rows[lines] = interpolate_rows(ends[:, 0], ends[:, 1], np.array([u[k] for k in lines]))
     for k, path in enumerate(every):
-        if not isinstance(path, Line):
+        if not isinstance(path, LineCurve):
             rows[k] = path.pose(u[k]).row()
     return rows
 
 
-def _starts(paths: Sequence[Path]) -> Floats:
+def _starts(paths: Sequence[SegmentCurve]) -> Floats:
     """Return the poses (n, 7) at which paths begin."""
     return np.array(
-        [path.ends[0] if isinstance(path, Line) else path.start.row() for path in paths]
+        [path.ends[0] if isinstance(path, LineCurve) else path.start.row() for path in paths]
     )
 
 
-def _ends(lines: Sequence[Line]) -> Floats:
+def _ends(lines: Sequence[LineCurve]) -> Floats:
     """Return both ends (n, 2, 7) of lines."""
     return np.array([line.ends for line in lines])
 
 
-class _Shapes:
+class _BlendShapes:
     """
     The measures of many corners.
 
@@ -210,13 +214,13 @@ class _Shapes:
     def lengths(self) -> Floats:
         """Return the lengths [m], of parabolas and circles between straight lines."""
         arc = fillet_radius(self.radius, self.opening) * (np.pi - self.opening)
-        to_and_fro = np.linalg.norm(self.start - self.middle, axis=1) + np.linalg.norm(
+        there_and_back = np.linalg.norm(self.start - self.middle, axis=1) + np.linalg.norm(
             self.end - self.middle, axis=1
         )
         has_circle = (self.opening > _STRAIGHT) & (self.opening < np.pi - _STRAIGHT)
         lengths: Floats = np.where(
             self.fillet,
-            np.where(has_circle, arc, to_and_fro),
+            np.where(has_circle, arc, there_and_back),
             _parabola_lengths(self.start, self.middle, self.end),
         )
         return lengths
@@ -224,7 +228,7 @@ class _Shapes:
     def samples(self) -> Floats:
         """Return into how many pieces to cut them."""
         # At its ends the blend turns at twice its mean rate.
-        turns = np.ceil(2.0 * self.turns / TURN_PER_SAMPLE)
+        turns = np.ceil(2.0 * self.turns / MAX_TURN_PER_SAMPLE)
         radius = np.maximum(fillet_radius(self.radius, self.opening), 1e-3)
         on_circle = (np.pi - self.opening) / np.sqrt(8.0 * ARC_CHORD_ERROR / radius)
         # A parabola with control points a, p, b leaves its chords by |a - 2 p + b| / (4 n^2).
@@ -233,56 +237,58 @@ class _Shapes:
         curve = np.ceil(np.where(self.fillet, on_circle, on_parabola))
         return np.maximum(2.0, np.maximum(turns, curve)).astype(np.intp)
 
-    def rooms(self) -> Floats:
+    def blend_tolerances(self) -> Floats:
         """Return the room (n, 2) beside them [m], [rad]."""
         height = np.linalg.norm(self.middle - 0.5 * (self.start + self.end), axis=1)
         return 0.5 * np.stack((height, np.maximum(self.before, self.after)), axis=1)
 
 
-def corner_rows(all_corners: Sequence[Corner], which: NDArray[np.intp], s: Floats) -> Floats:
+def blend_rows(all_blends: Sequence[Blend], which: NDArray[np.intp], s: Floats) -> Floats:
     """
     Return poses (n, 7) in many corners.
 
     :param which: (n,) the number of the corner of each row, not decreasing.
     :param s: (n,) where in it, [0, 1].
     """
-    in_joints = np.array([corner.in_joints for corner in all_corners], dtype=np.bool_)
-    if not in_joints.any():
-        return _crossing_rows(all_corners, which, s)
+    in_joint_space = np.array([blend.in_joint_space for blend in all_blends], dtype=np.bool_)
+    if not in_joint_space.any():
+        return _crossfade_rows(all_blends, which, s)
     rows = np.empty((len(s), 7))
-    crossing_ones = np.flatnonzero(~in_joints[which])
-    rows[crossing_ones] = _crossing_rows(all_corners, which[crossing_ones], s[crossing_ones])
-    for k in np.flatnonzero(in_joints).tolist():
+    crossfaded = np.flatnonzero(~in_joint_space[which])
+    rows[crossfaded] = _crossfade_rows(all_blends, which[crossfaded], s[crossfaded])
+    for k in np.flatnonzero(in_joint_space).tolist():
         first, last = np.searchsorted(which, (k, k + 1))
-        rows[first:last] = all_corners[k].rows(s[first:last])
+        rows[first:last] = all_blends[k].rows(s[first:last])
     return rows
 
 
-def _crossing_rows(all_corners: Sequence[Corner], which: NDArray[np.intp], s: Floats) -> Floats:
+def _crossfade_rows(all_blends: Sequence[Blend], which: NDArray[np.intp], s: Floats) -> Floats:
     """Return poses in corners whose poses cross over."""
-    leave = np.array([c.leave for c in all_corners])[which]
-    join = np.array([c.join for c in all_corners])[which]
-    a, b = crossing(leave, join, s)
-    first = path_rows([c.first for c in all_corners], which, a)
-    second = path_rows([c.second for c in all_corners], which, b)
-    middle = _starts([c.second for c in all_corners])[which]
+    leave = np.array([c.leave for c in all_blends])[which]
+    join = np.array([c.join for c in all_blends])[which]
+    a, b = crossfade(leave, join, s)
+    first = path_rows([c.first for c in all_blends], which, a)
+    second = path_rows([c.second for c in all_blends], which, b)
+    middle = _starts([c.second for c in all_blends])[which]
     rows = first + second - middle
     rows[:, 3:] = normalized_rows(
         multiply_rows(multiply_rows(first[:, 3:], conjugate_rows(middle[:, 3:])), second[:, 3:])
     )
-    round_ones = np.array([c.fillet for c in all_corners])[which]
-    if round_ones.any():
-        of_them = which[round_ones]
-        start = _places((c.first for c in all_corners), [c.leave for c in all_corners])[of_them]
-        end = _places((c.second for c in all_corners), [c.join for c in all_corners])[of_them]
-        radius = np.array([c.radius for c in all_corners])[of_them]
-        rows[round_ones, :3] = _on_fillets(
-            start[:, :3], middle[round_ones, :3], end[:, :3], radius, s[round_ones]
+    filleted = np.array([c.fillet for c in all_blends])[which]
+    if filleted.any():
+        of_them = which[filleted]
+        start = _poses_at((c.first for c in all_blends), [c.leave for c in all_blends])[of_them]
+        end = _poses_at((c.second for c in all_blends), [c.join for c in all_blends])[of_them]
+        radius = np.array([c.radius for c in all_blends])[of_them]
+        rows[filleted, :3] = _on_fillets(
+            start[:, :3], middle[filleted, :3], end[:, :3], radius, s[filleted]
         )
     return rows
 
 
-def path_rows(paths: Sequence[Path | ToolCurve], which: NDArray[np.intp], u: Floats) -> Floats:
+def path_rows(
+    paths: Sequence[SegmentCurve | ToolCurve], which: NDArray[np.intp], u: Floats
+) -> Floats:
     """
     Return poses (n, 7) of many paths.
 
@@ -290,11 +296,11 @@ def path_rows(paths: Sequence[Path | ToolCurve], which: NDArray[np.intp], u: Flo
     :param u: (n,) where on it.
     """
     rows = np.empty((len(u), 7))
-    is_line = np.array([isinstance(path, Line) for path in paths], dtype=np.bool_)
+    is_line = np.array([isinstance(path, LineCurve) for path in paths], dtype=np.bool_)
     on_line = is_line[which]
     if on_line.any():
         number = np.cumsum(is_line) - 1
-        ends = _ends([path for path in paths if isinstance(path, Line)])
+        ends = _ends([path for path in paths if isinstance(path, LineCurve)])
         of = ends[number[which[on_line]]]
         rows[on_line] = interpolate_rows(of[:, 0], of[:, 1], u[on_line])
     for k in np.unique(which[~on_line]):
@@ -303,9 +309,9 @@ def path_rows(paths: Sequence[Path | ToolCurve], which: NDArray[np.intp], u: Flo
     return rows
 
 
-def opening_rows(start: Floats, corner: Floats, end: Floats) -> Floats:
+def opening_rows(start: Floats, waypoint: Floats, end: Floats) -> Floats:
     """Return the angles between the two legs at the waypoints [rad], pi = straight on."""
-    a, b = _units(start - corner), _units(end - corner)
+    a, b = _units(start - waypoint), _units(end - waypoint)
     # Better than the arc cosine where the legs are in line.
     opening: Floats = 2.0 * np.arctan2(
         np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1)
@@ -319,24 +325,24 @@ def fillet_radius(radius: Floats, opening: Floats) -> Floats:
     return result
 
 
-def _on_fillets(start: Floats, corner: Floats, end: Floats, radius: Floats, s: Floats) -> Floats:
+def _on_fillets(start: Floats, waypoint: Floats, end: Floats, radius: Floats, s: Floats) -> Floats:
     """Return positions (n, 3) on circles that touch both legs, evenly along them."""
-    opening = opening_rows(start, corner, end)
+    opening = opening_rows(start, waypoint, end)
     rho = fillet_radius(radius, opening)
-    inwards = _units(_units(start - corner) + _units(end - corner))
+    inwards = _units(_units(start - waypoint) + _units(end - waypoint))
     across = _units(end - start)
     phi = (s - 0.5) * (np.pi - opening)
     # The center lies rho / sin(opening / 2) from the waypoint.
     depth = rho / np.maximum(np.sin(0.5 * opening), 1e-12) - rho * np.cos(phi)
-    circle = corner + depth[:, None] * inwards + (rho * np.sin(phi))[:, None] * across
+    circle = waypoint + depth[:, None] * inwards + (rho * np.sin(phi))[:, None] * across
     # Straight on, or straight back, there is no circle.
-    share = np.abs(1.0 - 2.0 * s)[:, None]
-    straight = corner + share * (np.where(s[:, None] < 0.5, start, end) - corner)
+    fraction = np.abs(1.0 - 2.0 * s)[:, None]
+    straight = waypoint + fraction * (np.where(s[:, None] < 0.5, start, end) - waypoint)
     has_circle = (opening > _STRAIGHT) & (opening < np.pi - _STRAIGHT)
     return np.where(has_circle[:, None], circle, straight)
 
 
-def _parabola_lengths(start: Floats, corner: Floats, end: Floats) -> Floats:
+def _parabola_lengths(start: Floats, waypoint: Floats, end: Floats) -> Floats:
     """
     Return the lengths of parabolas with these control points [m].
 
@@ -345,7 +351,7 @@ def _parabola_lengths(start: Floats, corner: Floats, end: Floats) -> Floats:
     are exact to a millionth but for corners that go back nearly straight, where it is a
     thousandth, and which knows no special cases.
     """
-    u, w = corner - start, start - 2.0 * corner + end
+    u, w = waypoint - start, start - 2.0 * waypoint + end
     nodes, weights = np.polynomial.legendre.leggauss(8)
     s = 0.5 * (nodes + 1.0)
     speeds = 2.0 * np.linalg.norm(u[:, None, :] + s[None, :, None] * w[:, None, :], axis=2)

@@ -17,12 +17,12 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.corner import Corner
+from ur_cartesian_driver.planning.geometry.blend import Blend
+from ur_cartesian_driver.planning.geometry.curves import is_same_pose, LineCurve, SegmentCurve
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.path import Line, Path, same
-from ur_cartesian_driver.planning.spoken import spoken_radius
-from ur_cartesian_driver.planning.validate import (
-    arc_of,
+from ur_cartesian_driver.planning.request.dialect_adaptation import adapt_blend_radius
+from ur_cartesian_driver.planning.request.validate import (
+    arc_through_via,
     check_blends_fit,
     point_field,
     segment_of,
@@ -34,7 +34,7 @@ _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 #: direction a line turns the tool [rad].
 HALF_TURN = 1e-3
 #: Motions on straight lines in joint space.
-IN_JOINTS = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
+JOINT_SPACE_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 #: Motions that can only be blended into from some others; all else stops before them.
 _BLENDS_FROM = {
     SegmentType.JOINT: (_LINEAR, _JOINT),
@@ -44,7 +44,7 @@ _BLENDS_FROM = {
 
 
 @dataclass(slots=True)
-class Draft:
+class SegmentDraft:
     """A leg in the making."""
 
     index: int
@@ -52,12 +52,12 @@ class Draft:
     segment: Segment
     radius: float
     #: None = a joint move whose start is not known yet.
-    path: Path | None = None
+    path: SegmentCurve | None = None
     joints: Joints | None = None
-    before: Corner | None = None
-    after: Corner | None = None
+    before: Blend | None = None
+    after: Blend | None = None
     #: How far its path has been looked at, where that ends before the leg does.
-    seen: float = 1.0
+    checked_until: float = 1.0
 
     @property
     def begin(self) -> float:
@@ -65,24 +65,24 @@ class Draft:
         return self.before.join if self.before else 0.0
 
     @property
-    def leaves(self) -> float:
+    def u_leave(self) -> float:
         """The ``u`` where its path is left, once its corner is known."""
         return self.after.leave if self.after else 1.0
 
     @property
-    def way(self) -> Path:
+    def known_path(self) -> SegmentCurve:
         """Its path, which is known by now."""
         assert self.path is not None
         return self.path
 
     @property
-    def arrives(self) -> Joints:
+    def known_joints(self) -> Joints:
         """Its configuration at the end, which is known by now."""
         assert self.joints is not None
         return self.joints
 
 
-class Drafts:
+class SegmentDraftBuilder:
     """
     Makes the drafts of one goal.
 
@@ -97,13 +97,13 @@ class Drafts:
         self._goal, self._targets, self._options = goal, targets, options
         self._remarks = remarks
 
-    def all(self, begin: int, start: Pose) -> list[Draft]:
+    def build_all(self, begin: int, start: Pose) -> list[SegmentDraft]:
         """
         Return the drafts from a waypoint on.
 
         :param start: where the tool is [base].
         """
-        drafts: list[Draft] = []
+        drafts: list[SegmentDraft] = []
         before, last = start, len(self._goal.waypoints) - 1
         for i in range(begin, last + 1):
             segment = segment_of(self._goal, i)
@@ -111,17 +111,19 @@ class Drafts:
             radius = (
                 0.0
                 if i == last
-                else spoken_radius(segment.blend_radius, i, self._options.dialect, self._remarks)
+                else adapt_blend_radius(
+                    segment.blend_radius, i, self._options.dialect, self._remarks
+                )
             )
-            draft = Draft(i, kind, segment, radius)
-            if kind not in IN_JOINTS:
-                draft.path = self.straight(draft, before)
+            draft = SegmentDraft(i, kind, segment, radius)
+            if kind not in JOINT_SPACE_TYPES:
+                draft.path = self.line_or_arc(draft, before)
             drafts.append(draft)
             before = draft.path.end if draft.path else self._targets[i]
         self._check_first_blend(drafts[0], start)
         return drafts
 
-    def straight(self, draft: Draft, start: Pose) -> Path:
+    def line_or_arc(self, draft: SegmentDraft, start: Pose) -> SegmentCurve:
         """Return the line or the arc of a segment from a pose."""
         i, segment = draft.index, draft.segment
         turn = start.angle_to(self._targets[i])
@@ -135,9 +137,9 @@ class Drafts:
                 'add a point in between, or use a JOINT segment',
             )
         if draft.kind != SegmentType.CIRCULAR:
-            return Line.between(start, self._targets[i])
+            return LineCurve.between(start, self._targets[i])
         assert segment.via is not None
-        arc = arc_of(
+        arc = arc_through_via(
             i, start, self._goal.T_base_frame @ segment.via, self._targets[i], segment.arc_mode
         )
         off = arc.end.angle_to(self._targets[i])
@@ -148,17 +150,17 @@ class Drafts:
             )
         return arc
 
-    def _check_first_blend(self, first: Draft, start: Pose) -> None:
+    def _check_first_blend(self, first: SegmentDraft, start: Pose) -> None:
         if first.radius <= 0.0:
             return
         target = self._targets[first.index]
-        if same(start, target) and not self._goal.waypoints[first.index].posture:
+        if is_same_pose(start, target) and not self._goal.waypoints[first.index].posture:
             first.radius = 0.0  # the robot stands there already, and the report says so
             return
         check_blends_fit(self._goal, first.index, start.distance_to(target), 0.0, first.radius)
 
 
-def can_blend(first: Draft, second: Draft) -> bool:
+def can_blend(first: SegmentDraft, second: SegmentDraft) -> bool:
     """Tell whether the robot can blend from the motion of one leg into that of the next."""
     allowed = _BLENDS_FROM.get(second.kind)
     return allowed is None or first.kind in allowed

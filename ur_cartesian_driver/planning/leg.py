@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 from ur_cartesian_driver.motion.goal import Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.corner import Corner
-from ur_cartesian_driver.planning.margins import Nearest
-from ur_cartesian_driver.planning.path import Path
-from ur_cartesian_driver.planning.profile import Profile
+from ur_cartesian_driver.planning.geometry.blend import Blend
+from ur_cartesian_driver.planning.geometry.curves import SegmentCurve
+from ur_cartesian_driver.planning.geometry.speed_profile import SpeedProfile
+from ur_cartesian_driver.planning.preflight.margins import TightestMargin
 
 
 @dataclass(frozen=True, slots=True)
-class Pace:
+class JointSpeedBound:
     """How long the joints need for a segment, each of them at its limit at the most."""
 
     #: All of it at the pace of the place where the joints are fastest [s].
@@ -24,12 +24,12 @@ class Pace:
     joint: int
     fraction: float
     #: The same of the place where they are slowest, and with some joint at its limit everywhere.
-    quickest: float
-    whole: float
+    shortest_time: float
+    time_at_limits: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Leg:
+class SegmentGeometry:
     """A segment whose way is decided and whose speed is not."""
 
     index: int
@@ -37,17 +37,17 @@ class Leg:
     kind: SegmentType
     waypoint: Waypoint
     segment: Segment
-    path: Path
+    path: SegmentCurve
     #: Configuration at the end [rad].
     joints: Joints
     #: What the joints and the singularities say about it.
-    pace: Pace
-    nearest: Nearest
+    speed_bound: JointSpeedBound
+    tightest_margin: TightestMargin
     #: Time that the goal gives it [s]; None = speeds decide.
     time: float | None
     #: The corners at its ends; None = it stands there.
-    before: Corner | None = None
-    after: Corner | None = None
+    before: Blend | None = None
+    after: Blend | None = None
     #: Where the path is joined after the corner before, and left for the corner after.
     u_before: float = 0.0
     u_after: float = 1.0
@@ -56,7 +56,7 @@ class Leg:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Timing:
+class SegmentTiming:
     """How fast one leg goes."""
 
     #: What the wire carries; ``wire_time`` 0 = speed and acceleration count.
@@ -65,11 +65,11 @@ class Timing:
     wire_time: float
     #: The leading quantity, its unit, and the motion between the corners.
     unit: str
-    profile: Profile
+    profile: SpeedProfile
     #: Expected time, half of each corner included [s].
     duration: float
     #: Time in the corner after it [s], 0 without one.
-    corner: float = 0.0
+    blend_time: float = 0.0
     #: Why, as the end of "because ...".
     reason: str = ''
     #: What was changed, empty if nothing.

@@ -12,13 +12,13 @@ from ur_cartesian_driver.motion.plan import PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.outputs import check_outputs
-from ur_cartesian_driver.planning.spline_plan import SplineState
-from ur_cartesian_driver.planning.validate import point_field
+from ur_cartesian_driver.planning.output_placement import check_outputs
+from ur_cartesian_driver.planning.request.validate import point_field
+from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Addition:
+class AppendedPoints:
     """What a client appends."""
 
     waypoints: tuple[Waypoint, ...] = ()
@@ -31,7 +31,7 @@ class Addition:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Known:
+class ReplannablePoint:
     """A point that may have to be planned again, and where the arm was before it."""
 
     waypoint: Waypoint
@@ -41,7 +41,7 @@ class Known:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class OpenGoal:
+class AppendableGoal:
     """What has to be remembered of a goal so that it can go on; as much, however long it is."""
 
     #: Without its points.
@@ -51,31 +51,33 @@ class OpenGoal:
     points: int
     #: On the wire, and how many of them are not given up.
     records: int
-    firm: int
+    committed_records: int
     #: When the firm ones end and when all of them do, in the time of the motion [s].
     time: float
     rest_time: float
     #: What the client's times lack to those of the motion, and the last of the client's [s].
-    shift: float
-    told: float
+    time_offset: float
+    last_client_time: float
     #: Where the arm rests in the end [rad].
     q_rest: Joints
-    tail: tuple[Known, ...] = ()
+    replannable: tuple[ReplannablePoint, ...] = ()
     #: Of a spline: behind its last point.
     state: SplineState | None = None
     #: Its last piece with its way, where that is not firm because of outputs.
-    again: tuple[PlannedSegment, ReferencePath] | None = None
+    replanned_piece: tuple[PlannedSegment, ReferencePath] | None = None
     #: Outputs that may not have been switched yet, and when that is due [s].
     outputs: tuple[tuple[float, IOCommand], ...] = ()
 
 
-def check_addition(open_goal: OpenGoal, addition: Addition, options: PlanningOptions) -> None:
+def check_appended_points(
+    appendable: AppendableGoal, appended: AppendedPoints, options: PlanningOptions
+) -> None:
     """
     Check what can be known wrong of an addition without looking where the arm is.
 
     :raises GoalRefused: with the reason; points are numbered from the start of the goal.
     """
-    count, first = len(addition.waypoints), open_goal.points
+    count, first = len(appended.waypoints), appendable.points
     if not count:
         raise InvalidGoal('points', 'is empty', 'give at least one point, or set last')
     if count > options.max_points:
@@ -84,13 +86,13 @@ def check_addition(open_goal: OpenGoal, addition: Addition, options: PlanningOpt
             f'has {count} points, more than max_points = {options.max_points}',
             'append them in several requests',
         )
-    if addition.segments and len(addition.segments) != count:
+    if appended.segments and len(appended.segments) != count:
         raise InvalidGoal(
             'segments',
-            f'has {len(addition.segments)} entries for {count} points',
+            f'has {len(appended.segments)} entries for {count} points',
             'give none, or exactly one for each point',
         )
-    for i, command in enumerate(addition.io_commands):
+    for i, command in enumerate(appended.io_commands):
         if not first <= command.waypoint < first + count:
             raise InvalidGoal(
                 f'io_commands[{i}].point_index',
@@ -101,27 +103,27 @@ def check_addition(open_goal: OpenGoal, addition: Addition, options: PlanningOpt
     # By themselves, too: what is planned has older ones in front of them.
     check_outputs(
         replace(
-            open_goal.goal, waypoints=addition.waypoints, io_commands=numbered(addition, first)
+            appendable.goal, waypoints=appended.waypoints, io_commands=numbered(appended, first)
         ),
         options,
     )
-    _check_times(open_goal, addition)
+    _check_times(appendable, appended)
 
 
-def numbered(addition: Addition, first: int) -> tuple[IOCommand, ...]:
+def numbered(appended: AppendedPoints, first: int) -> tuple[IOCommand, ...]:
     """Return the commands of an addition, with waypoints counted from a point."""
     return tuple(
-        replace(command, waypoint=command.waypoint - first) for command in addition.io_commands
+        replace(command, waypoint=command.waypoint - first) for command in appended.io_commands
     )
 
 
-def _check_times(open_goal: OpenGoal, addition: Addition) -> None:
+def _check_times(appendable: AppendableGoal, appended: AppendedPoints) -> None:
     """Refuse points that are not later than those before them, in the times of the client."""
-    before = open_goal.told
-    if before == 0.0 and not any(point.time for point in addition.waypoints):
+    before = appendable.last_client_time
+    if before == 0.0 and not any(point.time for point in appended.waypoints):
         return
-    for i, point in enumerate(addition.waypoints, open_goal.points):
-        if open_goal.told == 0.0 and open_goal.points > 1:
+    for i, point in enumerate(appended.waypoints, appendable.points):
+        if appendable.last_client_time == 0.0 and appendable.points > 1:
             raise InvalidGoal(
                 point_field(i, 'time_from_start'),
                 f'is {point.time:g} s, and the points before '

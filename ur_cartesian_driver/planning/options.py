@@ -9,10 +9,10 @@ from math import isfinite
 from typing import Literal, TypeAlias
 
 from ur_cartesian_driver.planning.workspace import parse_planes
-from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
+from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST_DIALECT
 
 #: Finer than this the wire does not carry joint positions [m].
-LEAST_SPLINE_TOLERANCE = 1e-6
+MIN_SPLINE_TOLERANCE = 1e-6
 
 Choice: TypeAlias = Literal['refuse', 'slow']
 PostureChoice: TypeAlias = Literal['refuse', 'movej']
@@ -66,7 +66,7 @@ class PlanningOptions:
     #: Whether the robot reports the accelerations of the TCP; else nobody can watch them.
     acceleration_known: bool = True
     #: What the robot program understands.
-    dialect: Dialect = NEWEST
+    dialect: Dialect = NEWEST_DIALECT
     #: Prefix of the joint names in postures.
     tf_prefix: str = ''
 
@@ -101,14 +101,14 @@ class PlanningOptions:
 
     #: Live targets: how fast the tool follows [m/s], [m/s^2], [rad/s], [rad/s^2], the fastest
     #: joint meanwhile [rad/s] ...
-    servo_target_linear_velocity: float = 0.25
-    servo_target_linear_acceleration: float = 1.0
-    servo_target_angular_velocity: float = 1.0
-    servo_target_angular_acceleration: float = 4.0
-    servo_target_joint_velocity: float = 1.5
+    live_target_linear_velocity: float = 0.25
+    live_target_linear_acceleration: float = 1.0
+    live_target_angular_velocity: float = 1.0
+    live_target_angular_acceleration: float = 4.0
+    live_target_joint_velocity: float = 1.5
     #: ... how old a target may be, and how long after the last one the session ends [s].
-    servo_target_max_age: float = 0.2
-    servo_target_timeout: float = 2.0
+    live_target_max_age: float = 0.2
+    live_target_timeout: float = 2.0
 
     #: Largest accelerations that a time may lead to [m/s^2], [rad/s^2], [rad/s^2].
     max_linear_acceleration: float = 10.0
@@ -118,7 +118,7 @@ class PlanningOptions:
     #: turned is as much at 0.1 m.
     spline_tolerance: float = 0.00005
     #: How hard the fastest joint brakes where an open goal ends without a last point [rad/s^2].
-    closing_deceleration: float = 4.0
+    keep_open_deceleration: float = 4.0
     #: The longest time that the wire carries, (2^31 - 1) us.
     max_segment_time: float = 2147.483647
 
@@ -137,7 +137,7 @@ class PlanningOptions:
             'joint_acceleration',
             'optimized_velocity',
             'optimized_acceleration',
-            'closing_deceleration',
+            'keep_open_deceleration',
             *(field for field in self.__slots__ if field.startswith('servo_target_')),
         ):
             if getattr(self, name) == 0.0:
@@ -156,15 +156,15 @@ class PlanningOptions:
                 f"self_collision is {self.self_collision!r}; it must be 'off', "
                 "'warn', 'refuse' or 'auto'"
             )
-        if self.spline_tolerance < LEAST_SPLINE_TOLERANCE:
+        if self.spline_tolerance < MIN_SPLINE_TOLERANCE:
             raise ValueError(
                 f'spline_tolerance is {self.spline_tolerance}; it must be at least '
-                f'{LEAST_SPLINE_TOLERANCE:g} m'
+                f'{MIN_SPLINE_TOLERANCE:g} m'
             )
-        if self.max_segment_time > NEWEST.max_duration:
+        if self.max_segment_time > NEWEST_DIALECT.max_duration:
             raise ValueError(
                 f'max_segment_time is {self.max_segment_time}; at most '
-                f'{NEWEST.max_duration} s can be sent'
+                f'{NEWEST_DIALECT.max_duration} s can be sent'
             )
         parse_planes(self.workspace_planes)
         if self.max_points < 1:

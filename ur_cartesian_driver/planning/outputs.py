@@ -22,13 +22,13 @@ from ur_cartesian_driver.motion.goal import Goal, IOCommand, OutputKind
 from ur_cartesian_driver.motion.plan import PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import conjugate, Pose, pose_from_row, rotate, Vector6
 from ur_cartesian_driver.motion.primitive import Spline, SwitchOutput
+from ur_cartesian_driver.planning.geometry.pose_rows import Floats
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.pose_rows import Floats
-from ur_cartesian_driver.protocol.dialects import NEWEST
-from ur_cartesian_driver.protocol.trajectory import MOST_OUTPUTS
+from ur_cartesian_driver.protocol.dialects import NEWEST_DIALECT
+from ur_cartesian_driver.protocol.trajectory import MAX_PENDING_OUTPUTS
 
 #: The longest time after a point [s].
-LARGEST_OFFSET = 60.0
+MAX_OUTPUT_OFFSET = 60.0
 
 _OUTPUTS = {
     OutputKind.STANDARD_DIGITAL: ('standard digital output', 8),
@@ -37,12 +37,12 @@ _OUTPUTS = {
     OutputKind.STANDARD_ANALOG: ('standard analog output', 2),
 }
 # Two times nearer than this are one [s].
-_NOW = 1e-6
+_SAME_TIME = 1e-6
 # Half of the time over which a heading is looked for [s], and how long it may get.
-_HEADING, _LONGEST_HEADING = 0.002, 0.6
+_DIRECTION_TIME, _MAX_DIRECTION_TIME = 0.002, 0.6
 # Where the tool moves by less than this the heading means nothing [m], [rad]; where it moves by
 # less than so much for a turn, it is that of the turn [m/rad].
-_NO_WAY = 1e-7
+_MIN_MOTION = 1e-7
 _TURNING = 0.01
 # A tool that is less beyond a place when its record is read does not come round to it [m], [rad].
 _BEYOND = 1e-4
@@ -55,7 +55,7 @@ def check_outputs(goal: Goal, options: PlanningOptions) -> None:
     :raises InvalidGoal: names field, value and bound.
     :raises NotAvailable: the robot program is not ours.
     """
-    if goal.io_commands and options.dialect is not NEWEST:
+    if goal.io_commands and options.dialect is not NEWEST_DIALECT:
         raise NotAvailable(
             'io_commands',
             'is not empty, and robot programs of wire dialect '
@@ -74,10 +74,10 @@ def _check(command: IOCommand, field: str, points: int) -> None:
             f'is {command.waypoint}, and the points are 0 to {points - 1}',
             'name one of these',
         )
-    if not 0.0 <= command.offset <= LARGEST_OFFSET:
+    if not 0.0 <= command.offset <= MAX_OUTPUT_OFFSET:
         raise InvalidGoal(
             f'{field}.offset',
-            f'is {command.offset:g} s; it is 0 to {LARGEST_OFFSET:g} s after the point',
+            f'is {command.offset:g} s; it is 0 to {MAX_OUTPUT_OFFSET:g} s after the point',
             'name a later point',
         )
     if not 0 <= command.pin < pins:
@@ -100,13 +100,13 @@ def _check(command: IOCommand, field: str, points: int) -> None:
         )
 
 
-def with_outputs(
+def place_outputs(
     segments: Sequence[PlannedSegment],
     reference: ReferencePath,
     commands: Sequence[IOCommand],
     *,
-    corners: Sequence[float] = (),
-    since: float = 0.0,
+    blend_times: Sequence[float] = (),
+    start_time: float = 0.0,
 ) -> tuple[PlannedSegment, ...]:
     """
     Return the segments with the outputs that are switched on the way, in their order in time.
@@ -119,21 +119,21 @@ def with_outputs(
     """
     if not commands:
         return tuple(segments)
-    way = _Way(segments, reference, corners, since)
+    timed_path = _TimedPath(segments, reference, blend_times, start_time)
     switches = sorted(
-        (way.switch(command, f'io_commands[{i}]') for i, command in enumerate(commands)),
+        (timed_path.switch(command, f'io_commands[{i}]') for i, command in enumerate(commands)),
         key=lambda found: found.time,
     )
     outputs: list[list[SwitchOutput]] = [[] for _ in segments]
     notes = [segment.note for segment in segments]
     for found in switches:
-        outputs[found.behind].append(found.record)
-        notes[found.told] += f'; {found.text}'
+        outputs[found.after_index].append(found.record)
+        notes[found.report_index] += f'; {found.text}'
     for own, segment in zip(outputs, segments, strict=True):
-        if sum(record.place is not None for record in own) > MOST_OUTPUTS:
+        if sum(record.trigger_pose is not None for record in own) > MAX_PENDING_OUTPUTS:
             raise InvalidGoal(
                 'io_commands',
-                f'switches more than {MOST_OUTPUTS} outputs between two motions, '
+                f'switches more than {MAX_PENDING_OUTPUTS} outputs between two motions, '
                 f'behind point {segment.waypoint}',
                 'add a point in between',
             )
@@ -144,79 +144,87 @@ def with_outputs(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Switch:
+class _PlacedOutput:
     """One output: when, behind which segment, and in which segment's line it is told."""
 
     time: float
-    behind: int
-    told: int
+    after_index: int
+    report_index: int
     record: SwitchOutput
     text: str
 
 
-class _Way:
+class _TimedPath:
     """The motions in time, and the path."""
 
     def __init__(
         self,
         segments: Sequence[PlannedSegment],
         reference: ReferencePath,
-        corners: Sequence[float],
-        since: float,
+        blend_times: Sequence[float],
+        start_time: float,
     ) -> None:
         """Note when each motion ends, and when it returns."""
         self.segments, self.reference = segments, reference
-        self.ends: Floats = since + np.cumsum([segment.duration for segment in segments])
-        self.corners = np.array(corners or [0.0] * len(segments))
-        self.returns: Floats = self.ends - 0.5 * self.corners
+        self.ends: Floats = start_time + np.cumsum([segment.duration for segment in segments])
+        self.blend_times = np.array(blend_times or [0.0] * len(segments))
+        self.returns: Floats = self.ends - 0.5 * self.blend_times
         self.index = {segment.waypoint: k for k, segment in enumerate(segments)}
 
-    def switch(self, command: IOCommand, field: str) -> _Switch:
+    def switch(self, command: IOCommand, field: str) -> _PlacedOutput:
         """Return when and where a command is carried out."""
-        told = self.index.get(command.waypoint)
-        if told is None:
+        report_index = self.index.get(command.waypoint)
+        if report_index is None:
             raise InvalidGoal(
                 f'{field}.point_index',
                 f'is {command.waypoint}, and no motion leads there: the robot stands there',
                 'set the output before',
             )
-        time, last = float(self.ends[told]) + command.offset, len(self.segments) - 1
+        time, last = float(self.ends[report_index]) + command.offset, len(self.segments) - 1
         late = time - float(self.ends[last])
-        if command.offset <= _NOW:
-            behind, place, where = told, self._at_point(told), self._where(told)
-        elif late > -_NOW:
-            behind, place = last, None
+        if command.offset <= _SAME_TIME:
+            after_index, trigger_time, where = (
+                report_index,
+                self._at_point(report_index),
+                self._where(report_index),
+            )
+        elif late > -_SAME_TIME:
+            after_index, trigger_time = last, None
             where = f'{max(late, 0.0):.3f} s after the end'
         else:
-            behind, place, where = self._behind(time), time, f'{command.offset:.3f} s after it'
+            after_index, trigger_time, where = (
+                self._last_returned(time),
+                time,
+                f'{command.offset:.3f} s after it',
+            )
         record = SwitchOutput(
             output=command.output,
             pin=command.pin,
             value=command.value,
             domain=command.domain,
-            delay=max(late, 0.0) if place is None and command.offset > _NOW else 0.0,
+            delay=max(late, 0.0) if trigger_time is None and command.offset > _SAME_TIME else 0.0,
         )
-        if place is not None:
-            record = self._at(record, place, float(self.returns[behind]))
-        return _Switch(
-            time=time if place is None else place,
-            behind=behind,
-            told=told,
+        if trigger_time is not None:
+            record = self._at(record, trigger_time, float(self.returns[after_index]))
+        return _PlacedOutput(
+            time=time if trigger_time is None else trigger_time,
+            after_index=after_index,
+            report_index=report_index,
             record=record,
-            text=f'switches {_spoken(command)} {where}',
+            text=f'switches {_describe_command(command)} {where}',
         )
 
-    def _behind(self, time: float) -> int:
+    def _last_returned(self, time: float) -> int:
         """Return the number of the last motion that has returned at a time [s]."""
-        return int(np.searchsorted(self.returns, time + _NOW, side='right')) - 1
+        return int(np.searchsorted(self.returns, time + _SAME_TIME, side='right')) - 1
 
     def _passes(self, k: int) -> bool:
         """Tell whether the arm moves at the end of a motion."""
         piece = self.segments[k].primitive
-        return self.corners[k] > 0.0 or (isinstance(piece, Spline) and any(piece.velocities))
+        return self.blend_times[k] > 0.0 or (isinstance(piece, Spline) and any(piece.velocities))
 
     def _where(self, k: int) -> str:
-        if self.corners[k] > 0.0:
+        if self.blend_times[k] > 0.0:
             return 'in the middle of its corner'
         return 'on passing it' if self._passes(k) else 'when it has stopped there'
 
@@ -224,7 +232,7 @@ class _Way:
         """Return when the tool is nearest to the end of a motion [s], None where it stops."""
         if not self._passes(k):
             return None
-        end, half = float(self.ends[k]), 0.5 * float(self.corners[k])
+        end, half = float(self.ends[k]), 0.5 * float(self.blend_times[k])
         target = getattr(self.segments[k].primitive, 'target', None)
         if half <= 0.0 or not isinstance(target, Pose):
             return end
@@ -238,23 +246,28 @@ class _Way:
             int(np.searchsorted(times, end)) + 1,
         )
         points, t = rows[own, :3], times[own]
-        way = np.diff(points, axis=0)
-        square = (way * way).sum(axis=1)
-        if square.max(initial=0.0) < _NO_WAY**2:
+        chords = np.diff(points, axis=0)
+        square = (chords * chords).sum(axis=1)
+        if square.max(initial=0.0) < _MIN_MOTION**2:
             return middle
-        along = ((position - points[:-1]) * way).sum(axis=1) / np.maximum(square, 1e-300)
+        along = ((position - points[:-1]) * chords).sum(axis=1) / np.maximum(square, 1e-300)
         u = np.clip(along, 0.0, 1.0)
-        k = int(np.argmin(np.linalg.norm(points[:-1] + u[:, None] * way - position, axis=1)))
+        k = int(np.argmin(np.linalg.norm(points[:-1] + u[:, None] * chords - position, axis=1)))
         return float(np.clip(t[k] + u[k] * (t[k + 1] - t[k]), begin, end))
 
     def _at(self, record: SwitchOutput, time: float, read: float) -> SwitchOutput:
         """Return a record with its place: where the tool is at a time, read at another [s]."""
-        place, heading = self._pose(time), self._heading(time)
-        if heading is None:
+        trigger_pose, trigger_direction = self._pose(time), self._trigger_direction(time)
+        if trigger_direction is None:
             return record
-        start = (place.inverse() @ self._pose(read)).rotation_vector()
-        beyond = sum(a * b for a, b in zip(start, heading, strict=True))
-        return replace(record, place=place, heading=heading, comes_round=beyond > _BEYOND)
+        start = (trigger_pose.inverse() @ self._pose(read)).rotation_vector()
+        beyond = sum(a * b for a, b in zip(start, trigger_direction, strict=True))
+        return replace(
+            record,
+            trigger_pose=trigger_pose,
+            trigger_direction=trigger_direction,
+            starts_beyond=beyond > _BEYOND,
+        )
 
     def _pose(self, time: float) -> Pose:
         times, rows = self.reference.time, self.reference.poses
@@ -263,30 +276,30 @@ class _Way:
         part = min(max((time - before) / span, 0.0), 1.0) if span > 0.0 else 1.0
         return pose_from_row(rows[k - 1]).interpolate(pose_from_row(rows[k]), part)
 
-    def _heading(self, time: float) -> Vector6 | None:
+    def _trigger_direction(self, time: float) -> Vector6 | None:
         """Return the direction of the path at a time, None where it stands."""
-        place, half = self._pose(time), _HEADING
-        while half <= _LONGEST_HEADING:
+        pose, half = self._pose(time), _DIRECTION_TIME
+        while half <= _MAX_DIRECTION_TIME:
             a, b = self._pose(time - half), self._pose(time + half)
-            way, angle = a.distance_to(b), a.angle_to(b)
-            if way > max(_NO_WAY, _TURNING * angle):
+            distance, angle = a.distance_to(b), a.angle_to(b)
+            if distance > max(_MIN_MOTION, _TURNING * angle):
                 x, y, z = rotate(
-                    conjugate(place.quaternion),
+                    conjugate(pose.quaternion),
                     (
                         b.position[0] - a.position[0],
                         b.position[1] - a.position[1],
                         b.position[2] - a.position[2],
                     ),
                 )
-                return (x / way, y / way, z / way, 0.0, 0.0, 0.0)
-            if angle > _NO_WAY:
+                return (x / distance, y / distance, z / distance, 0.0, 0.0, 0.0)
+            if angle > _MIN_MOTION:
                 *_, x, y, z = (a.inverse() @ b).rotation_vector()
                 return (0.0, 0.0, 0.0, x / angle, y / angle, z / angle)
             half *= 4.0
         return None
 
 
-def _spoken(command: IOCommand) -> str:
+def _describe_command(command: IOCommand) -> str:
     name, _ = _OUTPUTS[command.output]
     if command.output is OutputKind.STANDARD_ANALOG:
         return f'{name} {command.pin} to {command.value:g} ({command.domain.name.lower()})'

@@ -5,7 +5,7 @@ The curves that the robot's motions trace: lines, arcs and joint lines.
 
 A path maps ``u`` in [0, 1] to poses of the TCP in the robot's base, with ``u`` proportional to
 the quantity that leads the motion (length of a line or an arc, travel of the joints). Corner to
-corner: what a blend makes of the corner is the business of :mod:`~.corner`.
+corner: what a blend makes of the corner is the business of :mod:`~.blend`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.pose import (
     Vector3,
 )
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.pose_rows import (
+from ur_cartesian_driver.planning.geometry.pose_rows import (
     compose_rows,
     Floats,
     interpolate_rows,
@@ -40,18 +40,18 @@ from ur_cartesian_driver.planning.pose_rows import (
 SAME_POSITION = 1e-6
 SAME_ANGLE = 1e-6
 #: Least height of the via above the chord [m] at which three points still make a circle.
-LEAST_ARC_HEIGHT = 1e-5
+MIN_ARC_HEIGHT = 1e-5
 #: Arcs through points that are farther apart are refused [m]: no arm comes there.
-LARGEST_ARC = 1000.0
+MAX_ARC_SIZE = 1000.0
 #: Chord error of sampled arcs and of sampled joint lines [m].
 ARC_CHORD_ERROR = 5e-6
 CURVE_CHORD_ERROR = 20e-6
 #: Largest turn between two samples [rad].
-TURN_PER_SAMPLE = pi / 18.0
+MAX_TURN_PER_SAMPLE = pi / 18.0
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class LineCurve:
     """The tool on a straight line, its orientation along the shortest rotation."""
 
     start: Pose
@@ -62,7 +62,7 @@ class Line:
     ends: Floats = field(compare=False, repr=False)
 
     @classmethod
-    def between(cls, start: Pose, end: Pose) -> Line:
+    def between(cls, start: Pose, end: Pose) -> LineCurve:
         """Return the line from one pose to another."""
         return cls(
             start,
@@ -75,7 +75,7 @@ class Line:
     @property
     def samples(self) -> int:
         """Into how many pieces to cut it so that chords follow it: 1 unless it turns."""
-        return max(1, ceil(self.angle / TURN_PER_SAMPLE))
+        return max(1, ceil(self.angle / MAX_TURN_PER_SAMPLE))
 
     def pose(self, u: float) -> Pose:
         """Return the pose at ``u``."""
@@ -91,7 +91,7 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class Arc:
+class ArcCurve:
     """
     The tool on a circular arc.
 
@@ -111,7 +111,7 @@ class Arc:
     u_via: float
 
     @classmethod
-    def through(cls, start: Pose, via: Vector3, end: Pose, mode: ArcMode) -> Arc:
+    def through(cls, start: Pose, via: Vector3, end: Pose, mode: ArcMode) -> ArcCurve:
         """
         Return the arc from start through a position [m] to the end's position.
 
@@ -143,7 +143,7 @@ class Arc:
     def samples(self) -> int:
         """Into how many pieces to cut it so that chords follow it."""
         step = sqrt(8.0 * ARC_CHORD_ERROR / self.radius)
-        return max(1, ceil(self.sweep / step), ceil(self.angle / TURN_PER_SAMPLE))
+        return max(1, ceil(self.sweep / step), ceil(self.angle / MAX_TURN_PER_SAMPLE))
 
     def pose(self, u: float) -> Pose:
         """Return the pose at ``u``."""
@@ -173,7 +173,7 @@ class Arc:
 
 
 @dataclass(frozen=True, slots=True)
-class JointLine:
+class JointLineCurve:
     """All joints in step on a straight line in joint space; the tool goes where that leads."""
 
     arm: Arm
@@ -189,12 +189,14 @@ class JointLine:
     unevenness: float
 
     @classmethod
-    def between(cls, arm: Arm, T_flange_tcp: Pose, q_start: Joints, q_end: Joints) -> JointLine:
+    def between(
+        cls, arm: Arm, T_flange_tcp: Pose, q_start: Joints, q_end: Joints
+    ) -> JointLineCurve:
         """Return the joint line from one configuration to another."""
         # A point at most `reach` from all axes of rotation leaves its chord by at most
         # reach delta^2 / 8 when the joints together turn by delta.
-        reach = arm.model.reach + hypot(*T_flange_tcp.position)
-        step = sqrt(8.0 * CURVE_CHORD_ERROR / reach)
+        max_reach = arm.model.max_reach + hypot(*T_flange_tcp.position)
+        step = sqrt(8.0 * CURVE_CHORD_ERROR / max_reach)
         samples = max(1, ceil(sum(abs(b - a) for a, b in zip(q_start, q_end, strict=True)) / step))
         q = np.linspace(q_start, q_end, samples + 1)
         chords = np.linalg.norm(np.diff(tcp_rows(arm, T_flange_tcp, q)[:, :3], axis=0), axis=1)
@@ -262,19 +264,19 @@ class JointLine:
             low, high = (middle, high) if inside else (low, middle)
         return high
 
-    def reversed(self) -> JointLine:
+    def reversed(self) -> JointLineCurve:
         """Return the same line from its end to its start."""
         return replace(
             self, q_start=self.q_end, q_end=self.q_start, start=self.end, end=self.start
         )
 
 
-Path: TypeAlias = Line | Arc | JointLine
+SegmentCurve: TypeAlias = LineCurve | ArcCurve | JointLineCurve
 
 
-def trim_end(path: Path, radius: float) -> float:
+def trim_end(path: SegmentCurve, radius: float) -> float:
     """Return the ``u`` at which a path comes into a ball of that radius [m] around its end."""
-    if isinstance(path, JointLine):
+    if isinstance(path, JointLineCurve):
         return 1.0 - path.reversed().trim(radius)
     return 1.0 - path.trim(radius)
 
@@ -284,7 +286,7 @@ def tcp_rows(arm: Arm, T_flange_tcp: Pose, q: Floats) -> Floats:
     return compose_rows(arm.forward_rows(q), T_flange_tcp)
 
 
-def same(a: Pose, b: Pose) -> bool:
+def is_same_pose(a: Pose, b: Pose) -> bool:
     """Tell whether two poses are the same within the resolution of the wire."""
     return a.distance_to(b) <= SAME_POSITION and a.angle_to(b) <= SAME_ANGLE
 
@@ -293,18 +295,18 @@ def _circle(a: Vector3, b: Vector3, c: Vector3) -> tuple[Vector3, Vector3, float
     """Return center, axis (unit) and radius of the circle that goes a, b, c in this order."""
     ab, ac = _minus(b, a), _minus(c, a)
     chord = hypot(*ac)
-    for name, apart in (
+    for name, distance_apart in (
         ('the start and the end', chord),
         ('the start and the via', hypot(*ab)),
         ('the via and the end', distance(b, c)),
     ):
-        if apart < LEAST_ARC_HEIGHT:
-            raise ValueError(f'{name} of the arc coincide ({1e3 * apart:.3f} mm apart)')
-    if max(chord, hypot(*ab)) > LARGEST_ARC:
-        raise ValueError(f'the points of the arc are more than {LARGEST_ARC:g} m apart')
+        if distance_apart < MIN_ARC_HEIGHT:
+            raise ValueError(f'{name} of the arc coincide ({1e3 * distance_apart:.3f} mm apart)')
+    if max(chord, hypot(*ab)) > MAX_ARC_SIZE:
+        raise ValueError(f'the points of the arc are more than {MAX_ARC_SIZE:g} m apart')
     normal = _cross(ab, ac)
     area = hypot(*normal)
-    if area / max(chord, hypot(*ab), distance(b, c)) < LEAST_ARC_HEIGHT:
+    if area / max(chord, hypot(*ab), distance(b, c)) < MIN_ARC_HEIGHT:
         raise ValueError('the start, the via and the end of the arc lie on one straight line')
     # Circumcenter seen from a: ((|ab|^2 ac - |ac|^2 ab) x (ab x ac)) / (2 |ab x ac|^2).
     ab2, ac2 = hypot(*ab) ** 2, chord**2

@@ -3,7 +3,7 @@
 """
 From a goal to a plan: choose the primitives, and refuse what the arm cannot do.
 
-The stages: :func:`~.validate.check` (no robot needed), the way of every segment with the
+The stages: :func:`~.request.validate.check` (no robot needed), the way of every segment with the
 configuration in which it arrives, blends, speeds, and then the primitives, the reference path and
 the report. The first reason to refuse that is met is raised; nothing has been sent by then.
 """
@@ -37,39 +37,53 @@ from ur_cartesian_driver.motion.primitive import (
     Target,
 )
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.planning.clearance import Clearance
-from ur_cartesian_driver.planning.clearance import remarks as clearance_remarks
-from ur_cartesian_driver.planning.controlled import Carried, carried, tools
-from ur_cartesian_driver.planning.leg import Leg, Timing
-from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.outputs import with_outputs
-from ur_cartesian_driver.planning.path import Arc
-from ur_cartesian_driver.planning.postures import (
-    full,
-    missed,
-    named_joints,
-    Reach,
+from ur_cartesian_driver.planning.geometry.curves import ArcCurve
+from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
+from ur_cartesian_driver.planning.moves.plan_report import (
+    ignored_remarks,
+    segment_note,
+    tightest_remark,
 )
-from ur_cartesian_driver.planning.reference import reference_path
-from ur_cartesian_driver.planning.report import ignored, note, smallest
-from ur_cartesian_driver.planning.route import Route, SAME_SOLUTION
-from ur_cartesian_driver.planning.spline_plan import plan_pieces, SplineState, stretched
-from ur_cartesian_driver.planning.spoken import poses_only, spoken
-from ur_cartesian_driver.planning.timing import schedule
-from ur_cartesian_driver.planning.tolerances import with_default_tolerances
-from ur_cartesian_driver.planning.validate import (
+from ur_cartesian_driver.planning.moves.reference_path import reference_path
+from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
+from ur_cartesian_driver.planning.moves.segment_timing import schedule
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.output_placement import place_outputs
+from ur_cartesian_driver.planning.preflight.clearance import Clearance, clearance_remarks
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
+    describe_miss,
+    full_posture,
+    named_joints,
+    TcpKinematics,
+)
+from ur_cartesian_driver.planning.request.controlled_frame import (
+    retarget_to_tcp,
+    RetargetedGoal,
+    tool_tips,
+)
+from ur_cartesian_driver.planning.request.default_tolerances import apply_default_tolerances
+from ur_cartesian_driver.planning.request.dialect_adaptation import (
+    adapt_to_dialect,
+    explain_poses_only,
+)
+from ur_cartesian_driver.planning.request.validate import (
     check,
     is_spline,
     is_timed,
     point_field,
+    resolve_execution_mode,
     segment_field,
-    way_of_execution,
+)
+from ur_cartesian_driver.planning.spline.spline_planner import (
+    plan_spline,
+    SplineState,
+    stretch_times,
 )
 
 #: How far the reported TCP may be from where the kinematics puts it [m], [rad]. Calibration moves
 #: it by some millimetres; another model or another TCP moves it by much more.
-LARGEST_MISMATCH_POSITION = 0.015
-LARGEST_MISMATCH_ANGLE = 0.05
+MAX_MISMATCH_POSITION = 0.015
+MAX_MISMATCH_ANGLE = 0.05
 
 
 def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
@@ -103,19 +117,19 @@ def _no_collections() -> Iterator[None]:
 
 def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
     check(goal, options)
-    goal = with_default_tolerances(goal, options)
+    goal = apply_default_tolerances(goal, options)
     T_flange_active = state.T_flange_tcp
-    about = carried(goal, state, options)
-    goal, state = about.goal, about.state
+    retargeted = retarget_to_tcp(goal, state, options)
+    goal, state = retargeted.goal, retargeted.state
     planner = _Planner(goal, state, arm, options)
     if is_spline(goal):
-        return _spline_plan(planner, about, T_flange_active)
-    legs = planner.legs()
-    samples = planner.route.survey.samples()
-    said = list(
+        return _spline_plan(planner, retargeted, T_flange_active)
+    geometries = planner.geometries()
+    samples = planner.joint_path_planner.path_margins.samples()
+    clearance_lines = list(
         dict.fromkeys(
             line
-            for T_flange_tcp in tools(goal, T_flange_active)
+            for T_flange_tcp in tool_tips(goal, T_flange_active)
             for line in clearance_remarks(
                 Clearance(arm, T_flange_tcp, options).check(samples.q, state.actual_q),
                 samples.segment,
@@ -123,21 +137,24 @@ def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> 
             )
         )
     )
-    timings = schedule(legs, options, arm.model)
-    reference = reference_path(state.actual_tcp_pose, legs, timings)
-    segments = with_outputs(
-        [planner.segment(leg, timing) for leg, timing in zip(legs, timings, strict=True)],
+    timings = schedule(geometries, options, arm.model)
+    reference = reference_path(state.actual_tcp_pose, geometries, timings)
+    segments = place_outputs(
+        [
+            planner.segment(geometry, timing)
+            for geometry, timing in zip(geometries, timings, strict=True)
+        ],
         reference,
         goal.io_commands,
-        corners=[timing.corner for timing in timings],
+        blend_times=[timing.blend_time for timing in timings],
     )
     remarks = [
-        *about.remarks,
+        *retargeted.remarks,
         *planner.remarks,
-        *ignored(goal),
+        *ignored_remarks(goal),
         *(timing.remark for timing in timings if timing.remark),
-        *said,
-        smallest(legs),
+        *clearance_lines,
+        tightest_remark(geometries),
     ]
     return Plan(
         goal=goal,
@@ -146,12 +163,12 @@ def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> 
         remarks=tuple(remarks),
         reference=reference,
         T_flange_active=T_flange_active,
-        T_flange_tcp=about.T_flange_tcp,
-        T_tcp_controlled=about.T_tcp_controlled,
+        T_flange_tcp=retargeted.T_flange_tcp,
+        T_tcp_controlled=retargeted.T_tcp_controlled,
     )
 
 
-def _spline_plan(planner: _Planner, about: Carried, T_flange_active: Pose) -> Plan:
+def _spline_plan(planner: _Planner, retargeted: RetargetedGoal, T_flange_active: Pose) -> Plan:
     """Return the plan of a goal whose points are joined by a spline."""
     goal, state, options = planner.goal, planner.state, planner.options
     begin = planner.begin()
@@ -160,25 +177,25 @@ def _spline_plan(planner: _Planner, about: Carried, T_flange_active: Pose) -> Pl
         if not begin
         else replace(goal, waypoints=goal.waypoints[begin:], segments=goal.segments[begin:])
     )
-    found = plan_pieces(
+    found = plan_spline(
         SplineState(q=state.actual_q),
         part,
-        planner.reach.arm,
+        planner.kinematics.arm,
         state.T_flange_tcp,
         options,
         first=begin,
-        tools=tools(goal, T_flange_active),
+        tool_tips=tool_tips(goal, T_flange_active),
     )
     return Plan(
-        goal=stretched(goal, found.stretch),
+        goal=stretch_times(goal, found.stretch),
         start=state.actual_q,
-        segments=with_outputs(found.segments, found.reference, goal.io_commands),
+        segments=place_outputs(found.segments, found.reference, goal.io_commands),
         reference=found.reference,
-        remarks=(*about.remarks, *planner.remarks, *found.remarks),
+        remarks=(*retargeted.remarks, *planner.remarks, *found.remarks),
         T_flange_active=T_flange_active,
-        T_flange_tcp=about.T_flange_tcp,
-        T_tcp_controlled=about.T_tcp_controlled,
-        execution=way_of_execution(goal),
+        T_flange_tcp=retargeted.T_flange_tcp,
+        T_tcp_controlled=retargeted.T_tcp_controlled,
+        execution=resolve_execution_mode(goal),
     )
 
 
@@ -187,7 +204,7 @@ class _Planner:
 
     def __init__(self, goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> None:
         self.goal, self.state, self.options = goal, state, options
-        self.reach = Reach(arm, state.T_flange_tcp)
+        self.kinematics = TcpKinematics(arm, state.T_flange_tcp)
         self.remarks: list[str] = []
         #: By point: why its primitive is not the plain one.
         self.why: dict[int, list[str]] = {}
@@ -198,7 +215,9 @@ class _Planner:
                 f'all points: times are kept by speeds, because robot programs '
                 f'of wire dialect {options.dialect.name} count in milliseconds'
             )
-        self.route = Route(goal, self.targets, self.reach, options, self.remarks, self.why)
+        self.joint_path_planner = JointPathPlanner(
+            goal, self.targets, self.kinematics, options, self.remarks, self.why
+        )
         self._check_robot()
 
     # -- before the first segment ----------------------------------------------------------------
@@ -206,13 +225,14 @@ class _Planner:
     def _check_robot(self) -> None:
         """Refuse where the robot is not what the kinematics thinks, or is somewhere else."""
         state = self.state
-        predicted = self.reach.arm.forward(state.actual_q) @ state.T_flange_tcp
-        apart = predicted.distance_to(state.actual_tcp_pose)
+        predicted = self.kinematics.arm.forward(state.actual_q) @ state.T_flange_tcp
+        distance = predicted.distance_to(state.actual_tcp_pose)
         angle = predicted.angle_to(state.actual_tcp_pose)
-        if apart > LARGEST_MISMATCH_POSITION or angle > LARGEST_MISMATCH_ANGLE:
+        if distance > MAX_MISMATCH_POSITION or angle > MAX_MISMATCH_ANGLE:
             raise RobotNotReady(
-                f'The robot reports its TCP {1e3 * apart:.1f} mm and {angle:.3f} rad away from '
-                f'where the kinematics of a {self.reach.arm.model.name} puts it; check ur_type '
+                f'The robot reports its TCP {1e3 * distance:.1f} mm and {angle:.3f} rad away from '
+                f'where the kinematics of a {self.kinematics.arm.model.name} puts it; '
+                'check ur_type '
                 'and the TCP. Where the software of a robot does not report its TCP (RTDE field '
                 'tcp_offset), it has to be the flange.'
             )
@@ -230,7 +250,7 @@ class _Planner:
                 'goal with points in between, or raise the parameter',
             )
 
-    def _stands_at_first(self) -> bool:
+    def _is_at_first_point(self) -> bool:
         """
         Tell whether the first point is at time 0 and so needs no motion.
 
@@ -239,12 +259,12 @@ class _Planner:
         if not self.timed or self.goal.waypoints[0].time != 0.0:
             return False
         actual, target = self.state.actual_tcp_pose, self.targets[0]
-        apart, angle = actual.distance_to(target), actual.angle_to(target)
+        distance, angle = actual.distance_to(target), actual.angle_to(target)
         options = self.options
-        if apart > options.start_tolerance_position or angle > options.start_tolerance_angle:
+        if distance > options.start_tolerance_position or angle > options.start_tolerance_angle:
             raise InvalidGoal(
                 point_field(0, 'time_from_start'),
-                f'is 0, but the tool is {apart:.4f} m and '
+                f'is 0, but the tool is {distance:.4f} m and '
                 f'{angle:.4f} rad away from the point (allowed are '
                 f'{options.start_tolerance_position:g} m and {options.start_tolerance_angle:g} '
                 'rad)',
@@ -261,10 +281,12 @@ class _Planner:
         if posture:
             named = named_joints(posture, self.options.tf_prefix)
             q = self.state.actual_q
-            chosen = self.reach.chosen(self.targets[0], named, q, point_field(0, 'pose'))
+            chosen = self.kinematics.solve_posture(
+                self.targets[0], named, q, point_field(0, 'pose')
+            )
             # The robot stands within the start's tolerance, not exactly there.
-            near = self.reach.nearest(self.targets[0], q, point_field(0, 'pose'))
-            if clause := missed(near, chosen, named):
+            near = self.kinematics.nearest(self.targets[0], q, point_field(0, 'pose'))
+            if clause := describe_miss(near, chosen, named):
                 raise InvalidPosture(
                     f'{point_field(0, "posture")} is not the one in which the '
                     f'robot stands: {clause}; give the first point a time.'
@@ -272,42 +294,46 @@ class _Planner:
 
     def begin(self) -> int:
         """Return the number of the first point to which there is a motion."""
-        return 1 if self._stands_at_first() else 0
+        return 1 if self._is_at_first_point() else 0
 
-    def legs(self) -> list[Leg]:
+    def geometries(self) -> list[SegmentGeometry]:
         """Return the way of every segment and the configuration it arrives in."""
         begin = self.begin()
         stops = [0.0, *(point.time for point in self.goal.waypoints)][begin:]
         times = [after - before if self.timed else None for before, after in pairwise(stops)]
-        legs = self.route.legs(begin, self.state.actual_tcp_pose, self.state.actual_q, times)
-        self.samples = self.route.survey.samples()
-        return legs
+        geometries = self.joint_path_planner.geometries(
+            begin, self.state.actual_tcp_pose, self.state.actual_q, times
+        )
+        self.samples = self.joint_path_planner.path_margins.samples()
+        return geometries
 
     # -- primitives ------------------------------------------------------------------------------
 
-    def segment(self, leg: Leg, timing: Timing) -> PlannedSegment:
+    def segment(self, geometry: SegmentGeometry, timing: SegmentTiming) -> PlannedSegment:
         """Return the primitive of a leg and what is expected of it."""
-        primitive, why = spoken(self._primitive(leg, timing), leg.index, leg.joints, self.options)
+        primitive, why = adapt_to_dialect(
+            self._primitive(geometry, timing), geometry.index, geometry.joints, self.options
+        )
         if why:
-            self.why.setdefault(leg.index, []).append(why)
+            self.why.setdefault(geometry.index, []).append(why)
         return PlannedSegment(
             primitive=primitive,
-            waypoint=leg.index,
-            length=leg.path.length,
-            angle=leg.path.angle,
+            waypoint=geometry.index,
+            length=geometry.path.length,
+            angle=geometry.path.angle,
             duration=timing.duration,
-            joints=leg.joints,
-            note=note(leg, timing, primitive, self.why.get(leg.index, ())),
+            joints=geometry.joints,
+            note=segment_note(geometry, timing, primitive, self.why.get(geometry.index, ())),
         )
 
-    def _primitive(self, leg: Leg, timing: Timing) -> Primitive:
-        blend = leg.after.radius if leg.after else 0.0
-        v, a, target = timing.velocity, timing.acceleration, self.targets[leg.index]
-        match leg.kind:
+    def _primitive(self, geometry: SegmentGeometry, timing: SegmentTiming) -> Primitive:
+        blend = geometry.after.radius if geometry.after else 0.0
+        v, a, target = timing.velocity, timing.acceleration, self.targets[geometry.index]
+        match geometry.kind:
             case SegmentType.JOINT:
                 return MoveJ(
                     target=target,
-                    q_near=self._q_near(leg),
+                    q_near=self._q_near(geometry),
                     velocity=v,
                     acceleration=a,
                     duration=timing.wire_time,
@@ -316,17 +342,17 @@ class _Planner:
             case SegmentType.PROCESS:
                 return MoveP(
                     target=target,
-                    q_near=self._posture_near(leg),
+                    q_near=self._posture_near(geometry),
                     velocity=v,
                     acceleration=a,
                     blend_radius=blend,
                 )
             case SegmentType.CIRCULAR:
-                return self._arc(leg, v, a, blend)
+                return self._arc(geometry, v, a, blend)
             case SegmentType.OPTIMIZED_JOINT:
                 return OptimoveJ(
                     target=target,
-                    q_near=self._q_near(leg),
+                    q_near=self._q_near(geometry),
                     velocity=v,
                     acceleration=a,
                     blend_radius=blend,
@@ -334,7 +360,7 @@ class _Planner:
             case SegmentType.OPTIMIZED_LINEAR:
                 return OptimoveL(
                     target=target,
-                    q_near=self._posture_near(leg),
+                    q_near=self._posture_near(geometry),
                     velocity=v,
                     acceleration=a,
                     blend_radius=blend,
@@ -342,53 +368,58 @@ class _Planner:
             case _:
                 return MoveL(
                     target=target,
-                    q_near=self._posture_near(leg),
+                    q_near=self._posture_near(geometry),
                     velocity=v,
                     acceleration=a,
                     duration=timing.wire_time,
                     blend_radius=blend,
                 )
 
-    def _posture_near(self, leg: Leg) -> Joints | None:
-        return self._q_near(leg) if leg.waypoint.posture else None
+    def _posture_near(self, geometry: SegmentGeometry) -> Joints | None:
+        return self._q_near(geometry) if geometry.waypoint.posture else None
 
-    def _q_near(self, leg: Leg) -> Joints:
+    def _q_near(self, geometry: SegmentGeometry) -> Joints:
         """Return the chosen solution; a full posture itself where it leads to the same one."""
-        wanted = full(named_joints(leg.waypoint.posture, self.options.tf_prefix))
+        wanted = full_posture(named_joints(geometry.waypoint.posture, self.options.tf_prefix))
         if wanted is not None:
-            place = point_field(leg.index, 'pose')
-            found = self.reach.nearest(self.targets[leg.index], wanted, place)
-            if max(abs(a - b) for a, b in zip(found, leg.joints, strict=True)) <= SAME_SOLUTION:
+            location = point_field(geometry.index, 'pose')
+            found = self.kinematics.nearest(self.targets[geometry.index], wanted, location)
+            if (
+                max(abs(a - b) for a, b in zip(found, geometry.joints, strict=True))
+                <= SAME_SOLUTION
+            ):
                 return wanted
-        return leg.joints
+        return geometry.joints
 
-    def _arc(self, leg: Leg, velocity: float, acceleration: float, blend: float) -> MoveC:
+    def _arc(
+        self, geometry: SegmentGeometry, velocity: float, acceleration: float, blend: float
+    ) -> MoveC:
         """Return the arc, with joint fields where target or via carry a posture."""
-        segment = leg.segment
+        segment = geometry.segment
         assert segment.via is not None
-        assert isinstance(leg.path, Arc)
+        assert isinstance(geometry.path, ArcCurve)
         T_base_via = self.goal.T_base_frame @ segment.via
         via: Target = T_base_via
-        target: Target = self.targets[leg.index]
+        target: Target = self.targets[geometry.index]
         wanted = [
             name
             for name, posture in (
-                ('the point', leg.waypoint.posture),
+                ('the point', geometry.waypoint.posture),
                 ('the via', segment.via_posture),
             )
             if posture
         ]
-        if wanted and (reason := poses_only(self.options)):
+        if wanted and (reason := explain_poses_only(self.options)):
             self.remarks.append(
-                f'point {leg.index}: sent as poses in spite of the posture of '
+                f'point {geometry.index}: sent as poses in spite of the posture of '
                 f'{" and ".join(wanted)}, because {reason}'
             )
         elif wanted:
-            self.why.setdefault(leg.index, []).append(
+            self.why.setdefault(geometry.index, []).append(
                 f'{" and ".join(wanted)} {"has" if len(wanted) == 1 else "have"} a posture'
             )
-            target = leg.joints if leg.waypoint.posture else target
-            via = self._via_joints(leg, segment, T_base_via) if segment.via_posture else via
+            target = geometry.joints if geometry.waypoint.posture else target
+            via = self._via_joints(geometry, segment, T_base_via) if segment.via_posture else via
         return MoveC(
             target=target,
             via=via,
@@ -398,22 +429,23 @@ class _Planner:
             mode=segment.arc_mode,
         )
 
-    def _via_joints(self, leg: Leg, segment: Segment, via: Pose) -> Joints:
+    def _via_joints(self, geometry: SegmentGeometry, segment: Segment, via: Pose) -> Joints:
         """
         Return the solution of the via's pose that its posture means.
 
         :raises InvalidPosture: the arm goes along the arc in another configuration.
         """
-        assert isinstance(leg.path, Arc)
-        place = segment_field(leg.index, 'via')
-        passing = self.samples.joints_at(leg.index, leg.path.u_via)
+        assert isinstance(geometry.path, ArcCurve)
+        location = segment_field(geometry.index, 'via')
+        passing = self.samples.joints_at(geometry.index, geometry.path.u_via)
         # The orientation of the via does not shape the arc, so go on from there to its pose.
-        q = self.reach.nearest(via, passing, place)
+        q = self.kinematics.nearest(via, passing, location)
         named = named_joints(segment.via_posture, self.options.tf_prefix)
-        chosen = self.reach.chosen(via, named, q, place)
-        if clause := missed(q, chosen, named):
+        chosen = self.kinematics.solve_posture(via, named, q, location)
+        if clause := describe_miss(q, chosen, named):
             raise InvalidPosture(
-                f'{segment_field(leg.index, "via_posture")} is not the configuration in which '
+                f'{segment_field(geometry.index, "via_posture")} is not the configuration in '
+                'which '
                 f'the arm goes along the arc: {clause}; leave it empty, or go to the start of '
                 'the arc in that configuration.'
             )

@@ -17,7 +17,7 @@ RAMP_SHARE = 1.0 / 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Profile:
+class SpeedProfile:
     """
     One motion of a length [m, rad, ...] that enters, cruises and leaves at given speeds.
 
@@ -35,44 +35,47 @@ class Profile:
         """Return the time it takes [s]."""
         if self.length <= 0.0:
             return 0.0
-        way_in, way_out = self._way(self.enter), self._way(self.leave)
-        return (self.length - way_in - way_out) / self.cruise + (
+        ramp_in, ramp_out = self._ramp_distance(self.enter), self._ramp_distance(self.leave)
+        return (self.length - ramp_in - ramp_out) / self.cruise + (
             2.0 * self.cruise - self.enter - self.leave
         ) / self.acceleration
 
-    def time_at(self, way: float) -> float:
+    def time_at(self, distance: float) -> float:
         """Return the time after which that much of the length is done [s]."""
-        if way <= 0.0 or self.length <= 0.0:
+        if distance <= 0.0 or self.length <= 0.0:
             return 0.0
-        if way >= self.length:
+        if distance >= self.length:
             return self.duration
-        way_in, way_out = self._way(self.enter), self._way(self.leave)
-        if way < way_in:
-            return self._ramp(self.enter, way)
-        if way > self.length - way_out:
-            return self.duration - self._ramp(self.leave, self.length - way)
-        return (self.cruise - self.enter) / self.acceleration + (way - way_in) / self.cruise
+        ramp_in, ramp_out = self._ramp_distance(self.enter), self._ramp_distance(self.leave)
+        if distance < ramp_in:
+            return self._ramp_time(self.enter, distance)
+        if distance > self.length - ramp_out:
+            return self.duration - self._ramp_time(self.leave, self.length - distance)
+        return (self.cruise - self.enter) / self.acceleration + (distance - ramp_in) / self.cruise
 
     def knots(self) -> tuple[float, ...]:
         """Return the ways at which the time curve bends, ends left out, as fractions in (0, 1)."""
         if self.length <= 0.0:
             return ()
-        a, b = self._way(self.enter) / self.length, self._way(self.leave) / self.length
+        a, b = (
+            self._ramp_distance(self.enter) / self.length,
+            self._ramp_distance(self.leave) / self.length,
+        )
         # The halves of the ramps keep straight lines between the knots near the parabola.
         return tuple(f for f in (0.25 * a, a, 1.0 - b, 1.0 - 0.25 * b) if 0.0 < f < 1.0)
 
-    def _way(self, speed: float) -> float:
+    def _ramp_distance(self, speed: float) -> float:
         """Return the way between a speed and the cruise: (v^2 - u^2) / 2a."""
         return (self.cruise + speed) * (self.cruise - speed) / (2.0 * self.acceleration)
 
-    def _ramp(self, speed: float, way: float) -> float:
+    def _ramp_time(self, speed: float, distance: float) -> float:
         """Return the time for the first part of a ramp from a speed: s = u t + a t^2 / 2."""
         a = self.acceleration
-        return (sqrt(speed * speed + 2.0 * a * way) - speed) / a
+        return (sqrt(speed * speed + 2.0 * a * distance) - speed) / a
 
 
 def times_at(
-    profiles: Sequence[Profile], which: NDArray[np.intp], way: NDArray[np.float64]
+    profiles: Sequence[SpeedProfile], which: NDArray[np.intp], distance: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """
     Return :meth:`Profile.time_at` of many ways (n,).
@@ -82,21 +85,25 @@ def times_at(
     length, enter, cruise, leave, a = np.array(
         [(p.length, p.enter, p.cruise, p.leave, p.acceleration) for p in profiles]
     ).T[:, which]
-    way, cruise = np.clip(way, 0.0, length), np.maximum(cruise, 1e-300)
-    way_in, way_out = ((cruise + v) * (cruise - v) / (2.0 * a) for v in (enter, leave))
-    left = length - way
-    speeding = (np.sqrt(enter * enter + 2.0 * a * np.minimum(way, way_in)) - enter) / a
-    even = np.clip(way - way_in, 0.0, length - way_in - way_out) / cruise
+    distance, cruise = np.clip(distance, 0.0, length), np.maximum(cruise, 1e-300)
+    ramp_in, ramp_out = ((cruise + v) * (cruise - v) / (2.0 * a) for v in (enter, leave))
+    left = length - distance
+    speeding = (np.sqrt(enter * enter + 2.0 * a * np.minimum(distance, ramp_in)) - enter) / a
+    even = np.clip(distance - ramp_in, 0.0, length - ramp_in - ramp_out) / cruise
     # What braking takes from its beginning: all of it less what is still to come.
-    to_come = (np.sqrt(leave * leave + 2.0 * a * np.minimum(left, way_out)) - leave) / a
-    braking = np.where(left < way_out, (cruise - leave) / a - to_come, 0.0)
+    to_come = (np.sqrt(leave * leave + 2.0 * a * np.minimum(left, ramp_out)) - leave) / a
+    braking = np.where(left < ramp_out, (cruise - leave) / a - to_come, 0.0)
     times: NDArray[np.float64] = speeding + even + braking
     return times
 
 
 def trapezoid(
-    length: float, velocity: float, acceleration: float, enter: float = 0.0, tail: float = 0.0
-) -> Profile:
+    length: float,
+    velocity: float,
+    acceleration: float,
+    enter: float = 0.0,
+    stop_distance: float = 0.0,
+) -> SpeedProfile:
     """
     Return the fastest profile within a speed and an acceleration.
 
@@ -106,17 +113,19 @@ def trapezoid(
     :param tail: how far behind the end it would come to rest; inf = it goes on at its speed. A
         robot that does not know yet what follows its blend brakes for the waypoint.
     """
-    leave = min(velocity, sqrt(2.0 * acceleration * tail))
+    leave = min(velocity, sqrt(2.0 * acceleration * stop_distance))
     enter = min(velocity, enter)
     peak = sqrt(acceleration * length + 0.5 * (enter * enter + leave * leave))
-    return Profile(length, enter, max(enter, leave, min(velocity, peak)), leave, acceleration)
+    return SpeedProfile(length, enter, max(enter, leave, min(velocity, peak)), leave, acceleration)
 
 
-def timed(length: float, duration: float, stands_before: bool, stands_after: bool) -> Profile:
+def profile_for_time(
+    length: float, duration: float, stands_before: bool, stands_after: bool
+) -> SpeedProfile:
     """Return the profile of a motion for which the robot is told the time."""
     cruise = length / duration / (1.0 - 0.5 * RAMP_SHARE * (stands_before + stands_after))
     acceleration = max(cruise, 1e-12) / (RAMP_SHARE * duration)
-    return Profile(
+    return SpeedProfile(
         length,
         0.0 if stands_before else cruise,
         cruise,
@@ -125,7 +134,7 @@ def timed(length: float, duration: float, stands_before: bool, stands_after: boo
     )
 
 
-def peak_of(length: float, duration: float) -> tuple[float, float]:
+def peak_speed_and_acceleration(length: float, duration: float) -> tuple[float, float]:
     """
     Return the largest speed and acceleration of a motion for which the robot is told the time.
 
@@ -136,7 +145,7 @@ def peak_of(length: float, duration: float) -> tuple[float, float]:
     return speed, speed / (RAMP_SHARE * duration)
 
 
-def least_time(length: float, speed: float, acceleration: float) -> float:
+def min_duration(length: float, speed: float, acceleration: float) -> float:
     """Return the shortest time that keeps :func:`peak_of` within both bounds."""
     return max(
         length / speed / (1.0 - RAMP_SHARE),
@@ -144,7 +153,9 @@ def least_time(length: float, speed: float, acceleration: float) -> float:
     )
 
 
-def cruise_for(length: float, duration: float, acceleration: float, ramps: int) -> float | None:
+def cruise_speed_for(
+    length: float, duration: float, acceleration: float, ramps: int
+) -> float | None:
     """
     Return the cruise speed that takes exactly a duration, None if the acceleration is too low.
 

@@ -14,95 +14,99 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.planning.corner import Corner, corner_rows, path_rows
-from ur_cartesian_driver.planning.leg import Leg, Timing
-from ur_cartesian_driver.planning.path import JointLine, Path
-from ur_cartesian_driver.planning.pose_rows import Floats
-from ur_cartesian_driver.planning.profile import Profile, times_at
+from ur_cartesian_driver.planning.geometry.blend import Blend, blend_rows, path_rows
+from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SegmentCurve
+from ur_cartesian_driver.planning.geometry.pose_rows import Floats
+from ur_cartesian_driver.planning.geometry.speed_profile import SpeedProfile, times_at
+from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
 
 #: The fewest pieces of a joint move, for the sake of its times.
-_LEAST_OF_JOINTS = 8
+_MIN_JOINT_SAMPLES = 8
 
 
-def reference_path(start: Pose, legs: Sequence[Leg], timings: Sequence[Timing]) -> ReferencePath:
+def reference_path(
+    start: Pose, geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming]
+) -> ReferencePath:
     """
     Return the path that the robot is expected to take, blends included.
 
     Lines have their ends and the places where they change speed, curves as many samples as keep
-    the chords near (see :mod:`~.path`), and nothing turns by more than 10 degrees from row to row.
+    the chords near (see :mod:`~.curves`), and no two rows differ by more than 10 degrees.
     """
-    sections = list(_sections(legs, timings))
+    sections = list(_sections(geometries, timings))
     count = [len(section.at) for section in sections]
     of = np.repeat(np.arange(len(sections)), count)
     at = np.fromiter(chain.from_iterable(section.at for section in sections), dtype=np.float64)
-    is_corner = np.array([isinstance(section.curve, Corner) for section in sections])
-    points = np.array([section.point for section in sections])[of] + (is_corner[of] & (at > 0.5))
-    room = np.array(
+    is_blend = np.array([isinstance(section.curve, Blend) for section in sections])
+    points = np.array([section.point for section in sections])[of] + (is_blend[of] & (at > 0.5))
+    blend_tolerance = np.array(
         [
-            section.curve.room if isinstance(section.curve, Corner) else (0.0, 0.0)
+            section.curve.blend_tolerance if isinstance(section.curve, Blend) else (0.0, 0.0)
             for section in sections
         ]
     )[of]
-    poses = np.concatenate([[start.row()], _poses(sections, is_corner, of, at)])
+    poses = np.concatenate([[start.row()], _poses(sections, is_blend, of, at)])
     keep_hemisphere(poses)
     return ReferencePath(
         poses=poses,
-        point=np.concatenate([[legs[0].index], points]).astype(np.int32),
+        point=np.concatenate([[geometries[0].index], points]).astype(np.int32),
         time=np.maximum.accumulate(np.concatenate([[0.0], _times(sections, of, at)])),
-        room=np.concatenate([[(0.0, 0.0)], room]),
+        blend_tolerance=np.concatenate([[(0.0, 0.0)], blend_tolerance]),
     )
 
 
-class _Section(NamedTuple):
+class _PathSection(NamedTuple):
     """The rows of one path or of one corner."""
 
-    curve: Path | Corner
+    curve: SegmentCurve | Blend
     point: int
     #: Where on it, and where it begins.
     at: list[float]
     begin: float
     #: When it begins [s], how its length passes, and what of that one unit of ``at`` is.
     now: float
-    profile: Profile
+    profile: SpeedProfile
     rate: float
     #: How long the profile's second lasts [s].
     second: float = 1.0
 
 
 #: In corners ``s`` passes evenly.
-_EVENLY = Profile(1.0, 1.0, 1.0, 1.0, 1.0)
+_UNIFORM = SpeedProfile(1.0, 1.0, 1.0, 1.0, 1.0)
 
 
-def _sections(legs: Sequence[Leg], timings: Sequence[Timing]) -> Iterator[_Section]:
+def _sections(
+    geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming]
+) -> Iterator[_PathSection]:
     now = 0.0
-    for leg, timing in zip(legs, timings, strict=True):
-        profile, span = timing.profile, leg.u_after - leg.u_before
-        yield _Section(
-            leg.path,
-            leg.index,
-            _places(leg, timing),
-            leg.u_before,
+    for geometry, timing in zip(geometries, timings, strict=True):
+        profile, span = timing.profile, geometry.u_after - geometry.u_before
+        yield _PathSection(
+            geometry.path,
+            geometry.index,
+            _row_parameters(geometry, timing),
+            geometry.u_before,
             now,
             profile,
             profile.length / span if span > 0.0 else 0.0,
         )
         now += profile.duration
-        if leg.after is not None:
-            n = leg.after.samples
-            yield _Section(
-                leg.after,
-                leg.index,
+        if geometry.after is not None:
+            n = geometry.after.samples
+            yield _PathSection(
+                geometry.after,
+                geometry.index,
                 [k / n for k in range(1, n + 1)],
                 0.0,
                 now,
-                _EVENLY,
+                _UNIFORM,
                 1.0,
-                timing.corner,
+                timing.blend_time,
             )
-            now += timing.corner
+            now += timing.blend_time
 
 
-def _times(sections: Sequence[_Section], of: NDArray[np.intp], at: Floats) -> Floats:
+def _times(sections: Sequence[_PathSection], of: NDArray[np.intp], at: Floats) -> Floats:
     """Return when each row is expected (n,) [s]."""
     now, begin, rate, second = np.array([(x.now, x.begin, x.rate, x.second) for x in sections])[
         of
@@ -112,31 +116,33 @@ def _times(sections: Sequence[_Section], of: NDArray[np.intp], at: Floats) -> Fl
 
 
 def _poses(
-    sections: Sequence[_Section], is_corner: NDArray[np.bool_], of: NDArray[np.intp], at: Floats
+    sections: Sequence[_PathSection], is_blend: NDArray[np.bool_], of: NDArray[np.intp], at: Floats
 ) -> Floats:
     """Return the poses (n, 7) of all rows."""
-    number = np.where(is_corner, np.cumsum(is_corner), np.cumsum(~is_corner)) - 1
-    rounds = is_corner[of]
-    paths = [section.curve for section in sections if not isinstance(section.curve, Corner)]
-    corners = [section.curve for section in sections if isinstance(section.curve, Corner)]
+    number = np.where(is_blend, np.cumsum(is_blend), np.cumsum(~is_blend)) - 1
+    on_blend = is_blend[of]
+    paths = [section.curve for section in sections if not isinstance(section.curve, Blend)]
+    blends = [section.curve for section in sections if isinstance(section.curve, Blend)]
     poses = np.empty((len(at), 7))
-    poses[~rounds] = path_rows(paths, number[of[~rounds]], at[~rounds])
-    if corners:
-        poses[rounds] = corner_rows(corners, number[of[rounds]], at[rounds])
+    poses[~on_blend] = path_rows(paths, number[of[~on_blend]], at[~on_blend])
+    if blends:
+        poses[on_blend] = blend_rows(blends, number[of[on_blend]], at[on_blend])
     return poses
 
 
-def _places(leg: Leg, timing: Timing) -> list[float]:
+def _row_parameters(geometry: SegmentGeometry, timing: SegmentTiming) -> list[float]:
     """Return the ``u`` of the rows of a leg, the first one left out (it is there already)."""
-    begin, end = leg.u_before, leg.u_after
+    begin, end = geometry.u_before, geometry.u_after
     span = max(end - begin, 0.0)
-    if isinstance(leg.path, JointLine):  # evenly: preview finds the joint positions by counting
-        n = max(_LEAST_OF_JOINTS, ceil(leg.path.samples * span))
+    if isinstance(
+        geometry.path, JointLineCurve
+    ):  # evenly: preview finds the joint positions by counting
+        n = max(_MIN_JOINT_SAMPLES, ceil(geometry.path.samples * span))
         return [*(begin + span * k / n for k in range(1, n)), end]
-    n = max(1, ceil(leg.path.samples * span))
-    places = {begin + span * k / n for k in range(1, n)}
-    places.update(begin + span * f for f in timing.profile.knots())
-    return [*sorted(places), end]
+    n = max(1, ceil(geometry.path.samples * span))
+    parameters = {begin + span * k / n for k in range(1, n)}
+    parameters.update(begin + span * f for f in timing.profile.knots())
+    return [*sorted(parameters), end]
 
 
 def keep_hemisphere(poses: Floats) -> None:

@@ -10,63 +10,66 @@ from math import degrees
 from ur_cartesian_driver.motion.goal import Goal, SegmentType
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, OptimoveJ, Primitive
-from ur_cartesian_driver.planning.leg import Leg, Timing
-from ur_cartesian_driver.planning.path import JointLine
-from ur_cartesian_driver.planning.validate import is_optimized, is_timed, segment_of
+from ur_cartesian_driver.planning.geometry.curves import JointLineCurve
+from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
+from ur_cartesian_driver.planning.request.validate import is_optimized, is_timed, segment_of
 
 #: How many points a remark lists before it counts the rest.
-_LISTED = 5
+_MAX_LISTED = 5
 
 
-def note(leg: Leg, timing: Timing, primitive: Primitive, why: Sequence[str]) -> str:
+def segment_note(
+    geometry: SegmentGeometry, timing: SegmentTiming, primitive: Primitive, why: Sequence[str]
+) -> str:
     """
     Return the line of one segment.
 
     :param why: reasons for the choice of the primitive, before the reason for its speed.
     """
-    asked = SegmentType(leg.segment.type).name
+    asked = SegmentType(geometry.segment.type).name
     parts = [
-        f'point {leg.index}: {asked} -> {_name(primitive)} {_way(leg)} in {_duration(leg, timing)}'
+        f'point {geometry.index}: {asked} -> {_name(primitive)} '
+        f'{_extent(geometry)} in {_duration(geometry, timing)}'
     ]
-    if leg.after is not None:
-        parts.append(f'blend {1e3 * leg.after.radius:g} mm')
+    if geometry.after is not None:
+        parts.append(f'blend {1e3 * geometry.after.radius:g} mm')
     parts.append('because ' + ' and '.join([*why, timing.reason]))
-    return f'{", ".join(parts)}; nearest: {leg.nearest}'
+    return f'{", ".join(parts)}; nearest: {geometry.tightest_margin}'
 
 
-def smallest(legs: Sequence[Leg]) -> str:
+def tightest_remark(geometries: Sequence[SegmentGeometry]) -> str:
     """Return the remark about what comes nearest to its bound in the whole goal."""
-    leg = min(legs, key=lambda leg: leg.nearest.share)
-    return f'nearest of all: {leg.nearest} of the way to point {leg.index}'
+    geometry = min(geometries, key=lambda geometry: geometry.tightest_margin.share)
+    return f'nearest of all: {geometry.tightest_margin} of the way to point {geometry.index}'
 
 
-def ignored(goal: Goal, first: int = 0) -> list[str]:
+def ignored_remarks(goal: Goal, first: int = 0) -> list[str]:
     """Return a remark for all that has no effect in a checked goal; points count from first."""
     remarks: list[str] = []
     timed = is_timed(goal)
     points = list(enumerate(goal.waypoints, first))
     if timed:
-        say(
+        add_remark(
             remarks,
             [i for i, p in points if any(p.twist)],
             'twist is ignored: UR motion commands stop or blend at a point',
         )
     else:
-        say(
+        add_remark(
             remarks,
             [i for i, p in points if any(p.twist) and not _takes_twist(goal, i - first)],
             'twist is ignored: the segment has a velocity of its own, or no speed of the tool',
         )
-    say(
+    add_remark(
         remarks,
         [i for i, p in points if any(p.acceleration)],
         'acceleration is ignored: UR motion commands cannot meet it',
     )
-    say(
+    add_remark(
         remarks, [i for i, p in points if any(p.jerk)], 'jerk is ignored: no robot motion takes it'
     )
     if timed:
-        say(
+        add_remark(
             remarks,
             [
                 i
@@ -92,12 +95,12 @@ def _takes_twist(goal: Goal, index: int) -> bool:
     )
 
 
-def say(remarks: list[str], points: list[int], what: str) -> None:
+def add_remark(remarks: list[str], points: list[int], what: str) -> None:
     """Add the remark about some points, none if there are no such points."""
     if not points:
         return
-    listed = ', '.join(str(i) for i in points[:_LISTED])
-    more = f' and {len(points) - _LISTED} more' if len(points) > _LISTED else ''
+    listed = ', '.join(str(i) for i in points[:_MAX_LISTED])
+    more = f' and {len(points) - _MAX_LISTED} more' if len(points) > _MAX_LISTED else ''
     word = 'point' if len(points) == 1 else 'points'
     remarks.append(f'{word} {listed}{more}: {what}')
 
@@ -115,20 +118,20 @@ def _name(primitive: Primitive) -> str:
     return name
 
 
-def _way(leg: Leg) -> str:
-    turn = degrees(leg.path.angle)
-    return f'{leg.path.length:.3f} m' + (f' and {turn:.1f} degrees' if turn >= 0.05 else '')
+def _extent(geometry: SegmentGeometry) -> str:
+    turn = degrees(geometry.path.angle)
+    return f'{geometry.path.length:.3f} m' + (f' and {turn:.1f} degrees' if turn >= 0.05 else '')
 
 
-def _duration(leg: Leg, timing: Timing) -> str:
-    about = 'about ' if is_optimized(leg.kind) else ''
-    if leg.path.length > 1e-6:
-        speed = f'{leg.path.length / max(timing.duration, 1e-9):.3f} m/s on average'
-    elif isinstance(leg.path, JointLine):  # another posture of the same pose
+def _duration(geometry: SegmentGeometry, timing: SegmentTiming) -> str:
+    about = 'about ' if is_optimized(geometry.kind) else ''
+    if geometry.path.length > 1e-6:
+        speed = f'{geometry.path.length / max(timing.duration, 1e-9):.3f} m/s on average'
+    elif isinstance(geometry.path, JointLineCurve):  # another posture of the same pose
         speed = (
-            f'{max(leg.path.travel) / max(timing.duration, 1e-9):.3f} rad/s of the leading '
+            f'{max(geometry.path.travel) / max(timing.duration, 1e-9):.3f} rad/s of the leading '
             'joint on average'
         )
     else:
-        speed = f'{leg.path.angle / max(timing.duration, 1e-9):.3f} rad/s on average'
+        speed = f'{geometry.path.angle / max(timing.duration, 1e-9):.3f} rad/s on average'
     return f'{about}{timing.duration:.3f} s ({speed})'

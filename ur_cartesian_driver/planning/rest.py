@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.pose import Vector6
 from ur_cartesian_driver.motion.state import RobotState
 
 
-def come_to_rest(state: RobotState, arm: Arm, deceleration: float) -> RobotState:
+def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState:
     """
     Return the state in which the arm would be if it were stopped now; itself where it stands.
 
@@ -29,7 +29,7 @@ def come_to_rest(state: RobotState, arm: Arm, deceleration: float) -> RobotState
     leading = max(map(abs, state.target_qd))
     if leading == 0.0:
         return state
-    q = _moved(state.actual_q, state.target_qd, 0.5 * leading / deceleration)
+    q = _extrapolate(state.actual_q, state.target_qd, 0.5 * leading / deceleration)
     # By the change of the pose: an arm whose calibration is unknown is off its model anyway.
     T_flange_tcp_now = arm.forward(state.actual_q).inverse() @ state.actual_tcp_pose
     T_base_tcp = arm.forward(q) @ T_flange_tcp_now
@@ -46,6 +46,6 @@ def come_to_rest(state: RobotState, arm: Arm, deceleration: float) -> RobotState
     )
 
 
-def _moved(q: Vector6, qd: Vector6, time: float) -> Vector6:
+def _extrapolate(q: Vector6, qd: Vector6, time: float) -> Vector6:
     a, b, c, d, e, f = (x + v * time for x, v in zip(q, qd, strict=True))
     return a, b, c, d, e, f

@@ -19,14 +19,14 @@ from math import factorial
 
 import numpy as np
 
-from ur_cartesian_driver.motion.polynomials import Rates
-from ur_cartesian_driver.planning.pose_rows import cross_rows, Floats
+from ur_cartesian_driver.motion.polynomials import MotionRows
+from ur_cartesian_driver.planning.geometry.pose_rows import cross_rows, Floats
 
 # Terms of the series: exact to rounding for turns up to two full turns.
 _TERMS = 26
-_B = np.array([(-1.0) ** k / factorial(2 * k + 2) for k in range(_TERMS)])
-_C = np.array([(-1.0) ** k / factorial(2 * k + 3) for k in range(_TERMS)])
-_LEAST = 1e-150
+_B_SERIES = np.array([(-1.0) ** k / factorial(2 * k + 2) for k in range(_TERMS)])
+_C_SERIES = np.array([(-1.0) ** k / factorial(2 * k + 3) for k in range(_TERMS)])
+_MIN_LENGTH = 1e-150
 
 
 def exp_rows(r: Floats) -> Floats:
@@ -40,13 +40,13 @@ def log_rows(quaternions: Floats) -> Floats:
     upper = np.where(quaternions[:, 3:] < 0.0, -1.0, 1.0) * quaternions
     length = np.linalg.norm(upper[:, :3], axis=1)
     scale = np.where(
-        length < 1e-9, 2.0, 2.0 * np.arctan2(length, upper[:, 3]) / np.maximum(length, _LEAST)
+        length < 1e-9, 2.0, 2.0 * np.arctan2(length, upper[:, 3]) / np.maximum(length, _MIN_LENGTH)
     )
     vectors: Floats = scale[:, None] * upper[:, :3]
     return vectors
 
 
-def angular(turn: Rates) -> tuple[Floats, Floats]:
+def angular_rates(turn: MotionRows) -> tuple[Floats, Floats]:
     """Return angular velocity [rad/s] and acceleration [rad/s^2] (n, 3) of a turn, base axes."""
     r, v, a = turn
     b, b_s, c, c_s = _series(r)
@@ -58,15 +58,15 @@ def angular(turn: Rates) -> tuple[Floats, Floats]:
     return w, e
 
 
-def turn_of(r: Floats, w: Floats, e: Floats) -> Rates:
+def rotation_rates(r: Floats, w: Floats, e: Floats) -> MotionRows:
     """Return the turn with a rotation vector r, |r| < 2 pi, and these :func:`angular` rates."""
     b, _, c, _ = _series(r)
     K = _cross_matrices(r)
     J = np.eye(3) + b[:, :, None] * K + c[:, :, None] * (K @ K)
     inverse = np.linalg.inv(J)
     v: Floats = (inverse @ w[:, :, None])[:, :, 0]
-    _, bias = angular(Rates(r, v, np.zeros_like(v)))
-    return Rates(r, v, (inverse @ (e - bias)[:, :, None])[:, :, 0])
+    _, bias = angular_rates(MotionRows(r, v, np.zeros_like(v)))
+    return MotionRows(r, v, (inverse @ (e - bias)[:, :, None])[:, :, 0])
 
 
 def _series(r: Floats) -> tuple[Floats, Floats, Floats, Floats]:
@@ -76,8 +76,8 @@ def _series(r: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     # No more terms than the largest turn needs.
     terms = _TERMS if s.max(initial=0.0) > 4.0 else 14
     for k in range(terms - 1, -1, -1):
-        b_s, b = b_s * s + b, b * s + _B[k]
-        c_s, c = c_s * s + c, c * s + _C[k]
+        b_s, b = b_s * s + b, b * s + _B_SERIES[k]
+        c_s, c = c_s * s + c, c * s + _C_SERIES[k]
     return b, b_s, c, c_s
 
 

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.rows import nearest_rows
+from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows
 from ur_cartesian_driver.motion.errors import (
     GoalRefused,
     InvalidGoal,
@@ -28,25 +28,39 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.goal import Goal, SegmentType
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.corner import Corner, corners, Meeting
-from ur_cartesian_driver.planning.drafts import can_blend, Draft, Drafts, IN_JOINTS
-from ur_cartesian_driver.planning.leg import Leg
-from ur_cartesian_driver.planning.lookahead import farthest_way, Followed, followed, in_joints
-from ur_cartesian_driver.planning.margins import too_near
-from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.path import (
-    JointLine,
-    same,
+from ur_cartesian_driver.planning.geometry.blend import Blend, BlendInput, blends
+from ur_cartesian_driver.planning.geometry.curves import (
+    is_same_pose,
+    JointLineCurve,
     SAME_POSITION,
     trim_end,
 )
-from ur_cartesian_driver.planning.pose_rows import compose_rows
-from ur_cartesian_driver.planning.postures import missed, named_joints, Reach
-from ur_cartesian_driver.planning.samples import Piece, segments_of
-from ur_cartesian_driver.planning.survey import Survey, Surveyed
-from ur_cartesian_driver.planning.validate import (
-    no_way,
-    PLAIN,
+from ur_cartesian_driver.planning.geometry.pose_rows import compose_rows
+from ur_cartesian_driver.planning.geometry.samples import CurvePiece, segments_of
+from ur_cartesian_driver.planning.moves.path_margins import PathMargins, SolvedPieces
+from ur_cartesian_driver.planning.moves.segment_draft import (
+    can_blend,
+    JOINT_SPACE_TYPES,
+    SegmentDraft,
+    SegmentDraftBuilder,
+)
+from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.joint_path import (
+    JointPath,
+    max_path_length,
+    sample_joint_moves,
+    solve_joint_path,
+)
+from ur_cartesian_driver.planning.preflight.margins import near_singularity_refusal
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
+    describe_miss,
+    named_joints,
+    TcpKinematics,
+)
+from ur_cartesian_driver.planning.request.validate import (
+    DEFAULT_SEGMENT,
+    no_motion_error,
     point_field,
     segment_field,
 )
@@ -54,16 +68,16 @@ from ur_cartesian_driver.planning.validate import (
 #: Solutions that differ by less are one [rad].
 SAME_SOLUTION = 1e-6
 #: Where a blend leads into a joint line, the arm comes out of it this near to the line [rad].
-_SAME_LINE = 0.05
+_MAX_LINE_OFFSET = 0.05
 #: Legs of the first run where lines may turn into joint moves; of later ones ever more.
 _FIRST_RUN = 8
 
 _JOINT = SegmentType.JOINT
 #: Why a line or an arc may become a joint move.
-_NO_STRAIGHT_WAY = (InvalidPosture, NearSingularity, JointLimitExceeded, Unreachable)
+_NO_STRAIGHT_PATH = (InvalidPosture, NearSingularity, JointLimitExceeded, Unreachable)
 
 
-class Route:
+class JointPathPlanner:
     """
     The legs of one goal, one after the other, from where the robot stands.
 
@@ -77,22 +91,22 @@ class Route:
         self,
         goal: Goal,
         targets: Sequence[Pose],
-        reach: Reach,
+        kinematics: TcpKinematics,
         options: PlanningOptions,
         remarks: list[str],
         why: dict[int, list[str]],
     ) -> None:
         """Take what the legs are made of."""
-        self.goal, self.targets, self.reach, self.options = goal, targets, reach, options
+        self.goal, self.targets, self.kinematics, self.options = goal, targets, kinematics, options
         self.remarks, self.why = remarks, why
-        self.survey = Survey(reach.arm)
-        self._drafting = Drafts(goal, targets, options, remarks)
-        self._farthest = farthest_way(reach)
+        self.path_margins = PathMargins(kinematics.arm)
+        self._draft_builder = SegmentDraftBuilder(goal, targets, options, remarks)
+        self._max_path_length = max_path_length(kinematics)
         self._replaces = options.on_posture_change == 'movej'
 
-    def legs(
+    def geometries(
         self, begin: int, T_base_tcp: Pose, q: Joints, times: Sequence[float | None]
-    ) -> list[Leg]:
+    ) -> list[SegmentGeometry]:
         """
         Return the way of every segment, its corners and the configuration it arrives in.
 
@@ -101,19 +115,19 @@ class Route:
         :raises GoalRefused: the arm cannot go there.
         """
         self._q_start = self._q = q
-        self._drafts = self._drafting.all(begin, T_base_tcp)
+        self._drafts = self._draft_builder.build_all(begin, T_base_tcp)
         k, limit = 0, _FIRST_RUN if self._replaces else len(self._drafts)
         while k < len(self._drafts):
-            if self._drafts[k].kind in IN_JOINTS:
+            if self._drafts[k].kind in JOINT_SPACE_TYPES:
                 self._joint_move(k)
                 k += 1
                 continue
             stop = self._end_of_run(k, limit)
-            came = self._run(k, stop)
-            limit = 2 * limit if came == stop else _FIRST_RUN
-            k = came
-        self._say_what_stops()
-        return list(self._made(times))
+            resume_at = self._run(k, stop)
+            limit = 2 * limit if resume_at == stop else _FIRST_RUN
+            k = resume_at
+        self._remark_stops()
+        return list(self._geometries(times))
 
     # -- runs ------------------------------------------------------------------------------------
 
@@ -122,7 +136,7 @@ class Route:
         while (
             stop < len(self._drafts)
             and stop - k < limit
-            and self._drafts[stop].kind not in IN_JOINTS
+            and self._drafts[stop].kind not in JOINT_SPACE_TYPES
         ):
             stop += 1
         return stop
@@ -133,13 +147,15 @@ class Route:
 
         That is k again where one of them has become a joint move.
         """
-        self._join(k, stop)
+        self._make_blends(k, stop)
         pieces, q_start = self._pieces(k, stop), self._q
-        found = followed(self.reach, pieces, q_start)
-        segments, fractions = segments_of(pieces, found.piece, found.t)
-        measures = self.survey.measured(found.q)
-        near = too_near(pieces, found, measures, segments, fractions, self.options)
-        refusal, index = found.refusal, found.refused_segment
+        joint_path = solve_joint_path(self.kinematics, pieces, q_start)
+        segments, fractions = segments_of(pieces, joint_path.piece, joint_path.t)
+        measures = self.path_margins.singularity_distance_rows(joint_path.q)
+        near = near_singularity_refusal(
+            pieces, joint_path, measures, segments, fractions, self.options
+        )
+        refusal, index = joint_path.refusal, joint_path.refused_segment
         # The end of a range behind a singularity is where the joints swing to beside it.
         if near is not None and (
             refusal is None
@@ -148,62 +164,70 @@ class Route:
         ):
             refusal, index = near
         drafts = self._drafts[k:stop]
-        arrived = self._arrivals(drafts, found, segments)
-        for draft, joints in zip(drafts, arrived, strict=True):
+        arrivals = self._arrivals(drafts, joint_path, segments)
+        for draft, joints in zip(drafts, arrivals, strict=True):
             if refusal is not None and draft.index >= index:
                 break
-            if (wrong := self._misses(draft, joints)) is not None:
+            if (wrong := self._posture_refusal(draft, joints)) is not None:
                 refusal, index = wrong, draft.index
                 break
         if refusal is not None:
             self._replace(max(k, index - self._drafts[0].index), refusal)
             return k
-        for draft, joints in zip(drafts, arrived, strict=True):
+        for draft, joints in zip(drafts, arrivals, strict=True):
             draft.joints = joints
-        self._leave(drafts[-1], found)
-        self.survey.add(Surveyed(pieces, found, segments, fractions, measures, q_start))
+        self._finish_run(drafts[-1], joint_path)
+        self.path_margins.add(
+            SolvedPieces(pieces, joint_path, segments, fractions, measures, q_start)
+        )
         return stop
 
-    def _join(self, k: int, stop: int) -> None:
+    def _make_blends(self, k: int, stop: int) -> None:
         """Round the corners of a run, the one into it included."""
         drafts = self._drafts
-        meetings: list[Meeting] = []
-        places: list[int] = []
+        inputs: list[BlendInput] = []
+        indices: list[int] = []
         for n in range(k, stop):
             drafts[n].before = None
             if n > 0:
                 drafts[n - 1].after = None
-                if self._blends(n - 1):
+                if self._is_blended(n - 1):
                     first, second = drafts[n - 1], drafts[n]
                     fillet = first.kind == second.kind == SegmentType.PROCESS
-                    meetings.append(Meeting(first.way, second.way, first.radius, fillet))
-                    places.append(n)
-        for n, corner in zip(places, corners(meetings), strict=True):
-            drafts[n - 1].after = drafts[n].before = corner
+                    inputs.append(
+                        BlendInput(first.known_path, second.known_path, first.radius, fillet)
+                    )
+                    indices.append(n)
+        for n, blend in zip(indices, blends(inputs), strict=True):
+            drafts[n - 1].after = drafts[n].before = blend
         for n in range(max(k - 1, 0), stop):
             self._check_overlap(n)
 
-    def _pieces(self, k: int, stop: int) -> list[Piece]:
+    def _pieces(self, k: int, stop: int) -> list[CurvePiece]:
         """Return the pieces from what has been seen to where the last leg is left."""
-        pieces: list[Piece] = []
+        pieces: list[CurvePiece] = []
         for n in range(k, stop):
             draft = self._drafts[n]
             pieces += self._entry(n)
             begin, end = draft.begin, self._end(n)
-            most = self._farthest / max(draft.way.length, 1e-300)
+            max_step = self._max_path_length / max(draft.known_path.length, 1e-300)
             if end > begin or not (draft.before or draft.after):
-                pieces.append(Piece.part(draft.index, draft.way, begin, min(end, begin + most)))
+                pieces.append(
+                    CurvePiece.part(
+                        draft.index, draft.known_path, begin, min(end, begin + max_step)
+                    )
+                )
         return pieces
 
-    def _entry(self, n: int) -> list[Piece]:
+    def _entry(self, n: int) -> list[CurvePiece]:
         """Return the piece into a leg: the corner, or the rest of the leg before."""
         if n == 0:
             return []
         before = self._drafts[n - 1]
         if before.after is not None:
-            return [Piece.corner(before.index, before.after)]
-        if before.seen < 1.0:
-            return [Piece.part(before.index, before.way, before.seen, 1.0)]
+            return [CurvePiece.blend(before.index, before.after)]
+        if before.checked_until < 1.0:
+            return [CurvePiece.part(before.index, before.known_path, before.checked_until, 1.0)]
         return []
 
     def _end(self, n: int) -> float:
@@ -211,16 +235,16 @@ class Route:
         draft = self._drafts[n]
         if draft.after is not None:
             return draft.after.leave
-        return trim_end(draft.way, draft.radius) if self._blends(n) else 1.0
+        return trim_end(draft.known_path, draft.radius) if self._is_blended(n) else 1.0
 
     def _arrivals(
-        self, drafts: list[Draft], found: Followed, segments: np.ndarray
+        self, drafts: list[SegmentDraft], joint_path: JointPath, segments: np.ndarray
     ) -> list[Joints]:
         """Return the configuration of the waypoint at the end of each leg, as far as found."""
         last = np.searchsorted(segments, [draft.index for draft in drafts], side='right') - 1
-        if not len(found.q):
+        if not len(joint_path.q):
             return [self._q for _ in drafts]
-        q = found.q[np.maximum(last, 0)]
+        q = joint_path.q[np.maximum(last, 0)]
         rounded = [
             n
             for n, draft in enumerate(drafts)
@@ -228,30 +252,32 @@ class Route:
         ]
         if rounded:
             # The arm does not come there; the report and joint moves from there want to know.
-            ends = pose_rows(drafts[n].way.end for n in rounded)
+            ends = pose_rows(drafts[n].known_path.end for n in rounded)
             there = nearest_rows(
-                self.reach.arm, compose_rows(ends, self.reach.T_tcp_flange), q[rounded]
+                self.kinematics.arm, compose_rows(ends, self.kinematics.T_tcp_flange), q[rounded]
             )
             q[rounded] = np.where(np.isnan(there), q[rounded], there)
         return [(a, b, c, d, e, f) for a, b, c, d, e, f in q.tolist()]
 
-    def _leave(self, draft: Draft, found: Followed) -> None:
-        draft.seen = self._end(draft.index - self._drafts[0].index)
-        if len(found.q):
-            a, b, c, d, e, f = found.q[-1].tolist()
+    def _finish_run(self, draft: SegmentDraft, joint_path: JointPath) -> None:
+        draft.checked_until = self._end(draft.index - self._drafts[0].index)
+        if len(joint_path.q):
+            a, b, c, d, e, f = joint_path.q[-1].tolist()
             self._q = (a, b, c, d, e, f)
 
-    def _misses(self, draft: Draft, q: Joints) -> InvalidPosture | None:
+    def _posture_refusal(self, draft: SegmentDraft, q: Joints) -> InvalidPosture | None:
         """Return the refusal of a straight or circular leg that misses its posture."""
         posture = self.goal.waypoints[draft.index].posture
         if not posture:
             return None
         named = named_joints(posture, self.options.tf_prefix)
-        chosen = self.reach.chosen(draft.way.end, named, q, point_field(draft.index, 'pose'))
-        clause = missed(q, chosen, named)
+        chosen = self.kinematics.solve_posture(
+            draft.known_path.end, named, q, point_field(draft.index, 'pose')
+        )
+        clause = describe_miss(q, chosen, named)
         if not clause:
             return None
-        flips = self.reach.flips(q, chosen)
+        flips = self.kinematics.describe_flips(q, chosen)
         return InvalidPosture(
             f'{point_field(draft.index, "posture")} cannot be reached by a straight or circular '
             f'move: {clause}{f", which takes {flips}" if flips else ""}; use a JOINT segment, or '
@@ -261,7 +287,7 @@ class Route:
     def _replace(self, n: int, refusal: GoalRefused) -> None:
         """Make a leg a joint move, or refuse the goal."""
         draft = self._drafts[n]
-        if not self._replaces or not isinstance(refusal, _NO_STRAIGHT_WAY):
+        if not self._replaces or not isinstance(refusal, _NO_STRAIGHT_PATH):
             raise refusal
         self.remarks.append(
             f'point {draft.index}: JOINT instead of {draft.kind.name} '
@@ -275,93 +301,105 @@ class Route:
         draft.kind, draft.path, draft.before = _JOINT, None, None
         if n + 1 < len(self._drafts) and self._drafts[n + 1].path is not None:
             after = self._drafts[n + 1]
-            after.path = self._drafting.straight(after, self.targets[draft.index])
+            after.path = self._draft_builder.line_or_arc(after, self.targets[draft.index])
 
     # -- joint moves -----------------------------------------------------------------------------
 
     def _joint_move(self, k: int) -> None:
         draft, i = self._drafts[k], self._drafts[k].index
-        q = self._from(k)
+        q = self._start_joints(k)
         target, posture = self.targets[i], self.goal.waypoints[i].posture
         where = point_field(i, 'pose')
         if posture:
             named = named_joints(posture, self.options.tf_prefix)
-            chosen = self.reach.chosen(target, named, q, where)
+            chosen = self.kinematics.solve_posture(target, named, q, where)
         else:
-            chosen = self.reach.nearest(target, q, where)
-        line = JointLine.between(self.reach.arm, self.reach.T_flange_tcp, q, chosen)
+            chosen = self.kinematics.nearest(target, q, where)
+        line = JointLineCurve.between(self.kinematics.arm, self.kinematics.T_flange_tcp, q, chosen)
         if i == 0 and max(line.travel) <= SAME_SOLUTION:
             draft.radius = 0.0
         draft.path, draft.joints = line, chosen
-        self._join(k, k + 1)
-        self._enter(k)
-        self._look_in_joints([Piece.part(i, line, draft.begin, self._end(k))])
-        draft.seen = self._end(k)
+        self._make_blends(k, k + 1)
+        self._solve_entry(k)
+        self._add_joint_move([CurvePiece.part(i, line, draft.begin, self._end(k))])
+        draft.checked_until = self._end(k)
 
-    def _from(self, k: int) -> Joints:
+    def _start_joints(self, k: int) -> Joints:
         """Return the configuration in which a joint move begins: that of the waypoint before."""
         if k == 0:
             return self._q_start
         before = self._drafts[k - 1]
-        if before.seen == 1.0:
-            return before.arrives
-        if isinstance(before.way, JointLine):
-            return before.arrives
+        if before.checked_until == 1.0:
+            return before.known_joints
+        if isinstance(before.known_path, JointLineCurve):
+            return before.known_joints
         # A blended waypoint may lie out of reach, but not one at which a joint line begins: there
         # the robot has to know the joints to which the rest of the leg would bring it.
-        rest = followed(
-            self.reach, [Piece.part(before.index, before.way, before.seen, 1.0)], self._q
+        rest = solve_joint_path(
+            self.kinematics,
+            [CurvePiece.part(before.index, before.known_path, before.checked_until, 1.0)],
+            self._q,
         )
         if rest.refusal is not None:
             raise rest.refusal
         a, b, c, d, e, f = rest.q[-1].tolist()
         return (a, b, c, d, e, f)
 
-    def _enter(self, k: int) -> None:
+    def _solve_entry(self, k: int) -> None:
         """Look along what leads into a joint move."""
         pieces = self._entry(k)
         if not pieces:
             return
         curve = pieces[0].curve
-        if isinstance(curve, JointLine) or (isinstance(curve, Corner) and curve.in_joints):
-            self._look_in_joints(pieces)
+        if isinstance(curve, JointLineCurve) or (
+            isinstance(curve, Blend) and curve.in_joint_space
+        ):
+            self._add_joint_move(pieces)
             return
         q_start = self._q
-        found = followed(self.reach, pieces, q_start)
-        if found.refusal is not None:
-            raise found.refusal
-        segments, fractions = segments_of(pieces, found.piece, found.t)
+        joint_path = solve_joint_path(self.kinematics, pieces, q_start)
+        if joint_path.refusal is not None:
+            raise joint_path.refusal
+        segments, fractions = segments_of(pieces, joint_path.piece, joint_path.t)
         measures = np.where(
-            (segments == self._drafts[k].index)[:, None], np.inf, self.survey.measured(found.q)
+            (segments == self._drafts[k].index)[:, None],
+            np.inf,
+            self.path_margins.singularity_distance_rows(joint_path.q),
         )
-        near = too_near(pieces, found, measures, segments, fractions, self.options)
+        near = near_singularity_refusal(
+            pieces, joint_path, measures, segments, fractions, self.options
+        )
         if near is not None:
             raise near[0]
-        a, b, c, d, e, f = found.q[-1].tolist()
+        a, b, c, d, e, f = joint_path.q[-1].tolist()
         self._q = (a, b, c, d, e, f)
-        line = self._drafts[k].way
-        assert isinstance(line, JointLine)
+        line = self._drafts[k].known_path
+        assert isinstance(line, JointLineCurve)
         joins = line.joints(self._drafts[k].begin)
-        if max(abs(x - y) for x, y in zip(self._q, joins, strict=True)) > _SAME_LINE:
-            raise self.reach.jump(
+        if max(abs(x - y) for x, y in zip(self._q, joins, strict=True)) > _MAX_LINE_OFFSET:
+            raise self.kinematics.discontinuity_error(
                 line.pose(self._drafts[k].begin),
                 self._q,
                 joins,
                 f'{segment_field(self._drafts[k - 1].index, "blend_radius")}',
             )
-        self.survey.add(Surveyed(pieces, found, segments, fractions, measures, q_start))
+        self.path_margins.add(
+            SolvedPieces(pieces, joint_path, segments, fractions, measures, q_start)
+        )
 
-    def _look_in_joints(self, pieces: list[Piece]) -> None:
-        found = in_joints(self.reach, pieces)
-        segments, fractions = segments_of(pieces, found.piece, found.t)
-        nothing = np.full((len(found.t), 3), np.inf)  # singularities do not matter here
-        self.survey.add(Surveyed(pieces, found, segments, fractions, nothing, self._q))
-        a, b, c, d, e, f = found.q[-1].tolist()
+    def _add_joint_move(self, pieces: list[CurvePiece]) -> None:
+        joint_path = sample_joint_moves(self.kinematics, pieces)
+        segments, fractions = segments_of(pieces, joint_path.piece, joint_path.t)
+        nothing = np.full((len(joint_path.t), 3), np.inf)  # singularities do not matter here
+        self.path_margins.add(
+            SolvedPieces(pieces, joint_path, segments, fractions, nothing, self._q)
+        )
+        a, b, c, d, e, f = joint_path.q[-1].tolist()
         self._q = (a, b, c, d, e, f)
 
     # -- blends ----------------------------------------------------------------------------------
 
-    def _blends(self, n: int) -> bool:
+    def _is_blended(self, n: int) -> bool:
         """Tell whether a leg is blended into the next one."""
         if n + 1 >= len(self._drafts) or self._drafts[n].radius <= SAME_POSITION:
             return False  # the wire rounds so small a radius to none
@@ -377,7 +415,7 @@ class Route:
                 'make them smaller',
             )
 
-    def _say_what_stops(self) -> None:
+    def _remark_stops(self) -> None:
         for n, draft in enumerate(self._drafts[:-1]):
             after = self._drafts[n + 1]
             if draft.radius > SAME_POSITION and not can_blend(draft, after):
@@ -388,48 +426,51 @@ class Route:
 
     # -- legs ------------------------------------------------------------------------------------
 
-    def _made(self, times: Sequence[float | None]) -> Iterator[Leg]:
-        paces, nearest = self.survey.paces(), self.survey.nearest()
+    def _geometries(self, times: Sequence[float | None]) -> Iterator[SegmentGeometry]:
+        speed_bounds, margins = (
+            self.path_margins.joint_speed_bounds(),
+            self.path_margins.tightest_margin(),
+        )
         for draft, time in zip(self._drafts, times, strict=True):
             i = draft.index
-            leg = Leg(
+            geometry = SegmentGeometry(
                 index=i,
                 kind=draft.kind,
                 waypoint=self.goal.waypoints[i],
                 segment=draft.segment,
-                path=draft.way,
-                joints=draft.arrives,
+                path=draft.known_path,
+                joints=draft.known_joints,
                 time=time,
-                pace=paces[i],
-                nearest=nearest[i],
+                speed_bound=speed_bounds[i],
+                tightest_margin=margins[i],
                 before=draft.before,
                 after=draft.after,
                 u_before=draft.begin,
-                u_after=draft.leaves,
-                share=max(draft.leaves - draft.begin, 1e-9),
+                u_after=draft.u_leave,
+                share=max(draft.u_leave - draft.begin, 1e-9),
             )
-            yield self._already_there(leg) if self._goes_nowhere(leg) else leg
+            yield self._at_first_point(geometry) if self._has_no_motion(geometry) else geometry
 
-    def _goes_nowhere(self, leg: Leg) -> bool:
-        if leg.path.length > SAME_POSITION:
+    def _has_no_motion(self, geometry: SegmentGeometry) -> bool:
+        if geometry.path.length > SAME_POSITION:
             return False
-        if isinstance(leg.path, JointLine):
-            return max(leg.path.travel) <= SAME_SOLUTION
-        return same(leg.path.start, leg.path.end)
+        if isinstance(geometry.path, JointLineCurve):
+            return max(geometry.path.travel) <= SAME_SOLUTION
+        return is_same_pose(geometry.path.start, geometry.path.end)
 
-    def _already_there(self, leg: Leg) -> Leg:
+    def _at_first_point(self, geometry: SegmentGeometry) -> SegmentGeometry:
         """Return the leg to a first point at which the robot stands; others are refused."""
-        i = leg.index
+        i = geometry.index
         if i > 0:
-            raise no_way(self.goal, i)
-        waits = f'; its {leg.time:g} s are not waited' if leg.time else ''
-        self.remarks.append(f'point 0: the robot stands there already{waits}')
+            raise no_motion_error(self.goal, i)
+        wait_clause = f'; its {geometry.time:g} s are not waited' if geometry.time else ''
+        self.remarks.append(f'point 0: the robot stands there already{wait_clause}')
         self.why[0] = ['the robot stands there already']
-        kind = leg.kind if leg.kind == _JOINT else SegmentType.LINEAR
+        kind = geometry.kind if geometry.kind == _JOINT else SegmentType.LINEAR
         return replace(
-            leg,
+            geometry,
             kind=kind,
             time=None,
-            segment=replace(PLAIN, type=leg.segment.type),
-            waypoint=replace(leg.waypoint, twist=(0.0,) * 6),
+            segment=replace(DEFAULT_SEGMENT, type=geometry.segment.type),
+            waypoint=replace(geometry.waypoint, twist=(0.0,) * 6),
         )

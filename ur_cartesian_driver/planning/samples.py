@@ -5,7 +5,7 @@ Places along the way of a goal, as the robot will go it: parts of paths, and the
 
 A place every 2 mm and every degree, and at least eight on each piece. Pieces shorter than 13 mm
 and 6 degrees have fewer, one every 1.6 mm and 0.8 degrees: a path of 5 mm steps has four places on
-each of them. Where the joints turn fast :mod:`~.lookahead` adds places.
+each of them. Where the joints turn fast :mod:`~.joint_path` adds places.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.corner import Corner, corner_rows, crossing, path_rows
-from ur_cartesian_driver.planning.path import JointLine, Path
-from ur_cartesian_driver.planning.pose_rows import Floats
-from ur_cartesian_driver.planning.tool_spline import ToolCurve
+from ur_cartesian_driver.planning.geometry.blend import Blend, blend_rows, crossfade, path_rows
+from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SegmentCurve
+from ur_cartesian_driver.planning.geometry.pose_rows import Floats
+from ur_cartesian_driver.planning.geometry.tool_spline import ToolCurve
 
 Ints = NDArray[np.int32]
 
@@ -31,12 +31,12 @@ STEP_LENGTH = 0.002
 STEP_ANGLE = pi / 180.0
 #: The least number of places on a piece, and how much finer than the largest distance they then
 #: are at most.
-LEAST_PLACES = 8
-_FINER = 1.25
+MIN_SAMPLES = 8
+_MIN_REFINEMENT = 1.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Samples:
+class PathSamples:
     """All places of a goal at which the arm was looked at, in order of time."""
 
     #: (n,) the index of the waypoint to which the motion leads.
@@ -57,43 +57,43 @@ class Samples:
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class CurvePiece:
     """A part of one path, or a whole corner."""
 
     #: Index of the waypoint at the end of the path; of a corner the one that it rounds.
     index: int
-    curve: Path | Corner | ToolCurve
+    curve: SegmentCurve | Blend | ToolCurve
     #: From where to where: the path's ``u``, the corner's ``s``.
     begin: float
     end: float
-    places: int
+    sample_count: int
 
     @classmethod
-    def part(cls, index: int, path: Path, begin: float, end: float) -> Piece:
+    def part(cls, index: int, path: SegmentCurve, begin: float, end: float) -> CurvePiece:
         """Return a part of a path."""
         share = end - begin
-        turn = max(path.travel) if isinstance(path, JointLine) else path.angle
-        return cls(index, path, begin, end, _places(path.length * share, turn * share))
+        turn = max(path.travel) if isinstance(path, JointLineCurve) else path.angle
+        return cls(index, path, begin, end, _sample_count(path.length * share, turn * share))
 
     @classmethod
-    def corner(cls, index: int, corner: Corner) -> Piece:
+    def blend(cls, index: int, blend: Blend) -> CurvePiece:
         """Return a corner; it has places on both sides of its waypoint."""
-        turn = corner.angle
-        if isinstance(corner.first, JointLine):
-            turn = max(turn, (1.0 - corner.leave) * max(corner.first.travel))
-        if isinstance(corner.second, JointLine):
-            turn = max(turn, corner.join * max(corner.second.travel))
-        return cls(index, corner, 0.0, 1.0, max(2, _places(corner.length, turn)))
+        turn = blend.angle
+        if isinstance(blend.first, JointLineCurve):
+            turn = max(turn, (1.0 - blend.leave) * max(blend.first.travel))
+        if isinstance(blend.second, JointLineCurve):
+            turn = max(turn, blend.join * max(blend.second.travel))
+        return cls(index, blend, 0.0, 1.0, max(2, _sample_count(blend.length, turn)))
 
     def pose(self, t: float) -> Pose:
         """Return the pose at a place."""
-        if isinstance(self.curve, Corner):
+        if isinstance(self.curve, Blend):
             return pose_from_row(self.curve.rows(np.array([t]))[0])
         return self.curve.end if t == 1.0 else self.curve.pose(t)
 
     def on_segment(self, t: float) -> tuple[int, float]:
         """Return the segment and the fraction of it at a place."""
-        if not isinstance(self.curve, Corner):
+        if not isinstance(self.curve, Blend):
             return self.index, t
         leave, join = self.curve.leave, self.curve.join
         if t <= 0.5:
@@ -106,13 +106,13 @@ class Piece:
         return self.curve.length, self.curve.angle
 
 
-def _places(length: float, angle: float) -> int:
+def _sample_count(length: float, angle: float) -> int:
     steps = max(length / STEP_LENGTH, angle / STEP_ANGLE)
-    return max(1, ceil(steps), min(LEAST_PLACES, ceil(_FINER * steps)))
+    return max(1, ceil(steps), min(MIN_SAMPLES, ceil(_MIN_REFINEMENT * steps)))
 
 
 @dataclass(frozen=True, slots=True)
-class Places:
+class PoseSamples:
     """Rows of places on pieces: the number of the piece, where on it, and the pose there."""
 
     #: (n,) not decreasing.
@@ -123,25 +123,25 @@ class Places:
     poses: Floats
 
 
-def places_on(pieces: Sequence[Piece]) -> Places:
+def sample_poses(pieces: Sequence[CurvePiece]) -> PoseSamples:
     """Return the places on pieces of the tool's space; where a piece begins is none of its."""
-    piece, t = along(pieces)
+    piece, t = sample_parameters(pieces)
     poses = np.empty((len(t), 7))
-    is_corner = np.array([isinstance(p.curve, Corner) for p in pieces], dtype=np.bool_)
-    rounds = is_corner[piece]
-    number = np.where(is_corner, np.cumsum(is_corner), np.cumsum(~is_corner)) - 1
-    corners = [p.curve for p in pieces if isinstance(p.curve, Corner)]
-    paths = [p.curve for p in pieces if not isinstance(p.curve, Corner)]
+    is_blend = np.array([isinstance(p.curve, Blend) for p in pieces], dtype=np.bool_)
+    on_blend = is_blend[piece]
+    number = np.where(is_blend, np.cumsum(is_blend), np.cumsum(~is_blend)) - 1
+    blends = [p.curve for p in pieces if isinstance(p.curve, Blend)]
+    paths = [p.curve for p in pieces if not isinstance(p.curve, Blend)]
     if paths:
-        poses[~rounds] = path_rows(paths, number[piece[~rounds]], t[~rounds])
-    if corners:
-        poses[rounds] = corner_rows(corners, number[piece[rounds]], t[rounds])
-    return Places(piece, t, poses)
+        poses[~on_blend] = path_rows(paths, number[piece[~on_blend]], t[~on_blend])
+    if blends:
+        poses[on_blend] = blend_rows(blends, number[piece[on_blend]], t[on_blend])
+    return PoseSamples(piece, t, poses)
 
 
-def along(pieces: Sequence[Piece]) -> tuple[NDArray[np.intp], Floats]:
+def sample_parameters(pieces: Sequence[CurvePiece]) -> tuple[NDArray[np.intp], Floats]:
     """Return the piece (n,) and the parameter (n,) of each of its places."""
-    n = np.array([p.places for p in pieces], dtype=np.intp)
+    n = np.array([p.sample_count for p in pieces], dtype=np.intp)
     begin, end = np.array([(p.begin, p.end) for p in pieces]).reshape(-1, 2).T
     piece = np.repeat(np.arange(len(pieces)), n)
     k = np.arange(1, len(piece) + 1) - np.repeat(np.cumsum(n) - n, n)
@@ -151,18 +151,18 @@ def along(pieces: Sequence[Piece]) -> tuple[NDArray[np.intp], Floats]:
 
 
 def segments_of(
-    pieces: Sequence[Piece], piece: NDArray[np.intp], t: Floats
+    pieces: Sequence[CurvePiece], piece: NDArray[np.intp], t: Floats
 ) -> tuple[Ints, Floats]:
     """Return the segment (n,) and the fraction (n,) of it of each place: many ``on_segment``."""
     index = np.array([p.index for p in pieces], dtype=np.int32)[piece]
     ends = np.array(
         [
-            (p.curve.leave, p.curve.join) if isinstance(p.curve, Corner) else (-1.0, 0.0)
+            (p.curve.leave, p.curve.join) if isinstance(p.curve, Blend) else (-1.0, 0.0)
             for p in pieces
         ]
     )[piece]
     leave, join = ends.T
-    first, second = crossing(leave, join, t)
-    rounds, behind = leave >= 0.0, t > 0.5
-    fraction = np.where(rounds, np.where(behind, second, first), t)
-    return index + (rounds & behind), fraction
+    first, second = crossfade(leave, join, t)
+    on_blend, after_waypoint = leave >= 0.0, t > 0.5
+    fraction = np.where(on_blend, np.where(after_waypoint, second, first), t)
+    return index + (on_blend & after_waypoint), fraction

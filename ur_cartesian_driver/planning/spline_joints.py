@@ -15,28 +15,28 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.rates import joint_rates
-from ur_cartesian_driver.kinematics.rows import nearest_rows
+from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
+from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows
 from ur_cartesian_driver.motion.errors import TooFast
-from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluated, quintic_rows, Rates
-from ur_cartesian_driver.planning.path import tcp_rows
-from ur_cartesian_driver.planning.pose_rows import angle_rows, compose_rows, Floats
-from ur_cartesian_driver.planning.postures import Reach
-from ur_cartesian_driver.planning.spline_way import SplineWay
-from ur_cartesian_driver.planning.validate import point_field
+from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluate, MotionRows, quintic_rows
+from ur_cartesian_driver.planning.geometry.curves import tcp_rows
+from ur_cartesian_driver.planning.geometry.pose_rows import angle_rows, compose_rows, Floats
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.request.validate import point_field
+from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
 #: Times of pieces are whole microseconds, as on the wire, so that sums of them do not drift.
 TICK = 1e-6
 #: Pieces are not halved below this [s]: one step of the fastest controllers.
-_LEAST = 0.002
+_MIN_PIECE_TIME = 0.002
 # Digits of joint rates that are more than rounding.
 _DIGITS = 12
 #: Places inside a piece at which the tool is compared, at least and at most.
-_COMPARED = 7, 23
+_COMPARED_SAMPLES = 7, 23
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class JointTrack:
+class JointPolynomials:
     """The joints over time, in n pieces."""
 
     #: (n + 1,) [s], whole ticks.
@@ -53,14 +53,14 @@ class JointTrack:
     angle: float
 
 
-def joint_track(
-    reach: Reach,
-    way: SplineWay,
-    start: Rates,
+def fit_joint_polynomials(
+    kinematics: TcpKinematics,
+    path: SplinePath,
+    start: MotionRows,
     quintic: bool,
     tolerance: float,
     angle_tolerance: float,
-) -> JointTrack:
+) -> JointPolynomials:
     """
     Return the pieces for a way.
 
@@ -68,37 +68,43 @@ def joint_track(
     :param tolerance: how far the tool may be off [m], and ``angle_tolerance`` how far turned.
     :raises TooFast: pieces as short as a step of the controller are not enough.
     """
-    return _Refining(reach, way, start, quintic).within(tolerance, angle_tolerance)
+    return _PieceRefinement(kinematics, path, start, quintic).refine_within(
+        tolerance, angle_tolerance
+    )
 
 
-class _Refining:
+class _PieceRefinement:
     """The pieces so far: ends in order of time, and which of them are not compared yet."""
 
-    def __init__(self, reach: Reach, way: SplineWay, start: Rates, quintic: bool) -> None:
-        self.reach, self.way, self.quintic = reach, way, quintic
-        self._places = way.times
-        spline = way.spline
+    def __init__(
+        self, kinematics: TcpKinematics, path: SplinePath, start: MotionRows, quintic: bool
+    ) -> None:
+        self.kinematics, self.path, self.quintic = kinematics, path, quintic
+        self._sample_times = path.times
+        spline = path.spline
         n = len(spline.positions)
         #: Ends by the piece of the tool spline they lie on, and the exact time there.
         self.piece = np.arange(n)
-        self.times = np.concatenate([spline.times[:1], _whole(spline.times[1:])])
+        self.times = np.concatenate([spline.times[:1], _to_ticks(spline.times[1:])])
         joints = self._joints(self.piece, np.diff(spline.times), self.times[1:])
-        self.joints = Rates(*(np.concatenate([a, b]) for a, b in zip(start, joints, strict=True)))
-        self.fresh = np.ones(n, dtype=np.bool_)
-        self.off = np.zeros((n, 2))
+        self.joints = MotionRows(
+            *(np.concatenate([a, b]) for a, b in zip(start, joints, strict=True))
+        )
+        self.pending = np.ones(n, dtype=np.bool_)
+        self.deviation = np.zeros((n, 2))
 
-    def within(self, tolerance: float, angle_tolerance: float) -> JointTrack:
+    def refine_within(self, tolerance: float, angle_tolerance: float) -> JointPolynomials:
         bounds = np.array([tolerance, angle_tolerance])
         while True:
-            rows = np.flatnonzero(self.fresh)
-            self.off[rows] = self._compared(rows)
-            self.fresh[rows] = False
-            bad = rows[(self.off[rows] > bounds).any(axis=1)]
+            rows = np.flatnonzero(self.pending)
+            self.deviation[rows] = self._deviations(rows)
+            self.pending[rows] = False
+            bad = rows[(self.deviation[rows] > bounds).any(axis=1)]
             if not len(bad):
                 break
             self._halve(bad)
-        distance, angle = self.off.max(axis=0).tolist()
-        return JointTrack(
+        distance, angle = self.deviation.max(axis=0).tolist()
+        return JointPolynomials(
             times=self.times,
             q=self.joints.x,
             qd=self.joints.v,
@@ -109,59 +115,65 @@ class _Refining:
             angle=angle,
         )
 
-    def _joints(self, piece: NDArray[np.intp], t: Floats, times: Floats) -> Rates:
+    def _joints(self, piece: NDArray[np.intp], t: Floats, times: Floats) -> MotionRows:
         """Return the joints at times ``t`` since pieces of the tool spline began."""
-        tool = self.way.spline.rows(piece, t)
-        near = self.way.q[np.clip(np.searchsorted(self._places, times), 0, len(self._places) - 1)]
-        q = nearest_rows(self.reach.arm, compose_rows(tool.poses, self.reach.T_tcp_flange), near)
+        tool = self.path.spline.rows(piece, t)
+        near = self.path.q[
+            np.clip(np.searchsorted(self._sample_times, times), 0, len(self._sample_times) - 1)
+        ]
+        q = nearest_rows(
+            self.kinematics.arm, compose_rows(tool.poses, self.kinematics.T_tcp_flange), near
+        )
         qd, qdd = joint_rates(
-            self.reach.arm, self.reach.T_flange_tcp, q, tool.twists, tool.accelerations
+            self.kinematics.arm, self.kinematics.T_flange_tcp, q, tool.twists, tool.accelerations
         )
         # At rest is exactly at rest.
-        return Rates(q, np.round(qd, _DIGITS) + 0.0, np.round(qdd, _DIGITS) + 0.0)
+        return MotionRows(q, np.round(qd, _DIGITS) + 0.0, np.round(qdd, _DIGITS) + 0.0)
 
     def _coefficients(self, rows: NDArray[np.intp]) -> Floats:
         between = quintic_rows if self.quintic else cubic_rows
-        start, end = (Rates(*(x[rows + k] for x in self.joints)) for k in (0, 1))
+        start, end = (MotionRows(*(x[rows + k] for x in self.joints)) for k in (0, 1))
         return between(np.diff(self.times)[rows], start, end)
 
-    def _compared(self, rows: NDArray[np.intp]) -> Floats:
+    def _deviations(self, rows: NDArray[np.intp]) -> Floats:
         """Return how far the tool is off on pieces (n, 2) [m], [rad]."""
         begin, end = self.times[rows], self.times[rows + 1]
-        places = np.searchsorted(self._places, end) - np.searchsorted(self._places, begin)
-        count = int(np.clip(places.max(), *_COMPARED))
+        sample_count = np.searchsorted(self._sample_times, end) - np.searchsorted(
+            self._sample_times, begin
+        )
+        count = int(np.clip(sample_count.max(), *_COMPARED_SAMPLES))
         t = (end - begin)[:, None] * (np.arange(1, count + 1) / (count + 1))
         coefficients = np.repeat(self._coefficients(rows), count, axis=0)
-        q = evaluated(coefficients, t.ravel()).x
-        tool = tcp_rows(self.reach.arm, self.reach.T_flange_tcp, q)
-        spline, piece = self.way.spline, np.repeat(self.piece[rows], count)
+        q = evaluate(coefficients, t.ravel()).x
+        tool = tcp_rows(self.kinematics.arm, self.kinematics.T_flange_tcp, q)
+        spline, piece = self.path.spline, np.repeat(self.piece[rows], count)
         asked = spline.rows(piece, (begin[:, None] + t).ravel() - spline.times[piece]).poses
         distance = np.linalg.norm(tool[:, :3] - asked[:, :3], axis=1)
-        off = np.stack([distance, angle_rows(asked[:, 3:], tool[:, 3:])], axis=1)
-        most: Floats = off.reshape(len(rows), count, 2).max(axis=1)
-        return most
+        deviation = np.stack([distance, angle_rows(asked[:, 3:], tool[:, 3:])], axis=1)
+        largest: Floats = deviation.reshape(len(rows), count, 2).max(axis=1)
+        return largest
 
     def _halve(self, rows: NDArray[np.intp]) -> None:
         begin, end = self.times[rows], self.times[rows + 1]
-        middle = _whole(0.5 * (begin + end))
-        short = np.flatnonzero(end - begin < 2.0 * _LEAST)
+        middle = _to_ticks(0.5 * (begin + end))
+        short = np.flatnonzero(end - begin < 2.0 * _MIN_PIECE_TIME)
         if len(short):
             self._refuse(int(rows[short[0]]))
         piece = self.piece[rows]
-        joints = self._joints(piece, middle - self.way.spline.times[piece], middle)
-        self.joints = Rates(
+        joints = self._joints(piece, middle - self.path.spline.times[piece], middle)
+        self.joints = MotionRows(
             *(np.insert(x, rows + 1, y, axis=0) for x, y in zip(self.joints, joints, strict=True))
         )
         self.times = np.insert(self.times, rows + 1, middle)
         self.piece = np.insert(self.piece, rows, piece)
-        self.off = np.insert(self.off, rows, 0.0, axis=0)
-        self.fresh[rows] = True
-        self.fresh = np.insert(self.fresh, rows, True)
+        self.deviation = np.insert(self.deviation, rows, 0.0, axis=0)
+        self.pending[rows] = True
+        self.pending = np.insert(self.pending, rows, True)
 
     def _refuse(self, row: int) -> None:
-        distance, angle = self.off[row].tolist()
+        distance, angle = self.deviation[row].tolist()
         raise TooFast(
-            point_field(self.way.first + int(self.piece[row])),
+            point_field(self.path.first + int(self.piece[row])),
             f'cannot be approached along the spline: {self.times[row]:.3f} s from the start the '
             f'joints change so fast that the tool would be {1e3 * distance:.3f} mm and '
             f'{angle:.4f} rad off it in one step of the controller',
@@ -169,6 +181,6 @@ class _Refining:
         )
 
 
-def _whole(times: Floats) -> Floats:
+def _to_ticks(times: Floats) -> Floats:
     rounded: Floats = np.round(times / TICK) * TICK
     return rounded

@@ -15,20 +15,20 @@ from math import ceil
 
 import numpy as np
 
-from ur_cartesian_driver.kinematics.rates import joint_rates
+from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import TooFast
+from ur_cartesian_driver.planning.geometry.pose_rows import Floats
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.pose_rows import Floats
-from ur_cartesian_driver.planning.postures import Reach
-from ur_cartesian_driver.planning.spline_way import SplineWay
-from ur_cartesian_driver.planning.validate import point_field
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.request.validate import point_field
+from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
 _ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Excess:
+class LimitExcess:
     """What exceeds its limit by most."""
 
     #: How many times the time would be enough.
@@ -71,31 +71,37 @@ class _Quantity:
     name: str
 
 
-def excess(reach: Reach, way: SplineWay, options: PlanningOptions) -> Excess | None:
+def worst_excess(
+    kinematics: TcpKinematics, path: SplinePath, options: PlanningOptions
+) -> LimitExcess | None:
     """Return what exceeds its limit by most on a way, None if nothing does."""
-    found: Excess | None = None
-    for quantity in _quantities(reach, way, options):
+    worst: LimitExcess | None = None
+    for quantity in _quantities(kinematics, path, options):
         row = int(np.argmax(quantity.values))
-        most = float(quantity.values[row])
-        factor = (most / quantity.limit) ** (1.0 / quantity.power)
-        if factor > max(1.0 + _ROUNDING, found.factor if found else 0.0):
-            found = Excess(
+        peak = float(quantity.values[row])
+        factor = (peak / quantity.limit) ** (1.0 / quantity.power)
+        if factor > max(1.0 + _ROUNDING, worst.factor if worst else 0.0):
+            worst = LimitExcess(
                 factor=factor,
-                point=int(way.points[row]),
-                fraction=float(way.u[row]),
+                point=int(path.points[row]),
+                fraction=float(path.u[row]),
                 what=quantity.what,
-                needed=most,
+                needed=peak,
                 allowed=quantity.limit,
                 unit=quantity.unit,
                 name=quantity.name,
             )
-    return found
+    return worst
 
 
-def _quantities(reach: Reach, way: SplineWay, options: PlanningOptions) -> Iterator[_Quantity]:
-    begin, end = way.spline.times[way.piece], way.spline.times[way.piece + 1]
-    tool = way.spline.rows(way.piece, way.u * (end - begin))
-    qd, qdd = joint_rates(reach.arm, reach.T_flange_tcp, way.q, tool.twists, tool.accelerations)
+def _quantities(
+    kinematics: TcpKinematics, path: SplinePath, options: PlanningOptions
+) -> Iterator[_Quantity]:
+    begin, end = path.spline.times[path.piece], path.spline.times[path.piece + 1]
+    tool = path.spline.rows(path.piece, path.u * (end - begin))
+    qd, qdd = joint_rates(
+        kinematics.arm, kinematics.T_flange_tcp, path.q, tool.twists, tool.accelerations
+    )
     if options.max_tool_speed > 0.0:
         yield _Quantity(
             'the tool',
@@ -122,7 +128,7 @@ def _quantities(reach: Reach, way: SplineWay, options: PlanningOptions) -> Itera
         'max_angular_acceleration',
     )
     for k, (name, limit) in enumerate(
-        zip(JOINT_NAMES, reach.arm.model.max_joint_speed, strict=True)
+        zip(JOINT_NAMES, kinematics.arm.model.max_joint_speed, strict=True)
     ):
         yield _Quantity(name, np.abs(qd[:, k]), limit, 1, 'rad/s', 'the limit of the joint')
         yield _Quantity(

@@ -3,9 +3,9 @@
 """
 From points with times, twists and accelerations to joint spline pieces: SPLINE and SERVO.
 
-Points -> the tool over time (:mod:`~.tool_spline`) -> the arm along it (:mod:`~.spline_way`) ->
-limits -> joint polynomials (:mod:`~.spline_joints`). A motion may be planned in parts, each from
-where the one before ends: :func:`plan_pieces` takes any :class:`SplineState`, also a moving one,
+Points -> the tool over time (:mod:`~.tool_spline`) -> the arm along it (:mod:`~.spline_path`) ->
+limits -> joint polynomials (:mod:`~.joint_polynomials`). A motion may be planned in parts, from
+where the one before ends: :func:`plan_spline` takes any :class:`SplineState`, also a moving one,
 and :func:`closing` brings such a motion to rest.
 """
 
@@ -18,35 +18,36 @@ from math import degrees
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.rates import tool_rates
+from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded
 from ur_cartesian_driver.motion.goal import Goal, ZERO6
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
-from ur_cartesian_driver.motion.polynomials import Rates
+from ur_cartesian_driver.motion.polynomials import MotionRows
 from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.motion.primitive import Joints, Spline
-from ur_cartesian_driver.planning.clearance import Clearance
-from ur_cartesian_driver.planning.clearance import remarks as clearance_remarks
+from ur_cartesian_driver.planning.geometry.curves import tcp_rows
+from ur_cartesian_driver.planning.geometry.pose_rows import Floats
+from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
+from ur_cartesian_driver.planning.moves.reference_path import keep_hemisphere
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.path import tcp_rows
-from ur_cartesian_driver.planning.pose_rows import Floats
-from ur_cartesian_driver.planning.postures import Reach
-from ur_cartesian_driver.planning.reference import keep_hemisphere
-from ur_cartesian_driver.planning.spline_joints import joint_track, JointTrack
-from ur_cartesian_driver.planning.spline_limits import excess
-from ur_cartesian_driver.planning.spline_points import remarks as point_remarks
-from ur_cartesian_driver.planning.spline_points import tool_points
-from ur_cartesian_driver.planning.spline_way import SplineWay, way_along
-from ur_cartesian_driver.planning.tool_spline import ToolPoints, ToolSpline
-from ur_cartesian_driver.planning.validate import point_field
+from ur_cartesian_driver.planning.preflight.clearance import Clearance, clearance_remarks
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.request.validate import point_field
+from ur_cartesian_driver.planning.spline.joint_polynomials import (
+    fit_joint_polynomials,
+    JointPolynomials,
+)
+from ur_cartesian_driver.planning.spline.spline_limits import worst_excess
+from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, SplinePath
+from ur_cartesian_driver.planning.spline.spline_points import point_remarks, tool_points
 
 #: What an angle counts as a length: tolerances of a tool spline are as much at this distance [m].
-ANGLE_LEVER = 0.1
+ANGLE_TOLERANCE_RADIUS = 0.1
 # Places at which a closing piece is looked at, and how much shorter the next try is.
-_LOOKS = 17
-_SHORTER = 0.8
+_SAMPLES = 17
+_SHORTENING = 0.8
 _TRIES = 20
 
 
@@ -69,13 +70,13 @@ class SplineState:
         )
 
     @property
-    def moves(self) -> bool:
+    def is_moving(self) -> bool:
         """Whether the arm is not at rest."""
         return any(self.qd) or any(self.qdd)
 
-    def rows(self) -> Rates:
+    def rows(self) -> MotionRows:
         """Return the joints in rows (1, 6)."""
-        return Rates(np.array([self.q]), np.array([self.qd]), np.array([self.qdd]))
+        return MotionRows(np.array([self.q]), np.array([self.qd]), np.array([self.qdd]))
 
     def tool(self, arm: Arm, T_flange_tcp: Pose) -> ToolPoints:
         """Return the TCP in base, one row."""
@@ -105,7 +106,7 @@ class SplinePieces:
     stretch: float = 1.0
 
 
-def plan_pieces(
+def plan_spline(
     start: SplineState,
     goal: Goal,
     arm: Arm,
@@ -113,7 +114,7 @@ def plan_pieces(
     options: PlanningOptions,
     *,
     first: int = 0,
-    tools: Sequence[Pose] = (),
+    tool_tips: Sequence[Pose] = (),
 ) -> SplinePieces:
     """
     Return the pieces from a state to points.
@@ -126,37 +127,44 @@ def plan_pieces(
     :param tools: where tools reach behind the flange, for collisions; empty = the TCP.
     :raises GoalRefused: the subclass that fits; its text names point, quantity, value and bound.
     """
-    reach = Reach(arm, T_flange_tcp)
+    kinematics = TcpKinematics(arm, T_flange_tcp)
     points = tool_points(goal, start.tool(arm, T_flange_tcp))
-    way = way_along(
-        reach,
+    path = solve_spline_path(
+        kinematics,
         ToolSpline.through(points),
         goal.waypoints,
         start.q,
         options,
         first=first,
-        rests=not start.moves,
+        rests=not start.is_moving,
     )
-    way, stretch, said = _in_time(reach, way, start, goal, options)
-    track = joint_track(
-        reach,
-        way,
+    path, stretch, remarks_made = _fit_to_limits(kinematics, path, start, goal, options)
+    polynomials = fit_joint_polynomials(
+        kinematics,
+        path,
         start.rows(),
         points.quintic,
         options.spline_tolerance,
-        options.spline_tolerance / ANGLE_LEVER,
+        options.spline_tolerance / ANGLE_TOLERANCE_RADIUS,
     )
-    segments = tuple(_segments(way, track, goal))
+    segments = tuple(_segments(path, polynomials, goal))
     piece = segments[-1].primitive
     assert isinstance(piece, Spline)
-    end = SplineState.after(piece, float(track.times[-1]))
-    said += _clearances(way, end, arm, tools or (T_flange_tcp,), start, options)
+    end = SplineState.after(piece, float(polynomials.times[-1]))
+    remarks_made += _clearance_remarks(
+        path, end, arm, tool_tips or (T_flange_tcp,), start, options
+    )
     return SplinePieces(
         segments=segments,
-        reference=_reference(way),
+        reference=_reference(path),
         end=end,
         stretch=stretch,
-        remarks=(*point_remarks(goal, first), *said, _precision(track), _smallest(way)),
+        remarks=(
+            *point_remarks(goal, first),
+            *remarks_made,
+            _precision(polynomials),
+            _tightest_remark(path),
+        ),
     )
 
 
@@ -167,7 +175,7 @@ def end_state(plan: Plan) -> SplineState:
     return SplineState.after(piece, float(plan.reference.time[-1]))
 
 
-def closing(state: SplineState, arm: Arm, deceleration: float) -> Spline:
+def plan_stop(state: SplineState, arm: Arm, deceleration: float) -> Spline:
     """
     Return the piece that brings a moving arm to rest, each joint on as it goes.
 
@@ -180,95 +188,106 @@ def closing(state: SplineState, arm: Arm, deceleration: float) -> Spline:
     """
     v, a = np.array(state.qd), np.array(state.qdd)
     speed = np.maximum(arm.model.max_joint_speed, np.abs(v))
-    T = max(1.5 * float(np.abs(v).max()) / deceleration, _LOOKS * 1e-3)
+    T = max(1.5 * float(np.abs(v).max()) / deceleration, _SAMPLES * 1e-3)
     for _ in range(_TRIES):
         T = round(T, 6)
         target = np.array(state.q) + 0.5 * T * v + T**2 / 12.0 * a
         piece = Spline(target=_six(target), velocities=ZERO6, accelerations=ZERO6, duration=T)
         q, qd, _ = _rows_of(state, piece)
-        beyond = _beyond(arm, q)
-        if beyond is None and (np.abs(qd) <= speed * (1.0 + 1e-9)).all():
+        joint = _joint_outside_range(arm, q)
+        if joint is None and (np.abs(qd) <= speed * (1.0 + 1e-9)).all():
             return piece
-        T *= _SHORTER
+        T *= _SHORTENING
     raise JointLimitExceeded(
-        f'{JOINT_NAMES[beyond or 0]} is so near to the end of its range, and so fast, that it '
+        f'{JOINT_NAMES[joint or 0]} is so near to the end of its range, and so fast, that it '
         'cannot be stopped before it; end the motion earlier.'
     )
 
 
 def _rows_of(state: SplineState, piece: Spline) -> tuple[Floats, Floats, Floats]:
     spline = JointSpline.of(state.q, [piece], velocities=state.qd, accelerations=state.qdd)
-    return spline.rows(np.linspace(0.0, piece.duration, _LOOKS))
+    return spline.rows(np.linspace(0.0, piece.duration, _SAMPLES))
 
 
-def _beyond(arm: Arm, q: Floats) -> int | None:
+def _joint_outside_range(arm: Arm, q: Floats) -> int | None:
     """Return the joint that leaves its range, None if none does."""
     low, high = np.array(arm.model.position_limits).T
     outside = ((q < low - 1e-9) | (q > high + 1e-9)).any(axis=0)
     return int(np.argmax(outside)) if outside.any() else None
 
 
-def _in_time(
-    reach: Reach, way: SplineWay, start: SplineState, goal: Goal, options: PlanningOptions
-) -> tuple[SplineWay, float, list[str]]:
+def _fit_to_limits(
+    kinematics: TcpKinematics,
+    path: SplinePath,
+    start: SplineState,
+    goal: Goal,
+    options: PlanningOptions,
+) -> tuple[SplinePath, float, list[str]]:
     """Return the way in the time that the limits allow, the factor, and what is said of it."""
-    found = excess(reach, way, options)
+    found = worst_excess(kinematics, path, options)
     if found is None:
-        return way, 1.0, []
-    in_parts = start.moves or goal.keep_open
+        return path, 1.0, []
+    in_parts = start.is_moving or goal.keep_open
     if options.on_too_fast != 'slow' or in_parts:
         raise found.refusal(may_slow=not in_parts)
-    way = way.stretched(found.factor)
-    longest = int(np.argmax(np.diff(way.spline.times)))
-    time = float(np.diff(way.spline.times)[longest])
+    path = path.stretch_times(found.factor)
+    longest = int(np.argmax(np.diff(path.spline.times)))
+    time = float(np.diff(path.spline.times)[longest])
     if time > options.max_segment_time:
         raise InvalidGoal(
-            point_field(way.first + longest, 'time_from_start'),
+            point_field(path.first + longest, 'time_from_start'),
             f'would take {time:.0f} s because of {found.name}, more than max_segment_time = '
             f'{options.max_segment_time:.0f} s',
             'go around the place where it has to be slow',
         )
     return (
-        way,
+        path,
         found.factor,
         [
             f'all times are stretched by {found.factor:.4g}, because of {found.name} = '
             f'{found.allowed:.3f} {found.unit} of {found.what} on the way to point {found.point}: '
-            f'{way.spline.times[-1]:.3f} s in all'
+            f'{path.spline.times[-1]:.3f} s in all'
         ],
     )
 
 
-def _segments(way: SplineWay, track: JointTrack, goal: Goal) -> Iterator[PlannedSegment]:
-    length = np.interp(track.times, way.times, way.length)
-    angle = np.interp(track.times, way.times, way.angle)
+def _segments(
+    path: SplinePath, polynomials: JointPolynomials, goal: Goal
+) -> Iterator[PlannedSegment]:
+    length = np.interp(polynomials.times, path.times, path.length)
+    angle = np.interp(polynomials.times, path.times, path.angle)
     columns = (
-        track.piece,
-        np.diff(track.piece, append=-1) != 0,
+        polynomials.piece,
+        np.diff(polynomials.piece, append=-1) != 0,
         np.diff(length),
         np.diff(angle),
-        np.round(np.diff(track.times), 6),
-        track.q[1:],
-        track.qd[1:],
-        track.qdd[1:],
+        np.round(np.diff(polynomials.times), 6),
+        polynomials.q[1:],
+        polynomials.qd[1:],
+        polynomials.qdd[1:],
     )
-    since, far, turned, count = 0.0, 0.0, 0.0, 0
+    time_done, length_done, angle_done, count = 0.0, 0.0, 0.0, 0
     for k, is_last, metres, radians, duration, q, qd, qdd in zip(
         *(column.tolist() for column in columns), strict=True
     ):
-        since, far, turned, count = since + duration, far + metres, turned + radians, count + 1
+        time_done, length_done, angle_done, count = (
+            time_done + duration,
+            length_done + metres,
+            angle_done + radians,
+            count + 1,
+        )
         note = ''
         if is_last:
-            note = _note(way, goal, k, count, (far, turned, since))
-            since, far, turned, count = 0.0, 0.0, 0.0, 0
+            note = _segment_note(path, goal, k, count, (length_done, angle_done, time_done))
+            time_done, length_done, angle_done, count = 0.0, 0.0, 0.0, 0
         yield PlannedSegment(
             primitive=Spline(
                 target=tuple(q),
                 velocities=tuple(qd),
                 duration=duration,
-                accelerations=tuple(qdd) if track.quintic else None,
+                accelerations=tuple(qdd) if polynomials.quintic else None,
             ),
-            waypoint=way.first + k,
+            waypoint=path.first + k,
             length=metres,
             angle=radians,
             duration=duration,
@@ -277,14 +296,16 @@ def _segments(way: SplineWay, track: JointTrack, goal: Goal) -> Iterator[Planned
         )
 
 
-def _note(way: SplineWay, goal: Goal, k: int, count: int, done: tuple[float, float, float]) -> str:
+def _segment_note(
+    path: SplinePath, goal: Goal, k: int, count: int, done: tuple[float, float, float]
+) -> str:
     """Return the line of the segment to a point: ``done`` are its length, turn and time."""
     length, angle, time = done
     turn = f' and {degrees(angle):.1f} degrees' if degrees(angle) >= 0.05 else ''
     speed = (
         f'{length / time:.3f} m/s' if length > 1e-6 else f'{angle / time:.3f} rad/s'
     ) + ' on average'
-    point = way.first + k
+    point = path.first + k
     passes = (
         'stops there'
         if not any(goal.waypoints[k].twist)
@@ -294,52 +315,52 @@ def _note(way: SplineWay, goal: Goal, k: int, count: int, done: tuple[float, flo
     pieces = '1 piece' if count == 1 else f'{count} pieces'
     return (
         f'point {point}: SPLINE in {pieces}, {length:.3f} m{turn} in {time:.3f} s ({speed}), '
-        f'{passes}; nearest: {way.nearest[point]}'
+        f'{passes}; nearest: {path.tightest_margin[point]}'
     )
 
 
-def _clearances(
-    way: SplineWay,
+def _clearance_remarks(
+    path: SplinePath,
     end: SplineState,
     arm: Arm,
-    tools: Sequence[Pose],
+    tool_tips: Sequence[Pose],
     start: SplineState,
     options: PlanningOptions,
 ) -> list[str]:
     """Return what is said of collisions; behind a moving end the way to rest counts as well."""
-    q, points, u = way.q[1:], way.points[1:], way.u[1:]
-    if end.moves:
-        on = _rows_of(end, closing(end, arm, options.closing_deceleration))[0]
+    q, points, u = path.q[1:], path.points[1:], path.u[1:]
+    if end.is_moving:
+        on = _rows_of(end, plan_stop(end, arm, options.keep_open_deceleration))[0]
         q = np.concatenate([q, on])
         points = np.concatenate([points, np.full(len(on), points[-1])])
         u = np.concatenate([u, np.ones(len(on))])
-    said = (
+    remarks_made = (
         line
-        for T_flange_tcp in tools
+        for T_flange_tcp in tool_tips
         for line in clearance_remarks(
             Clearance(arm, T_flange_tcp, options).check(q, start.q), points, u
         )
     )
-    return list(dict.fromkeys(said))
+    return list(dict.fromkeys(remarks_made))
 
 
-def _reference(way: SplineWay) -> ReferencePath:
-    poses = way.poses.copy()
+def _reference(path: SplinePath) -> ReferencePath:
+    poses = path.poses.copy()
     keep_hemisphere(poses)
-    return ReferencePath(poses=poses, point=way.points, time=way.times)
+    return ReferencePath(poses=poses, point=path.points, time=path.times)
 
 
-def _precision(track: JointTrack) -> str:
-    kind = 'quintic' if track.quintic else 'cubic'
+def _precision(polynomials: JointPolynomials) -> str:
+    kind = 'quintic' if polynomials.quintic else 'cubic'
     return (
-        f'joints: {len(track.piece)} {kind} pieces, along which the tool stays within '
-        f'{1e3 * track.distance:.3f} mm and {track.angle:.5f} rad of its spline'
+        f'joints: {len(polynomials.piece)} {kind} pieces, along which the tool stays within '
+        f'{1e3 * polynomials.distance:.3f} mm and {polynomials.angle:.5f} rad of its spline'
     )
 
 
-def _smallest(way: SplineWay) -> str:
-    point, nearest = min(way.nearest.items(), key=lambda item: item[1].share)
-    return f'nearest of all: {nearest} of the way to point {point}'
+def _tightest_remark(path: SplinePath) -> str:
+    point, tightest_margin = min(path.tightest_margin.items(), key=lambda item: item[1].share)
+    return f'nearest of all: {tightest_margin} of the way to point {point}'
 
 
 def _six(values: Floats) -> Vector6:
@@ -347,7 +368,7 @@ def _six(values: Floats) -> Vector6:
     return (a, b, c, d, e, f)
 
 
-def stretched(goal: Goal, factor: float) -> Goal:
+def stretch_times(goal: Goal, factor: float) -> Goal:
     """Return a goal with all its times stretched."""
     return replace(
         goal, waypoints=tuple(replace(point, time=factor * point.time) for point in goal.waypoints)

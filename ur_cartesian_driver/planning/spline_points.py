@@ -17,18 +17,18 @@ import numpy as np
 
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
-from ur_cartesian_driver.planning.pose_rows import (
+from ur_cartesian_driver.planning.geometry.pose_rows import (
     conjugate_rows,
     Floats,
     multiply_rows,
     normalized_rows,
 )
-from ur_cartesian_driver.planning.report import say
-from ur_cartesian_driver.planning.rotation_rows import log_rows, turn_of
-from ur_cartesian_driver.planning.tool_spline import ToolPoints
+from ur_cartesian_driver.planning.geometry.rotation_rows import log_rows, rotation_rates
+from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints
+from ur_cartesian_driver.planning.moves.plan_report import add_remark
 
 # Shorter ways are none, and a point beside one is not passed through [m], [rad].
-_NO_WAY = 1e-9
+_MIN_DISTANCE = 1e-9
 
 
 def tool_points(goal: Goal, start: ToolPoints) -> ToolPoints:
@@ -40,7 +40,7 @@ def tool_points(goal: Goal, start: ToolPoints) -> ToolPoints:
     """
     given = _given(goal.waypoints)
     T_frame_base = goal.T_base_frame.inverse()
-    start = _seen_from(start, T_frame_base)
+    start = _in_frame(start, T_frame_base)
     points = ToolPoints(
         times=np.concatenate([start.times, given.times]),
         poses=np.concatenate([start.poses, given.poses]),
@@ -48,33 +48,35 @@ def tool_points(goal: Goal, start: ToolPoints) -> ToolPoints:
         accelerations=np.concatenate([start.accelerations, given.accelerations]),
         quintic=bool(np.any(given.accelerations)),
     )
-    return _seen_from(_chosen(points, ends_moving=goal.keep_open), goal.T_base_frame)
+    return _in_frame(_without_nan(points, ends_moving=goal.keep_open), goal.T_base_frame)
 
 
-def remarks(goal: Goal, first: int) -> list[str]:
+def point_remarks(goal: Goal, first: int) -> list[str]:
     """Return what the report says of twists and accelerations; points count from ``first``."""
     points = list(enumerate(goal.waypoints, first))
     inner = points if goal.keep_open else points[:-1]
-    said: list[str] = []
+    lines: list[str] = []
     stops = [i for i, point in inner if not any(point.twist)]
-    say(said, stops, 'the arm stops there, because the twist is 0 (NaN lets the driver choose)')
+    add_remark(
+        lines, stops, 'the arm stops there, because the twist is 0 (NaN lets the driver choose)'
+    )
     for field in ('twist', 'acceleration'):
-        say(
-            said,
+        add_remark(
+            lines,
             [i for i, point in inner if isnan(sum(getattr(point, field)))],
             f'{field} is NaN, so it is chosen, to fit the points around',
         )
-    say(
-        said,
+    add_remark(
+        lines,
         [i for i, point in points if any(point.jerk)],
         'jerk is ignored: no robot motion takes it',
     )
-    say(
-        said,
+    add_remark(
+        lines,
         [i for i, segment in enumerate(goal.segments, first) if segment.acceleration > 0.0],
         'the acceleration of the segment is ignored: its time counts',
     )
-    return said
+    return lines
 
 
 def _given(waypoints: Sequence[Waypoint]) -> ToolPoints:
@@ -89,7 +91,7 @@ def _given(waypoints: Sequence[Waypoint]) -> ToolPoints:
     )
 
 
-def _seen_from(points: ToolPoints, T_new_old: Pose) -> ToolPoints:
+def _in_frame(points: ToolPoints, T_new_old: Pose) -> ToolPoints:
     """Return the same points in the axes of another frame at rest."""
     R = T_new_old.matrix()[:3, :3]
 
@@ -109,14 +111,14 @@ def _seen_from(points: ToolPoints, T_new_old: Pose) -> ToolPoints:
     )
 
 
-def _chosen(points: ToolPoints, *, ends_moving: bool) -> ToolPoints:
+def _without_nan(points: ToolPoints, *, ends_moving: bool) -> ToolPoints:
     """Return the points without NaN."""
     twists, accelerations = points.twists, points.accelerations
     if np.isnan(twists).any():
-        twists = np.where(np.isnan(twists), _twists(points, ends_moving), twists)
+        twists = np.where(np.isnan(twists), _chosen_twists(points, ends_moving), twists)
     if np.isnan(accelerations).any():
         accelerations = np.where(
-            np.isnan(accelerations), _accelerations(points, twists), accelerations
+            np.isnan(accelerations), _chosen_accelerations(points, twists), accelerations
         )
     return ToolPoints(
         times=points.times,
@@ -127,7 +129,7 @@ def _chosen(points: ToolPoints, *, ends_moving: bool) -> ToolPoints:
     )
 
 
-def _twists(points: ToolPoints, ends_moving: bool) -> Floats:
+def _chosen_twists(points: ToolPoints, ends_moving: bool) -> Floats:
     """
     Return velocities by the neighbours, those of parabolas; 0 at the start.
 
@@ -135,26 +137,26 @@ def _twists(points: ToolPoints, ends_moving: bool) -> Floats:
     the angular velocity at the point is their derivative.
     """
     h = np.diff(points.times)[:, None]
-    way = np.concatenate(
+    displacement = np.concatenate(
         [
             np.diff(points.poses[:, :3], axis=0),
-            _turns(points.poses[1:, 3:], points.poses[:-1, 3:]),
+            _relative_rotations(points.poses[1:, 3:], points.poses[:-1, 3:]),
         ],
         axis=1,
     )
-    mean = way / h
+    mean = displacement / h
     twists = np.zeros_like(points.twists)
     twists[1:-1] = (h[1:] * mean[:-1] + h[:-1] * mean[1:]) / (h[1:] + h[:-1])
     if ends_moving:
         twists[-1] = mean[-1]
     for part in (slice(0, 3), slice(3, 6)):
-        stands = np.linalg.norm(way[:, part], axis=1) < _NO_WAY
-        beside = np.concatenate([[False], stands]) | np.concatenate([stands, [False]])
+        is_still = np.linalg.norm(displacement[:, part], axis=1) < _MIN_DISTANCE
+        beside = np.concatenate([[False], is_still]) | np.concatenate([is_still, [False]])
         twists[beside, part] = 0.0
     return twists
 
 
-def _accelerations(points: ToolPoints, twists: Floats) -> Floats:
+def _chosen_accelerations(points: ToolPoints, twists: Floats) -> Floats:
     """Return the means of what cubics before and after each point have there; 0 at both ends."""
     h = np.diff(points.times)[:, None]
     inner = slice(1, -1)
@@ -162,7 +164,9 @@ def _accelerations(points: ToolPoints, twists: Floats) -> Floats:
     # All seen from the inner point: positions, and rotation vectors from its orientation.
     there = []
     for around in (slice(None, -2), slice(2, None)):
-        turn = turn_of(_turns(poses[around, 3:], poses[inner, 3:]), twists[around, 3:], zero)
+        turn = rotation_rates(
+            _relative_rotations(poses[around, 3:], poses[inner, 3:]), twists[around, 3:], zero
+        )
         there.append(
             (
                 np.concatenate([poses[around, :3] - poses[inner, :3], turn.x], axis=1),
@@ -181,5 +185,5 @@ def _accelerations(points: ToolPoints, twists: Floats) -> Floats:
     return accelerations
 
 
-def _turns(after: Floats, before: Floats) -> Floats:
+def _relative_rotations(after: Floats, before: Floats) -> Floats:
     return log_rows(multiply_rows(after, conjugate_rows(before)))

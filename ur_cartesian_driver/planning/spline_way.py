@@ -26,40 +26,48 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.goal import Waypoint
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.drafts import HALF_TURN
-from ur_cartesian_driver.planning.lookahead import farthest_way, Followed, followed
-from ur_cartesian_driver.planning.margins import (
-    leaving_rows,
-    measured,
-    Nearest,
-    nearest_of,
-    too_near,
-)
-from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.path import ARC_CHORD_ERROR
-from ur_cartesian_driver.planning.pose_rows import angle_rows, Floats
-from ur_cartesian_driver.planning.postures import missed, named_joints, Reach
-from ur_cartesian_driver.planning.samples import (
-    LEAST_PLACES,
-    Piece,
-    Places,
+from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR
+from ur_cartesian_driver.planning.geometry.pose_rows import angle_rows, Floats
+from ur_cartesian_driver.planning.geometry.samples import (
+    CurvePiece,
+    MIN_SAMPLES,
+    PoseSamples,
     STEP_ANGLE,
     STEP_LENGTH,
 )
-from ur_cartesian_driver.planning.tool_spline import ToolCurve, ToolSpline
-from ur_cartesian_driver.planning.validate import point_field
+from ur_cartesian_driver.planning.geometry.tool_spline import ToolCurve, ToolSpline
+from ur_cartesian_driver.planning.moves.segment_draft import HALF_TURN
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.joint_path import (
+    JointPath,
+    max_path_length,
+    solve_joint_path,
+)
+from ur_cartesian_driver.planning.preflight.margins import (
+    is_leaving_rows,
+    margins_by_segment,
+    near_singularity_refusal,
+    singularity_distance_rows,
+    TightestMargin,
+)
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
+    describe_miss,
+    named_joints,
+    TcpKinematics,
+)
+from ur_cartesian_driver.planning.request.validate import point_field
 
 # Where a piece is looked at for how fast it gets, and what it may be faster in between.
-_LOOKS = 9
-_FASTER = 1.05
+_COARSE_SAMPLES = 9
+_SPEED_MARGIN = 1.05
 #: The farthest turn from the begin of a piece [rad]: rotation vectors do not mean more.
-_FARTHEST_TURN = 2.0 * pi
+_MAX_TURN = 2.0 * pi
 #: The most places of a goal; each takes a quarter of a kilobyte while it is looked at.
-MOST_PLACES = 2_000_000
+MAX_SAMPLES = 2_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SplineWay:
+class SplinePath:
     """A spline that the arm can follow, and the places at which it was looked at."""
 
     spline: ToolSpline
@@ -75,7 +83,7 @@ class SplineWay:
     length: Floats
     angle: Floats
     #: By point.
-    nearest: dict[int, Nearest]
+    tightest_margin: dict[int, TightestMargin]
 
     @property
     def times(self) -> Floats:
@@ -89,13 +97,13 @@ class SplineWay:
         """(m,) the number of the point to which each place leads."""
         return (self.first + self.piece).astype(np.int32)
 
-    def stretched(self, factor: float) -> SplineWay:
+    def stretch_times(self, factor: float) -> SplinePath:
         """Return the same way in so many times the time."""
-        return replace(self, spline=self.spline.stretched(factor))
+        return replace(self, spline=self.spline.stretch_times(factor))
 
 
-def way_along(
-    reach: Reach,
+def solve_spline_path(
+    kinematics: TcpKinematics,
     spline: ToolSpline,
     waypoints: Sequence[Waypoint],
     q_start: Joints,
@@ -103,7 +111,7 @@ def way_along(
     *,
     first: int,
     rests: bool,
-) -> SplineWay:
+) -> SplinePath:
     """
     Return the arm's way along a spline.
 
@@ -113,46 +121,52 @@ def way_along(
     :param q_start: the configuration at its begin [rad].
     :raises GoalRefused: the arm cannot go there.
     """
-    looks = _looked_at(spline)
-    _check_sizes(reach, spline, looks, first)
-    places = _places(spline, looks, first)
-    pieces = _pieces(spline, places, first)
-    found = followed(reach, pieces, q_start, places)
+    coarse = _coarse_samples(spline)
+    _check_sizes(kinematics, spline, coarse, first)
+    samples = _pose_samples(spline, coarse, first)
+    pieces = _pieces(spline, samples, first)
+    joint_path = solve_joint_path(kinematics, pieces, q_start, samples)
     start = spline.rows(np.zeros(1, dtype=np.intp), np.zeros(1)).poses
-    poses = np.concatenate([start, found.poses])
-    length = _sum(np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1))
-    angle = _sum(angle_rows(poses[:-1, 3:], poses[1:, 3:]))
-    measures = measured(reach.arm, found.q)
-    leaving = leaving_rows(measures, length[1:], angle[1:], rests=rests)
-    _check(reach, pieces, found, np.where(leaving, np.inf, measures), waypoints, options)
-    return SplineWay(
+    poses = np.concatenate([start, joint_path.poses])
+    length = _cumulative(np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1))
+    angle = _cumulative(angle_rows(poses[:-1, 3:], poses[1:, 3:]))
+    measures = singularity_distance_rows(kinematics.arm, joint_path.q)
+    leaving = is_leaving_rows(measures, length[1:], angle[1:], rests=rests)
+    _check_path(
+        kinematics, pieces, joint_path, np.where(leaving, np.inf, measures), waypoints, options
+    )
+    return SplinePath(
         spline=spline,
         first=first,
         poses=poses,
-        q=np.concatenate([[q_start], found.q]),
-        piece=np.concatenate([[0], found.piece]),
-        u=np.concatenate([[0.0], found.t]),
+        q=np.concatenate([[q_start], joint_path.q]),
+        piece=np.concatenate([[0], joint_path.piece]),
+        u=np.concatenate([[0.0], joint_path.t]),
         length=length,
         angle=angle,
-        nearest=nearest_of(
-            reach.arm, found.q, measures, first + found.piece.astype(np.int32), found.t
+        tightest_margin=margins_by_segment(
+            kinematics.arm,
+            joint_path.q,
+            measures,
+            first + joint_path.piece.astype(np.int32),
+            joint_path.t,
         ),
     )
 
 
-def _check(
-    reach: Reach,
-    pieces: Sequence[Piece],
-    found: Followed,
+def _check_path(
+    kinematics: TcpKinematics,
+    pieces: Sequence[CurvePiece],
+    joint_path: JointPath,
     measures: Floats,
     waypoints: Sequence[Waypoint],
     options: PlanningOptions,
 ) -> None:
     """Raise the first reason why the arm cannot go along."""
     first = pieces[0].index
-    segments = first + found.piece.astype(np.int32)
-    refusal, index = found.refusal, found.refused_segment
-    near = too_near(pieces, found, measures, segments, found.t, options)
+    segments = first + joint_path.piece.astype(np.int32)
+    refusal, index = joint_path.refusal, joint_path.refused_segment
+    near = near_singularity_refusal(pieces, joint_path, measures, segments, joint_path.t, options)
     # The end of a range behind a singularity is where the joints swing to beside it.
     if near is not None and (
         refusal is None
@@ -164,13 +178,13 @@ def _check(
         if refusal is not None and first + k >= index:
             break
         if point.posture:
-            row = int(np.searchsorted(found.piece, k, side='right')) - 1
-            _check_posture(reach, pieces[k], point, found.q[row], options)
+            row = int(np.searchsorted(joint_path.piece, k, side='right')) - 1
+            _check_posture(kinematics, pieces[k], point, joint_path.q[row], options)
     if refusal is not None:
-        raise _said(refusal)
+        raise _with_spline_advice(refusal)
 
 
-def _said(refusal: GoalRefused) -> GoalRefused:
+def _with_spline_advice(refusal: GoalRefused) -> GoalRefused:
     """Return a refusal whose advice is good for splines, which have no JOINT segments."""
     if isinstance(refusal, NearSingularity | JointLimitExceeded):
         text = str(refusal)
@@ -181,14 +195,20 @@ def _said(refusal: GoalRefused) -> GoalRefused:
 
 
 def _check_posture(
-    reach: Reach, piece: Piece, point: Waypoint, q: Floats, options: PlanningOptions
+    kinematics: TcpKinematics,
+    piece: CurvePiece,
+    point: Waypoint,
+    q: Floats,
+    options: PlanningOptions,
 ) -> None:
     named = named_joints(point.posture, options.tf_prefix)
     a, b, c, d, e, f = q.tolist()
     arrives = (a, b, c, d, e, f)
-    chosen = reach.chosen(piece.pose(1.0), named, arrives, point_field(piece.index, 'pose'))
-    if clause := missed(arrives, chosen, named):
-        flips = reach.flips(arrives, chosen)
+    chosen = kinematics.solve_posture(
+        piece.pose(1.0), named, arrives, point_field(piece.index, 'pose')
+    )
+    if clause := describe_miss(arrives, chosen, named):
+        flips = kinematics.describe_flips(arrives, chosen)
         raise InvalidPosture(
             f'{point_field(piece.index, "posture")} cannot be reached along the spline: {clause}'
             f'{f", which takes {flips}" if flips else ""}; start in that configuration, or use '
@@ -196,24 +216,27 @@ def _check_posture(
         )
 
 
-def _looked_at(spline: ToolSpline) -> tuple[NDArray[np.intp], Floats]:
+def _coarse_samples(spline: ToolSpline) -> tuple[NDArray[np.intp], Floats]:
     """Return some places on all pieces: piece and time since it began."""
     n = len(spline.positions)
-    piece = np.repeat(np.arange(n), _LOOKS)
-    return piece, np.tile(np.linspace(0.0, 1.0, _LOOKS), n) * np.diff(spline.times)[piece]
+    piece = np.repeat(np.arange(n), _COARSE_SAMPLES)
+    return piece, np.tile(np.linspace(0.0, 1.0, _COARSE_SAMPLES), n) * np.diff(spline.times)[piece]
 
 
 def _check_sizes(
-    reach: Reach, spline: ToolSpline, looks: tuple[NDArray[np.intp], Floats], first: int
+    kinematics: TcpKinematics,
+    spline: ToolSpline,
+    coarse: tuple[NDArray[np.intp], Floats],
+    first: int,
 ) -> None:
     """Refuse pieces that turn either way round, or on which rates carry the tool far away."""
     n = len(spline.positions)
-    x, turn = spline.vectors(*looks)
-    x = x.reshape(n, _LOOKS, 3)
+    x, turn = spline.vectors(*coarse)
+    x = x.reshape(n, _COARSE_SAMPLES, 3)
     detour = np.linalg.norm(np.diff(x, axis=1), axis=2).sum(axis=1) - np.linalg.norm(
         x[:, -1] - x[:, 0], axis=1
     )
-    angles = np.linalg.norm(turn, axis=1).reshape(n, _LOOKS)
+    angles = np.linalg.norm(turn, axis=1).reshape(n, _COARSE_SAMPLES)
     k = int(np.argmax(angles[:, -1]))
     if angles[k, -1] > pi - HALF_TURN:
         raise InvalidGoal(
@@ -222,30 +245,32 @@ def _check_sizes(
             f'{degrees(angles[k, -1]):.2f} degrees on the way, and either way round is as short',
             'add a point in between',
         )
-    for sizes, most, what, unit in (
-        (detour, farthest_way(reach), 'a detour of', 'm'),
-        (angles.max(axis=1), _FARTHEST_TURN, 'a turn by up to', 'rad'),
+    for sizes, bound, what, unit in (
+        (detour, max_path_length(kinematics), 'a detour of', 'm'),
+        (angles.max(axis=1), _MAX_TURN, 'a turn by up to', 'rad'),
     ):
-        k = int(np.argmax(sizes > most))
-        if sizes[k] > most:
+        k = int(np.argmax(sizes > bound))
+        if sizes[k] > bound:
             raise InvalidGoal(
                 point_field(first + k),
                 f'and the point before it ask for {what} {sizes[k]:.3g} '
-                f'{unit} in between, by their twists and accelerations; more than {most:.3g} '
+                f'{unit} in between, by their twists and accelerations; more than {bound:.3g} '
                 f'{unit} make no sense',
                 'check units, directions, and the time in between',
             )
 
 
-def _places(spline: ToolSpline, looks: tuple[NDArray[np.intp], Floats], first: int) -> Places:
+def _pose_samples(
+    spline: ToolSpline, coarse: tuple[NDArray[np.intp], Floats], first: int
+) -> PoseSamples:
     n, h = len(spline.positions), np.diff(spline.times)
-    rows = spline.rows(*looks)
+    rows = spline.rows(*coarse)
 
     def largest(vectors: Floats) -> Floats:
-        most: Floats = np.linalg.norm(vectors, axis=1).reshape(n, _LOOKS).max(axis=1)
-        return most
+        bound: Floats = np.linalg.norm(vectors, axis=1).reshape(n, _COARSE_SAMPLES).max(axis=1)
+        return bound
 
-    steps = _FASTER * np.max(
+    steps = _SPEED_MARGIN * np.max(
         [
             h * largest(rows.twists[:, :3]) / STEP_LENGTH,
             h * largest(rows.twists[:, 3:]) / STEP_ANGLE,
@@ -253,42 +278,42 @@ def _places(spline: ToolSpline, looks: tuple[NDArray[np.intp], Floats], first: i
         ],
         axis=0,
     )
-    count = np.maximum(np.ceil(steps), np.minimum(LEAST_PLACES, np.ceil(1.25 * steps) + 1.0))
-    if count.sum() > MOST_PLACES:
+    count = np.maximum(np.ceil(steps), np.minimum(MIN_SAMPLES, np.ceil(1.25 * steps) + 1.0))
+    if count.sum() > MAX_SAMPLES:
         k = int(np.argmax(count))
         raise InvalidGoal(
             'trajectory.points',
             f'ask for a way so long, or so fast (most of all to points'
             f'[{first + k}]), that it would have to be looked at in {count.sum():.3g} places, '
-            f'more than {MOST_PLACES:,}',
+            f'more than {MAX_SAMPLES:,}',
             'check twists and accelerations, or split the goal',
         )
     count = count.astype(np.intp)
     piece = np.repeat(np.arange(n), count)
     number = np.arange(1, len(piece) + 1) - np.repeat(np.cumsum(count) - count, count)
     u = number / count[piece]
-    return Places(piece, u, spline.rows(piece, u * h[piece]).poses)
+    return PoseSamples(piece, u, spline.rows(piece, u * h[piece]).poses)
 
 
-def _pieces(spline: ToolSpline, places: Places, first: int) -> list[Piece]:
+def _pieces(spline: ToolSpline, samples: PoseSamples, first: int) -> list[CurvePiece]:
     """Return the pieces, with lengths by chords that begin at their first place."""
     n = len(spline.positions)
     starts = spline.rows(np.arange(n), np.zeros(n)).poses
-    begins = np.searchsorted(places.piece, np.arange(n))
-    before = np.concatenate([places.poses[:1], places.poses[:-1]])
+    begins = np.searchsorted(samples.piece, np.arange(n))
+    before = np.concatenate([samples.poses[:1], samples.poses[:-1]])
     before[begins] = starts
     lengths = np.bincount(
-        places.piece, np.linalg.norm(places.poses[:, :3] - before[:, :3], axis=1)
+        samples.piece, np.linalg.norm(samples.poses[:, :3] - before[:, :3], axis=1)
     )
-    angles = np.bincount(places.piece, angle_rows(before[:, 3:], places.poses[:, 3:]))
-    counts = np.bincount(places.piece)
+    angles = np.bincount(samples.piece, angle_rows(before[:, 3:], samples.poses[:, 3:]))
+    counts = np.bincount(samples.piece)
     return [
-        Piece(first + k, ToolCurve(spline, k, length, angle), 0.0, 1.0, count)
+        CurvePiece(first + k, ToolCurve(spline, k, length, angle), 0.0, 1.0, count)
         for k, (length, angle, count) in enumerate(
             zip(lengths.tolist(), angles.tolist(), counts.tolist(), strict=True)
         )
     ]
 
 
-def _sum(steps: Floats) -> Floats:
+def _cumulative(steps: Floats) -> Floats:
     return np.concatenate([[0.0], np.cumsum(steps)])

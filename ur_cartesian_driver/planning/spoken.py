@@ -23,12 +23,12 @@ from ur_cartesian_driver.motion.primitive import (
     Spline,
 )
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.validate import segment_field
+from ur_cartesian_driver.planning.request.validate import segment_field
 from ur_cartesian_driver.protocol.dialects import Dialect
 from ur_cartesian_driver.protocol.trajectory import motion_type, MotionType
 
 
-def spoken(
+def adapt_to_dialect(
     primitive: Primitive, point: int, joints: Joints, options: PlanningOptions
 ) -> tuple[Primitive, str]:
     """
@@ -69,7 +69,7 @@ def _check_calibration(primitive: Primitive, point: int, options: PlanningOption
         )
 
 
-def poses_only(options: PlanningOptions) -> str:
+def explain_poses_only(options: PlanningOptions) -> str:
     """Return why arcs cannot be sent as joint positions, as the end of "because ..."; '' = can."""
     if not options.calibration_known:
         return 'the calibration of the robot is not known'
@@ -78,9 +78,9 @@ def poses_only(options: PlanningOptions) -> str:
     return ''
 
 
-def spoken_radius(radius: float, point: int, dialect: Dialect, remarks: list[str]) -> float:
+def adapt_blend_radius(radius: float, point: int, dialect: Dialect, remarks: list[str]) -> float:
     """Return a blend radius that the wire carries [m]."""
-    whole = dialect.whole_radius(radius)
+    whole = dialect.round_down_radius(radius)
     if whole < radius - 1e-6:
         remarks.append(
             f'point {point}: blend of {1e3 * whole:g} mm instead of '

@@ -13,23 +13,27 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.corner import Corner
-from ur_cartesian_driver.planning.leg import Pace
-from ur_cartesian_driver.planning.lookahead import Followed
-from ur_cartesian_driver.planning.margins import measured, Nearest, nearest_of
-from ur_cartesian_driver.planning.pose_rows import Floats
-from ur_cartesian_driver.planning.samples import Ints, Piece, Samples
+from ur_cartesian_driver.planning.geometry.blend import Blend
+from ur_cartesian_driver.planning.geometry.pose_rows import Floats
+from ur_cartesian_driver.planning.geometry.samples import CurvePiece, Ints, PathSamples
+from ur_cartesian_driver.planning.moves.segment_geometry import JointSpeedBound
+from ur_cartesian_driver.planning.preflight.joint_path import JointPath
+from ur_cartesian_driver.planning.preflight.margins import (
+    margins_by_segment,
+    singularity_distance_rows,
+    TightestMargin,
+)
 
 # Places nearer than this are one, and say nothing about a speed.
-_NO_WAY = 1e-12
+_MIN_STEP = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
-class Surveyed:
+class SolvedPieces:
     """Pieces that the arm can go along, one after the other, and the places on them."""
 
-    pieces: Sequence[Piece]
-    found: Followed
+    pieces: Sequence[CurvePiece]
+    joint_path: JointPath
     #: (n,) and the fraction (n,) of it.
     segments: Ints
     fractions: Floats
@@ -39,64 +43,68 @@ class Surveyed:
     q_start: Joints
 
 
-class Survey:
+class PathMargins:
     """Collects places in order of time."""
 
     def __init__(self, arm: Arm) -> None:
         """Begin with none."""
         self._arm = arm
-        self._seen: list[Surveyed] = []
+        self._solved: list[SolvedPieces] = []
 
-    def measured(self, q: Floats) -> Floats:
+    def singularity_distance_rows(self, q: Floats) -> Floats:
         """Return how far configurations (n, 6) are from singularities (n, 3)."""
-        return measured(self._arm, q)
+        return singularity_distance_rows(self._arm, q)
 
-    def add(self, seen: Surveyed) -> None:
+    def add(self, solved: SolvedPieces) -> None:
         """Add what comes next."""
-        self._seen.append(seen)
+        self._solved.append(solved)
 
-    def samples(self) -> Samples:
+    def samples(self) -> PathSamples:
         """Return all places."""
-        return Samples(
-            segment=np.concatenate([seen.segments for seen in self._seen]),
-            fraction=np.concatenate([seen.fractions for seen in self._seen]),
-            q=np.concatenate([seen.found.q for seen in self._seen]),
-            poses=np.concatenate([seen.found.poses for seen in self._seen]),
+        return PathSamples(
+            segment=np.concatenate([solved.segments for solved in self._solved]),
+            fraction=np.concatenate([solved.fractions for solved in self._solved]),
+            q=np.concatenate([solved.joint_path.q for solved in self._solved]),
+            poses=np.concatenate([solved.joint_path.poses for solved in self._solved]),
         )
 
-    def nearest(self) -> dict[int, Nearest]:
+    def tightest_margin(self) -> dict[int, TightestMargin]:
         """Return what comes nearest to its bound, by segment."""
         samples = self.samples()
-        measures = np.concatenate([seen.measures for seen in self._seen])
-        return nearest_of(self._arm, samples.q, measures, samples.segment, samples.fraction)
+        measures = np.concatenate([solved.measures for solved in self._solved])
+        return margins_by_segment(
+            self._arm, samples.q, measures, samples.segment, samples.fraction
+        )
 
-    def paces(self) -> dict[int, Pace]:
+    def joint_speed_bounds(self) -> dict[int, JointSpeedBound]:
         """Return the time that the joints need for each whole segment, by segment."""
         limits = np.array(self._arm.model.max_joint_speed)
-        parts = [_paces(seen, limits) for seen in self._seen]
-        segment, time, joint, fraction, burden, quick = (
+        parts = [_speed_samples(solved, limits) for solved in self._solved]
+        segment, time, joint, fraction, joint_time, local_time = (
             np.concatenate(column) for column in zip(*parts, strict=True)
         )
         order = np.lexsort((time, segment))
         bounds = np.flatnonzero(np.diff(segment[order], append=segment[order[-1]] + 1))
         last = order[bounds]
-        quickest = np.minimum.reduceat(quick[order], np.concatenate([[0], bounds[:-1] + 1]))
+        shortest_time = np.minimum.reduceat(
+            local_time[order], np.concatenate([[0], bounds[:-1] + 1])
+        )
         columns = (
             time[last],
             joint[last],
             fraction[last],
-            np.minimum(quickest, time[last]),
-            np.bincount(segment, burden)[segment[last]],
+            np.minimum(shortest_time, time[last]),
+            np.bincount(segment, joint_time)[segment[last]],
         )
         return {
-            index: Pace(*row)
+            index: JointSpeedBound(*row)
             for index, *row in zip(
                 segment[last].tolist(), *(column.tolist() for column in columns), strict=True
             )
         }
 
 
-class _Paces(NamedTuple):
+class _SpeedSamples(NamedTuple):
     """What places say of their segments, each (n,); those in corners do so of two."""
 
     segment: Ints
@@ -105,40 +113,40 @@ class _Paces(NamedTuple):
     joint: NDArray[np.intp]
     fraction: Floats
     #: The time from the place before [s]; half of it where that counts for two segments.
-    burden: Floats
+    joint_time: Floats
     #: The time at the pace there, inf in corners, where joints may turn round.
-    quick: Floats
+    local_time: Floats
 
 
-def _paces(seen: Surveyed, limits: Floats) -> _Paces:
+def _speed_samples(solved: SolvedPieces, limits: Floats) -> _SpeedSamples:
     """Return how fast a segment may go at each place."""
-    found = seen.found
-    begin = np.array([piece.begin for piece in seen.pieces])[found.piece]
-    before = np.concatenate([[0.0], found.t[:-1]])
-    is_first = np.diff(found.piece, prepend=-1) != 0
-    way = found.t - np.where(is_first, begin, before)
-    change = np.abs(np.diff(found.q, axis=0, prepend=np.array([seen.q_start])))
-    burdens = change / limits
-    joint = np.argmax(burdens, axis=1)
-    burden = np.take_along_axis(burdens, joint[:, None], axis=1)[:, 0]
-    pace = np.where(way > _NO_WAY, burden / np.maximum(way, _NO_WAY), 0.0)
-    quick = np.where(way > _NO_WAY, pace, np.inf)
-    index = np.array([p.index for p in seen.pieces], dtype=np.int32)[found.piece]
-    leaving, joining = (rate[found.piece] for rate in _rates(seen.pieces))
-    rounds = np.flatnonzero(joining > 0.0)
-    burden[rounds] *= 0.5
-    quick[rounds] = np.inf
-    return _Paces(
-        np.concatenate([index, index[rounds] + 1]),
-        np.concatenate([pace / leaving, pace[rounds] / joining[rounds]]),
-        np.concatenate([joint, joint[rounds]]),
-        np.concatenate([seen.fractions, seen.fractions[rounds]]),
-        np.concatenate([burden, burden[rounds]]),
-        np.concatenate([quick, quick[rounds]]),
+    joint_path = solved.joint_path
+    begin = np.array([piece.begin for piece in solved.pieces])[joint_path.piece]
+    before = np.concatenate([[0.0], joint_path.t[:-1]])
+    is_first = np.diff(joint_path.piece, prepend=-1) != 0
+    step = joint_path.t - np.where(is_first, begin, before)
+    change = np.abs(np.diff(joint_path.q, axis=0, prepend=np.array([solved.q_start])))
+    joint_times = change / limits
+    joint = np.argmax(joint_times, axis=1)
+    joint_time = np.take_along_axis(joint_times, joint[:, None], axis=1)[:, 0]
+    rate = np.where(step > _MIN_STEP, joint_time / np.maximum(step, _MIN_STEP), 0.0)
+    local_time = np.where(step > _MIN_STEP, rate, np.inf)
+    index = np.array([p.index for p in solved.pieces], dtype=np.int32)[joint_path.piece]
+    leaving, joining = (rate[joint_path.piece] for rate in _blend_rates(solved.pieces))
+    on_blend = np.flatnonzero(joining > 0.0)
+    joint_time[on_blend] *= 0.5
+    local_time[on_blend] = np.inf
+    return _SpeedSamples(
+        np.concatenate([index, index[on_blend] + 1]),
+        np.concatenate([rate / leaving, rate[on_blend] / joining[on_blend]]),
+        np.concatenate([joint, joint[on_blend]]),
+        np.concatenate([solved.fractions, solved.fractions[on_blend]]),
+        np.concatenate([joint_time, joint_time[on_blend]]),
+        np.concatenate([local_time, local_time[on_blend]]),
     )
 
 
-def _rates(pieces: Sequence[Piece]) -> tuple[Floats, Floats]:
+def _blend_rates(pieces: Sequence[CurvePiece]) -> tuple[Floats, Floats]:
     """
     Return how fast the paths' ``u`` goes per parameter of each piece, where it leaves and joins.
 
@@ -147,11 +155,11 @@ def _rates(pieces: Sequence[Piece]) -> tuple[Floats, Floats]:
     """
     leaving, joining = np.ones(len(pieces)), np.zeros(len(pieces))
     for k, piece in enumerate(pieces):
-        corner = piece.curve
-        if isinstance(corner, Corner):
-            if corner.fillet:
-                leaving[k] = corner.length / corner.first.length
-                joining[k] = corner.length / corner.second.length
+        blend = piece.curve
+        if isinstance(blend, Blend):
+            if blend.fillet:
+                leaving[k] = blend.length / blend.first.length
+                joining[k] = blend.length / blend.second.length
             else:
-                leaving[k], joining[k] = 2.0 * (1.0 - corner.leave), 2.0 * corner.join
+                leaving[k], joining[k] = 2.0 * (1.0 - blend.leave), 2.0 * blend.join
     return leaving, joining

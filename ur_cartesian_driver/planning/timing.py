@@ -5,7 +5,7 @@ How fast each segment goes: from the times of the goal, from its speeds, or from
 
 ``movel`` and ``movej`` take a time on the wire. ``movec`` and ``movep`` do not: their speed is
 derived so that the time is met. All of it is about the quantity that leads a segment, see
-:mod:`~.limits`.
+:mod:`~.speed_limits`.
 """
 
 from __future__ import annotations
@@ -16,88 +16,94 @@ from math import ceil, hypot, inf, sqrt
 from ur_cartesian_driver.kinematics.robots import RobotModel
 from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
 from ur_cartesian_driver.motion.goal import SegmentType
-from ur_cartesian_driver.planning.leg import Leg, Timing
-from ur_cartesian_driver.planning.limits import (
-    is_blended,
-    Limits,
-    limits_of,
-    measure,
-    moves,
-    speed_unit,
-)
-from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.profile import (
-    cruise_for,
-    least_time,
-    peak_of,
-    Profile,
-    timed,
+from ur_cartesian_driver.planning.geometry.speed_profile import (
+    cruise_speed_for,
+    min_duration,
+    peak_speed_and_acceleration,
+    profile_for_time,
+    SpeedProfile,
     trapezoid,
 )
-from ur_cartesian_driver.planning.validate import is_optimized, point_field
+from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
+from ur_cartesian_driver.planning.moves.speed_limits import (
+    is_blended,
+    leading_quantity,
+    speed_limits,
+    speed_unit,
+    SpeedLimits,
+    translates,
+)
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.validate import is_optimized, point_field
 
 #: The lowest speed that the wire carries well enough: it counts in millionths.
-LEAST_SPEED = 1e-5
+MIN_SPEED = 1e-5
 #: What an OPTIMIZED move is taken to accelerate with at fraction 1 [rad/s^2]; the robot's own
 #: limits are not published. It only serves to say about how long such a move takes.
 _OPTIMIZED_JOINT_ACCELERATION = 40.0
-_TIME_SAYS_SO = 'its time_from_start says so'
+_FROM_TIME = 'its time_from_start says so'
 #: Motions whose messages have a time.
-_HAVE_TIMES = (SegmentType.LINEAR, SegmentType.JOINT)
+_TIMED_ON_WIRE = (SegmentType.LINEAR, SegmentType.JOINT)
 #: Rounds in which speeds and the times in corners are made to agree.
-_ROUNDS = 12
+_MAX_ITERATIONS = 12
 
 
-def schedule(legs: Sequence[Leg], options: PlanningOptions, model: RobotModel) -> list[Timing]:
+def schedule(
+    geometries: Sequence[SegmentGeometry], options: PlanningOptions, model: RobotModel
+) -> list[SegmentTiming]:
     """
     Return the timing of every leg.
 
     :raises TooFast: a time needs more speed or acceleration than the limits allow.
     :raises InvalidGoal: a speed is too low for the wire.
     """
-    measures = [measure(leg) for leg in legs]
+    measures = [leading_quantity(geometry) for geometry in geometries]
     timings = [
-        _first_guess(leg, length, unit, options, model)
-        for leg, (length, unit) in zip(legs, measures, strict=True)
+        _first_guess(geometry, length, unit, options, model)
+        for geometry, (length, unit) in zip(geometries, measures, strict=True)
     ]
     derived = [
         k
-        for k, leg in enumerate(legs)
-        if leg.time is not None and not _takes_time(leg.kind, options)
+        for k, geometry in enumerate(geometries)
+        if geometry.time is not None and not _takes_time(geometry.kind, options)
     ]
     # The time in a corner depends on the speeds on both of its sides, so go round a few times.
-    for _ in range(_ROUNDS if any(is_blended(legs[k]) for k in derived) else 1):
+    for _ in range(_MAX_ITERATIONS if any(is_blended(geometries[k]) for k in derived) else 1):
         changed = 0.0
         for k in derived:
-            new = _for_time(legs[k], measures[k], _corner_time(legs, timings, k), options, model)
+            new = _by_speed_for_time(
+                geometries[k], measures[k], _blend_time(geometries, timings, k), options, model
+            )
             changed = max(changed, abs(new.velocity / timings[k].velocity - 1.0))
             timings[k] = new
         if changed < 1e-6:
             break
-    for leg, timing in zip(legs, timings, strict=True):
-        _check_wire(leg, timing, options)
-    for k in range(1, len(legs)):
-        if legs[k].before is not None and legs[k].time is None:
-            timings[k] = _from_corner(legs, timings, k)
-    corners = [
-        corner_duration(legs[k], timings[k], legs[k + 1], timings[k + 1])
-        if legs[k].after is not None
+    for geometry, timing in zip(geometries, timings, strict=True):
+        _check_wire(geometry, timing, options)
+    for k in range(1, len(geometries)):
+        if geometries[k].before is not None and geometries[k].time is None:
+            timings[k] = _after_blend(geometries, timings, k)
+    blend_times = [
+        blend_duration(geometries[k], timings[k], geometries[k + 1], timings[k + 1])
+        if geometries[k].after is not None
         else 0.0
-        for k in range(len(legs))
+        for k in range(len(geometries))
     ]
     return [
-        _whole(leg, timing, before, after)
-        for leg, timing, before, after in zip(
-            legs, timings, [0.0, *corners[:-1]], corners, strict=True
+        _with_duration(geometry, timing, before, after)
+        for geometry, timing, before, after in zip(
+            geometries, timings, [0.0, *blend_times[:-1]], blend_times, strict=True
         )
     ]
 
 
-def _check_wire(leg: Leg, timing: Timing, options: PlanningOptions) -> None:
+def _check_wire(
+    geometry: SegmentGeometry, timing: SegmentTiming, options: PlanningOptions
+) -> None:
     """Refuse what would be zero on the wire, or next to it, and times that it does not carry."""
     if timing.wire_time > options.max_segment_time:
         raise InvalidGoal(
-            point_field(leg.index),
+            point_field(geometry.index),
             f'would be approached in {timing.wire_time:.4g} s, more than '
             f'max_segment_time = {options.max_segment_time:.0f} s',
             'raise velocity or acceleration',
@@ -106,16 +112,18 @@ def _check_wire(leg: Leg, timing: Timing, options: PlanningOptions) -> None:
         return
     unit = speed_unit(timing.unit)
     for value, name in ((timing.velocity, unit), (timing.acceleration, f'{unit}^2')):
-        if value < LEAST_SPEED:
+        if value < MIN_SPEED:
             raise InvalidGoal(
-                point_field(leg.index),
+                point_field(geometry.index),
                 f'would be approached with {value:.2g} {name}, less than '
-                f'the {LEAST_SPEED:g} that the robot can be told',
-                'give it less time' if leg.time else 'raise velocity or acceleration',
+                f'the {MIN_SPEED:g} that the robot can be told',
+                'give it less time' if geometry.time else 'raise velocity or acceleration',
             )
 
 
-def _from_corner(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> Timing:
+def _after_blend(
+    geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming], k: int
+) -> SegmentTiming:
     """
     Return the timing of a leg that comes out of a corner no faster than both legs accelerate.
 
@@ -123,14 +131,14 @@ def _from_corner(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> Timi
     r2 s^2, so s' may grow to sqrt(a / 2r) of either.
     """
     before, old = timings[k - 1].profile, timings[k].profile
-    r1 = (1.0 - legs[k - 1].u_after) * before.length / legs[k - 1].share
-    r2 = legs[k].u_before * old.length / legs[k].share
-    pace = max(
+    r1 = (1.0 - geometries[k - 1].u_after) * before.length / geometries[k - 1].share
+    r2 = geometries[k].u_before * old.length / geometries[k].share
+    blend_rate = max(
         before.leave / (2.0 * r1), sqrt(min(before.acceleration / r1, old.acceleration / r2) / 2.0)
     )
     enter = min(
         timings[k].velocity,
-        2.0 * r2 * pace,
+        2.0 * r2 * blend_rate,
         sqrt(2.0 * old.acceleration * old.length + old.leave**2),
     )
     profile = trapezoid(
@@ -140,33 +148,37 @@ def _from_corner(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> Timi
         enter,
         0.5 * old.leave**2 / old.acceleration,
     )
-    return _with(timings[k], profile)
+    return _with_profile(timings[k], profile)
 
 
-def _whole(leg: Leg, timing: Timing, before: float, after: float) -> Timing:
+def _with_duration(
+    geometry: SegmentGeometry, timing: SegmentTiming, before: float, after: float
+) -> SegmentTiming:
     """
     Return the timing with its expected duration, half of each corner included.
 
     :param before: time in the corners before and after it [s].
     """
-    in_corners, profile = 0.5 * (before + after), timing.profile
-    if timing.wire_time > 0.0 and in_corners > 0.0:
+    time_in_blends, profile = 0.5 * (before + after), timing.profile
+    if timing.wire_time > 0.0 and time_in_blends > 0.0:
         # What is sent as a time is kept in sum: corners are shorter, so what is left has longer.
-        left = max(timing.wire_time - in_corners, 0.05 * timing.wire_time)
-        profile = timed(profile.length, left, *_stands(leg))
-    return _with(timing, profile, profile.duration + in_corners, after)
+        left = max(timing.wire_time - time_in_blends, 0.05 * timing.wire_time)
+        profile = profile_for_time(profile.length, left, *_rests_at_ends(geometry))
+    return _with_profile(timing, profile, profile.duration + time_in_blends, after)
 
 
-def _with(timing: Timing, profile: Profile, duration: float = 0.0, corner: float = 0.0) -> Timing:
+def _with_profile(
+    timing: SegmentTiming, profile: SpeedProfile, duration: float = 0.0, blend_time: float = 0.0
+) -> SegmentTiming:
     """Return the timing with another profile; ``replace`` takes twice as long, for each leg."""
-    return Timing(
+    return SegmentTiming(
         velocity=timing.velocity,
         acceleration=timing.acceleration,
         wire_time=timing.wire_time,
         unit=timing.unit,
         profile=profile,
         duration=duration,
-        corner=corner,
+        blend_time=blend_time,
         reason=timing.reason,
         remark=timing.remark,
     )
@@ -179,64 +191,76 @@ def _takes_time(kind: SegmentType, options: PlanningOptions) -> bool:
     Never in the dialect that counts in milliseconds: a robot program that counts in microseconds
     would run a segment a thousand times too fast, and nobody can ask a program how it counts.
     """
-    return kind in _HAVE_TIMES and not options.dialect.is_coarse
+    return kind in _TIMED_ON_WIRE and not options.dialect.is_coarse
 
 
-def _own_acceleration(leg: Leg) -> float:
+def _own_acceleration(geometry: SegmentGeometry) -> float:
     """Return the acceleration of a timed leg that the goal may choose, 0 = it has none."""
-    return 0.0 if leg.kind in _HAVE_TIMES else leg.segment.acceleration
+    return 0.0 if geometry.kind in _TIMED_ON_WIRE else geometry.segment.acceleration
 
 
-def _stands(leg: Leg) -> tuple[bool, bool]:
-    return leg.before is None, leg.after is None
+def _rests_at_ends(geometry: SegmentGeometry) -> tuple[bool, bool]:
+    return geometry.before is None, geometry.after is None
 
 
-def _tail(leg: Leg, length: float) -> float:
+def _stop_distance(geometry: SegmentGeometry, length: float) -> float:
     """Return how far behind its end between corners the robot plans to stop, see trapezoid."""
-    if leg.after is not None and leg.kind == SegmentType.PROCESS:
+    if geometry.after is not None and geometry.kind == SegmentType.PROCESS:
         return inf
-    return length * (1.0 - leg.u_after)
+    return length * (1.0 - geometry.u_after)
 
 
 def _first_guess(
-    leg: Leg, length: float, unit: str, options: PlanningOptions, model: RobotModel
-) -> Timing:
-    if leg.time is None:
-        return _by_speed(leg, length, unit, options, model)
-    if _takes_time(leg.kind, options):
-        return _by_time(leg, length, unit, options, model)
-    return _for_time(leg, (length, unit), 0.0, options, model, strict=False)
+    geometry: SegmentGeometry,
+    length: float,
+    unit: str,
+    options: PlanningOptions,
+    model: RobotModel,
+) -> SegmentTiming:
+    if geometry.time is None:
+        return _by_speed(geometry, length, unit, options, model)
+    if _takes_time(geometry.kind, options):
+        return _by_time(geometry, length, unit, options, model)
+    return _by_speed_for_time(geometry, (length, unit), 0.0, options, model, strict=False)
 
 
 # -- speeds ---------------------------------------------------------------------------------------
 
 
 def _by_speed(
-    leg: Leg, length: float, unit: str, options: PlanningOptions, model: RobotModel
-) -> Timing:
+    geometry: SegmentGeometry,
+    length: float,
+    unit: str,
+    options: PlanningOptions,
+    model: RobotModel,
+) -> SegmentTiming:
     """Return the timing of a leg without a time."""
-    wanted, reason = _wanted_speed(leg, unit, options)
-    acceleration = leg.segment.acceleration or _default_acceleration(leg, unit, options)
-    limits = limits_of(leg, length, options, model)
-    if not is_optimized(leg.kind):
+    wanted, reason = _wanted_speed(geometry, unit, options)
+    acceleration = geometry.segment.acceleration or _default_acceleration(geometry, unit, options)
+    limits = speed_limits(geometry, length, options, model)
+    if not is_optimized(geometry.kind):
         acceleration = min(acceleration, limits.acceleration)
-    turns_on_the_way = leg.kind == SegmentType.LINEAR and unit == 'rad' and moves(leg)
-    if turns_on_the_way:
-        return _turning_line(leg, length, wanted, acceleration, reason, options)
+    turn_leads = geometry.kind == SegmentType.LINEAR and unit == 'rad' and translates(geometry)
+    if turn_leads:
+        return _turning_line(geometry, length, wanted, acceleration, reason, options)
     velocity = min(wanted, limits.speed)
     remark = ''
     if velocity < wanted:
         remark = (
-            f'point {leg.index}: slowed from {wanted:.3g} to {velocity:.3g} '
+            f'point {geometry.index}: slowed from {wanted:.3g} to {velocity:.3g} '
             f'{speed_unit(unit)} by {limits.name}'
         )
     rate = acceleration
-    if is_optimized(leg.kind):
+    if is_optimized(geometry.kind):
         rate *= _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed)
     profile = trapezoid(
-        length * leg.share, velocity, rate, inf if leg.before else 0.0, _tail(leg, length)
+        length * geometry.share,
+        velocity,
+        rate,
+        inf if geometry.before else 0.0,
+        _stop_distance(geometry, length),
     )
-    return Timing(
+    return SegmentTiming(
         velocity=velocity,
         acceleration=acceleration,
         wire_time=0.0,
@@ -248,21 +272,23 @@ def _by_speed(
     )
 
 
-def _wanted_speed(leg: Leg, unit: str, options: PlanningOptions) -> tuple[float, str]:
+def _wanted_speed(
+    geometry: SegmentGeometry, unit: str, options: PlanningOptions
+) -> tuple[float, str]:
     """Return the speed that the goal asks for, and the words for where it comes from."""
-    if leg.segment.velocity > 0.0:
-        return leg.segment.velocity, 'its velocity says so'
-    if is_optimized(leg.kind):
+    if geometry.segment.velocity > 0.0:
+        return geometry.segment.velocity, 'its velocity says so'
+    if is_optimized(geometry.kind):
         return options.optimized_velocity, 'that is the default speed'
-    if leg.kind == SegmentType.JOINT:
+    if geometry.kind == SegmentType.JOINT:
         return options.joint_velocity, 'that is the default speed'
-    twist = leg.waypoint.twist
-    speed = hypot(*twist[:3]) if moves(leg) else hypot(*twist[3:])
+    twist = geometry.waypoint.twist
+    speed = hypot(*twist[:3]) if translates(geometry) else hypot(*twist[3:])
     if speed > 0.0:
         return speed, 'its twist says so'
-    if not moves(leg):
+    if not translates(geometry):
         return options.angular_velocity, 'that is the default speed'
-    if unit == 'rad' and leg.kind != SegmentType.LINEAR:
+    if unit == 'rad' and geometry.kind != SegmentType.LINEAR:
         # One number for both: as rad/s the turn may have more, but never more than the tool may.
         fastest = options.max_tool_speed or options.angular_velocity
         return (
@@ -272,45 +298,47 @@ def _wanted_speed(leg: Leg, unit: str, options: PlanningOptions) -> tuple[float,
     return options.linear_velocity, 'that is the default speed'
 
 
-def _default_acceleration(leg: Leg, unit: str, options: PlanningOptions) -> float:
-    if is_optimized(leg.kind):
+def _default_acceleration(geometry: SegmentGeometry, unit: str, options: PlanningOptions) -> float:
+    if is_optimized(geometry.kind):
         return options.optimized_acceleration
-    if leg.kind == SegmentType.JOINT:
+    if geometry.kind == SegmentType.JOINT:
         return options.joint_acceleration
-    return options.linear_acceleration if moves(leg) else options.angular_acceleration
+    return options.linear_acceleration if translates(geometry) else options.angular_acceleration
 
 
 def _turning_line(
-    leg: Leg,
+    geometry: SegmentGeometry,
     angle: float,
     velocity: float,
     acceleration: float,
     reason: str,
     options: PlanningOptions,
-) -> Timing:
+) -> SegmentTiming:
     """
     Return the timing of a line on which the turn leads.
 
-    The robot's one number would turn the tool as slowly as it moves, so a time is sent in which
+    The robot's one number would turn the tool as slowly as it moves: a time is sent in which
     the tool keeps its speed [m/s] and turns no faster than the default.
     """
     remark = ''
     if 0.0 < options.max_tool_speed < velocity:
         remark = (
-            f'point {leg.index}: slowed from {velocity:.3g} to {options.max_tool_speed:.3g} '
+            f'point {geometry.index}: slowed from {velocity:.3g} to {options.max_tool_speed:.3g} '
             'm/s by max_tool_speed'
         )
         velocity = options.max_tool_speed
     time = max(
-        least_time(leg.path.length, velocity, acceleration),
-        least_time(angle, options.angular_velocity, options.angular_acceleration),
+        min_duration(geometry.path.length, velocity, acceleration),
+        min_duration(angle, options.angular_velocity, options.angular_acceleration),
     )
-    profile = timed(angle * leg.share, time * leg.share, *_stands(leg))
+    profile = profile_for_time(
+        angle * geometry.share, time * geometry.share, *_rests_at_ends(geometry)
+    )
     wire_time = time
-    if not _takes_time(leg.kind, options):
+    if not _takes_time(geometry.kind, options):
         velocity, wire_time = profile.cruise, 0.0
-        _, acceleration = peak_of(angle, time)
-    return Timing(
+        _, acceleration = peak_speed_and_acceleration(angle, time)
+    return SegmentTiming(
         velocity=velocity,
         acceleration=acceleration,
         wire_time=wire_time,
@@ -326,114 +354,131 @@ def _turning_line(
 
 
 def _by_time(
-    leg: Leg, length: float, unit: str, options: PlanningOptions, model: RobotModel
-) -> Timing:
+    geometry: SegmentGeometry,
+    length: float,
+    unit: str,
+    options: PlanningOptions,
+    model: RobotModel,
+) -> SegmentTiming:
     """Return the timing of a leg for which the wire carries the time."""
-    assert leg.time is not None
-    limits = limits_of(leg, length, options, model)
-    least = least_time(length, limits.speed, limits.acceleration)
-    time, remark = leg.time, ''
-    if time < least * (1.0 - 1e-9):
-        time, remark = _slowed(leg, length, unit, least, limits, options)
-    profile = timed(length * leg.share, time * leg.share, *_stands(leg))
+    assert geometry.time is not None
+    limits = speed_limits(geometry, length, options, model)
+    min_time = min_duration(length, limits.speed, limits.acceleration)
+    time, remark = geometry.time, ''
+    if time < min_time * (1.0 - 1e-9):
+        time, remark = _slow_or_refuse(geometry, length, unit, min_time, limits, options)
+    profile = profile_for_time(
+        length * geometry.share, time * geometry.share, *_rests_at_ends(geometry)
+    )
     # The robot ignores speed and acceleration when it has a time; they say what it will need.
-    velocity, acceleration = peak_of(length, time)
-    return Timing(
+    velocity, acceleration = peak_speed_and_acceleration(length, time)
+    return SegmentTiming(
         velocity=velocity,
         acceleration=acceleration,
         wire_time=time,
         unit=unit,
         profile=profile,
         duration=time,
-        reason=_TIME_SAYS_SO,
+        reason=_FROM_TIME,
         remark=remark,
     )
 
 
-def _for_time(
-    leg: Leg,
+def _by_speed_for_time(
+    geometry: SegmentGeometry,
     measured: tuple[float, str],
-    in_corners: float,
+    time_in_blends: float,
     options: PlanningOptions,
     model: RobotModel,
     strict: bool = True,
-) -> Timing:
+) -> SegmentTiming:
     """
     Return the timing of a leg that has to meet a time by its speed.
 
     :param in_corners: the part of the time that passes in the corners at its ends [s].
     :param strict: whether a time that is too short is refused (not in a first guess).
     """
-    assert leg.time is not None
+    assert geometry.time is not None
     length, unit = measured
-    limits = limits_of(leg, length, options, model)
-    way, tail = length * leg.share, _tail(leg, length)
-    bound = _bound(leg, limits)
-    time, remark = leg.time, ''
-    least = in_corners + _least_by_speed(leg, way, limits.speed, bound)
-    if strict and time < least * (1.0 - 1e-9):
-        time, remark = _slowed(leg, length, unit, least, limits, options)
-    between = max(time - in_corners, 0.05 * time)
-    acceleration = _own_acceleration(leg) or max(
-        _default_acceleration(leg, unit, options),
+    limits = speed_limits(geometry, length, options, model)
+    distance, stop_distance = length * geometry.share, _stop_distance(geometry, length)
+    bound = _max_acceleration(geometry, limits)
+    time, remark = geometry.time, ''
+    min_time = time_in_blends + _min_time_by_speed(geometry, distance, limits.speed, bound)
+    if strict and time < min_time * (1.0 - 1e-9):
+        time, remark = _slow_or_refuse(geometry, length, unit, min_time, limits, options)
+    between = max(time - time_in_blends, 0.05 * time)
+    acceleration = _own_acceleration(geometry) or max(
+        _default_acceleration(geometry, unit, options),
         # A third each of speeding up, cruising and braking; and no braking before a blend.
-        min(bound, 4.5 * way / between**2),
-        min(bound, (way / between) ** 2 / tail if 0.0 < tail < inf else 0.0),
+        min(bound, 4.5 * distance / between**2),
+        min(
+            bound, (distance / between) ** 2 / stop_distance if 0.0 < stop_distance < inf else 0.0
+        ),
     )
-    velocity = cruise_for(way, between, acceleration, sum(_stands(leg)))
+    velocity = cruise_speed_for(distance, between, acceleration, sum(_rests_at_ends(geometry)))
     if velocity is None:  # only before the corners are known, or within rounding
-        velocity = 2.0 * way / between
-    profile = trapezoid(way, velocity, acceleration, inf if leg.before else 0.0, tail)
-    return Timing(
+        velocity = 2.0 * distance / between
+    profile = trapezoid(
+        distance, velocity, acceleration, inf if geometry.before else 0.0, stop_distance
+    )
+    return SegmentTiming(
         velocity=velocity,
         acceleration=acceleration,
         wire_time=0.0,
         unit=unit,
         profile=profile,
         duration=time,
-        reason=_TIME_SAYS_SO,
+        reason=_FROM_TIME,
         remark=remark,
     )
 
 
-def _slowed(
-    leg: Leg, length: float, unit: str, least: float, limits: Limits, options: PlanningOptions
+def _slow_or_refuse(
+    geometry: SegmentGeometry,
+    length: float,
+    unit: str,
+    min_time: float,
+    limits: SpeedLimits,
+    options: PlanningOptions,
 ) -> tuple[float, str]:
     """Return the time that the limits allow and the remark, or refuse."""
-    assert leg.time is not None
-    if least > options.max_segment_time:
+    assert geometry.time is not None
+    if min_time > options.max_segment_time:
         raise TooFast(
-            point_field(leg.index, 'time_from_start'),
-            f'gives the segment {leg.time:.3f} s, but because of {limits.name} it takes '
-            f'{least:.0f} s, more than max_segment_time = {options.max_segment_time:.0f} s',
+            point_field(geometry.index, 'time_from_start'),
+            f'gives the segment {geometry.time:.3f} s, but because of {limits.name} it takes '
+            f'{min_time:.0f} s, more than max_segment_time = {options.max_segment_time:.0f} s',
             'go around the place where it has to be slow, or use a JOINT segment',
         )
     if options.on_too_fast == 'slow':
-        return least, (
-            f'point {leg.index}: takes {least:.3f} s instead of {leg.time:.3f} s, '
+        return min_time, (
+            f'point {geometry.index}: takes {min_time:.3f} s instead of {geometry.time:.3f} s, '
             f'because of {limits.name}'
         )
-    speed, acceleration = peak_of(length, leg.time)
+    speed, acceleration = peak_speed_and_acceleration(length, geometry.time)
     raise TooFast(
-        point_field(leg.index, 'time_from_start'),
-        f'gives the segment {leg.time:.3f} s for {length:.3f} {unit}, which needs up to '
+        point_field(geometry.index, 'time_from_start'),
+        f'gives the segment {geometry.time:.3f} s for {length:.3f} {unit}, which needs up to '
         f'{speed:.3f} {speed_unit(unit)} and {acceleration:.3f} {speed_unit(unit)}^2; '
         f'allowed are {limits.speed:.3f} {speed_unit(unit)} ({limits.name}) and '
-        f'{_bound(leg, limits):.3f} {speed_unit(unit)}^2',
-        f'give it at least {ceil(1e3 * least) / 1e3:.3f} s, or set on_too_fast to slow',
+        f'{_max_acceleration(geometry, limits):.3f} {speed_unit(unit)}^2',
+        f'give it at least {ceil(1e3 * min_time) / 1e3:.3f} s, or set on_too_fast to slow',
     )
 
 
-def _least_by_speed(leg: Leg, way: float, speed: float, acceleration: float) -> float:
+def _min_time_by_speed(
+    geometry: SegmentGeometry, distance: float, speed: float, acceleration: float
+) -> float:
     """Return the shortest time between the corners of a leg that is sent as a speed."""
-    ramps = sum(_stands(leg))
-    peak = min(speed, sqrt(2.0 * acceleration * way / ramps)) if ramps else speed
-    return way / peak + 0.5 * ramps * peak / acceleration
+    ramps = sum(_rests_at_ends(geometry))
+    peak = min(speed, sqrt(2.0 * acceleration * distance / ramps)) if ramps else speed
+    return distance / peak + 0.5 * ramps * peak / acceleration
 
 
-def _bound(leg: Leg, limits: Limits) -> float:
+def _max_acceleration(geometry: SegmentGeometry, limits: SpeedLimits) -> float:
     """Return the largest acceleration that a time may lead to."""
-    if own := _own_acceleration(leg):
+    if own := _own_acceleration(geometry):
         return min(own, limits.acceleration)
     return limits.acceleration
 
@@ -441,17 +486,24 @@ def _bound(leg: Leg, limits: Limits) -> float:
 # -- corners --------------------------------------------------------------------------------------
 
 
-def _corner_time(legs: Sequence[Leg], timings: Sequence[Timing], k: int) -> float:
+def _blend_time(
+    geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming], k: int
+) -> float:
     """Return the time that a leg spends in its halves of the corners at its ends [s]."""
     time = 0.0
-    if legs[k].before is not None:
-        time += corner_duration(legs[k - 1], timings[k - 1], legs[k], timings[k]) / 2.0
-    if legs[k].after is not None:
-        time += corner_duration(legs[k], timings[k], legs[k + 1], timings[k + 1]) / 2.0
+    if geometries[k].before is not None:
+        time += blend_duration(geometries[k - 1], timings[k - 1], geometries[k], timings[k]) / 2.0
+    if geometries[k].after is not None:
+        time += blend_duration(geometries[k], timings[k], geometries[k + 1], timings[k + 1]) / 2.0
     return time
 
 
-def corner_duration(first: Leg, timing: Timing, second: Leg, next_timing: Timing) -> float:
+def blend_duration(
+    first: SegmentGeometry,
+    timing: SegmentTiming,
+    second: SegmentGeometry,
+    next_timing: SegmentTiming,
+) -> float:
     """Return the time in the corner between two legs [s]; the tool's speed changes evenly."""
     assert first.after is not None
     speeds = (

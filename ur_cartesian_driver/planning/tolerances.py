@@ -21,20 +21,22 @@ _QUANTITIES = (
 )
 
 
-def tolerances_of(goal: Goal) -> tuple[tuple[str, Tolerance], tuple[str, Tolerance]]:
+def named_tolerances(goal: Goal) -> tuple[tuple[str, Tolerance], tuple[str, Tolerance]]:
     """Return both tolerances of a goal with their names."""
     return ('path_tolerance', goal.path_tolerance), ('goal_tolerance', goal.goal_tolerance)
 
 
-def with_default_tolerances(goal: Goal, options: PlanningOptions) -> Goal:
+def apply_default_tolerances(goal: Goal, options: PlanningOptions) -> Goal:
     """Return the goal with the parameters in place of zeros; what is still zero has no limit."""
-    path, end = (_filled(tolerance, name, options) for name, tolerance in tolerances_of(goal))
+    path, end = (
+        _with_defaults(tolerance, name, options) for name, tolerance in named_tolerances(goal)
+    )
     if path is goal.path_tolerance and end is goal.goal_tolerance:
         return goal
     return replace(goal, path_tolerance=path, goal_tolerance=end)
 
 
-def _filled(tolerance: Tolerance, name: str, options: PlanningOptions) -> Tolerance:
+def _with_defaults(tolerance: Tolerance, name: str, options: PlanningOptions) -> Tolerance:
     """Return a tolerance with the parameters ``<name>_position`` ... in place of its zeros."""
     position, orientation, *rest = (
         float(getattr(options, f'{name}_{quantity}')) for quantity in _QUANTITIES

@@ -16,15 +16,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluated, quintic_rows, Rates
+from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluate, MotionRows, quintic_rows
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
-from ur_cartesian_driver.planning.pose_rows import (
+from ur_cartesian_driver.planning.geometry.pose_rows import (
     conjugate_rows,
     Floats,
     multiply_rows,
     normalized_rows,
 )
-from ur_cartesian_driver.planning.rotation_rows import angular, exp_rows, log_rows, turn_of
+from ur_cartesian_driver.planning.geometry.rotation_rows import (
+    angular_rates,
+    exp_rows,
+    log_rows,
+    rotation_rates,
+)
 
 Ints = NDArray[np.intp]
 
@@ -81,14 +86,14 @@ class ToolSpline:
             orientations=orientations[begin],
             positions=between(
                 durations,
-                Rates(x[begin], v[begin, :3], a[begin, :3]),
-                Rates(x[end], v[end, :3], a[end, :3]),
+                MotionRows(x[begin], v[begin, :3], a[begin, :3]),
+                MotionRows(x[end], v[end, :3], a[end, :3]),
             ),
             # At the begin the vector is 0, and there its derivatives are the angular ones.
             turns=between(
                 durations,
-                Rates(zero, v[begin, 3:], a[begin, 3:]),
-                turn_of(turn, v[end, 3:], a[end, 3:]),
+                MotionRows(zero, v[begin, 3:], a[begin, 3:]),
+                rotation_rates(turn, v[end, 3:], a[end, 3:]),
             ),
         )
 
@@ -98,8 +103,8 @@ class ToolSpline:
 
         :param t: (m,) time since the piece began [s].
         """
-        x, turn = evaluated(self.positions[piece], t), evaluated(self.turns[piece], t)
-        w, e = angular(turn)
+        x, turn = evaluate(self.positions[piece], t), evaluate(self.turns[piece], t)
+        w, e = angular_rates(turn)
         turned = multiply_rows(exp_rows(turn.x), self.orientations[piece])
         return ToolRows(
             np.concatenate([x.x, normalized_rows(turned)], axis=1),
@@ -109,7 +114,7 @@ class ToolSpline:
 
     def vectors(self, piece: Ints, t: Floats) -> tuple[Floats, Floats]:
         """Return positions [m] and rotation vectors since the piece began [rad] (m, 3)."""
-        return (evaluated(self.positions[piece], t).x, evaluated(self.turns[piece], t).x)
+        return (evaluate(self.positions[piece], t).x, evaluate(self.turns[piece], t).x)
 
     def at(self, times: Floats) -> ToolRows:
         """Return the tool at times (m,) [s]; where two pieces meet on the second one."""
@@ -118,7 +123,7 @@ class ToolSpline:
         )
         return self.rows(piece, times - self.times[piece])
 
-    def stretched(self, factor: float) -> ToolSpline:
+    def stretch_times(self, factor: float) -> ToolSpline:
         """Return the same way in so many times the time."""
         powers = factor ** -np.arange(6.0)[:, None]
         return ToolSpline(

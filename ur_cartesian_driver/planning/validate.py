@@ -4,7 +4,7 @@
 Every reason to refuse a goal that can be known without a robot.
 
 :data:`RULES` is the list, in the order in which the rules are tried; each is a small function that
-raises the refusal or returns. What needs the robot (reach, posture, speed) is in :mod:`~.plan`.
+raises the refusal or returns. What needs the robot (reach, posture, speed) is in :mod:`~.planner`.
 
 The texts name places as the ROS messages do (``trajectory.points[2].pose.orientation``), so that
 a reader finds them in what was sent.
@@ -34,30 +34,33 @@ from ur_cartesian_driver.motion.goal import (
     Waypoint,
 )
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Quaternion
+from ur_cartesian_driver.planning.geometry.curves import ArcCurve, is_same_pose
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.outputs import check_outputs
-from ur_cartesian_driver.planning.path import Arc, same
-from ur_cartesian_driver.planning.tolerances import tolerances_of, with_default_tolerances
-from ur_cartesian_driver.protocol.dialects import NEWEST
+from ur_cartesian_driver.planning.output_placement import check_outputs
+from ur_cartesian_driver.planning.request.default_tolerances import (
+    apply_default_tolerances,
+    named_tolerances,
+)
+from ur_cartesian_driver.protocol.dialects import NEWEST_DIALECT
 
 #: How far a quaternion's length may be off 1.
 QUATERNION_TOLERANCE = 1e-3
 #: No joint of these robots is told to turn further [rad]; values beyond are mistakes, as degrees.
-LARGEST_JOINT_VALUE = 8.0 * pi
+MAX_JOINT_VALUE = 8.0 * pi
 #: How far ahead a stamp may lie [s].
-LARGEST_DELAY = 60.0
+MAX_STAMP_AHEAD = 60.0
 #: The shortest way of a spline from point to point [s].
-LEAST_SPLINE_TIME = 0.001
+MIN_SPLINE_TIME = 0.001
 #: What points of splines may ask for before it is absurd [m], [m/s, rad/s], [m/s^2, rad/s^2].
-FARTHEST_POINT = 1000.0
-LARGEST_TWIST = 100.0
-LARGEST_ACCELERATION = 10_000.0
+MAX_POINT_COORDINATE = 1000.0
+MAX_TWIST = 100.0
+MAX_ACCELERATION = 10_000.0
 
 Rule: TypeAlias = Callable[[Goal, PlanningOptions], None]
 _Enum = TypeVar('_Enum', bound=IntEnum)
 
 #: A goal without segments has these.
-PLAIN = Segment()
+DEFAULT_SEGMENT = Segment()
 
 
 def check(goal: Goal, options: PlanningOptions) -> None:
@@ -82,10 +85,10 @@ def segment_field(index: int, field: str) -> str:
 
 def segment_of(goal: Goal, index: int) -> Segment:
     """Return the segment that ends at a point, the plain one where the goal has none."""
-    return goal.segments[index] if goal.segments else PLAIN
+    return goal.segments[index] if goal.segments else DEFAULT_SEGMENT
 
 
-def way_of_execution(goal: Goal) -> ExecutionMode:
+def resolve_execution_mode(goal: Goal) -> ExecutionMode:
     """Return how a goal is carried out: AUTO means SPLINE where only that does what it asks."""
     if goal.execution != ExecutionMode.AUTO:
         return ExecutionMode(goal.execution)
@@ -97,7 +100,7 @@ def way_of_execution(goal: Goal) -> ExecutionMode:
 
 def is_spline(goal: Goal) -> bool:
     """Tell whether the goal's points are joined by a spline, with times."""
-    return way_of_execution(goal) in (ExecutionMode.SPLINE, ExecutionMode.SERVO)
+    return resolve_execution_mode(goal) in (ExecutionMode.SPLINE, ExecutionMode.SERVO)
 
 
 def is_timed(goal: Goal) -> bool:
@@ -129,11 +132,11 @@ def _number_of_segments(goal: Goal, options: PlanningOptions) -> None:
         )
 
 
-def _known_numbers(goal: Goal, options: PlanningOptions) -> None:
-    _known('execution', goal.execution, ExecutionMode)
+def _enum_values(goal: Goal, options: PlanningOptions) -> None:
+    _check_enum('execution', goal.execution, ExecutionMode)
     for i, segment in enumerate(goal.segments):
-        _known(segment_field(i, 'type'), segment.type, SegmentType)
-        _known(segment_field(i, 'arc_mode'), segment.arc_mode, ArcMode)
+        _check_enum(segment_field(i, 'type'), segment.type, SegmentType)
+        _check_enum(segment_field(i, 'arc_mode'), segment.arc_mode, ArcMode)
 
 
 def _numbers_of_frames(goal: Goal, options: PlanningOptions) -> None:
@@ -147,11 +150,11 @@ def _numbers_of_frames(goal: Goal, options: PlanningOptions) -> None:
 
 
 def _numbers_of_points(goal: Goal, options: PlanningOptions) -> None:
-    chooses: bool | None = None
+    nan_allowed: bool | None = None
     for i, point in enumerate(goal.waypoints):
         if not _all_finite(point):
-            chooses = is_spline(goal) if chooses is None else chooses
-            _name_the_infinite(i, point, chooses)
+            nan_allowed = is_spline(goal) if nan_allowed is None else nan_allowed
+            _refuse_not_finite(i, point, nan_allowed)
         _check_unit(point_field(i, 'pose.orientation'), point.pose.quaternion)
 
 
@@ -171,7 +174,7 @@ def _numbers_of_segments(goal: Goal, options: PlanningOptions) -> None:
 
 
 def _numbers_of_tolerances(goal: Goal, options: PlanningOptions) -> None:
-    for name, tolerance in tolerances_of(goal):
+    for name, tolerance in named_tolerances(goal):
         _check_finite(f'{name}.position_error', tolerance.position)
         _check_finite(f'{name}.orientation_error', tolerance.orientation)
         _check_finite(f'{name}.twist_error', tolerance.twist)
@@ -182,7 +185,7 @@ def _numbers_of_tolerances(goal: Goal, options: PlanningOptions) -> None:
 def _tolerances_are_measurable(goal: Goal, options: PlanningOptions) -> None:
     if options.acceleration_known:
         return
-    for name, tolerance in tolerances_of(with_default_tolerances(goal, options)):
+    for name, tolerance in named_tolerances(apply_default_tolerances(goal, options)):
         if max(tolerance.acceleration) > 0.0:
             raise InvalidGoal(
                 f'{name}.acceleration_error',
@@ -203,16 +206,16 @@ def _stamp(goal: Goal, options: PlanningOptions) -> None:
             f'trajectory.header.stamp lies {age:.3f} s in the past, more than stamp_tolerance = '
             f'{options.stamp_tolerance:g} s; send 0 for "now", or compare the clocks.'
         )
-    if age < -LARGEST_DELAY:
+    if age < -MAX_STAMP_AHEAD:
         raise InvalidGoal(
             'trajectory.header.stamp',
-            f'lies {-age:.1f} s in the future, more than {LARGEST_DELAY:g} s',
+            f'lies {-age:.1f} s in the future, more than {MAX_STAMP_AHEAD:g} s',
             'send the goal later',
         )
 
 
-def _available(goal: Goal, options: PlanningOptions) -> None:
-    if goal.keep_open and not options.dialect.streams:
+def _supported(goal: Goal, options: PlanningOptions) -> None:
+    if goal.keep_open and not options.dialect.supports_append:
         raise NotAvailable(
             'keep_open',
             'is set, but a robot program of wire dialect '
@@ -260,7 +263,7 @@ def _times(goal: Goal, options: PlanningOptions) -> None:
 def _spline(goal: Goal, options: PlanningOptions) -> None:
     if not is_spline(goal):
         return
-    name = way_of_execution(goal).name
+    name = resolve_execution_mode(goal).name
     if not is_timed(goal):
         raise InvalidGoal(
             'execution',
@@ -270,32 +273,32 @@ def _spline(goal: Goal, options: PlanningOptions) -> None:
     _spline_can_be_sent(goal, name, options)
     before = 0.0
     for i, point in enumerate(goal.waypoints):
-        if 0.0 < point.time < before + LEAST_SPLINE_TIME:
+        if 0.0 < point.time < before + MIN_SPLINE_TIME:
             raise InvalidGoal(
                 point_field(i, 'time_from_start'),
                 f'gives the segment {point.time - before:g} s; '
-                f'pieces of splines take at least {LEAST_SPLINE_TIME:g} s',
+                f'pieces of splines take at least {MIN_SPLINE_TIME:g} s',
                 'leave points out',
             )
         before = point.time
-        for field, values, most in (
-            ('pose.position', point.pose.position, FARTHEST_POINT),
-            ('twist', point.twist, LARGEST_TWIST),
-            ('acceleration', point.acceleration, LARGEST_ACCELERATION),
+        for field, values, cap in (
+            ('pose.position', point.pose.position, MAX_POINT_COORDINATE),
+            ('twist', point.twist, MAX_TWIST),
+            ('acceleration', point.acceleration, MAX_ACCELERATION),
         ):
-            if any(abs(value) > most for value in values):
+            if any(abs(value) > cap for value in values):
                 raise InvalidGoal(
                     point_field(i, field),
-                    f'contains a number beyond {most:g}, far more than any of these robots can do',
+                    f'contains a number beyond {cap:g}, far more than any of these robots can do',
                     'check the units: metres, radians, seconds',
                 )
     for i, segment in enumerate(goal.segments):
-        if segment is not PLAIN:
+        if segment is not DEFAULT_SEGMENT:
             _spline_segment(i, segment, name)
     if goal.waypoints[0].time == 0.0:
-        _check_rests(goal, 0, 'the robot stands there when the motion begins')
+        _check_at_rest(goal, 0, 'the robot stands there when the motion begins')
     if not goal.keep_open:
-        _check_rests(goal, len(goal.waypoints) - 1, 'the motion ends there')
+        _check_at_rest(goal, len(goal.waypoints) - 1, 'the motion ends there')
 
 
 def _spline_can_be_sent(goal: Goal, name: str, options: PlanningOptions) -> None:
@@ -308,7 +311,7 @@ def _spline_can_be_sent(goal: Goal, name: str, options: PlanningOptions) -> None
             remedy,
         )
     if goal.execution == ExecutionMode.SERVO:
-        if options.dialect is not NEWEST:
+        if options.dialect is not NEWEST_DIALECT:
             raise NotAvailable(
                 'execution',
                 f'is {name}, which robot programs of wire dialect '
@@ -349,7 +352,7 @@ def _spline_segment(index: int, segment: Segment, name: str) -> None:
         )
 
 
-def _check_rests(goal: Goal, index: int, why: str) -> None:
+def _check_at_rest(goal: Goal, index: int, why: str) -> None:
     point = goal.waypoints[index]
     for field, values in (('twist', point.twist), ('acceleration', point.acceleration)):
         if any(value != 0.0 and not isnan(value) for value in values):
@@ -359,7 +362,7 @@ def _check_rests(goal: Goal, index: int, why: str) -> None:
 def _segment_rules(goal: Goal, options: PlanningOptions) -> None:
     timed = is_timed(goal)
     for i, segment in enumerate(goal.segments):
-        if segment is not PLAIN:
+        if segment is not DEFAULT_SEGMENT:
             if is_optimized(SegmentType(segment.type)) and not options.optimove_known:
                 raise NotAvailable(
                     segment_field(i, 'type'),
@@ -395,7 +398,7 @@ def _blends(goal: Goal, options: PlanningOptions) -> None:
         )
 
 
-def _ways(goal: Goal, options: PlanningOptions) -> None:
+def _motions(goal: Goal, options: PlanningOptions) -> None:
     if is_spline(goal):
         return  # it can wait at a point
     for i in range(1, len(goal.waypoints)):
@@ -404,31 +407,31 @@ def _ways(goal: Goal, options: PlanningOptions) -> None:
         if segment.type == SegmentType.CIRCULAR:
             # The start's orientation does not matter for the shape.
             assert segment.via is not None
-            arc_of(i, start.pose, segment.via, end.pose, segment.arc_mode)
-        elif is_straight(segment.type) and same(start.pose, end.pose):
+            arc_through_via(i, start.pose, segment.via, end.pose, segment.arc_mode)
+        elif is_straight(segment.type) and is_same_pose(start.pose, end.pose):
             # With a posture it may become a joint move: decided with the robot at hand.
             if not (end.posture and options.on_posture_change == 'movej'):
-                raise no_way(goal, i)
+                raise no_motion_error(goal, i)
 
 
 #: All rules, in order: later ones may rely on what earlier ones made sure of.
 RULES: tuple[Rule, ...] = (
     _number_of_points,
     _number_of_segments,
-    _known_numbers,
+    _enum_values,
     _numbers_of_frames,
     _numbers_of_points,
     _numbers_of_segments,
     _numbers_of_tolerances,
     _tolerances_are_measurable,
     _stamp,
-    _available,
+    _supported,
     _times,
     _spline,
     _segment_rules,
     _postures,
     _blends,
-    _ways,
+    _motions,
 )
 
 
@@ -479,14 +482,14 @@ def check_posture(field: str, posture: Posture, tf_prefix: str) -> None:
             raise InvalidJoints(
                 f"{field}.posture_joint_values[{k}] ('{name}') is {value}; it must be finite."
             )
-        if abs(value) > LARGEST_JOINT_VALUE:
+        if abs(value) > MAX_JOINT_VALUE:
             raise InvalidJoints(
                 f"{field}.posture_joint_values[{k}] ('{name}') is {value:g} rad, more than any "
                 'joint can turn; joint values are radians, not degrees.'
             )
 
 
-def check_blends_fit(goal: Goal, index: int, apart: float, before: float, after: float) -> None:
+def check_blends_fit(goal: Goal, index: int, length: float, before: float, after: float) -> None:
     """
     Check that the blends around both ends of a segment do not overlap.
 
@@ -495,23 +498,23 @@ def check_blends_fit(goal: Goal, index: int, apart: float, before: float, after:
     :param apart: distance of the two points [m].
     """
     # A rounding error may not decide over blends that touch.
-    if before + after > apart * (1.0 + 1e-9) + 1e-9:
+    if before + after > length * (1.0 + 1e-9) + 1e-9:
         raise InvalidGoal(
             segment_field(index if after > 0.0 else index - 1, 'blend_radius'),
             f'is too large: the blends around points {index - 1} and {index} reach '
-            f'{1e3 * before:g} mm and {1e3 * after:g} mm into a segment of {1e3 * apart:.3f} mm',
+            f'{1e3 * before:g} mm and {1e3 * after:g} mm into a segment of {1e3 * length:.3f} mm',
             'make them smaller',
         )
 
 
-def arc_of(index: int, start: Pose, via: Pose, end: Pose, mode: ArcMode) -> Arc:
+def arc_through_via(index: int, start: Pose, via: Pose, end: Pose, mode: ArcMode) -> ArcCurve:
     """
     Return the arc of a CIRCULAR segment.
 
     :raises InvalidGoal: start, via and end make no circle.
     """
     try:
-        return Arc.through(start, via.position, end, mode)
+        return ArcCurve.through(start, via.position, end, mode)
     except ValueError as error:
         raise InvalidGoal(
             segment_field(index, 'via'),
@@ -520,13 +523,13 @@ def arc_of(index: int, start: Pose, via: Pose, end: Pose, mode: ArcMode) -> Arc:
         ) from None
 
 
-def no_way(goal: Goal, index: int) -> InvalidGoal:
+def no_motion_error(goal: Goal, index: int) -> InvalidGoal:
     """Return the refusal of a segment without a motion."""
     dwell = goal.waypoints[index].time - goal.waypoints[index - 1].time
-    waits = f' for {dwell:g} s' if is_timed(goal) else ''
+    dwell_clause = f' for {dwell:g} s' if is_timed(goal) else ''
     return InvalidGoal(
         point_field(index),
-        f'is the same as points[{index - 1}]{waits}: there is no way to go, '
+        f'is the same as points[{index - 1}]{dwell_clause}: there is no way to go, '
         'and the robot cannot wait at a point',
         'remove one of the two, or split the goal there',
     )
@@ -535,7 +538,7 @@ def no_way(goal: Goal, index: int) -> InvalidGoal:
 # -- details ------------------------------------------------------------------------------------
 
 
-def _known(field: str, value: int, kind: type[_Enum]) -> None:
+def _check_enum(field: str, value: int, kind: type[_Enum]) -> None:
     try:
         kind(value)
     except ValueError:
@@ -557,7 +560,7 @@ def _all_finite(point: Waypoint) -> bool:
     )
 
 
-def _name_the_infinite(index: int, point: Waypoint, chooses: bool) -> None:
+def _refuse_not_finite(index: int, point: Waypoint, nan_allowed: bool) -> None:
     """
     Refuse the number that is not finite.
 
@@ -570,7 +573,10 @@ def _name_the_infinite(index: int, point: Waypoint, chooses: bool) -> None:
         values = getattr(point, field)
         _check_finite(
             point_field(index, field),
-            (0.0 if chooses and field != 'jerk' and isnan(value) else value for value in values),
+            (
+                0.0 if nan_allowed and field != 'jerk' and isnan(value) else value
+                for value in values
+            ),
         )
 
 

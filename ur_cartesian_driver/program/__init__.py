@@ -3,10 +3,10 @@
 """The robot's side: the URScript program, and what fills it with the constants of the protocol."""
 
 from ur_cartesian_driver.program.render import (
-    as_program,
     PROGRAM_NAME,
     ProgramSettings,
     render,
+    wrap_in_program,
 )
 
-__all__ = ['PROGRAM_NAME', 'ProgramSettings', 'as_program', 'render']
+__all__ = ['PROGRAM_NAME', 'ProgramSettings', 'render', 'wrap_in_program']

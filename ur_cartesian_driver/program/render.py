@@ -34,10 +34,10 @@ PROGRAM_NAME = 'ur_cartesian_driver'
 
 #: A set-point of the buffered servo is repeated until each joint is as near to it [rad], as in the
 #: manufacturer's guide, but not more often than this.
-SERVO_NEAR = 0.2
-SERVO_MOST_REPEATS = 500
+SERVO_TOLERANCE = 0.2
+SERVO_MAX_REPEATS = 500
 #: A set-point that comes longer after the one before stands for one step, as in the guide.
-SERVO_MOST_STEPS = 50
+SERVO_MAX_STEPS = 50
 
 #: The first software of the CB3/e-Series line and of PolyScope X that has a feature.
 FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
@@ -46,7 +46,7 @@ FEATURES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
 }
 
 #: How the program follows splines.
-SPLINE_LAW: dict[str, float] = {
+SPLINE_CONSTANTS: dict[str, float] = {
     #: How fast the leading axis changes its speed from step to step [rad/s^2]; the client
     #: library's number for speedj.
     'ACCELERATION': 40.0,
@@ -75,7 +75,7 @@ OUTPUT_COLUMNS = {
     trajectory.PointField.OUTPUT_PIN: 'PIN',
     trajectory.PointField.OUTPUT_VALUE: 'VALUE',
     trajectory.PointField.OUTPUT_DOMAIN: 'DOMAIN',
-    trajectory.PointField.COMES_ROUND: 'COMES_ROUND',
+    trajectory.PointField.STARTS_BEYOND: 'STARTS_BEYOND',
 }
 
 
@@ -101,7 +101,7 @@ class ProgramSettings:
     #: How many set-points the buffered servo can hold.
     servo_buffer_depth: int = 250
     #: Whether the buffered servo may let people push the arm.
-    allow_teach: bool = False
+    allow_freedrive: bool = False
 
     def __post_init__(self) -> None:
         """Refuse a host that would not survive inside a quoted string."""
@@ -121,7 +121,7 @@ def render(settings: ProgramSettings) -> str:
     return '\n'.join(_lines('driver', settings)) + '\n'
 
 
-def as_program(text: str) -> str:
+def wrap_in_program(text: str) -> str:
     """Return the text as a program that can be uploaded: indented, in a ``def`` of our name."""
     body = ''.join(f'\t{line}\n' if line else '\n' for line in text.splitlines())
     return f'def {PROGRAM_NAME}():\n{body}end\n'
@@ -144,7 +144,7 @@ def _lines(name: str, settings: ProgramSettings) -> Iterator[str]:
             case ['#!', 'include', part]:
                 yield from _lines(part, settings)
             case ['#!', 'if', 'teach']:
-                keep = settings.allow_teach
+                keep = settings.allow_freedrive
             case ['#!', 'if', feature] if feature in FEATURES:
                 keep = has_feature(feature, settings.version)
             case ['#!', 'end']:
@@ -178,15 +178,15 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield from _enum('TRAJECTORY', reverse.TrajectoryAction)
     yield from _enum('MOTION', trajectory.MotionType)
     yield from _enum('SPLINE', trajectory.SplineKind)
-    for name, value in SPLINE_LAW.items():
+    for name, value in SPLINE_CONSTANTS.items():
         yield f'SPLINE_{name} = {value:.10f}'
     yield from _enum('RESULT', TrajectoryResult)
     yield from _enum('COMMAND', script_command.ScriptCommand)
-    yield from _enum('TCP', script_command.TcpHold)
-    yield f'OUTPUTS_WAITING = {trajectory.MOST_OUTPUTS}'
+    yield from _enum('TCP', script_command.TcpPersistence)
+    yield f'OUTPUTS_WAITING = {trajectory.MAX_PENDING_OUTPUTS}'
     yield f'OUTPUT_WORDS = {OUTPUT_WORDS}'
     # Of floats, as the matrices that are made with them.
-    yield f'OUTPUT_ONES = {[1.0] * trajectory.MOST_OUTPUTS}'
+    yield f'OUTPUT_ONES = {[1.0] * trajectory.MAX_PENDING_OUTPUTS}'
     yield f'OUTPUT_ROW = {[0.0] * OUTPUT_WORDS}'
     yield f'OUTPUT_LEAD = {OUTPUT_LEAD}'
     yield from _enum('OUTPUT', OutputKind)
@@ -201,14 +201,14 @@ def _servo_constants(settings: ProgramSettings) -> Iterator[str]:
     """Yield those of the buffered servo."""
     yield f'SERVOJ_GAIN = {settings.servoj_gain}'
     yield f'SERVOJ_LOOKAHEAD_TIME = {settings.servoj_lookahead_time}'
-    yield f'SERVO_ALLOW_TEACH = {settings.allow_teach}'
+    yield f'SERVO_ALLOW_TEACH = {settings.allow_freedrive}'
     yield f'SERVO_DEPTH = {settings.servo_buffer_depth}'
     # A list as long as the buffer: old controllers have no other way to make one.
     yield f'SERVO_ONES = {[1.0] * settings.servo_buffer_depth}'
     yield f'SERVO_ROW = {[0.0] * 6}'
-    yield f'SERVO_MOST_STEPS = {SERVO_MOST_STEPS}'
-    yield f'SERVO_MOST_REPEATS = {SERVO_MOST_REPEATS}'
-    yield f'SERVO_NEAR = {[SERVO_NEAR] * 6}'
+    yield f'SERVO_MAX_STEPS = {SERVO_MAX_STEPS}'
+    yield f'SERVO_MAX_REPEATS = {SERVO_MAX_REPEATS}'
+    yield f'SERVO_TOLERANCE = {[SERVO_TOLERANCE] * 6}'
     yield from _enum('SERVO_IN', registers.InputInteger)
     yield from _enum('SERVO_IN', registers.InputDouble)
     yield from _enum('SERVO_OUT', registers.OutputInteger)

@@ -5,7 +5,7 @@ The dashboard: one line asks, one line answers.
 
 The server greets with one line. Then each command, a line of text, gets exactly one line in
 return, in order; there is nothing else that joins the two. A command that is refused is answered
-by a sentence for people, so success is recognised by the shape of the answer (:data:`SHAPES`).
+by a sentence for people, so success is recognised by its form (:data:`COMMAND_SPECS`).
 
 Which commands there are depends on the software: CB3 robots count to 3, e-Series robots from 5.
 PolyScope X has no dashboard.
@@ -24,13 +24,13 @@ from ur_cartesian_driver.protocol.framing import LineBuffer
 
 BANNER = 'Connected: Universal Robots Dashboard Server'
 #: Longest line in either direction [bytes].
-LONGEST_LINE = 8192
+MAX_LINE_LENGTH = 8192
 #: Most commands that may wait for their answers.
-MOST_PENDING = 64
+MAX_PENDING_REQUESTS = 64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shape:
+class CommandSpec:
     """
     A command and what its success looks like.
 
@@ -41,71 +41,80 @@ class Shape:
     """
 
     reply: str
-    takes: bool = False
+    takes_argument: bool = False
     cb3: tuple[int, int] | None = (0, 0)
     e_series: tuple[int, int] | None = (5, 0)
 
-    def pattern(self) -> re.Pattern[str]:
+    def reply_pattern(self) -> re.Pattern[str]:
         """Return what matches the whole answer; group 1 is the telling part."""
-        before, telling, after = self.reply.partition('{}')
-        return re.compile(re.escape(before) + ('(.*)' if telling else '') + re.escape(after))
+        before, value, after = self.reply.partition('{}')
+        return re.compile(re.escape(before) + ('(.*)' if value else '') + re.escape(after))
 
-    def available(self, version: tuple[int, int]) -> bool:
+    def is_available(self, version: tuple[int, int]) -> bool:
         """Tell whether software of a version has the command."""
-        least = self.cb3 if version < (5, 0) else self.e_series
-        return least is not None and version >= least
+        min_version = self.cb3 if version < (5, 0) else self.e_series
+        return min_version is not None and version >= min_version
 
 
 #: All commands of the dashboard that we know.
-SHAPES: Mapping[str, Shape] = MappingProxyType(
+COMMAND_SPECS: Mapping[str, CommandSpec] = MappingProxyType(
     {
-        'load': Shape(reply='Loading program: {}', takes=True, cb3=(1, 4)),
-        'play': Shape(reply='Starting program', cb3=(1, 4)),
-        'pause': Shape(reply='Pausing program', cb3=(1, 4)),
-        'stop': Shape(reply='Stopped', cb3=(1, 4)),
-        'quit': Shape(reply='Disconnected', cb3=(1, 4)),
-        'shutdown': Shape(reply='Shutting down', cb3=(1, 4)),
-        'running': Shape(reply='Program running: {}', cb3=(1, 6)),
-        'robotmode': Shape(reply='Robotmode: {}', cb3=(1, 6)),
-        'safetymode': Shape(reply='Safetymode: {}', cb3=(3, 0)),
-        'safetystatus': Shape(reply='Safetystatus: {}', cb3=None, e_series=(5, 4)),
-        'get loaded program': Shape(reply='Loaded program: {}', cb3=(1, 6)),
-        'popup': Shape(reply='showing popup', takes=True, cb3=(1, 6)),
-        'close popup': Shape(reply='closing popup', cb3=(1, 6)),
-        'close safety popup': Shape(reply='closing safety popup', cb3=(3, 1)),
-        'addToLog': Shape(reply='Added log message', takes=True, cb3=(1, 8)),
-        'isProgramSaved': Shape(reply='{}', cb3=(1, 8)),
-        'programState': Shape(reply='{}', cb3=(1, 8)),
-        'PolyscopeVersion': Shape(reply='URSoftware {}', cb3=(1, 8)),
-        'version': Shape(reply='{}', cb3=None),
-        'setUserRole': Shape(reply='Setting user role: {}', takes=True, cb3=(3, 1), e_series=None),
-        'getUserRole': Shape(reply='{}', cb3=(3, 1), e_series=None),
-        'power on': Shape(reply='Powering on', cb3=(3, 0)),
-        'power off': Shape(reply='Powering off', cb3=(3, 0)),
-        'brake release': Shape(reply='Brake releasing', cb3=(3, 0)),
-        'unlock protective stop': Shape(reply='Protective stop releasing', cb3=(3, 1)),
-        'restart safety': Shape(reply='Restarting safety', cb3=(3, 7), e_series=(5, 1)),
-        'load installation': Shape(reply='Loading installation: {}', takes=True, cb3=(3, 2)),
-        'set operational mode': Shape(reply='Operational mode {}', takes=True, cb3=None),
-        'get operational mode': Shape(reply='{}', cb3=None, e_series=(5, 6)),
-        'clear operational mode': Shape(
+        'load': CommandSpec(reply='Loading program: {}', takes_argument=True, cb3=(1, 4)),
+        'play': CommandSpec(reply='Starting program', cb3=(1, 4)),
+        'pause': CommandSpec(reply='Pausing program', cb3=(1, 4)),
+        'stop': CommandSpec(reply='Stopped', cb3=(1, 4)),
+        'quit': CommandSpec(reply='Disconnected', cb3=(1, 4)),
+        'shutdown': CommandSpec(reply='Shutting down', cb3=(1, 4)),
+        'running': CommandSpec(reply='Program running: {}', cb3=(1, 6)),
+        'robotmode': CommandSpec(reply='Robotmode: {}', cb3=(1, 6)),
+        'safetymode': CommandSpec(reply='Safetymode: {}', cb3=(3, 0)),
+        'safetystatus': CommandSpec(reply='Safetystatus: {}', cb3=None, e_series=(5, 4)),
+        'get loaded program': CommandSpec(reply='Loaded program: {}', cb3=(1, 6)),
+        'popup': CommandSpec(reply='showing popup', takes_argument=True, cb3=(1, 6)),
+        'close popup': CommandSpec(reply='closing popup', cb3=(1, 6)),
+        'close safety popup': CommandSpec(reply='closing safety popup', cb3=(3, 1)),
+        'addToLog': CommandSpec(reply='Added log message', takes_argument=True, cb3=(1, 8)),
+        'isProgramSaved': CommandSpec(reply='{}', cb3=(1, 8)),
+        'programState': CommandSpec(reply='{}', cb3=(1, 8)),
+        'PolyscopeVersion': CommandSpec(reply='URSoftware {}', cb3=(1, 8)),
+        'version': CommandSpec(reply='{}', cb3=None),
+        'setUserRole': CommandSpec(
+            reply='Setting user role: {}', takes_argument=True, cb3=(3, 1), e_series=None
+        ),
+        'getUserRole': CommandSpec(reply='{}', cb3=(3, 1), e_series=None),
+        'power on': CommandSpec(reply='Powering on', cb3=(3, 0)),
+        'power off': CommandSpec(reply='Powering off', cb3=(3, 0)),
+        'brake release': CommandSpec(reply='Brake releasing', cb3=(3, 0)),
+        'unlock protective stop': CommandSpec(reply='Protective stop releasing', cb3=(3, 1)),
+        'restart safety': CommandSpec(reply='Restarting safety', cb3=(3, 7), e_series=(5, 1)),
+        'load installation': CommandSpec(
+            reply='Loading installation: {}', takes_argument=True, cb3=(3, 2)
+        ),
+        'set operational mode': CommandSpec(
+            reply='Operational mode {}', takes_argument=True, cb3=None
+        ),
+        'get operational mode': CommandSpec(reply='{}', cb3=None, e_series=(5, 6)),
+        'clear operational mode': CommandSpec(
             reply='No longer controlling the operational mode. {}', cb3=None
         ),
-        'is in remote control': Shape(reply='{}', cb3=None, e_series=(5, 6)),
-        'get serial number': Shape(reply='{}', cb3=(3, 12), e_series=(5, 6)),
-        'get robot model': Shape(reply='{}', cb3=(3, 12), e_series=(5, 6)),
-        'generate flight report': Shape(
-            reply='Flight Report generated with id: {}', takes=True, cb3=(3, 13), e_series=(5, 8)
+        'is in remote control': CommandSpec(reply='{}', cb3=None, e_series=(5, 6)),
+        'get serial number': CommandSpec(reply='{}', cb3=(3, 12), e_series=(5, 6)),
+        'get robot model': CommandSpec(reply='{}', cb3=(3, 12), e_series=(5, 6)),
+        'generate flight report': CommandSpec(
+            reply='Flight Report generated with id: {}',
+            takes_argument=True,
+            cb3=(3, 13),
+            e_series=(5, 8),
         ),
-        'generate support file': Shape(
-            reply='Completed successfully: {}', takes=True, cb3=(3, 13), e_series=(5, 8)
+        'generate support file': CommandSpec(
+            reply='Completed successfully: {}', takes_argument=True, cb3=(3, 13), e_series=(5, 8)
         ),
-        'saveLog': Shape(reply='Log saved to disk', cb3=(3, 13), e_series=(5, 8)),
+        'saveLog': CommandSpec(reply='Log saved to disk', cb3=(3, 13), e_series=(5, 8)),
     }
 )
 
 #: Answers that have no words of their own, by the forms that are possible.
-_FORMS: Mapping[str, re.Pattern[str]] = MappingProxyType(
+_VALUE_PATTERNS: Mapping[str, re.Pattern[str]] = MappingProxyType(
     {
         'running': re.compile('true|false'),
         'isProgramSaved': re.compile(r'(?:true|false)(?: .*)?'),
@@ -119,11 +128,11 @@ _FORMS: Mapping[str, re.Pattern[str]] = MappingProxyType(
     }
 )
 #: Longest first, so that ``load installation`` is not taken for ``load``.
-_NAMES = sorted(SHAPES, key=len, reverse=True)
+_NAMES = sorted(COMMAND_SPECS, key=len, reverse=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Request:
+class DashboardRequest:
     """A command with its text."""
 
     name: str
@@ -131,16 +140,16 @@ class Request:
 
     def __post_init__(self) -> None:
         """Check that it is one line of a command that exists."""
-        shape = SHAPES.get(self.name)
-        if shape is None:
+        spec = COMMAND_SPECS.get(self.name)
+        if spec is None:
             raise LocalProtocolError(f'{self.name!r} is not a command of the dashboard.')
         if '\n' in self.argument or '\r' in self.argument:
             raise LocalProtocolError(
                 f'{self.name} takes one line of text, but it got {self.argument!r}.'
             )
-        if bool(self.argument) != shape.takes:
+        if bool(self.argument) != spec.takes_argument:
             raise LocalProtocolError(
-                f'{self.name} takes {"a" if shape.takes else "no"} text, but it got '
+                f'{self.name} takes {"a" if spec.takes_argument else "no"} text, but it got '
                 f'{self.argument!r}.'
             )
 
@@ -150,7 +159,7 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reply:
+class DashboardReply:
     """
     An answer and the command that it belongs to.
 
@@ -158,7 +167,7 @@ class Reply:
     :param value: its telling part when the command succeeded ('' if there is none), else None.
     """
 
-    request: Request
+    request: DashboardRequest
     text: str
     value: str | None
 
@@ -169,29 +178,29 @@ class Reply:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Greeting:
+class DashboardGreeting:
     """The first line of the server."""
 
     text: str
 
 
-def parse_reply(request: Request, line: str) -> Reply:
+def parse_reply(request: DashboardRequest, line: str) -> DashboardReply:
     """Return what an answer means."""
-    match = SHAPES[request.name].pattern().fullmatch(line.rstrip())
+    match = COMMAND_SPECS[request.name].reply_pattern().fullmatch(line.rstrip())
     value = None if match is None else ''.join(match.groups())
-    form = _FORMS.get(request.name)
-    if value is not None and form is not None and not form.fullmatch(value):
+    value_pattern = _VALUE_PATTERNS.get(request.name)
+    if value is not None and value_pattern is not None and not value_pattern.fullmatch(value):
         value = None
-    return Reply(request=request, text=line, value=value)
+    return DashboardReply(request=request, text=line, value=value)
 
 
-class DashboardClient:
+class DashboardClientCodec:
     """The asking side: joins answers to commands by their order."""
 
     def __init__(self) -> None:
         """Wait for the greeting."""
-        self._lines = LineBuffer(LONGEST_LINE)
-        self._pending: deque[Request] = deque()
+        self._lines = LineBuffer(MAX_LINE_LENGTH)
+        self._pending: deque[DashboardRequest] = deque()
         self._greeted = False
 
     def send(self, name: str, argument: str = '') -> bytes:
@@ -200,22 +209,22 @@ class DashboardClient:
 
         :raises LocalProtocolError: there is no such command, or too many wait for an answer.
         """
-        request = Request(name=name, argument=argument)
-        if len(self._pending) >= MOST_PENDING:
+        request = DashboardRequest(name=name, argument=argument)
+        if len(self._pending) >= MAX_PENDING_REQUESTS:
             raise LocalProtocolError(
-                f'{MOST_PENDING} dashboard commands wait for an answer; connect anew.'
+                f'{MAX_PENDING_REQUESTS} dashboard commands wait for an answer; connect anew.'
             )
         self._pending.append(request)
         return request.encode()
 
-    def feed(self, data: bytes) -> list[Greeting | Reply]:
+    def feed(self, data: bytes) -> list[DashboardGreeting | DashboardReply]:
         """
         Take bytes from the server (none at all = its end) and return the answers in them.
 
         :raises RemoteProtocolError: an answer to nothing, a line that is too long or cut off, or
             the end while a command waits.
         """
-        events: list[Greeting | Reply] = []
+        events: list[DashboardGreeting | DashboardReply] = []
         lines = self._lines.feed(data)
         if not data and self._pending:
             raise RemoteProtocolError(
@@ -225,7 +234,7 @@ class DashboardClient:
         for line in lines:
             if not self._greeted:
                 self._greeted = True
-                events.append(Greeting(text=line))
+                events.append(DashboardGreeting(text=line))
             elif self._pending:
                 events.append(parse_reply(self._pending.popleft(), line))
             else:
@@ -233,14 +242,14 @@ class DashboardClient:
         return events
 
 
-class DashboardServer:
+class DashboardServerCodec:
     """The answering side: reads commands; answer with :func:`success` or in free words."""
 
     def __init__(self) -> None:
         """Start empty."""
-        self._lines = LineBuffer(LONGEST_LINE)
+        self._lines = LineBuffer(MAX_LINE_LENGTH)
 
-    def feed(self, data: bytes) -> list[Request | str]:
+    def feed(self, data: bytes) -> list[DashboardRequest | str]:
         """
         Take bytes from a client (none at all = its end) and return its commands.
 
@@ -252,12 +261,12 @@ class DashboardServer:
         return [parse_request(line.strip()) for line in self._lines.feed(data)]
 
 
-def parse_request(line: str) -> Request | str:
+def parse_request(line: str) -> DashboardRequest | str:
     """Return the command of a line, or the line when it is none."""
     for name in _NAMES:
         if line == name or line.startswith(name + ' '):
             try:
-                return Request(name=name, argument=line[len(name) :].strip())
+                return DashboardRequest(name=name, argument=line[len(name) :].strip())
             except LocalProtocolError:
                 return line
     return line
@@ -268,14 +277,16 @@ def encode_line(text: str) -> bytes:
     return text.encode() + b'\n'
 
 
-def success(request: Request, value: str | None = None) -> bytes:
+def success(request: DashboardRequest, value: str | None = None) -> bytes:
     """
     Return the answer that says a command succeeded.
 
     :param value: the telling part; None = the text that came with the command.
     """
     return encode_line(
-        SHAPES[request.name].reply.replace('{}', request.argument if value is None else value)
+        COMMAND_SPECS[request.name].reply.replace(
+            '{}', request.argument if value is None else value
+        )
     )
 
 

@@ -56,25 +56,25 @@ class Dialect:
     #: Whether words 6 - 14 of a move are q_near, velocity, acceleration and flag.
     q_near: bool
     #: Whether trajectories may have an open end (STREAM_START, STREAM_END).
-    streams: bool
+    supports_append: bool
     #: Whether it is sure that the program sets a TCP when it is told to.
-    sets_tcp: bool
+    supports_tcp_change: bool
     #: The longest duration that fits [s].
     max_duration: float = field(init=False)
     #: The shortest one that is not rounded to 0, which would mean another thing [s].
-    least_duration: float = field(init=False)
+    min_duration: float = field(init=False)
 
     def __post_init__(self) -> None:
         """Derive what is looked up for every point."""
         object.__setattr__(self, 'max_duration', INT32_MAX / self.time_scale)
-        object.__setattr__(self, 'least_duration', 0.5 / self.time_scale)
+        object.__setattr__(self, 'min_duration', 0.5 / self.time_scale)
 
     @property
     def is_coarse(self) -> bool:
         """Tell whether times and radii are rounded to an extent that matters."""
         return self.time_scale < FIXED_POINT
 
-    def whole_radius(self, radius: float) -> float:
+    def round_down_radius(self, radius: float) -> float:
         """Return the largest radius that the wire carries and that is not larger [m]."""
         if not self.is_coarse:
             return radius
@@ -92,35 +92,35 @@ DIALECTS: Mapping[str, Dialect] = MappingProxyType(
                 time_scale=1000,
                 motion_types=_ARCS_AND_LINES | _SPLINE,
                 q_near=False,
-                streams=False,
-                sets_tcp=False,
+                supports_append=False,
+                supports_tcp_change=False,
             ),
             Dialect(
                 name='2.10',
                 time_scale=FIXED_POINT,
                 motion_types=_ARCS_AND_LINES | _OPTIMOVES | _SPLINE,
                 q_near=False,
-                streams=False,
-                sets_tcp=False,
+                supports_append=False,
+                supports_tcp_change=False,
             ),
             Dialect(
                 name='2.12',
                 time_scale=FIXED_POINT,
                 motion_types=_ARCS_AND_LINES | _OPTIMOVES | _OTHER_TARGETS | _SPLINE,
                 q_near=True,
-                streams=False,
-                sets_tcp=False,
+                supports_append=False,
+                supports_tcp_change=False,
             ),
             Dialect(
                 name='2.14',
                 time_scale=FIXED_POINT,
                 motion_types=_ARCS_AND_LINES | _OPTIMOVES | _OTHER_TARGETS | _SPLINE | _OUTPUTS,
                 q_near=True,
-                streams=True,
-                sets_tcp=True,
+                supports_append=True,
+                supports_tcp_change=True,
             ),
         )
     }
 )
 #: The one that the robot program of this package speaks.
-NEWEST = DIALECTS['2.14']
+NEWEST_DIALECT = DIALECTS['2.14']

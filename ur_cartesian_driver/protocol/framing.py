@@ -23,7 +23,7 @@ INT32_MIN = -(2**31)
 INT32_MAX = 2**31 - 1
 
 #: Longest piece of a stream that an error text quotes [bytes].
-_QUOTED = 48
+_MAX_QUOTED = 48
 
 
 def to_fixed(value: float, field: str, scale: int = FIXED_POINT) -> int:
@@ -36,7 +36,7 @@ def to_fixed(value: float, field: str, scale: int = FIXED_POINT) -> int:
     scaled = value * scale
     # Written so that NaN fails. The rounding below moves a number by half a unit at most.
     if not INT32_MIN - 0.5 < scaled < INT32_MAX + 0.5:
-        raise out_of_range(value, field, scale)
+        raise range_error(value, field, scale)
     whole = int(scaled)
     # The difference is exact, while adding 0.5 first would round 0.49999999999999994 up.
     rest = scaled - whole
@@ -50,7 +50,7 @@ def from_fixed(raw: int, scale: int = FIXED_POINT) -> float:
     return raw / scale
 
 
-def out_of_range(value: float, field: str, scale: int = FIXED_POINT) -> LocalProtocolError:
+def range_error(value: float, field: str, scale: int = FIXED_POINT) -> LocalProtocolError:
     """Return the error for a value that no int32 can stand for."""
     return LocalProtocolError(
         f'{field} is {value!r}, but only finite numbers from {INT32_MIN / scale!r} to '
@@ -72,10 +72,10 @@ def checked_int32(value: int, field: str) -> int:
     return value
 
 
-def quote(data: bytes) -> str:
+def hex_text(data: bytes) -> str:
     """Return bytes as hexadecimal digits for an error text, cut when they are many."""
-    text = data[:_QUOTED].hex()
-    return f'{text}... ({len(data)} bytes)' if len(data) > _QUOTED else text or 'no bytes'
+    text = data[:_MAX_QUOTED].hex()
+    return f'{text}... ({len(data)} bytes)' if len(data) > _MAX_QUOTED else text or 'no bytes'
 
 
 def checked_size(data: bytes, size: int, what: str) -> bytes:
@@ -86,7 +86,7 @@ def checked_size(data: bytes, size: int, what: str) -> bytes:
     """
     if len(data) != size:
         raise RemoteProtocolError(
-            f'A {what} has {size} bytes, but {len(data)} came: {quote(data)}.'
+            f'A {what} has {size} bytes, but {len(data)} came: {hex_text(data)}.'
         )
     return data
 
@@ -113,7 +113,7 @@ class RecordBuffer:
         """
         if not data:
             if self._rest:
-                raise cut_off(self._what, self._rest)
+                raise truncated_stream(self._what, self._rest)
             return []
         data = self._rest + data
         end = len(data) - len(data) % self._size
@@ -133,7 +133,7 @@ class FrameBuffer:
 
     """
 
-    def __init__(self, width: int, smallest: int, largest: int, what: str) -> None:
+    def __init__(self, size_width: int, min_size: int, max_size: int, what: str) -> None:
         """
         Start empty.
 
@@ -142,8 +142,8 @@ class FrameBuffer:
         :param largest: greatest size that is believed [bytes]; it bounds the memory.
         :param what: what the frames are, for error texts.
         """
-        self._width = width
-        self._bounds = (smallest, largest)
+        self._width = size_width
+        self._bounds = (min_size, max_size)
         self._what = what
         self._buffer = bytearray()
 
@@ -160,7 +160,7 @@ class FrameBuffer:
         """
         if not data:
             if self._buffer:
-                raise cut_off(self._what, bytes(self._buffer))
+                raise truncated_stream(self._what, bytes(self._buffer))
             return []
         self._buffer += data
         frames = []
@@ -177,11 +177,11 @@ class FrameBuffer:
         if len(head) < self._width:
             return 0
         size = int.from_bytes(head, 'big')
-        smallest, largest = self._bounds
-        if not smallest <= size <= largest:
+        min_size, max_size = self._bounds
+        if not min_size <= size <= max_size:
             raise RemoteProtocolError(
-                f'A {self._what} says that it has {size} bytes, but only {smallest} to {largest} '
-                f'are possible: {quote(bytes(self._buffer[start:]))}.'
+                f'A {self._what} says that it has {size} bytes, but only {min_size} to {max_size} '
+                f'are possible: {hex_text(bytes(self._buffer[start:]))}.'
             )
         return size
 
@@ -211,14 +211,14 @@ class LineBuffer:
         """
         if not data:
             if self._rest:
-                raise cut_off('line', self._rest)
+                raise truncated_stream('line', self._rest)
             return []
         *lines, self._rest = (self._rest + data).split(b'\n')
         for line in (*lines, self._rest):
             if len(line) > self._limit:
                 self._rest = b''
                 raise RemoteProtocolError(
-                    f'A line is longer than {self._limit} bytes: {quote(line)}.'
+                    f'A line is longer than {self._limit} bytes: {hex_text(line)}.'
                 )
         return [decode_text(line.removesuffix(b'\r')) for line in lines]
 
@@ -229,19 +229,19 @@ def decode_text(data: bytes) -> str:
 
 
 #: Longest text of a robot that is shown to people.
-_SHOWN = 400
+_MAX_SHOWN = 400
 
 
-def one_line(text: str) -> str:
+def to_single_line(text: str) -> str:
     """
     Return a text of a robot as it may stand in a log or a message: one line, of bounded length.
 
     Control characters could forge lines, or speak to the terminal.
     """
-    shown = ''.join(c if c.isprintable() else ' ' for c in text[:_SHOWN]).strip()
-    return f'{shown}...' if len(text) > _SHOWN else shown
+    shown = ''.join(c if c.isprintable() else ' ' for c in text[:_MAX_SHOWN]).strip()
+    return f'{shown}...' if len(text) > _MAX_SHOWN else shown
 
 
-def cut_off(what: str, rest: bytes) -> RemoteProtocolError:
+def truncated_stream(what: str, rest: bytes) -> RemoteProtocolError:
     """Return the error for a stream that ended too early."""
-    return RemoteProtocolError(f'The stream ended inside a {what}: {quote(rest)}.')
+    return RemoteProtocolError(f'The stream ended inside a {what}: {hex_text(rest)}.')

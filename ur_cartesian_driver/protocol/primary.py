@@ -5,7 +5,7 @@ The primary interface: state and messages from the controller, programs and comm
 
 To us: frames, big-endian. ``int32`` size of the whole frame, ``uint8`` type, body.
 
-* type 16, robot state: sub-packages, see :mod:`~ur_cartesian_driver.protocol.primary_state`; ten
+* type 16, robot state: sub-packages, see `primary_state`; ten
   times a second.
 * type 20, robot message: ``u64`` timestamp, ``i8`` source, ``u8`` message type, then
 
@@ -22,7 +22,7 @@ To us: frames, big-endian. ``int32`` size of the whole frame, ``uint8`` type, bo
   10    RuntimeException    u32 line, u32 column (from 1); text
   ====  ==================  ====================================================================
 
-* everything else is passed on as :class:`OtherFrame`.
+* everything else is passed on as :class:`RawFrame`.
 
 To the controller: text. A line is a command; ``def`` or ``sec`` begins a program, which replaces
 the running one (``sec``: runs beside it) when its ``end`` has come.
@@ -42,7 +42,7 @@ import struct
 from typing import Any, ClassVar, TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.protocol.framing import decode_text, FrameBuffer, quote
+from ur_cartesian_driver.protocol.framing import decode_text, FrameBuffer, hex_text
 from ur_cartesian_driver.protocol.primary_state import (
     AdditionalInfo,
     CalibrationData,
@@ -51,16 +51,16 @@ from ur_cartesian_driver.protocol.primary_state import (
     decode_sub_packages,
     encode_sub_package,
     ForceModeData,
-    Immi,
+    ImmiData,
     JointData,
     KinematicsInfo,
     MasterboardData,
     pack,
-    RawState,
+    RawSubPackage,
     RobotModeData,
     RobotType,
     SAFETY_DATA,
-    StatePackage,
+    SubPackage,
     ToolCommunication,
     ToolData,
     ToolModeInfo,
@@ -72,40 +72,40 @@ __all__ = [
     'AdditionalInfo',
     'CalibrationData',
     'CartesianInfo',
-    'Command',
     'ConfigurationData',
     'ErrorCodeMessage',
     'ForceModeData',
-    'Frame',
     'FrameType',
-    'Immi',
+    'ImmiData',
     'JointData',
     'KeyMessage',
     'KinematicsInfo',
     'MasterboardData',
-    'Message',
-    'OtherFrame',
+    'PrimaryCommand',
     'PrimaryDecoder',
+    'PrimaryFrame',
+    'PrimaryMessage',
+    'RawFrame',
     'RawMessage',
-    'RawState',
+    'RawSubPackage',
     'ReportLevel',
     'RobotModeData',
-    'RobotState',
+    'RobotStateFrame',
     'RobotType',
     'RuntimeExceptionMessage',
     'SafetyModeMessage',
-    'ScriptDecoder',
-    'StatePackage',
+    'ScriptUploadDecoder',
+    'SubPackage',
     'TextMessage',
     'ToolCommunication',
     'ToolData',
     'ToolModeInfo',
     'VersionMessage',
-    'command',
     'decode_frame',
+    'encode_command',
     'encode_message',
+    'encode_program',
     'encode_state',
-    'upload',
 ]
 
 
@@ -134,9 +134,9 @@ class ReportLevel(IntEnum):
 
 
 #: Largest frame that the manufacturer's library can read.
-LARGEST_SENT_FRAME = 4091
+MAX_SENT_FRAME_SIZE = 4091
 #: Frames with the values of all variables of a program can be long.
-LARGEST_FRAME = 1 << 20
+MAX_FRAME_SIZE = 1 << 20
 #: Sources of messages: the controller, and its motion control.
 SOURCE_CONTROLLER = -2
 SOURCE_MOTION = -3
@@ -286,7 +286,7 @@ class RawMessage:
         return self.content
 
 
-Message: TypeAlias = (
+PrimaryMessage: TypeAlias = (
     TextMessage
     | VersionMessage
     | SafetyModeMessage
@@ -298,24 +298,24 @@ Message: TypeAlias = (
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RobotState:
+class RobotStateFrame:
     """A robot state frame."""
 
-    packages: tuple[StatePackage, ...]
+    packages: tuple[SubPackage, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OtherFrame:
+class RawFrame:
     """A frame of another type, as it came."""
 
     frame_type: int
     body: bytes
 
 
-Frame: TypeAlias = RobotState | Message | OtherFrame
+PrimaryFrame: TypeAlias = RobotStateFrame | PrimaryMessage | RawFrame
 
 
-def encode_state(packages: Iterable[StatePackage]) -> bytes:
+def encode_state(packages: Iterable[SubPackage]) -> bytes:
     """
     Return a robot state frame.
 
@@ -324,7 +324,7 @@ def encode_state(packages: Iterable[StatePackage]) -> bytes:
     return _frame(FrameType.ROBOT_STATE, b''.join(map(encode_sub_package, packages)))
 
 
-def encode_message(message: Message) -> bytes:
+def encode_message(message: PrimaryMessage) -> bytes:
     """
     Return a robot message frame.
 
@@ -334,7 +334,7 @@ def encode_message(message: Message) -> bytes:
     return _frame(FrameType.ROBOT_MESSAGE, head + message.body())
 
 
-def decode_frame(data: bytes) -> Frame:
+def decode_frame(data: bytes) -> PrimaryFrame:
     """
     Return the content of one whole frame; the size field is not looked at.
 
@@ -343,10 +343,10 @@ def decode_frame(data: bytes) -> Frame:
     _, frame_type = unpack(_HEADER, data, 'primary frame')
     body = data[_HEADER.size :]
     if frame_type == FrameType.ROBOT_STATE:
-        return RobotState(packages=decode_sub_packages(body))
+        return RobotStateFrame(packages=decode_sub_packages(body))
     if frame_type == FrameType.ROBOT_MESSAGE:
         return _decode_message(body)
-    return OtherFrame(frame_type=frame_type, body=body)
+    return RawFrame(frame_type=frame_type, body=body)
 
 
 class PrimaryDecoder:
@@ -355,10 +355,10 @@ class PrimaryDecoder:
     def __init__(self) -> None:
         """Start empty."""
         self._frames = FrameBuffer(
-            width=4, smallest=_HEADER.size, largest=LARGEST_FRAME, what='primary frame'
+            size_width=4, min_size=_HEADER.size, max_size=MAX_FRAME_SIZE, what='primary frame'
         )
 
-    def feed(self, data: bytes) -> list[Frame]:
+    def feed(self, data: bytes) -> list[PrimaryFrame]:
         """
         Take bytes from the controller (none at all = its end) and return the frames in them.
 
@@ -370,14 +370,14 @@ class PrimaryDecoder:
 
 def _frame(frame_type: FrameType, body: bytes) -> bytes:
     size = _HEADER.size + len(body)
-    if size > LARGEST_SENT_FRAME:
+    if size > MAX_SENT_FRAME_SIZE:
         raise LocalProtocolError(
-            f'A primary frame has {size} bytes, but clients read {LARGEST_SENT_FRAME} at most.'
+            f'A primary frame has {size} bytes, but clients read {MAX_SENT_FRAME_SIZE} at most.'
         )
     return _HEADER.pack(size, frame_type) + body
 
 
-def _decode_message(body: bytes) -> Message:
+def _decode_message(body: bytes) -> PrimaryMessage:
     timestamp, source, message_type = unpack(_MESSAGE, body, 'robot message')
     content = body[_MESSAGE.size :]
     head = {'timestamp': timestamp, 'source': source}
@@ -391,7 +391,7 @@ def _version_message(content: bytes, head: dict[str, Any]) -> VersionMessage:
     (length,) = unpack(struct.Struct('>b'), content, 'version message')
     if length < 0:
         raise RemoteProtocolError(
-            f'A version message has a name of {length} bytes: {quote(content)}.'
+            f'A version message has a name of {length} bytes: {hex_text(content)}.'
         )
     end = 1 + length
     major, minor, bugfix, build = unpack(_VERSION, content, 'version message', end)
@@ -432,7 +432,7 @@ def _key_message(content: bytes, head: dict[str, Any]) -> KeyMessage:
     end = _KEY.size + length
     if len(content) < end:
         raise RemoteProtocolError(
-            f'A key message has a title of {length} bytes, but is shorter: {quote(content)}.'
+            f'A key message has a title of {length} bytes, but is shorter: {hex_text(content)}.'
         )
     return KeyMessage(
         code=code,
@@ -450,7 +450,7 @@ def _runtime_exception(content: bytes, head: dict[str, Any]) -> RuntimeException
     )
 
 
-_MESSAGES: Mapping[int, Callable[[bytes, dict[str, Any]], Message]] = {
+_MESSAGES: Mapping[int, Callable[[bytes, dict[str, Any]], PrimaryMessage]] = {
     TextMessage.message_type: lambda content, head: TextMessage(text=decode_text(content), **head),
     VersionMessage.message_type: _version_message,
     SafetyModeMessage.message_type: _safety_mode_message,
@@ -460,7 +460,7 @@ _MESSAGES: Mapping[int, Callable[[bytes, dict[str, Any]], Message]] = {
 }
 
 
-class Command(Enum):
+class PrimaryCommand(Enum):
     """Commands of one line that need no program."""
 
     POWER_ON = 'power on'
@@ -471,25 +471,25 @@ class Command(Enum):
     STOP_PROGRAM = 'stop program'
 
 
-def command(line: Command) -> bytes:
+def encode_command(line: PrimaryCommand) -> bytes:
     """Return the bytes of a command."""
     return line.value.encode() + b'\n'
 
 
-def upload(program_text: str) -> bytes:
+def encode_program(program_text: str) -> bytes:
     """Return the bytes that make the controller run a program."""
     return program_text.encode() + b'\n'
 
 
 #: Longest program that is believed [bytes]; it bounds the memory.
-LONGEST_PROGRAM = 4 << 20
+MAX_PROGRAM_SIZE = 4 << 20
 
 _FIRST_WORD = re.compile(r'\s*(\w+)')
 _PROGRAM_WORDS = frozenset({'def', 'sec'})
 _BLOCK_WORDS = frozenset({'def', 'sec', 'thread', 'if', 'while', 'for', 'switch'})
 
 
-class ScriptDecoder:
+class ScriptUploadDecoder:
     """
     Reads what a client sends to the controller: commands and whole programs.
 
@@ -512,9 +512,9 @@ class ScriptDecoder:
         """
         *lines, self._rest = (self._rest + (data or b'\n')).split(b'\n')
         texts = [text for line in lines if (text := self._line(line)) is not None]
-        if self._size + len(self._rest) > LONGEST_PROGRAM:
+        if self._size + len(self._rest) > MAX_PROGRAM_SIZE:
             raise RemoteProtocolError(
-                f'A program is longer than {LONGEST_PROGRAM} bytes: {quote(self._rest)}.'
+                f'A program is longer than {MAX_PROGRAM_SIZE} bytes: {hex_text(self._rest)}.'
             )
         if not data and self._program:
             texts.append(self._take())

@@ -45,7 +45,7 @@ from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocol
 from ur_cartesian_driver.motion.goal import ZERO6
 from ur_cartesian_driver.motion.pose import Vector6
 from ur_cartesian_driver.motion.state import RobotMode, SafetyMode
-from ur_cartesian_driver.protocol.framing import quote
+from ur_cartesian_driver.protocol.framing import hex_text
 
 Integers6: TypeAlias = tuple[int, int, int, int, int, int]
 Pair: TypeAlias = tuple[float, float]
@@ -106,13 +106,13 @@ def unpack(layout: struct.Struct, body: bytes, what: str, offset: int = 0) -> tu
     if len(body) < offset + layout.size:
         raise RemoteProtocolError(
             f'A {what} has at least {offset + layout.size} bytes, but {len(body)} came: '
-            f'{quote(body)}.'
+            f'{hex_text(body)}.'
         )
     return layout.unpack_from(body, offset)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RawState:
+class RawSubPackage:
     """A sub-package as it came."""
 
     sub_type: int
@@ -254,7 +254,7 @@ class ToolData:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Immi:
+class ImmiData:
     """The injection moulding machine interface (Euromap 67): bits, supply [V], current [A]."""
 
     input_bits: int = 0
@@ -289,7 +289,7 @@ class MasterboardData:
     io_current: float = 0.0
     safety_mode: int = SafetyMode.NORMAL
     reduced_mode: bool = False
-    immi: Immi | None = None
+    immi: ImmiData | None = None
     reserved_1: int = 0
     operational_mode_selector: int = 0
     three_position_enabling_device: bool = False
@@ -344,7 +344,7 @@ class MasterboardData:
         immi = None
         if v[16]:
             i = unpack(_BOARD_IMMI, body, 'masterboard data', offset)
-            immi = Immi(input_bits=i[0], output_bits=i[1], voltage_24v=i[2], current=i[3])
+            immi = ImmiData(input_bits=i[0], output_bits=i[1], voltage_24v=i[2], current=i[3])
             offset += _BOARD_IMMI.size
         if len(body) >= offset + 4:  # older software ends behind the reserved word
             body = body.ljust(offset + _BOARD_TAIL.size, b'\0')
@@ -620,9 +620,9 @@ class ToolModeInfo:
 
 
 #: The content is the manufacturer's own; only the size is known.
-SAFETY_DATA = RawState(sub_type=10, body=bytes(38))
+SAFETY_DATA = RawSubPackage(sub_type=10, body=bytes(38))
 
-StatePackage: TypeAlias = (
+SubPackage: TypeAlias = (
     RobotModeData
     | JointData
     | ToolData
@@ -635,17 +635,17 @@ StatePackage: TypeAlias = (
     | CalibrationData
     | ToolCommunication
     | ToolModeInfo
-    | RawState
+    | RawSubPackage
 )
 
 
-def encode_sub_package(package: StatePackage) -> bytes:
+def encode_sub_package(package: SubPackage) -> bytes:
     """Return a sub-package with its header."""
     body = package.encode()
     return pack(_SUB_HEADER, _SUB_HEADER.size + len(body), package.sub_type) + body
 
 
-def decode_sub_packages(body: bytes) -> tuple[StatePackage, ...]:
+def decode_sub_packages(body: bytes) -> tuple[SubPackage, ...]:
     """
     Return the sub-packages of a state frame without the frame's header.
 
@@ -654,19 +654,21 @@ def decode_sub_packages(body: bytes) -> tuple[StatePackage, ...]:
 
     :raises RemoteProtocolError: a size is impossible, or a body that is read is too short.
     """
-    packages: list[StatePackage] = []
+    packages: list[SubPackage] = []
     start = 0
     while start < len(body):
         size, sub_type = unpack(_SUB_HEADER, body, 'state sub-package', start)
         if not _SUB_HEADER.size <= size <= len(body) - start:
             raise RemoteProtocolError(
                 f'A state sub-package says that it has {size} bytes, but {len(body) - start} '
-                f'are left: {quote(body[start:])}.'
+                f'are left: {hex_text(body[start:])}.'
             )
         content = body[start + _SUB_HEADER.size : start + size]
         reader = _READ.get(sub_type)
         packages.append(
-            RawState(sub_type=sub_type, body=content) if reader is None else reader.decode(content)
+            RawSubPackage(sub_type=sub_type, body=content)
+            if reader is None
+            else reader.decode(content)
         )
         start += size
     return tuple(packages)

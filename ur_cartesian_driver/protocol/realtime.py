@@ -29,12 +29,12 @@ from typing import cast, Final
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.goal import ZERO6
 from ur_cartesian_driver.motion.pose import Vector3, Vector6
-from ur_cartesian_driver.protocol.framing import quote
+from ur_cartesian_driver.protocol.framing import hex_text
 
 ZERO3: Final[Vector3] = (0.0, 0.0, 0.0)
 
 #: Size of the packet [bytes] from a version (major, minor) on, oldest first.
-_SIZES: Final = (
+_PACKET_SIZES: Final = (
     ((3, 2), 1060),
     ((3, 5), 1108),
     ((3, 10), 1116),
@@ -44,7 +44,7 @@ _SIZES: Final = (
     ((5, 9), 1140),
     ((5, 10), 1220),
 )
-SIZES: Final = frozenset(size for _, size in _SIZES)
+PACKET_SIZES: Final = frozenset(size for _, size in _PACKET_SIZES)
 _SIZE = struct.Struct('>i')
 
 
@@ -114,8 +114,10 @@ class RealtimeData:
         :param size: see :func:`packet_size`; what does not fit into it is left out.
         :raises LocalProtocolError: no packet has this size.
         """
-        if size not in SIZES:
-            raise LocalProtocolError(f'A real-time packet has {sorted(SIZES)} bytes, not {size}.')
+        if size not in PACKET_SIZES:
+            raise LocalProtocolError(
+                f'A real-time packet has {sorted(PACKET_SIZES)} bytes, not {size}.'
+            )
         numbers = [number for field in fields(self) for number in _flat(getattr(self, field.name))]
         count = _count(size)
         return struct.pack(f'>i{count}d', size, *numbers[:count])
@@ -127,8 +129,8 @@ def packet_size(version: tuple[int, ...]) -> int:
 
     :param version: of PolyScope: major, minor, and more that does not matter.
     """
-    found = _SIZES[0][1]
-    for first, size in _SIZES:
+    found = _PACKET_SIZES[0][1]
+    for first, size in _PACKET_SIZES:
         if version[:2] >= first:
             found = size
     return found
@@ -141,9 +143,9 @@ def decode_packet(data: bytes) -> RealtimeData:
     :raises RemoteProtocolError: the size is wrong.
     """
     stated = _SIZE.unpack_from(data)[0] if len(data) >= _SIZE.size else 0
-    if stated != len(data) or stated < min(SIZES) or (stated - _SIZE.size) % 8:
+    if stated != len(data) or stated < min(PACKET_SIZES) or (stated - _SIZE.size) % 8:
         raise RemoteProtocolError(
-            f'A real-time packet of {len(data)} bytes says that it has {stated}: {quote(data)}.'
+            f'A real-time packet of {len(data)} bytes says that it has {stated}: {hex_text(data)}.'
         )
     count = min(_count(stated), _ENDS[-1])
     numbers = struct.unpack_from(f'>{count}d', data, _SIZE.size)
@@ -171,9 +173,9 @@ class RealtimeDecoder:
         self._rest += data
         while len(self._rest) >= _SIZE.size:
             size = _SIZE.unpack_from(self._rest)[0]
-            if not min(SIZES) <= size <= 4 * max(SIZES):
+            if not min(PACKET_SIZES) <= size <= 4 * max(PACKET_SIZES):
                 raise RemoteProtocolError(
-                    f'A real-time packet says that it has {size} bytes: {quote(self._rest)}.'
+                    f'A real-time packet says that it has {size} bytes: {hex_text(self._rest)}.'
                 )
             if len(self._rest) < size:
                 return

@@ -102,7 +102,7 @@ class ExternalError(IntEnum):
 POINTS_BEGUN = OutputInteger.POINTS_BEGUN
 
 
-def field(
+def register_name(
     register: InputInteger | InputDouble | OutputInteger | OutputDouble, offset: int = 0
 ) -> str:
     """
@@ -115,28 +115,28 @@ def field(
     return f'{direction}_{kind}_register_{register + offset}'
 
 
-def six_fields(register: InputDouble) -> tuple[str, ...]:
+def six_register_names(register: InputDouble) -> tuple[str, ...]:
     """Return the names of a group of six registers, joint by joint."""
-    return tuple(field(register, joint) for joint in range(6))
+    return tuple(register_name(register, joint) for joint in range(6))
 
 
 #: The input recipe of the buffered servo, in this order.
 SERVO_INPUTS = (
-    field(InputInteger.DESIRED_MODE),
-    field(InputInteger.SEQUENCE_ID),
-    field(InputInteger.EXTERNAL_ERROR),
-    field(InputInteger.EXTERNAL_SYNC_STATE),
-    *six_fields(InputDouble.DESIRED_JOINT_POSITIONS),
-    *six_fields(InputDouble.MAX_JOINT_DIVERGENCE_THRESHOLDS),
-    field(InputDouble.STATE_TIME),
+    register_name(InputInteger.DESIRED_MODE),
+    register_name(InputInteger.SEQUENCE_ID),
+    register_name(InputInteger.EXTERNAL_ERROR),
+    register_name(InputInteger.EXTERNAL_SYNC_STATE),
+    *six_register_names(InputDouble.DESIRED_JOINT_POSITIONS),
+    *six_register_names(InputDouble.MAX_JOINT_DIVERGENCE_THRESHOLDS),
+    register_name(InputDouble.STATE_TIME),
 )
 #: What the buffered servo reports, in this order: first what the guide's program does, too.
 SERVO_OUTPUTS = (
-    field(OutputInteger.ACTUAL_MODE),
-    field(OutputInteger.LAST_SEQUENCE_ID),
-    field(OutputDouble.LAG_TIME),
+    register_name(OutputInteger.ACTUAL_MODE),
+    register_name(OutputInteger.LAST_SEQUENCE_ID),
+    register_name(OutputDouble.LAG_TIME),
     *(
-        field(register)
+        register_name(register)
         for register in (
             OutputInteger.SETPOINTS_DONE,
             OutputInteger.REPEATS,

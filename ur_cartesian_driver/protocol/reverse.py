@@ -32,7 +32,7 @@ The sender must
 * end or cancel a stream before the next START, which would else swallow the new points.
 
 ``BUFFERED_SERVO`` is a mode of our own robot program, whose words 1 to 6 have no meaning either.
-The streams came with URCL 2.14 (see :mod:`~ur_cartesian_driver.protocol.dialects`). All else here
+The streams came with URCL 2.14 (see `dialects`). All else here
 has had its place and scale since URCL 2.0.
 """
 
@@ -46,14 +46,14 @@ from typing import cast, TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.pose import Vector6
-from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
+from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST_DIALECT
 from ur_cartesian_driver.protocol.framing import (
     checked_int32,
     checked_size,
     from_fixed,
+    hex_text,
     INT32_MAX,
     INT32_MIN,
-    quote,
     RecordBuffer,
     to_fixed,
 )
@@ -128,7 +128,7 @@ _VALUE_NAMES = {
     ControlMode.TORQUE: 'torque',
 }
 
-Words: TypeAlias = tuple[int, int, int, int, int, int]
+MessageWords: TypeAlias = tuple[int, int, int, int, int, int]
 
 _MESSAGE = struct.Struct('>8i')
 
@@ -145,7 +145,7 @@ class ReverseMessage:
 
     read_timeout: int
     mode: ControlMode
-    payload: Words = (0, 0, 0, 0, 0, 0)
+    payload: MessageWords = (0, 0, 0, 0, 0, 0)
 
     def __post_init__(self) -> None:
         """Check everything, so that no invalid message exists."""
@@ -173,11 +173,13 @@ class ReverseMessage:
         words = _MESSAGE.unpack(checked_size(data, MESSAGE_SIZE, 'reverse message'))
         try:
             return cls(
-                read_timeout=words[0], mode=ControlMode(words[7]), payload=cast(Words, words[1:7])
+                read_timeout=words[0],
+                mode=ControlMode(words[7]),
+                payload=cast(MessageWords, words[1:7]),
             )
         except (ValueError, LocalProtocolError) as error:
             raise RemoteProtocolError(
-                f'A reverse message is wrong: {error} {quote(data)}'
+                f'A reverse message is wrong: {error} {hex_text(data)}'
             ) from None
 
     @property
@@ -231,7 +233,7 @@ def trajectory(
     count: int = 0,
     read_timeout: int = 200,
     step_time: int = DEFAULT_STEP_TIME,
-    dialect: Dialect = NEWEST,
+    dialect: Dialect = NEWEST_DIALECT,
 ) -> ReverseMessage:
     """
     Return the message that starts, ends, cancels or keeps alive a trajectory.
@@ -239,7 +241,7 @@ def trajectory(
     :param count: number of points: START, STREAM_END, CANCEL of a stream.
     :raises LocalProtocolError: the dialect has no such action; a program would ignore it.
     """
-    if action in _STREAMS and not dialect.streams:
+    if action in _STREAMS and not dialect.supports_append:
         raise LocalProtocolError(
             f'{action.name} does not exist in wire dialect {dialect.name}: its trajectories have '
             'a number of points that is known at their start.'
@@ -286,7 +288,7 @@ def setpoint(
     return ReverseMessage(
         read_timeout=read_timeout_for(mode, read_timeout, step_time),
         mode=mode,
-        payload=cast(Words, words),
+        payload=cast(MessageWords, words),
     )
 
 

@@ -28,7 +28,7 @@ counts as that reply. Up to five other packages out of turn are reported and bor
 
 The packages themselves, with the controller's side of them, are in
 :mod:`~ur_cartesian_driver.protocol.rtde_packages` and can be imported from here too; what a
-controller does with a whole connection is in :mod:`~ur_cartesian_driver.protocol.rtde_server`.
+controller does with a whole connection is in `rtde_server`.
 """
 
 from __future__ import annotations
@@ -43,71 +43,71 @@ from ur_cartesian_driver.protocol.rtde_fields import DataType, INPUT_TYPES, OUTP
 from ur_cartesian_driver.protocol.rtde_packages import (
     Acknowledgement,
     ControllerVersion,
-    Data,
+    DataPackage,
     decode_reply,
     decode_request,
     GetControllerVersion,
     IN_USE,
-    InputsReply,
-    NEWEST_VERSION,
+    LATEST_PROTOCOL_VERSION,
     NOT_FOUND,
-    OutputsReply,
     PackageType,
-    Pause,
+    PauseStreaming,
     Recipe,
-    Reply,
-    Request,
     RequestProtocolVersion,
     RtdeFrameBuffer,
+    RtdeReply,
+    RtdeRequest,
+    RtdeTextMessage,
+    RtdeValue,
+    RtdeValues,
     SetupInputs,
+    SetupInputsReply,
     SetupOutputs,
-    Start,
-    TextMessage,
-    Value,
-    Values,
+    SetupOutputsReply,
+    StartStreaming,
 )
 
 __all__ = [
     'INPUT_TYPES',
     'IN_USE',
-    'NEWEST_VERSION',
+    'LATEST_PROTOCOL_VERSION',
     'NOT_FOUND',
     'OUTPUT_TYPES',
     'Acknowledgement',
     'ControllerVersion',
-    'Data',
+    'DataPackage',
     'DataReceived',
     'DataType',
     'FieldsNotFound',
-    'ForeignPackage',
     'GetControllerVersion',
+    'HandshakeDone',
     'InputsInUse',
-    'InputsReply',
-    'OutputsReply',
     'PackageType',
-    'Pause',
-    'Ready',
+    'PauseStreaming',
     'Recipe',
-    'Reply',
-    'Request',
     'RequestProtocolVersion',
-    'RtdeClient',
+    'RtdeClientCodec',
     'RtdeEvent',
     'RtdeFrameBuffer',
+    'RtdeReply',
+    'RtdeRequest',
     'RtdeState',
+    'RtdeTextMessage',
+    'RtdeValue',
+    'RtdeValues',
     'SetupInputs',
+    'SetupInputsReply',
     'SetupOutputs',
-    'Start',
-    'TextMessage',
-    'Value',
-    'Values',
+    'SetupOutputsReply',
+    'StartStreaming',
+    'UnexpectedPackage',
     'decode_reply',
     'decode_request',
-    'greatest_frequency',
+    'max_frequency',
 ]
 
 #: How many packages out of turn are borne in each state of the handshake.
-FOREIGN_PACKAGES = 5
+MAX_UNEXPECTED_PACKAGES = 5
 
 
 class FieldsNotFound(RemoteProtocolError):
@@ -148,7 +148,7 @@ class RtdeState(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ready:
+class HandshakeDone:
     """
     The handshake is over and data come.
 
@@ -170,25 +170,25 @@ class Ready:
 class DataReceived:
     """Values in the order of ``Ready.outputs``; vectors are tuples."""
 
-    values: Values
+    values: RtdeValues
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ForeignPackage:
+class UnexpectedPackage:
     """A package that nobody asked for; of no consequence, but worth a line in a log."""
 
-    package: Reply
+    package: RtdeReply
 
 
-RtdeEvent: TypeAlias = Ready | DataReceived | TextMessage | ForeignPackage
+RtdeEvent: TypeAlias = HandshakeDone | DataReceived | RtdeTextMessage | UnexpectedPackage
 
 
-def greatest_frequency(version: ControllerVersion) -> float:
+def max_frequency(version: ControllerVersion) -> float:
     """Return the rate of the controller [Hz]: 125 before software 5, 500 since."""
     return 125.0 if version.major < 5 else 500.0
 
 
-class RtdeClient:
+class RtdeClientCodec:
     """One RTDE connection, seen from the client; use it once."""
 
     def __init__(
@@ -211,9 +211,11 @@ class RtdeClient:
         """
         self._groups = [tuple(group) for group in (inputs, *input_groups) if group]
         for names in (outputs, [name for group in self._groups for name in group]):
-            twice = sorted({name for name in names if list(names).count(name) > 1})
-            if twice:
-                raise LocalProtocolError(f'{", ".join(twice)} stands twice in an RTDE recipe.')
+            duplicates = sorted({name for name in names if list(names).count(name) > 1})
+            if duplicates:
+                raise LocalProtocolError(
+                    f'{", ".join(duplicates)} stands twice in an RTDE recipe.'
+                )
         if not outputs or not 0.0 <= frequency <= 500.0:
             raise LocalProtocolError(
                 f'An RTDE connection needs outputs and a frequency of 0 to 500 Hz, but '
@@ -224,11 +226,11 @@ class RtdeClient:
         self._optional = frozenset(optional_outputs)
         self._missing: tuple[str, ...] = ()
         self._frequency = frequency
-        self._version = NEWEST_VERSION
+        self._version = LATEST_PROTOCOL_VERSION
         self._controller = ControllerVersion(major=0, minor=0, bugfix=0)
         self._recipe: Recipe | None = None
         self._inputs: list[Recipe] = []
-        self._foreign = 0
+        self._unexpected = 0
         self._frames = RtdeFrameBuffer()
         self._to_send = b''
 
@@ -239,8 +241,10 @@ class RtdeClient:
         :raises LocalProtocolError: it was started before.
         """
         if self.state is not RtdeState.NEW:
-            raise LocalProtocolError('An RtdeClient serves one connection; make a new one.')
-        self._ask(RtdeState.PROTOCOL_VERSION, RequestProtocolVersion(version=self._version))
+            raise LocalProtocolError('An RtdeClientCodec serves one connection; make a new one.')
+        self._send_request(
+            RtdeState.PROTOCOL_VERSION, RequestProtocolVersion(version=self._version)
+        )
         return self.data_to_send()
 
     def data_to_send(self) -> bytes:
@@ -248,7 +252,7 @@ class RtdeClient:
         data, self._to_send = self._to_send, b''
         return data
 
-    def values_in(self, data: bytes) -> Values | None:
+    def values_in(self, data: bytes) -> RtdeValues | None:
         """
         Return the values where the bytes are one data package and no more, as nearly always.
 
@@ -289,16 +293,18 @@ class RtdeClient:
         ):
             return [DataReceived(self._recipe.unpack(frame[3:]))]
         reply = decode_reply(frame, self._version)
-        if isinstance(reply, TextMessage):
+        if isinstance(reply, RtdeTextMessage):
             return [reply]
-        if self.state is RtdeState.START and isinstance(reply, Data):
+        if self.state is RtdeState.START and isinstance(reply, DataPackage):
             return [*self._ready(), *self._frame(frame)]
         expected, handle = self._handlers().get(self.state, (None, None))
         if handle is None or PackageType(frame[2]) is not expected:
-            return self._out_of_turn(reply)
+            return self._handle_unexpected(reply)
         return handle(reply)
 
-    def _handlers(self) -> dict[RtdeState, tuple[PackageType, Callable[[Reply], list[RtdeEvent]]]]:
+    def _handlers(
+        self,
+    ) -> dict[RtdeState, tuple[PackageType, Callable[[RtdeReply], list[RtdeEvent]]]]:
         """Return state -> the package that it waits for, and what is done with it."""
         return {
             RtdeState.PROTOCOL_VERSION: (
@@ -314,56 +320,58 @@ class RtdeClient:
             RtdeState.START: (PackageType.CONTROL_PACKAGE_START, self._on_start),
         }
 
-    def _ask(self, state: RtdeState, request: Request) -> list[RtdeEvent]:
+    def _send_request(self, state: RtdeState, request: RtdeRequest) -> list[RtdeEvent]:
         """Send a request and wait for its answer."""
         self.state = state
-        self._foreign = 0
+        self._unexpected = 0
         self._to_send += request.encode()
         return []
 
-    def _out_of_turn(self, reply: Reply) -> list[RtdeEvent]:
-        late_start = (
+    def _handle_unexpected(self, reply: RtdeReply) -> list[RtdeEvent]:
+        is_late_start = (
             self.state is RtdeState.READY
             and isinstance(reply, Acknowledgement)
             and reply.type is PackageType.CONTROL_PACKAGE_START
         )
-        if late_start:  # the data overtook the reply
+        if is_late_start:  # the data overtook the reply
             return self._on_start(reply)
         if self.state is not RtdeState.READY:
-            self._foreign += 1
-            if self._foreign > FOREIGN_PACKAGES:
+            self._unexpected += 1
+            if self._unexpected > MAX_UNEXPECTED_PACKAGES:
                 raise RemoteProtocolError(
-                    f'The robot sent {self._foreign} RTDE packages out of turn, expected was '
+                    f'The robot sent {self._unexpected} RTDE packages out of turn, expected was '
                     f'{self.state.value}; the last one was {reply!r:.200}.'
                 )
-        return [ForeignPackage(package=reply)]
+        return [UnexpectedPackage(package=reply)]
 
-    def _on_protocol_version(self, reply: Reply) -> list[RtdeEvent]:
-        if _accepted(reply):
-            return self._ask(RtdeState.CONTROLLER_VERSION, GetControllerVersion())
+    def _on_protocol_version(self, reply: RtdeReply) -> list[RtdeEvent]:
+        if _require_accepted(reply):
+            return self._send_request(RtdeState.CONTROLLER_VERSION, GetControllerVersion())
         if self._version == 1:
             raise RemoteProtocolError('The robot speaks neither version 2 nor version 1 of RTDE.')
         self._version = 1
-        return self._ask(RtdeState.PROTOCOL_VERSION, RequestProtocolVersion(version=1))
+        return self._send_request(RtdeState.PROTOCOL_VERSION, RequestProtocolVersion(version=1))
 
-    def _on_controller_version(self, reply: Reply) -> list[RtdeEvent]:
+    def _on_controller_version(self, reply: RtdeReply) -> list[RtdeEvent]:
         assert isinstance(reply, ControllerVersion)
         self._controller = reply
-        greatest = greatest_frequency(reply)
-        if self._frequency > greatest:
+        limit = max_frequency(reply)
+        if self._frequency > limit:
             raise LocalProtocolError(
-                f'The robot, software {reply}, streams at {greatest:g} Hz at most, but '
+                f'The robot, software {reply}, streams at {limit:g} Hz at most, but '
                 f'{self._frequency:g} Hz were asked for.'
             )
-        self._frequency = self._frequency or greatest
-        return self._ask_outputs()
+        self._frequency = self._frequency or limit
+        return self._request_outputs()
 
-    def _ask_outputs(self) -> list[RtdeEvent]:
+    def _request_outputs(self) -> list[RtdeEvent]:
         frequency = None if self._version == 1 else self._frequency
-        return self._ask(RtdeState.OUTPUTS, SetupOutputs(names=self._outputs, frequency=frequency))
+        return self._send_request(
+            RtdeState.OUTPUTS, SetupOutputs(names=self._outputs, frequency=frequency)
+        )
 
-    def _on_outputs(self, reply: Reply) -> list[RtdeEvent]:
-        assert isinstance(reply, OutputsReply)
+    def _on_outputs(self, reply: RtdeReply) -> list[RtdeEvent]:
+        assert isinstance(reply, SetupOutputsReply)
         names = self._outputs
         _check_count(reply.types, names)
         missing = [n for n, text in zip(names, reply.types, strict=True) if text == NOT_FOUND]
@@ -373,22 +381,24 @@ class RtdeClient:
         if missing:
             self._missing += tuple(missing)
             self._outputs = tuple(name for name in names if name not in missing)
-            return self._ask_outputs()
+            return self._request_outputs()
         types = [
             _type(name, text, OUTPUT_TYPES.get(name))
             for name, text in zip(names, reply.types, strict=True)
         ]
         self._recipe = Recipe(names, types, reply.recipe_id)
-        return self._ask_inputs()
+        return self._request_inputs()
 
-    def _ask_inputs(self) -> list[RtdeEvent]:
+    def _request_inputs(self) -> list[RtdeEvent]:
         """Ask for the next group of inputs, or start when all are agreed."""
         if len(self._inputs) < len(self._groups):
-            return self._ask(RtdeState.INPUTS, SetupInputs(names=self._groups[len(self._inputs)]))
-        return self._ask(RtdeState.START, Start())
+            return self._send_request(
+                RtdeState.INPUTS, SetupInputs(names=self._groups[len(self._inputs)])
+            )
+        return self._send_request(RtdeState.START, StartStreaming())
 
-    def _on_inputs(self, reply: Reply) -> list[RtdeEvent]:
-        assert isinstance(reply, InputsReply)
+    def _on_inputs(self, reply: RtdeReply) -> list[RtdeEvent]:
+        assert isinstance(reply, SetupInputsReply)
         names = self._groups[len(self._inputs)]
         _check_count(reply.types, names)
         answers = list(zip(names, reply.types, strict=True))
@@ -398,10 +408,10 @@ class RtdeClient:
             raise InputsInUse(taken)
         types = [_type(name, text, INPUT_TYPES.get(name)) for name, text in answers]
         self._inputs.append(Recipe(names, types, reply.recipe_id))
-        return self._ask_inputs()
+        return self._request_inputs()
 
-    def _on_start(self, reply: Reply) -> list[RtdeEvent]:
-        if not _accepted(reply):
+    def _on_start(self, reply: RtdeReply) -> list[RtdeEvent]:
+        if not _require_accepted(reply):
             raise RemoteProtocolError('The robot refused to start the RTDE data.')
         return [] if self.state is RtdeState.READY else self._ready()
 
@@ -409,7 +419,7 @@ class RtdeClient:
         assert self._recipe is not None
         self.state = RtdeState.READY
         return [
-            Ready(
+            HandshakeDone(
                 protocol_version=self._version,
                 controller_version=self._controller,
                 frequency=self._frequency,
@@ -420,7 +430,7 @@ class RtdeClient:
         ]
 
 
-def _accepted(reply: Reply) -> bool:
+def _require_accepted(reply: RtdeReply) -> bool:
     return isinstance(reply, Acknowledgement) and reply.accepted
 
 
@@ -432,7 +442,7 @@ def _check_count(types: Sequence[str], names: Sequence[str]) -> None:
         )
 
 
-def _type(name: str, text: str, usual: DataType | None) -> DataType:
+def _type(name: str, text: str, expected_type: DataType | None) -> DataType:
     """
     Return the type that the controller states.
 
@@ -441,8 +451,8 @@ def _type(name: str, text: str, usual: DataType | None) -> DataType:
     """
     if text in DataType.__members__:
         return DataType[text]
-    if usual is None:
+    if expected_type is None:
         raise RemoteProtocolError(
             f'The robot says that the RTDE field {name} is of type {text!r:.60}, which is unknown.'
         )
-    return usual
+    return expected_type

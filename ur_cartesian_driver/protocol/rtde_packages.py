@@ -40,7 +40,7 @@ import struct
 from typing import Any, cast, TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.protocol.framing import decode_text, FrameBuffer, quote
+from ur_cartesian_driver.protocol.framing import decode_text, FrameBuffer, hex_text
 from ur_cartesian_driver.protocol.rtde_fields import DataType
 
 
@@ -59,15 +59,15 @@ class PackageType(IntEnum):
 
 NOT_FOUND = 'NOT_FOUND'
 IN_USE = 'IN_USE'
-NEWEST_VERSION = 2
+LATEST_PROTOCOL_VERSION = 2
 
 _HEADER = struct.Struct('>HB')
 _VERSION = struct.Struct('>4I')
 
 #: A number, a flag, or a vector of numbers.
-Value: TypeAlias = int | float | tuple[float, ...]
+RtdeValue: TypeAlias = int | float | tuple[float, ...]
 #: Values in the order of a recipe.
-Values: TypeAlias = tuple[Value, ...]
+RtdeValues: TypeAlias = tuple[RtdeValue, ...]
 
 
 class RtdeFrameBuffer(FrameBuffer):
@@ -75,7 +75,7 @@ class RtdeFrameBuffer(FrameBuffer):
 
     def __init__(self) -> None:
         """Start empty."""
-        super().__init__(width=2, smallest=3, largest=65535, what='RTDE package')
+        super().__init__(size_width=2, min_size=3, max_size=65535, what='RTDE package')
 
 
 class Recipe:
@@ -126,7 +126,7 @@ class Recipe:
         # With a single key itemgetter gives the bare item, so that case is left to unpack().
         self._pick = itemgetter(*keys) if len(keys) > 1 else None
 
-    def unpack(self, payload: bytes) -> Values:
+    def unpack(self, payload: bytes) -> RtdeValues:
         """
         Return the values of a data package without its first three bytes; vectors are tuples.
 
@@ -137,20 +137,20 @@ class Recipe:
         if len(payload) != self._size:
             raise RemoteProtocolError(
                 f'An RTDE data package of this recipe has {self._size} bytes, but {len(payload)} '
-                f'came: {quote(payload)}.'
+                f'came: {hex_text(payload)}.'
             )
         flat = self._struct.unpack(payload)
         if self._pick is None:
             return flat if len(flat) == 1 else (flat,)
-        return cast(Values, self._pick(flat))
+        return cast(RtdeValues, self._pick(flat))
 
-    def unpack_frame(self, data: bytes) -> Values | None:
+    def unpack_frame(self, data: bytes) -> RtdeValues | None:
         """Return the values of a whole frame; None where the bytes are anything else."""
         if len(data) != self._frame.size or self._pick is None or data[:3] != self._head:
             return None
-        return cast(Values, self._pick(self._struct.unpack_from(data, _HEADER.size)))
+        return cast(RtdeValues, self._pick(self._struct.unpack_from(data, _HEADER.size)))
 
-    def pack(self, values: Sequence[Value]) -> bytes:
+    def pack(self, values: Sequence[RtdeValue]) -> bytes:
         """
         Return the whole frame of a data package.
 
@@ -166,12 +166,12 @@ class Recipe:
                 elif len(value) == length:  # type: ignore[arg-type]
                     flat.extend(value)  # type: ignore[arg-type]
                 else:
-                    raise self._why_not(values)
+                    raise self._packing_error(values)
             return self._frame.pack(self._frame.size, PackageType.DATA_PACKAGE, *flat)
         except (struct.error, OverflowError, TypeError, ValueError):
-            raise self._why_not(values) from None
+            raise self._packing_error(values) from None
 
-    def pack_named(self, values: Mapping[str, Value]) -> bytes:
+    def pack_named(self, values: Mapping[str, RtdeValue]) -> bytes:
         """
         Return the whole frame of a data package with values by name.
 
@@ -186,11 +186,11 @@ class Recipe:
             )
         return self.pack([values[name] for name in self.names])
 
-    def named(self, values: Values) -> dict[str, Value]:
+    def named(self, values: RtdeValues) -> dict[str, RtdeValue]:
         """Return values by name."""
         return dict(zip(self.names, values, strict=True))
 
-    def zeros(self) -> Values:
+    def zeros(self) -> RtdeValues:
         """Return zero for each field."""
         return tuple(0 if t.length == 1 else (0,) * t.length for t in self.types)
 
@@ -214,7 +214,7 @@ class Recipe:
     def _key(self) -> tuple[object, ...]:
         return self.names, self.types, self.recipe_id
 
-    def _why_not(self, values: Sequence[Value]) -> LocalProtocolError:
+    def _packing_error(self, values: Sequence[RtdeValue]) -> LocalProtocolError:
         """Return the error that names the value which cannot be packed."""
         if len(values) != len(self.names):
             return LocalProtocolError(
@@ -223,12 +223,12 @@ class Recipe:
         problems = [
             f'{name} is {value!r}, which is no {data_type.name}'
             for name, data_type, value in zip(self.names, self.types, values, strict=True)
-            if not _fits(data_type, value)
+            if not _fits_type(data_type, value)
         ]
         return LocalProtocolError('; '.join(problems) + '.')
 
 
-def _fits(data_type: DataType, value: Any) -> bool:
+def _fits_type(data_type: DataType, value: Any) -> bool:
     try:
         struct.pack(f'>{data_type.codes}', *(value if data_type.length > 1 else (value,)))
     except (struct.error, OverflowError, TypeError):
@@ -244,7 +244,9 @@ class RequestProtocolVersion:
 
     def encode(self) -> bytes:
         """Return the frame."""
-        return frame(PackageType.REQUEST_PROTOCOL_VERSION, _packed('>H', self.version))
+        return encode_frame(
+            PackageType.REQUEST_PROTOCOL_VERSION, _pack_checked('>H', self.version)
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -253,7 +255,7 @@ class GetControllerVersion:
 
     def encode(self) -> bytes:
         """Return the frame."""
-        return frame(PackageType.GET_URCONTROL_VERSION)
+        return encode_frame(PackageType.GET_URCONTROL_VERSION)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -265,8 +267,10 @@ class SetupOutputs:
 
     def encode(self) -> bytes:
         """Return the frame."""
-        head = b'' if self.frequency is None else _packed('>d', self.frequency)
-        return frame(PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS, head + join(self.names))
+        head = b'' if self.frequency is None else _pack_checked('>d', self.frequency)
+        return encode_frame(
+            PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS, head + encode_names(self.names)
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -277,29 +281,29 @@ class SetupInputs:
 
     def encode(self) -> bytes:
         """Return the frame."""
-        return frame(PackageType.CONTROL_PACKAGE_SETUP_INPUTS, join(self.names))
+        return encode_frame(PackageType.CONTROL_PACKAGE_SETUP_INPUTS, encode_names(self.names))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Start:
+class StartStreaming:
     """Client: start streaming."""
 
     def encode(self) -> bytes:
         """Return the frame."""
-        return frame(PackageType.CONTROL_PACKAGE_START)
+        return encode_frame(PackageType.CONTROL_PACKAGE_START)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pause:
+class PauseStreaming:
     """Client: pause streaming."""
 
     def encode(self) -> bytes:
         """Return the frame."""
-        return frame(PackageType.CONTROL_PACKAGE_PAUSE)
+        return encode_frame(PackageType.CONTROL_PACKAGE_PAUSE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Data:
+class DataPackage:
     """Either side: values, to be read with a recipe; the payload includes a recipe id."""
 
     payload: bytes
@@ -311,11 +315,11 @@ class Data:
 
     def encode(self) -> bytes:
         """Return the frame."""
-        return frame(PackageType.DATA_PACKAGE, self.payload)
+        return encode_frame(PackageType.DATA_PACKAGE, self.payload)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TextMessage:
+class RtdeTextMessage:
     """
     Either side: a text for the log.
 
@@ -326,19 +330,23 @@ class TextMessage:
     source: str = ''
     level: int = 3
 
-    def encode(self, version: int = NEWEST_VERSION) -> bytes:
+    def encode(self, version: int = LATEST_PROTOCOL_VERSION) -> bytes:
         """Return the frame."""
         text, source = self.text.encode(), self.source.encode()
         if version == 1:
-            return frame(PackageType.TEXT_MESSAGE, _packed('>B', self.level) + text)
+            return encode_frame(PackageType.TEXT_MESSAGE, _pack_checked('>B', self.level) + text)
         if max(len(text), len(source)) > 255:
             raise LocalProtocolError(
                 f'text has {len(text)} and source {len(source)} bytes, but an RTDE text message '
                 'holds at most 255 of each.'
             )
-        return frame(
+        return encode_frame(
             PackageType.TEXT_MESSAGE,
-            bytes([len(text)]) + text + bytes([len(source)]) + source + _packed('>B', self.level),
+            bytes([len(text)])
+            + text
+            + bytes([len(source)])
+            + source
+            + _pack_checked('>B', self.level),
         )
 
 
@@ -351,7 +359,7 @@ class Acknowledgement:
 
     def encode(self) -> bytes:
         """Return the frame."""
-        return frame(self.type, bytes([self.accepted]))
+        return encode_frame(self.type, bytes([self.accepted]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -365,9 +373,9 @@ class ControllerVersion:
 
     def encode(self) -> bytes:
         """Return the frame."""
-        return frame(
+        return encode_frame(
             PackageType.GET_URCONTROL_VERSION,
-            _packed('>4I', self.major, self.minor, self.bugfix, self.build),
+            _pack_checked('>4I', self.major, self.minor, self.bugfix, self.build),
         )
 
     def __str__(self) -> str:
@@ -376,7 +384,7 @@ class ControllerVersion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OutputsReply:
+class SetupOutputsReply:
     """Controller: types of the outputs as text; the recipe id is None in version 1."""
 
     types: tuple[str, ...]
@@ -384,12 +392,14 @@ class OutputsReply:
 
     def encode(self) -> bytes:
         """Return the frame."""
-        head = b'' if self.recipe_id is None else _packed('>B', self.recipe_id)
-        return frame(PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS, head + join(self.types))
+        head = b'' if self.recipe_id is None else _pack_checked('>B', self.recipe_id)
+        return encode_frame(
+            PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS, head + encode_names(self.types)
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class InputsReply:
+class SetupInputsReply:
     """Controller: types of the inputs as text."""
 
     types: tuple[str, ...]
@@ -397,28 +407,33 @@ class InputsReply:
 
     def encode(self) -> bytes:
         """Return the frame."""
-        return frame(
+        return encode_frame(
             PackageType.CONTROL_PACKAGE_SETUP_INPUTS,
-            _packed('>B', self.recipe_id) + join(self.types),
+            _pack_checked('>B', self.recipe_id) + encode_names(self.types),
         )
 
 
-Request: TypeAlias = (
+RtdeRequest: TypeAlias = (
     RequestProtocolVersion
     | GetControllerVersion
     | SetupOutputs
     | SetupInputs
-    | Start
-    | Pause
-    | Data
-    | TextMessage
+    | StartStreaming
+    | PauseStreaming
+    | DataPackage
+    | RtdeTextMessage
 )
-Reply: TypeAlias = (
-    Acknowledgement | ControllerVersion | OutputsReply | InputsReply | Data | TextMessage
+RtdeReply: TypeAlias = (
+    Acknowledgement
+    | ControllerVersion
+    | SetupOutputsReply
+    | SetupInputsReply
+    | DataPackage
+    | RtdeTextMessage
 )
 
 
-def frame(package_type: PackageType, payload: bytes = b'') -> bytes:
+def encode_frame(package_type: PackageType, payload: bytes = b'') -> bytes:
     """
     Return a whole frame.
 
@@ -433,14 +448,14 @@ def frame(package_type: PackageType, payload: bytes = b'') -> bytes:
     return _HEADER.pack(size, package_type) + payload
 
 
-def _packed(layout: str, *values: float) -> bytes:
+def _pack_checked(layout: str, *values: float) -> bytes:
     try:
         return struct.pack(layout, *values)
     except (struct.error, OverflowError) as error:
         raise LocalProtocolError(f'{values} cannot be sent in an RTDE package: {error}.') from None
 
 
-def join(names: Sequence[str]) -> bytes:
+def encode_names(names: Sequence[str]) -> bytes:
     """
     Return names as the wire has them.
 
@@ -452,99 +467,101 @@ def join(names: Sequence[str]) -> bytes:
     return ','.join(names).encode()
 
 
-def decode_request(data: bytes, version: int = NEWEST_VERSION) -> Request:
+def decode_request(data: bytes, version: int = LATEST_PROTOCOL_VERSION) -> RtdeRequest:
     """
     Return what a client said in one frame.
 
     :param version: the protocol version that was agreed.
     :raises RemoteProtocolError: type or length is impossible.
     """
-    kind, payload = _open(data)
+    kind, payload = _split_frame(data)
     match kind:
         case PackageType.REQUEST_PROTOCOL_VERSION:
-            return RequestProtocolVersion(version=int.from_bytes(_sized(data, payload, 2), 'big'))
+            return RequestProtocolVersion(
+                version=int.from_bytes(_require_size(data, payload, 2), 'big')
+            )
         case PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS if version == 1:
-            return SetupOutputs(names=_split(payload))
+            return SetupOutputs(names=_split_names(payload))
         case PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS:
-            (frequency,) = struct.unpack('>d', _sized(data, payload[:8], 8))
-            return SetupOutputs(names=_split(payload[8:]), frequency=frequency)
+            (frequency,) = struct.unpack('>d', _require_size(data, payload[:8], 8))
+            return SetupOutputs(names=_split_names(payload[8:]), frequency=frequency)
         case PackageType.CONTROL_PACKAGE_SETUP_INPUTS:
-            return SetupInputs(names=_split(payload))
+            return SetupInputs(names=_split_names(payload))
         case PackageType.DATA_PACKAGE:
-            return Data(payload=_at_least(data, payload, 1))
+            return DataPackage(payload=_require_min_size(data, payload, 1))
         case PackageType.TEXT_MESSAGE:
             return _text_message(data, payload, version)
-    _sized(data, payload, 0)
+    _require_size(data, payload, 0)
     if kind is PackageType.GET_URCONTROL_VERSION:
         return GetControllerVersion()
-    return Start() if kind is PackageType.CONTROL_PACKAGE_START else Pause()
+    return StartStreaming() if kind is PackageType.CONTROL_PACKAGE_START else PauseStreaming()
 
 
-def decode_reply(data: bytes, version: int = NEWEST_VERSION) -> Reply:
+def decode_reply(data: bytes, version: int = LATEST_PROTOCOL_VERSION) -> RtdeReply:
     """
     Return what a controller said in one frame.
 
     :param version: the protocol version that was agreed.
     :raises RemoteProtocolError: type or length is impossible.
     """
-    kind, payload = _open(data)
+    kind, payload = _split_frame(data)
     match kind:
         case PackageType.DATA_PACKAGE:
-            return Data(payload=_at_least(data, payload, 1))
+            return DataPackage(payload=_require_min_size(data, payload, 1))
         case PackageType.GET_URCONTROL_VERSION:
-            major, minor, bugfix, build = _VERSION.unpack(_sized(data, payload, 16))
+            major, minor, bugfix, build = _VERSION.unpack(_require_size(data, payload, 16))
             return ControllerVersion(major=major, minor=minor, bugfix=bugfix, build=build)
         case PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS if version == 1:
-            return OutputsReply(types=_split(payload), recipe_id=None)
+            return SetupOutputsReply(types=_split_names(payload), recipe_id=None)
         case PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS:
-            _at_least(data, payload, 1)
-            return OutputsReply(types=_split(payload[1:]), recipe_id=payload[0])
+            _require_min_size(data, payload, 1)
+            return SetupOutputsReply(types=_split_names(payload[1:]), recipe_id=payload[0])
         case PackageType.CONTROL_PACKAGE_SETUP_INPUTS:
-            _at_least(data, payload, 1)
-            return InputsReply(types=_split(payload[1:]), recipe_id=payload[0])
+            _require_min_size(data, payload, 1)
+            return SetupInputsReply(types=_split_names(payload[1:]), recipe_id=payload[0])
         case PackageType.TEXT_MESSAGE:
             return _text_message(data, payload, version)
-    return Acknowledgement(type=kind, accepted=_sized(data, payload, 1) != b'\0')
+    return Acknowledgement(type=kind, accepted=_require_size(data, payload, 1) != b'\0')
 
 
-def _open(data: bytes) -> tuple[PackageType, bytes]:
+def _split_frame(data: bytes) -> tuple[PackageType, bytes]:
     if len(data) < _HEADER.size:
-        raise RemoteProtocolError(f'An RTDE package is too short: {quote(data)}.')
+        raise RemoteProtocolError(f'An RTDE package is too short: {hex_text(data)}.')
     try:
         return PackageType(data[2]), data[3:]
     except ValueError:
         raise RemoteProtocolError(
-            f'{data[2]} is not a type of RTDE package: {quote(data)}.'
+            f'{data[2]} is not a type of RTDE package: {hex_text(data)}.'
         ) from None
 
 
-def _split(payload: bytes) -> tuple[str, ...]:
+def _split_names(payload: bytes) -> tuple[str, ...]:
     """Return the items of a list; clients in use (ur_rtde) end it with a comma."""
     items = decode_text(payload).removesuffix(',')
     return tuple(items.split(',')) if items else ()
 
 
-def _sized(data: bytes, payload: bytes, size: int) -> bytes:
+def _require_size(data: bytes, payload: bytes, size: int) -> bytes:
     if len(payload) != size:
-        raise RemoteProtocolError(f'An RTDE package has the wrong length: {quote(data)}.')
+        raise RemoteProtocolError(f'An RTDE package has the wrong length: {hex_text(data)}.')
     return payload
 
 
-def _at_least(data: bytes, payload: bytes, size: int) -> bytes:
+def _require_min_size(data: bytes, payload: bytes, size: int) -> bytes:
     if len(payload) < size:
-        raise RemoteProtocolError(f'An RTDE package is too short: {quote(data)}.')
+        raise RemoteProtocolError(f'An RTDE package is too short: {hex_text(data)}.')
     return payload
 
 
-def _text_message(data: bytes, payload: bytes, version: int) -> TextMessage:
-    _at_least(data, payload, 1)
+def _text_message(data: bytes, payload: bytes, version: int) -> RtdeTextMessage:
+    _require_min_size(data, payload, 1)
     if version == 1:
-        return TextMessage(text=decode_text(payload[1:]), level=payload[0])
+        return RtdeTextMessage(text=decode_text(payload[1:]), level=payload[0])
     end = 1 + payload[0]
-    _at_least(data, payload, end + 2)
+    _require_min_size(data, payload, end + 2)
     source_end = end + 1 + payload[end]
-    _at_least(data, payload, source_end + 1)
-    return TextMessage(
+    _require_min_size(data, payload, source_end + 1)
+    return RtdeTextMessage(
         text=decode_text(payload[1:end]),
         source=decode_text(payload[end + 1 : source_end]),
         level=payload[source_end],

@@ -29,33 +29,33 @@ from ur_cartesian_driver.protocol.rtde_fields import DataType, INPUT_TYPES, OUTP
 from ur_cartesian_driver.protocol.rtde_packages import (
     Acknowledgement,
     ControllerVersion,
-    Data,
+    DataPackage,
     decode_request,
     GetControllerVersion,
     IN_USE,
-    InputsReply,
-    NEWEST_VERSION,
+    LATEST_PROTOCOL_VERSION,
     NOT_FOUND,
-    OutputsReply,
     PackageType,
-    Pause,
+    PauseStreaming,
     Recipe,
-    Reply,
     RequestProtocolVersion,
     RtdeFrameBuffer,
+    RtdeReply,
+    RtdeTextMessage,
+    RtdeValues,
     SetupInputs,
+    SetupInputsReply,
     SetupOutputs,
-    Start,
-    TextMessage,
-    Values,
+    SetupOutputsReply,
+    StartStreaming,
 )
 
 #: Recipe ids are bytes and 0 means invalid.
-MOST_RECIPES = 255
+MAX_RECIPES = 255
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Output:
+class OutputStream:
     """What a client wants to be sent, and how often [Hz]."""
 
     recipe: Recipe
@@ -67,10 +67,10 @@ class InputReceived:
     """A client wrote values, in the order of the recipe."""
 
     recipe: Recipe
-    values: Values
+    values: RtdeValues
 
 
-class RtdeServer:
+class RtdeServerCodec:
     """One connection, seen from the controller."""
 
     def __init__(
@@ -88,10 +88,10 @@ class RtdeServer:
         :param frequency: the rate of the controller [Hz], and the greatest that a client gets.
         """
         self.streaming = False
-        self.outputs: list[Output] = []
+        self.outputs: list[OutputStream] = []
         self._inputs: list[Recipe] = []
         self._version = version
-        self._protocol = NEWEST_VERSION
+        self._protocol = LATEST_PROTOCOL_VERSION
         self._taken = taken_inputs
         self._frequency = frequency
         self._output_types = output_types
@@ -109,18 +109,18 @@ class RtdeServer:
         data, self._to_send = self._to_send, b''
         return data
 
-    def feed(self, data: bytes) -> list[InputReceived | TextMessage]:
+    def feed(self, data: bytes) -> list[InputReceived | RtdeTextMessage]:
         """
         Take bytes from the client (none at all = its end) and return what it wrote.
 
         :raises RemoteProtocolError: the client broke the rules; close the connection.
         """
-        events: list[InputReceived | TextMessage] = []
+        events: list[InputReceived | RtdeTextMessage] = []
         for frame in self._frames.feed(data):
             request = decode_request(frame, self._protocol)
-            if isinstance(request, TextMessage):
+            if isinstance(request, RtdeTextMessage):
                 events.append(request)
-            elif isinstance(request, Data):
+            elif isinstance(request, DataPackage):
                 events.append(self._input(request))
             else:
                 self._to_send += self._answer(request).encode()
@@ -139,12 +139,12 @@ class RtdeServer:
         | GetControllerVersion
         | SetupOutputs
         | SetupInputs
-        | Start
-        | Pause,
-    ) -> Reply:
+        | StartStreaming
+        | PauseStreaming,
+    ) -> RtdeReply:
         match request:
             case RequestProtocolVersion():
-                known = 1 <= request.version <= NEWEST_VERSION
+                known = 1 <= request.version <= LATEST_PROTOCOL_VERSION
                 self._protocol = request.version if known else self._protocol
                 return Acknowledgement(type=PackageType.REQUEST_PROTOCOL_VERSION, accepted=known)
             case GetControllerVersion():
@@ -153,14 +153,14 @@ class RtdeServer:
                 return self._set_up_outputs(request)
             case SetupInputs():
                 return self._set_up_inputs(request)
-            case Start():
+            case StartStreaming():
                 self.streaming = True
                 return Acknowledgement(type=PackageType.CONTROL_PACKAGE_START, accepted=True)
-            case Pause():
+            case PauseStreaming():
                 self.streaming = False
                 return Acknowledgement(type=PackageType.CONTROL_PACKAGE_PAUSE, accepted=True)
 
-    def _set_up_outputs(self, request: SetupOutputs) -> OutputsReply:
+    def _set_up_outputs(self, request: SetupOutputs) -> SetupOutputsReply:
         types = [self._output_types.get(name) for name in request.names]
         known = [data_type for data_type in types if data_type is not None]
         valid = len(known) == len(types) > 0
@@ -170,31 +170,31 @@ class RtdeServer:
         if valid:
             _check_number(self.outputs)
             self.outputs.append(
-                Output(
+                OutputStream(
                     recipe=Recipe(request.names, known, recipe_id),
-                    frequency=self._granted(request.frequency),
+                    frequency=self._granted_frequency(request.frequency),
                 )
             )
-        return OutputsReply(
+        return SetupOutputsReply(
             types=tuple(t.name if t else NOT_FOUND for t in types), recipe_id=recipe_id
         )
 
-    def _granted(self, frequency: float | None) -> float:
+    def _granted_frequency(self, frequency: float | None) -> float:
         """Return the frequency that a client gets [Hz]."""
         if frequency is None or not math.isfinite(frequency) or frequency <= 0.0:
             return self._frequency
         return min(frequency, self._frequency)
 
-    def _set_up_inputs(self, request: SetupInputs) -> InputsReply:
+    def _set_up_inputs(self, request: SetupInputs) -> SetupInputsReply:
         texts = []
-        ours = {name for recipe in self._inputs for name in recipe.names}
+        own_names = {name for recipe in self._inputs for name in recipe.names}
         for name in request.names:
             data_type = self._input_types.get(name)
             texts.append(
                 NOT_FOUND
                 if data_type is None
                 else IN_USE
-                if name in self._taken - ours
+                if name in self._taken - own_names
                 else data_type.name
             )
         recipe_id = 0
@@ -204,9 +204,9 @@ class RtdeServer:
             types = [self._input_types[name] for name in request.names]
             self._inputs.append(Recipe(request.names, types, recipe_id))
             self._taken.update(request.names)
-        return InputsReply(types=tuple(texts), recipe_id=recipe_id)
+        return SetupInputsReply(types=tuple(texts), recipe_id=recipe_id)
 
-    def _input(self, data: Data) -> InputReceived:
+    def _input(self, data: DataPackage) -> InputReceived:
         """Read an input package; a client with one recipe may give it any id."""
         if not self._inputs:
             raise RemoteProtocolError('An RTDE client wrote inputs before it had set them up.')
@@ -220,5 +220,5 @@ class RtdeServer:
 
 
 def _check_number(recipes: Sequence[object]) -> None:
-    if len(recipes) >= MOST_RECIPES:
-        raise RemoteProtocolError(f'An RTDE client asked for more than {MOST_RECIPES} recipes.')
+    if len(recipes) >= MAX_RECIPES:
+        raise RemoteProtocolError(f'An RTDE client asked for more than {MAX_RECIPES} recipes.')

@@ -48,7 +48,7 @@ from ur_cartesian_driver.protocol.framing import (
     checked_size,
     FIXED_POINT,
     from_fixed,
-    quote,
+    hex_text,
     RecordBuffer,
     to_fixed,
 )
@@ -72,16 +72,16 @@ class ScriptCommand(IntEnum):
     SET_TARGET_PAYLOAD = 12
 
 
-class TcpHold(IntEnum):
+class TcpPersistence(IntEnum):
     """For how long a TCP is set; known to our own robot program only."""
 
     #: Until somebody sets another one.
-    KEEP = 0
+    PERMANENT = 0
     #: Until LENT is taken back: the program remembers the TCP that it finds, and puts it back by
     #: itself before it ends.
-    LENT = 1
+    TEMPORARY = 1
     #: The end of LENT: the program puts back what it remembers, else what the message says.
-    BACK = 2
+    RESTORE = 2
 
 
 class ToolContactResult(IntEnum):
@@ -97,18 +97,18 @@ _COMMAND = struct.Struct('>28i')
 _RESULT = struct.Struct('>i')
 
 #: Software version: major, minor, bugfix.
-Version: TypeAlias = tuple[int, int, int]
+SoftwareVersion: TypeAlias = tuple[int, int, int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ZeroFtSensor:
+class ZeroFtSensorCommand:
     """Take the present force as zero."""
 
     command: ClassVar = ScriptCommand.ZERO_FTSENSOR
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetPayload:
+class SetPayloadCommand:
     """Set mass [kg] and centre of gravity [m] (in the flange) of what the flange carries."""
 
     command: ClassVar = ScriptCommand.SET_PAYLOAD
@@ -117,7 +117,7 @@ class SetPayload:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetToolVoltage:
+class SetToolVoltageCommand:
     """Set the voltage at the tool connector: 0, 12 or 24 V."""
 
     command: ClassVar = ScriptCommand.SET_TOOL_VOLTAGE
@@ -130,7 +130,7 @@ class SetToolVoltage:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StartForceMode:
+class StartForceModeCommand:
     """
     Be compliant in some axes of the task frame.
 
@@ -160,28 +160,28 @@ class StartForceMode:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EndForceMode:
+class EndForceModeCommand:
     """End force mode."""
 
     command: ClassVar = ScriptCommand.END_FORCE_MODE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StartToolContact:
+class StartToolContactCommand:
     """Watch for a contact of the tool; it answers with a :class:`ToolContactResult`."""
 
     command: ClassVar = ScriptCommand.START_TOOL_CONTACT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EndToolContact:
+class EndToolContactCommand:
     """Stop watching for a contact."""
 
     command: ClassVar = ScriptCommand.END_TOOL_CONTACT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetFrictionCompensation:
+class SetFrictionCompensationCommand:
     """Turn friction compensation for torque control on or off."""
 
     command: ClassVar = ScriptCommand.SET_FRICTION_COMPENSATION
@@ -189,7 +189,7 @@ class SetFrictionCompensation:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FtRtdeInputEnable:
+class FtRtdeInputEnableCommand:
     """Take forces from RTDE's ``external_force_torque``; describes that sensor."""
 
     command: ClassVar = ScriptCommand.FT_RTDE_INPUT_ENABLE
@@ -200,7 +200,7 @@ class FtRtdeInputEnable:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetGravity:
+class SetGravityCommand:
     """Set the acceleration [m/s^2] that holds the base up: it points away from the earth."""
 
     command: ClassVar = ScriptCommand.SET_GRAVITY
@@ -208,16 +208,16 @@ class SetGravity:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetTcpOffset:
+class SetTcpOffsetCommand:
     """Set the active TCP: its pose in the flange."""
 
     command: ClassVar = ScriptCommand.SET_TCP_OFFSET
     offset: Vector6
-    hold: TcpHold = TcpHold.KEEP
+    persistence: TcpPersistence = TcpPersistence.PERMANENT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetFrictionScales:
+class SetFrictionScalesCommand:
     """Scale the friction compensation of each joint; what lies outside [0, 1] is limited."""
 
     command: ClassVar = ScriptCommand.SET_FRICTION_SCALES
@@ -226,7 +226,7 @@ class SetFrictionScales:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetTargetPayload:
+class SetTargetPayloadCommand:
     """Set mass [kg], centre of gravity [m] and inertia [kg m^2], reached in a time [s]."""
 
     command: ClassVar = ScriptCommand.SET_TARGET_PAYLOAD
@@ -236,30 +236,30 @@ class SetTargetPayload:
     transition_time: float = 0.0
 
 
-Command: TypeAlias = (
-    ZeroFtSensor
-    | SetPayload
-    | SetToolVoltage
-    | StartForceMode
-    | EndForceMode
-    | StartToolContact
-    | EndToolContact
-    | SetFrictionCompensation
-    | FtRtdeInputEnable
-    | SetGravity
-    | SetTcpOffset
-    | SetFrictionScales
-    | SetTargetPayload
+AnyScriptCommand: TypeAlias = (
+    ZeroFtSensorCommand
+    | SetPayloadCommand
+    | SetToolVoltageCommand
+    | StartForceModeCommand
+    | EndForceModeCommand
+    | StartToolContactCommand
+    | EndToolContactCommand
+    | SetFrictionCompensationCommand
+    | FtRtdeInputEnableCommand
+    | SetGravityCommand
+    | SetTcpOffsetCommand
+    | SetFrictionScalesCommand
+    | SetTargetPayloadCommand
 )
 
 #: Software from which a command works: CB3 and e-Series software 3 to 5, PolyScope X.
-MINIMUM_VERSIONS: Mapping[ScriptCommand, tuple[Version, Version]] = {
+MIN_VERSIONS: Mapping[ScriptCommand, tuple[SoftwareVersion, SoftwareVersion]] = {
     ScriptCommand.SET_FRICTION_COMPENSATION: ((5, 23, 0), (10, 10, 0)),
     ScriptCommand.SET_FRICTION_SCALES: ((5, 25, 1), (10, 12, 1)),
 }
 
 
-def encode(command: Command, robot_version: Version | None = None) -> bytes:
+def encode(command: AnyScriptCommand, robot_version: SoftwareVersion | None = None) -> bytes:
     """
     Return the 112 bytes of a command.
 
@@ -272,7 +272,7 @@ def encode(command: Command, robot_version: Version | None = None) -> bytes:
     return _COMMAND.pack(command.command, *words, *(0,) * (COMMAND_WORDS - 1 - len(words)))
 
 
-def decode(data: bytes) -> Command:
+def decode(data: bytes) -> AnyScriptCommand:
     """
     Return the command of 112 bytes; words beyond its arguments are not looked at.
 
@@ -282,17 +282,17 @@ def decode(data: bytes) -> Command:
     try:
         return _READERS[ScriptCommand(number)](words, [from_fixed(word) for word in words])
     except (ValueError, LocalProtocolError) as error:
-        raise RemoteProtocolError(f'A script command is wrong: {error} {quote(data)}') from None
+        raise RemoteProtocolError(f'A script command is wrong: {error} {hex_text(data)}') from None
 
 
-class CommandDecoder:
+class ScriptCommandDecoder:
     """Reads script commands: the robot's side."""
 
     def __init__(self) -> None:
         """Start empty."""
         self._records = RecordBuffer(COMMAND_SIZE, 'script command')
 
-    def feed(self, data: bytes) -> list[Command]:
+    def feed(self, data: bytes) -> list[AnyScriptCommand]:
         """
         Take bytes (none at all = the end) and return the commands in them.
 
@@ -306,7 +306,7 @@ def encode_result(result: ToolContactResult) -> bytes:
     return _RESULT.pack(result)
 
 
-class ResultDecoder:
+class ToolContactResultDecoder:
     """Reads the answers to START_TOOL_CONTACT."""
 
     def __init__(self) -> None:
@@ -328,99 +328,101 @@ def _result(record: bytes) -> ToolContactResult:
         return ToolContactResult(number)
     except ValueError:
         raise RemoteProtocolError(
-            f'{number} is not a tool contact result (0 or 1): {quote(record)}.'
+            f'{number} is not a tool contact result (0 or 1): {hex_text(record)}.'
         ) from None
 
 
-def _words(command: Command) -> list[int]:
+def _words(command: AnyScriptCommand) -> list[int]:
     """Return the words after the number."""
     match command:
-        case SetPayload():
-            return [to_fixed(command.mass, 'mass'), *_fixed_all(command.cog, 'cog')]
-        case SetToolVoltage():
+        case SetPayloadCommand():
+            return [to_fixed(command.mass, 'mass'), *_scaled_all(command.cog, 'cog')]
+        case SetToolVoltageCommand():
             return [to_fixed(command.voltage, 'voltage')]
-        case StartForceMode():
+        case StartForceModeCommand():
             return [
-                *_fixed_all(command.task_frame, 'task_frame'),
+                *_scaled_all(command.task_frame, 'task_frame'),
                 *(FIXED_POINT * bool(selected) for selected in command.selection),
-                *_fixed_all(command.wrench, 'wrench'),
+                *_scaled_all(command.wrench, 'wrench'),
                 to_fixed(command.type, 'type'),
-                *_fixed_all(command.limits, 'limits'),
+                *_scaled_all(command.limits, 'limits'),
                 to_fixed(command.damping, 'damping'),
                 to_fixed(command.gain_scaling, 'gain_scaling'),
             ]
-        case SetFrictionCompensation():
+        case SetFrictionCompensationCommand():
             return [int(command.enabled)]
-        case FtRtdeInputEnable():
+        case FtRtdeInputEnableCommand():
             return [
                 int(command.enabled),
                 to_fixed(command.sensor_mass, 'sensor_mass'),
-                *_fixed_all(command.sensor_offset, 'sensor_offset'),
-                *_fixed_all(command.sensor_cog, 'sensor_cog'),
+                *_scaled_all(command.sensor_offset, 'sensor_offset'),
+                *_scaled_all(command.sensor_cog, 'sensor_cog'),
             ]
-        case SetGravity():
-            return _fixed_all(command.gravity, 'gravity')
-        case SetTcpOffset():
-            return [*_fixed_all(command.offset, 'offset'), int(command.hold)]
-        case SetFrictionScales():
+        case SetGravityCommand():
+            return _scaled_all(command.gravity, 'gravity')
+        case SetTcpOffsetCommand():
+            return [*_scaled_all(command.offset, 'offset'), int(command.persistence)]
+        case SetFrictionScalesCommand():
             # URCL limits these where it refuses other values; the bytes shall be the same.
             return [
-                *_fixed_all([min(max(v, 0.0), 1.0) for v in command.viscous], 'viscous'),
-                *_fixed_all([min(max(v, 0.0), 1.0) for v in command.coulomb], 'coulomb'),
+                *_scaled_all([min(max(v, 0.0), 1.0) for v in command.viscous], 'viscous'),
+                *_scaled_all([min(max(v, 0.0), 1.0) for v in command.coulomb], 'coulomb'),
             ]
-        case SetTargetPayload():
+        case SetTargetPayloadCommand():
             return [
                 to_fixed(command.mass, 'mass'),
-                *_fixed_all(command.cog, 'cog'),
-                *_fixed_all(command.inertia, 'inertia'),
+                *_scaled_all(command.cog, 'cog'),
+                *_scaled_all(command.inertia, 'inertia'),
                 to_fixed(command.transition_time, 'transition_time'),
             ]
     return []
 
 
 #: The raw and the scaled words after the number -> the command.
-_READERS: Mapping[ScriptCommand, Callable[[list[int], list[float]], Command]] = {
-    ScriptCommand.ZERO_FTSENSOR: lambda _, v: ZeroFtSensor(),
-    ScriptCommand.SET_PAYLOAD: lambda _, v: SetPayload(mass=v[0], cog=_three(v[1:4])),
-    ScriptCommand.SET_TOOL_VOLTAGE: lambda _, v: SetToolVoltage(voltage=_whole(v[0], 'voltage')),
-    ScriptCommand.START_FORCE_MODE: lambda _, v: StartForceMode(
+_READERS: Mapping[ScriptCommand, Callable[[list[int], list[float]], AnyScriptCommand]] = {
+    ScriptCommand.ZERO_FTSENSOR: lambda _, v: ZeroFtSensorCommand(),
+    ScriptCommand.SET_PAYLOAD: lambda _, v: SetPayloadCommand(mass=v[0], cog=_three(v[1:4])),
+    ScriptCommand.SET_TOOL_VOLTAGE: lambda _, v: SetToolVoltageCommand(
+        voltage=_as_int(v[0], 'voltage')
+    ),
+    ScriptCommand.START_FORCE_MODE: lambda _, v: StartForceModeCommand(
         task_frame=_six(v[0:6]),
         selection=_flags(v[6:12]),
         wrench=_six(v[12:18]),
-        type=_whole(v[18], 'type'),
+        type=_as_int(v[18], 'type'),
         limits=_six(v[19:25]),
         damping=v[25],
         gain_scaling=v[26],
     ),
-    ScriptCommand.END_FORCE_MODE: lambda _, v: EndForceMode(),
-    ScriptCommand.START_TOOL_CONTACT: lambda _, v: StartToolContact(),
-    ScriptCommand.END_TOOL_CONTACT: lambda _, v: EndToolContact(),
-    ScriptCommand.SET_FRICTION_COMPENSATION: lambda raw, _: SetFrictionCompensation(
+    ScriptCommand.END_FORCE_MODE: lambda _, v: EndForceModeCommand(),
+    ScriptCommand.START_TOOL_CONTACT: lambda _, v: StartToolContactCommand(),
+    ScriptCommand.END_TOOL_CONTACT: lambda _, v: EndToolContactCommand(),
+    ScriptCommand.SET_FRICTION_COMPENSATION: lambda raw, _: SetFrictionCompensationCommand(
         enabled=raw[0] != 0
     ),
-    ScriptCommand.FT_RTDE_INPUT_ENABLE: lambda raw, v: FtRtdeInputEnable(
+    ScriptCommand.FT_RTDE_INPUT_ENABLE: lambda raw, v: FtRtdeInputEnableCommand(
         enabled=raw[0] != 0,
         sensor_mass=v[1],
         sensor_offset=_three(v[2:5]),
         sensor_cog=_three(v[5:8]),
     ),
-    ScriptCommand.SET_GRAVITY: lambda _, v: SetGravity(gravity=_three(v[0:3])),
-    ScriptCommand.SET_TCP_OFFSET: lambda raw, v: SetTcpOffset(
-        offset=_six(v[0:6]), hold=TcpHold(raw[6])
+    ScriptCommand.SET_GRAVITY: lambda _, v: SetGravityCommand(gravity=_three(v[0:3])),
+    ScriptCommand.SET_TCP_OFFSET: lambda raw, v: SetTcpOffsetCommand(
+        offset=_six(v[0:6]), persistence=TcpPersistence(raw[6])
     ),
-    ScriptCommand.SET_FRICTION_SCALES: lambda _, v: SetFrictionScales(
+    ScriptCommand.SET_FRICTION_SCALES: lambda _, v: SetFrictionScalesCommand(
         viscous=_six(v[0:6]), coulomb=_six(v[6:12])
     ),
-    ScriptCommand.SET_TARGET_PAYLOAD: lambda _, v: SetTargetPayload(
+    ScriptCommand.SET_TARGET_PAYLOAD: lambda _, v: SetTargetPayloadCommand(
         mass=v[0], cog=_three(v[1:4]), inertia=_six(v[4:10]), transition_time=v[10]
     ),
 }
 
 
-def _check_version(command: ScriptCommand, version: Version) -> None:
-    if command not in MINIMUM_VERSIONS:
+def _check_version(command: ScriptCommand, version: SoftwareVersion) -> None:
+    if command not in MIN_VERSIONS:
         return
-    polyscope_5, polyscope_x = MINIMUM_VERSIONS[command]
+    polyscope_5, polyscope_x = MIN_VERSIONS[command]
     needed = polyscope_x if version >= (10, 0, 0) else polyscope_5
     if version < needed:
         raise LocalProtocolError(
@@ -429,7 +431,7 @@ def _check_version(command: ScriptCommand, version: Version) -> None:
         )
 
 
-def _dotted(version: Version) -> str:
+def _dotted(version: SoftwareVersion) -> str:
     return '.'.join(str(part) for part in version)
 
 
@@ -438,11 +440,11 @@ def _check_range(name: str, value: float, low: float, high: float) -> None:
         raise LocalProtocolError(f'{name} is {value!r}, but it must lie within {low} and {high}.')
 
 
-def _fixed_all(values: Sequence[float], field: str) -> list[int]:
+def _scaled_all(values: Sequence[float], field: str) -> list[int]:
     return [to_fixed(value, f'{field}[{i}]') for i, value in enumerate(values)]
 
 
-def _whole(value: float, field: str) -> int:
+def _as_int(value: float, field: str) -> int:
     if value != int(value):
         raise LocalProtocolError(f'{field} is {value!r}, but it must be a whole number.')
     return int(value)

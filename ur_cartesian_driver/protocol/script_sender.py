@@ -15,7 +15,7 @@ finds the end by the marker that the program contains.
 from __future__ import annotations
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
-from ur_cartesian_driver.protocol.framing import cut_off, quote
+from ur_cartesian_driver.protocol.framing import hex_text, truncated_stream
 
 #: What the robot sends.
 REQUEST = b'request_program\n'
@@ -36,12 +36,14 @@ class RequestDecoder:
         """
         if not data:
             if self._rest:
-                raise cut_off('program request', self._rest)
+                raise truncated_stream('program request', self._rest)
             return 0
         data = self._rest + data
         count, rest = divmod(len(data), len(REQUEST))
         if data != REQUEST * count + REQUEST[:rest]:
-            raise RemoteProtocolError(f'Expected {REQUEST!r}, but the robot sent {quote(data)}.')
+            raise RemoteProtocolError(
+                f'Expected {REQUEST!r}, but the robot sent {hex_text(data)}.'
+            )
         self._rest = data[count * len(REQUEST) :]
         return count
 

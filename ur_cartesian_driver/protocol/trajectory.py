@@ -77,15 +77,15 @@ from ur_cartesian_driver.motion.primitive import (
     Target,
 )
 from ur_cartesian_driver.motion.signals import AnalogDomain
-from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST
+from ur_cartesian_driver.protocol.dialects import Dialect, NEWEST_DIALECT
 from ur_cartesian_driver.protocol.framing import (
     checked_size,
     FIXED_POINT,
     from_fixed,
+    hex_text,
     INT32_MAX,
     INT32_MIN,
-    out_of_range,
-    quote,
+    range_error,
     RecordBuffer,
     to_fixed,
 )
@@ -148,20 +148,20 @@ class PointField(IntEnum):
     OUTPUT_PIN = 13
     OUTPUT_VALUE = 14
     OUTPUT_DOMAIN = 15
-    HAS_PLACE = 16
-    COMES_ROUND = 17
+    HAS_TRIGGER_POSE = 16
+    STARTS_BEYOND = 17
     DURATION = 18
     BLEND = 19
     TYPE = 20
 
 
 #: How many outputs may wait for their places at one time.
-MOST_OUTPUTS = 64
+MAX_PENDING_OUTPUTS = 64
 POINT_FIELDS = 21
 POINT_SIZE = 4 * POINT_FIELDS
 
 #: The 21 numbers of a point in the order of the table, before scaling.
-Fields: TypeAlias = tuple[float, ...]
+PointFields: TypeAlias = tuple[float, ...]
 
 _E = TypeVar('_E', bound=IntEnum)
 
@@ -197,14 +197,14 @@ _SPLINE_FIELD_NAMES = (
     'motion type',
 )
 _OUTPUT_FIELD_NAMES = (
-    *(f'place[{i}]' for i in range(6)),
-    *(f'heading[{i}]' for i in range(6)),
+    *(f'trigger_pose[{i}]' for i in range(6)),
+    *(f'trigger_direction[{i}]' for i in range(6)),
     'output',
     'pin',
     'value',
     'domain',
-    'has_place',
-    'comes_round',
+    'has_trigger_pose',
+    'starts_beyond',
     'delay',
     'word 19',
     'motion type',
@@ -253,7 +253,7 @@ def motion_type(primitive: Instruction) -> MotionType:
         raise LocalProtocolError(f'{primitive!r} is not a motion primitive.') from None
 
 
-def to_fields(primitive: Instruction, dialect: Dialect = NEWEST) -> Fields:
+def to_fields(primitive: Instruction, dialect: Dialect = NEWEST_DIALECT) -> PointFields:
     """
     Return the 21 numbers of a primitive in SI units, see the table above.
 
@@ -262,18 +262,18 @@ def to_fields(primitive: Instruction, dialect: Dialect = NEWEST) -> Fields:
     """
     kind = motion_type(primitive)
     if kind not in dialect.motion_types:
-        raise _unknown_in(dialect, f'{kind.name} (motion type {kind})')
+        raise _unsupported_error(dialect, f'{kind.name} (motion type {kind})')
     if isinstance(primitive, SwitchOutput):
-        place = primitive.place
+        trigger_pose = primitive.trigger_pose
         return (
-            *(_numbers(place) if place else ZERO6),
-            *primitive.heading,
+            *(_numbers(trigger_pose) if trigger_pose else ZERO6),
+            *primitive.trigger_direction,
             primitive.output,
             primitive.pin,
             primitive.value,
             primitive.domain,
-            place is not None,
-            primitive.comes_round,
+            trigger_pose is not None,
+            primitive.starts_beyond,
             primitive.delay,
             0,
             kind,
@@ -325,39 +325,39 @@ def to_fields(primitive: Instruction, dialect: Dialect = NEWEST) -> Fields:
             kind,
         )
     if near is not None:
-        raise _unknown_in(dialect, 'q_near')
+        raise _unsupported_error(dialect, 'q_near')
     return (*target, v, v, v, v, v, v, a, a, a, a, a, a, duration, primitive.blend_radius, kind)
 
 
-def _unknown_in(dialect: Dialect, what: str) -> LocalProtocolError:
+def _unsupported_error(dialect: Dialect, what: str) -> LocalProtocolError:
     return LocalProtocolError(f'{what} does not exist in wire dialect {dialect.name}.')
 
 
-def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST) -> Instruction:
+def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST_DIALECT) -> Instruction:
     """
     Return the primitive, or the output, of the 21 numbers.
 
     :raises RemoteProtocolError: motion type, spline kind, arc mode or output is unknown.
     """
-    kind = _known(MotionType, fields[20], 'motion type (word 20)')
+    kind = _enum_member(MotionType, fields[20], 'motion type (word 20)')
     if kind not in dialect.motion_types:
         raise RemoteProtocolError(
             f'{kind:d} is an unknown motion type (word 20) in wire dialect {dialect.name}.'
         )
     target, second = _vector(fields[:6]), _vector(fields[6:12])
     if kind is MotionType.SPLINE:
-        spline = _known(SplineKind, fields[19], 'spline kind (word 19)')
+        spline = _enum_member(SplineKind, fields[19], 'spline kind (word 19)')
         third = _vector(fields[12:18]) if spline is SplineKind.QUINTIC else None
         return Spline(target=target, velocities=second, accelerations=third, duration=fields[18])
     if kind is MotionType.SWITCH_OUTPUT:
         return SwitchOutput(
-            output=_known(OutputKind, fields[12], 'kind of output (word 12)'),
+            output=_enum_member(OutputKind, fields[12], 'kind of output (word 12)'),
             pin=int(fields[13]),
             value=fields[14],
-            domain=_known(AnalogDomain, fields[15], 'domain (word 15)'),
-            place=Pose.from_rotation_vector(target) if fields[16] else None,
-            heading=second,
-            comes_round=bool(fields[17]),
+            domain=_enum_member(AnalogDomain, fields[15], 'domain (word 15)'),
+            trigger_pose=Pose.from_rotation_vector(target) if fields[16] else None,
+            trigger_direction=second,
+            starts_beyond=bool(fields[17]),
             delay=fields[18],
         )
     velocity, acceleration, flag = fields[12:15]
@@ -369,7 +369,7 @@ def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST) -> Instructi
             velocity=velocity,
             acceleration=acceleration,
             blend_radius=fields[19],
-            mode=_known(ArcMode, flag, 'arc mode (word 14)'),
+            mode=_enum_member(ArcMode, flag, 'arc mode (word 14)'),
         )
     cls, is_pose = _MOVES[kind]
     if not dialect.q_near:
@@ -394,15 +394,15 @@ def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST) -> Instructi
     )
 
 
-def check_fields(fields: Fields, dialect: Dialect = NEWEST) -> None:
+def check_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> None:
     """
     Refuse what URCL refuses to send: it would mean something else to the robot, or nothing.
 
     :raises LocalProtocolError: names the field, its value, the bound and the dialect.
     """
     duration, blend, kind = fields[18], fields[19], fields[20]
-    if duration and (duration > dialect.max_duration or 0.0 < duration < dialect.least_duration):
-        raise _bad_duration(duration, dialect)
+    if duration and (duration > dialect.max_duration or 0.0 < duration < dialect.min_duration):
+        raise _duration_error(duration, dialect)
     if kind == MotionType.SWITCH_OUTPUT and not 0.0 <= duration <= dialect.max_duration:
         raise LocalProtocolError(f'delay is {duration!r} s, but it must not be negative.')
     if kind in (MotionType.SPLINE, MotionType.SWITCH_OUTPUT):
@@ -427,8 +427,8 @@ def check_fields(fields: Fields, dialect: Dialect = NEWEST) -> None:
         )
 
 
-def _bad_duration(duration: float, dialect: Dialect) -> LocalProtocolError:
-    if duration < dialect.least_duration:
+def _duration_error(duration: float, dialect: Dialect) -> LocalProtocolError:
+    if duration < dialect.min_duration:
         return LocalProtocolError(
             f'duration is {duration!r} s, but wire dialect {dialect.name} counts in '
             f'{1.0 / dialect.time_scale:g} s, and 0 would mean that the velocity counts.'
@@ -439,7 +439,7 @@ def _bad_duration(duration: float, dialect: Dialect) -> LocalProtocolError:
     )
 
 
-def encode_fields(fields: Fields, dialect: Dialect = NEWEST) -> bytes:
+def encode_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> bytes:
     """
     Return the 84 bytes of the 21 numbers.
 
@@ -454,7 +454,7 @@ def encode_fields(fields: Fields, dialect: Dialect = NEWEST) -> bytes:
     return _POINT.pack(*words, word18, word19, int(fields[20]))
 
 
-def decode_fields(data: bytes, dialect: Dialect = NEWEST) -> Fields:
+def decode_fields(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> PointFields:
     """
     Return the 21 numbers of 84 bytes, in SI units.
 
@@ -471,7 +471,7 @@ def decode_fields(data: bytes, dialect: Dialect = NEWEST) -> Fields:
     )
 
 
-def encode_point(primitive: Instruction, dialect: Dialect = NEWEST) -> bytes:
+def encode_point(primitive: Instruction, dialect: Dialect = NEWEST_DIALECT) -> bytes:
     """
     Return the 84 bytes of a primitive.
 
@@ -480,7 +480,7 @@ def encode_point(primitive: Instruction, dialect: Dialect = NEWEST) -> bytes:
     return encode_fields(to_fields(primitive, dialect), dialect)
 
 
-def decode_point(data: bytes, dialect: Dialect = NEWEST) -> Instruction:
+def decode_point(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> Instruction:
     """
     Return the primitive, or the output, of 84 bytes.
 
@@ -489,14 +489,14 @@ def decode_point(data: bytes, dialect: Dialect = NEWEST) -> Instruction:
     try:
         return from_fields(decode_fields(data, dialect), dialect)
     except RemoteProtocolError as error:
-        raise RemoteProtocolError(f'{error} Bytes: {quote(data)}') from None
+        raise RemoteProtocolError(f'{error} Bytes: {hex_text(data)}') from None
 
 
 #: Points that are encoded at once: large enough for numpy, small enough for the cache.
 _CHUNK = 4096
 
 
-def encode_points(primitives: Iterable[Instruction], dialect: Dialect = NEWEST) -> bytes:
+def encode_points(primitives: Iterable[Instruction], dialect: Dialect = NEWEST_DIALECT) -> bytes:
     """
     Return the bytes of many of them, the same as :func:`encode_point` one by one but faster.
 
@@ -533,7 +533,7 @@ def _encode_rows(fields: NDArray[np.float64], first: int, dialect: Dialect) -> b
     bad = ~((scaled > INT32_MIN - 0.5) & (scaled < INT32_MAX + 0.5))
     if bad.any():
         row, column = (int(i) for i in np.argwhere(bad)[0])
-        error = out_of_range(
+        error = range_error(
             float(fields[row, column]),
             _names(fields[row, 20], dialect)[column],
             int(scales[column]),
@@ -561,7 +561,7 @@ def encode_result(result: TrajectoryResult) -> bytes:
     return _RESULT.pack(result)
 
 
-class ResultDecoder:
+class TrajectoryResultDecoder:
     """Reads the results that the robot program sends."""
 
     def __init__(self) -> None:
@@ -583,7 +583,7 @@ def _result(record: bytes) -> TrajectoryResult:
         return TrajectoryResult(number)
     except ValueError:
         raise RemoteProtocolError(
-            f'{number} is not a trajectory result (0, 1 or 2): {quote(record)}.'
+            f'{number} is not a trajectory result (0, 1 or 2): {hex_text(record)}.'
         ) from None
 
 
@@ -600,7 +600,7 @@ def _vector(numbers: Sequence[float]) -> Vector6:
     return (a, b, c, d, e, f)
 
 
-def _known(enum: type[_E], number: float, what: str) -> _E:
+def _enum_member(enum: type[_E], number: float, what: str) -> _E:
     for member in enum:
         if member == number:
             return member

@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.goal import OutputKind
 from ur_cartesian_driver.motion.pose import Pose, Vector3
 from ur_cartesian_driver.motion.signals import AnalogDomain
-from ur_cartesian_driver.protocol.dashboard import Request
+from ur_cartesian_driver.protocol.dashboard import DashboardRequest
 
 #: How many outputs there are of each kind.
 PINS = {
@@ -27,15 +27,15 @@ PINS = {
 }
 
 #: Longest text for the dashboard: as lines of any alphabet the server takes it.
-LONGEST_TEXT = 1000
+MAX_TEXT_LENGTH = 1000
 #: No tool is longer [m], and no arm carries more [kg].
-LARGEST_TOOL, LARGEST_MASS = 5.0, 100.0
+MAX_TOOL_OFFSET, MAX_PAYLOAD_MASS = 5.0, 100.0
 #: How far the length of a quaternion may be off 1.
 UNIT_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
+class ServiceAnswer:
     """
     How a call ended.
 
@@ -48,7 +48,7 @@ class Answer:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Dashboard:
+class DashboardCall:
     """Give a command to the dashboard, and wait until the robot has done it."""
 
     command: str
@@ -56,12 +56,12 @@ class Dashboard:
 
     def __post_init__(self) -> None:
         """Check that there is such a command, and that it fits into a line."""
-        Request(name=self.command, argument=self.argument)
+        DashboardRequest(name=self.command, argument=self.argument)
         _check_length(self.argument)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DashboardLine:
+class DashboardLineCall:
     """Send a line to the dashboard, whatever it does there, and fetch the line that comes back."""
 
     line: str
@@ -76,7 +76,7 @@ class DashboardLine:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetTcp:
+class SetTcpCall:
     """Set the active TCP, given in the flange frame."""
 
     T_flange_tcp: Pose
@@ -84,9 +84,9 @@ class SetTcp:
     def __post_init__(self) -> None:
         """Check that it is a pose, and not one in millimetres."""
         position, quaternion = self.T_flange_tcp.position, self.T_flange_tcp.quaternion
-        if not all(abs(value) <= LARGEST_TOOL for value in position):  # NaN neither
+        if not all(abs(value) <= MAX_TOOL_OFFSET for value in position):  # NaN neither
             raise LocalProtocolError(
-                f'The TCP is at {position} m in the flange, farther than {LARGEST_TOOL:g} m; '
+                f'The TCP is at {position} m in the flange, farther than {MAX_TOOL_OFFSET:g} m; '
                 'give its position in metres.'
             )
         if not abs(hypot(*quaternion) - 1.0) <= UNIT_TOLERANCE:
@@ -97,7 +97,7 @@ class SetTcp:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetPayload:
+class SetPayloadCall:
     """Set mass [kg] and centre of gravity [m] (in the flange frame) of what the flange carries."""
 
     mass: float
@@ -105,22 +105,22 @@ class SetPayload:
 
     def __post_init__(self) -> None:
         """Check that the mass can be one."""
-        if not 0.0 <= self.mass <= LARGEST_MASS or not all(
-            abs(value) <= LARGEST_TOOL for value in self.cog
+        if not 0.0 <= self.mass <= MAX_PAYLOAD_MASS or not all(
+            abs(value) <= MAX_TOOL_OFFSET for value in self.cog
         ):  # NaN neither
             raise LocalProtocolError(
                 f'The payload is {self.mass} kg at {self.cog} m; the mass has to be 0 to '
-                f'{LARGEST_MASS:g} kg, and each coordinate at most {LARGEST_TOOL:g} m.'
+                f'{MAX_PAYLOAD_MASS:g} kg, and each coordinate at most {MAX_TOOL_OFFSET:g} m.'
             )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ZeroFtSensor:
+class ZeroFtSensorCall:
     """Take the force and torque that are measured now as zero."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetOutput:
+class SetOutputCall:
     """
     Set an output.
 
@@ -154,7 +154,7 @@ class SetOutput:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetSpeedSlider:
+class SetSpeedSliderCall:
     """Move the speed slider to a fraction, 0 to 1."""
 
     fraction: float
@@ -169,40 +169,40 @@ class SetSpeedSlider:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SendProgram:
+class SendProgramCall:
     """Upload the robot program (again), and wait until it has called."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Recover:
+class RecoverCall:
     """Bring a stopped robot back to where it takes goals, as far as software may."""
 
 
-def yes(text: str) -> Answer:
+def succeeded(text: str) -> ServiceAnswer:
     """Return that it is done, or what was asked for."""
-    return Answer(ok=True, text=text)
+    return ServiceAnswer(ok=True, text=text)
 
 
-def no(text: str) -> Answer:
+def failed(text: str) -> ServiceAnswer:
     """Return why it is not done."""
-    return Answer(ok=False, text=text)
+    return ServiceAnswer(ok=False, text=text)
 
 
 def _check_length(text: str) -> None:
-    if len(text) > LONGEST_TEXT:
+    if len(text) > MAX_TEXT_LENGTH:
         raise LocalProtocolError(
-            f'A text for the dashboard has at most {LONGEST_TEXT} characters, not {len(text)}.'
+            f'A text for the dashboard has at most {MAX_TEXT_LENGTH} characters, not {len(text)}.'
         )
 
 
-Call: TypeAlias = (
-    Dashboard
-    | DashboardLine
-    | SetTcp
-    | SetPayload
-    | ZeroFtSensor
-    | SetOutput
-    | SetSpeedSlider
-    | SendProgram
-    | Recover
+ServiceCall: TypeAlias = (
+    DashboardCall
+    | DashboardLineCall
+    | SetTcpCall
+    | SetPayloadCall
+    | ZeroFtSensorCall
+    | SetOutputCall
+    | SetSpeedSliderCall
+    | SendProgramCall
+    | RecoverCall
 )

@@ -9,9 +9,19 @@ from dataclasses import dataclass
 
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
-from ur_cartesian_driver.robot.calls import Answer, Dashboard, DashboardLine, no, yes
-from ur_cartesian_driver.robot.dashboard_client import DashboardClient, explain, why_not_available
-from ur_cartesian_driver.robot.robot_view import modes, Robot, until
+from ur_cartesian_driver.robot.calls import (
+    DashboardCall,
+    DashboardLineCall,
+    failed,
+    ServiceAnswer,
+    succeeded,
+)
+from ur_cartesian_driver.robot.dashboard_client import (
+    DashboardConnection,
+    explain_refusal,
+    unavailable_reason,
+)
+from ur_cartesian_driver.robot.robot_view import describe_modes, LinkInterface, wait_for_state
 
 #: How long the robot may take to do what it is asked for [s]: powering up takes a while.
 POWER_TIMEOUT = 30.0
@@ -19,78 +29,90 @@ EFFECT_TIMEOUT = 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class Effect:
+class ExpectedEffect:
     """How it is seen that the robot has done something."""
 
-    seen: Callable[[RobotState], bool]
+    is_reached: Callable[[RobotState], bool]
     timeout: float
     #: What it shall be, for the sentence that says that it is not.
-    words: str
+    target_mode: str
 
 
 #: Dashboard commands that take a while, by what they lead to.
-EFFECTS: Mapping[str, Effect] = {
-    'power on': Effect(
+EXPECTED_EFFECTS: Mapping[str, ExpectedEffect] = {
+    'power on': ExpectedEffect(
         lambda r: r.robot_mode in (RobotMode.IDLE, RobotMode.RUNNING), POWER_TIMEOUT, 'IDLE'
     ),
-    'power off': Effect(
+    'power off': ExpectedEffect(
         lambda r: r.robot_mode is RobotMode.POWER_OFF, EFFECT_TIMEOUT, 'POWER_OFF'
     ),
-    'brake release': Effect(lambda r: r.robot_mode is RobotMode.RUNNING, POWER_TIMEOUT, 'RUNNING'),
-    'unlock protective stop': Effect(
+    'brake release': ExpectedEffect(
+        lambda r: r.robot_mode is RobotMode.RUNNING, POWER_TIMEOUT, 'RUNNING'
+    ),
+    'unlock protective stop': ExpectedEffect(
         lambda r: r.safety_mode is not SafetyMode.PROTECTIVE_STOP, EFFECT_TIMEOUT, 'unlocked'
     ),
-    'restart safety': Effect(
+    'restart safety': ExpectedEffect(
         lambda r: r.safety_mode not in (SafetyMode.VIOLATION, SafetyMode.FAULT),
         POWER_TIMEOUT,
         'restarted',
     ),
-    'play': Effect(lambda r: r.runtime_state is RuntimeState.PLAYING, EFFECT_TIMEOUT, 'PLAYING'),
-    'pause': Effect(lambda r: r.runtime_state is RuntimeState.PAUSED, EFFECT_TIMEOUT, 'PAUSED'),
-    'stop': Effect(lambda r: r.runtime_state is RuntimeState.STOPPED, EFFECT_TIMEOUT, 'STOPPED'),
+    'play': ExpectedEffect(
+        lambda r: r.runtime_state is RuntimeState.PLAYING, EFFECT_TIMEOUT, 'PLAYING'
+    ),
+    'pause': ExpectedEffect(
+        lambda r: r.runtime_state is RuntimeState.PAUSED, EFFECT_TIMEOUT, 'PAUSED'
+    ),
+    'stop': ExpectedEffect(
+        lambda r: r.runtime_state is RuntimeState.STOPPED, EFFECT_TIMEOUT, 'STOPPED'
+    ),
 }
 
 
-class DashboardCalls:
+class DashboardService:
     """The dashboard of a robot, from one event loop; several calls at a time."""
 
-    def __init__(self, host: str, port: int, robot: Robot) -> None:
+    def __init__(self, host: str, port: int, robot: LinkInterface) -> None:
         """Prepare; every call connects by itself."""
-        self._client = DashboardClient(host, port)
+        self._client = DashboardConnection(host, port)
         self._robot = robot
 
-    async def ask(self, call: Dashboard) -> Answer:
+    async def request(self, call: DashboardCall) -> ServiceAnswer:
         """Give a command, and wait until the robot has done it."""
         version = self._robot.version
-        if version is not None and (reason := why_not_available(call.command, version)):
-            return no(reason)
-        reply = await self._client.ask(call.command, call.argument)
+        if version is not None and (reason := unavailable_reason(call.command, version)):
+            return failed(reason)
+        reply = await self._client.request(call.command, call.argument)
         if not reply.ok:
-            return no(
-                explain(call.command, reply.text, self._robot.robot, await self.remote_control())
+            return failed(
+                explain_refusal(
+                    call.command, reply.text, self._robot.robot, await self.remote_control()
+                )
             )
-        effect = EFFECTS.get(call.command)
-        if effect is not None and not await until(self._robot, effect.seen, effect.timeout):
-            return no(
-                f'The robot answers {reply.text!r}, but is not {effect.words} after '
-                f'{effect.timeout:g} s: {modes(self._robot)}'
+        effect = EXPECTED_EFFECTS.get(call.command)
+        if effect is not None and not await wait_for_state(
+            self._robot, effect.is_reached, effect.timeout
+        ):
+            return failed(
+                f'The robot answers {reply.text!r}, but is not {effect.target_mode} after '
+                f'{effect.timeout:g} s: {describe_modes(self._robot)}'
             )
-        return yes(reply.value or reply.text)
+        return succeeded(reply.value or reply.text)
 
-    async def ask_raw(self, call: DashboardLine) -> Answer:
+    async def request_raw(self, call: DashboardLineCall) -> ServiceAnswer:
         """Send any line and return the one that comes back."""
         version = self._robot.version
-        if version is not None and (reason := why_not_available('quit', version)):
-            return no(reason)
-        return yes(await self._client.ask_raw(call.line))
+        if version is not None and (reason := unavailable_reason('quit', version)):
+            return failed(reason)
+        return succeeded(await self._client.request_raw(call.line))
 
     async def remote_control(self) -> bool | None:
         """Return whether clients may control the robot; None = it cannot be known."""
         version = self._robot.version
-        if version is None or why_not_available('is in remote control', version):
+        if version is None or unavailable_reason('is in remote control', version):
             return None
         try:
-            reply = await self._client.ask('is in remote control')
+            reply = await self._client.request('is in remote control')
         except (OSError, DriverError):
             return None
         return {'true': True, 'false': False}.get(reply.value or '')

@@ -16,24 +16,24 @@ from types import MappingProxyType
 
 from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
-from ur_cartesian_driver.protocol.dashboard import DashboardClient as Codec
 from ur_cartesian_driver.protocol.dashboard import (
+    COMMAND_SPECS,
+    DashboardGreeting,
+    DashboardReply,
     encode_line,
-    Greeting,
-    LONGEST_LINE,
-    Reply,
-    SHAPES,
+    MAX_LINE_LENGTH,
 )
+from ur_cartesian_driver.protocol.dashboard import DashboardClientCodec as Codec
 from ur_cartesian_driver.protocol.framing import LineBuffer
 from ur_cartesian_driver.protocol.rtde import ControllerVersion
-from ur_cartesian_driver.robot.transport import Connection, dial
+from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
 #: How long the dashboard may take to greet, and to answer [s].
 ANSWER_TIMEOUT = 5.0
 #: The first software without a dashboard.
 POLYSCOPE_X = 10
 #: What serves instead there; a command that is not named is for a person at the pendant.
-INSTEAD: Mapping[str, str] = MappingProxyType(
+REPLACEMENTS: Mapping[str, str] = MappingProxyType(
     {
         **dict.fromkeys(
             ('power on', 'brake release', 'unlock protective stop'),
@@ -52,14 +52,14 @@ INSTEAD: Mapping[str, str] = MappingProxyType(
 TOO_EARLY = 'Cannot unlock protective stop'
 
 
-class DashboardClient:
+class DashboardConnection:
     """Asks the dashboard, from one event loop; several requests at once are fine."""
 
     def __init__(self, host: str, port: int) -> None:
         """Prepare; every request connects by itself."""
         self._host, self._port = host, port
 
-    async def ask(self, command: str, argument: str = '') -> Reply:
+    async def request(self, command: str, argument: str = '') -> DashboardReply:
         """
         Give a command and return the answer.
 
@@ -67,24 +67,24 @@ class DashboardClient:
         :raises ProtocolError: it answers nonsense.
         """
         codec = Codec()
-        replies: list[Reply] = []
+        replies: list[DashboardReply] = []
         await self._exchange(
             codec.send(command, argument),
             lambda data: replies.extend(
-                event for event in codec.feed(data) if not isinstance(event, Greeting)
+                event for event in codec.feed(data) if not isinstance(event, DashboardGreeting)
             ),
             lambda: bool(replies),
         )
         return replies[0]
 
-    async def ask_raw(self, line: str) -> str:
+    async def request_raw(self, line: str) -> str:
         """
         Send any line and return the one that comes back.
 
         :raises OSError: the dashboard does not answer.
         :raises ProtocolError: it answers nonsense.
         """
-        buffer = LineBuffer(LONGEST_LINE)
+        buffer = LineBuffer(MAX_LINE_LENGTH)
         lines: list[str] = []
         await self._exchange(
             encode_line(line), lambda data: lines.extend(buffer.feed(data)), lambda: len(lines) > 1
@@ -110,7 +110,7 @@ class DashboardClient:
             if not ended.done():
                 ended.set_result(reason)
 
-        connection = Connection(take, close)
+        connection = TcpConnection(take, close)
         where = f'{self._host} port {self._port} (dashboard)'
         try:
             await dial(connection, self._host, self._port)
@@ -127,26 +127,26 @@ class DashboardClient:
             raise OSError(f'{where}: {reason}')
 
 
-def why_not_available(command: str, version: ControllerVersion) -> str:
+def unavailable_reason(command: str, version: ControllerVersion) -> str:
     """Return why the software of a robot does not have a command; empty when it has it."""
     if version.major >= POLYSCOPE_X:
         return (
             'PolyScope X has no dashboard server, so this service is not available with '
-            f'software {version}; {INSTEAD.get(command, "do it on the pendant")}.'
+            f'software {version}; {REPLACEMENTS.get(command, "do it on the pendant")}.'
         )
-    shape = SHAPES[command]
-    if shape.available((version.major, version.minor)):
+    spec = COMMAND_SPECS[command]
+    if spec.is_available((version.major, version.minor)):
         return ''
-    least = shape.cb3 if version.major < 5 else shape.e_series
-    if least is None:
+    since = spec.cb3 if version.major < 5 else spec.e_series
+    if since is None:
         return f'The dashboard of this robot, software {version}, has no command {command!r}.'
     return (
-        f'The dashboard command {command!r} needs software {least[0]}.{least[1]} or newer, '
+        f'The dashboard command {command!r} needs software {since[0]}.{since[1]} or newer, '
         f'but the robot runs {version}.'
     )
 
 
-def explain(
+def explain_refusal(
     command: str, answer: str, robot: RobotState | None, remote_control: bool | None
 ) -> str:
     """

@@ -18,12 +18,12 @@ from ur_cartesian_driver.robot.settings import LinkSettings
 from ur_cartesian_driver.robot.status import DriverStatus, has_ended
 
 #: Modes of an arm that can be switched on.
-_WITHOUT_MOTION = frozenset({RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE})
+_UNPOWERED_MODES = frozenset({RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE})
 #: How long it may take [s].
 POWER_UP_TIMEOUT = 30.0
 
 
-class FirstStart:
+class ProgramAutoStart:
     """One upload of the program on the first connection, or none."""
 
     def __init__(
@@ -55,7 +55,7 @@ class FirstStart:
             ConnectionState.STOPPED,
         ):
             return
-        if self._waits_for_power(robot, status):
+        if self._is_waiting_for_power(robot, status):
             return
         self._pending = False
         if not self._settings.headless_mode or program_connected:
@@ -70,12 +70,12 @@ class FirstStart:
         else:
             self._upload()
 
-    def _waits_for_power(self, robot: RobotState, status: DriverStatus) -> bool:
+    def _is_waiting_for_power(self, robot: RobotState, status: DriverStatus) -> bool:
         """Switch the arm on, where that is wanted; tell whether the program has to wait for it."""
         s = self._settings
         if (
             not (s.auto_power and s.headless_mode)
-            or robot.robot_mode not in _WITHOUT_MOTION
+            or robot.robot_mode not in _UNPOWERED_MODES
             or status.state is ConnectionState.STOPPED
         ):
             return False

@@ -12,16 +12,16 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState, RuntimeState
 from ur_cartesian_driver.program.secondary import tcp_program
 from ur_cartesian_driver.protocol import primary, script_command
-from ur_cartesian_driver.protocol.script_command import TcpHold
+from ur_cartesian_driver.protocol.script_command import TcpPersistence
 from ur_cartesian_driver.robot.primary_client import PrimaryClient
 from ur_cartesian_driver.robot.program_sockets import ProgramSockets
 from ur_cartesian_driver.robot.status import is_paused
 
 #: A program runs, whoever sent it.
-_RUNS = frozenset({RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.RESUMING})
+_RUNNING_STATES = frozenset({RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.RESUMING})
 
 
-class GoalTcp:
+class TemporaryTcpSetter:
     """The two ways to set a TCP: by the robot program, or by a program of its own."""
 
     def __init__(
@@ -37,12 +37,12 @@ class GoalTcp:
         #: The robot program that is connected is the one that has set it.
         self._program_remembers = False
 
-    def lend(self, T_flange_tcp: Pose) -> None:
+    def set_temporary(self, T_flange_tcp: Pose) -> None:
         """Have the robot program set the TCP for the time of a goal."""
         self._program_remembers = True
-        self._send(T_flange_tcp, TcpHold.LENT)
+        self._send(T_flange_tcp, TcpPersistence.TEMPORARY)
 
-    def put_back(self, T_flange_tcp: Pose, robot: RobotState) -> None:
+    def restore(self, T_flange_tcp: Pose, robot: RobotState) -> None:
         """
         Have the TCP put back to what it was before a goal.
 
@@ -52,17 +52,19 @@ class GoalTcp:
         """
         listens = self._program.connected and not is_paused(robot)
         if listens and (self._program_remembers or not self._headless_mode):
-            self._send(T_flange_tcp, TcpHold.BACK)
-        elif self._headless_mode and (listens or robot.runtime_state not in _RUNS):
-            self._primary.send(primary.upload(tcp_program(T_flange_tcp.rotation_vector())))
+            self._send(T_flange_tcp, TcpPersistence.RESTORE)
+        elif self._headless_mode and (listens or robot.runtime_state not in _RUNNING_STATES):
+            self._primary.send(primary.encode_program(tcp_program(T_flange_tcp.rotation_vector())))
 
     def program_lost(self) -> None:
         """Take note that the robot program is gone, and with it what it remembers."""
         self._program_remembers = False
 
-    def _send(self, T_flange_tcp: Pose, hold: TcpHold) -> None:
+    def _send(self, T_flange_tcp: Pose, persistence: TcpPersistence) -> None:
         self._program.send_command(
             script_command.encode(
-                script_command.SetTcpOffset(offset=T_flange_tcp.rotation_vector(), hold=hold)
+                script_command.SetTcpOffsetCommand(
+                    offset=T_flange_tcp.rotation_vector(), persistence=persistence
+                )
             )
         )

@@ -36,7 +36,7 @@ class ConnectionState(IntEnum):
     REFUSED = 6
 
 
-class Change(Enum):
+class ConnectionEvent(Enum):
     """What happened to the connection."""
 
     ROBOT_ANSWERED = auto()
@@ -47,52 +47,54 @@ class Change(Enum):
     PROGRAM_PAUSED = auto()
     PROGRAM_LOST = auto()
     ROBOT_STOPPED = auto()
-    ROBOT_FREE = auto()
+    STOP_CLEARED = auto()
     GOAL_STARTED = auto()
     GOAL_ENDED = auto()
-    TCP_OWED = auto()
+    TCP_RESTORE_PENDING = auto()
 
 
-S, C = ConnectionState, Change
+S, E = ConnectionState, ConnectionEvent
 
 #: A change that a state does not name leaves it as it is.
-TRANSITIONS: Mapping[ConnectionState, Mapping[Change, ConnectionState]] = MappingProxyType(
-    {
-        S.DISCONNECTED: {C.ROBOT_ANSWERED: S.CONNECTING},
-        S.CONNECTING: {
-            C.ROBOT_ACCEPTED: S.CONNECTED,
-            C.ROBOT_REFUSED: S.REFUSED,
-            C.ROBOT_LOST: S.DISCONNECTED,
-        },
-        S.CONNECTED: {
-            C.PROGRAM_CONNECTED: S.READY,
-            C.ROBOT_STOPPED: S.STOPPED,
-            C.ROBOT_LOST: S.DISCONNECTED,
-        },
-        S.READY: {
-            C.GOAL_STARTED: S.EXECUTING,
-            C.PROGRAM_PAUSED: S.CONNECTED,
-            C.PROGRAM_LOST: S.CONNECTED,
-            C.TCP_OWED: S.CONNECTED,
-            C.ROBOT_STOPPED: S.STOPPED,
-            C.ROBOT_LOST: S.DISCONNECTED,
-        },
-        S.EXECUTING: {
-            C.GOAL_ENDED: S.READY,
-            C.PROGRAM_LOST: S.CONNECTED,
-            C.TCP_OWED: S.CONNECTED,
-            C.ROBOT_STOPPED: S.STOPPED,
-            C.ROBOT_LOST: S.DISCONNECTED,
-        },
-        S.STOPPED: {
-            C.ROBOT_FREE: S.CONNECTED,
-            C.ROBOT_LOST: S.DISCONNECTED,
-        },
-        S.REFUSED: {C.ROBOT_LOST: S.DISCONNECTED},
-    }
+TRANSITIONS: Mapping[ConnectionState, Mapping[ConnectionEvent, ConnectionState]] = (
+    MappingProxyType(
+        {
+            S.DISCONNECTED: {E.ROBOT_ANSWERED: S.CONNECTING},
+            S.CONNECTING: {
+                E.ROBOT_ACCEPTED: S.CONNECTED,
+                E.ROBOT_REFUSED: S.REFUSED,
+                E.ROBOT_LOST: S.DISCONNECTED,
+            },
+            S.CONNECTED: {
+                E.PROGRAM_CONNECTED: S.READY,
+                E.ROBOT_STOPPED: S.STOPPED,
+                E.ROBOT_LOST: S.DISCONNECTED,
+            },
+            S.READY: {
+                E.GOAL_STARTED: S.EXECUTING,
+                E.PROGRAM_PAUSED: S.CONNECTED,
+                E.PROGRAM_LOST: S.CONNECTED,
+                E.TCP_RESTORE_PENDING: S.CONNECTED,
+                E.ROBOT_STOPPED: S.STOPPED,
+                E.ROBOT_LOST: S.DISCONNECTED,
+            },
+            S.EXECUTING: {
+                E.GOAL_ENDED: S.READY,
+                E.PROGRAM_LOST: S.CONNECTED,
+                E.TCP_RESTORE_PENDING: S.CONNECTED,
+                E.ROBOT_STOPPED: S.STOPPED,
+                E.ROBOT_LOST: S.DISCONNECTED,
+            },
+            S.STOPPED: {
+                E.STOP_CLEARED: S.CONNECTED,
+                E.ROBOT_LOST: S.DISCONNECTED,
+            },
+            S.REFUSED: {E.ROBOT_LOST: S.DISCONNECTED},
+        }
+    )
 )
 
 
-def after(state: ConnectionState, change: Change) -> ConnectionState:
+def next_state(state: ConnectionState, event: ConnectionEvent) -> ConnectionState:
     """Return the state after a change."""
-    return TRANSITIONS[state].get(change, state)
+    return TRANSITIONS[state].get(event, state)

@@ -9,7 +9,7 @@ and errors, and takes the robot program), then the robot program calls us. What 
 dialled again when it breaks.
 
 Power, brakes and programs are never started again by ourselves, on the first connection only
-(:mod:`~.first_start`).
+(:mod:`~.auto_start`).
 
 Events (:mod:`~ur_cartesian_driver.motion.events`) go to one callback, in the order in which they
 happened, on the event loop; a status that follows from an event is told before it, so that nobody
@@ -25,24 +25,24 @@ import logging
 from math import inf
 from typing import NoReturn
 
-from ur_cartesian_driver.kinematics.robots import Geometry, MODELS
+from ur_cartesian_driver.kinematics.robots import DhTable, MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, TrajectoryEnded
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.program import as_program, PROGRAM_NAME, ProgramSettings, render
+from ur_cartesian_driver.program import PROGRAM_NAME, ProgramSettings, render, wrap_in_program
 from ur_cartesian_driver.protocol import primary
-from ur_cartesian_driver.protocol.dialects import NEWEST
+from ur_cartesian_driver.protocol.dialects import NEWEST_DIALECT
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.rtde import ControllerVersion
-from ur_cartesian_driver.robot.chronicle import changes
-from ur_cartesian_driver.robot.evidence import Evidence
-from ur_cartesian_driver.robot.first_start import FirstStart
-from ur_cartesian_driver.robot.goal_tcp import GoalTcp
-from ur_cartesian_driver.robot.lifecycle import after, Change, ConnectionState
-from ur_cartesian_driver.robot.primary_client import PrimaryClient, PrimaryListener
-from ur_cartesian_driver.robot.program_sockets import ProgramListener, ProgramSockets
+from ur_cartesian_driver.robot.chronicle import mode_changes
+from ur_cartesian_driver.robot.evidence import LinkEventLog
+from ur_cartesian_driver.robot.first_start import ProgramAutoStart
+from ur_cartesian_driver.robot.goal_tcp import TemporaryTcpSetter
+from ur_cartesian_driver.robot.lifecycle import ConnectionEvent, ConnectionState, next_state
+from ur_cartesian_driver.robot.primary_client import PrimaryCallbacks, PrimaryClient
+from ur_cartesian_driver.robot.program_sockets import ProgramCallbacks, ProgramSockets
 from ur_cartesian_driver.robot.settings import LinkSettings
 from ur_cartesian_driver.robot.signal_stream import SignalStream
 from ur_cartesian_driver.robot.state_stream import StateStream
@@ -51,25 +51,25 @@ from ur_cartesian_driver.robot.status import (
     has_ended,
     is_paused,
     is_stopped,
-    stamped,
-    what_is_needed,
+    required_action,
+    timestamped,
 )
-from ur_cartesian_driver.robot.transport import Retry
+from ur_cartesian_driver.robot.transport import Backoff
 
 #: In these states nobody knows the robot, or it is the wrong one: the reason is the message.
 _OUT_OF_REACH = frozenset({ConnectionState.DISCONNECTED, ConnectionState.REFUSED})
 
 #: How long a robot has to wait for its program before the log says so [s]: a program that is on
 #: its way there needs nobody's help.
-NOTEWORTHY = 1.0
+LOG_DELAY = 1.0
 
 
 #: How long after a loss its reasons are waited for [s]: each comes by a connection of its own.
-GATHER = 0.1
+CAUSE_TIMEOUT = 0.1
 
 
 #: How long a program may hold its sockets after the robot has reported its end [s].
-GHOST = 0.5
+DEAD_PROGRAM_TIMEOUT = 0.5
 
 
 class RobotLink:
@@ -82,7 +82,7 @@ class RobotLink:
         on_state: Callable[[RobotState], None],
         on_event: Callable[[Event], None],
         on_status: Callable[[DriverStatus], None],
-        on_geometry: Callable[[Geometry], None],
+        on_geometry: Callable[[DhTable], None],
         on_log: Callable[[int, str], None],
         on_signals: Callable[[Signals], None] = lambda _: None,
         may_upload: bool = True,
@@ -99,50 +99,50 @@ class RobotLink:
         :param may_upload: whether the first connection to the robot is the owner's first.
         """
         self._settings = settings
-        self._tell_state, self._on_event, self._on_status = on_state, on_event, on_status
+        self._state_callback, self._on_event, self._on_status = on_state, on_event, on_status
         self._on_geometry, self._on_log = on_geometry, on_log
-        self._tell_signals = on_signals
+        self._signals_callback = on_signals
         self._status = DriverStatus(message=f'Connecting to the robot at {settings.robot_ip}.')
         self._version: ControllerVersion | None = None
         self._robot: RobotState | None = None
         self._signals: Signals | None = None
         #: The TCP that a goal had set is still to be put back.
-        self._tcp_owed = False
+        self._tcp_restore_pending = False
         #: Since when the robot reports that no program runs while one is connected [s].
-        self._ghost_since = inf
+        self._program_dead_since = inf
         #: The robot program that is connected was told to end.
         self._program_is_ending = False
         #: The program that runs on the robot has called us, even if it has hung up since.
         self._program_is_ours = False
-        self._explanation: asyncio.TimerHandle | None = None
+        self._explain_timer: asyncio.TimerHandle | None = None
         self._primary = PrimaryClient(
-            PrimaryListener(
+            PrimaryCallbacks(
                 configuration=self._on_configuration,
                 geometry=self._on_kinematics,
                 error=self._robot_error,
-                trouble=self._error,
+                connection_error=self._error,
                 text=self._robot_text,
             )
         )
         self._program = ProgramSockets(
             settings,
-            ProgramListener(
+            ProgramCallbacks(
                 connected=self._on_program_connected,
                 lost=self._on_program_lost,
                 result=lambda result: self._on_event(TrajectoryEnded(result=result)),
                 warning=self._warn,
             ),
         )
-        self._evidence = Evidence(self._program, settings.robot_receive_timeout)
-        self._goal_tcp = GoalTcp(
+        self._event_log = LinkEventLog(self._program, settings.robot_receive_timeout)
+        self._tcp_setter = TemporaryTcpSetter(
             self._program, self._primary, headless_mode=settings.headless_mode
         )
-        self._first_start = FirstStart(
+        self._auto_start = ProgramAutoStart(
             settings,
             pending=may_upload,
             upload=self.upload_program,
             warn=self._warn,
-            power_up=lambda: self.send_primary(primary.Command.RUN),
+            power_up=lambda: self.send_primary(primary.PrimaryCommand.RUN),
         )
 
     # ---- what is known ------------------------------------------------------------------------
@@ -173,32 +173,32 @@ class RobotLink:
         return self._program.connected
 
     @property
-    def tcp_owed(self) -> bool:
+    def tcp_restore_pending(self) -> bool:
         """Whether the TCP of a goal is still to be put back."""
-        return self._tcp_owed
+        return self._tcp_restore_pending
 
     def keepalive_gap(self) -> float:
         """Return the longest pause between two keepalives since the last call [s]."""
-        return self._evidence.keepalive_gap()
+        return self._event_log.keepalive_gap()
 
-    def chain(self) -> tuple[str, ...]:
+    def event_chain(self) -> tuple[str, ...]:
         """Return what led to what has just ended, the first thing first, and how all stands."""
-        return self._evidence.chain()
+        return self._event_log.event_chain()
 
     def robot_error(self) -> str:
         """Return what the robot itself said lately is wrong; empty when it said nothing."""
-        return self._evidence.robot_error()
+        return self._event_log.robot_error()
 
     def explain(self, text: str) -> None:
         """Take something that has ended, and why, for the last error of the status."""
-        if self._explanation is not None:
-            self._explanation.cancel()
-            self._explanation = None
-        self._tell(last_error=stamped(f'{text} {"; ".join(self.chain())}.'))
+        if self._explain_timer is not None:
+            self._explain_timer.cancel()
+            self._explain_timer = None
+        self._update_status(last_error=timestamped(f'{text} {"; ".join(self.event_chain())}.'))
 
     def set_serial_number(self, serial_number: str) -> None:
         """Take note of the serial number of the robot."""
-        self._tell(serial_number=serial_number)
+        self._update_status(serial_number=serial_number)
 
     # ---- commands -----------------------------------------------------------------------------
 
@@ -206,7 +206,7 @@ class RobotLink:
         """Send a trajectory action to the robot program."""
         self._program.send_control(action, count)
         if action is TrajectoryAction.CANCEL:
-            self._evidence.note('the driver sent CANCEL')
+            self._event_log.note('the driver sent CANCEL')
 
     def send_points(self, data: bytes) -> None:
         """Send points to the robot program."""
@@ -215,49 +215,53 @@ class RobotLink:
     def send_servo(self, on: bool) -> None:
         """Have the robot program enter the buffered servo, or leave it and brake."""
         self._program.send_servo(on)
-        self._evidence.note('the driver entered the servo' if on else 'the driver left the servo')
+        self._event_log.note('the driver entered the servo' if on else 'the driver left the servo')
 
     def send_command(self, data: bytes) -> bool:
         """Send a single command to the robot program; False = it is not there."""
         return self._program.send_command(data)
 
-    def send_primary(self, command: primary.Command) -> bool:
+    def send_primary(self, command: primary.PrimaryCommand) -> bool:
         """Send a command to the primary interface; False = there is no connection."""
-        return self._primary.send(primary.command(command))
+        return self._primary.send(primary.encode_command(command))
 
-    def set_busy(self, busy: bool) -> None:
+    def set_executing(self, busy: bool) -> None:
         """Say whether a goal runs: its keepalives are another message."""
-        self._program.busy = busy
+        self._program.is_executing = busy
         if busy:
-            self._change(Change.GOAL_STARTED)
+            self._apply(ConnectionEvent.GOAL_STARTED)
         else:
-            self._change(Change.GOAL_ENDED if self._program_reads() else Change.PROGRAM_LOST)
+            self._apply(
+                ConnectionEvent.GOAL_ENDED
+                if self._program_reads()
+                else ConnectionEvent.PROGRAM_LOST
+            )
 
-    def lend_tcp(self, T_flange_tcp: Pose) -> None:
+    def set_temporary_tcp(self, T_flange_tcp: Pose) -> None:
         """Have the robot program set the TCP for the time of a goal."""
-        self._goal_tcp.lend(T_flange_tcp)
+        self._tcp_setter.set_temporary(T_flange_tcp)
 
-    def return_tcp(self, T_flange_tcp: Pose) -> None:
+    def restore_tcp(self, T_flange_tcp: Pose) -> None:
         """Have the TCP put back to what it was before a goal, where the robot is connected."""
         if self._robot is not None:
-            self._goal_tcp.put_back(T_flange_tcp, self._robot)
+            self._tcp_setter.restore(T_flange_tcp, self._robot)
 
-    def owe_tcp(self, owed: bool) -> None:
+    def set_tcp_restore_pending(self, pending: bool) -> None:
         """Say whether the TCP is still to be put back: until it is, no goal is taken."""
-        if owed == self._tcp_owed:
+        if pending == self._tcp_restore_pending:
             return
-        self._tcp_owed = owed
-        if owed:
-            self._change(Change.TCP_OWED)
+        self._tcp_restore_pending = pending
+        if pending:
+            self._apply(ConnectionEvent.TCP_RESTORE_PENDING)
         else:
-            self._review()
+            self._review_state()
 
     def stop_program(self, reason: str) -> None:
         """End the robot program, so that nothing of it can resume."""
         self._warn(f'the robot program is stopped: {reason}')
-        self._evidence.note('the driver ended the robot program')
+        self._event_log.note('the driver ended the robot program')
         self._program_is_ending = self._program.connected
-        self._primary.send(primary.command(primary.Command.STOP_PROGRAM))
+        self._primary.send(primary.encode_command(primary.PrimaryCommand.STOP_PROGRAM))
         self._program.send_stop()
 
     def upload_program(self) -> None:
@@ -276,13 +280,13 @@ class RobotLink:
                 'the robot program is not sent: wire_dialect says that the robot has an '
                 'older one of its own; play that on the pendant'
             )
-        elif not self._primary.send(primary.upload(as_program(self._program.text))):
+        elif not self._primary.send(primary.encode_program(wrap_in_program(self._program.text))):
             self._warn(
                 'the robot program is not sent: there is no connection to the primary '
                 'interface of the robot'
             )
         else:
-            self._evidence.note('the driver sent the robot program')
+            self._event_log.note('the driver sent the robot program')
 
     def _foreign_program_runs(self) -> bool:
         return (
@@ -298,8 +302,8 @@ class RobotLink:
 
     def close(self) -> None:
         """Close everything; the robot program stops the arm, at the latest when we hang up."""
-        if self._explanation is not None:
-            self._explanation.cancel()
+        if self._explain_timer is not None:
+            self._explain_timer.cancel()
         self._program.close()
 
     # ---- life ---------------------------------------------------------------------------------
@@ -311,18 +315,18 @@ class RobotLink:
             tasks.create_task(self._stay_connected())
 
     async def _stay_connected(self) -> NoReturn:
-        retry = Retry()
+        retry = Backoff()
         while True:
             try:
-                reason = await self._session()
-                told = f'RTDE: {reason}'
+                reason = await self._serve_connection()
+                status_text = f'RTDE: {reason}'
                 retry.reset()
             except (OSError, DriverError) as error:
-                reason = told = str(error)
-            self._on_robot_lost(reason, told)
-            await retry.pause()
+                reason = status_text = str(error)
+            self._on_robot_lost(reason, status_text)
+            await retry.wait()
 
-    async def _session(self) -> str:
+    async def _serve_connection(self) -> str:
         """
         Serve one RTDE connection from its first to its last byte and return why it ended.
 
@@ -333,14 +337,16 @@ class RobotLink:
         stream = StateStream(s.rtde_frequency, self._on_state)
         try:
             self._version = await stream.open(s.robot_ip, s.rtde_port)
-            self._change(Change.ROBOT_ANSWERED)
+            self._apply(ConnectionEvent.ROBOT_ANSWERED)
             await self._listen(stream, self._version)
             async with asyncio.TaskGroup() as tasks:
-                others = [tasks.create_task(self._primary.hold(s.robot_ip, s.primary_port))]
+                others = [
+                    tasks.create_task(self._primary.stay_connected(s.robot_ip, s.primary_port))
+                ]
                 if s.io_publish_rate > 0.0:
                     others.append(
                         tasks.create_task(
-                            SignalStream(self._on_signals, self._warn).hold(
+                            SignalStream(self._on_signals, self._warn).stay_connected(
                                 s.robot_ip, s.rtde_port, s.io_publish_rate
                             )
                         )
@@ -360,7 +366,7 @@ class RobotLink:
             host, frozenset(s.allowed_peers or (s.robot_ip, stream.peer_address))
         )
         ports = self._program.ports
-        if s.dialect is NEWEST:  # else the program on the robot is another one
+        if s.dialect is NEWEST_DIALECT:  # else the program on the robot is another one
             self._program.text = render(
                 ProgramSettings(
                     host=s.reverse_ip or host,
@@ -372,48 +378,48 @@ class RobotLink:
                     servoj_gain=s.servoj_gain,
                     servoj_lookahead_time=s.servoj_lookahead_time,
                     servo_buffer_depth=s.servo_buffer_depth,
-                    allow_teach=s.allow_teach,
+                    allow_freedrive=s.allow_freedrive,
                 )
             )
-        self._tell(ports=ports)
+        self._update_status(ports=ports)
 
     # ---- what comes in ------------------------------------------------------------------------
 
     def _on_state(self, robot: RobotState) -> None:
         before, self._robot = self._robot, robot
-        self._tell_state(robot)
+        self._state_callback(robot)
         if before is not None and _modes(before) == _modes(robot):
             # No status follows from it, and what the event leads to, a CANCEL maybe, goes first.
             self._on_event(StateReceived(state=robot))
-            self._evidence.take_report(robot)
-            self._look_at_program(robot)
+            self._event_log.note_report(robot)
+            self._track_program(robot)
             return
-        self._evidence.take_report(robot)
-        for change in () if before is None else changes(before, robot):
-            self._evidence.note(change)
-        self._look_at_program(robot)
-        self._review()
+        self._event_log.note_report(robot)
+        for change in () if before is None else mode_changes(before, robot):
+            self._event_log.note(change)
+        self._track_program(robot)
+        self._review_state()
         self._on_event(StateReceived(state=robot))
 
     def _on_signals(self, signals: Signals) -> None:
         self._signals = signals
-        self._tell_signals(signals)
+        self._signals_callback(signals)
 
-    def _look_at_program(self, robot: RobotState) -> None:
-        self._look_for_ghost(robot)
+    def _track_program(self, robot: RobotState) -> None:
+        self._drop_dead_program(robot)
         if has_ended(robot):
             self._program_is_ours = False
         elif self._program.connected:
             self._program_is_ours = True
 
-    def _look_for_ghost(self, robot: RobotState) -> None:
+    def _drop_dead_program(self, robot: RobotState) -> None:
         """Hang up on a program that has ended without a word."""
         self._program.ended = has_ended(robot)
         if not (self._program.connected and self._program.ended):
-            self._ghost_since = inf
+            self._program_dead_since = inf
         else:
-            self._ghost_since = min(self._ghost_since, robot.timestamp)
-            if robot.timestamp - self._ghost_since > GHOST:
+            self._program_dead_since = min(self._program_dead_since, robot.timestamp)
+            if robot.timestamp - self._program_dead_since > DEAD_PROGRAM_TIMEOUT:
                 self._program.drop('the robot reports that no program runs')
 
     def _on_configuration(self, configuration: primary.ConfigurationData) -> None:
@@ -425,78 +431,82 @@ class RobotLink:
         expected = self._settings.ur_type
         found = ' or '.join(models)
         if expected in models:
-            self._change(
-                Change.ROBOT_ACCEPTED, robot_model=expected, polyscope_version=str(self._version)
+            self._apply(
+                ConnectionEvent.ROBOT_ACCEPTED,
+                robot_model=expected,
+                polyscope_version=str(self._version),
             )
-            self._review()
+            self._review_state()
         else:
-            self._change(
-                Change.ROBOT_REFUSED,
+            self._apply(
+                ConnectionEvent.ROBOT_REFUSED,
                 robot_model=found,
                 polyscope_version=str(self._version),
                 message=f'The robot is a {found}, but ur_type is {expected}; set ur_type to the '
                 'model that is there.',
             )
 
-    def _on_kinematics(self, geometry: Geometry) -> None:
+    def _on_kinematics(self, geometry: DhTable) -> None:
         if not self._status.calibration_known:
             self._on_geometry(geometry)
-            self._tell(calibration_known=True)
+            self._update_status(calibration_known=True)
 
     def _on_program_connected(self) -> None:
-        self._evidence.note('the robot program has connected')
+        self._event_log.note('the robot program has connected')
         self._program_is_ending = False
-        self._tell(program_running=True)
-        self._review()
+        self._update_status(program_running=True)
+        self._review_state()
 
     def _on_program_lost(self, reason: str) -> None:
-        self._evidence.note(
-            f'{reason}, {self._evidence.pulse().sign:.3f} s after the last sign '
+        self._event_log.note(
+            f'{reason}, {self._event_log.timing().keepalive:.3f} s after the last sign '
             'of life that it was sent'
         )
-        if self._explanation is None:
-            self._explanation = asyncio.get_running_loop().call_later(
-                GATHER, self.explain, 'The robot program is gone.'
+        if self._explain_timer is None:
+            self._explain_timer = asyncio.get_running_loop().call_later(
+                CAUSE_TIMEOUT, self.explain, 'The robot program is gone.'
             )
-        self._goal_tcp.program_lost()
-        self._change(Change.PROGRAM_LOST, program_running=False)
+        self._tcp_setter.program_lost()
+        self._apply(ConnectionEvent.PROGRAM_LOST, program_running=False)
         self._on_event(LinkLost(link='program', reason=reason))
 
-    def _on_robot_lost(self, reason: str, told: str) -> None:
+    def _on_robot_lost(self, reason: str, status_text: str) -> None:
         """Take note that the robot is gone, or never was there; people are told by whom."""
-        self._evidence.note(told)
-        news = (
-            stamped(told, self._status.last_error)
+        self._event_log.note(status_text)
+        changes = (
+            timestamped(status_text, self._status.last_error)
             if self._robot is None
-            else stamped(f'The robot is gone. {"; ".join(self.chain())}.')
+            else timestamped(f'The robot is gone. {"; ".join(self.event_chain())}.')
         )
         before, self._robot, self._signals = self._robot, None, None
-        self._program.deaf = False  # nobody knows; too many messages are better than none
-        self._change(
-            Change.ROBOT_LOST,
+        self._program.is_paused = False  # nobody knows; too many messages are better than none
+        self._apply(
+            ConnectionEvent.ROBOT_LOST,
             calibration_known=False,
-            last_error=news,
-            message=f'No connection to the robot: {told.rstrip(".")}.',
+            last_error=changes,
+            message=f'No connection to the robot: {status_text.rstrip(".")}.',
         )
         if before is not None:
             self._on_event(LinkLost(link='RTDE', reason=reason))
 
     # ---- status -------------------------------------------------------------------------------
 
-    def _review(self) -> None:
+    def _review_state(self) -> None:
         """Bring the connection's state in line with what robot and program are now."""
         robot = self._robot
         if robot is None:
             return
-        self._change(Change.ROBOT_STOPPED if is_stopped(robot) else Change.ROBOT_FREE)
-        self._first_start.review(robot, self._status, program_connected=self._program.connected)
-        self._program.deaf = is_paused(robot)
+        self._apply(
+            ConnectionEvent.ROBOT_STOPPED if is_stopped(robot) else ConnectionEvent.STOP_CLEARED
+        )
+        self._auto_start.review(robot, self._status, program_connected=self._program.connected)
+        self._program.is_paused = is_paused(robot)
         if not self._program_reads():
-            self._change(Change.PROGRAM_PAUSED)
-        elif not self._tcp_owed:
-            self._change(Change.PROGRAM_CONNECTED)
-            if self._program.busy:  # after a stop that the goal has outlived
-                self._change(Change.GOAL_STARTED)
+            self._apply(ConnectionEvent.PROGRAM_PAUSED)
+        elif not self._tcp_restore_pending:
+            self._apply(ConnectionEvent.PROGRAM_CONNECTED)
+            if self._program.is_executing:  # after a stop that the goal has outlived
+                self._apply(ConnectionEvent.GOAL_STARTED)
 
     def _program_reads(self) -> bool:
         """Tell whether the robot program would act now on what it is sent."""
@@ -509,22 +519,22 @@ class RobotLink:
             and not has_ended(robot)
         )
 
-    def _change(self, change: Change, **news: object) -> None:
+    def _apply(self, change: ConnectionEvent, **changes: object) -> None:
         """Go where the table of the life cycle leads, and tell it with other news."""
-        self._tell(state=after(self._status.state, change), **news)
+        self._update_status(state=next_state(self._status.state, change), **changes)
 
-    def _tell(self, **news: object) -> None:
+    def _update_status(self, **changes: object) -> None:
         # Who calls names fields; mypy cannot follow names.
-        status = replace(self._status, **news)  # type: ignore[arg-type]
+        status = replace(self._status, **changes)  # type: ignore[arg-type]
         if status.state not in _OUT_OF_REACH:
             status = replace(
                 status,
-                message=what_is_needed(
+                message=required_action(
                     status.state,
                     self._robot,
                     program_connected=self._program.connected,
                     headless_mode=self._settings.headless_mode,
-                    tcp_owed=self._tcp_owed,
+                    tcp_restore_pending=self._tcp_restore_pending,
                     program_is_ending=self._program_is_ending,
                     foreign_program=self._foreign_program_runs(),
                 ),
@@ -538,7 +548,7 @@ class RobotLink:
         """Write what is needed into the log, for those who do not see the status."""
         if now.message and now.message != before.message:
             if now.state is ConnectionState.CONNECTED:
-                asyncio.get_running_loop().call_later(NOTEWORTHY, self._log_if_still, now.message)
+                asyncio.get_running_loop().call_later(LOG_DELAY, self._log_if_still, now.message)
             else:
                 self._on_log(logging.INFO, now.message)
         idle = (ConnectionState.READY, ConnectionState.EXECUTING)
@@ -551,7 +561,7 @@ class RobotLink:
 
     def _robot_error(self, text: str) -> None:
         """Take what the robot says is wrong."""
-        self._evidence.note(text, is_robot_error=True)
+        self._event_log.note(text, is_robot_error=True)
         self._error(text)
 
     def _robot_text(self, text: str) -> None:
@@ -559,10 +569,10 @@ class RobotLink:
         self._on_log(logging.INFO, f'robot: {text}')
         program, _, said = text.partition(': ')
         if program == PROGRAM_NAME and said:
-            self._evidence.note(f'the robot program says: {said}')
+            self._event_log.note(f'the robot program says: {said}')
 
     def _error(self, text: str) -> None:
-        self._tell(last_error=stamped(text))
+        self._update_status(last_error=timestamped(text))
         self._on_log(logging.ERROR, text)
 
     def _warn(self, text: str) -> None:

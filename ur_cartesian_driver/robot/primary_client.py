@@ -13,31 +13,31 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NoReturn
 
-from ur_cartesian_driver.kinematics.robots import Geometry
+from ur_cartesian_driver.kinematics.robots import DhTable
 from ur_cartesian_driver.motion.errors import ProtocolError, RemoteProtocolError
 from ur_cartesian_driver.protocol import primary
-from ur_cartesian_driver.protocol.framing import one_line
-from ur_cartesian_driver.robot.transport import Connection, dial, Retry
+from ur_cartesian_driver.protocol.framing import to_single_line
+from ur_cartesian_driver.robot.transport import Backoff, dial, TcpConnection
 
 #: How long the robot may take to report its configuration [s].
 REPORT_TIMEOUT = 5.0
 #: A robot reports its state ten times a second; a connection that is silent for so long is dead
 #: [s], and what would be sent on it (stop program) would be lost.
-SILENCE = 1.5
+SILENCE_TIMEOUT = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PrimaryListener:
+class PrimaryCallbacks:
     """Who is told what; all of it on the event loop."""
 
     #: The robot's configuration, at least once for each connection.
     configuration: Callable[[primary.ConfigurationData], None]
     #: Its calibrated geometry, as often as it is reported.
-    geometry: Callable[[Geometry], None]
+    geometry: Callable[[DhTable], None]
     #: The robot says that something is wrong, with it or its program.
     error: Callable[[str], None]
     #: Something is wrong with this connection.
-    trouble: Callable[[str], None]
+    connection_error: Callable[[str], None]
     #: A text that the robot program wrote.
     text: Callable[[str], None]
 
@@ -45,43 +45,43 @@ class PrimaryListener:
 class PrimaryClient:
     """One connection at a time, made again when it breaks."""
 
-    def __init__(self, listener: PrimaryListener) -> None:
-        """Prepare; :meth:`hold` connects."""
+    def __init__(self, listener: PrimaryCallbacks) -> None:
+        """Prepare; :meth:`stay_connected` connects."""
         self._listener = listener
-        self._frames = primary.PrimaryDecoder()
-        self._connection: Connection | None = None
-        self._reported = self._heard = False
+        self._decoder = primary.PrimaryDecoder()
+        self._connection: TcpConnection | None = None
+        self._has_configuration = self._has_received = False
 
     def send(self, data: bytes) -> bool:
         """Send a program or command; False while there is no connection."""
         return self._connection is not None and self._connection.send(data)
 
-    async def hold(self, host: str, port: int) -> NoReturn:
+    async def stay_connected(self, host: str, port: int) -> NoReturn:
         """Keep connected until cancelled."""
-        retry = Retry()
-        complaint = ''
+        retry = Backoff()
+        last_warning = ''
         while True:
             try:
-                reason = await self._one_connection(host, port)
+                reason = await self._serve_connection(host, port)
                 retry.reset()
-                complaint = ''
+                last_warning = ''
             except OSError as error:
                 reason = str(error)
-            if reason != complaint:  # once, not with each attempt
-                complaint = reason
-                self._listener.trouble(f'primary interface: {reason}')
-            await retry.pause()
+            if reason != last_warning:  # once, not with each attempt
+                last_warning = reason
+                self._listener.connection_error(f'primary interface: {reason}')
+            await retry.wait()
 
-    async def _one_connection(self, host: str, port: int) -> str:
+    async def _serve_connection(self, host: str, port: int) -> str:
         """
         Serve one connection and return why it ended.
 
         :raises OSError: nobody answers, or not as a robot.
         """
         closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-        self._frames = primary.PrimaryDecoder()
-        self._reported = False
-        self._connection = Connection(
+        self._decoder = primary.PrimaryDecoder()
+        self._has_configuration = False
+        self._connection = TcpConnection(
             # Cancelled, where the link is closed while it waits here.
             self._on_data,
             lambda reason: None if closed.done() else closed.set_result(reason),
@@ -90,32 +90,32 @@ class PrimaryClient:
             await dial(self._connection, host, port)
             begin = asyncio.get_running_loop().time()
             while True:
-                self._heard = False
-                await asyncio.wait({closed}, timeout=SILENCE)
+                self._has_received = False
+                await asyncio.wait({closed}, timeout=SILENCE_TIMEOUT)
                 if closed.done():
                     return closed.result()
-                self._watch(f'{host} port {port}', asyncio.get_running_loop().time() - begin)
+                self._check_alive(f'{host} port {port}', asyncio.get_running_loop().time() - begin)
         finally:
             self._connection.close()
             self._connection = None
 
-    def _watch(self, where: str, age: float) -> None:
+    def _check_alive(self, where: str, age: float) -> None:
         """
         Look at a connection once in a while.
 
         :param age: how long it has been there [s].
         :raises OSError: it is dead, or not one to a robot.
         """
-        if not self._reported and age > REPORT_TIMEOUT:
+        if not self._has_configuration and age > REPORT_TIMEOUT:
             raise OSError(f'{where}: the robot does not report its configuration')
-        if self._reported and not self._heard:
-            raise OSError(f'{where}: the robot sent nothing for {SILENCE:g} s')
+        if self._has_configuration and not self._has_received:
+            raise OSError(f'{where}: the robot sent nothing for {SILENCE_TIMEOUT:g} s')
 
     def _on_data(self, data: bytes) -> None:
-        self._heard = True
+        self._has_received = True
         try:
-            for frame in self._frames.feed(data):
-                if isinstance(frame, primary.RobotState):
+            for frame in self._decoder.feed(data):
+                if isinstance(frame, primary.RobotStateFrame):
                     for package in frame.packages:
                         self._on_package(package)
                 else:
@@ -124,38 +124,38 @@ class PrimaryClient:
             if self._connection is not None:
                 self._connection.abort(str(error))
 
-    def _on_package(self, package: primary.StatePackage) -> None:
+    def _on_package(self, package: primary.SubPackage) -> None:
         match package:
             case primary.ConfigurationData():
-                self._reported = True
+                self._has_configuration = True
                 self._listener.configuration(package)
             case primary.KinematicsInfo():
                 self._listener.geometry(_geometry(package))
 
-    def _on_message(self, message: primary.Frame) -> None:
+    def _on_message(self, message: primary.PrimaryFrame) -> None:
         match message:
             case primary.ErrorCodeMessage(level=level) if (
                 primary.ReportLevel.WARNING <= level <= primary.ReportLevel.CRITICAL_FAULT
             ):
                 self._listener.error(
-                    f'the robot reports {message.label} {one_line(message.text)}'.rstrip()
+                    f'the robot reports {message.label} {to_single_line(message.text)}'.rstrip()
                 )
             case primary.RuntimeExceptionMessage():
                 self._listener.error(
                     f'the robot program failed in line {message.line}, column '
-                    f'{message.column}: {one_line(message.text)}'
+                    f'{message.column}: {to_single_line(message.text)}'
                 )
             case primary.TextMessage():
-                self._listener.text(one_line(message.text))
+                self._listener.text(to_single_line(message.text))
 
 
-def _geometry(package: primary.KinematicsInfo) -> Geometry:
+def _geometry(package: primary.KinematicsInfo) -> DhTable:
     """
     Return the arm's own geometry.
 
     :raises RemoteProtocolError: there cannot be such an arm.
     """
     try:
-        return Geometry(a=package.a, d=package.d, alpha=package.alpha, theta=package.theta)
+        return DhTable(a=package.a, d=package.d, alpha=package.alpha, theta=package.theta)
     except ValueError as error:
         raise RemoteProtocolError(f'The robot reports impossible kinematics: {error}') from error

@@ -25,13 +25,13 @@ from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.protocol import reverse, script_sender
 from ur_cartesian_driver.protocol.reverse import TrajectoryAction
-from ur_cartesian_driver.protocol.trajectory import ResultDecoder
+from ur_cartesian_driver.protocol.trajectory import TrajectoryResultDecoder
 from ur_cartesian_driver.robot.settings import LinkSettings
-from ur_cartesian_driver.robot.transport import Connection, Listener
+from ur_cartesian_driver.robot.transport import TcpConnection, TcpListener
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ProgramListener:
+class ProgramCallbacks:
     """Who is told what; all of it on the event loop."""
 
     #: A robot program holds all its sockets.
@@ -47,36 +47,36 @@ class ProgramListener:
 class ProgramSockets:
     """The robot program as seen from here."""
 
-    def __init__(self, settings: LinkSettings, listener: ProgramListener) -> None:
+    def __init__(self, settings: LinkSettings, listener: ProgramCallbacks) -> None:
         """Prepare; :meth:`open` listens."""
         self._settings = settings
         self._listener = listener
         #: What the script sender hands out; empty = nothing, the robot has its own program.
         self.text = ''
         #: A goal runs: its keepalives are another message.
-        self.busy = False
+        self.is_executing = False
         #: It goes through the buffered servo, whose keepalives are yet another one.
         self.servo = False
         #: The program is paused and reads nothing: it is not sent more than it can read at once,
         #: because a START must not stand behind the keepalives of an hour.
-        self.deaf = False
+        self.is_paused = False
         #: The robot reports that no program runs: who holds the sockets has gone without a word,
         #: as behind a cable that was cut, and whoever calls may have them.
         self.ended = False
         self.connected = False
         #: The longest pause between two keepalives since somebody reset it [s].
-        self.longest_gap = 0.0
+        self.max_keepalive_gap = 0.0
         #: When the last keepalive was sent to the program that is there, or was last [s].
         self.last_keepalive = -inf
         #: Where the ports are open.
         self._host = ''
         self._read_timeout = round(1000.0 * settings.robot_receive_timeout)
-        self._results = ResultDecoder()
+        self._results = TrajectoryResultDecoder()
         self._requests = script_sender.RequestDecoder()
         self._trajectory = self._program_port('trajectory_port', self._on_results)
         self._commands = self._program_port('script_command_port', _ignore)
         self._reverse = self._program_port('reverse_port', _ignore)
-        self._sender = Listener(
+        self._sender = TcpListener(
             'script_sender_port',
             on_open=self._on_sender_open,
             on_data=self._on_request,
@@ -85,8 +85,8 @@ class ProgramSockets:
         )
         self._program_ports = (self._trajectory, self._commands, self._reverse)
 
-    def _program_port(self, name: str, on_data: Callable[[bytes], None]) -> Listener:
-        return Listener(
+    def _program_port(self, name: str, on_data: Callable[[bytes], None]) -> TcpListener:
+        return TcpListener(
             name,
             on_open=self._on_open,
             on_data=on_data,
@@ -147,7 +147,7 @@ class ProgramSockets:
     def drop(self, reason: str) -> None:
         """Hang up on a program, and say that it is lost."""
         for port in self._program_ports:
-            port.hang_up()
+            port.disconnect()
         if self.connected:
             self.connected = False
             self._listener.lost(reason)
@@ -160,13 +160,13 @@ class ProgramSockets:
         """Send the message that keeps the robot program running at a steady pace."""
         loop = asyncio.get_running_loop()
         due = last = loop.time()
-        was_deaf = False
+        was_paused = False
         while True:
             last, before = loop.time(), last
-            self.longest_gap = max(self.longest_gap, last - before)
-            if not (self.deaf and was_deaf):  # one more, for the read that is under way
+            self.max_keepalive_gap = max(self.max_keepalive_gap, last - before)
+            if not (self.is_paused and was_paused):  # one more, for the read that is under way
                 self._send_keepalive()
-            was_deaf = self.deaf
+            was_paused = self.is_paused
             due = max(due + self._settings.keepalive_period, loop.time())
             await asyncio.sleep(due - loop.time())
 
@@ -182,7 +182,7 @@ class ProgramSockets:
     def _send_keepalive(self) -> None:
         if self.servo:
             self.send_servo(True)
-        elif self.busy:
+        elif self.is_executing:
             self.send_control(TrajectoryAction.NOOP, 0)
         else:
             self._send(reverse.keepalive(self._read_timeout))
@@ -195,15 +195,15 @@ class ProgramSockets:
 
     # ---- what comes in ------------------------------------------------------------------------
 
-    def _on_open(self, connection: Connection) -> None:
+    def _on_open(self, connection: TcpConnection) -> None:
         if self.connected:
             self.connected = False
             self._listener.lost('another robot program calls')
         called = [port.connection for port in self._program_ports].index(connection)
         for port in self._program_ports[called + 1 :]:
-            port.hang_up()  # a stranger, or a program that died while it connected
+            port.disconnect()  # a stranger, or a program that died while it connected
         if connection is self._trajectory.connection:
-            self._results = ResultDecoder()
+            self._results = TrajectoryResultDecoder()
         if all(port.connection is not None for port in self._program_ports):
             self.connected = True
             self._listener.connected()
@@ -220,7 +220,7 @@ class ProgramSockets:
             assert self._trajectory.connection is not None
             self._trajectory.connection.abort(str(error))
 
-    def _on_sender_open(self, _: Connection) -> None:
+    def _on_sender_open(self, _: TcpConnection) -> None:
         self._requests = script_sender.RequestDecoder()
 
     def _on_request(self, data: bytes) -> None:
@@ -230,11 +230,11 @@ class ProgramSockets:
         try:
             wanted = self._requests.feed(data)
         except ProtocolError as error:
-            self._sender.complain(str(error))
+            self._sender.warn_limited(str(error))
             connection.abort(str(error))
             return
         if not self.text:
-            self._sender.complain(
+            self._sender.warn_limited(
                 'the robot asks for a robot program, but wire_dialect says that it has an older '
                 'one of its own; leave wire_dialect out to have ours run'
             )

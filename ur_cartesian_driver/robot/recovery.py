@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 
-class Step(Enum):
+class RecoveryStep(Enum):
     """What is next."""
 
     DONE = auto()
@@ -36,19 +36,19 @@ class Step(Enum):
     SEND_PROGRAM = auto()
     PLAY = auto()
     #: A person has to act.
-    PERSON = auto()
+    OPERATOR = auto()
 
 
 #: What a step is called in a sentence: an imperative.
-WORDS: Mapping[Step, str] = MappingProxyType(
+STEP_NAMES: Mapping[RecoveryStep, str] = MappingProxyType(
     {
-        Step.UNLOCK: 'unlock the protective stop',
-        Step.RESTART_SAFETY: 'restart the safety system',
-        Step.POWER_ON: 'switch the arm on',
-        Step.RELEASE_BRAKES: 'release the brakes',
-        Step.STOP_PROGRAM: 'stop the paused program',
-        Step.SEND_PROGRAM: 'send the robot program',
-        Step.PLAY: 'play the loaded program',
+        RecoveryStep.UNLOCK: 'unlock the protective stop',
+        RecoveryStep.RESTART_SAFETY: 'restart the safety system',
+        RecoveryStep.POWER_ON: 'switch the arm on',
+        RecoveryStep.RELEASE_BRAKES: 'release the brakes',
+        RecoveryStep.STOP_PROGRAM: 'stop the paused program',
+        RecoveryStep.SEND_PROGRAM: 'send the robot program',
+        RecoveryStep.PLAY: 'play the loaded program',
     }
 )
 
@@ -57,17 +57,17 @@ _BUTTON = 'The emergency stop is pressed: see that nobody is in danger, then rel
 _ENABLE = 'An enabling device is in use: let go of it, or choose the automatic mode.'
 
 #: What the safety system needs; a sentence = a person has to act, None = nothing.
-SAFETY: Mapping[SafetyMode, Step | str | None] = MappingProxyType(
+SAFETY_STEPS: Mapping[SafetyMode, RecoveryStep | str | None] = MappingProxyType(
     {
         SafetyMode.NORMAL: None,
         SafetyMode.REDUCED: None,
-        SafetyMode.PROTECTIVE_STOP: Step.UNLOCK,
+        SafetyMode.PROTECTIVE_STOP: RecoveryStep.UNLOCK,
         SafetyMode.RECOVERY: 'The arm is outside its safety limits: move it back on the pendant.',
         SafetyMode.SAFEGUARD_STOP: _GUARD,
         SafetyMode.SYSTEM_EMERGENCY_STOP: _BUTTON,
         SafetyMode.ROBOT_EMERGENCY_STOP: _BUTTON,
-        SafetyMode.VIOLATION: Step.RESTART_SAFETY,
-        SafetyMode.FAULT: Step.RESTART_SAFETY,
+        SafetyMode.VIOLATION: RecoveryStep.RESTART_SAFETY,
+        SafetyMode.FAULT: RecoveryStep.RESTART_SAFETY,
         SafetyMode.VALIDATE_JOINT_ID: 'A joint has to be identified: follow the pendant.',
         SafetyMode.UNDEFINED_SAFETY_MODE: 'The safety mode is not known: look at the pendant.',
         SafetyMode.AUTOMATIC_MODE_SAFEGUARD_STOP: _GUARD,
@@ -86,15 +86,15 @@ SAFETY: Mapping[SafetyMode, Step | str | None] = MappingProxyType(
 )
 
 #: What power and brakes need, as above.
-POWER: Mapping[RobotMode, Step | str | None] = MappingProxyType(
+POWER_STEPS: Mapping[RobotMode, RecoveryStep | str | None] = MappingProxyType(
     {
         RobotMode.NO_CONTROLLER: 'The controller does not run: look at the pendant.',
         RobotMode.DISCONNECTED: 'The arm is not connected to its controller: look at the pendant.',
         RobotMode.CONFIRM_SAFETY: 'The safety configuration has to be confirmed on the pendant.',
-        RobotMode.BOOTING: Step.WAIT,
-        RobotMode.POWER_OFF: Step.POWER_ON,
-        RobotMode.POWER_ON: Step.WAIT,
-        RobotMode.IDLE: Step.RELEASE_BRAKES,
+        RobotMode.BOOTING: RecoveryStep.WAIT,
+        RobotMode.POWER_OFF: RecoveryStep.POWER_ON,
+        RobotMode.POWER_ON: RecoveryStep.WAIT,
+        RobotMode.IDLE: RecoveryStep.RELEASE_BRAKES,
         RobotMode.BACKDRIVE: 'The arm is being moved by hand: end that on the pendant.',
         RobotMode.RUNNING: None,
         RobotMode.UPDATING_FIRMWARE: 'The firmware of the arm is being updated: wait for its end.',
@@ -103,7 +103,7 @@ POWER: Mapping[RobotMode, Step | str | None] = MappingProxyType(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Situation:
+class RecoverySituation:
     """
     What the next step depends on.
 
@@ -123,74 +123,77 @@ class Situation:
 
 
 @dataclass(frozen=True, slots=True)
-class Next:
+class NextStep:
     """A step, with a sentence where it ends the way."""
 
-    step: Step
+    step: RecoveryStep
     text: str = ''
 
 
-def next_step(situation: Situation) -> Next:
+def next_step(situation: RecoverySituation) -> NextStep:
     """Return what has to be done next."""
     if situation.connection is ConnectionState.READY:
-        return Next(Step.DONE, 'The robot is ready for goals.')
+        return NextStep(RecoveryStep.DONE, 'The robot is ready for goals.')
     if situation.connection is ConnectionState.EXECUTING:
         return _during_a_goal(situation)
     if situation.connection is ConnectionState.REFUSED:
-        return Next(Step.PERSON, situation.message)
+        return NextStep(RecoveryStep.OPERATOR, situation.message)
     if situation.robot is None or situation.connection in (
         ConnectionState.DISCONNECTED,
         ConnectionState.CONNECTING,
     ):
         # Restarting the safety system may cost the connection; it comes back by itself.
-        return Next(Step.WAIT, situation.message)
+        return NextStep(RecoveryStep.WAIT, situation.message)
     return _unless_local(_of_robot(situation, situation.robot), situation)
 
 
-def _during_a_goal(situation: Situation) -> Next:
+def _during_a_goal(situation: RecoverySituation) -> NextStep:
     robot = situation.robot
     if robot is not None and robot.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED):
-        return Next(Step.PERSON, 'A goal is running and paused: play it on, or cancel it.')
-    return Next(Step.DONE, 'A goal is running; nothing has to be recovered.')
+        return NextStep(
+            RecoveryStep.OPERATOR, 'A goal is running and paused: play it on, or cancel it.'
+        )
+    return NextStep(RecoveryStep.DONE, 'A goal is running; nothing has to be recovered.')
 
 
-def _of_robot(situation: Situation, robot: RobotState) -> Next:
-    for needed in (SAFETY[robot.safety_mode], POWER[robot.robot_mode]):
+def _of_robot(situation: RecoverySituation, robot: RobotState) -> NextStep:
+    for needed in (SAFETY_STEPS[robot.safety_mode], POWER_STEPS[robot.robot_mode]):
         if isinstance(needed, str):
-            return Next(Step.PERSON, needed)
+            return NextStep(RecoveryStep.OPERATOR, needed)
         if needed is not None:
-            return Next(needed)
+            return NextStep(needed)
     return _of_program(situation, robot.runtime_state)
 
 
-def _of_program(situation: Situation, runtime: RuntimeState) -> Next:
+def _of_program(situation: RecoverySituation, runtime: RuntimeState) -> NextStep:
     match runtime:
         case RuntimeState.STOPPING | RuntimeState.RESUMING:
-            return Next(Step.WAIT)
+            return NextStep(RecoveryStep.WAIT)
         case RuntimeState.PAUSING | RuntimeState.PAUSED:
             # Played on, it could go on with an old motion.
-            return Next(Step.STOP_PROGRAM)
+            return NextStep(RecoveryStep.STOP_PROGRAM)
         case RuntimeState.PLAYING if situation.program_connected:
-            return Next(Step.WAIT)
+            return NextStep(RecoveryStep.WAIT)
         case RuntimeState.PLAYING:
-            return Next(
-                Step.PERSON,
+            return NextStep(
+                RecoveryStep.OPERATOR,
                 'Another program runs on the robot: stop it, or let it come '
                 'to its External Control node.',
             )
         case RuntimeState.STOPPED:
-            return Next(Step.SEND_PROGRAM if situation.headless else Step.PLAY)
+            return NextStep(RecoveryStep.SEND_PROGRAM if situation.headless else RecoveryStep.PLAY)
 
 
-def _unless_local(wanted: Next, situation: Situation) -> Next:
+def _unless_local(wanted: NextStep, situation: RecoverySituation) -> NextStep:
     """Leave to a person what the robot does for nobody else in local control."""
-    if situation.remote_control is False and wanted.step in WORDS:
+    if situation.remote_control is False and wanted.step in STEP_NAMES:
         at_hand = (
             ''
-            if wanted.step is Step.SEND_PROGRAM
-            else (f', or {WORDS[wanted.step]} on the pendant')
+            if wanted.step is RecoveryStep.SEND_PROGRAM
+            else (f', or {STEP_NAMES[wanted.step]} on the pendant')
         )
-        return Next(
-            Step.PERSON, f'The robot is in local control: switch it to remote control{at_hand}.'
+        return NextStep(
+            RecoveryStep.OPERATOR,
+            f'The robot is in local control: switch it to remote control{at_hand}.',
         )
     return wanted

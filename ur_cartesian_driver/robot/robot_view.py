@@ -15,10 +15,10 @@ from ur_cartesian_driver.protocol.rtde import ControllerVersion
 from ur_cartesian_driver.robot.status import DriverStatus
 
 #: How often an effect is looked for [s].
-LOOK = 0.02
+POLL_PERIOD = 0.02
 
 
-class Robot(Protocol):
+class LinkInterface(Protocol):
     """What is known of a robot, and the ways to it that belong to others."""
 
     @property
@@ -42,10 +42,10 @@ class Robot(Protocol):
         """Whether the robot program holds its sockets."""
 
     @property
-    def tcp_owed(self) -> bool:
+    def tcp_restore_pending(self) -> bool:
         """Whether the TCP of a goal is still to be put back."""
 
-    def send_primary(self, command: primary.Command) -> bool:
+    def send_primary(self, command: primary.PrimaryCommand) -> bool:
         """Send a command to the primary interface; False = there is no connection."""
 
     def send_command(self, data: bytes) -> bool:
@@ -55,7 +55,9 @@ class Robot(Protocol):
         """Upload the robot program."""
 
 
-async def until(robot: Robot, seen: Callable[[RobotState], bool], within: float) -> bool:
+async def wait_for_state(
+    robot: LinkInterface, predicate: Callable[[RobotState], bool], within: float
+) -> bool:
     """
     Wait until the robot reports something; one that is lost may come back.
 
@@ -66,13 +68,13 @@ async def until(robot: Robot, seen: Callable[[RobotState], bool], within: float)
     end = loop.time() + within
     while loop.time() < end:
         state = robot.robot
-        if state is not None and seen(state):
+        if state is not None and predicate(state):
             return True
-        await asyncio.sleep(LOOK)
+        await asyncio.sleep(POLL_PERIOD)
     return False
 
 
-def modes(robot: Robot) -> str:
+def describe_modes(robot: LinkInterface) -> str:
     """Return what the robot is doing, as the end of a sentence."""
     state = robot.robot
     if state is None:

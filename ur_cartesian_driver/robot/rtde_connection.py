@@ -11,19 +11,19 @@ from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.protocol.rtde import (
     ControllerVersion,
     DataReceived,
-    Ready,
+    HandshakeDone,
     Recipe,
-    RtdeClient,
+    RtdeClientCodec,
     RtdeEvent,
-    Value,
-    Values,
+    RtdeValue,
+    RtdeValues,
 )
-from ur_cartesian_driver.robot.transport import Connection, dial
+from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
 #: How long the robot may take to agree on what it streams [s].
 ANSWER_TIMEOUT = 2.0
 #: A robot that streams nothing for that long is lost [s].
-SILENCE = 1.0
+SILENCE_TIMEOUT = 1.0
 
 
 class RtdeConnection:
@@ -31,10 +31,10 @@ class RtdeConnection:
 
     def __init__(
         self,
-        client: RtdeClient,
-        on_values: Callable[[Sequence[str], Values], None],
+        client: RtdeClientCodec,
+        on_values: Callable[[Sequence[str], RtdeValues], None],
         *,
-        silence: float = SILENCE,
+        silence: float = SILENCE_TIMEOUT,
     ) -> None:
         """
         Prepare a connection.
@@ -53,7 +53,7 @@ class RtdeConnection:
         self._version: ControllerVersion | None = None
         self._answered = asyncio.Event()  # by a version or by hanging up
         self._closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
-        self._connection = Connection(self._on_data, self._on_closed)
+        self._connection = TcpConnection(self._on_data, self._on_closed)
 
     @property
     def local_address(self) -> str:
@@ -85,7 +85,7 @@ class RtdeConnection:
         self._last_packet = asyncio.get_running_loop().time()
         return self._version
 
-    def write(self, values: Mapping[str, Value]) -> None:
+    def write(self, values: Mapping[str, RtdeValue]) -> None:
         """Write all inputs of the first group, by name."""
         self._connection.send(self._inputs[0].pack_named(values))
 
@@ -118,12 +118,12 @@ class RtdeConnection:
     def _take(self, event: RtdeEvent) -> None:
         if isinstance(event, DataReceived):
             self._take_values(event.values)
-        elif isinstance(event, Ready):
+        elif isinstance(event, HandshakeDone):
             self._names, self._inputs = event.outputs.names, event.inputs
             self._version = event.controller_version
             self._answered.set()
 
-    def _take_values(self, values: Values) -> None:
+    def _take_values(self, values: RtdeValues) -> None:
         self._on_values(self._names, values)  # first, because a CANCEL may follow from it
         self._last_packet = asyncio.get_running_loop().time()
 

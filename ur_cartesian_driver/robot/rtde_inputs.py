@@ -18,8 +18,8 @@ from typing import Any
 
 from ur_cartesian_driver.motion.goal import OutputKind
 from ur_cartesian_driver.motion.signals import AnalogDomain
-from ur_cartesian_driver.protocol.rtde import RtdeClient, Value, Values
-from ur_cartesian_driver.robot.calls import SetOutput, SetSpeedSlider
+from ur_cartesian_driver.protocol.rtde import RtdeClientCodec, RtdeValue, RtdeValues
+from ur_cartesian_driver.robot.calls import SetOutputCall, SetSpeedSliderCall
 from ur_cartesian_driver.robot.rtde_connection import RtdeConnection
 
 #: How long the robot may take to show what was written [s].
@@ -38,7 +38,7 @@ RANGES: Mapping[AnalogDomain, tuple[float, float]] = {
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Writing:
+class InputWrite:
     """
     What is written, and how its effect is seen.
 
@@ -47,14 +47,14 @@ class Writing:
     :param done: tells from these whether it is there.
     """
 
-    inputs: Mapping[str, Value]
+    inputs: Mapping[str, RtdeValue]
     outputs: tuple[str, ...]
     done: Callable[[Mapping[str, Any]], bool]
 
 
-def speed_slider(call: SetSpeedSlider) -> Writing:
+def speed_slider_write(call: SetSpeedSliderCall) -> InputWrite:
     """Return how the speed slider is moved."""
-    return Writing(
+    return InputWrite(
         inputs={'speed_slider_mask': 1, 'speed_slider_fraction': call.fraction},
         outputs=('target_speed_fraction',),
         # The pendant shows whole percents.
@@ -62,14 +62,14 @@ def speed_slider(call: SetSpeedSlider) -> Writing:
     )
 
 
-def output(call: SetOutput) -> Writing:
+def output_write(call: SetOutputCall) -> InputWrite:
     """Return how an output is set."""
     return _analog(call) if call.is_analog else _digital(call)
 
 
-def _digital(call: SetOutput) -> Writing:
+def _digital(call: SetOutputCall) -> InputWrite:
     name, first_bit = _DIGITAL[call.kind]
-    return Writing(
+    return InputWrite(
         inputs={f'{name}_mask': 1 << call.pin, name: round(call.value) << call.pin},
         outputs=('actual_digital_output_bits',),
         done=lambda values: (
@@ -79,11 +79,11 @@ def _digital(call: SetOutput) -> Writing:
     )
 
 
-def _analog(call: SetOutput) -> Writing:
+def _analog(call: SetOutputCall) -> InputWrite:
     low, high = RANGES[call.domain]
     expected = low + call.value * (high - low)
     shown = f'standard_analog_output{call.pin}'
-    return Writing(
+    return InputWrite(
         inputs={
             'standard_analog_output_mask': 1 << call.pin,
             'standard_analog_output_type': call.domain << call.pin,
@@ -97,7 +97,7 @@ def _analog(call: SetOutput) -> Writing:
     )
 
 
-async def write(host: str, port: int, writing: Writing) -> bool:
+async def write_inputs(host: str, port: int, input_write: InputWrite) -> bool:
     """
     Write, and tell whether the effect was seen.
 
@@ -105,16 +105,16 @@ async def write(host: str, port: int, writing: Writing) -> bool:
     """
     done = asyncio.Event()
 
-    def look(names: Sequence[str], values: Values) -> None:
-        if writing.done(dict(zip(names, values, strict=True))):
+    def check(names: Sequence[str], values: RtdeValues) -> None:
+        if input_write.done(dict(zip(names, values, strict=True))):
             done.set()
 
     connection = RtdeConnection(
-        RtdeClient(outputs=writing.outputs, inputs=tuple(writing.inputs)), look
+        RtdeClientCodec(outputs=input_write.outputs, inputs=tuple(input_write.inputs)), check
     )
     try:
         await connection.open(host, port)
-        connection.write(writing.inputs)
+        connection.write(input_write.inputs)
         async with asyncio.timeout(EFFECT_TIMEOUT):
             await done.wait()
     except TimeoutError:

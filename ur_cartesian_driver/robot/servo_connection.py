@@ -20,12 +20,12 @@ from typing import Any
 from ur_cartesian_driver.motion.servo import ServoFeedback
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.protocol.registers import SERVO_INPUTS, SERVO_OUTPUTS
-from ur_cartesian_driver.protocol.rtde import RtdeClient, Values
+from ur_cartesian_driver.protocol.rtde import RtdeClientCodec, RtdeValues
 from ur_cartesian_driver.robot.rtde_connection import RtdeConnection
 
-OUTPUTS = ('timestamp', 'speed_scaling', 'runtime_state', *SERVO_OUTPUTS)
+SERVO_FIELDS = ('timestamp', 'speed_scaling', 'runtime_state', *SERVO_OUTPUTS)
 #: For so long is it tried to get the inputs, and so long is the pause between two attempts [s].
-PATIENCE, PAUSE = 0.2, 0.02
+OPEN_TIMEOUT, RETRY_PERIOD = 0.2, 0.02
 
 
 class ServoConnection:
@@ -49,13 +49,13 @@ class ServoConnection:
             :meth:`close`.
         """
         loop = asyncio.get_running_loop()
-        give_up, reason = loop.time() + PATIENCE, ''
+        give_up, reason = loop.time() + OPEN_TIMEOUT, ''
         while self._is_open:
             self._attempt = attempt = _Attempt(self._on_row)
             reason = await attempt.serve(host, port)
             if attempt.has_inputs or loop.time() >= give_up:
                 break
-            await asyncio.sleep(PAUSE)
+            await asyncio.sleep(RETRY_PERIOD)
         if self._is_open:
             self._is_open = False
             on_end(reason)
@@ -71,16 +71,16 @@ class ServoConnection:
         if self._attempt is not None:
             self._attempt.close()
 
-    def _on_row(self, _: Sequence[str], values: Values) -> None:
+    def _on_row(self, _: Sequence[str], values: RtdeValues) -> None:
         if self._is_open:
-            self._on_feedback(feedback_of(values))
+            self._on_feedback(feedback_from_rtde(values))
 
 
 class _Attempt(RtdeConnection):
     """One connection to the robot, which may not give the inputs."""
 
-    def __init__(self, on_values: Callable[[Sequence[str], Values], None]) -> None:
-        super().__init__(RtdeClient(outputs=OUTPUTS, inputs=SERVO_INPUTS), on_values)
+    def __init__(self, on_values: Callable[[Sequence[str], RtdeValues], None]) -> None:
+        super().__init__(RtdeClientCodec(outputs=SERVO_FIELDS, inputs=SERVO_INPUTS), on_values)
         self._is_wanted = True
 
     @property
@@ -110,8 +110,8 @@ class _Attempt(RtdeConnection):
         super().close()
 
 
-def feedback_of(values: tuple[Any, ...]) -> ServoFeedback:
-    """Return a packet with the values of :data:`OUTPUTS`."""
+def feedback_from_rtde(values: tuple[Any, ...]) -> ServoFeedback:
+    """Return a packet with the values of :data:`SERVO_FIELDS`."""
     timestamp, scaling, state, mode, sequence, lag, done, repeats, skipped, size, over = values
     return ServoFeedback(
         timestamp=timestamp,

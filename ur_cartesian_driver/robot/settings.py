@@ -7,10 +7,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 import ipaddress
 
-from ur_cartesian_driver.protocol.dialects import Dialect, DIALECTS, NEWEST
+from ur_cartesian_driver.protocol.dialects import Dialect, DIALECTS, NEWEST_DIALECT
 
 #: A robot that reports less often cannot be watched, nor told from one that is lost [Hz].
-LEAST_FREQUENCY = 10.0
+MIN_RTDE_FREQUENCY = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,14 +37,14 @@ class LinkSettings:
     headless_mode: bool = False
     #: Which messages the robot program understands, by the version of the library that it came
     #: with; other than the newest for a program that was saved on the robot.
-    wire_dialect: str = NEWEST.name
+    wire_dialect: str = NEWEST_DIALECT.name
     #: The program stops the arm and ends when we are silent for that long [s].
     robot_receive_timeout: float = 0.2
     #: Switch the arm on and release its brakes on the first connection (headless mode only).
     auto_power: bool = False
     #: Time between two messages on the reverse socket [s].
     keepalive_period: float = 0.02
-    #: Packets per second from the robot, at least :data:`LEAST_FREQUENCY`; 0 = as many as it can.
+    #: Packets per second from the robot, at least :data:`MIN_RTDE_FREQUENCY`; 0 = as many as it can.
     rtde_frequency: float = 0.0
     #: How often inputs, outputs and tool are reported [Hz]; 0 = never.
     io_publish_rate: float = 25.0
@@ -56,7 +56,7 @@ class LinkSettings:
     servoj_lookahead_time: float = 0.03
     servo_buffer_depth: int = 250
     #: Whether people may push the arm in the teach mode of the servo.
-    allow_teach: bool = False
+    allow_freedrive: bool = False
 
     def __post_init__(self) -> None:
         """
@@ -71,10 +71,10 @@ class LinkSettings:
         for address in self.allowed_peers:
             _require_address('allowed_peers', address)
         self._require_positive('robot_receive_timeout', 'keepalive_period', 'stop_deceleration')
-        if self.rtde_frequency != 0.0 and not self.rtde_frequency >= LEAST_FREQUENCY:
+        if self.rtde_frequency != 0.0 and not self.rtde_frequency >= MIN_RTDE_FREQUENCY:
             raise ValueError(
                 f'rtde_frequency is {self.rtde_frequency:g} Hz, it has to be 0 (as often as the '
-                f'robot can) or at least {LEAST_FREQUENCY:g} Hz.'
+                f'robot can) or at least {MIN_RTDE_FREQUENCY:g} Hz.'
             )
         if self.robot_receive_timeout < 2.0 * self.keepalive_period:
             raise ValueError(
@@ -93,10 +93,11 @@ class LinkSettings:
                 f'wire_dialect is {self.wire_dialect!r}, it has to be one of '
                 f'{", ".join(DIALECTS)}.'
             )
-        if self.headless_mode and self.dialect is not NEWEST:
+        if self.headless_mode and self.dialect is not NEWEST_DIALECT:
             raise ValueError(
                 f"wire_dialect is '{self.wire_dialect}' and headless_mode is true, but "
-                f"headless_mode sends our own robot program, which understands '{NEWEST.name}'; "
+                'headless_mode sends our own robot program, which understands '
+                f"'{NEWEST_DIALECT.name}'; "
                 'leave wire_dialect out, or set headless_mode to false and start the program that '
                 'is saved on the robot.'
             )

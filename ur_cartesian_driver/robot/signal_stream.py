@@ -20,13 +20,13 @@ from ur_cartesian_driver.motion.signals import (
     DigitalChannels,
     Signals,
 )
-from ur_cartesian_driver.protocol.rtde import RtdeClient, Values
-from ur_cartesian_driver.robot.rtde_connection import RtdeConnection, SILENCE
-from ur_cartesian_driver.robot.transport import Retry
+from ur_cartesian_driver.protocol.rtde import RtdeClientCodec, RtdeValues
+from ur_cartesian_driver.robot.rtde_connection import RtdeConnection, SILENCE_TIMEOUT
+from ur_cartesian_driver.robot.transport import Backoff
 
-REQUIRED = ('actual_digital_input_bits', 'actual_digital_output_bits')
+REQUIRED_FIELDS = ('actual_digital_input_bits', 'actual_digital_output_bits')
 #: Old software does not have all of these.
-OPTIONAL = (
+OPTIONAL_FIELDS = (
     'analog_io_types',
     'standard_analog_input0',
     'standard_analog_input1',
@@ -51,7 +51,7 @@ class SignalStream:
         self, on_signals: Callable[[Signals], None], on_warning: Callable[[str], None]
     ) -> None:
         """
-        Prepare; :meth:`hold` connects.
+        Prepare; :meth:`stay_connected` connects.
 
         :param on_signals: something changed.
         :param on_warning: the connection was lost, and why.
@@ -59,16 +59,18 @@ class SignalStream:
         self._on_signals, self._on_warning = on_signals, on_warning
         self._last: Signals | None = None
 
-    async def hold(self, host: str, port: int, frequency: float) -> NoReturn:
+    async def stay_connected(self, host: str, port: int, frequency: float) -> NoReturn:
         """Keep connected until cancelled."""
-        retry, complaint = Retry(), ''
+        retry, last_warning = Backoff(), ''
         while True:
             connection = RtdeConnection(
-                RtdeClient(
-                    outputs=(*REQUIRED, *OPTIONAL), optional_outputs=OPTIONAL, frequency=frequency
+                RtdeClientCodec(
+                    outputs=(*REQUIRED_FIELDS, *OPTIONAL_FIELDS),
+                    optional_outputs=OPTIONAL_FIELDS,
+                    frequency=frequency,
                 ),
                 self._on_values,
-                silence=max(SILENCE, 5.0 / frequency),
+                silence=max(SILENCE_TIMEOUT, 5.0 / frequency),
             )
             try:
                 await connection.open(host, port)
@@ -78,19 +80,19 @@ class SignalStream:
                 reason = str(error)
             finally:
                 connection.close()
-            if reason != complaint:  # once, not with each attempt
-                complaint = reason
+            if reason != last_warning:  # once, not with each attempt
+                last_warning = reason
                 self._on_warning(f'inputs and outputs are not reported: {reason}')
-            await retry.pause()
+            await retry.wait()
 
-    def _on_values(self, names: Sequence[str], values: Values) -> None:
-        now = signals(dict(zip(names, values, strict=True)))
+    def _on_values(self, names: Sequence[str], values: RtdeValues) -> None:
+        now = signals_from_rtde(dict(zip(names, values, strict=True)))
         if now != self._last:
             self._last = now
             self._on_signals(now)
 
 
-def signals(values: Mapping[str, Any]) -> Signals:
+def signals_from_rtde(values: Mapping[str, Any]) -> Signals:
     """Return the snapshot of one data package, given by those of the names above that it has."""
     types, tool_types = values.get('analog_io_types', 0), values.get('tool_analog_input_types', 0)
 

@@ -24,11 +24,11 @@ from ur_cartesian_driver.motion.state import (
     SafetyStatus,
 )
 from ur_cartesian_driver.protocol import registers
-from ur_cartesian_driver.protocol.rtde import Values
+from ur_cartesian_driver.protocol.rtde import RtdeValues
 
-POINTS_BEGUN = registers.field(registers.OutputInteger.POINTS_BEGUN)
+POINTS_BEGUN = registers.register_name(registers.OutputInteger.POINTS_BEGUN)
 
-REQUIRED = (
+REQUIRED_FIELDS = (
     'timestamp',
     'actual_q',
     'actual_qd',
@@ -48,7 +48,7 @@ REQUIRED = (
     'safety_status_bits',
 )
 #: Old software does not have these.
-OPTIONAL = (
+OPTIONAL_FIELDS = (
     'tcp_offset',
     'actual_TCP_acceleration',
     'target_TCP_acceleration',
@@ -56,7 +56,7 @@ OPTIONAL = (
     POINTS_BEGUN,
 )
 #: The order in which they are asked for.
-NAMES = (*REQUIRED, *OPTIONAL)
+STATE_FIELDS = (*REQUIRED_FIELDS, *OPTIONAL_FIELDS)
 
 _ROBOT_MODES = {mode.value: mode for mode in RobotMode}
 _SAFETY_MODES = {mode.value: mode for mode in SafetyMode}
@@ -68,17 +68,17 @@ _VECTORS = slice(1, 9)
 _NUMBERS = ('timestamp', 'speed_scaling', 'target_speed_fraction')
 
 
-def in_order(names: Sequence[str], values: Values) -> Values | tuple[Any, ...]:
-    """Return values as :data:`NAMES` has them, None for what the robot does not know."""
-    if names == NAMES:
+def in_recipe_order(names: Sequence[str], values: RtdeValues) -> RtdeValues | tuple[Any, ...]:
+    """Return values as :data:`STATE_FIELDS` has them, None for what the robot does not know."""
+    if names == STATE_FIELDS:
         return values
     found = dict(zip(names, values, strict=True))
-    return tuple(found.get(name) for name in NAMES)
+    return tuple(found.get(name) for name in STATE_FIELDS)
 
 
-def robot_state(values: tuple[Any, ...]) -> RobotState:
+def robot_state_from_rtde(values: tuple[Any, ...]) -> RobotState:
     """
-    Return the snapshot of one data package, whose values are in the order of :data:`NAMES`.
+    Return the snapshot of one data package, whose values are in the order of :data:`STATE_FIELDS`.
 
     :raises RemoteProtocolError: a number is not finite: no comparison with it would ever be true,
         so whoever watches the motion would see nothing.
@@ -164,8 +164,8 @@ def _modes(
 def _not_finite(values: tuple[Any, ...]) -> str:
     names = [
         name
-        for name, value in zip(NAMES, values, strict=True)
-        if name in (*NAMES[_VECTORS], *_NUMBERS, 'tcp_offset')
+        for name, value in zip(STATE_FIELDS, values, strict=True)
+        if name in (*STATE_FIELDS[_VECTORS], *_NUMBERS, 'tcp_offset')
         and not isfinite(sum(value) if isinstance(value, tuple) else value or 0.0)
     ]
     return f'The robot reports numbers that are not finite: {", ".join(names)}.'

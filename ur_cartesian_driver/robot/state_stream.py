@@ -7,9 +7,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.protocol.rtde import RtdeClient
+from ur_cartesian_driver.protocol.rtde import RtdeClientCodec
 from ur_cartesian_driver.robot.rtde_connection import RtdeConnection
-from ur_cartesian_driver.robot.state_recipe import in_order, NAMES, OPTIONAL, robot_state
+from ur_cartesian_driver.robot.state_recipe import (
+    in_recipe_order,
+    OPTIONAL_FIELDS,
+    robot_state_from_rtde,
+    STATE_FIELDS,
+)
 
 
 class StateStream(RtdeConnection):
@@ -23,6 +28,8 @@ class StateStream(RtdeConnection):
         :param on_state: a packet came in; also before :meth:`open` returns.
         """
         super().__init__(
-            RtdeClient(outputs=NAMES, optional_outputs=OPTIONAL, frequency=frequency),
-            lambda names, values: on_state(robot_state(in_order(names, values))),
+            RtdeClientCodec(
+                outputs=STATE_FIELDS, optional_outputs=OPTIONAL_FIELDS, frequency=frequency
+            ),
+            lambda names, values: on_state(robot_state_from_rtde(in_recipe_order(names, values))),
         )

@@ -46,7 +46,7 @@ class DriverStatus:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Gaps:
+class LinkGaps:
     """
     The longest pauses lately [s].
 
@@ -58,7 +58,7 @@ class Gaps:
     keepalives: float = nan
 
 
-def stamped(text: str, before: str = '') -> str:
+def timestamped(text: str, before: str = '') -> str:
     """
     Return a text behind the present time; the same text keeps the time that it has.
 
@@ -84,13 +84,13 @@ def has_ended(robot: RobotState) -> bool:
     return robot.runtime_state in (RuntimeState.STOPPING, RuntimeState.STOPPED)
 
 
-def what_is_needed(
+def required_action(
     state: ConnectionState,
     robot: RobotState | None,
     *,
     program_connected: bool,
     headless_mode: bool,
-    tcp_owed: bool = False,
+    tcp_restore_pending: bool = False,
     program_is_ending: bool = False,
     foreign_program: bool = False,
 ) -> str:
@@ -98,7 +98,7 @@ def what_is_needed(
     Return the sentence that says what is needed before a goal can run; empty when nothing is.
 
     :param robot: what the robot reported last; None = nothing yet.
-    :param tcp_owed: the TCP that a goal had set is still to be put back.
+    :param tcp_restore_pending: the TCP that a goal had set is still to be put back.
     :param program_is_ending: our program was told to end, and is still connected.
     :param foreign_program: a program runs on the robot that has not called us.
     """
@@ -108,7 +108,7 @@ def what_is_needed(
             '(primary_port).'
         )
     if state is ConnectionState.STOPPED:
-        return _after_a_stop(robot)
+        return _needed_after_stop(robot)
     if state is not ConnectionState.CONNECTED:
         return ''
     if robot.robot_mode is not RobotMode.RUNNING:
@@ -129,7 +129,7 @@ def what_is_needed(
                 'The TCP that the last goal had set is still to be put back; should it stay, set '
                 'the right one on the robot.'
             )
-            if tcp_owed
+            if tcp_restore_pending
             else ''
         )
     if foreign_program:
@@ -150,7 +150,7 @@ def what_is_needed(
     )
 
 
-def _after_a_stop(robot: RobotState) -> str:
+def _needed_after_stop(robot: RobotState) -> str:
     mode = robot.safety_mode.name.replace('_', ' ').lower()
     if robot.safety_mode is SafetyMode.PROTECTIVE_STOP:
         return (

@@ -22,18 +22,18 @@ OnData = Callable[[bytes], None]
 OnClosed = Callable[[str], None]
 
 #: Pauses between two attempts to connect [s]; the last one repeats.
-BACK_OFF = (0.1, 0.2, 0.5, 1.0, 2.0)
+BACKOFF_PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0)
 CONNECT_TIMEOUT = 2.0
 
 #: How much may wait for a side that does not read [bytes]; more than a window of points has, and
 #: it bounds the memory.
-MOST_UNSENT = 1 << 20
+MAX_UNSENT = 1 << 20
 #: How much is read at once [bytes].
-MOST_READ = 1 << 16
+MAX_READ = 1 << 16
 #: How long a connection may take to get rid of what is unsent, once it is closed [s].
-LINGER = 1.0
+LINGER_TIMEOUT = 1.0
 #: So many callers that are turned away get a line in the log, each time [s].
-MOST_LINES, LINES_PERIOD = 3, 60.0
+MAX_LINES, WARNING_PERIOD = 3, 60.0
 
 #: What helps where a port cannot be opened.
 REMEDIES = {
@@ -42,7 +42,7 @@ REMEDIES = {
 }
 
 
-class Connection(asyncio.BufferedProtocol):
+class TcpConnection(asyncio.BufferedProtocol):
     """
     One TCP connection, either way.
 
@@ -54,7 +54,7 @@ class Connection(asyncio.BufferedProtocol):
         self,
         on_data: OnData,
         on_closed: OnClosed,
-        on_open: Callable[[Connection], None] | None = None,
+        on_open: Callable[[TcpConnection], None] | None = None,
     ) -> None:
         """
         Set the callbacks; all of them run on the event loop.
@@ -65,7 +65,7 @@ class Connection(asyncio.BufferedProtocol):
         """
         self._on_data, self._on_closed, self._on_open = on_data, on_closed, on_open
         self._transport: asyncio.Transport | None = None
-        self._buffer = memoryview(bytearray(MOST_READ))
+        self._buffer = memoryview(bytearray(MAX_READ))
         self._reason = ''
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -127,15 +127,15 @@ class Connection(asyncio.BufferedProtocol):
         """Send bytes; False when the connection is gone, or gets lost by that."""
         if self._transport is None or self._transport.is_closing():
             return False
-        if self._transport.get_write_buffer_size() > MOST_UNSENT:
-            self.abort(f'the other side did not read {MOST_UNSENT} bytes')
+        if self._transport.get_write_buffer_size() > MAX_UNSENT:
+            self.abort(f'the other side did not read {MAX_UNSENT} bytes')
             return False
         self._transport.write(data)
         return True
 
     def close(self, reason: str = '') -> None:
         """
-        Close after what was sent has gone out, if it does within :data:`LINGER`.
+        Close after what was sent has gone out, if it does within :data:`LINGER_TIMEOUT`.
 
         :param reason: what ``on_closed`` is told.
         """
@@ -143,7 +143,7 @@ class Connection(asyncio.BufferedProtocol):
         if self._transport is not None:
             self._transport.close()
             if self._transport.get_write_buffer_size():
-                asyncio.get_running_loop().call_later(LINGER, self._transport.abort)
+                asyncio.get_running_loop().call_later(LINGER_TIMEOUT, self._transport.abort)
 
     def abort(self, reason: str) -> None:
         """Close at once, whatever is still unsent."""
@@ -152,7 +152,7 @@ class Connection(asyncio.BufferedProtocol):
             self._transport.abort()
 
 
-async def dial(connection: Connection, host: str, port: int) -> None:
+async def dial(connection: TcpConnection, host: str, port: int) -> None:
     """
     Connect once.
 
@@ -168,17 +168,17 @@ async def dial(connection: Connection, host: str, port: int) -> None:
     except TimeoutError:
         raise OSError(f'{host} port {port} does not answer within {CONNECT_TIMEOUT:g} s') from None
     except OSError as error:
-        raise OSError(f'{host} port {port}: {cause(error)}') from error
+        raise OSError(f'{host} port {port}: {error_reason(error)}') from error
 
 
-def cause(error: OSError) -> str:
+def error_reason(error: OSError) -> str:
     """Return the system's own words: those of asyncio repeat the address, or count attempts."""
     if error.errno is not None and error.errno in errno.errorcode:
         return os.strerror(error.errno).lower()
     return error.strerror or str(error)  # a name that is not known
 
 
-class Retry:
+class Backoff:
     """The pauses between attempts to connect, which grow until one of them succeeds."""
 
     def __init__(self) -> None:
@@ -189,34 +189,34 @@ class Retry:
         """Take note of a success."""
         self._attempt = 0
 
-    async def pause(self) -> None:
+    async def wait(self) -> None:
         """Wait before the next attempt."""
-        await asyncio.sleep(BACK_OFF[min(self._attempt, len(BACK_OFF) - 1)])
+        await asyncio.sleep(BACKOFF_PERIODS[min(self._attempt, len(BACKOFF_PERIODS) - 1)])
         self._attempt += 1
 
 
-class Complaints:
+class WarningLimiter:
     """Lines for the log about callers, so few that a flood of calls is none of lines."""
 
     def __init__(self, tell: Callable[[str], None]) -> None:
         """Tell nothing yet."""
-        self._tell = tell
+        self._warn = tell
         self._begin = -inf
         self._count = 0
 
     def add(self, text: str, now: float) -> None:
         """Tell it, or only count it."""
-        if now - self._begin >= LINES_PERIOD:
-            unsaid = self._count - MOST_LINES
+        if now - self._begin >= WARNING_PERIOD:
+            suppressed = self._count - MAX_LINES
             self._begin, self._count = now, 0
-            if unsaid > 0:
-                text += f' ({unsaid} more lines like this were left out)'
+            if suppressed > 0:
+                text += f' ({suppressed} more lines like this were left out)'
         self._count += 1
-        if self._count <= MOST_LINES:
-            self._tell(text)
+        if self._count <= MAX_LINES:
+            self._warn(text)
 
 
-class Listener:
+class TcpListener:
     """
     A TCP port on which the robot program calls; one caller at a time.
 
@@ -229,7 +229,7 @@ class Listener:
         self,
         name: str,
         *,
-        on_open: Callable[[Connection], None],
+        on_open: Callable[[TcpConnection], None],
         on_data: OnData,
         on_closed: OnClosed,
         on_refused: Callable[[str], None],
@@ -244,10 +244,10 @@ class Listener:
         """
         self.name = name
         self.port = 0
-        self.connection: Connection | None = None
+        self.connection: TcpConnection | None = None
         self._on_open, self._on_data, self._on_closed = on_open, on_data, on_closed
         self._is_taken = is_taken
-        self._complaints = Complaints(on_refused)
+        self._warnings = WarningLimiter(on_refused)
         self._server: asyncio.Server | None = None
         self._allowed: frozenset[str] = frozenset()
 
@@ -276,7 +276,7 @@ class Listener:
                 error.errno or 0, 'set bind_address to an address of this computer'
             ).format(name=self.name)
             raise OSError(
-                f'cannot listen on {host} port {port} ({cause(error)}): {remedy}'
+                f'cannot listen on {host} port {port} ({error_reason(error)}): {remedy}'
             ) from error
         self.port = int(self._server.sockets[0].getsockname()[1])
 
@@ -285,46 +285,46 @@ class Listener:
         if self._server is not None:
             self._server.close()
             self._server = None
-        self.hang_up()
+        self.disconnect()
 
-    def hang_up(self) -> None:
+    def disconnect(self) -> None:
         """Close the connection, if there is one; nobody is told, and the next may call."""
         connection, self.connection = self.connection, None
         if connection is not None:
             connection.close()
 
-    def _accept(self) -> Connection:
-        connection = Connection(
+    def _accept(self) -> TcpConnection:
+        connection = TcpConnection(
             self._on_data, lambda reason: self._ended(connection, reason), self._opened
         )
         return connection
 
-    def _opened(self, connection: Connection) -> None:
+    def _opened(self, connection: TcpConnection) -> None:
         peer = plain_address(connection.peer_address)
         if not self.is_open or not peer:  # closed, or hung up, between the call and here
             connection.abort('nobody is left on one side')
         elif self._allowed and peer not in self._allowed:
-            self._turn_away(
+            self._reject(
                 connection, f'{peer} may not connect; add it to allowed_peers if it is the robot'
             )
         elif self.connection is not None and self._is_taken():
-            self._turn_away(
+            self._reject(
                 connection, f'{peer} was turned away, the robot program is connected already'
             )
         else:
-            self.hang_up()
+            self.disconnect()
             self.connection = connection
             self._on_open(connection)
 
-    def complain(self, text: str) -> None:
+    def warn_limited(self, text: str) -> None:
         """Tell what is wrong with a caller, unless too much of that was told already."""
-        self._complaints.add(f'{self.name}: {text}', asyncio.get_running_loop().time())
+        self._warnings.add(f'{self.name}: {text}', asyncio.get_running_loop().time())
 
-    def _turn_away(self, connection: Connection, text: str) -> None:
+    def _reject(self, connection: TcpConnection, text: str) -> None:
         connection.abort(text)
-        self.complain(text)
+        self.warn_limited(text)
 
-    def _ended(self, connection: Connection, reason: str) -> None:
+    def _ended(self, connection: TcpConnection, reason: str) -> None:
         if connection is self.connection:  # not one that was turned away or hung up on
             self.connection = None
             self._on_closed(reason)

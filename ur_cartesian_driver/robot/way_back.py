@@ -9,52 +9,63 @@ from collections.abc import Awaitable, Callable, Mapping
 
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.protocol import primary
-from ur_cartesian_driver.robot.calls import Answer, Dashboard, no, yes
+from ur_cartesian_driver.robot.calls import DashboardCall, failed, ServiceAnswer, succeeded
 from ur_cartesian_driver.robot.dashboard_calls import (
-    DashboardCalls,
-    Effect,
+    DashboardService,
     EFFECT_TIMEOUT,
-    EFFECTS,
+    EXPECTED_EFFECTS,
+    ExpectedEffect,
 )
 from ur_cartesian_driver.robot.dashboard_client import POLYSCOPE_X, TOO_EARLY
-from ur_cartesian_driver.robot.recovery import Next, next_step, Situation, Step, WORDS
-from ur_cartesian_driver.robot.robot_view import LOOK, modes, Robot, until
+from ur_cartesian_driver.robot.recovery import (
+    next_step,
+    NextStep,
+    RecoverySituation,
+    RecoveryStep,
+    STEP_NAMES,
+)
+from ur_cartesian_driver.robot.robot_view import (
+    describe_modes,
+    LinkInterface,
+    POLL_PERIOD,
+    wait_for_state,
+)
 
 #: How long a robot may be on its way without another step [s].
 STEP_TIMEOUT = 35.0
 #: The same for a robot that is not connected, and never was meanwhile [s].
-LOST_TIMEOUT = 2.0
+DISCONNECTED_TIMEOUT = 2.0
 #: How long the reports of a robot may contradict each other after a change [s].
-SETTLING = 0.3
+SETTLING_TIMEOUT = 0.3
 #: How often an unlock that came too early is repeated [s].
-REPEAT = 0.5
+UNLOCK_RETRY_PERIOD = 0.5
 
 #: Dashboard commands of the steps of a recovery; the last one does it.
-COMMANDS: Mapping[Step, tuple[str, ...]] = {
-    Step.UNLOCK: ('close safety popup', 'close popup', 'unlock protective stop'),
-    Step.RESTART_SAFETY: ('close safety popup', 'restart safety'),
-    Step.POWER_ON: ('power on',),
-    Step.RELEASE_BRAKES: ('brake release',),
-    Step.STOP_PROGRAM: ('stop',),
-    Step.PLAY: ('close popup', 'play'),
+STEP_COMMANDS: Mapping[RecoveryStep, tuple[str, ...]] = {
+    RecoveryStep.UNLOCK: ('close safety popup', 'close popup', 'unlock protective stop'),
+    RecoveryStep.RESTART_SAFETY: ('close safety popup', 'restart safety'),
+    RecoveryStep.POWER_ON: ('power on',),
+    RecoveryStep.RELEASE_BRAKES: ('brake release',),
+    RecoveryStep.STOP_PROGRAM: ('stop',),
+    RecoveryStep.PLAY: ('close popup', 'play'),
 }
 #: The same through the primary interface, where there is no dashboard.
-PRIMARY: Mapping[Step, primary.Command] = {
-    Step.UNLOCK: primary.Command.UNLOCK_PROTECTIVE_STOP,
-    Step.POWER_ON: primary.Command.POWER_ON,
-    Step.RELEASE_BRAKES: primary.Command.RUN,
-    Step.STOP_PROGRAM: primary.Command.STOP_PROGRAM,
+PRIMARY_COMMANDS: Mapping[RecoveryStep, primary.PrimaryCommand] = {
+    RecoveryStep.UNLOCK: primary.PrimaryCommand.UNLOCK_PROTECTIVE_STOP,
+    RecoveryStep.POWER_ON: primary.PrimaryCommand.POWER_ON,
+    RecoveryStep.RELEASE_BRAKES: primary.PrimaryCommand.RUN,
+    RecoveryStep.STOP_PROGRAM: primary.PrimaryCommand.STOP_PROGRAM,
 }
 
 
-class WayBack:
+class RecoveryRunner:
     """One at a time."""
 
     def __init__(
         self,
-        robot: Robot,
-        dashboard: DashboardCalls,
-        send_program: Callable[[], Awaitable[Answer]],
+        robot: LinkInterface,
+        dashboard: DashboardService,
+        send_program: Callable[[], Awaitable[ServiceAnswer]],
         *,
         headless: bool,
     ) -> None:
@@ -66,48 +77,52 @@ class WayBack:
         """
         self._robot, self._dashboard = robot, dashboard
         self._send_program, self._headless = send_program, headless
-        self._under_way = False
+        self._is_running = False
 
-    async def go(self) -> Answer:
+    async def run(self) -> ServiceAnswer:
         """Go it to its end, or to where a person has to act; the text tells what was done."""
-        if self._under_way:
-            return no('A recovery is under way already.')
-        self._under_way = True
+        if self._is_running:
+            return failed('A recovery is under way already.')
+        self._is_running = True
         try:
             return await self._step_by_step()
         finally:
-            self._under_way = False
+            self._is_running = False
 
-    async def _step_by_step(self) -> Answer:
+    async def _step_by_step(self) -> ServiceAnswer:
         done: list[str] = []
         remote = await self._dashboard.remote_control()
         loop = asyncio.get_running_loop()
-        moved_on = loop.time()
+        last_step_time = loop.time()
         while True:
-            following = await self._settled(remote)
-            if following.step is Step.DONE:
-                return yes(_report(done, following.text))
-            if following.step is Step.PERSON:
-                return no(_report(done, following.text))
-            if following.step is Step.WAIT:
+            upcoming = await self._settled_step(remote)
+            if upcoming.step is RecoveryStep.DONE:
+                return succeeded(_report(done, upcoming.text))
+            if upcoming.step is RecoveryStep.OPERATOR:
+                return failed(_report(done, upcoming.text))
+            if upcoming.step is RecoveryStep.WAIT:
                 # A robot that was never there will not come by waiting.
                 lost = self._robot.robot is None and not done
-                if loop.time() - moved_on > (LOST_TIMEOUT if lost else STEP_TIMEOUT):
-                    return no(_report(done, following.text or modes(self._robot)))
-                await asyncio.sleep(LOOK)
+                if loop.time() - last_step_time > (DISCONNECTED_TIMEOUT if lost else STEP_TIMEOUT):
+                    return failed(_report(done, upcoming.text or describe_modes(self._robot)))
+                await asyncio.sleep(POLL_PERIOD)
                 continue
-            if WORDS[following.step] in done:
-                return no(_report(done, f'The robot needs a person: {modes(self._robot)}'))
+            if STEP_NAMES[upcoming.step] in done:
+                return failed(
+                    _report(done, f'The robot needs a person: {describe_modes(self._robot)}')
+                )
             try:
-                answer = await self._do(following.step)
+                answer = await self._do(upcoming.step)
             except (OSError, DriverError) as error:
-                answer = no(str(error))
+                answer = failed(str(error))
             if not answer.ok:
-                return no(_report(done, f'Could not {WORDS[following.step]}: {answer.text}'))
-            done.append(WORDS[following.step])
-            moved_on = loop.time()
+                return failed(
+                    _report(done, f'Could not {STEP_NAMES[upcoming.step]}: {answer.text}')
+                )
+            done.append(STEP_NAMES[upcoming.step])
+            last_step_time = loop.time()
 
-    async def _settled(self, remote: bool | None) -> Next:
+    async def _settled_step(self, remote: bool | None) -> NextStep:
         """
         Return the next step; one for a person only when it stays so.
 
@@ -115,16 +130,16 @@ class WayBack:
         has just been started has not called yet.
         """
         loop = asyncio.get_running_loop()
-        following = next_step(self._situation(remote))
-        end = loop.time() + SETTLING
-        while following.step is Step.PERSON and loop.time() < end:
-            await asyncio.sleep(LOOK)
-            following = next_step(self._situation(remote))
-        return following
+        upcoming = next_step(self._situation(remote))
+        end = loop.time() + SETTLING_TIMEOUT
+        while upcoming.step is RecoveryStep.OPERATOR and loop.time() < end:
+            await asyncio.sleep(POLL_PERIOD)
+            upcoming = next_step(self._situation(remote))
+        return upcoming
 
-    def _situation(self, remote: bool | None) -> Situation:
+    def _situation(self, remote: bool | None) -> RecoverySituation:
         robot = self._robot
-        return Situation(
+        return RecoverySituation(
             connection=robot.status.state,
             message=robot.status.message,
             robot=robot.robot,
@@ -133,40 +148,42 @@ class WayBack:
             remote_control=remote,
         )
 
-    async def _do(self, step: Step) -> Answer:
+    async def _do(self, step: RecoveryStep) -> ServiceAnswer:
         """Do one step and wait until it is done."""
-        if step is Step.SEND_PROGRAM:
+        if step is RecoveryStep.SEND_PROGRAM:
             return await self._send_program()
         version = self._robot.version
-        *before, command = COMMANDS[step]
-        if version is not None and version.major >= POLYSCOPE_X and step in PRIMARY:
-            return await self._do_without_dashboard(step, EFFECTS[command])
+        *before, command = STEP_COMMANDS[step]
+        if version is not None and version.major >= POLYSCOPE_X and step in PRIMARY_COMMANDS:
+            return await self._do_without_dashboard(step, EXPECTED_EFFECTS[command])
         for line in before:
-            await self._dashboard.ask(Dashboard(command=line))
-        answer = await self._dashboard.ask(Dashboard(command=command))
+            await self._dashboard.request(DashboardCall(command=line))
+        answer = await self._dashboard.request(DashboardCall(command=command))
         while not answer.ok and TOO_EARLY in answer.text:
-            await asyncio.sleep(REPEAT)
-            answer = await self._dashboard.ask(Dashboard(command=command))
+            await asyncio.sleep(UNLOCK_RETRY_PERIOD)
+            answer = await self._dashboard.request(DashboardCall(command=command))
         if (
             answer.ok
-            and step is Step.PLAY
-            and not await until(
+            and step is RecoveryStep.PLAY
+            and not await wait_for_state(
                 self._robot, lambda _: self._robot.program_connected, EFFECT_TIMEOUT
             )
         ):
-            return no(
+            return failed(
                 'it plays, but has not come to its External Control node within '
                 f'{EFFECT_TIMEOUT:g} s.'
             )
         return answer
 
-    async def _do_without_dashboard(self, step: Step, effect: Effect) -> Answer:
+    async def _do_without_dashboard(
+        self, step: RecoveryStep, effect: ExpectedEffect
+    ) -> ServiceAnswer:
         for _ in range(2):  # an unlock is refused for 5 s after the stop
-            if not self._robot.send_primary(PRIMARY[step]):
-                return no('there is no connection to the primary interface of the robot.')
-            if await until(self._robot, effect.seen, effect.timeout):
-                return yes('')
-        return no(f'the robot is not {effect.words}; {modes(self._robot)}')
+            if not self._robot.send_primary(PRIMARY_COMMANDS[step]):
+                return failed('there is no connection to the primary interface of the robot.')
+            if await wait_for_state(self._robot, effect.is_reached, effect.timeout):
+                return succeeded('')
+        return failed(f'the robot is not {effect.target_mode}; {describe_modes(self._robot)}')
 
 
 def _report(done: list[str], text: str) -> str:

@@ -28,7 +28,7 @@ from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
-from ur_cartesian_driver.driver import Driver, Motion
+from ur_cartesian_driver.driver import Driver, MotionHandle
 from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import (
     Cancelled,
@@ -42,29 +42,29 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.plan import Plan
-from ur_cartesian_driver.planning.validate import check
-from ur_cartesian_driver.ros.convert import goal_from_message, nanoseconds, placed
-from ur_cartesian_driver.ros.deferring_server import DeferringActionServer
-from ur_cartesian_driver.ros.frames import Frames, Stand
+from ur_cartesian_driver.planning.request.validate import check
+from ur_cartesian_driver.ros.convert import goal_from_message, nanoseconds, resolve_frames
+from ur_cartesian_driver.ros.deferring_server import DeferredActionServer
+from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames
+from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter, ArmRequest
 from ur_cartesian_driver.ros.parameters import Settings
 from ur_cartesian_driver.ros.reports import feedback_message, FeedbackFrame, result_message
-from ur_cartesian_driver.ros.transforms import listen
-from ur_cartesian_driver.ros.turns import Turn, Turns
+from ur_cartesian_driver.ros.transforms import listen_to_tf
 
 GoalHandle: TypeAlias = Any
 
 #: How long the result of a goal is kept for clients that ask late [s]; the goal is kept with it.
 RESULT_TIMEOUT = 60
 #: How requests are queued.
-REQUESTS = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST)
+REQUEST_QOS = QoSProfile(depth=1000, history=HistoryPolicy.KEEP_LAST)
 #: So many goals may be under way, each with a thread and its points in memory.
-MOST_GOALS = 100
+MAX_GOALS = 100
 #: How often a waiting goal looks at the node's clock, which may be a simulated one [s].
 CLOCK_PERIOD = 0.05
 #: How long rclpy may need from calling us about a cancel request to noting it [s].
-CANCEL_NOTED = 1.0
+CANCELING_TIMEOUT = 1.0
 #: How long the end of a goal is waited for when the node is destroyed [s].
-PATIENCE = 10.0
+JOIN_TIMEOUT = 10.0
 
 SHUTDOWN = 'The driver node is shutting down'
 
@@ -78,16 +78,16 @@ class CartesianActionServer:
         self._clock = node.get_clock()
         self._driver = driver
         self._settings = settings
-        self._transforms = listen(node, settings.node.tf_max_age)
+        self._transforms = listen_to_tf(node, settings.node.tf_max_age)
         self._frames = settings.frames.with_transforms(self._transforms)
         self._joint_names = tuple(settings.planning.tf_prefix + name for name in JOINT_NAMES)
         #: Which of the goals may move the arm.
-        self.turns = Turns()
+        self.arbiter = ArmArbiter()
         # Guards what follows: the goals that have not ended.
         self._lock = threading.Lock()
         self._runs: dict[bytes, GoalRun] = {}
         self._closing = False
-        self._server: Any = DeferringActionServer(  # type: ignore[no-untyped-call]  # rclpy's
+        self._server: Any = DeferredActionServer(  # type: ignore[no-untyped-call]  # rclpy's
             node,
             FollowCartesianTrajectory,
             '~/follow_cartesian_trajectory',
@@ -97,9 +97,9 @@ class CartesianActionServer:
             cancel_callback=self._cancel,
             result_timeout=RESULT_TIMEOUT,
             # Requests that come in a burst wait here; beyond the depth they would be lost.
-            goal_service_qos_profile=REQUESTS,
-            result_service_qos_profile=REQUESTS,
-            cancel_service_qos_profile=REQUESTS,
+            goal_service_qos_profile=REQUEST_QOS,
+            result_service_qos_profile=REQUEST_QOS,
+            cancel_service_qos_profile=REQUEST_QOS,
         )
 
     @property
@@ -113,7 +113,7 @@ class CartesianActionServer:
         with self._lock:
             return not self._runs
 
-    def run_of(self, key: bytes) -> GoalRun | None:
+    def find_run(self, key: bytes) -> GoalRun | None:
         """Return the run of a goal that has not ended, by the bytes of its id."""
         with self._lock:
             return self._runs.get(key)
@@ -132,7 +132,7 @@ class CartesianActionServer:
         with self._lock:
             runs = list(self._runs.values())
         for run in runs:
-            run.thread.join(PATIENCE)
+            run.thread.join(JOIN_TIMEOUT)
         self._server.destroy()
         if self._transforms is not None:
             self._transforms.close()
@@ -142,21 +142,21 @@ class CartesianActionServer:
     def _begin(self, handle: GoalHandle) -> None:
         """Give an accepted goal its thread."""
         run = GoalRun(self, handle, received=self._clock.now().nanoseconds)
-        if not (run.is_for_later or handle.request.validate_only):
-            self.turns.line_up(run.turn)  # here, where goals come one after the other
+        if not (run.is_scheduled or handle.request.validate_only):
+            self.arbiter.enqueue(run.arm_request)  # here, where goals come one after the other
         with self._lock:
-            one_too_many = len(self._runs) >= MOST_GOALS
-            if not one_too_many:
+            is_over_limit = len(self._runs) >= MAX_GOALS
+            if not is_over_limit:
                 self._runs[run.key] = run
             if self._closing:
                 run.shut_down()
-        if one_too_many:
-            self.ended(
+        if is_over_limit:
+            self.finish_run(
                 run,
                 Outcome(
                     code=ErrorCode.ROBOT_NOT_READY,
                     text=(
-                        f'{MOST_GOALS} goals are being planned, wait or run; send this one again '
+                        f'{MAX_GOALS} goals are being planned, wait or run; send this one again '
                         'when some of them have ended.'
                     ),
                 ),
@@ -188,55 +188,55 @@ class CartesianActionServer:
 
     # ---- called by the threads of the goals ---------------------------------------------------
 
-    def converted(self, run: GoalRun) -> Goal:
+    def convert_goal(self, run: GoalRun) -> Goal:
         """Return the goal of a run, in our own terms."""
         return goal_from_message(
             run.handle.request,
             self._frames,
             now=run.received,
-            stand=self._stand(),
+            snapshot=self._snapshot(),
             time_tolerance=self._settings.node.goal_time_tolerance,
         )
 
-    def placed(self, run: GoalRun, goal: Goal) -> Goal:
+    def resolve_frames(self, run: GoalRun, goal: Goal) -> Goal:
         """Return a goal with its frames where they are now: the arm may have moved since."""
-        return placed(
+        return resolve_frames(
             goal,
             run.handle.request.trajectory,
             self._frames,
             now=self._clock.now().nanoseconds,
-            stand=self._stand(),
+            snapshot=self._snapshot(),
         )
 
-    def _stand(self) -> Stand | None:
+    def _snapshot(self) -> ArmSnapshot | None:
         state = self._driver.rest_state
-        return None if state is None else Stand.of(state)
+        return None if state is None else ArmSnapshot.of(state)
 
     def plan(self, goal: Goal) -> Plan:
         """Plan from where the arm stands, or would stand if it were stopped now."""
         return self._driver.plan(goal)
 
-    def wait(self, until: int, given_up: threading.Event) -> None:
+    def wait(self, until: int, abort_requested: threading.Event) -> None:
         """Wait for a time of the node's clock [ns]."""
-        while (left := until - self._clock.now().nanoseconds) > 0:
-            if given_up.wait(min(left / 1_000_000_000, CLOCK_PERIOD)):
+        while (remaining := until - self._clock.now().nanoseconds) > 0:
+            if abort_requested.wait(min(remaining / 1_000_000_000, CLOCK_PERIOD)):
                 return
 
     @property
-    def preempts(self) -> bool:
+    def is_preempting(self) -> bool:
         """Tell whether a new goal takes the place of the one that runs."""
         return self._settings.node.on_new_goal == 'preempt'
 
-    def seize(self, run: GoalRun, goal: Goal) -> None:
+    def acquire_if_free(self, run: GoalRun, goal: Goal) -> None:
         """
         Give the arm to a goal where none has it.
 
         :raises GoalRefused: another goal has it; if this one is malformed, that is said instead.
         """
-        if self.turns.seize(run.turn):
+        if self.arbiter.acquire(run.arm_request):
             return
         check(goal, self._settings.planning)
-        holder = self.turns.holder
+        holder = self.arbiter.holder
         other = (
             'Another goal is'
             if not holder or holder.startswith('goal ')
@@ -247,23 +247,23 @@ class CartesianActionServer:
             'cancel it, then send this goal again.'
         )
 
-    def claim(self, run: GoalRun) -> None:
+    def preempt_others(self, run: GoalRun) -> None:
         """
         Have the goal that runs make way for this one, which has passed its checks; wait for it.
 
         :raises RobotNotReady: the robot could not follow; the goal that runs goes on.
         """
-        if self.turns.is_taken():
-            self._driver.check_can_make_way()
-        self.turns.claim(run.turn)
+        if self.arbiter.is_held():
+            self._driver.check_can_preempt()
+        self.arbiter.preempt(run.arm_request)
 
-    def start(self, plan: Plan, on_progress: Callable[[Progress], None]) -> Motion:
+    def start(self, plan: Plan, on_progress: Callable[[Progress], None]) -> MotionHandle:
         """Set the arm in motion."""
         return self._driver.start(plan, on_progress)
 
-    def ended(self, run: GoalRun, outcome: Outcome) -> None:
+    def finish_run(self, run: GoalRun, outcome: Outcome) -> None:
         """Give the arm free, and the outcome to the executor."""
-        self.turns.leave(run.turn)
+        self.arbiter.release(run.arm_request)
         self._server.finish(run.handle, lambda handle: self._finish(run, outcome))
 
     def feedback_frame(self, run: GoalRun, plan: Plan) -> FeedbackFrame:
@@ -298,26 +298,26 @@ class GoalRun:
         self.received = received
         #: When it is to start [ns]; 0 = at once.
         self.start_time = nanoseconds(handle.request.trajectory.header.stamp)
-        self.turn = Turn(f'goal {self.key.hex()[:8]}', self._make_way)
-        self.thread = threading.Thread(target=self._run, name=self.turn.name, daemon=True)
+        self.arm_request = ArmRequest(f'goal {self.key.hex()[:8]}', self._preempt_motion)
+        self.thread = threading.Thread(target=self._run, name=self.arm_request.name, daemon=True)
         self._server = server
         self._lock = threading.Lock()
-        self._motion: Motion | None = None
+        self._motion: MotionHandle | None = None
         #: Set when the motion has begun, or never will.
         self._begun = threading.Event()
         #: Whether it waits for its time.
-        self.waits = self.is_for_later
+        self.is_waiting = self.is_scheduled
         #: The last request for more points that was granted, and its response.
-        self.answered: tuple[object, Any] | None = None
-        self._given_up = threading.Event()
+        self.last_append: tuple[object, Any] | None = None
+        self._abort_requested = threading.Event()
         self._cancel_requested = False
 
     @property
-    def is_for_later(self) -> bool:
+    def is_scheduled(self) -> bool:
         """Tell whether its time is still to come when it is received."""
         return self.start_time > self.received
 
-    def motion(self, timeout: float) -> Motion | None:
+    def motion(self, timeout: float) -> MotionHandle | None:
         """Return its motion, waiting for its begin; None: there is none [s]."""
         self._begun.wait(timeout)
         return self._motion
@@ -326,40 +326,40 @@ class GoalRun:
     def points(self) -> int:
         """How many points it has, where it may have more."""
         motion = self._motion
-        return motion.continuing.points if motion is not None and motion.continuing else 0
+        return motion.appender.points if motion is not None and motion.appender else 0
 
     def cancel(self) -> None:
         """Stop, because the client wants it."""
         self._cancel_requested = True
-        self._give_up()
+        self._abort()
 
     def shut_down(self) -> None:
         """Stop, because the node ends."""
-        self._give_up()
+        self._abort()
 
-    def _give_up(self) -> None:
+    def _abort(self) -> None:
         with self._lock:
-            self._given_up.set()
+            self._abort_requested.set()
             motion = self._motion
-        self._server.turns.withdraw(self.turn)
+        self._server.arbiter.withdraw(self.arm_request)
         if motion is not None:
             motion.cancel()
 
-    def _make_way(self) -> None:
+    def _preempt_motion(self) -> None:
         """Stop for a newer goal."""
         with self._lock:
             motion = self._motion
         if motion is not None:
-            motion.preempt(self.turn.successor)
+            motion.preempt(self.arm_request.preempted_by)
 
     def _run(self) -> None:
         try:
-            outcome = self._outcome()
+            outcome = self._process()
         except DriverError as error:
-            outcome = Outcome(code=code_of(error), text=self._sentence(error))
+            outcome = Outcome(code=code_of(error), text=self._refusal_text(error))
         except Exception as error:
             # A goal always ends with a result; the traceback goes the way of all threads.
-            self._server.ended(
+            self._server.finish_run(
                 self,
                 Outcome(
                     code=ErrorCode.EXECUTION_FAILED,
@@ -371,33 +371,33 @@ class GoalRun:
         finally:
             self._begun.set()
         if outcome.code is ErrorCode.CANCELLED and self._cancel_requested:
-            self._wait_until_cancel_is_noted()
-        self._server.ended(self, outcome)
+            self._wait_for_canceling_state()
+        self._server.finish_run(self, outcome)
 
-    def _outcome(self) -> Outcome:
+    def _process(self) -> Outcome:
         server, request = self._server, self.handle.request
-        goal = server.converted(self)
+        goal = server.convert_goal(self)
         if request.validate_only:
             return Outcome(
                 code=ErrorCode.SUCCESSFUL,
                 text='The goal passed all checks.',
-                report=self._checked(server.plan(goal)).report,
+                report=self._require_wanted(server.plan(goal)).report,
             )
-        if self.is_for_later:
-            self._checked(server.plan(goal))
-            server.wait(self.start_time, self._given_up)
-            self.waits = False
+        if self.is_scheduled:
+            self._require_wanted(server.plan(goal))
+            server.wait(self.start_time, self._abort_requested)
+            self.is_waiting = False
             self._check_wanted()
-            server.turns.line_up(self.turn)
+            server.arbiter.enqueue(self.arm_request)
             goal = replace(goal, age=0.0)
-        return self._moved(
-            self._plan_preempting(goal) if server.preempts else self._plan_if_free(goal)
+        return self._execute(
+            self._plan_preempting(goal) if server.is_preempting else self._plan_if_free(goal)
         )
 
     def _plan_if_free(self, goal: Goal) -> Plan:
         """Return the plan of a goal that runs if no other one does."""
-        self._server.seize(self, goal)
-        return self._planned(goal)
+        self._server.acquire_if_free(self, goal)
+        return self._plan_goal(goal)
 
     def _plan_preempting(self, goal: Goal) -> Plan:
         """
@@ -407,16 +407,16 @@ class GoalRun:
         nobody. When the arm has been somebody else's since it is planned again from where it is.
         """
         server = self._server
-        changes = server.turns.changes
-        plan = self._planned(goal)
-        server.claim(self)
+        release_count = server.arbiter.release_count
+        plan = self._plan_goal(goal)
+        server.preempt_others(self)
         self._check_wanted()
-        return plan if server.turns.changes == changes else self._planned(goal)
+        return plan if server.arbiter.release_count == release_count else self._plan_goal(goal)
 
-    def _planned(self, goal: Goal) -> Plan:
-        return self._checked(self._server.plan(self._server.placed(self, goal)))
+    def _plan_goal(self, goal: Goal) -> Plan:
+        return self._require_wanted(self._server.plan(self._server.resolve_frames(self, goal)))
 
-    def _checked(self, plan: Plan) -> Plan:
+    def _require_wanted(self, plan: Plan) -> Plan:
         """
         Return a plan that is still wanted.
 
@@ -432,14 +432,14 @@ class GoalRun:
         :raises Cancelled: it was given up meanwhile.
         :raises Preempted: a newer one has taken its place.
         """
-        if self._given_up.is_set():
-            raise self._cancelled('before anything moved')
-        if successor := self.turn.successor:
+        if self._abort_requested.is_set():
+            raise self._cancellation('before anything moved')
+        if preempted_by := self.arm_request.preempted_by:
             raise Preempted(
-                f'{successor.capitalize()} took the place of this one before anything moved.'
+                f'{preempted_by.capitalize()} took the place of this one before anything moved.'
             )
 
-    def _moved(self, plan: Plan) -> Outcome:
+    def _execute(self, plan: Plan) -> Outcome:
         server = self._server
         frame = server.feedback_frame(self, plan)
         motion = server.start(
@@ -447,37 +447,37 @@ class GoalRun:
         )
         with self._lock:
             self._motion = motion
-            given_up = self._given_up.is_set()
+            abort_requested = self._abort_requested.is_set()
         self._begun.set()
-        if given_up:
+        if abort_requested:
             motion.cancel()
-        elif self.turn.successor:
-            motion.preempt(self.turn.successor)
+        elif self.arm_request.preempted_by:
+            motion.preempt(self.arm_request.preempted_by)
         outcome = motion.result()
         if (
             outcome.code is ErrorCode.CANCELLED
             and not self._cancel_requested
-            and self._given_up.is_set()
+            and self._abort_requested.is_set()
         ):
-            return replace(outcome, text=str(self._cancelled('and the arm was stopped')))
+            return replace(outcome, text=str(self._cancellation('and the arm was stopped')))
         return outcome
 
-    def _sentence(self, error: DriverError) -> str:
+    def _refusal_text(self, error: DriverError) -> str:
         """Return what to say of a refusal; also that another goal had to go for nothing."""
-        predecessor = self.turn.predecessor
-        if not (isinstance(error, GoalRefused) and predecessor):
+        preempted = self.arm_request.preempted
+        if not (isinstance(error, GoalRefused) and preempted):
             return str(error)
         return (
             f'{error} The goal had passed all checks from where the arm was expected to come '
-            f'to rest, so {predecessor} has made way for it and is over.'
+            f'to rest, so {preempted} has made way for it and is over.'
         )
 
-    def _cancelled(self, when: str) -> Cancelled:
+    def _cancellation(self, when: str) -> Cancelled:
         if self._cancel_requested:
             return Cancelled(f'The goal was cancelled {when}.')
         return Cancelled(f'{SHUTDOWN}: the goal ended {when}.')
 
-    def _wait_until_cancel_is_noted(self) -> None:
+    def _wait_for_canceling_state(self) -> None:
         """
         Wait until rclpy knows that the goal is being cancelled.
 
@@ -485,7 +485,7 @@ class GoalRun:
         the goal cannot become CANCELED.
         """
         tick = threading.Event()
-        for _ in range(int(CANCEL_NOTED / 0.001)):
+        for _ in range(int(CANCELING_TIMEOUT / 0.001)):
             if self.handle.is_cancel_requested:
                 return
             tick.wait(0.001)

@@ -19,20 +19,22 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
 from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNotReady
-from ur_cartesian_driver.planning.open_goal import Addition
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.ros.action_server import CartesianActionServer, GoalRun
-from ur_cartesian_driver.ros.convert import addition_from_message
-from ur_cartesian_driver.ros.services import PromisedService
+from ur_cartesian_driver.ros.convert import appended_points_from_message
+from ur_cartesian_driver.ros.services import DeferredService
 from ur_cartesian_driver.srv import AppendPoints
 
 #: How long a goal may take from its acceptance to its motion while points wait for it [s].
-BEGIN_PATIENCE = 10.0
+BEGIN_TIMEOUT = 10.0
 
 #: How many requests may wait for their turn, with their points in memory.
-MOST_WAITING = 32
+MAX_WAITING_REQUESTS = 32
 
-CLOSING = 'The driver node is shutting down.'
-TOO_MANY = f'{MOST_WAITING} requests to append points wait; send this one again later.'
+SHUTDOWN_REFUSAL = 'The driver node is shutting down.'
+OVERLOAD_REFUSAL = (
+    f'{MAX_WAITING_REQUESTS} requests to append points wait; send this one again later.'
+)
 
 
 class AppendService:
@@ -42,67 +44,67 @@ class AppendService:
         """Begin to serve."""
         self._server = server
         self._thread = ThreadPoolExecutor(1, thread_name_prefix='append points')
-        self._places = threading.Semaphore(MOST_WAITING)
-        self._service = _Service(
-            node, AppendPoints, '~/append_points', self._ask, MutuallyExclusiveCallbackGroup()
+        self._slots = threading.Semaphore(MAX_WAITING_REQUESTS)
+        self._service = _AppendServiceServer(
+            node, AppendPoints, '~/append_points', self._handle, MutuallyExclusiveCallbackGroup()
         )
 
     def close(self) -> None:
         """Take nothing any more; what is being planned comes to its end."""
         self._thread.shutdown(cancel_futures=True)
 
-    def _ask(self, request: Any) -> Future[Any]:
-        promise: Future[Any] = Future()
-        if not self._places.acquire(blocking=False):
-            promise.set_result(_refused(TOO_MANY))
-            return promise
+    def _handle(self, request: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        if not self._slots.acquire(blocking=False):
+            future.set_result(_refusal(OVERLOAD_REFUSAL))
+            return future
 
         def answer(done: Future[Any]) -> None:
-            self._places.release()
-            promise.set_result(_refused(CLOSING) if done.cancelled() else done.result())
+            self._slots.release()
+            future.set_result(_refusal(SHUTDOWN_REFUSAL) if done.cancelled() else done.result())
 
         try:
             self._thread.submit(self._append, request).add_done_callback(answer)
         except RuntimeError:  # the thread takes no more work
-            promise.set_result(_refused(CLOSING))
-        return promise
+            future.set_result(_refusal(SHUTDOWN_REFUSAL))
+        return future
 
     def _append(self, request: Any) -> Any:
         """Return the response to a request."""
-        run = self._server.run_of(bytes(request.goal_id.uuid))
+        run = self._server.find_run(bytes(request.goal_id.uuid))
         if run is None:
-            return _refused(
+            return _refusal(
                 'There is no goal with this goal_id that is being carried out: it '
                 'has ended, or was never sent.'
             )
         try:
-            return self._appended(run, request)
+            return self._append_to_run(run, request)
         except DriverError as error:
-            return _refused(str(error), run.points)
+            return _refusal(str(error), run.points)
         except Exception as error:
-            return _refused(
+            return _refusal(
                 f'The driver has a defect, {type(error).__name__}: {error}.', run.points
             )
 
-    def _appended(self, run: GoalRun, request: Any) -> Any:
+    def _append_to_run(self, run: GoalRun, request: Any) -> Any:
         """
         Return the response to a request to a goal.
 
         :raises GoalRefused: nothing was taken.
         """
         # Others may append to the goal that has the arm until then; nobody keeps them waiting.
-        motion = run.motion(0.0 if run.waits else BEGIN_PATIENCE)
-        if motion is None or motion.continuing is None:
+        motion = run.motion(0.0 if run.is_waiting else BEGIN_TIMEOUT)
+        if motion is None or motion.appender is None:
             raise RobotNotReady(
                 'The goal does not move yet; append its points when it does.'
                 if motion is None
                 else 'The goal was sent without keep_open: nothing can be appended.'
             )
-        addition = addition_from_message(request)
-        asked = request.first_index, _digest(addition)
-        if run.answered is not None and run.answered[0] == asked:
-            return run.answered[1]  # it came twice
-        points = motion.continuing.points
+        new_points = appended_points_from_message(request)
+        request_key = request.first_index, _digest(new_points)
+        if run.last_append is not None and run.last_append[0] == request_key:
+            return run.last_append[1]  # it came twice
+        points = motion.appender.points
         if request.first_index != points:
             raise InvalidGoal(
                 'first_index',
@@ -111,25 +113,25 @@ class AppendService:
                 if request.first_index > points
                 else f'go on with point {points}',
             )
-        appended = motion.continuing.append(addition)
+        appended = motion.appender.append(new_points)
         response = AppendPoints.Response(
             accepted=True, message=appended.text, points_received=appended.points
         )
-        run.answered = (asked, response)
+        run.last_append = (request_key, response)
         return response
 
 
-class _Service(PromisedService):
+class _AppendServiceServer(DeferredService):
     """Promises responses."""
 
     def _response(self, answer: Any) -> Any:
         return answer
 
 
-def _digest(addition: Addition) -> bytes:
+def _digest(new_points: AppendedPoints) -> bytes:
     """Return what tells additions apart; also where they contain NaN, which equals nothing."""
-    return sha256(pickle.dumps(addition)).digest()
+    return sha256(pickle.dumps(new_points)).digest()
 
 
-def _refused(text: str, points: int = 0) -> Any:
+def _refusal(text: str, points: int = 0) -> Any:
     return AppendPoints.Response(accepted=False, message=text, points_received=points)

@@ -47,7 +47,7 @@ STATUS_NAMES = {
     GoalStatus.STATUS_ABORTED: 'ABORTED',
 }
 #: Without a server for that long, the driver counts as gone [s].
-SERVER_PATIENCE = 3.0
+SERVER_TIMEOUT = 3.0
 _INTEGERS = {
     f'{sign}int{bits}': (0 if sign else -(2 ** (bits - 1)), 2 ** (bits - (not sign)) - 1)
     for sign in ('', 'u')
@@ -84,7 +84,7 @@ def load_goal(source: str | os.PathLike[str]) -> FollowCartesianTrajectory.Goal:
     return goal
 
 
-def with_prefix(
+def add_tf_prefix(
     goal: FollowCartesianTrajectory.Goal, tf_prefix: str
 ) -> FollowCartesianTrajectory.Goal:
     """Change a goal to the frames and joints of an arm with a ``tf_prefix``; return it."""
@@ -275,13 +275,13 @@ class GoalClient:
 
     def _spin_until(self, future: Any, between: Callable[[], None]) -> Any:
         """Serve callbacks until a future is done."""
-        seen = monotonic()
+        last_seen = monotonic()
         while not future.done():
             self._executor.spin_once(timeout_sec=0.1)
             between()
             if self._client.server_is_ready():
-                seen = monotonic()
-            elif monotonic() - seen > SERVER_PATIENCE:
+                last_seen = monotonic()
+            elif monotonic() - last_seen > SERVER_TIMEOUT:
                 raise ConnectionError(
                     f'The driver that served {self.action} is gone; how the goal ended is not '
                     'known.'

@@ -31,8 +31,8 @@ from ur_cartesian_driver.motion.goal import (
 )
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector3, Vector6
 from ur_cartesian_driver.motion.signals import AnalogDomain
-from ur_cartesian_driver.planning.open_goal import Addition
-from ur_cartesian_driver.ros.frames import Frames, Stand
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
+from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames
 
 #: Generated message classes carry no types.
 Message: TypeAlias = Any
@@ -46,21 +46,21 @@ def goal_from_message(
     frames: Frames,
     *,
     now: int,
-    stand: Stand | None = None,
+    snapshot: ArmSnapshot | None = None,
     time_tolerance: float = 0.0,
 ) -> Goal:
     """
     Return the goal of a ``FollowCartesianTrajectory.Goal``.
 
     :param now: time of the node's clock when the goal was received [ns].
-    :param stand: where the arm stands, None while it is unknown.
+    :param snapshot: where the arm stands, None while it is unknown.
     :param time_tolerance: what a ``goal_time_tolerance`` of zero means [s].
     :raises InvalidGoal: a frame is unknown or an enumeration has no such value; the text names
         the field.
     :raises RobotNotReady: a frame moves with the arm, and nobody knows where that stands.
     """
     trajectory = message.trajectory
-    return placed(
+    return resolve_frames(
         Goal(
             waypoints=tuple(map(_waypoint, trajectory.points)),
             segments=tuple(
@@ -81,17 +81,17 @@ def goal_from_message(
         trajectory,
         frames,
         now=now,
-        stand=stand,
+        snapshot=snapshot,
     )
 
 
-def addition_from_message(message: Message) -> Addition:
+def appended_points_from_message(message: Message) -> AppendedPoints:
     """
     Return what an ``AppendPoints.Request`` appends.
 
     :raises InvalidGoal: an enumeration has no such value; the text names the field.
     """
-    return Addition(
+    return AppendedPoints(
         waypoints=tuple(map(_waypoint, message.points)),
         segments=tuple(
             _segment(segment, f'segments[{i}]') for i, segment in enumerate(message.segments)
@@ -104,8 +104,8 @@ def addition_from_message(message: Message) -> Addition:
     )
 
 
-def placed(
-    goal: Goal, trajectory: Message, frames: Frames, *, now: int, stand: Stand | None
+def resolve_frames(
+    goal: Goal, trajectory: Message, frames: Frames, *, now: int, snapshot: ArmSnapshot | None
 ) -> Goal:
     """
     Return a goal whose frames are where they are at this moment.
@@ -118,11 +118,11 @@ def placed(
     :raises RobotNotReady: it moves with the arm, and nobody knows where that stands.
     """
     stamp = nanoseconds(trajectory.header.stamp)
-    T_flange_controlled = frames.T_flange_frame(trajectory.controlled_frame, stand)
+    T_flange_controlled = frames.T_flange_frame(trajectory.controlled_frame, snapshot)
     return replace(
         goal,
         T_base_frame=frames.T_base_frame(
-            trajectory.header.frame_id, stand, at=stamp if stamp <= now else 0
+            trajectory.header.frame_id, snapshot, at=stamp if stamp <= now else 0
         ),
         T_flange_controlled=T_flange_controlled,
         # Empty: the active TCP, by whatever name it was given.

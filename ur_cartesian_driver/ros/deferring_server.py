@@ -13,7 +13,7 @@ from rclpy.action.server import ActionServer
 GoalHandle: TypeAlias = Any
 
 
-class DeferringActionServer(ActionServer):
+class DeferredActionServer(ActionServer):
     """
     An action server whose goals come to the executor when their outcome is there.
 

@@ -25,7 +25,7 @@ from math import isfinite, sqrt
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.ros.transforms import Transforms
+from ur_cartesian_driver.ros.transforms import TransformLookup
 
 #: ``base_link`` in ``base``.
 T_BASE_BASE_LINK = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
@@ -77,14 +77,14 @@ class StaticFrame:
 
 
 @dataclass(frozen=True, slots=True)
-class Stand:
+class ArmSnapshot:
     """Where the arm stands, and the TCP that it has."""
 
     T_base_flange: Pose
     T_flange_tcp: Pose
 
     @classmethod
-    def of(cls, state: RobotState) -> Stand:
+    def of(cls, state: RobotState) -> ArmSnapshot:
         """Return it by the robot's own report, which knows the arm's calibration."""
         return cls(state.actual_tcp_pose @ state.T_flange_tcp.inverse(), state.T_flange_tcp)
 
@@ -102,8 +102,8 @@ class Frames:
         self.base = tf_prefix + BASE
         self.tcp = tf_prefix + TCP
         self.tool0 = tf_prefix + TOOL0
-        self._transforms: Transforms | None = None
-        resolved = _resolved(
+        self._transforms: TransformLookup | None = None
+        resolved = _resolve_static_frames(
             {
                 self.base: (self.base, IDENTITY),
                 tf_prefix + BASE_LINK: (self.base, T_BASE_BASE_LINK),
@@ -118,17 +118,17 @@ class Frames:
             for of in (self.base, self.tool0, self.tcp)
         )
 
-    def with_transforms(self, transforms: Transforms | None) -> Frames:
+    def with_transforms(self, transforms: TransformLookup | None) -> Frames:
         """Return the same frames, and those of tf2."""
         frames = copy.copy(self)
         frames._transforms = transforms
         return frames
 
-    def T_base_frame(self, name: str, stand: Stand | None = None, at: int = 0) -> Pose:
+    def T_base_frame(self, name: str, snapshot: ArmSnapshot | None = None, at: int = 0) -> Pose:
         """
         Return where a frame is in the robot's base; the empty name is the base itself.
 
-        :param stand: for frames that move with the arm; None while nobody knows.
+        :param snapshot: for frames that move with the arm; None while nobody knows.
         :param at: when, for frames of tf2 [ns]; 0 = as new as there is.
         :raises InvalidGoal: the frame is unknown, or tf2 does not know where it is (any more).
         :raises RobotNotReady: it moves with the arm, and nobody knows where that stands.
@@ -137,9 +137,11 @@ class Frames:
         if name in self._T_base:
             return self._T_base[name]
         if name in self._T_flange:
-            return _known(stand, _FRAME_ID, name).T_base_flange @ self._T_flange[name]
+            return (
+                _require_snapshot(snapshot, _FRAME_ID, name).T_base_flange @ self._T_flange[name]
+            )
         if name in self._T_tcp:
-            known = _known(stand, _FRAME_ID, name)
+            known = _require_snapshot(snapshot, _FRAME_ID, name)
             return known.T_base_flange @ known.T_flange_tcp @ self._T_tcp[name]
         if self._transforms is not None:
             return self._transforms.T_target_source(_FRAME_ID, self.base, name, at)
@@ -150,11 +152,11 @@ class Frames:
             'be named in the parameter static_frames',
         )
 
-    def T_flange_frame(self, name: str, stand: Stand | None = None) -> Pose | None:
+    def T_flange_frame(self, name: str, snapshot: ArmSnapshot | None = None) -> Pose | None:
         """
         Return where a controlled frame is behind the flange; None for the robot's active TCP.
 
-        :param stand: for frames behind the active TCP; None while nobody knows.
+        :param snapshot: for frames behind the active TCP; None while nobody knows.
         :raises InvalidGoal: there is no such frame, or it is not behind the flange.
         :raises RobotNotReady: it is behind the TCP, and nobody knows where that is.
         """
@@ -163,7 +165,7 @@ class Frames:
         if name in self._T_flange:
             return self._T_flange[name]
         if name in self._T_tcp:
-            return _known(stand, _CONTROLLED, name).T_flange_tcp @ self._T_tcp[name]
+            return _require_snapshot(snapshot, _CONTROLLED, name).T_flange_tcp @ self._T_tcp[name]
         known = ', '.join([self.tcp, *self._T_flange, *list(self._T_tcp)[1:]])
         if name in self._T_base:
             raise InvalidGoal(
@@ -172,7 +174,7 @@ class Frames:
                 f'leave it empty for the active TCP of the robot, or name one of {known}',
             )
         if self._transforms is not None:
-            return self._transforms.T_rigid(_CONTROLLED, self.tool0, name)
+            return self._transforms.T_static(_CONTROLLED, self.tool0, name)
         raise InvalidGoal(
             _CONTROLLED,
             f'is "{name}", which is not a known frame',
@@ -181,16 +183,16 @@ class Frames:
         )
 
 
-def _known(stand: Stand | None, field: str, name: str) -> Stand:
-    if stand is None:
+def _require_snapshot(snapshot: ArmSnapshot | None, field: str, name: str) -> ArmSnapshot:
+    if snapshot is None:
         raise RobotNotReady(
             f'{field} is "{name}", which moves with the arm, and the robot has '
             'not said yet where it stands; wait for the connection to the robot.'
         )
-    return stand
+    return snapshot
 
 
-def _resolved(
+def _resolve_static_frames(
     known: Mapping[str, tuple[str, Pose]], static_frames: Iterable[StaticFrame]
 ) -> dict[str, tuple[str, Pose]]:
     """Return each frame's root and where it is there, whatever the order of the static ones."""

@@ -30,17 +30,26 @@ from rclpy.signals import SignalHandlerOptions
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.ros.action_server import CartesianActionServer
 from ur_cartesian_driver.ros.append_points import AppendService
-from ur_cartesian_driver.ros.parameters import declare, overrides, ParameterError, Value
-from ur_cartesian_driver.ros.services import Services
-from ur_cartesian_driver.ros.servo_topics import ServoStates, ServoTargets, TeachService
+from ur_cartesian_driver.ros.parameters import (
+    as_overrides,
+    declare_parameters,
+    ParameterError,
+    ParameterValue,
+)
+from ur_cartesian_driver.ros.services import CommandServices
+from ur_cartesian_driver.ros.servo_topics import (
+    FreedriveService,
+    LiveTargetSubscriber,
+    ServoStatePublisher,
+)
 from ur_cartesian_driver.ros.state_publisher import StatePublisher
 
 #: How often the driver hears that the executor of the node is alive, at least [s].
 HEARTBEAT_PERIOD = 0.5
 #: How long the other nodes have to make themselves known [s].
-DISCOVERY = 2.0
+DISCOVERY_TIME = 2.0
 #: How long :func:`main` waits for the arm to stop and the results to be sent [s].
-SHUTDOWN_PATIENCE = 5.0
+SHUTDOWN_TIMEOUT = 5.0
 
 
 class CartesianDriverNode(Node):
@@ -57,7 +66,7 @@ class CartesianDriverNode(Node):
         node_name: str = 'ur_cartesian_driver',
         *,
         namespace: str | None = None,
-        parameter_overrides: Mapping[str, Value] | Iterable[Parameter] | None = None,
+        parameter_overrides: Mapping[str, ParameterValue] | Iterable[Parameter] | None = None,
         **node_kwargs: Any,
     ) -> None:
         """
@@ -71,7 +80,7 @@ class CartesianDriverNode(Node):
             super().__init__(
                 node_name,
                 namespace=namespace,
-                parameter_overrides=overrides(parameter_overrides),
+                parameter_overrides=as_overrides(parameter_overrides),
                 automatically_declare_parameters_from_overrides=True,
                 **node_kwargs,
             )
@@ -82,7 +91,7 @@ class CartesianDriverNode(Node):
                 "A parameter is given without a value; write '' for an empty "
                 "text and [''] for an empty list."
             ) from None
-        self._parts: list[Any] = []  # with close(), the last one first
+        self._components: list[Any] = []  # with close(), the last one first
         try:
             self._start()
         except BaseException:
@@ -90,28 +99,32 @@ class CartesianDriverNode(Node):
             raise
 
     def _start(self) -> None:
-        settings = declare(self)
+        settings = declare_parameters(self)
         logger = self.get_logger()  # type: ignore[no-untyped-call]  # rclpy's
-        self._parts.append(_LogBridge(logger))
+        self._components.append(_LogBridge(logger))
         self.driver = Driver(settings.driver, settings.planning, auto_heartbeat=False)
-        self._parts.append(self.driver)
+        self._components.append(self.driver)
         self.driver.open()
         self._publisher = StatePublisher(self, self.driver, settings)
-        self._parts.append(self._publisher)
+        self._components.append(self._publisher)
         self.action_server = CartesianActionServer(self, self.driver, settings)
-        self._parts.append(self.action_server)
+        self._components.append(self.action_server)
         self._append_service = AppendService(self, self.action_server)
-        self._parts.append(self._append_service)
-        turns = self.action_server.turns
+        self._components.append(self._append_service)
+        arbiter = self.action_server.arbiter
         if settings.node.servo_state_rate > 0.0:
-            self._servo_states = ServoStates(self, self.driver, settings.node.servo_state_rate)
-        if settings.node.servo_target_enabled:
-            self.servo_targets = ServoTargets(self, self.driver, turns, self.action_server.frames)
-            self._parts.append(self.servo_targets)
-        self._teach_service = TeachService(self, self.driver, turns)
-        self._parts.append(self._teach_service)
+            self._servo_state_publisher = ServoStatePublisher(
+                self, self.driver, settings.node.servo_state_rate
+            )
+        if settings.node.live_target_enabled:
+            self.live_targets = LiveTargetSubscriber(
+                self, self.driver, arbiter, self.action_server.frames
+            )
+            self._components.append(self.live_targets)
+        self._freedrive_service = FreedriveService(self, self.driver, arbiter)
+        self._components.append(self._freedrive_service)
         self._publisher.start()
-        self._call_services = Services(self, self.driver, self._is_idle)
+        self._call_services = CommandServices(self, self.driver, self._is_idle)
         self.create_timer(
             min(HEARTBEAT_PERIOD, settings.driver.node_timeout / 4.0),
             self.driver.heartbeat,
@@ -119,19 +132,21 @@ class CartesianDriverNode(Node):
             callback_group=MutuallyExclusiveCallbackGroup(),
             clock=Clock(clock_type=ClockType.STEADY_TIME),
         )
-        self._twin_timer = self.create_timer(
-            DISCOVERY, self._look_for_a_twin, clock=Clock(clock_type=ClockType.STEADY_TIME)
+        self._name_check_timer = self.create_timer(
+            DISCOVERY_TIME,
+            self._warn_if_name_is_taken,
+            clock=Clock(clock_type=ClockType.STEADY_TIME),
         )
 
     def _is_idle(self) -> bool:
         """Tell whether nobody counts on the TCP and the payload that are set."""
-        return self.action_server.idle and not self.action_server.turns.is_taken()
+        return self.action_server.idle and not self.action_server.arbiter.is_held()
 
-    def _look_for_a_twin(self) -> None:
+    def _warn_if_name_is_taken(self) -> None:
         """Say once that there is another driver of the same name: each would answer for both."""
-        self._twin_timer.cancel()
-        mine = self.get_name(), self.get_namespace()
-        if self.get_node_names_and_namespaces().count(mine) > 1:
+        self._name_check_timer.cancel()
+        own_name = self.get_name(), self.get_namespace()
+        if self.get_node_names_and_namespaces().count(own_name) > 1:
             self.get_logger().error(  # type: ignore[no-untyped-call]  # rclpy's
                 f'Another node is called {self.get_fully_qualified_name()}: goals and calls may '
                 'reach the wrong robot. Give each driver a namespace, a tf_prefix and ports of '
@@ -140,9 +155,9 @@ class CartesianDriverNode(Node):
 
     def destroy_node(self) -> None:
         """Stop the arm if it moves, end all goals, threads and connections, then the node."""
-        parts, self._parts = self._parts, []
-        for part in reversed(parts):
-            part.close()
+        components, self._components = self._components, []
+        for component in reversed(components):
+            component.close()
         super().destroy_node()  # type: ignore[no-untyped-call]  # rclpy's
 
 
@@ -199,7 +214,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except RuntimeError as error:
         # Behind the sentence stands where in the source of rcl it was written.
         sys.exit(f'ur_cartesian_driver: {re.split(r", at /", str(error))[0]}')
-    signals = _Signals()
+    signals = _SignalCounter()
     try:
         node = CartesianDriverNode()
     except ParameterError as error:
@@ -217,17 +232,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _end_goals(
-    node: CartesianDriverNode, executor: SingleThreadedExecutor, signals: _Signals
+    node: CartesianDriverNode, executor: SingleThreadedExecutor, signals: _SignalCounter
 ) -> None:
     node.action_server.stop()
-    deadline = monotonic() + SHUTDOWN_PATIENCE
+    deadline = monotonic() + SHUTDOWN_TIMEOUT
     while not node.action_server.idle and monotonic() < deadline and signals.count < 2:
         executor.spin_once(timeout_sec=0.05)
     for _ in range(3):  # the results are on their way through the executor
         executor.spin_once(timeout_sec=0.02)
 
 
-class _Signals:
+class _SignalCounter:
     """Counts SIGINT and SIGTERM."""
 
     def __init__(self) -> None:

@@ -13,7 +13,12 @@ from pathlib import Path
 
 import yaml
 
-from ur_cartesian_driver.ros.parameters import checked, ParameterError, Settings, Value
+from ur_cartesian_driver.ros.parameters import (
+    ParameterError,
+    ParameterValue,
+    Settings,
+    settings_from,
+)
 
 _NODE = 'ur_cartesian_driver'
 
@@ -27,7 +32,7 @@ def read_settings(files: Iterable[Path] = (), words: Iterable[str] = ()) -> Sett
     :raises ParameterError: a name is unknown or a value cannot be.
     :raises OSError: a file cannot be read.
     """
-    given: dict[str, Value] = {}
+    given: dict[str, ParameterValue] = {}
     for file in files:
         given |= _of_file(file)
     for word in words:
@@ -35,13 +40,13 @@ def read_settings(files: Iterable[Path] = (), words: Iterable[str] = ()) -> Sett
         if not sign:
             raise ParameterError(f'"{word}" sets no parameter; write NAME:=VALUE.')
         given[name] = _yaml(value, word)
-    return checked(given)
+    return settings_from(given)
 
 
-def _of_file(file: Path) -> dict[str, Value]:
+def _of_file(file: Path) -> dict[str, ParameterValue]:
     """Return the parameters that a file has for the node, whatever its namespace."""
     content: object = _yaml(file.read_text(encoding='utf-8'), str(file))
-    found: dict[str, Value] = {}
+    found: dict[str, ParameterValue] = {}
     for node, values in content.items() if isinstance(content, dict) else ():
         if str(node).split('/')[-1] in ('**', '*', _NODE) and isinstance(values, dict):
             found |= values.get('ros__parameters') or {}
@@ -53,9 +58,9 @@ def _of_file(file: Path) -> dict[str, Value]:
     return found
 
 
-def _yaml(text: str, name: str) -> Value:
+def _yaml(text: str, name: str) -> ParameterValue:
     try:
-        value: Value = yaml.safe_load(text)
+        value: ParameterValue = yaml.safe_load(text)
     except yaml.YAMLError as error:
         raise ParameterError(f'{name} is not YAML: {" ".join(str(error).split())}.') from None
     return value

@@ -28,7 +28,7 @@ from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.protocol.dialects import DIALECTS
 from ur_cartesian_driver.ros.frames import Frames, StaticFrame
 
-Value: TypeAlias = bool | int | float | str | list[str]
+ParameterValue: TypeAlias = bool | int | float | str | list[str]
 
 _TYPE_NAMES: Mapping[type, str] = {
     bool: 'true or false',
@@ -38,9 +38,9 @@ _TYPE_NAMES: Mapping[type, str] = {
     list: 'a list of texts',
 }
 #: Fields that are not set but found out.
-_FOUND_OUT = ('calibration_known', 'optimove_known', 'acceleration_known', 'dialect')
+_DETECTED_OPTIONS = ('calibration_known', 'optimove_known', 'acceleration_known', 'dialect')
 #: Parameters that rclpy itself makes out of what it is given.
-_OF_RCLPY = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
+_RCLPY_PARAMETERS = ('use_sim_time', 'start_type_description_service', 'qos_overrides.')
 
 
 class ParameterError(ValueError):
@@ -57,7 +57,7 @@ class NodeSettings:
     diagnostics_rate: float = 1.0
     static_frames: tuple[str, ...] = ()
     tf_max_age: float = 1.0
-    servo_target_enabled: bool = False
+    live_target_enabled: bool = False
     servo_state_rate: float = 25.0
 
 
@@ -72,7 +72,7 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True)
-class Declaration:
+class ParameterDeclaration:
     """A parameter but for its default: what it is, and which values it takes."""
 
     name: str
@@ -81,7 +81,7 @@ class Declaration:
     high: float = inf
     choices: tuple[str, ...] = ()
 
-    def descriptor(self, default: Value) -> ParameterDescriptor:
+    def descriptor(self, default: ParameterValue) -> ParameterDescriptor:
         """Return what ``ros2 param describe`` shows."""
         descriptor = ParameterDescriptor(
             name=self.name,
@@ -100,7 +100,7 @@ class Declaration:
                 ]
         return descriptor
 
-    def check(self, value: Value, default: Value) -> None:
+    def check(self, value: ParameterValue, default: ParameterValue) -> None:
         """
         Refuse a value of another type or out of range.
 
@@ -128,7 +128,7 @@ class Declaration:
 _PORT = (0, 65535)
 
 #: Name, words, unit and largest sensible value of everything that has a tolerance.
-_TOLERATED = (
+_TOLERANCE_PARAMETERS = (
     ('position', 'position', 'm', 10.0),
     ('orientation', 'orientation', 'rad', 3.2),
     ('linear_velocity', 'velocity', 'm/s', 10.0),
@@ -138,38 +138,38 @@ _TOLERATED = (
 )
 
 
-def _tolerances(which: str, where: str) -> tuple[Declaration, ...]:
+def _tolerances(which: str, where: str) -> tuple[ParameterDeclaration, ...]:
     """Return the parameters that stand in for zeros of ``<which>_tolerance``."""
     return tuple(
-        Declaration(
+        ParameterDeclaration(
             f'{which}_tolerance_{name}',
-            f'Largest deviation of the {words} {where}, where the goal does not say '
+            f'Largest deviation of the {phrase} {where}, where the goal does not say '
             f'[{unit}]; 0: without limit.',
             0.0,
-            largest,
+            upper,
         )
-        for name, words, unit, largest in _TOLERATED
+        for name, phrase, unit, upper in _TOLERANCE_PARAMETERS
     )
 
 
 #: Every parameter of the node, in the order of ``config/driver.yaml``.
-DECLARATIONS: tuple[Declaration, ...] = (
+DECLARATIONS: tuple[ParameterDeclaration, ...] = (
     # -- which robot
-    Declaration(
+    ParameterDeclaration(
         'ur_type',
         'Model of the robot; a robot that reports another one is refused.',
         choices=tuple(MODELS),
     ),
-    Declaration('robot_ip', 'Address of the robot.'),
-    Declaration('tf_prefix', 'Prefix of joint and frame names, for example left_.'),
-    Declaration(
+    ParameterDeclaration('robot_ip', 'Address of the robot.'),
+    ParameterDeclaration('tf_prefix', 'Prefix of joint and frame names, for example left_.'),
+    ParameterDeclaration(
         'static_frames',
         'Fixed frames in which goals may be given, and tools that they may move, each as '
         '"name parent x y z qx qy qz qw" [m, unit quaternion]; the parent is base, '
         'base_link, tool0, flange, tool0_controller or another one of them. Empty texts '
         'are skipped.',
     ),
-    Declaration(
+    ParameterDeclaration(
         'tf_max_age',
         'How old the newest transform of a frame of tf2 may be when a goal is planned '
         '[s]; static ones are never old.',
@@ -177,144 +177,146 @@ DECLARATIONS: tuple[Declaration, ...] = (
         3600.0,
     ),
     # -- the robot program
-    Declaration(
+    ParameterDeclaration(
         'headless_mode',
         'Send the robot program directly (needs remote control), instead of serving it '
         'to the External Control URCap.',
     ),
-    Declaration(
+    ParameterDeclaration(
         'auto_power',
         'Switch the arm on and release its brakes on the first connection, and never '
         'again; only with headless_mode.',
     ),
-    Declaration(
+    ParameterDeclaration(
         'wire_dialect',
         'Version of the messages that the robot program understands; an older one only '
         'for a robot that runs a saved, older External Control program of its own.',
         choices=tuple(DIALECTS),
     ),
     # -- what a goal may do
-    Declaration(
+    ParameterDeclaration(
         'on_new_goal',
         'A goal that comes while another one runs: it may preempt that one once it has '
         'passed all checks, or reject it (it ends ABORTED).',
         choices=('preempt', 'reject'),
     ),
-    Declaration('max_points', 'Longest list of points that a goal may have.', 1, 1_000_000),
-    Declaration(
+    ParameterDeclaration(
+        'max_points', 'Longest list of points that a goal may have.', 1, 1_000_000
+    ),
+    ParameterDeclaration(
         'max_tool_speed',
         'Largest speed of the TCP [m/s]; 0: without bound. Motions without times are '
         'slowed to it.',
         0.0,
         10.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'on_too_fast',
         'A goal whose times need more speed than the limits allow: refuse it, or slow it down.',
         choices=('refuse', 'slow'),
     ),
-    Declaration(
+    ParameterDeclaration(
         'after_robot_stop',
         'What becomes of a goal when the robot makes a protective or safeguard stop: '
         'abort it, and the old motion never goes on; or continue it when somebody has '
         'unlocked the robot and plays its program, as the robot itself does.',
         choices=('abort', 'continue'),
     ),
-    Declaration(
+    ParameterDeclaration(
         'max_approach_distance',
         'Longest way of the tool to the first point [m]; 0: without bound.',
         0.0,
         10.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'on_posture_change',
         'A straight line or arc that cannot arrive in the posture asked for, or cannot be '
         'gone although its end can be reached: refuse the goal, or go there by a joint '
         'motion.',
         choices=('refuse', 'movej'),
     ),
-    Declaration(
+    ParameterDeclaration(
         'singularity_margin_wrist',
         'How near straight lines and arcs may come to a straight wrist [rad]; 0: without limit.',
         0.0,
         1.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'singularity_margin_elbow',
         'How near straight lines and arcs may come to a stretched arm [rad]; 0: without limit.',
         0.0,
         1.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'singularity_margin_shoulder',
         'How near straight lines and arcs may bring the centre of the wrist to the place '
         'above or below the shoulder, measured along the arm [m]; 0: without limit.',
         0.0,
         1.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'allow_tcp_change',
         'Set the TCP of the robot to the controlled frame of a goal for the time of the '
         'goal. False: a goal whose controlled frame is not the TCP must not turn it on '
         'straight or circular segments.',
     ),
-    Declaration(
+    ParameterDeclaration(
         'self_collision',
         'A goal on whose way the arm comes too near to itself: off, warn in its report, '
         'refuse it, or auto: refuse where meshes tell (UR3, UR5, UR10), warn where only '
         'capsules do.',
         choices=('auto', 'off', 'warn', 'refuse'),
     ),
-    Declaration('min_clearance', 'How near the arm may come to itself [m].', 0.0, 1.0),
-    Declaration(
+    ParameterDeclaration('min_clearance', 'How near the arm may come to itself [m].', 0.0, 1.0),
+    ParameterDeclaration(
         'tool_radius',
         'Radius of a tool between flange and TCP, for self_collision and '
         'workspace_planes [m]; 0: no tool.',
         0.0,
         1.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'workspace_planes',
         'Planes that neither arm, tool nor TCP may cross, each as "name x y z nx ny nz '
         '[margin]" [m]: a point on it and its normal into the allowed side, both in '
         'base (not base_link). Empty texts are skipped.',
     ),
-    Declaration(
+    ParameterDeclaration(
         'stamp_tolerance', 'How old the stamp of a goal may be when it arrives [s].', 0.0, 3600.0
     ),
-    Declaration(
+    ParameterDeclaration(
         'goal_time_tolerance',
         'How much later than planned the end may be reached, where the goal does not say [s].',
         0.001,
         3600.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'start_tolerance_position',
         'How far the robot may stand from a first point at time 0 [m].',
         0.0,
         1.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'start_tolerance_angle',
         'How far the robot may stand from a first point at time 0 [rad].',
         0.0,
         3.2,
     ),
     # -- what is watched
-    Declaration(
+    ParameterDeclaration(
         'max_plan_deviation',
         "How far the controller's own target may be from the plan, corners apart [m]; 0: any way.",
         0.0,
         1.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'max_plan_deviation_angle',
         "How far the controller's own target may be from the plan, corners apart [rad]; "
         '0: any angle.',
         0.0,
         3.2,
     ),
-    Declaration(
+    ParameterDeclaration(
         'max_calibration_difference',
         'Warn of a robot whose calibration moves the flange farther than this from where '
         'the nominal model has it [m]; 0: never.',
@@ -324,194 +326,200 @@ DECLARATIONS: tuple[Declaration, ...] = (
     *_tolerances('path', 'on the way'),
     *_tolerances('goal', 'at the end'),
     # -- speeds where the goal says nothing
-    Declaration('linear_velocity', 'Speed of the tool on lines and arcs [m/s].', 1e-4, 10.0),
-    Declaration(
+    ParameterDeclaration(
+        'linear_velocity', 'Speed of the tool on lines and arcs [m/s].', 1e-4, 10.0
+    ),
+    ParameterDeclaration(
         'linear_acceleration', 'Acceleration of the tool on lines and arcs [m/s^2].', 1e-3, 100.0
     ),
-    Declaration(
+    ParameterDeclaration(
         'angular_velocity', 'Speed of a segment that only turns the tool [rad/s].', 1e-3, 20.0
     ),
-    Declaration(
+    ParameterDeclaration(
         'angular_acceleration',
         'Acceleration of a segment that only turns the tool [rad/s^2].',
         1e-2,
         400.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'joint_velocity', 'Speed of the leading axis in joint motions [rad/s].', 1e-3, 10.0
     ),
-    Declaration(
+    ParameterDeclaration(
         'joint_acceleration',
         'Acceleration of the leading axis in joint motions [rad/s^2].',
         1e-2,
         400.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'optimized_velocity',
         "Speed of OPTIMIZED_* segments, as a fraction of the robot's limits.",
         1e-3,
         1.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'optimized_acceleration',
         "Acceleration of OPTIMIZED_* segments, as a fraction of the robot's limits.",
         1e-3,
         1.0,
     ),
     # -- bounds of timed motions
-    Declaration(
+    ParameterDeclaration(
         'max_linear_acceleration',
         'Largest acceleration of the tool that a time may lead to [m/s^2].',
         0.1,
         100.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'max_angular_acceleration',
         'Largest angular acceleration of the tool that a time may lead to [rad/s^2].',
         0.1,
         1000.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'max_joint_acceleration',
         'Largest acceleration of a joint that a time may lead to [rad/s^2].',
         0.1,
         1000.0,
     ),
-    Declaration('max_segment_time', 'Longest duration of one segment [s].', 0.1, 2147.483647),
+    ParameterDeclaration(
+        'max_segment_time', 'Longest duration of one segment [s].', 0.1, 2147.483647
+    ),
     # -- splines
-    Declaration(
+    ParameterDeclaration(
         'spline_tolerance',
         'How far the tool may be beside the curve through the points '
         'of SPLINE and SERVO goals [m]; how far turned is as much at 0.1 m.',
         1e-6,
         0.01,
     ),
-    Declaration(
-        'closing_deceleration',
+    ParameterDeclaration(
+        'keep_open_deceleration',
         'How hard the fastest joint brakes where an open goal '
         'ends without a last point [rad/s^2].',
         0.1,
         100.0,
     ),
     # -- live targets
-    Declaration(
-        'servo_target_enabled', 'Follow the poses on ~/servo_target; false: nobody listens there.'
+    ParameterDeclaration(
+        'live_target_enabled', 'Follow the poses on ~/live_target; false: nobody listens there.'
     ),
-    Declaration(
-        'servo_target_max_age',
+    ParameterDeclaration(
+        'live_target_max_age',
         'How old a live target may be, by its stamp or else since it came [s]; then the '
         'arm stops smoothly until a newer one comes.',
         0.01,
         10.0,
     ),
-    Declaration(
-        'servo_target_timeout',
+    ParameterDeclaration(
+        'live_target_timeout',
         'How long after the last live target the session ends [s].',
         0.1,
         3600.0,
     ),
-    Declaration(
-        'servo_target_linear_velocity',
+    ParameterDeclaration(
+        'live_target_linear_velocity',
         'Largest speed of the tool when it follows live targets [m/s]; not above max_tool_speed.',
         1e-4,
         10.0,
     ),
-    Declaration(
-        'servo_target_linear_acceleration',
+    ParameterDeclaration(
+        'live_target_linear_acceleration',
         'Acceleration of the tool when it follows live targets [m/s^2].',
         1e-3,
         100.0,
     ),
-    Declaration(
-        'servo_target_angular_velocity',
+    ParameterDeclaration(
+        'live_target_angular_velocity',
         'Largest speed at which the tool turns when it follows live targets [rad/s].',
         1e-3,
         20.0,
     ),
-    Declaration(
-        'servo_target_angular_acceleration',
+    ParameterDeclaration(
+        'live_target_angular_acceleration',
         'Angular acceleration of the tool when it follows live targets [rad/s^2].',
         1e-2,
         400.0,
     ),
-    Declaration(
-        'servo_target_joint_velocity',
+    ParameterDeclaration(
+        'live_target_joint_velocity',
         'Largest speed of a joint when the tool follows live targets [rad/s].',
         1e-3,
         10.0,
     ),
     # -- what is published
-    Declaration(
+    ParameterDeclaration(
         'state_publish_rate',
         'How often joint states, TCP pose, wrench, speed scaling and tf are published [Hz].',
         1.0,
         500.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'io_publish_rate',
         'How often changes of inputs, outputs and tool data are looked for [Hz]; 0: never.',
         0.0,
         125.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'diagnostics_rate', 'How often /diagnostics is published [Hz]; 0: never.', 0.0, 50.0
     ),
-    Declaration(
+    ParameterDeclaration(
         'servo_state_rate',
         'How often ~/servo_state is published at most [Hz]; 0: never.',
         0.0,
         500.0,
     ),
-    Declaration('feedback_rate', 'How often a goal sends feedback [Hz].', 0.5, 500.0),
+    ParameterDeclaration('feedback_rate', 'How often a goal sends feedback [Hz].', 0.5, 500.0),
     # -- set-points
-    Declaration('servoj_gain', 'SERVO: how stiff servoj holds a set-point.', 100.0, 2000.0),
-    Declaration(
+    ParameterDeclaration(
+        'servoj_gain', 'SERVO: how stiff servoj holds a set-point.', 100.0, 2000.0
+    ),
+    ParameterDeclaration(
         'servoj_lookahead_time',
         'SERVO: how far servoj looks ahead, and so lags behind [s].',
         0.03,
         0.2,
     ),
-    Declaration(
+    ParameterDeclaration(
         'servo_target_lag',
         'SERVO: motion time that is under way to the arm, so how long '
         'nothing may come through [s].',
         0.008,
         0.2,
     ),
-    Declaration(
+    ParameterDeclaration(
         'servo_buffer_depth',
         'SERVO: set-points that the buffer of the robot program '
         'holds; servo_target_lag has to fit in at 500 Hz.',
         20,
         1000,
     ),
-    Declaration(
+    ParameterDeclaration(
         'servo_max_divergence',
         'SERVO: the robot program stops the arm when a joint is farther from its set-point [rad].',
         0.01,
         3.0,
     ),
-    Declaration(
-        'allow_teach',
+    ParameterDeclaration(
+        'allow_freedrive',
         'Whether people may push the arm in the teach mode of the servo; '
         'the robot program is made for it.',
     ),
     # -- goals that go on
-    Declaration(
-        'stream_horizon',
+    ParameterDeclaration(
+        'keep_open_horizon',
         'Goals with keep_open: planned time of the motion that the '
-        'robot is given ahead [s]; at least twice stream_margin.',
+        'robot is given ahead [s]; at least twice keep_open_margin.',
         0.1,
         60.0,
     ),
-    Declaration(
-        'stream_margin',
+    ParameterDeclaration(
+        'keep_open_margin',
         'Goals with keep_open: how long before the robot runs out of '
         'points it is brought to rest, if no more come [s].',
         0.02,
         10.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'keep_open_timeout',
         'Goals with keep_open: how long one waits at rest for more '
         'points until it ends [s]; 0: without end.',
@@ -519,12 +527,12 @@ DECLARATIONS: tuple[Declaration, ...] = (
         86400.0,
     ),
     # -- what is recorded
-    Declaration(
+    ParameterDeclaration(
         'record_directory',
         'Directory in which each motion is recorded, a file each, to '
         'be drawn by `ur-cartesian plot`; empty: nothing is.',
     ),
-    Declaration(
+    ParameterDeclaration(
         'record_max_size',
         'What the recordings may take together [MB]; the oldest ones '
         'are removed, and one alone ends at half of it.',
@@ -532,73 +540,73 @@ DECLARATIONS: tuple[Declaration, ...] = (
         1e6,
     ),
     # -- network
-    Declaration('rtde_port', 'Port of RTDE on the robot.', *_PORT),
-    Declaration('primary_port', 'Port of the primary interface on the robot.', *_PORT),
-    Declaration('dashboard_port', 'Port of the dashboard of the robot.', *_PORT),
-    Declaration(
+    ParameterDeclaration('rtde_port', 'Port of RTDE on the robot.', *_PORT),
+    ParameterDeclaration('primary_port', 'Port of the primary interface on the robot.', *_PORT),
+    ParameterDeclaration('dashboard_port', 'Port of the dashboard of the robot.', *_PORT),
+    ParameterDeclaration(
         'reverse_port',
         'Port to which the robot program connects for control messages; 0: any free one.',
         *_PORT,
     ),
-    Declaration(
+    ParameterDeclaration(
         'script_sender_port',
         'Port that serves the robot program to the External Control URCap; 0: any free one.',
         *_PORT,
     ),
-    Declaration(
+    ParameterDeclaration(
         'trajectory_port',
         'Port to which the robot program connects for trajectory points; 0: any free one.',
         *_PORT,
     ),
-    Declaration(
+    ParameterDeclaration(
         'script_command_port',
         'Port to which the robot program connects for single commands; 0: any free one.',
         *_PORT,
     ),
-    Declaration(
+    ParameterDeclaration(
         'bind_address',
         'Address at which the ports above listen; empty: the local '
         'address of the connection to the robot.',
     ),
-    Declaration(
+    ParameterDeclaration(
         'reverse_ip',
         'Address at which the robot reaches this computer (NAT, '
         'containers); empty: the one that is listened at.',
     ),
-    Declaration(
+    ParameterDeclaration(
         'allowed_peers',
         'Addresses that may connect to the ports above; empty: robot_ip. Empty texts are skipped.',
     ),
     # -- timing
-    Declaration(
+    ParameterDeclaration(
         'rtde_frequency',
         'How often the robot reports its state [Hz], at least 10; 0: as often as it can.',
         0.0,
         500.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'robot_receive_timeout',
         'How long the robot program waits for a sign of life before it stops the arm [s].',
         0.02,
         10.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'keepalive_period', 'How often the robot program gets a sign of life [s].', 0.002, 1.0
     ),
-    Declaration(
+    ParameterDeclaration(
         'node_timeout',
         'How long this node may be silent before the arm is stopped [s]; '
         'longer than the largest goal takes to arrive.',
         0.5,
         60.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'stop_deceleration',
         'Deceleration of the leading axis when a goal is stopped [rad/s^2].',
         0.1,
         100.0,
     ),
-    Declaration(
+    ParameterDeclaration(
         'robot_loop',
         'Where the connection to the robot is served: in a process of its '
         'own, or in a thread (tests).',
@@ -607,9 +615,9 @@ DECLARATIONS: tuple[Declaration, ...] = (
 )
 
 
-def defaults() -> dict[str, Value]:
+def defaults() -> dict[str, ParameterValue]:
     """Return the default of every parameter, by name."""
-    values: dict[str, Value] = {}
+    values: dict[str, ParameterValue] = {}
     for options in (DriverConfig(), PlanningOptions(), NodeSettings()):
         for name in _names(type(options)):
             value = getattr(options, name)
@@ -617,7 +625,7 @@ def defaults() -> dict[str, Value]:
     return values
 
 
-def declare(node: Node) -> Settings:
+def declare_parameters(node: Node) -> Settings:
     """
     Declare all parameters of a node and return their values.
 
@@ -627,7 +635,7 @@ def declare(node: Node) -> Settings:
     """
     by_name = defaults()
     _refuse_unknown(node.list_parameters([], 0).names, by_name)
-    values: dict[str, Value] = {}
+    values: dict[str, ParameterValue] = {}
     for declaration in DECLARATIONS:
         default = by_name[declaration.name]
         if node.has_parameter(declaration.name):
@@ -644,7 +652,7 @@ def declare(node: Node) -> Settings:
     return settings(values)
 
 
-def checked(given: Mapping[str, Value]) -> Settings:
+def settings_from(given: Mapping[str, ParameterValue]) -> Settings:
     """
     Return values and, for all that are not given, the defaults; without a node.
 
@@ -660,7 +668,7 @@ def checked(given: Mapping[str, Value]) -> Settings:
     return settings(values)
 
 
-def settings(values: Mapping[str, Value]) -> Settings:
+def settings(values: Mapping[str, ParameterValue]) -> Settings:
     """
     Return parameter values, sorted by who uses them.
 
@@ -679,7 +687,9 @@ def settings(values: Mapping[str, Value]) -> Settings:
         raise ParameterError(f'Parameter {str(error).rstrip(".")}.') from None
 
 
-def overrides(values: Mapping[str, Value] | Iterable[Parameter] | None) -> list[Parameter]:
+def as_overrides(
+    values: Mapping[str, ParameterValue] | Iterable[Parameter] | None,
+) -> list[Parameter]:
     """Return values by name as rclpy wants them."""
     if isinstance(values, Mapping):
         return [
@@ -691,7 +701,7 @@ def overrides(values: Mapping[str, Value] | Iterable[Parameter] | None) -> list[
 
 def _refuse_unknown(names: Iterable[str], known: Iterable[str]) -> None:
     for name in names:
-        if name in known or name.startswith(_OF_RCLPY):
+        if name in known or name.startswith(_RCLPY_PARAMETERS):
             continue
         near = get_close_matches(name, list(known), n=1)
         hint = f'did you mean {near[0]}?' if near else 'config/driver.yaml lists all there are.'
@@ -699,14 +709,14 @@ def _refuse_unknown(names: Iterable[str], known: Iterable[str]) -> None:
 
 
 def _names(options: type[Any]) -> list[str]:
-    return [field.name for field in fields(options) if field.name not in _FOUND_OUT]
+    return [field.name for field in fields(options) if field.name not in _DETECTED_OPTIONS]
 
 
-def _fields_of(options: type[Any], values: Mapping[str, Value]) -> dict[str, Any]:
+def _fields_of(options: type[Any], values: Mapping[str, ParameterValue]) -> dict[str, Any]:
     return {name: _without_blanks(values[name]) for name in _names(options)}
 
 
-def _without_blanks(value: Value) -> object:
+def _without_blanks(value: ParameterValue) -> object:
     """Return a list as a tuple without the empty texts that keep it from being empty."""
     return tuple(text for text in value if text.strip()) if isinstance(value, list) else value
 
@@ -717,6 +727,6 @@ def _texts(value: object) -> list[str]:
     return [str(text) for text in value] or ['']
 
 
-def _plain(value: Any) -> Value:
+def _plain(value: Any) -> ParameterValue:
     """Return a parameter's value as plain Python; arrays come as other sequences."""
     return value if isinstance(value, (bool, int, float, str)) else _texts(value)

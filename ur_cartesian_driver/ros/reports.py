@@ -24,7 +24,7 @@ from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 
 _MAX_SECONDS = 2**31 - 1
-_UNKNOWN: Vector6 = (nan,) * 6
+_NAN6: Vector6 = (nan,) * 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,10 +48,10 @@ def feedback_message(
 
     desired = frame.T_frame_base @ progress.desired_pose
     actual = frame.T_frame_base @ progress.actual_pose
-    desired_twist = _turned(frame.T_frame_base, progress.desired_twist)
-    actual_twist = _turned(frame.T_frame_base, progress.actual_twist)
-    desired_acceleration = _turned(frame.T_frame_base, progress.desired_acceleration or _UNKNOWN)
-    actual_acceleration = _turned(frame.T_frame_base, progress.actual_acceleration or _UNKNOWN)
+    desired_twist = _rotate(frame.T_frame_base, progress.desired_twist)
+    actual_twist = _rotate(frame.T_frame_base, progress.actual_twist)
+    desired_acceleration = _rotate(frame.T_frame_base, progress.desired_acceleration or _NAN6)
+    actual_acceleration = _rotate(frame.T_frame_base, progress.actual_acceleration or _NAN6)
     message.desired = _point(progress.time, desired, desired_twist, desired_acceleration)
     message.actual = _point(progress.time, actual, actual_twist, actual_acceleration)
     message.actual.posture.posture_joint_names = list(frame.joint_names)
@@ -129,7 +129,7 @@ def _point(
         pose=pose_message(pose),
         twist=Twist(linear=Vector3(x=vx, y=vy, z=vz), angular=Vector3(x=wx, y=wy, z=wz)),
         acceleration=_accel(acceleration),
-        jerk=_accel(_UNKNOWN),
+        jerk=_accel(_NAN6),
     )
 
 
@@ -138,7 +138,7 @@ def _accel(values: Vector6) -> Accel:
     return Accel(linear=Vector3(x=ax, y=ay, z=az), angular=Vector3(x=ex, y=ey, z=ez))
 
 
-def _turned(T_frame_base: Pose, twist: Vector6) -> Vector6:
+def _rotate(T_frame_base: Pose, twist: Vector6) -> Vector6:
     """Return a twist (or acceleration) along the axes of the goal's frame, which stands still."""
     vx, vy, vz, wx, wy, wz = twist
     q = T_frame_base.quaternion

@@ -29,17 +29,17 @@ from ur_cartesian_driver.motion.goal import OutputKind
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.robot.calls import (
-    Answer,
-    Call,
-    Dashboard,
-    DashboardLine,
-    Recover,
-    SendProgram,
-    SetOutput,
-    SetPayload,
-    SetSpeedSlider,
-    SetTcp,
-    ZeroFtSensor,
+    DashboardCall,
+    DashboardLineCall,
+    RecoverCall,
+    SendProgramCall,
+    ServiceAnswer,
+    ServiceCall,
+    SetOutputCall,
+    SetPayloadCall,
+    SetSpeedSliderCall,
+    SetTcpCall,
+    ZeroFtSensorCall,
 )
 from ur_cartesian_driver.srv import (
     Load,
@@ -54,12 +54,12 @@ from ur_cartesian_driver.srv import (
 )
 
 #: Services that take and tell nothing but success and a sentence, or the value asked for.
-TRIGGERS: Mapping[str, Call] = {
-    'recover': Recover(),
-    'resend_robot_program': SendProgram(),
-    'zero_ftsensor': ZeroFtSensor(),
+TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
+    'recover': RecoverCall(),
+    'resend_robot_program': SendProgramCall(),
+    'zero_ftsensor': ZeroFtSensorCall(),
     **{
-        f'dashboard/{name}': Dashboard(command=command)
+        f'dashboard/{name}': DashboardCall(command=command)
         for name, command in {
             'power_on': 'power on',
             'power_off': 'power off',
@@ -86,50 +86,50 @@ TRIGGERS: Mapping[str, Call] = {
 }
 
 
-def _tcp(request: Any) -> Call:
+def _tcp(request: Any) -> ServiceCall:
     p, q = request.tcp.position, request.tcp.orientation
-    return SetTcp(T_flange_tcp=Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w)))
+    return SetTcpCall(T_flange_tcp=Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w)))
 
 
-def _payload(request: Any) -> Call:
+def _payload(request: Any) -> ServiceCall:
     cog = request.center_of_gravity
-    return SetPayload(mass=request.mass, cog=(cog.x, cog.y, cog.z))
+    return SetPayloadCall(mass=request.mass, cog=(cog.x, cog.y, cog.z))
 
 
-def _output(request: Any) -> Call:
+def _output(request: Any) -> ServiceCall:
     try:
         kind, domain = OutputKind(request.output), AnalogDomain(request.analog_domain)
     except ValueError as error:
         raise LocalProtocolError(f'output or analog_domain: {error}.') from None
-    return SetOutput(kind=kind, pin=request.pin, value=request.value, domain=domain)
+    return SetOutputCall(kind=kind, pin=request.pin, value=request.value, domain=domain)
 
 
 #: Services with a request of their own, and how it becomes a call.
-OTHERS: Mapping[str, tuple[Any, Callable[[Any], Call]]] = {
+REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
     'set_tcp': (SetTCP, _tcp),
     'set_payload': (SetPayloadService, _payload),
     'set_io': (SetIO, _output),
     'set_speed_slider': (
         SetSpeedSliderFraction,
-        lambda request: SetSpeedSlider(fraction=request.speed_slider_fraction),
+        lambda request: SetSpeedSliderCall(fraction=request.speed_slider_fraction),
     ),
     'dashboard/load_program': (
         Load,
-        lambda request: Dashboard(command='load', argument=request.filename),
+        lambda request: DashboardCall(command='load', argument=request.filename),
     ),
     'dashboard/load_installation': (
         Load,
-        lambda request: Dashboard(command='load installation', argument=request.filename),
+        lambda request: DashboardCall(command='load installation', argument=request.filename),
     ),
     'dashboard/popup': (
         Popup,
-        lambda request: Dashboard(command='popup', argument=request.message),
+        lambda request: DashboardCall(command='popup', argument=request.message),
     ),
-    'dashboard/raw_request': (RawRequest, lambda request: DashboardLine(line=request.query)),
+    'dashboard/raw_request': (RawRequest, lambda request: DashboardLineCall(line=request.query)),
 }
 
 
-class Services:
+class CommandServices:
     """All services of a driver; they go with the node."""
 
     def __init__(self, node: Node, driver: Driver, is_idle: Callable[[], bool]) -> None:
@@ -139,37 +139,39 @@ class Services:
         :param is_idle: tells whether no goal is being planned, waited for or carried out.
         """
         group = MutuallyExclusiveCallbackGroup()
-        kinds = {name: (Trigger, lambda _, call=call: call) for name, call in TRIGGERS.items()}
+        kinds = {
+            name: (Trigger, lambda _, call=call: call) for name, call in TRIGGER_SERVICES.items()
+        }
         self._services = [
-            PromisedService(node, kind, f'~/{name}', _Asker(driver, is_idle, call_of), group)
-            for name, (kind, call_of) in {**kinds, **OTHERS}.items()
+            DeferredService(node, kind, f'~/{name}', _CallHandler(driver, is_idle, call_of), group)
+            for name, (kind, call_of) in {**kinds, **REQUEST_SERVICES}.items()
         ]
 
 
-class _Asker:
+class _CallHandler:
     """Turns a request into a call of the driver."""
 
     def __init__(
-        self, driver: Driver, is_idle: Callable[[], bool], call_of: Callable[[Any], Call]
+        self, driver: Driver, is_idle: Callable[[], bool], call_of: Callable[[Any], ServiceCall]
     ) -> None:
         self._driver, self._is_idle, self._call_of = driver, is_idle, call_of
 
-    def __call__(self, request: Any) -> Future[Answer]:
+    def __call__(self, request: Any) -> Future[ServiceAnswer]:
         """Make the call, or refuse it; it is answered in any case."""
         try:
             call = self._call_of(request)
         except DriverError as error:
-            return kept(str(error))
+            return completed_answer(str(error))
         # A goal that is only planned so far counts on what it found.
-        if isinstance(call, SetTcp | SetPayload) and not self._is_idle():
-            return kept(
+        if isinstance(call, SetTcpCall | SetPayloadCall) and not self._is_idle():
+            return completed_answer(
                 'A goal is being planned or carried out, and this would change what it '
                 'counts on; wait for its end or cancel it, then try again.'
             )
         return self._driver.call(call)
 
 
-class PromisedService:
+class DeferredService:
     """A service whose responses are sent when they are there, from whatever thread."""
 
     def __init__(
@@ -177,22 +179,24 @@ class PromisedService:
         node: Node,
         kind: Any,
         name: str,
-        ask: Callable[[Any], Future[Answer]],
+        handle: Callable[[Any], Future[ServiceAnswer]],
         group: MutuallyExclusiveCallbackGroup,
     ) -> None:
-        self._kind, self._ask = kind, ask
+        self._kind, self._handle = kind, handle
         service: Any = node.create_service(kind, name, self._begin, callback_group=group)
         self._send_now = service.send_response
         # The executor hands what the callback returned, and whom it is for, to this method.
-        service.send_response = self._send_when_kept
+        service.send_response = self._send_when_done
 
     def _begin(self, request: Any, _: Any) -> Any:
-        return self._ask(request)
+        return self._handle(request)
 
-    def _send_when_kept(self, promise: Future[Answer], header: Any) -> None:
-        promise.add_done_callback(lambda kept: self._send(kept.result(), header))
+    def _send_when_done(self, future: Future[ServiceAnswer], header: Any) -> None:
+        future.add_done_callback(
+            lambda completed_answer: self._send(completed_answer.result(), header)
+        )
 
-    def _send(self, answer: Answer, header: Any) -> None:
+    def _send(self, answer: ServiceAnswer, header: Any) -> None:
         response = self._response(answer)
         # The node, or all of ROS, may have ended meanwhile.
         with contextlib.suppress(InvalidHandle, RCLError):
@@ -203,8 +207,8 @@ class PromisedService:
         return self._kind.Response(success=answer.ok, message=answer.text)
 
 
-def kept(text: str, *, ok: bool = False) -> Future[Answer]:
+def completed_answer(text: str, *, ok: bool = False) -> Future[ServiceAnswer]:
     """Return a promise that is kept already: mostly by a refusal."""
-    future: Future[Answer] = Future()
-    future.set_result(Answer(ok=ok, text=text))
+    future: Future[ServiceAnswer] = Future()
+    future.set_result(ServiceAnswer(ok=ok, text=text))
     return future

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The arm that is led while it moves: ``~/servo_target``, ``~/servo_state``, ``~/teach_mode``.
+The arm that is led while it moves: ``~/live_target``, ``~/servo_state``, ``~/freedrive_mode``.
 
 Of a target the executor only puts the message down; a thread of its own looks at the newest one,
 because a frame of tf2 may have to be waited for, and whoever sends faster than that is not to hold
@@ -33,7 +33,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import SetBool
 
-from ur_cartesian_driver.driver import Driver, Motion
+from ur_cartesian_driver.driver import Driver, MotionHandle
 from ur_cartesian_driver.driver.live import check_pose, LiveSession
 from ur_cartesian_driver.motion.errors import DriverError, ErrorCode, InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Outcome
@@ -41,22 +41,22 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.servo import ServoActivity, ServoReport
 from ur_cartesian_driver.motion.state import SafetyStatus
 from ur_cartesian_driver.msg import ServoState
-from ur_cartesian_driver.robot.calls import Answer
+from ur_cartesian_driver.robot.calls import ServiceAnswer
 from ur_cartesian_driver.ros.convert import nanoseconds
-from ur_cartesian_driver.ros.frames import Frames, Stand
+from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames
+from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter, ArmRequest
 from ur_cartesian_driver.ros.reports import duration_message
-from ur_cartesian_driver.ros.services import kept, PromisedService
-from ur_cartesian_driver.ros.turns import Turn, Turns
+from ur_cartesian_driver.ros.services import completed_answer, DeferredService
 
 #: Generated message classes carry no types.
 Message: TypeAlias = Any
 
 #: The newest one counts, and one that was lost is not sent again.
-NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+TARGET_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 #: As the other topics that tell the state.
-STATES = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+SERVO_STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 #: After these somebody has to look at the robot.
-STOPPED = (
+SAFETY_STOPS = (
     SafetyStatus.PROTECTIVE_STOPPED
     | SafetyStatus.SAFEGUARD_STOPPED
     | SafetyStatus.EMERGENCY_STOPPED
@@ -66,20 +66,20 @@ STOPPED = (
     | SafetyStatus.FAULT
 )
 #: How often the same kind of trouble is told, at most [s].
-COMPLAINT = 2.0
+WARNING_PERIOD = 2.0
 #: How long the end of a session is waited for when the node is destroyed [s].
-PATIENCE = 10.0
-SESSION = 'the session of live targets'
+JOIN_TIMEOUT = 10.0
+SESSION_NAME = 'the session of live targets'
 
 
-def pose_of(message: Message) -> Pose:
+def pose_from_message(message: Message) -> Pose:
     """Return the pose of a ``PoseStamped`` as it is, in its frame."""
     p, q = message.pose.position, message.pose.orientation
     return Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
 
 
 def target_from_message(
-    message: Message, frames: Frames, *, stand: Stand | None, now: int, max_age: float
+    message: Message, frames: Frames, *, snapshot: ArmSnapshot | None, now: int, max_age: float
 ) -> tuple[Pose, float]:
     """
     Return where the TCP is to be in the robot's base, and how old that is [s].
@@ -89,7 +89,7 @@ def target_from_message(
     :raises InvalidGoal: the pose is malformed, its frame unknown, or the stamp is not of now.
     :raises RobotNotReady: the frame moves with the arm, and nobody knows where that stands.
     """
-    pose = pose_of(message)
+    pose = pose_from_message(message)
     check_pose(pose)
     stamp = nanoseconds(message.header.stamp)
     age = (now - stamp) / 1_000_000_000 if stamp else 0.0
@@ -97,11 +97,11 @@ def target_from_message(
         raise InvalidGoal(
             'header.stamp',
             f'is {abs(age):.3f} s {"old" if age > 0.0 else "in the future"}, '
-            f'servo_target_max_age is {max_age:g} s',
+            f'live_target_max_age is {max_age:g} s',
             'compare the clocks of both computers, or leave the stamp 0: then the age counts '
             'from the receipt',
         )
-    return frames.T_base_frame(message.header.frame_id, stand) @ pose, max(0.0, age)
+    return frames.T_base_frame(message.header.frame_id, snapshot) @ pose, max(0.0, age)
 
 
 def servo_state_message(report: ServoReport, stamp: Time) -> ServoState:
@@ -125,7 +125,7 @@ def servo_state_message(report: ServoReport, stamp: Time) -> ServoState:
     return message
 
 
-class ServoStates:
+class ServoStatePublisher:
     """Publishes what the robot loop tells of set-points, as often as it is asked for."""
 
     def __init__(self, node: Node, driver: Driver, rate: float) -> None:
@@ -135,7 +135,7 @@ class ServoStates:
         :param rate: at most so often [Hz], more than 0.
         """
         self._clock, self._period, self._due = node.get_clock(), 1.0 / rate, -inf
-        self._topic = node.create_publisher(ServoState, '~/servo_state', STATES)
+        self._topic = node.create_publisher(ServoState, '~/servo_state', SERVO_STATE_QOS)
         driver.add_servo_listener(self._publish)
 
     def _publish(self, report: ServoReport) -> None:
@@ -149,16 +149,16 @@ class ServoStates:
             self._topic.publish(servo_state_message(report, self._clock.now().to_msg()))
 
 
-class TeachService:
-    """``~/teach_mode``: lets a person guide the arm by hand, and ends that."""
+class FreedriveService:
+    """``~/freedrive_mode``: lets a person guide the arm by hand, and ends that."""
 
-    def __init__(self, node: Node, driver: Driver, turns: Turns) -> None:
+    def __init__(self, node: Node, driver: Driver, arbiter: ArmArbiter) -> None:
         """Begin to serve."""
-        self._driver, self._turns = driver, turns
-        self._motion: Motion | None = None
+        self._driver, self._arbiter = driver, arbiter
+        self._motion: MotionHandle | None = None
         self._lock = threading.Lock()
-        self._service = PromisedService(
-            node, SetBool, '~/teach_mode', self.ask, MutuallyExclusiveCallbackGroup()
+        self._service = DeferredService(
+            node, SetBool, '~/freedrive_mode', self.handle, MutuallyExclusiveCallbackGroup()
         )
 
     @property
@@ -172,23 +172,23 @@ class TeachService:
         if motion is not None:
             motion.cancel()
             with contextlib.suppress(TimeoutError):
-                motion.result(PATIENCE)
+                motion.result(JOIN_TIMEOUT)
 
-    def ask(self, request: Message) -> Future[Answer]:
+    def handle(self, request: Message) -> Future[ServiceAnswer]:
         """Begin or end it; the answer comes when the robot has done that, or cannot."""
         with self._lock:
             motion = self._motion
             if request.data:
                 return (
-                    kept('The arm can be guided by hand already.', ok=True)
+                    completed_answer('The arm can be guided by hand already.', ok=True)
                     if motion is not None
-                    else self._begin()
+                    else self._start()
                 )
         if motion is None:
-            return kept('Nobody guides the arm.', ok=True)
-        answer = _Promise()
+            return completed_answer('Nobody guides the arm.', ok=True)
+        answer = _FirstAnswer()
         motion.add_done_callback(
-            lambda outcome: answer.keep(
+            lambda outcome: answer.set(
                 outcome.code is ErrorCode.CANCELLED,
                 'The arm is held by the robot again.'
                 if outcome.code is ErrorCode.CANCELLED
@@ -198,44 +198,44 @@ class TeachService:
         motion.cancel()
         return answer.future
 
-    def _begin(self) -> Future[Answer]:
-        turn = Turn('a person who guides the arm', lambda: None)
-        if not self._turns.seize(turn):
-            return kept(
+    def _start(self) -> Future[ServiceAnswer]:
+        arm_request = ArmRequest('a person who guides the arm', lambda: None)
+        if not self._arbiter.acquire(arm_request):
+            return completed_answer(
                 'A goal or a session of live targets has the arm; wait for its end or '
                 'cancel it, then try again.'
             )
-        answer = _Promise()
+        answer = _FirstAnswer()
         try:
-            motion = self._driver.teach(
-                lambda: answer.keep(True, 'The arm can be guided by hand.')
+            motion = self._driver.start_freedrive(
+                lambda: answer.set(True, 'The arm can be guided by hand.')
             )
         except DriverError as error:
-            self._turns.leave(turn)
-            return kept(str(error))
+            self._arbiter.release(arm_request)
+            return completed_answer(str(error))
         self._motion = motion
 
-        def ended(outcome: Outcome) -> None:
+        def on_end(outcome: Outcome) -> None:
             self._motion = None
-            self._turns.leave(turn)
-            answer.keep(False, outcome.text)
+            self._arbiter.release(arm_request)
+            answer.set(False, outcome.text)
 
-        motion.add_done_callback(ended)
+        motion.add_done_callback(on_end)
         return answer.future
 
 
-class _Promise:
+class _FirstAnswer:
     """An answer of which the first wording counts."""
 
     def __init__(self) -> None:
-        self.future: Future[Answer] = Future()
+        self.future: Future[ServiceAnswer] = Future()
 
-    def keep(self, ok: bool, text: str) -> None:
+    def set(self, ok: bool, text: str) -> None:
         with contextlib.suppress(InvalidStateError):
-            self.future.set_result(Answer(ok=ok, text=text))
+            self.future.set_result(ServiceAnswer(ok=ok, text=text))
 
 
-class Restraint:
+class TargetInhibitor:
     """
     Keeps targets from being followed after a stop, until they have paused.
 
@@ -245,36 +245,36 @@ class Restraint:
     def __init__(self, pause: float) -> None:
         """Begin without."""
         self._pause = pause
-        self._holds = False
+        self._is_active = False
         self._last = -inf
 
-    def impose(self) -> None:
+    def activate(self) -> None:
         """Begin to hold."""
-        self._holds = True
+        self._is_active = True
 
-    def holds(self, now: float) -> bool:
+    def blocks(self, now: float) -> bool:
         """
         Take note of a target, and tell whether it is not to be followed.
 
         :param now: time of a steady clock [s].
         """
-        self._holds = self._holds and now - self._last < self._pause
+        self._is_active = self._is_active and now - self._last < self._pause
         self._last = now
-        return self._holds
+        return self._is_active
 
 
-class ServoTargets:
+class LiveTargetSubscriber:
     """Listens to targets from its construction to :meth:`close`."""
 
-    def __init__(self, node: Node, driver: Driver, turns: Turns, frames: Frames) -> None:
+    def __init__(self, node: Node, driver: Driver, arbiter: ArmArbiter, frames: Frames) -> None:
         """Begin to listen."""
         self._clock, self._logger = node.get_clock(), node.get_logger()
-        self._driver, self._turns, self._frames = driver, turns, frames
-        self._max_age = driver.options.servo_target_max_age
+        self._driver, self._arbiter, self._frames = driver, arbiter, frames
+        self._max_age = driver.options.live_target_max_age
         self._session: LiveSession | None = None
-        self._restraint = Restraint(driver.options.servo_target_timeout)
+        self._inhibitor = TargetInhibitor(driver.options.live_target_timeout)
         #: Whether there was a session yet.
-        self._has_followed = False
+        self._had_session = False
         # Guards what follows: the newest message that nobody has looked at.
         self._condition = threading.Condition()
         self._pending: Message = None
@@ -285,9 +285,9 @@ class ServoTargets:
         self._thread.start()
         self._subscription = node.create_subscription(
             PoseStamped,
-            '~/servo_target',
+            '~/live_target',
             self._take,
-            NEWEST,
+            TARGET_QOS,
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
 
@@ -313,7 +313,7 @@ class ServoTargets:
         if session is not None:
             session.motion.cancel()
             with contextlib.suppress(TimeoutError):
-                session.motion.result(PATIENCE)
+                session.motion.result(JOIN_TIMEOUT)
 
     # ---- called by the executor ---------------------------------------------------------------
 
@@ -340,30 +340,30 @@ class ServoTargets:
                 message, self._pending = self._pending, None
                 received = self._received
             try:
-                self._follow(message, received)
+                self._handle_target(message, received)
             except DriverError as error:
                 reason = str(error).removeprefix('trajectory.')  # as of a goal, which it is not
                 self._logger.warning(
-                    f'A message on ~/servo_target is ignored: {reason}',
-                    throttle_duration_sec=COMPLAINT,
+                    f'A message on ~/live_target is ignored: {reason}',
+                    throttle_duration_sec=WARNING_PERIOD,
                 )
             except Exception as error:  # the next one may be better
                 self._logger.error(
-                    'A message on ~/servo_target is ignored, because of a defect of the driver, '
+                    'A message on ~/live_target is ignored, because of a defect of the driver, '
                     f'{type(error).__name__}: {error}.',
-                    throttle_duration_sec=COMPLAINT,
+                    throttle_duration_sec=WARNING_PERIOD,
                 )
 
-    def _follow(self, message: Message, received: int) -> None:
+    def _handle_target(self, message: Message, received: int) -> None:
         state = self._driver.state
-        if state is not None and state.safety_status & STOPPED:
-            self._restraint.impose()
-        if self._restraint.holds(monotonic()):
+        if state is not None and state.safety_status & SAFETY_STOPS:
+            self._inhibitor.activate()
+        if self._inhibitor.blocks(monotonic()):
             self._logger.warning(
                 'Live targets are ignored because the robot was stopped while they came: send '
-                f'none for {self._driver.options.servo_target_timeout:g} s (servo_target_timeout) '
+                f'none for {self._driver.options.live_target_timeout:g} s (live_target_timeout) '
                 'before new ones.',
-                throttle_duration_sec=COMPLAINT,
+                throttle_duration_sec=WARNING_PERIOD,
             )
             return
         T_base_tcp, age = target_from_message(
@@ -371,59 +371,61 @@ class ServoTargets:
             self._frames,
             now=received,
             max_age=self._max_age,
-            stand=None if state is None else Stand.of(state),
+            snapshot=None if state is None else ArmSnapshot.of(state),
         )
         age += (self._clock.now().nanoseconds - received) / 1_000_000_000
         session = self._session
         if session is None or session.motion.done():
-            self._begin(T_base_tcp, age)
+            self._start(T_base_tcp, age)
         else:
-            session.aim(T_base_tcp, age=age)
+            session.set_target(T_base_tcp, age=age)
 
-    def _begin(self, T_base_tcp: Pose, age: float) -> None:
+    def _start(self, T_base_tcp: Pose, age: float) -> None:
         """
         Begin a session, if nothing else has the arm.
 
         :raises GoalRefused: the robot is not ready, or the target cannot be meant.
         """
-        turn = Turn(SESSION, lambda: self._make_way_for(turn.successor))
-        if not self._turns.seize_for_now(turn):
+        arm_request = ArmRequest(
+            SESSION_NAME, lambda: self._preempt_session(arm_request.preempted_by)
+        )
+        if not self._arbiter.acquire_preemptible(arm_request):
             self._logger.info(
-                f'Live targets are ignored as long as {self._turns.holder} has the arm.',
-                throttle_duration_sec=COMPLAINT,
+                f'Live targets are ignored as long as {self._arbiter.holder} has the arm.',
+                throttle_duration_sec=WARNING_PERIOD,
             )
             return
         try:
-            session = self._driver.follow_targets(T_base_tcp, age=age)
+            session = self._driver.start_live_session(T_base_tcp, age=age)
         except BaseException as error:
-            self._turns.leave(turn)
-            if self._has_followed and isinstance(error, RobotNotReady):
-                self._restraint.impose()  # it was ready before: something has stopped it
+            self._arbiter.release(arm_request)
+            if self._had_session and isinstance(error, RobotNotReady):
+                self._inhibitor.activate()  # it was ready before: something has stopped it
             raise
-        self._session, self._has_followed = session, True
-        if turn.successor:
-            self._make_way_for(turn.successor)
-        session.motion.add_done_callback(self._ending(turn))
+        self._session, self._had_session = session, True
+        if arm_request.preempted_by:
+            self._preempt_session(arm_request.preempted_by)
+        session.motion.add_done_callback(self._on_session_end(arm_request))
         self._logger.info('A session of live targets begins.')
 
-    def _make_way_for(self, successor: str) -> None:
+    def _preempt_session(self, preempted_by: str) -> None:
         session = self._session
         if session is not None:
-            session.motion.preempt(successor)
+            session.motion.preempt(preempted_by)
 
-    def _ending(self, turn: Turn) -> Callable[[Outcome], None]:
+    def _on_session_end(self, arm_request: ArmRequest) -> Callable[[Outcome], None]:
         """Return what is done at the end of a session."""
 
-        def ended(outcome: Outcome) -> None:
+        def on_end(outcome: Outcome) -> None:
             if outcome.code not in (ErrorCode.SUCCESSFUL, ErrorCode.PREEMPTED):
-                self._restraint.impose()
+                self._inhibitor.activate()
             self._session = None
-            self._turns.leave(turn)
-            self._tell(outcome)
+            self._arbiter.release(arm_request)
+            self._log_end(outcome)
 
-        return ended
+        return on_end
 
-    def _tell(self, outcome: Outcome) -> None:
+    def _log_end(self, outcome: Outcome) -> None:
         """Write into the log how a session ended."""
         text = ' '.join(
             (

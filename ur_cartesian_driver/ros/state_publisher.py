@@ -46,17 +46,17 @@ from ur_cartesian_driver.ros.state_messages import (
 )
 
 #: The newest value is enough, but a reliable subscriber shall be served too.
-STATE = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
 #: Who comes late gets the last value at once.
-LATCHED = QoSProfile(
+LATCHED_QOS = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 #: As tf2 wants it.
-TF = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+TF_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 #: How often an unchanged status is confirmed [s].
-CONFIRMATION = 1.0
+STATUS_PERIOD = 1.0
 #: How often a defect is told, at most [s].
-COMPLAINT = 10.0
+WARNING_PERIOD = 10.0
 
 
 def tf_messages() -> ModuleType | None:
@@ -78,10 +78,10 @@ class StatePublisher:
         self._period = 1.0 / settings.node.state_publish_rate
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._run, name='state publisher', daemon=True)
-        self._steady = _Steady(node, settings)
-        self._changes = _Changes(node)
-        self._signals = _Signals(node)
-        self._diagnostics = _Diagnostics(node, settings.node.diagnostics_rate)
+        self._state_topics = _StateTopics(node, settings)
+        self._status_topics = _StatusTopics(node)
+        self._io_topics = _IoTopics(node)
+        self._diagnostics_topic = _DiagnosticsTopic(node, settings.node.diagnostics_rate)
 
     def start(self) -> None:
         """Start the thread."""
@@ -106,32 +106,32 @@ class StatePublisher:
                 self._logger.error(
                     f'The state of the robot is not published, because of a defect of the driver, '
                     f'{type(error).__name__}: {error}.',
-                    throttle_duration_sec=COMPLAINT,
+                    throttle_duration_sec=WARNING_PERIOD,
                 )
             due += self._period * max(1.0, (monotonic() - due) // self._period)
 
     def _publish(self, now: float) -> None:
         driver, stamp = self._driver, self._clock.now().to_msg()
         state = driver.state
-        self._steady.publish(state, stamp)
-        self._changes.publish(driver, state, now, stamp)
-        self._signals.publish(driver.signals, stamp)
-        self._diagnostics.publish(driver, now, stamp)
+        self._state_topics.publish(state, stamp)
+        self._status_topics.publish(driver, state, now, stamp)
+        self._io_topics.publish(driver.signals, stamp)
+        self._diagnostics_topic.publish(driver, now, stamp)
 
 
-class _Steady:
+class _StateTopics:
     """What is published with each new state of the robot."""
 
     def __init__(self, node: Node, settings: Settings) -> None:
         self._joint_names = tuple(settings.planning.tf_prefix + name for name in JOINT_NAMES)
         self._base, self._tcp = settings.frames.base, settings.frames.tcp
-        self._joint_states = node.create_publisher(JointState, 'joint_states', STATE)
-        self._tcp_pose = node.create_publisher(PoseStamped, '~/tcp_pose', STATE)
-        self._wrench = node.create_publisher(WrenchStamped, '~/wrench', STATE)
-        self._speed_scaling = node.create_publisher(Float64, '~/speed_scaling', STATE)
+        self._joint_states = node.create_publisher(JointState, 'joint_states', STATE_QOS)
+        self._tcp_pose = node.create_publisher(PoseStamped, '~/tcp_pose', STATE_QOS)
+        self._wrench = node.create_publisher(WrenchStamped, '~/wrench', STATE_QOS)
+        self._speed_scaling = node.create_publisher(Float64, '~/speed_scaling', STATE_QOS)
         tf = tf_messages()
-        self._tf_kind: Any = None if tf is None else tf.TFMessage
-        self._tf = None if tf is None else node.create_publisher(tf.TFMessage, '/tf', TF)
+        self._tf_message_type: Any = None if tf is None else tf.TFMessage
+        self._tf = None if tf is None else node.create_publisher(tf.TFMessage, '/tf', TF_QOS)
         self._last: RobotState | None = None
 
     def publish(self, state: RobotState | None, stamp: Time) -> None:
@@ -144,28 +144,30 @@ class _Steady:
         self._speed_scaling.publish(Float64(data=state.speed_scaling))
         if self._tf is not None:
             self._tf.publish(
-                self._tf_kind(transforms=[tcp_transform(state, self._base, self._tcp, stamp)])
+                self._tf_message_type(
+                    transforms=[tcp_transform(state, self._base, self._tcp, stamp)]
+                )
             )
 
 
-class _Changes:
+class _StatusTopics:
     """What is published when it changes: latched."""
 
     def __init__(self, node: Node) -> None:
-        self._status = node.create_publisher(DriverStatus, '~/status', LATCHED)
-        self._robot_mode = node.create_publisher(RobotMode, '~/robot_mode', LATCHED)
-        self._safety_mode = node.create_publisher(SafetyMode, '~/safety_mode', LATCHED)
-        self._program = node.create_publisher(Bool, '~/robot_program_running', LATCHED)
+        self._status = node.create_publisher(DriverStatus, '~/status', LATCHED_QOS)
+        self._robot_mode = node.create_publisher(RobotMode, '~/robot_mode', LATCHED_QOS)
+        self._safety_mode = node.create_publisher(SafetyMode, '~/safety_mode', LATCHED_QOS)
+        self._program = node.create_publisher(Bool, '~/robot_program_running', LATCHED_QOS)
         self._last: dict[Any, object] = {}
-        self._confirmed = -CONFIRMATION
+        self._last_status_time = -STATUS_PERIOD
 
     def publish(self, driver: Driver, state: RobotState | None, now: float, stamp: Time) -> None:
         connection = driver.status
         robot_mode = None if state is None else state.robot_mode
         safety_mode = None if state is None else state.safety_mode
-        overdue = now - self._confirmed >= CONFIRMATION
+        overdue = now - self._last_status_time >= STATUS_PERIOD
         if self._is_new(self._status, (connection, robot_mode, safety_mode)) or overdue:
-            self._confirmed = now
+            self._last_status_time = now
             self._status.publish(status_message(connection, state, stamp))
         if self._is_new(self._robot_mode, robot_mode):
             self._robot_mode.publish(robot_mode_message(state))
@@ -182,12 +184,12 @@ class _Changes:
         return True
 
 
-class _Signals:
+class _IoTopics:
     """Inputs, outputs and tool: when something of them changes, latched."""
 
     def __init__(self, node: Node) -> None:
-        self._io_states = node.create_publisher(IOStates, '~/io_states', LATCHED)
-        self._tool_data = node.create_publisher(ToolData, '~/tool_data', LATCHED)
+        self._io_states = node.create_publisher(IOStates, '~/io_states', LATCHED_QOS)
+        self._tool_data = node.create_publisher(ToolData, '~/tool_data', LATCHED_QOS)
         self._last: Signals | None = None
 
     def publish(self, signals: Signals | None, stamp: Time) -> None:
@@ -198,14 +200,16 @@ class _Signals:
         self._tool_data.publish(tool_data_message(signals, stamp))
 
 
-class _Diagnostics:
+class _DiagnosticsTopic:
     """``/diagnostics``, at a rate of its own."""
 
     def __init__(self, node: Node, rate: float) -> None:
         self._name = node.get_fully_qualified_name().strip('/')
         self._period = 1.0 / rate if rate > 0.0 else 0.0
         self._topic = (
-            node.create_publisher(DiagnosticArray, '/diagnostics', STATE) if rate > 0.0 else None
+            node.create_publisher(DiagnosticArray, '/diagnostics', STATE_QOS)
+            if rate > 0.0
+            else None
         )
         self._due = 0.0
 

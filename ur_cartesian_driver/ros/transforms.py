@@ -24,10 +24,10 @@ from ur_cartesian_driver.motion.pose import normalize, Pose
 Message: TypeAlias = Any
 
 #: How long a transform is waited for [s]: one for this moment is published in the next.
-PATIENCE = 0.5
+LOOKUP_TIMEOUT = 0.5
 
 
-class Buffer(Protocol):
+class TransformBuffer(Protocol):
     """What is used of ``tf2_ros.Buffer``."""
 
     def lookup_transform(
@@ -36,12 +36,12 @@ class Buffer(Protocol):
         """Return a ``TransformStamped`` that maps coordinates of the source to the target."""
 
 
-class Transforms:
+class TransformLookup:
     """A buffer of transforms, asked on behalf of goals."""
 
     def __init__(
         self,
-        buffer: Buffer,
+        buffer: TransformBuffer,
         errors: type[Exception] | tuple[type[Exception], ...],
         *,
         now: Callable[[], int],
@@ -70,7 +70,7 @@ class Transforms:
             has the stamp 0 and is never old.
         :raises InvalidGoal: there is no such transform, or only an old one.
         """
-        message = self._looked_up(field, target, source, at)
+        message = self._lookup(field, target, source, at)
         stamp = _nanoseconds(message.header.stamp)
         if at == 0 and stamp != 0:
             self._check_age(field, target, source, stamp)
@@ -86,13 +86,13 @@ class Transforms:
                 'see why it is not published any more, or raise the parameter',
             )
 
-    def T_rigid(self, field: str, target: str, source: str) -> Pose:
+    def T_static(self, field: str, target: str, source: str) -> Pose:
         """
         Return where a frame is that is fixed to another one.
 
         :raises InvalidGoal: there is no such transform, or the frames move against each other.
         """
-        message = self._looked_up(field, target, source, 0)
+        message = self._lookup(field, target, source, 0)
         if _nanoseconds(message.header.stamp) != 0:
             raise InvalidGoal(
                 field,
@@ -103,10 +103,10 @@ class Transforms:
             )
         return _pose(message.transform)
 
-    def _looked_up(self, field: str, target: str, source: str, at: int) -> Message:
+    def _lookup(self, field: str, target: str, source: str, at: int) -> Message:
         try:
             return self._buffer.lookup_transform(
-                target, source, Time(nanoseconds=at), Duration(seconds=PATIENCE)
+                target, source, Time(nanoseconds=at), Duration(seconds=LOOKUP_TIMEOUT)
             )
         except self._errors as error:
             when = ' for the stamp of the goal' if at else ''
@@ -118,7 +118,7 @@ class Transforms:
             ) from None
 
 
-def listen(node: Node, max_age: float) -> Transforms | None:
+def listen_to_tf(node: Node, max_age: float) -> TransformLookup | None:
     """
     Return the transforms that a node hears of; None where tf2 is not installed.
 
@@ -130,7 +130,7 @@ def listen(node: Node, max_age: float) -> Transforms | None:
         return None
     buffer = tf2_ros.Buffer()
     listener = tf2_ros.TransformListener(buffer, node)
-    return Transforms(
+    return TransformLookup(
         buffer,
         tf2_ros.TransformException,
         max_age=max_age,

@@ -18,120 +18,120 @@ from itertools import count
 import threading
 
 
-class Turn:
+class ArmRequest:
     """One goal's turn at the arm."""
 
-    def __init__(self, name: str, make_way: Callable[[], None]) -> None:
+    def __init__(self, name: str, on_preempt: Callable[[], None]) -> None:
         """
         Take part, without a place in line yet.
 
-        :param make_way: called, once or never, when ``successor`` is set; from any thread.
+        :param on_preempt: called, once or never, when ``preempted_by`` is set; from any thread.
         """
         self.name = name
-        self.make_way = make_way
+        self.on_preempt = on_preempt
         #: The newer goal that takes the place of this one; empty: none does.
-        self.successor = ''
+        self.preempted_by = ''
         #: The goal that had to make way when this one claimed the arm; empty: none had to.
-        self.predecessor = ''
+        self.preempted = ''
         self._number = 0
         self._withdrawn = False
 
 
-class Turns:
+class ArmArbiter:
     """The line in front of one arm; thread-safe."""
 
     def __init__(self) -> None:
         """Begin with a free arm."""
         self._condition = threading.Condition()
         self._numbers = count(1)
-        self._line: list[Turn] = []
-        self._owner: Turn | None = None
-        self._changes = 0
+        self._queue: list[ArmRequest] = []
+        self._holder: ArmRequest | None = None
+        self._release_count = 0
 
     @property
-    def changes(self) -> int:
+    def release_count(self) -> int:
         """How often the arm was given back: after each it may stand somewhere else."""
-        return self._changes
+        return self._release_count
 
     @property
     def holder(self) -> str:
         """Who has the arm; empty: nobody."""
-        owner = self._owner
-        return '' if owner is None else owner.name
+        holder = self._holder
+        return '' if holder is None else holder.name
 
-    def is_taken(self) -> bool:
+    def is_held(self) -> bool:
         """Tell whether a goal has the arm."""
-        return self._owner is not None
+        return self._holder is not None
 
-    def line_up(self, turn: Turn) -> None:
+    def enqueue(self, arm_request: ArmRequest) -> None:
         """Be the newest."""
         with self._condition:
-            turn._number = next(self._numbers)
-            self._line.append(turn)
+            arm_request._number = next(self._numbers)
+            self._queue.append(arm_request)
 
-    def seize(self, turn: Turn) -> bool:
+    def acquire(self, arm_request: ArmRequest) -> bool:
         """Take the arm if it is free; tell whether it was."""
         with self._condition:
-            if self._owner is not None:
+            if self._holder is not None:
                 return False
-            self._owner = turn
+            self._holder = arm_request
             return True
 
-    def seize_for_now(self, turn: Turn) -> bool:
+    def acquire_preemptible(self, arm_request: ArmRequest) -> bool:
         """
         Take the arm if it is free, and make way for whatever goal claims it; tell whether it was.
 
         In line it stands before all others: each of them is newer.
         """
         with self._condition:
-            if self._owner is not None:
+            if self._holder is not None:
                 return False
-            self._owner = turn
-            self._line.insert(0, turn)
+            self._holder = arm_request
+            self._queue.insert(0, arm_request)
             return True
 
-    def claim(self, turn: Turn) -> None:
+    def preempt(self, arm_request: ArmRequest) -> None:
         """
         Have all older goals make way, and wait for the arm.
 
-        On return the arm is that of this turn, unless it has a ``successor`` or was withdrawn.
+        On return the arm is that of this turn, unless it has a ``preempted_by`` or was withdrawn.
         """
         with self._condition:
             older = (
                 []
-                if turn.successor or turn._withdrawn
+                if arm_request.preempted_by or arm_request._withdrawn
                 else [
                     other
-                    for other in self._line
-                    if other._number < turn._number and not other.successor
+                    for other in self._queue
+                    if other._number < arm_request._number and not other.preempted_by
                 ]
             )
             for other in older:
-                other.successor = turn.name
-            if self._owner is not None:
-                turn.predecessor = self._owner.name
+                other.preempted_by = arm_request.name
+            if self._holder is not None:
+                arm_request.preempted = self._holder.name
             self._condition.notify_all()
         for other in older:  # not under our lock: it does more than we can know
-            other.make_way()
+            other.on_preempt()
         with self._condition:
             self._condition.wait_for(
-                lambda: self._owner is None or turn.successor or turn._withdrawn
+                lambda: self._holder is None or arm_request.preempted_by or arm_request._withdrawn
             )
-            if not (turn.successor or turn._withdrawn):
-                self._owner = turn
+            if not (arm_request.preempted_by or arm_request._withdrawn):
+                self._holder = arm_request
 
-    def withdraw(self, turn: Turn) -> None:
+    def withdraw(self, arm_request: ArmRequest) -> None:
         """Wait no longer."""
         with self._condition:
-            turn._withdrawn = True
+            arm_request._withdrawn = True
             self._condition.notify_all()
 
-    def leave(self, turn: Turn) -> None:
+    def release(self, arm_request: ArmRequest) -> None:
         """Leave the line, and give back the arm."""
         with self._condition:
-            if turn in self._line:
-                self._line.remove(turn)
-            if self._owner is turn:
-                self._owner = None
-                self._changes += 1
+            if arm_request in self._queue:
+                self._queue.remove(arm_request)
+            if self._holder is arm_request:
+                self._holder = None
+                self._release_count += 1
             self._condition.notify_all()

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ur_cartesian_driver.kinematics.chain import Frames
+from ur_cartesian_driver.kinematics.chain import ChainFrames
 from ur_cartesian_driver.motion.pose import Vector3, Vector6
 
 _ZERO: Vector3 = (0.0, 0.0, 0.0)
@@ -28,7 +28,7 @@ class PointMotion:
 
 
 def point_motion(
-    frames: Frames, qd: Vector6, qdd: Vector6, point: Vector3, joints: int = 6
+    frames: ChainFrames, qd: Vector6, qdd: Vector6, point: Vector3, joints: int = 6
 ) -> PointMotion:
     """
     Return how a point moves that is fixed behind the first joints.
@@ -43,14 +43,16 @@ def point_motion(
     here = frames.origins[0]
     for i in range(joints):
         axis, origin = frames.axes[i], frames.origins[i]
-        velocity, acceleration = _carried(
+        velocity, acceleration = _shifted_motion(
             velocity, acceleration, omega, alpha, _minus(origin, here)
         )
         turning = _times(qd[i], axis)
         alpha = _plus(alpha, _times(qdd[i], axis), cross(omega, turning))
         omega = _plus(omega, turning)
         here = origin
-    velocity, acceleration = _carried(velocity, acceleration, omega, alpha, _minus(point, here))
+    velocity, acceleration = _shifted_motion(
+        velocity, acceleration, omega, alpha, _minus(point, here)
+    )
     return PointMotion(
         velocity=velocity,
         acceleration=acceleration,
@@ -59,7 +61,7 @@ def point_motion(
     )
 
 
-def moments_for(frames: Frames, point: Vector3, force: Vector3) -> Vector6:
+def moments_for(frames: ChainFrames, point: Vector3, force: Vector3) -> Vector6:
     """
     Return the joint moments [Nm] that make a force [N] at a point of the last link.
 
@@ -72,18 +74,21 @@ def moments_for(frames: Frames, point: Vector3, force: Vector3) -> Vector6:
     )
 
 
-def flange_point(frames: Frames, offset: Vector3) -> Vector3:
+def flange_point(frames: ChainFrames, offset: Vector3) -> Vector3:
     """Return where a point is that is given in flange coordinates [m]."""
     x, y, z = offset
     return _plus(frames.position, _times(x, frames.x), _times(y, frames.y), _times(z, frames.z))
 
 
-def _carried(
-    velocity: Vector3, acceleration: Vector3, omega: Vector3, alpha: Vector3, arm: Vector3
+def _shifted_motion(
+    velocity: Vector3, acceleration: Vector3, omega: Vector3, alpha: Vector3, lever_arm: Vector3
 ) -> tuple[Vector3, Vector3]:
     """Return velocity and acceleration of a point of the same link, an arm farther out."""
-    round_ = cross(omega, arm)
-    return (_plus(velocity, round_), _plus(acceleration, cross(alpha, arm), cross(omega, round_)))
+    round_ = cross(omega, lever_arm)
+    return (
+        _plus(velocity, round_),
+        _plus(acceleration, cross(alpha, lever_arm), cross(omega, round_)),
+    )
 
 
 def dot(a: Vector3, b: Vector3) -> float:

@@ -27,10 +27,10 @@ from ur_cartesian_driver.sim.motion import MotionGenerator
 
 _ZERO: Vector6 = (0.0,) * 6
 # A solution farther than this from the target is another branch [rad].
-_OTHER_BRANCH = 0.5
+_BRANCH_JUMP = 0.5
 
 
-class Actual:
+class ActualMotion:
     """The measured side of one arm's motion."""
 
     def __init__(self, motion: MotionGenerator) -> None:
@@ -89,17 +89,17 @@ class Actual:
         """Joint speeds [rad/s]: those that lead to the twist."""
         if self._twist is None:
             return self._motion.qd
-        return _sum(self._motion.qd, self._joints_of(self._twist))
+        return _sum(self._motion.qd, self._joint_change(self._twist))
 
     def _solve(self, deviation: Vector6) -> Vector6:
         motion = self._motion
         T_base_flange = self.T_base_tcp @ motion.T_flange_tcp.inverse()
         q = nearest(motion.arm, T_base_flange, motion.q)
-        if q is None or dist(q, motion.q) > _OTHER_BRANCH:
-            return _sum(motion.q, self._joints_of(deviation))
+        if q is None or dist(q, motion.q) > _BRANCH_JUMP:
+            return _sum(motion.q, self._joint_change(deviation))
         return q
 
-    def _joints_of(self, change: Vector6) -> Vector6:
+    def _joint_change(self, change: Vector6) -> Vector6:
         """Return the joints' share in a small change of the tool; the least one if singular."""
         jacobian = self._motion.arm.jacobian(self._motion.q, self._motion.T_flange_tcp)
         a, b, c, d, e, f = (float(v) for v in np.linalg.pinv(jacobian, rcond=1e-6) @ change)

@@ -11,7 +11,7 @@ from ur_cartesian_driver.motion.state import SafetyMode
 from ur_cartesian_driver.protocol.primary import (
     ErrorCodeMessage,
     KeyMessage,
-    Message,
+    PrimaryMessage,
     RawMessage,
     ReportLevel,
     RuntimeExceptionMessage,
@@ -21,14 +21,14 @@ from ur_cartesian_driver.protocol.primary import (
 from ur_cartesian_driver.sim.controller_state import Popup
 
 #: Messages that wait to be sent, and lines that are remembered.
-_KEPT = 10_000
+_MAX_LOG_LINES = 10_000
 #: Longest text in a message [bytes]: a frame must stay below 4092.
-_LONGEST = 4000
+_MAX_TEXT_LENGTH = 4000
 
 _POPUP = 2
 
 
-class Announcements:
+class ControllerMessages:
     """Collects messages; whoever has clients takes them once per cycle."""
 
     def __init__(self, now: Callable[[], float]) -> None:
@@ -38,13 +38,13 @@ class Announcements:
         :param now: the controller's clock [s].
         """
         self._now = now
-        self.pending: deque[Message] = deque(maxlen=_KEPT)
+        self.pending: deque[PrimaryMessage] = deque(maxlen=_MAX_LOG_LINES)
         #: Called with code and argument of each error.
         self.on_error: Callable[[int, int], None] | None = None
         #: What programs wrote and what went wrong, as lines for people.
-        self.log: deque[str] = deque(maxlen=_KEPT)
+        self.log: deque[str] = deque(maxlen=_MAX_LOG_LINES)
 
-    def take(self) -> list[Message]:
+    def take(self) -> list[PrimaryMessage]:
         """Return what has been announced since the last time."""
         messages = list(self.pending)
         self.pending.clear()
@@ -107,7 +107,7 @@ class Announcements:
                 + flags
                 + bytes([len(title)])
                 + title
-                + popup.text.encode()[: _LONGEST - 255],
+                + popup.text.encode()[: _MAX_TEXT_LENGTH - 255],
             )
         )
 
@@ -117,4 +117,8 @@ class Announcements:
 
 def _cut(text: str) -> str:
     """Return as much of a text as a message can hold."""
-    return text if len(text) < _LONGEST // 4 else text.encode()[:_LONGEST].decode(errors='ignore')
+    return (
+        text
+        if len(text) < _MAX_TEXT_LENGTH // 4
+        else text.encode()[:_MAX_TEXT_LENGTH].decode(errors='ignore')
+    )

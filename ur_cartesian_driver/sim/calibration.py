@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.robots import Geometry, RobotModel
+from ur_cartesian_driver.kinematics.robots import DhTable, RobotModel
 
 Array = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class _Axes:
     flange: Array
 
 
-def read_calibration(path: Path, model: RobotModel) -> Geometry:
+def read_calibration(path: Path, model: RobotModel) -> DhTable:
     """
     Return the table of a calibration file, as ``ur_calibration`` of the UR ROS driver writes it.
 
@@ -70,7 +70,7 @@ def read_calibration(path: Path, model: RobotModel) -> Geometry:
     return _table(_axes_of_links([_link(path, links, name) for name in _LINKS], path), model)
 
 
-def random_calibration(model: RobotModel, seed: int) -> Geometry:
+def random_calibration(model: RobotModel, seed: int) -> DhTable:
     """
     Return the table of an arm whose axes are off as those of real arms are; see above.
 
@@ -121,7 +121,7 @@ def _axes_of_links(links: list[Array], path: Path) -> _Axes:
     return _Axes(np.array(points), np.array(directions), T)
 
 
-def _nominal_axes(geometry: Geometry) -> _Axes:
+def _nominal_axes(geometry: DhTable) -> _Axes:
     T = np.eye(4)
     points, directions = [], []
     for theta, d, a, alpha in zip(
@@ -133,7 +133,7 @@ def _nominal_axes(geometry: Geometry) -> _Axes:
     return _Axes(np.array(points), np.array(directions), T)
 
 
-def _table(axes: _Axes, model: RobotModel) -> Geometry:
+def _table(axes: _Axes, model: RobotModel) -> DhTable:
     """Return the DH table: each x axis is the common normal of an axis and the next."""
     rows = []
     origin, x, z = np.zeros(3), np.array([1.0, 0.0, 0.0]), axes.directions[0]
@@ -152,7 +152,7 @@ def _table(axes: _Axes, model: RobotModel) -> Geometry:
     thetas, ds, lengths, alphas = (
         (c[0], c[1], c[2], c[3], c[4], c[5]) for c in zip(*rows, strict=True)
     )
-    return Geometry(theta=thetas, d=ds, a=lengths, alpha=alphas)
+    return DhTable(theta=thetas, d=ds, a=lengths, alpha=alphas)
 
 
 def _common_normal(

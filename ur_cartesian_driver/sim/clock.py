@@ -21,8 +21,8 @@ _LOOP_GRAIN = 0.001
 #: Behind by more than this [s] (a suspended process, a starved machine), the clock starts anew
 #: instead of racing: programs count their timeouts in cycles, commonly 0.2 s, and in a race of
 #: cycles nobody could answer them in time.
-_GIVE_UP = 0.1
-_KEPT = 20_000
+_MAX_LAG = 0.1
+_MAX_SAMPLES = 20_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class RealClock:
         self._period = cycle / rate
         self._start: float | None = None
         self._count = 0
-        self._late: deque[float] = deque(maxlen=_KEPT)
+        self._late: deque[float] = deque(maxlen=_MAX_SAMPLES)
         #: How often the clock gave up catching up.
         self.slips = 0
 
@@ -80,7 +80,7 @@ class RealClock:
             time.sleep(rest)  # noqa: ASYNC251
         late = max(0.0, time.monotonic() - deadline)
         self._late.append(late)
-        if late > _GIVE_UP:
+        if late > _MAX_LAG:
             self._start, self._count, self.slips = time.monotonic(), 0, self.slips + 1
 
     def lateness(self) -> Lateness:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from math import pi
 from typing import Literal
 
-from ur_cartesian_driver.kinematics.robots import Geometry, robot_model, RobotModel
+from ur_cartesian_driver.kinematics.robots import DhTable, robot_model, RobotModel
 from ur_cartesian_driver.motion.pose import Vector6
 from ur_cartesian_driver.sim.faults import Fault
 
@@ -17,7 +17,7 @@ from ur_cartesian_driver.sim.faults import Fault
 HOME: Vector6 = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 
 _PRIMARY_PORT = 30001
-_NEWEST = {'CB3': '3.15.8', 'e': '5.21.0'}
+_DEFAULT_VERSIONS = {'CB3': '3.15.8', 'e': '5.21.0'}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,7 +50,7 @@ class SimulatorConfig:
     #: False = local control: the primary interface takes no scripts.
     remote_control: bool = True
     #: Denavit-Hartenberg parameters of this arm; None = the nominal ones of the model.
-    geometry: Geometry | None = None
+    geometry: DhTable | None = None
     #: Cycles per second; None = 500, or 125 for a CB3 model.
     frequency: float | None = None
     #: Unlocking is refused this long after a protective stop [s]. A real robot insists on 5 s.
@@ -61,7 +61,7 @@ class SimulatorConfig:
     brake_release_time: float = 0.5
     #: How fast time passes against the wall clock; 0 = as fast as it can.
     rate: float = 1.0
-    #: What goes wrong, as :mod:`~ur_cartesian_driver.sim.faults` or in words; times count from
+    #: What goes wrong, as `sim.faults.injector` or in words; times count from
     #: the first cycle.
     faults: Sequence[Fault | str] = ()
     #: Programs that the dashboard can load: file name -> URScript.
@@ -108,7 +108,7 @@ class SimulatorConfig:
         :raises ValueError: the text is not two to four numbers with dots between them.
         """
         series = 'CB3' if self.robot_model.series == 'CB3' else 'e'
-        text = self.polyscope or _NEWEST[series]
+        text = self.polyscope or _DEFAULT_VERSIONS[series]
         parts = text.split('.')
         if not 2 <= len(parts) <= 4 or not all(part.isdigit() for part in parts):
             raise ValueError(f'polyscope is {text!r}; write it like 5.21 or 5.21.0.')
@@ -118,19 +118,19 @@ class SimulatorConfig:
     @property
     def listening_secondary_port(self) -> int:
         """Return the port for the secondary interface; 0 = any free one."""
-        return self._beside_primary(self.secondary_port, 1)
+        return self._port_beside_primary(self.secondary_port, 1)
 
     @property
     def listening_realtime_port(self) -> int:
         """Return the port for the real-time interface; 0 = any free one."""
-        return self._beside_primary(self.realtime_port, 2)
+        return self._port_beside_primary(self.realtime_port, 2)
 
     @property
     def listening_interpreter_port(self) -> int:
         """Return the port for statements in interpreter mode; 0 = any free one."""
-        return self._beside_primary(self.interpreter_port, 19)
+        return self._port_beside_primary(self.interpreter_port, 19)
 
-    def _beside_primary(self, chosen: int | None, distance: int) -> int:
+    def _port_beside_primary(self, chosen: int | None, distance: int) -> int:
         if chosen is not None:
             return chosen
         return _PRIMARY_PORT + distance if self.primary_port == _PRIMARY_PORT else 0

@@ -21,26 +21,26 @@ from ur_cartesian_driver.motion.state import (
     SafetyMode,
     SafetyStatus,
 )
-from ur_cartesian_driver.sim.actual import Actual
-from ur_cartesian_driver.sim.announcements import Announcements
-from ur_cartesian_driver.sim.builtins import builtins_of
-from ur_cartesian_driver.sim.builtins.motion import HandGuided, Ownership
+from ur_cartesian_driver.sim.actual import ActualMotion
+from ur_cartesian_driver.sim.builtins import controller_builtins
+from ur_cartesian_driver.sim.builtins.motion import FreedriveState, MotionOwnership
 from ur_cartesian_driver.sim.config import SimulatorConfig
-from ur_cartesian_driver.sim.controller_state import Payload, Popup, Process
-from ur_cartesian_driver.sim.faults import Faults
-from ur_cartesian_driver.sim.interpreter import Interpreter
+from ur_cartesian_driver.sim.controller_state import Payload, Popup, ProcessState
+from ur_cartesian_driver.sim.faults import FaultInjector
+from ur_cartesian_driver.sim.interpreter import InterpreterMode
 from ur_cartesian_driver.sim.modes import (
+    ArmPower,
     OPERATIONAL,
-    Power,
     POWERLESS,
-    Safety,
     SafetyEvent,
+    SafetySystem,
     STATUS_BITS,
 )
 from ur_cartesian_driver.sim.motion import MotionGenerator
-from ur_cartesian_driver.sim.programs import Programs
+from ur_cartesian_driver.sim.programs import ProgramRunner
 from ur_cartesian_driver.sim.script_sockets import MemorySockets, ScriptSockets
-from ur_cartesian_driver.sim.signals import Signals
+from ur_cartesian_driver.sim.state.controller_io import ControllerIo
+from ur_cartesian_driver.sim.state.controller_messages import ControllerMessages
 from ur_cartesian_driver.sim.watchdog import Watchdogs
 from ur_cartesian_driver.urscript.errors import RuntimeException
 
@@ -50,8 +50,8 @@ START_TIME = 60.0
 #: Time in which the speed goes from full to zero [s]: by the slider and by a pause, and by a
 #: protective stop. A real robot's are not published.
 SLIDER_TIME, PROTECTIVE_STOP_TIME = 0.25, 0.1
-_HISTORY = 100
-_MOST_POPUPS = 100
+_MAX_HISTORY = 100
+_MAX_POPUPS = 100
 
 
 class Controller:
@@ -69,23 +69,23 @@ class Controller:
         self.arm = Arm(config.robot_model, config.geometry)
         self.motion = MotionGenerator(self.arm, self.cycle, config.q)
         #: What is measured of the motion: the targets, unless a fault interferes.
-        self.actual = Actual(self.motion)
+        self.actual = ActualMotion(self.motion)
         self.sockets = MemorySockets() if sockets is None else sockets
-        self.signals = Signals()
-        self.safety = Safety(config.unlock_delay)
-        self.power = Power(
+        self.io = ControllerIo()
+        self.safety = SafetySystem(config.unlock_delay)
+        self.power = ArmPower(
             RobotMode.RUNNING if config.power == 'running' else RobotMode.POWER_OFF,
             config.power_on_time,
             config.brake_release_time,
         )
-        self.announcements = Announcements(lambda: self.time)
-        self.ownership = Ownership(self.motion)
+        self.messages = ControllerMessages(lambda: self.time)
+        self.ownership = MotionOwnership(self.motion)
         self.watchdogs = Watchdogs()
         self.popups: list[Popup] = []
         self.payload = Payload()
         self.gravity: Vector3 = (0.0, 0.0, 9.82)
-        self.hand_guided = HandGuided.NOBODY
-        self.process = Process()
+        self.freedrive = FreedriveState.OFF
+        self.process = ProcessState()
         #: Where the last move leads to; None after a stream.
         self.waypoint: Pose | None = None
         self.force_mode = False
@@ -94,14 +94,16 @@ class Controller:
         self.contact_steps = 0
         self.remote_control = config.remote_control
         #: The speed slider, 0..1, and what motion really runs at.
-        self.slider = 1.0
+        self.speed_slider = 1.0
         self.scale = 1.0
-        self._past: deque[Vector6] = deque([config.q] * _HISTORY, maxlen=_HISTORY)
-        self.programs: Programs = Programs(builtins_of(self), self.announcements, self)
-        self.interpreter = Interpreter(self.programs, self.ownership)
+        self._joint_history: deque[Vector6] = deque([config.q] * _MAX_HISTORY, maxlen=_MAX_HISTORY)
+        self.programs: ProgramRunner = ProgramRunner(
+            controller_builtins(self), self.messages, self
+        )
+        self.interpreter_mode = InterpreterMode(self.programs, self.ownership)
         self.programs.on_end = self.sockets.close_all
-        self.announcements.on_error = self._pause_if_wanted
-        self.faults = Faults(self)
+        self.messages.on_error = self._pause_if_wanted
+        self.faults = FaultInjector(self)
 
     # What it reports
 
@@ -121,7 +123,7 @@ class Controller:
         return self.motion.tcp_twist
 
     @property
-    def standing(self) -> bool:
+    def at_rest(self) -> bool:
         """Whether nothing moves, at the end of a motion or paused on its path."""
         return self.scale == 0.0 or not self.motion.moving
 
@@ -137,15 +139,15 @@ class Controller:
         """Bits of the safety system."""
         return STATUS_BITS[self.safety.mode]
 
-    def past_joints(self, steps: int) -> Vector6:
+    def joint_history(self, steps: int) -> Vector6:
         """
         Return the joint positions some cycles ago.
 
         :raises RuntimeException: farther back than is remembered.
         """
-        if not 0 <= steps < _HISTORY:
-            raise RuntimeException(f'steps is {steps}; the history holds 0..{_HISTORY - 1}')
-        return self._past[-1 - steps]
+        if not 0 <= steps < _MAX_HISTORY:
+            raise RuntimeException(f'steps is {steps}; the history holds 0..{_MAX_HISTORY - 1}')
+        return self._joint_history[-1 - steps]
 
     # The cycle
 
@@ -157,24 +159,24 @@ class Controller:
         self.power.step(self.time)
         self.sockets.poll()
         self._watch_inputs()
-        rested = not self.motion.moving
+        was_at_rest = not self.motion.moving
         self.programs.step()
-        self._change_scale(rested)
+        self._change_scale(was_at_rest)
         self.motion.step(self.scale)
-        self._past.append(self.actual.q)
-        self._look_at_motion()
-        if self.safety.mode in POWERLESS and self.standing:
+        self._joint_history.append(self.actual.q)
+        self._report_motion_events()
+        if self.safety.mode in POWERLESS and self.at_rest:
             self.power.off()
 
-    def _change_scale(self, rested: bool) -> None:
+    def _change_scale(self, was_at_rest: bool) -> None:
         """
         Move the scale towards what it should be, slowly enough for an arm.
 
         :param rested: the arm stood before this cycle, so it can begin with any scale.
         """
         paused = self.programs.state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
-        target = 0.0 if paused else self.slider
-        if rested:
+        target = 0.0 if paused else self.speed_slider
+        if was_at_rest:
             self.scale = target
             return
         stopped = self.safety.mode not in OPERATIONAL
@@ -185,24 +187,24 @@ class Controller:
             else (min(target, self.scale + change))
         )
 
-    def _look_at_motion(self) -> None:
+    def _report_motion_events(self) -> None:
         for warning in self.motion.warnings:
-            self.announcements.error(warning.code, warning.argument, warning.text)
+            self.messages.error(warning.code, warning.argument, warning.text)
         self.motion.warnings.clear()
         fault = self.motion.fault
         if fault is not None and self.safety.mode in OPERATIONAL:
-            self.announcements.error(fault.code, fault.argument, fault.text)
+            self.messages.error(fault.code, fault.argument, fault.text)
             self.safety_event(SafetyEvent.PROTECTIVE_STOP, reported=True)
 
     def _pause_if_wanted(self, code: int, argument: int) -> None:
         """Pause a program that has asked for it by `pause_on_error_code`."""
-        if self.process.pauses_on(code, argument):
+        if self.process.has_pause_on(code, argument):
             self.programs.pause()
 
     def _watch_inputs(self) -> None:
         """Act on inputs that an RTDE client has stopped to write."""
         for variable, action in self.watchdogs.expired(self.time):
-            self.announcements.text(f'RTDE watchdog: {variable} was not written in time.')
+            self.messages.text(f'RTDE watchdog: {variable} was not written in time.')
             if action == 'stop':
                 self.programs.stop()
             elif action == 'pause':
@@ -213,15 +215,15 @@ class Controller:
     def brake(self) -> None:
         """Stop hard; an arm that stands on its path, paused or at a fault, only forgets it."""
         if self.scale == 0.0 or self.motion.fault is not None:
-            self.motion.halt_hard()
+            self.motion.stop_at_once()
         self.ownership.brake()
 
     def end_modes(self) -> None:
         """End what lives only as long as a program."""
-        self.hand_guided = HandGuided.NOBODY
+        self.freedrive = FreedriveState.OFF
         self.force_mode = False
-        self.process = Process()
-        self.interpreter.end_of_program()
+        self.process = ProcessState()
+        self.interpreter_mode.end_of_program()
         self.watchdogs.clear()
 
     def end_of_frame(self) -> None:
@@ -232,7 +234,7 @@ class Controller:
         """Forget a thread that has ended."""
         self.ownership.release(thread)
 
-    def why_not_ready(self) -> str:
+    def start_refusal(self) -> str:
         """Return why no program can run now."""
         if self.safety.mode not in OPERATIONAL:
             return f'the safety mode is {self.safety.mode.name}'
@@ -244,7 +246,7 @@ class Controller:
 
     def set_slider(self, fraction: float) -> None:
         """Set the speed slider, cut to 0..1."""
-        self.slider = min(1.0, max(0.0, fraction))
+        self.speed_slider = min(1.0, max(0.0, fraction))
 
     def power_on(self) -> str:
         """Power up to IDLE; return why not, or an empty string."""
@@ -262,7 +264,7 @@ class Controller:
 
     def power_off(self) -> None:
         """Cut the power; the arm stays where it is, the program ends."""
-        self.motion.halt_hard()
+        self.motion.stop_at_once()
         self.programs.stop()
         self.power.off()
 
@@ -277,8 +279,8 @@ class Controller:
         if refusal or self.safety.mode is before:
             return refusal
         if event is SafetyEvent.PROTECTIVE_STOP and not reported:
-            self.announcements.error(209, 0, 'A protective stop was triggered')
-        self.announcements.safety_mode(self.safety.mode)
+            self.messages.error(209, 0, 'A protective stop was triggered')
+        self.messages.safety_mode(self.safety.mode)
         if self.safety.mode in OPERATIONAL:
             self.motion.clear_fault()
         if self.safety.mode in (SafetyMode.VIOLATION, SafetyMode.FAULT):
@@ -303,9 +305,9 @@ class Controller:
 
     def show_popup(self, popup: Popup) -> None:
         """Show a window; one that nobody waits for is not kept when there are many already."""
-        if popup.blocking or len(self.popups) < _MOST_POPUPS:
+        if popup.blocking or len(self.popups) < _MAX_POPUPS:
             self.popups.append(popup)
-        self.announcements.popup(popup)
+        self.messages.popup(popup)
 
     def close_popups(self) -> None:
         """Close all windows; programs that wait for them go on."""

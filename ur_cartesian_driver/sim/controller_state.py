@@ -39,12 +39,12 @@ class PathOffset:
     #: Frame -> offset [m, rad].
     offsets: dict[int, Vector6] = field(default_factory=dict)
     alpha: float = 1.0
-    most_translation: float = 0.1
-    most_rotation: float = 0.52
+    max_translation: float = 0.1
+    max_rotation: float = 0.52
 
 
 @dataclass(slots=True, kw_only=True)
-class Process:
+class ProcessState:
     """What a program has set about its process; all of it ends with the program."""
 
     path_offset: PathOffset = field(default_factory=PathOffset)
@@ -57,6 +57,6 @@ class Process:
     #: Codes and arguments (None: any) of errors that pause the program.
     pause_on: set[tuple[int, int | None]] = field(default_factory=set)
 
-    def pauses_on(self, code: int, argument: int) -> bool:
+    def has_pause_on(self, code: int, argument: int) -> bool:
         """Tell whether an error is to pause the program."""
         return bool(self.pause_on & {(code, argument), (code, None)})

@@ -19,10 +19,10 @@ from ur_cartesian_driver.protocol.framing import LineBuffer
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.controller_state import Popup
 from ur_cartesian_driver.sim.modes import SafetyEvent
-from ur_cartesian_driver.sim.server import Hangup
+from ur_cartesian_driver.sim.server import HangUp
 
 BANNER = 'Connected: Universal Robots Dashboard Server'
-_LONGEST = 4096
+_MAX_LINE_LENGTH = 4096
 
 _RUNTIME_WORDS = {
     RuntimeState.STOPPING: 'STOPPED',
@@ -34,10 +34,10 @@ _RUNTIME_WORDS = {
 }
 _ROLES = ('PROGRAMMER', 'OPERATOR', 'NONE', 'LOCKED', 'RESTRICTED')
 
-Action = Callable[['Desk', str], str]
+CommandHandler = Callable[['DashboardHandlers', str], str]
 
 
-class Desk:
+class DashboardHandlers:
     """What the commands work on: a controller, and what only the pendant knows."""
 
     def __init__(self, controller: Controller) -> None:
@@ -126,7 +126,7 @@ class Desk:
 
     def add_to_log(self, text: str) -> str:
         """Write to the log."""
-        self.controller.announcements.note(text)
+        self.controller.messages.note(text)
         return 'Added log message'
 
     def running(self, _: str) -> str:
@@ -231,11 +231,11 @@ class Desk:
 
 
 @dataclass(frozen=True, slots=True)
-class Command:
+class DashboardCommand:
     """A command with the software versions of CB3 and e-Series from which on it exists."""
 
     words: str
-    action: Action
+    action: CommandHandler
     cb3: tuple[int, int] | None
     e: tuple[int, int] | None
     argument: bool = False
@@ -248,42 +248,52 @@ class Command:
 
 
 COMMANDS = (
-    Command('load installation', Desk.load_installation, (3, 2), (5, 0), argument=True),
-    Command('load', Desk.load, (1, 4), (5, 0), argument=True),
-    Command('play', Desk.play, (1, 4), (5, 0)),
-    Command('pause', Desk.pause, (1, 4), (5, 0)),
-    Command('stop', Desk.stop, (1, 4), (5, 0)),
-    Command('quit', Desk.quit, (1, 4), (5, 0)),
-    Command('shutdown', Desk.shutdown, (1, 4), (5, 0)),
-    Command('power on', Desk.power_on, (3, 0), (5, 0)),
-    Command('power off', Desk.power_off, (3, 0), (5, 0)),
-    Command('brake release', Desk.brake_release, (3, 0), (5, 0)),
-    Command('unlock protective stop', Desk.unlock, (3, 1), (5, 0)),
-    Command('close popup', Desk.close_popup, (1, 6), (5, 0)),
-    Command('close safety popup', Desk.close_safety_popup, (3, 1), (5, 0)),
-    Command('restart safety', Desk.restart_safety, (3, 7), (5, 1)),
-    Command('running', Desk.running, (1, 6), (5, 0)),
-    Command('robotmode', Desk.robot_mode, (1, 6), (5, 0)),
-    Command('safetymode', Desk.safety_mode, (3, 0), (5, 0)),
-    Command('safetystatus', Desk.safety_status, None, (5, 4)),
-    Command('get loaded program', Desk.loaded_program, (1, 6), (5, 0)),
-    Command('programState', Desk.program_state, (1, 8), (5, 0)),
-    Command('isProgramSaved', Desk.is_saved, (1, 8), (5, 0)),
-    Command('popup', Desk.popup, (1, 6), (5, 0), argument=True),
-    Command('addToLog', Desk.add_to_log, (1, 8), (5, 0), argument=True),
-    Command('PolyscopeVersion', Desk.polyscope_version, (1, 8), (5, 0)),
-    Command('version', Desk.version, None, (5, 0)),
-    Command('setUserRole', Desk.set_role, (3, 1), None, argument=True),
-    Command('getUserRole', Desk.get_role, (3, 1), None),
-    Command('set operational mode', Desk.set_operational_mode, None, (5, 0), argument=True),
-    Command('get operational mode', Desk.get_operational_mode, None, (5, 6)),
-    Command('clear operational mode', Desk.clear_operational_mode, None, (5, 0)),
-    Command('is in remote control', Desk.remote, None, (5, 6)),
-    Command('get serial number', Desk.serial_number, (3, 12), (5, 6)),
-    Command('get robot model', Desk.robot_model, (3, 12), (5, 6)),
-    Command('generate flight report', Desk.flight_report, (3, 13), (5, 8), argument=True),
-    Command('generate support file', Desk.support_file, (3, 13), (5, 8), argument=True),
-    Command('saveLog', Desk.save_log, (3, 13), (5, 8)),
+    DashboardCommand(
+        'load installation', DashboardHandlers.load_installation, (3, 2), (5, 0), argument=True
+    ),
+    DashboardCommand('load', DashboardHandlers.load, (1, 4), (5, 0), argument=True),
+    DashboardCommand('play', DashboardHandlers.play, (1, 4), (5, 0)),
+    DashboardCommand('pause', DashboardHandlers.pause, (1, 4), (5, 0)),
+    DashboardCommand('stop', DashboardHandlers.stop, (1, 4), (5, 0)),
+    DashboardCommand('quit', DashboardHandlers.quit, (1, 4), (5, 0)),
+    DashboardCommand('shutdown', DashboardHandlers.shutdown, (1, 4), (5, 0)),
+    DashboardCommand('power on', DashboardHandlers.power_on, (3, 0), (5, 0)),
+    DashboardCommand('power off', DashboardHandlers.power_off, (3, 0), (5, 0)),
+    DashboardCommand('brake release', DashboardHandlers.brake_release, (3, 0), (5, 0)),
+    DashboardCommand('unlock protective stop', DashboardHandlers.unlock, (3, 1), (5, 0)),
+    DashboardCommand('close popup', DashboardHandlers.close_popup, (1, 6), (5, 0)),
+    DashboardCommand('close safety popup', DashboardHandlers.close_safety_popup, (3, 1), (5, 0)),
+    DashboardCommand('restart safety', DashboardHandlers.restart_safety, (3, 7), (5, 1)),
+    DashboardCommand('running', DashboardHandlers.running, (1, 6), (5, 0)),
+    DashboardCommand('robotmode', DashboardHandlers.robot_mode, (1, 6), (5, 0)),
+    DashboardCommand('safetymode', DashboardHandlers.safety_mode, (3, 0), (5, 0)),
+    DashboardCommand('safetystatus', DashboardHandlers.safety_status, None, (5, 4)),
+    DashboardCommand('get loaded program', DashboardHandlers.loaded_program, (1, 6), (5, 0)),
+    DashboardCommand('programState', DashboardHandlers.program_state, (1, 8), (5, 0)),
+    DashboardCommand('isProgramSaved', DashboardHandlers.is_saved, (1, 8), (5, 0)),
+    DashboardCommand('popup', DashboardHandlers.popup, (1, 6), (5, 0), argument=True),
+    DashboardCommand('addToLog', DashboardHandlers.add_to_log, (1, 8), (5, 0), argument=True),
+    DashboardCommand('PolyscopeVersion', DashboardHandlers.polyscope_version, (1, 8), (5, 0)),
+    DashboardCommand('version', DashboardHandlers.version, None, (5, 0)),
+    DashboardCommand('setUserRole', DashboardHandlers.set_role, (3, 1), None, argument=True),
+    DashboardCommand('getUserRole', DashboardHandlers.get_role, (3, 1), None),
+    DashboardCommand(
+        'set operational mode', DashboardHandlers.set_operational_mode, None, (5, 0), argument=True
+    ),
+    DashboardCommand('get operational mode', DashboardHandlers.get_operational_mode, None, (5, 6)),
+    DashboardCommand(
+        'clear operational mode', DashboardHandlers.clear_operational_mode, None, (5, 0)
+    ),
+    DashboardCommand('is in remote control', DashboardHandlers.remote, None, (5, 6)),
+    DashboardCommand('get serial number', DashboardHandlers.serial_number, (3, 12), (5, 6)),
+    DashboardCommand('get robot model', DashboardHandlers.robot_model, (3, 12), (5, 6)),
+    DashboardCommand(
+        'generate flight report', DashboardHandlers.flight_report, (3, 13), (5, 8), argument=True
+    ),
+    DashboardCommand(
+        'generate support file', DashboardHandlers.support_file, (3, 13), (5, 8), argument=True
+    ),
+    DashboardCommand('saveLog', DashboardHandlers.save_log, (3, 13), (5, 8)),
 )
 
 
@@ -292,14 +302,15 @@ class DashboardSession:
 
     def __init__(self, controller: Controller) -> None:
         """Wait for commands."""
-        self._desk = Desk(controller)
-        self._lines = LineBuffer(_LONGEST)
+        self._handlers = DashboardHandlers(controller)
+        self._lines = LineBuffer(_MAX_LINE_LENGTH)
         version = controller.config.version[:2]
         cb3 = version[0] < 5
         self._commands = [
             command
             for command in COMMANDS
-            if (since := command.cb3 if cb3 else command.e) is not None and since <= version
+            if (min_version := command.cb3 if cb3 else command.e) is not None
+            and min_version <= version
         ]
 
     def open(self) -> bytes:
@@ -314,13 +325,13 @@ class DashboardSession:
         answers = ''
         for line in self._lines.feed(data):
             answers += self._answer(line.strip()) + '\n'
-            if self._desk.closing:
-                raise Hangup(answers.encode())
+            if self._handlers.closing:
+                raise HangUp(answers.encode())
         return answers.encode()
 
     def _answer(self, line: str) -> str:
         for command in self._commands:
             argument = command.argument_in(line)
             if argument is not None:
-                return command.action(self._desk, argument)
+                return command.action(self._handlers, argument)
         return f'could not understand: "{line}"'

@@ -19,25 +19,25 @@ from types import MappingProxyType
 from typing import Any, get_args
 
 from ur_cartesian_driver.sim.faults import (
-    Action,
-    After,
-    AXES,
-    Crossing,
-    Delay,
-    Deviation,
-    Drop,
-    Event,
+    AfterDistance,
+    AfterTime,
+    DelayFault,
+    DEVIATION_AXES,
+    DEVIATION_QUANTITIES,
+    DeviationFault,
+    DeviationShape,
+    DropFault,
+    EventFault,
     Fault,
-    ForeignMotion,
-    Garbage,
-    HalfOpen,
-    QUANTITIES,
-    Shape,
-    Silence,
-    Slider,
-    Throttle,
-    Travelled,
-    When,
+    FaultEvent,
+    FaultTrigger,
+    ForeignMotionFault,
+    GarbageFault,
+    HalfOpenFault,
+    PlaneCrossing,
+    SilenceFault,
+    SpeedSliderFault,
+    ThrottleFault,
 )
 
 # A number with its unit written close to it, such as 2s, are two words.
@@ -45,7 +45,7 @@ _WORD = re.compile(r'[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|[A-Za-z_]\w*|=|\S+?(
 _END = 'the end'
 
 
-class _Words:
+class _WordReader:
     """The words of a text, taken one by one."""
 
     def __init__(self, text: str) -> None:
@@ -93,66 +93,69 @@ class _Words:
         return value
 
 
-def _read_nothing_but(action: Action) -> Callable[[_Words], dict[str, Any]]:
+def _event_reader(action: FaultEvent) -> Callable[[_WordReader], dict[str, Any]]:
     return lambda _words: {'action': action}
 
 
-def _read_deviation(shape: Shape) -> Callable[[_Words], dict[str, Any]]:
-    def read(words: _Words) -> dict[str, Any]:
+def _read_deviation(shape: DeviationShape) -> Callable[[_WordReader], dict[str, Any]]:
+    def read(words: _WordReader) -> dict[str, Any]:
         return {
             'shape': shape,
-            'quantity': words.one_of(QUANTITIES),
-            'axis': words.one_of(AXES),
+            'quantity': words.one_of(DEVIATION_QUANTITIES),
+            'axis': words.one_of(DEVIATION_AXES),
             'amount': words.number('an amount'),
         }
 
     return read
 
 
-def _read_interface(words: _Words) -> dict[str, Any]:
+def _read_interface(words: _WordReader) -> dict[str, Any]:
     return {'interface': words.name()}
 
 
-def _read_delay(words: _Words) -> dict[str, Any]:
+def _read_delay(words: _WordReader) -> dict[str, Any]:
     found = {'interface': words.name(), 'seconds': words.number('a time in seconds')}
     words.skip('s')
     return found
 
 
-def _read_throttle(words: _Words) -> dict[str, Any]:
+def _read_throttle(words: _WordReader) -> dict[str, Any]:
     return {'interface': words.name(), 'rate': words.number('a rate in bytes per second')}
 
 
-def _read_garbage(words: _Words) -> dict[str, Any]:
+def _read_garbage(words: _WordReader) -> dict[str, Any]:
     found: dict[str, Any] = {'interface': words.name()}
     if words.peek() not in ('at', _END):
         found['size'] = int(words.number('a number of bytes'))
     return found
 
 
-def _read_slider(words: _Words) -> dict[str, Any]:
+def _read_slider(words: _WordReader) -> dict[str, Any]:
     return {'fraction': words.number('where the slider stands, 0 to 1')}
 
 
-def _read_motion(words: _Words) -> dict[str, Any]:
-    return {'axis': words.one_of(AXES), 'distance': words.number('a distance')}
+def _read_motion(words: _WordReader) -> dict[str, Any]:
+    return {'axis': words.one_of(DEVIATION_AXES), 'distance': words.number('a distance')}
 
 
-_Kind = tuple[Callable[..., Fault], Callable[[_Words], dict[str, Any]], bool]
+_Kind = tuple[Callable[..., Fault], Callable[[_WordReader], dict[str, Any]], bool]
 
 #: What begins a fault: what it makes, how its arguments are read, whether it can last.
 _KINDS: Mapping[str, _Kind] = MappingProxyType(
     {
-        **{action.value: (Event, _read_nothing_but(action), False) for action in Action},
-        'slider': (Slider, _read_slider, False),
-        'foreign_motion': (ForeignMotion, _read_motion, False),
-        **{shape: (Deviation, _read_deviation(shape), True) for shape in get_args(Shape)},
-        'drop': (Drop, _read_interface, True),
-        'half_open': (HalfOpen, _read_interface, False),
-        'silence': (Silence, _read_interface, True),
-        'delay': (Delay, _read_delay, True),
-        'throttle': (Throttle, _read_throttle, True),
-        'garbage': (Garbage, _read_garbage, False),
+        **{action.value: (EventFault, _event_reader(action), False) for action in FaultEvent},
+        'slider': (SpeedSliderFault, _read_slider, False),
+        'foreign_motion': (ForeignMotionFault, _read_motion, False),
+        **{
+            shape: (DeviationFault, _read_deviation(shape), True)
+            for shape in get_args(DeviationShape)
+        },
+        'drop': (DropFault, _read_interface, True),
+        'half_open': (HalfOpenFault, _read_interface, False),
+        'silence': (SilenceFault, _read_interface, True),
+        'delay': (DelayFault, _read_delay, True),
+        'throttle': (ThrottleFault, _read_throttle, True),
+        'garbage': (GarbageFault, _read_garbage, False),
     }
 )
 
@@ -163,31 +166,31 @@ def parse_fault(text: str) -> Fault:
 
     :raises ValueError: a word is not understood; the text names it.
     """
-    words = _Words(text)
+    words = _WordReader(text)
     if words.peek() not in _KINDS:
         raise words.wrong(f'one of {", ".join(_KINDS)}')
-    make, read, lasts = _KINDS[words.take()]
+    make, read, has_duration = _KINDS[words.take()]
     fields = read(words)
     if words.skip('at'):
-        fields['when'] = _read_when(words)
-    if lasts and words.skip('for'):
+        fields['trigger'] = _read_trigger(words)
+    if has_duration and words.skip('for'):
         fields['duration'] = words.number('a time in seconds')
         if not words.skip('s'):
             raise words.wrong("'s'")
     if words.peek() != _END:
-        raise words.wrong("'at', 'for' or the end" if lasts else "'at' or the end")
+        raise words.wrong("'at', 'for' or the end" if has_duration else "'at' or the end")
     return make(**fields)
 
 
-def _read_when(words: _Words) -> When:
+def _read_trigger(words: _WordReader) -> FaultTrigger:
     if words.peek() in ('x', 'y', 'z'):
         axis = words.one_of(('x', 'y', 'z'))
         if not words.skip('='):
             raise words.wrong("'='")
-        plane = Crossing(axis, words.number('a coordinate in metres'))
+        plane = PlaneCrossing(axis, words.number('a coordinate in metres'))
         words.skip('m')
         return plane
     value = words.number('a time such as 2 s, a way such as 0.35 m, or a plane such as z = 0.3 m')
     if value < 0.0:
         raise words.wrong('no negative number', f'{value:g}')
-    return After(value) if words.one_of(('s', 'm')) == 's' else Travelled(value)
+    return AfterTime(value) if words.one_of(('s', 'm')) == 's' else AfterDistance(value)

@@ -3,7 +3,7 @@
 """
 Faults on demand: what goes wrong with the simulated robot, and when.
 
-A fault is a value that says both. :class:`Faults` waits for its moment, counts in the controller's
+A fault is a value that says both. :class:`FaultInjector` awaits it, counts in the controller's
 cycles, and so is as deterministic as these; while no fault is set it costs nothing. How faults are
 written in words is in `fault_text`.
 """
@@ -28,13 +28,13 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-Axis: TypeAlias = Literal['x', 'y', 'z', 'rx', 'ry', 'rz']
-Quantity: TypeAlias = Literal['pose', 'twist', 'acceleration']
-Shape: TypeAlias = Literal['offset', 'ramp', 'noise']
+DeviationAxis: TypeAlias = Literal['x', 'y', 'z', 'rx', 'ry', 'rz']
+DeviationQuantity: TypeAlias = Literal['pose', 'twist', 'acceleration']
+DeviationShape: TypeAlias = Literal['offset', 'ramp', 'noise']
 
-AXES: tuple[Axis, ...] = get_args(Axis)
-QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
-SHAPES: tuple[Shape, ...] = get_args(Shape)
+DEVIATION_AXES: tuple[DeviationAxis, ...] = get_args(DeviationAxis)
+DEVIATION_QUANTITIES: tuple[DeviationQuantity, ...] = get_args(DeviationQuantity)
+DEVIATION_SHAPES: tuple[DeviationShape, ...] = get_args(DeviationShape)
 
 # Cycles are summed in floats.
 _ROUNDING = 1e-9
@@ -44,35 +44,35 @@ _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class After:
+class AfterTime:
     """So long after the fault was set [s] of the controller's time."""
 
     seconds: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class Travelled:
+class AfterDistance:
     """When the tool centre point has moved so far since the fault was set [m]."""
 
     metres: float
 
 
 @dataclass(frozen=True, slots=True)
-class Crossing:
+class PlaneCrossing:
     """When the tool centre point crosses the plane where a coordinate in the base is this [m]."""
 
     axis: Literal['x', 'y', 'z']
     position: float
 
 
-When: TypeAlias = After | Travelled | Crossing
-NOW = After()
+FaultTrigger: TypeAlias = AfterTime | AfterDistance | PlaneCrossing
+IMMEDIATELY = AfterTime()
 
 
 # --- What ------------------------------------------------------------------------------------
 
 
-class Action(Enum):
+class FaultEvent(Enum):
     """What somebody else does to the robot: another client, or a person at it."""
 
     PROTECTIVE_STOP = 'protective_stop'
@@ -90,19 +90,19 @@ class Action(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Event:
+class EventFault:
     """Something happens to safety, power or program, without being asked for by the client."""
 
-    action: Action
-    when: When = NOW
+    action: FaultEvent
+    trigger: FaultTrigger = IMMEDIATELY
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Slider:
+class SpeedSliderFault:
     """Somebody moves the speed slider, 0..1."""
 
     fraction: float
-    when: When = NOW
+    trigger: FaultTrigger = IMMEDIATELY
 
     def __post_init__(self) -> None:
         """Reject what no slider shows."""
@@ -111,31 +111,33 @@ class Slider:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ForeignMotion:
+class ForeignMotionFault:
     """Another client's program takes the place of the running one and moves the arm away."""
 
-    axis: Axis
+    axis: DeviationAxis
     #: In base axes, from where the tool is [m or rad].
     distance: float
-    when: When = NOW
+    trigger: FaultTrigger = IMMEDIATELY
 
     def script(self) -> str:
         """Return that program."""
-        step = ', '.join(f'{self.distance:.9f}' if axis == self.axis else '0' for axis in AXES)
+        step = ', '.join(
+            f'{self.distance:.9f}' if axis == self.axis else '0' for axis in DEVIATION_AXES
+        )
         return f'def foreign_motion():\n  movel(pose_add(get_target_tcp_pose(), p[{step}]))\nend\n'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Deviation:
+class DeviationFault:
     """An actual value is not what the target asks for, on one axis of the base."""
 
-    quantity: Quantity
-    axis: Axis
-    shape: Shape
+    quantity: DeviationQuantity
+    axis: DeviationAxis
+    shape: DeviationShape
     #: [m, rad and their derivatives]: of the offset, of the ramp per second, the standard
     #: deviation of the noise.
     amount: float
-    when: When = NOW
+    trigger: FaultTrigger = IMMEDIATELY
     #: [s]
     duration: float = inf
     seed: int = 0
@@ -148,39 +150,39 @@ class Deviation:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drop:
+class DropFault:
     """All connections of an interface are cut, and none is accepted for the duration."""
 
     interface: str
-    when: When = NOW
+    trigger: FaultTrigger = IMMEDIATELY
     #: [s]
     duration: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HalfOpen:
+class HalfOpenFault:
     """The connections that there are stay open and dead, new ones work: as if a cable was cut."""
 
     interface: str
-    when: When = NOW
+    trigger: FaultTrigger = IMMEDIATELY
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Silence:
+class SilenceFault:
     """The robot hears, but what it has to say on an interface is lost, message by message."""
 
     interface: str
-    when: When = NOW
+    trigger: FaultTrigger = IMMEDIATELY
     duration: float = inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Delay:
+class DelayFault:
     """Everything on an interface takes longer [s], in each direction."""
 
     interface: str
     seconds: float
-    when: When = NOW
+    trigger: FaultTrigger = IMMEDIATELY
     duration: float = inf
 
     def __post_init__(self) -> None:
@@ -190,12 +192,12 @@ class Delay:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Throttle:
+class ThrottleFault:
     """An interface carries no more than a rate [bytes/s], in each direction."""
 
     interface: str
     rate: float
-    when: When = NOW
+    trigger: FaultTrigger = IMMEDIATELY
     duration: float = inf
 
     def __post_init__(self) -> None:
@@ -207,12 +209,12 @@ class Throttle:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Garbage:
+class GarbageFault:
     """The robot says random bytes to all clients of an interface."""
 
     interface: str
     size: int = 64
-    when: When = NOW
+    trigger: FaultTrigger = IMMEDIATELY
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -222,19 +224,19 @@ class Garbage:
 
 
 Fault: TypeAlias = (
-    Event
-    | Slider
-    | ForeignMotion
-    | Deviation
-    | Drop
-    | HalfOpen
-    | Silence
-    | Delay
-    | Throttle
-    | Garbage
+    EventFault
+    | SpeedSliderFault
+    | ForeignMotionFault
+    | DeviationFault
+    | DropFault
+    | HalfOpenFault
+    | SilenceFault
+    | DelayFault
+    | ThrottleFault
+    | GarbageFault
 )
-_Lasting: TypeAlias = Deviation | Drop | Silence | Delay | Throttle
-_OnInterface = Drop | HalfOpen | Silence | Delay | Throttle | Garbage
+_TimedFault: TypeAlias = DeviationFault | DropFault | SilenceFault | DelayFault | ThrottleFault
+_OnInterface = DropFault | HalfOpenFault | SilenceFault | DelayFault | ThrottleFault | GarbageFault
 
 
 # --- Letting it happen -----------------------------------------------------------------------
@@ -254,26 +256,26 @@ def _power_off(controller: Controller) -> str:
     return ''
 
 
-_ACTIONS: Mapping[Action, Callable[[Controller], str]] = MappingProxyType(
+_ACTIONS: Mapping[FaultEvent, Callable[[Controller], str]] = MappingProxyType(
     {
-        Action.PROTECTIVE_STOP: _safety(SafetyEvent.PROTECTIVE_STOP),
-        Action.EMERGENCY_STOP: _safety(SafetyEvent.EMERGENCY_STOP),
-        Action.RELEASE_EMERGENCY_STOP: _safety(SafetyEvent.RELEASE),
-        Action.SAFEGUARD_STOP: _safety(SafetyEvent.SAFEGUARD_STOP),
-        Action.RESET_SAFEGUARD: _safety(SafetyEvent.SAFEGUARD_RESET),
-        Action.VIOLATION: _safety(SafetyEvent.VIOLATION),
-        Action.FAULT: _safety(SafetyEvent.FAULT),
-        Action.UNLOCK: _safety(SafetyEvent.UNLOCK),
-        Action.STOP: _stop,
-        Action.PAUSE: lambda controller: controller.programs.pause(),
-        Action.PLAY: lambda controller: controller.programs.play(),
-        Action.POWER_OFF: _power_off,
+        FaultEvent.PROTECTIVE_STOP: _safety(SafetyEvent.PROTECTIVE_STOP),
+        FaultEvent.EMERGENCY_STOP: _safety(SafetyEvent.EMERGENCY_STOP),
+        FaultEvent.RELEASE_EMERGENCY_STOP: _safety(SafetyEvent.RELEASE),
+        FaultEvent.SAFEGUARD_STOP: _safety(SafetyEvent.SAFEGUARD_STOP),
+        FaultEvent.RESET_SAFEGUARD: _safety(SafetyEvent.SAFEGUARD_RESET),
+        FaultEvent.VIOLATION: _safety(SafetyEvent.VIOLATION),
+        FaultEvent.FAULT: _safety(SafetyEvent.FAULT),
+        FaultEvent.UNLOCK: _safety(SafetyEvent.UNLOCK),
+        FaultEvent.STOP: _stop,
+        FaultEvent.PAUSE: lambda controller: controller.programs.pause(),
+        FaultEvent.PLAY: lambda controller: controller.programs.play(),
+        FaultEvent.POWER_OFF: _power_off,
     }
 )
 
 
 @dataclass(slots=True)
-class _Waiting:
+class _PendingFault:
     """A fault that has not happened, with what its moment is reckoned from."""
 
     fault: Fault
@@ -284,19 +286,19 @@ class _Waiting:
 
 
 @dataclass(slots=True)
-class _Running:
+class _ActiveFault:
     """A fault that lasts."""
 
-    fault: _Lasting
+    fault: _TimedFault
     since: float
     random: Random = field(default_factory=Random)
 
-    def over(self, now: float) -> bool:
+    def is_over(self, now: float) -> bool:
         """Whether its time is up."""
         return now >= self.since + self.fault.duration - _ROUNDING
 
 
-class Faults:
+class FaultInjector:
     """The faults of one robot: those that wait for their moment and those that last."""
 
     def __init__(self, controller: Controller) -> None:
@@ -306,9 +308,9 @@ class Faults:
         self.interfaces: dict[str, Impairable] = {}
         #: Whether there is anything to do in a cycle.
         self.active = False
-        self._waiting: list[_Waiting] = []
-        self._running: list[_Running] = []
-        self._pumping: dict[str, Impairable] = {}
+        self._pending: list[_PendingFault] = []
+        self._active: list[_ActiveFault] = []
+        self._delayed_interfaces: dict[str, Impairable] = {}
         self._impaired: dict[str, Impairment] = {}
         self._travelled = 0.0
 
@@ -323,9 +325,9 @@ class Faults:
             raise ValueError(
                 f'The robot has no interface {fault.interface!r}; faults know {known}.'
             )
-        when = fault.when
-        side = isinstance(when, Crossing) and self._beyond(when)
-        self._waiting.append(_Waiting(fault, self._controller.time, self._travelled, side))
+        trigger = fault.trigger
+        side = isinstance(trigger, PlaneCrossing) and self._is_beyond(trigger)
+        self._pending.append(_PendingFault(fault, self._controller.time, self._travelled, side))
         self.active = True
 
     def clear(self) -> None:
@@ -334,24 +336,24 @@ class Faults:
 
         What has happened stays: a stop, a dropped or half-open connection.
         """
-        self._waiting.clear()
-        self._running.clear()
+        self._pending.clear()
+        self._active.clear()
         self._apply_running(self._controller.time)
 
     def step(self) -> None:
         """Let happen what is due in this cycle."""
         now = self._controller.time
         self._measure_path()
-        due = [waiting for waiting in self._waiting if self._is_due(waiting, now)]
+        due = [pending for pending in self._pending if self._is_due(pending, now)]
         if due:
-            self._waiting = [waiting for waiting in self._waiting if waiting not in due]
-        for waiting in due:
-            self._begin(waiting.fault, now)
+            self._pending = [pending for pending in self._pending if pending not in due]
+        for pending in due:
+            self._start_fault(pending.fault, now)
         self._apply_running(now)
-        for name, interface in tuple(self._pumping.items()):
+        for name, interface in tuple(self._delayed_interfaces.items()):
             if not interface.pump(now):
-                del self._pumping[name]
-        self.active = bool(self._waiting or self._running or self._pumping)
+                del self._delayed_interfaces[name]
+        self.active = bool(self._pending or self._active or self._delayed_interfaces)
 
     # When
 
@@ -360,84 +362,86 @@ class Faults:
         vx, vy, vz, _, _, _ = self._controller.tcp_twist
         self._travelled += hypot(vx, vy, vz) * self._controller.cycle
 
-    def _beyond(self, plane: Crossing) -> bool:
+    def _is_beyond(self, plane: PlaneCrossing) -> bool:
         position = self._controller.motion.T_base_tcp.position
         return position['xyz'.index(plane.axis)] >= plane.position
 
-    def _is_due(self, waiting: _Waiting, now: float) -> bool:
-        when = waiting.fault.when
-        if isinstance(when, After):
-            return now >= waiting.set_at + when.seconds - _ROUNDING
-        if isinstance(when, Travelled):
-            return self._travelled - waiting.travelled >= when.metres - _ROUNDING
-        return self._beyond(when) != waiting.side
+    def _is_due(self, pending: _PendingFault, now: float) -> bool:
+        trigger = pending.fault.trigger
+        if isinstance(trigger, AfterTime):
+            return now >= pending.set_at + trigger.seconds - _ROUNDING
+        if isinstance(trigger, AfterDistance):
+            return self._travelled - pending.travelled >= trigger.metres - _ROUNDING
+        return self._is_beyond(trigger) != pending.side
 
     # What
 
-    def _begin(self, fault: Fault, now: float) -> None:
+    def _start_fault(self, fault: Fault, now: float) -> None:
         controller = self._controller
         if isinstance(fault, _OnInterface):
-            self._begin_on(self.interfaces[fault.interface], fault)
-        if isinstance(fault, _Lasting):
-            seed = fault.seed if isinstance(fault, Deviation) else 0
-            self._running.append(_Running(fault, now, Random(seed)))
-        elif isinstance(fault, Slider):
+            self._start_interface_fault(self.interfaces[fault.interface], fault)
+        if isinstance(fault, _TimedFault):
+            seed = fault.seed if isinstance(fault, DeviationFault) else 0
+            self._active.append(_ActiveFault(fault, now, Random(seed)))
+        elif isinstance(fault, SpeedSliderFault):
             controller.set_slider(fault.fraction)
-        elif isinstance(fault, ForeignMotion):
+        elif isinstance(fault, ForeignMotionFault):
             controller.programs.submit(fault.script())
-        elif isinstance(fault, Event) and (refusal := _ACTIONS[fault.action](controller)):
+        elif isinstance(fault, EventFault) and (refusal := _ACTIONS[fault.action](controller)):
             _log.warning('The fault %s had no effect: %s', fault.action.value, refusal)
 
-    def _begin_on(self, interface: Impairable, fault: Fault) -> None:
-        if isinstance(fault, Drop):
+    def _start_interface_fault(self, interface: Impairable, fault: Fault) -> None:
+        if isinstance(fault, DropFault):
             interface.drop()
-        elif isinstance(fault, HalfOpen):
+        elif isinstance(fault, HalfOpenFault):
             interface.freeze()
-            self._pumping[fault.interface] = interface
-        elif isinstance(fault, Garbage):
+            self._delayed_interfaces[fault.interface] = interface
+        elif isinstance(fault, GarbageFault):
             interface.inject(Random(fault.seed).randbytes(fault.size))
 
     def _apply_running(self, now: float) -> None:
         """Make of all faults that last what is wrong in this cycle."""
-        self._running = [running for running in self._running if not running.over(now)]
-        self._deviate(now)
+        self._active = [running for running in self._active if not running.is_over(now)]
+        self._apply_deviations(now)
         impaired = self._impairments()
         for name in self._impaired.keys() | impaired.keys():
             if self._impaired.get(name) != impaired.get(name):
                 self.interfaces[name].impair(impaired.get(name), now)
-                self._pumping[name] = self.interfaces[name]
+                self._delayed_interfaces[name] = self.interfaces[name]
         self._impaired = impaired
 
-    def _deviate(self, now: float) -> None:
-        sums: dict[Quantity, list[float]] = {}
-        for running in self._running:
+    def _apply_deviations(self, now: float) -> None:
+        sums: dict[DeviationQuantity, list[float]] = {}
+        for running in self._active:
             fault = running.fault
-            if isinstance(fault, Deviation):
+            if isinstance(fault, DeviationFault):
                 values = sums.setdefault(fault.quantity, [0.0] * 6)
-                values[AXES.index(fault.axis)] += fault.value(now - running.since, running.random)
+                values[DEVIATION_AXES.index(fault.axis)] += fault.value(
+                    now - running.since, running.random
+                )
         self._controller.actual.deviate(
-            pose=_six(sums.get('pose')),
-            twist=_six(sums.get('twist')),
-            acceleration=_six(sums.get('acceleration')),
+            pose=_vector6(sums.get('pose')),
+            twist=_vector6(sums.get('twist')),
+            acceleration=_vector6(sums.get('acceleration')),
         )
 
     def _impairments(self) -> dict[str, Impairment]:
         """Return what is wrong with each interface: the sum of its faults."""
         found: dict[str, Impairment] = {}
-        for running in self._running:
+        for running in self._active:
             fault = running.fault
-            if not isinstance(fault, Deviation):
+            if not isinstance(fault, DeviationFault):
                 before = found.get(fault.interface, Impairment())
                 found[fault.interface] = Impairment(
-                    silent=before.silent or isinstance(fault, Silence),
-                    refusing=before.refusing or isinstance(fault, Drop),
-                    delay=before.delay + (fault.seconds if isinstance(fault, Delay) else 0.0),
-                    rate=min(before.rate, fault.rate if isinstance(fault, Throttle) else inf),
+                    drops_outgoing=before.drops_outgoing or isinstance(fault, SilenceFault),
+                    refuses_connections=before.refuses_connections or isinstance(fault, DropFault),
+                    delay=before.delay + (fault.seconds if isinstance(fault, DelayFault) else 0.0),
+                    rate=min(before.rate, fault.rate if isinstance(fault, ThrottleFault) else inf),
                 )
         return found
 
 
-def _six(values: list[float] | None) -> Vector6 | None:
+def _vector6(values: list[float] | None) -> Vector6 | None:
     if values is None:
         return None
     x, y, z, rx, ry, rz = values

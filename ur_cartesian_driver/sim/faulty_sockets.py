@@ -4,14 +4,14 @@
 
 from __future__ import annotations
 
-from ur_cartesian_driver.sim.impairment import Hampered, Impairment
+from ur_cartesian_driver.sim.impairment import ImpairedConnection, Impairment
 from ur_cartesian_driver.sim.script_sockets import ScriptSockets, SocketState
 
 #: Bytes that are held back before the rest is left to the kernel, and so to the peer.
-_MOST_UNHEARD = 65_536
+_MAX_INCOMING = 65_536
 
 
-class FaultySockets:
+class ImpairedSockets:
     """
     Other script sockets, which may be impaired; see :class:`~.script_sockets.ScriptSockets`.
 
@@ -24,17 +24,17 @@ class FaultySockets:
         self._impairment: Impairment | None = None
         self._now = 0.0
         self._names: set[str] = set()
-        self._hampered: dict[str, Hampered] = {}
+        self._impaired: dict[str, ImpairedConnection] = {}
         self._arrived: dict[str, bytearray] = {}
 
     def open(self, name: str, address: str, port: int) -> None:
         """Begin to connect, unless a fault keeps the program from it."""
         self.close(name)
-        if self._impairment is not None and self._impairment.refusing:
+        if self._impairment is not None and self._impairment.refuses_connections:
             return
         self._names.add(name)
         if self._impairment is not None:
-            self._hamper(name)
+            self._impair_socket(name)
         self._sockets.open(name, address, port)
 
     def state(self, name: str) -> SocketState:
@@ -43,30 +43,30 @@ class FaultySockets:
 
     def received(self, name: str) -> bytearray:
         """Return what has arrived; what was delayed comes before what was not."""
-        if name in self._hampered:
+        if name in self._impaired:
             return self._arrived[name]
         return self._sockets.received(name)
 
     def send(self, name: str, data: bytes) -> bool:
         """Send; what a fault swallows counts as sent."""
-        if name not in self._hampered:
+        if name not in self._impaired:
             return self._sockets.send(name, data)
         if self._sockets.state(name) is not SocketState.OPEN:
             return False
-        self._hampered[name].say(data, self._now)
+        self._impaired[name].queue_outgoing(data, self._now)
         return True
 
     def close(self, name: str) -> None:
         """Close one."""
         self._names.discard(name)
-        self._hampered.pop(name, None)
+        self._impaired.pop(name, None)
         self._arrived.pop(name, None)
         self._sockets.close(name)
 
     def close_all(self) -> None:
         """Close all."""
         self._names.clear()
-        self._hampered.clear()
+        self._impaired.clear()
         self._arrived.clear()
         self._sockets.close_all()
 
@@ -80,14 +80,14 @@ class FaultySockets:
         """Let this be wrong with all sockets."""
         self._impairment, self._now = impairment, now
         for name in self._names:
-            self._hamper(name)
+            self._impair_socket(name)
 
     def pump(self, now: float) -> bool:
         """Let go what is due; tell whether this has to be called again in the next cycle."""
         self._now = now
-        for name, hampered in tuple(self._hampered.items()):
-            self._pump(name, hampered)
-        return self._impairment is not None or bool(self._hampered)
+        for name, impaired in tuple(self._impaired.items()):
+            self._pump(name, impaired)
+        return self._impairment is not None or bool(self._impaired)
 
     def drop(self) -> None:
         """Cut all sockets; the program finds them closed."""
@@ -96,26 +96,26 @@ class FaultySockets:
     def freeze(self) -> None:
         """Neither hear nor say anything on the sockets that there are."""
         for name in self._names:
-            self._hamper(name).frozen = True
+            self._impair_socket(name).frozen = True
 
     def inject(self, data: bytes) -> None:
         """Say something that no program has said."""
         for name in self._names:
             self.send(name, data)
 
-    def _hamper(self, name: str) -> Hampered:
-        hampered = self._hampered.setdefault(name, Hampered(self._impairment, self._now))
-        hampered.impairment = self._impairment
+    def _impair_socket(self, name: str) -> ImpairedConnection:
+        impaired = self._impaired.setdefault(name, ImpairedConnection(self._impairment, self._now))
+        impaired.impairment = self._impairment
         self._arrived.setdefault(name, bytearray())
-        return hampered
+        return impaired
 
-    def _pump(self, name: str, hampered: Hampered) -> None:
+    def _pump(self, name: str, impaired: ImpairedConnection) -> None:
         arrived = self._arrived[name]
-        if hampered.unheard < _MOST_UNHEARD and (incoming := self._sockets.received(name)):
-            hampered.hear(bytes(incoming), self._now)
+        if impaired.incoming_size < _MAX_INCOMING and (incoming := self._sockets.received(name)):
+            impaired.queue_incoming(bytes(incoming), self._now)
             incoming.clear()
-        arrived += hampered.heard(self._now)
-        if data := hampered.said(self._now):
+        arrived += impaired.due_incoming(self._now)
+        if data := impaired.due_outgoing(self._now):
             self._sockets.send(name, data)
-        if hampered.over and not arrived:
-            del self._hampered[name], self._arrived[name]
+        if impaired.is_over and not arrived:
+            del self._impaired[name], self._arrived[name]

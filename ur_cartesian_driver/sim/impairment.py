@@ -21,9 +21,9 @@ class Impairment:
     """What is wrong with all connections of an interface."""
 
     #: What the robot says is lost.
-    silent: bool = False
+    drops_outgoing: bool = False
     #: Who calls is hung up on.
-    refusing: bool = False
+    refuses_connections: bool = False
     #: In each direction [s].
     delay: float = 0.0
     #: In each direction [bytes/s].
@@ -49,7 +49,7 @@ class Impairable(Protocol):
         """Say something on all connections."""
 
 
-class Line:
+class DelayLine:
     """Bytes on their way in one direction."""
 
     def __init__(self, now: float) -> None:
@@ -87,27 +87,27 @@ class Line:
         return bytes(arrived)
 
 
-class Hampered:
+class ImpairedConnection:
     """One connection that something is wrong with, or that still holds what came before."""
 
     def __init__(self, impairment: Impairment | None, now: float) -> None:
         """Begin with nothing on its way."""
         self.impairment = impairment
         self.frozen = False
-        self._incoming, self._outgoing = Line(now), Line(now)
+        self._incoming, self._outgoing = DelayLine(now), DelayLine(now)
 
     @property
-    def unsent(self) -> int:
+    def outgoing_size(self) -> int:
         """Bytes that have been said and have not left."""
         return self._outgoing.size
 
     @property
-    def unheard(self) -> int:
+    def incoming_size(self) -> int:
         """Bytes that have come and have not reached the robot."""
         return self._incoming.size
 
     @property
-    def over(self) -> bool:
+    def is_over(self) -> bool:
         """Whether nothing is wrong any more and nothing held back."""
         return (
             self.impairment is None
@@ -116,29 +116,29 @@ class Hampered:
             and not self._outgoing.size
         )
 
-    def say(self, data: bytes, now: float) -> None:
+    def queue_outgoing(self, data: bytes, now: float) -> None:
         """Take what the robot says."""
-        silent = self.impairment is not None and self.impairment.silent
-        if not self.frozen and not silent:
+        drops_outgoing = self.impairment is not None and self.impairment.drops_outgoing
+        if not self.frozen and not drops_outgoing:
             self._outgoing.put(data, now + self._delay)
 
-    def hear(self, data: bytes, now: float) -> None:
+    def queue_incoming(self, data: bytes, now: float) -> None:
         """Take what the client says."""
         if not self.frozen:
             self._incoming.put(data, now + self._delay)
 
-    def heard(self, now: float) -> bytes:
+    def due_incoming(self, now: float) -> bytes:
         """Return what reaches the robot now."""
-        return self._incoming.take(*self._terms(now))
+        return self._incoming.take(*self._release_terms(now))
 
-    def said(self, now: float) -> bytes:
+    def due_outgoing(self, now: float) -> bytes:
         """Return what leaves the robot now."""
-        return self._outgoing.take(*self._terms(now))
+        return self._outgoing.take(*self._release_terms(now))
 
     @property
     def _delay(self) -> float:
         return 0.0 if self.impairment is None else self.impairment.delay
 
-    def _terms(self, now: float) -> tuple[float, float]:
+    def _release_terms(self, now: float) -> tuple[float, float]:
         """Return until when pieces are due, and how fast they may come; at once when cured."""
         return (inf, inf) if self.impairment is None else (now, self.impairment.rate)

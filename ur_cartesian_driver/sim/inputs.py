@@ -12,7 +12,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, TYPE_CHECKING
 
-from ur_cartesian_driver.sim.signals import BITS, FLOATS, INTEGERS, Registers
+from ur_cartesian_driver.sim.state.controller_io import (
+    REGISTER_BITS,
+    REGISTER_FLOATS,
+    REGISTER_INTEGERS,
+    Registers,
+)
 
 if TYPE_CHECKING:
     from ur_cartesian_driver.sim.controller import Controller
@@ -31,14 +36,14 @@ def apply_inputs(controller: Controller, values: Mapping[str, Any]) -> None:
     for side, name in _DIGITAL:
         mask = values.get(f'{name}_mask', 0)
         if mask and name in values:
-            _set_masked(getattr(controller.signals.digital_out, side), mask, values[name])
+            _set_masked(getattr(controller.io.digital_out, side), mask, values[name])
     if values.get('standard_analog_output_mask', 0):
         _set_analog(controller, values)
     if 'external_force_torque' in values:
-        controller.signals.external_force = values['external_force_torque']
+        controller.io.external_force = values['external_force_torque']
     for name, value in values.items():
         if write := _WRITE.get(name):
-            write(controller.signals.inputs, value)
+            write(controller.io.inputs, value)
     controller.watchdogs.written(tuple(values), controller.time)
 
 
@@ -49,14 +54,14 @@ def _set_masked(bits: list[bool], mask: int, value: int) -> None:
 
 
 def _set_analog(controller: Controller, values: Mapping[str, Any]) -> None:
-    mask, signals = values['standard_analog_output_mask'], controller.signals
+    mask, io = values['standard_analog_output_mask'], controller.io
     types = values.get('standard_analog_output_type')
     for i in (0, 1):
         if mask >> i & 1:
             if types is not None:
-                signals.analog_out_voltage[i] = bool(types >> i & 1)
+                io.analog_out_voltage[i] = bool(types >> i & 1)
             if f'standard_analog_output_{i}' in values:
-                signals.set_analog_out(i, values[f'standard_analog_output_{i}'])
+                io.set_analog_out(i, values[f'standard_analog_output_{i}'])
 
 
 Write = Callable[[Registers, Any], None]
@@ -81,13 +86,17 @@ def _writers() -> dict[str, Write]:
     return {
         'input_bit_registers0_to_31': _write_packed(0),
         'input_bit_registers32_to_63': _write_packed(32),
-        **{f'input_bit_register_{i}': _write_item(lambda r: r.bits, i) for i in range(64, BITS)},
         **{
-            f'input_int_register_{i}': _write_item(lambda r: r.integers, i)
-            for i in range(INTEGERS)
+            f'input_bit_register_{i}': _write_item(lambda r: r.bits, i)
+            for i in range(64, REGISTER_BITS)
         },
         **{
-            f'input_double_register_{i}': _write_item(lambda r: r.floats, i) for i in range(FLOATS)
+            f'input_int_register_{i}': _write_item(lambda r: r.integers, i)
+            for i in range(REGISTER_INTEGERS)
+        },
+        **{
+            f'input_double_register_{i}': _write_item(lambda r: r.floats, i)
+            for i in range(REGISTER_FLOATS)
         },
     }
 

@@ -18,23 +18,28 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Generator, Mapping
 
-from ur_cartesian_driver.sim.builtins.motion import Ownership
-from ur_cartesian_driver.sim.programs import Programs
-from ur_cartesian_driver.urscript import CompileError, Line, Machine, RuntimeException
+from ur_cartesian_driver.sim.builtins.motion import MotionOwnership
+from ur_cartesian_driver.sim.programs import ProgramRunner
+from ur_cartesian_driver.urscript import (
+    CompiledLine,
+    CompileError,
+    RuntimeException,
+    ScriptInterpreter,
+)
 
 #: Statements that wait to be compiled or executed; a robot takes about as many.
-MOST_WAITING = 500
+MAX_QUEUED_STATEMENTS = 500
 #: What statements must not be compiled behind before it has been executed.
 _CLOSING = frozenset({'clear_interpreter', 'end_interpreter'})
 
-Answer = Callable[[str], None]
-Steps = Generator[None, None, None]
+AnswerCallback = Callable[[str], None]
+ModeSteps = Generator[None, None, None]
 
 
-class Interpreter:
+class InterpreterMode:
     """The statements of all clients, and how far they have got."""
 
-    def __init__(self, programs: Programs, ownership: Ownership) -> None:
+    def __init__(self, programs: ProgramRunner, ownership: MotionOwnership) -> None:
         """
         Begin with no statements.
 
@@ -51,21 +56,21 @@ class Interpreter:
             'statelastcleared': lambda: f'state: {self._cleared}',
             'stateunexecuted': lambda: f'state: {len(self._queue)}',
         }
-        self._queue: deque[tuple[int, Line]] = deque()
-        self._waiting: deque[tuple[str, Answer]] = deque()
+        self._queue: deque[tuple[int, CompiledLine]] = deque()
+        self._uncompiled: deque[tuple[str, AnswerCallback]] = deque()
         self.end_of_program()
 
     def end_of_program(self) -> None:
         """Forget everything and count from 1 again."""
-        self._machine: Machine | None = None
+        self._interpreter: ScriptInterpreter | None = None
         self._interpreted = self._executed = self._cleared = 0
         self._closing = self._clear_wanted = self._end_wanted = False
         self._queue.clear()
-        self._discard_waiting('the program has ended')
+        self._discard_queued('the program has ended')
 
     # What clients send
 
-    def receive(self, statement: str, answer: Answer) -> None:
+    def receive(self, statement: str, answer: AnswerCallback) -> None:
         """
         Take one line.
 
@@ -76,11 +81,13 @@ class Interpreter:
             answer(f'{command()}: {statement.strip()}')
         elif not self._programs.running:
             answer(f'discard: no program is running: {statement}')
-        elif len(self._queue) + len(self._waiting) >= MOST_WAITING:
-            answer(f'discard: more than {MOST_WAITING} statements are waiting: {statement}')
+        elif len(self._queue) + len(self._uncompiled) >= MAX_QUEUED_STATEMENTS:
+            answer(
+                f'discard: more than {MAX_QUEUED_STATEMENTS} statements are waiting: {statement}'
+            )
         elif statement.strip():
-            self._waiting.append((statement, answer))
-            self._compile_waiting()
+            self._uncompiled.append((statement, answer))
+            self._compile_queued()
 
     def _abort(self) -> str:
         self._ownership.abort()
@@ -89,15 +96,15 @@ class Interpreter:
     def _skip(self) -> str:
         self._queue.clear()
         self._closing = False  # what would have cleared or ended the mode may be gone
-        self._compile_waiting()
+        self._compile_queued()
         return f'ack: {self._interpreted}'
 
-    def _compile_waiting(self) -> None:
+    def _compile_queued(self) -> None:
         """Compile and answer what waits, up to a statement that clears or ends the mode."""
-        while self._machine is not None and self._waiting and not self._closing:
-            statement, answer = self._waiting.popleft()
+        while self._interpreter is not None and self._uncompiled and not self._closing:
+            statement, answer = self._uncompiled.popleft()
             try:
-                line = self._machine.lines.compile(statement)
+                line = self._interpreter.lines.compile(statement)
             except CompileError as error:
                 answer(f'discard: {error.text.rstrip(":")}: {statement}')
                 continue
@@ -106,14 +113,14 @@ class Interpreter:
             self._closing = bool(line.calls & _CLOSING)
             answer(f'ack: {self._interpreted}: {statement}')
 
-    def _discard_waiting(self, reason: str) -> None:
-        while self._waiting:
-            statement, answer = self._waiting.popleft()
+    def _discard_queued(self, reason: str) -> None:
+        while self._uncompiled:
+            statement, answer = self._uncompiled.popleft()
             answer(f'discard: {reason}: {statement}')
 
     # What programs call
 
-    def run(self, clear_queue: bool, clear_on_end: bool) -> Steps:
+    def run(self, clear_queue: bool, clear_on_end: bool) -> ModeSteps:
         """
         Execute statements until one, or another thread, ends the mode.
 
@@ -121,15 +128,15 @@ class Interpreter:
         :param clear_on_end: forget what the statements have made when the mode ends.
         :raises RuntimeException: not in the main thread, or inside a statement.
         """
-        machine = self._programs.machine
-        if machine is None or machine.current_thread != 0 or self._machine is not None:
+        interpreter = self._programs.interpreter
+        if interpreter is None or interpreter.current_thread != 0 or self._interpreter is not None:
             raise RuntimeException('interpreter_mode is only possible in the main thread, once.')
         if clear_queue:
-            self._discard_waiting('the queue was cleared')
-        self._machine = machine
+            self._discard_queued('the queue was cleared')
+        self._interpreter = interpreter
         self._end_wanted = self._clear_wanted = self._closing = False
-        first_thread = machine.threads_started
-        self._compile_waiting()
+        first_thread = interpreter.threads_started
+        self._compile_queued()
         while not self._end_wanted:
             if self._queue:
                 self._executed, line = self._queue.popleft()
@@ -137,11 +144,11 @@ class Interpreter:
             else:
                 yield
             if self._clear_wanted:
-                self._forget(machine, first_thread)
+                self._forget(interpreter, first_thread)
         self._queue.clear()
         if clear_on_end:
-            self._forget(machine, first_thread)
-        self._machine = None
+            self._forget(interpreter, first_thread)
+        self._interpreter = None
 
     def end(self) -> None:
         """Let the mode end after the statement that is being executed."""
@@ -151,12 +158,12 @@ class Interpreter:
         """Let everything be forgotten after the statement that is being executed."""
         self._clear_wanted = True
 
-    def _forget(self, machine: Machine, first_thread: int) -> None:
+    def _forget(self, interpreter: ScriptInterpreter, first_thread: int) -> None:
         """Forget what statements have made, the threads that they have started included."""
-        machine.kill_since(first_thread)
-        machine.lines.forget()
+        interpreter.kill_since(first_thread)
+        interpreter.lines.forget()
         self._queue.clear()
         self._cleared = self._interpreted
         self._closing = self._clear_wanted = False
         if not self._end_wanted:
-            self._compile_waiting()
+            self._compile_queued()

@@ -8,7 +8,7 @@ from ur_cartesian_driver.protocol.framing import LineBuffer
 from ur_cartesian_driver.sim.controller import Controller
 
 #: A whole function may stand on one line [bytes].
-_LONGEST = 1024 * 1024
+_MAX_LINE_LENGTH = 1024 * 1024
 
 
 class InterpreterSession:
@@ -16,8 +16,8 @@ class InterpreterSession:
 
     def __init__(self, controller: Controller) -> None:
         """Wait for statements."""
-        self._interpreter = controller.interpreter
-        self._lines = LineBuffer(_LONGEST)
+        self._interpreter_mode = controller.interpreter_mode
+        self._lines = LineBuffer(_MAX_LINE_LENGTH)
         self._answers: list[str] = []
 
     def open(self) -> bytes:
@@ -30,7 +30,7 @@ class InterpreterSession:
     def feed(self, data: bytes) -> bytes:
         """Hand over each line, return what can be answered at once."""
         for line in self._lines.feed(data):
-            self._interpreter.receive(line, self._answers.append)
+            self._interpreter_mode.receive(line, self._answers.append)
         return self.answers()
 
     def answers(self) -> bytes:

@@ -34,25 +34,31 @@ class SafetyEvent(Enum):
     RESTART = 'restart safety'
 
 
-_STOPS = {
+_STOP_TRANSITIONS = {
     SafetyEvent.PROTECTIVE_STOP: SafetyMode.PROTECTIVE_STOP,
     SafetyEvent.SAFEGUARD_STOP: SafetyMode.SAFEGUARD_STOP,
     SafetyEvent.EMERGENCY_STOP: SafetyMode.ROBOT_EMERGENCY_STOP,
     SafetyEvent.VIOLATION: SafetyMode.VIOLATION,
     SafetyEvent.FAULT: SafetyMode.FAULT,
 }
-_CUTS = {
-    event: _STOPS[event]
+_POWER_CUT_TRANSITIONS = {
+    event: _STOP_TRANSITIONS[event]
     for event in (SafetyEvent.EMERGENCY_STOP, SafetyEvent.VIOLATION, SafetyEvent.FAULT)
 }
 
 #: What is not in the table is refused.
-SAFETY: Mapping[SafetyMode, Mapping[SafetyEvent, SafetyMode]] = MappingProxyType(
+SAFETY_TRANSITIONS: Mapping[SafetyMode, Mapping[SafetyEvent, SafetyMode]] = MappingProxyType(
     {
-        SafetyMode.NORMAL: _STOPS,
-        SafetyMode.REDUCED: _STOPS,
-        SafetyMode.PROTECTIVE_STOP: {**_CUTS, SafetyEvent.UNLOCK: SafetyMode.NORMAL},
-        SafetyMode.SAFEGUARD_STOP: {**_CUTS, SafetyEvent.SAFEGUARD_RESET: SafetyMode.NORMAL},
+        SafetyMode.NORMAL: _STOP_TRANSITIONS,
+        SafetyMode.REDUCED: _STOP_TRANSITIONS,
+        SafetyMode.PROTECTIVE_STOP: {
+            **_POWER_CUT_TRANSITIONS,
+            SafetyEvent.UNLOCK: SafetyMode.NORMAL,
+        },
+        SafetyMode.SAFEGUARD_STOP: {
+            **_POWER_CUT_TRANSITIONS,
+            SafetyEvent.SAFEGUARD_RESET: SafetyMode.NORMAL,
+        },
         SafetyMode.ROBOT_EMERGENCY_STOP: {SafetyEvent.RELEASE: SafetyMode.NORMAL},
         SafetyMode.VIOLATION: {SafetyEvent.RESTART: SafetyMode.NORMAL},
         SafetyMode.FAULT: {SafetyEvent.RESTART: SafetyMode.NORMAL},
@@ -89,10 +95,10 @@ POWERLESS = frozenset(
     }
 )
 
-_CHAIN = (RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.RUNNING)
+_POWER_SEQUENCE = (RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE, RobotMode.RUNNING)
 
 
-class Safety:
+class SafetySystem:
     """The safety system's mode and when it was entered."""
 
     def __init__(self, unlock_delay: float) -> None:
@@ -111,7 +117,7 @@ class Safety:
 
         :param now: the controller's clock [s].
         """
-        target = SAFETY.get(self.mode, {}).get(event)
+        target = SAFETY_TRANSITIONS.get(self.mode, {}).get(event)
         if target is None:
             return f'{event.value} is not possible in safety mode {self.mode.name}'
         wait = self._unlock_delay - (now - self._since)
@@ -124,7 +130,7 @@ class Safety:
         return ''
 
 
-class Power:
+class ArmPower:
     """The arm's power: where it is, and where it was told to go."""
 
     def __init__(self, mode: RobotMode, power_on_time: float, brake_release_time: float) -> None:
@@ -158,4 +164,4 @@ class Power:
     def step(self, now: float) -> None:
         """Climb one link of the chain when its time is over."""
         if self.mode < self._goal and now - self._since >= self._times[self.mode]:
-            self.mode, self._since = _CHAIN[_CHAIN.index(self.mode) + 1], now
+            self.mode, self._since = _POWER_SEQUENCE[_POWER_SEQUENCE.index(self.mode) + 1], now

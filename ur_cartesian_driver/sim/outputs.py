@@ -19,7 +19,13 @@ from typing import Any, TYPE_CHECKING
 from ur_cartesian_driver.motion.pose import IDENTITY, Vector3, Vector6
 from ur_cartesian_driver.motion.state import RobotMode
 from ur_cartesian_driver.sim.accelerations import dot, flange_point, moments_for, point_motion
-from ur_cartesian_driver.sim.signals import BITS, FLOATS, INTEGERS, pack_bits, Registers
+from ur_cartesian_driver.sim.state.controller_io import (
+    pack_bits,
+    REGISTER_BITS,
+    REGISTER_FLOATS,
+    REGISTER_INTEGERS,
+    Registers,
+)
 
 if TYPE_CHECKING:
     from ur_cartesian_driver.sim.controller import Controller
@@ -64,11 +70,15 @@ def _accelerometer(controller: Controller) -> Vector3:
     frames = controller.arm.frames(motion.q)
     acceleration = point_motion(frames, motion.qd, motion.qdd, frames.position).acceleration
     ex, ey, ez, _, _, _ = controller.actual.acceleration_error
-    felt = _sum(_sum(acceleration, (ex, ey, ez)), controller.gravity)
-    return dot(felt, frames.x), dot(felt, frames.y), dot(felt, frames.z)
+    specific_force = _sum(_sum(acceleration, (ex, ey, ez)), controller.gravity)
+    return (
+        dot(specific_force, frames.x),
+        dot(specific_force, frames.y),
+        dot(specific_force, frames.z),
+    )
 
 
-def _moments(controller: Controller) -> Vector6:
+def _payload_moments(controller: Controller) -> Vector6:
     """Return the joint moments that carry and accelerate the payload, a point mass [Nm]."""
     mass, motion = controller.payload.mass, controller.motion
     if mass == 0.0 or controller.power.mode is not RobotMode.RUNNING:
@@ -137,7 +147,7 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType(
             else c.motion.T_flange_tcp.rotation_vector()
         ),
         'speed_scaling': lambda c: c.motion.scaling,
-        'target_speed_fraction': lambda c: c.slider,
+        'target_speed_fraction': lambda c: c.speed_slider,
         'robot_mode': lambda c: c.power.mode,
         'safety_mode': lambda c: c.safety.mode,
         'safety_status': lambda c: c.safety.mode,
@@ -149,8 +159,8 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType(
         'actual_joint_voltage': lambda c: (_VOLTAGE if _powered(c) else 0.0,) * 6,
         'actual_robot_voltage': lambda c: _VOLTAGE if _powered(c) else 0.0,
         'actual_robot_current': lambda c: _CURRENT if _powered(c) else 0.0,
-        'target_moment': _moments,
-        'actual_current_as_torque': _moments,
+        'target_moment': _payload_moments,
+        'actual_current_as_torque': _payload_moments,
         'target_TCP_acceleration': _tcp_acceleration,
         'actual_TCP_acceleration': _actual_acceleration,
         'actual_tool_accelerometer': _accelerometer,
@@ -160,27 +170,25 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType(
         'payload_cog': lambda c: c.payload.cog,
         'payload_inertia': lambda c: c.payload.inertia,
         'target_gravity': lambda c: c.gravity,
-        'actual_TCP_force': lambda c: c.signals.external_force if c.external_ft else _NO_FORCE,
-        'ft_raw_wrench': lambda c: c.signals.external_force if c.external_ft else _NO_FORCE,
-        'tcp_force_scalar': lambda c: (
-            hypot(*c.signals.external_force[:3]) if c.external_ft else 0.0
-        ),
-        'actual_digital_input_bits': lambda c: c.signals.digital_in.packed(),
-        'actual_digital_output_bits': lambda c: c.signals.digital_out.packed(),
+        'actual_TCP_force': lambda c: c.io.external_force if c.external_ft else _NO_FORCE,
+        'ft_raw_wrench': lambda c: c.io.external_force if c.external_ft else _NO_FORCE,
+        'tcp_force_scalar': lambda c: hypot(*c.io.external_force[:3]) if c.external_ft else 0.0,
+        'actual_digital_input_bits': lambda c: c.io.digital_in.packed(),
+        'actual_digital_output_bits': lambda c: c.io.digital_out.packed(),
         'actual_configurable_digital_input_bits': lambda c: pack_bits(
-            c.signals.digital_in.configurable
+            c.io.digital_in.configurable
         ),
         'actual_configurable_digital_output_bits': lambda c: pack_bits(
-            c.signals.digital_out.configurable
+            c.io.digital_out.configurable
         ),
-        'analog_io_types': lambda c: c.signals.analog_types(),
-        'standard_analog_input0': lambda c: c.signals.analog_in[0],
-        'standard_analog_input1': lambda c: c.signals.analog_in[1],
-        'standard_analog_output0': lambda c: c.signals.analog_out[0],
-        'standard_analog_output1': lambda c: c.signals.analog_out[1],
-        'tool_analog_input0': lambda c: c.signals.tool_analog_in[0],
-        'tool_analog_input1': lambda c: c.signals.tool_analog_in[1],
-        'tool_output_voltage': lambda c: c.signals.tool_voltage,
+        'analog_io_types': lambda c: c.io.analog_types(),
+        'standard_analog_input0': lambda c: c.io.analog_in[0],
+        'standard_analog_input1': lambda c: c.io.analog_in[1],
+        'standard_analog_output0': lambda c: c.io.analog_out[0],
+        'standard_analog_output1': lambda c: c.io.analog_out[1],
+        'tool_analog_input0': lambda c: c.io.tool_analog_in[0],
+        'tool_analog_input1': lambda c: c.io.tool_analog_in[1],
+        'tool_output_voltage': lambda c: c.io.tool_voltage,
         'elbow_position': _elbow,
     }
 )
@@ -204,26 +212,30 @@ def _register_getters(prefix: str, of: Callable[[Controller], Registers]) -> dic
     return {
         f'{prefix}_bit_registers0_to_31': lambda c: pack_bits(of(c).bits[:32]),
         f'{prefix}_bit_registers32_to_63': lambda c: pack_bits(of(c).bits[32:64]),
-        **{f'{prefix}_bit_register_{i}': item(lambda c: of(c).bits, i) for i in range(64, BITS)},
         **{
-            f'{prefix}_int_register_{i}': item(lambda c: of(c).integers, i)
-            for i in range(INTEGERS)
+            f'{prefix}_bit_register_{i}': item(lambda c: of(c).bits, i)
+            for i in range(64, REGISTER_BITS)
         },
         **{
-            f'{prefix}_double_register_{i}': item(lambda c: of(c).floats, i) for i in range(FLOATS)
+            f'{prefix}_int_register_{i}': item(lambda c: of(c).integers, i)
+            for i in range(REGISTER_INTEGERS)
+        },
+        **{
+            f'{prefix}_double_register_{i}': item(lambda c: of(c).floats, i)
+            for i in range(REGISTER_FLOATS)
         },
     }
 
 
 REGISTERS: Mapping[str, Getter] = MappingProxyType(
     {
-        **_register_getters('input', lambda c: c.signals.inputs),
-        **_register_getters('output', lambda c: c.signals.outputs),
+        **_register_getters('input', lambda c: c.io.inputs),
+        **_register_getters('output', lambda c: c.io.outputs),
     }
 )
 
 
-def getter(name: str, zero: Any) -> Getter:
+def output_getter(name: str, zero: Any) -> Getter:
     """
     Return what computes an output.
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.primary_states import version_frame
-from ur_cartesian_driver.sim.script_commands import execute
-from ur_cartesian_driver.sim.server import Hangup
-from ur_cartesian_driver.sim.uploads import TooLong, Uploads
+from ur_cartesian_driver.sim.script_commands import execute_command
+from ur_cartesian_driver.sim.server import HangUp
+from ur_cartesian_driver.sim.uploads import UploadDecoder, UploadTooLong
 
 
 class ScriptSession:
@@ -22,7 +22,7 @@ class ScriptSession:
     def __init__(self, controller: Controller) -> None:
         """Wait for programs."""
         self._controller = controller
-        self._uploads = Uploads()
+        self._uploads = UploadDecoder()
 
     def open(self) -> bytes:
         """Say nothing: the first state comes in this cycle."""
@@ -35,9 +35,9 @@ class ScriptSession:
         """Do what is complete; what there is to say goes to all clients."""
         try:
             for item in self._uploads.feed(data):
-                execute(self._controller, item)
-        except TooLong:
-            raise Hangup from None
+                execute_command(self._controller, item)
+        except UploadTooLong:
+            raise HangUp from None
         return b''
 
 

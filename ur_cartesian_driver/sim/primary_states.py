@@ -20,7 +20,7 @@ from ur_cartesian_driver.protocol.primary import (
     MasterboardData,
     RobotModeData,
     SAFETY_DATA,
-    StatePackage,
+    SubPackage,
     ToolCommunication,
     ToolData,
     ToolModeInfo,
@@ -34,7 +34,7 @@ STATE_RATE = 10.0
 _JOINT_ACCELERATION = 40.0
 _EMERGENCY = frozenset({SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP})
 #: What stands for an endless joint on the wire, which has no infinity [rad].
-_ENDLESS = 1e6
+_UNLIMITED = 1e6
 
 
 def version_frame(controller: Controller) -> bytes:
@@ -59,23 +59,23 @@ class PrimaryStream:
         """Compute once what never changes."""
         self._controller = controller
         self._constant = (_kinematics(controller), _configuration(controller))
-        self._every = max(1, round(1.0 / (STATE_RATE * controller.cycle)))
+        self._cycles_per_state = max(1, round(1.0 / (STATE_RATE * controller.cycle)))
 
     def messages(self) -> Iterator[bytes]:
         """Yield what has been announced since the last cycle."""
-        for message in self._controller.announcements.take():
+        for message in self._controller.messages.take():
             yield encode_message(message)
 
     @property
     def is_due(self) -> bool:
         """Whether this is one of the cycles in which the state is sent."""
-        return self._controller.cycles % self._every == 0
+        return self._controller.cycles % self._cycles_per_state == 0
 
     def state(self) -> bytes:
         """Return a state frame, its sub-packages in the order of a recorded UR5e."""
         controller = self._controller
         kinematics, configuration = self._constant
-        packages: tuple[StatePackage, ...] = (
+        packages: tuple[SubPackage, ...] = (
             _mode(controller),
             _joints(controller),
             _cartesian(controller),
@@ -104,7 +104,7 @@ def _mode(controller: Controller) -> RobotModeData:
         program_running=controller.programs.running and not paused,
         program_paused=paused,
         robot_mode=controller.power.mode,
-        target_speed_fraction=controller.slider,
+        target_speed_fraction=controller.speed_slider,
         speed_scaling=controller.motion.scaling,
     )
 
@@ -131,26 +131,26 @@ def _cartesian(controller: Controller) -> CartesianInfo:
 
 
 def _masterboard(controller: Controller) -> MasterboardData:
-    signals = controller.signals
-    ain, aout = signals.analog_in_voltage, signals.analog_out_voltage
+    io = controller.io
+    ain, aout = io.analog_in_voltage, io.analog_out_voltage
     return MasterboardData(
-        digital_input_bits=signals.digital_in.packed(),
-        digital_output_bits=signals.digital_out.packed(),
+        digital_input_bits=io.digital_in.packed(),
+        digital_output_bits=io.digital_out.packed(),
         analog_input_range=(int(ain[0]), int(ain[1])),
-        analog_input=(signals.analog_in[0], signals.analog_in[1]),
+        analog_input=(io.analog_in[0], io.analog_in[1]),
         analog_output_domain=(int(aout[0]), int(aout[1])),
-        analog_output=(signals.analog_out[0], signals.analog_out[1]),
+        analog_output=(io.analog_out[0], io.analog_out[1]),
         temperature=25.0,
         safety_mode=controller.safety.mode,
     )
 
 
 def _tool(controller: Controller) -> ToolData:
-    signals = controller.signals
+    io = controller.io
     return ToolData(
-        analog_input=(signals.tool_analog_in[0], signals.tool_analog_in[1]),
+        analog_input=(io.tool_analog_in[0], io.tool_analog_in[1]),
         voltage_48v=48.0,
-        output_voltage=signals.tool_voltage,
+        output_voltage=io.tool_voltage,
         temperature=25.0,
     )
 
@@ -162,7 +162,9 @@ def _kinematics(controller: Controller) -> KinematicsInfo:
 
 def _configuration(controller: Controller) -> ConfigurationData:
     model, geometry = controller.arm.model, controller.arm.model.geometry
-    limits = [(max(low, -_ENDLESS), min(high, _ENDLESS)) for low, high in model.position_limits]
+    limits = [
+        (max(low, -_UNLIMITED), min(high, _UNLIMITED)) for low, high in model.position_limits
+    ]
     a, b, c, d, e, f = limits
     s1, s2, s3, s4, s5, s6 = ((speed, _JOINT_ACCELERATION) for speed in model.max_joint_speed)
     return ConfigurationData(

@@ -23,14 +23,20 @@ import logging
 from typing import Any, Protocol
 
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.sim.announcements import Announcements
-from ur_cartesian_driver.sim.builtins import timeless
-from ur_cartesian_driver.urscript import CompileError, Machine, parse, Program, RuntimeException
+from ur_cartesian_driver.sim.builtins import refuse_timed_functions
+from ur_cartesian_driver.sim.state.controller_messages import ControllerMessages
+from ur_cartesian_driver.urscript import (
+    CompileError,
+    parse,
+    RuntimeException,
+    ScriptInterpreter,
+    ScriptProgram,
+)
 
 _log = logging.getLogger(__name__)
 
 #: Clients send the same program again and again; its tree is immutable.
-_parsed = lru_cache(maxsize=8)(parse)
+_parse_cached = lru_cache(maxsize=8)(parse)
 
 #: What happens to the arm and to the modes around a program.
 RUNNING = frozenset(
@@ -38,11 +44,11 @@ RUNNING = frozenset(
 )
 
 
-class Arm(Protocol):
+class ProgramArm(Protocol):
     """What the life of programs needs to know of the arm, and to make it do."""
 
     @property
-    def standing(self) -> bool:
+    def at_rest(self) -> bool:
         """Whether the arm stands, at the end of a motion or paused on its path."""
 
     def brake(self) -> None:
@@ -57,26 +63,26 @@ class Arm(Protocol):
     def release(self, thread: Hashable) -> None:
         """Let a thread that has ended own the motion no longer."""
 
-    def why_not_ready(self) -> str:
+    def start_refusal(self) -> str:
         """Return why no program can run now; empty if one can."""
 
 
-class Programs:
+class ProgramRunner:
     """The primary program, its state, and the secondary programs of this cycle."""
 
     def __init__(
-        self, builtins: Mapping[str, Any], announcements: Announcements, arm: Arm
+        self, builtins: Mapping[str, Any], messages: ControllerMessages, arm: ProgramArm
     ) -> None:
         """Begin with no program."""
         self._builtins = builtins
-        self._secondary_builtins = timeless(builtins)
-        self._announce = announcements
+        self._secondary_builtins = refuse_timed_functions(builtins)
+        self._messages = messages
         self._arm = arm
-        self._machine: Machine | None = None
-        self._stepping: Machine | None = None
-        self._waiting: tuple[str, Machine] | None = None
-        self._secondaries: list[Machine] = []
-        self._loaded: Program | None = None
+        self._interpreter: ScriptInterpreter | None = None
+        self._stepping: ScriptInterpreter | None = None
+        self._queued: tuple[str, ScriptInterpreter] | None = None
+        self._secondaries: list[ScriptInterpreter] = []
+        self._loaded: ScriptProgram | None = None
         #: Name of the program that was loaded for `play`, empty if none was.
         self.loaded = ''
         self.state = RuntimeState.STOPPED
@@ -88,13 +94,13 @@ class Programs:
     @property
     def current_thread(self) -> Hashable:
         """Id of the thread whose function is being executed."""
-        machine = self._stepping
-        return None if machine is None else (id(machine), machine.current_thread)
+        interpreter = self._stepping
+        return None if interpreter is None else (id(interpreter), interpreter.current_thread)
 
     @property
-    def machine(self) -> Machine | None:
+    def interpreter(self) -> ScriptInterpreter | None:
         """The machine of the primary program, if its functions are being executed."""
-        return self._machine if self._stepping is self._machine else None
+        return self._interpreter if self._stepping is self._interpreter else None
 
     @property
     def running(self) -> bool:
@@ -108,20 +114,22 @@ class Programs:
         :param line_offset: lines that were put before the text that was sent.
         """
         try:
-            program = _parsed(text)
+            program = _parse_cached(text)
             secondary = program.kind == 'sec'
-            machine = Machine(program, self._secondary_builtins if secondary else self._builtins)
+            interpreter = ScriptInterpreter(
+                program, self._secondary_builtins if secondary else self._builtins
+            )
         except CompileError as error:
-            self._announce.exception(error.line - line_offset, error.column, error.text)
+            self._messages.exception(error.line - line_offset, error.column, error.text)
             return
         if secondary:
-            self._secondaries.append(machine)
+            self._secondaries.append(interpreter)
             return
-        reason = self._arm.why_not_ready()
+        reason = self._arm.start_refusal()
         if reason:
-            self._announce.text(f'Program {program.name} was not started: {reason}.')
+            self._messages.text(f'Program {program.name} was not started: {reason}.')
             return
-        self._replace(program.name, machine)
+        self._queue_start(program.name, interpreter)
 
     def load(self, name: str, text: str) -> str:
         """
@@ -132,44 +140,44 @@ class Programs:
         if self.running:
             return 'a program is running'
         try:
-            self._loaded = _parsed(text)
-            Machine(self._loaded, self._builtins)
+            self._loaded = _parse_cached(text)
+            ScriptInterpreter(self._loaded, self._builtins)
         except CompileError as error:
             return str(error)
         self.loaded = name
         return ''
 
-    def _replace(self, name: str, machine: Machine) -> None:
+    def _queue_start(self, name: str, interpreter: ScriptInterpreter) -> None:
         if self.running:
             self.stop()
-        self._waiting = (name, machine)
+        self._queued = (name, interpreter)
         self._start_waiting()
 
     def _start_waiting(self) -> None:
         """Start the program that waits, once the arm stands."""
-        if self._waiting is None or self.state is not RuntimeState.STOPPED:
+        if self._queued is None or self.state is not RuntimeState.STOPPED:
             return
-        self.name, self._machine = self._waiting
-        self._waiting = None
-        machine = self._machine
-        machine.on_thread_end = lambda number: self._arm.release((id(machine), number))
+        self.name, self._interpreter = self._queued
+        self._queued = None
+        interpreter = self._interpreter
+        interpreter.on_thread_end = lambda number: self._arm.release((id(interpreter), number))
         self.state = RuntimeState.PLAYING
         # XXX is what a controller writes; the name of the program follows as the text.
-        self._announce.key('PROGRAM_XXX_STARTED', self.name)
+        self._messages.key('PROGRAM_XXX_STARTED', self.name)
 
     def play(self) -> str:
         """Resume, or start the loaded program; return why not, or an empty string."""
-        reason = self._arm.why_not_ready()
+        reason = self._arm.start_refusal()
         if reason:
             return reason
         if self.state in (RuntimeState.PAUSED, RuntimeState.PAUSING):
             self.state = RuntimeState.RESUMING
-            if self._machine is not None:
-                self._machine.resume()
+            if self._interpreter is not None:
+                self._interpreter.resume()
         elif self.state is RuntimeState.STOPPED:
             if self._loaded is None:
                 return 'no program is loaded'
-            self._replace(self.loaded, Machine(self._loaded, self._builtins))
+            self._queue_start(self.loaded, ScriptInterpreter(self._loaded, self._builtins))
         return ''
 
     def pause(self) -> str:
@@ -181,76 +189,76 @@ class Programs:
 
     def stop(self) -> None:
         """End the program; the arm brakes."""
-        self._waiting = None
+        self._queued = None
         if not self.running:
             return
         self.state = RuntimeState.STOPPING
-        if self._stepping is not None and self._stepping is self._machine:
+        if self._stepping is not None and self._stepping is self._interpreter:
             self._stepping.stop()  # called by one of its own functions: it ends when that returns
         else:
             self._finish()
 
     def _finish(self) -> None:
         """Close the machine and clean up behind it."""
-        machine, self._machine = self._machine, None
-        if machine is not None:
-            machine.stop()
+        interpreter, self._interpreter = self._interpreter, None
+        if interpreter is not None:
+            interpreter.stop()
         self._arm.end_modes()
         self._arm.brake()
         self.state = RuntimeState.STOPPING
         if self.on_end is not None:
             self.on_end()
-        self._announce.key('PROGRAM_XXX_STOPPED', self.name)
+        self._messages.key('PROGRAM_XXX_STOPPED', self.name)
 
     def step(self) -> None:
         """Run one frame."""
         self._change_state()
-        if self.state is RuntimeState.PLAYING and self._machine is not None:
-            self._run(self._machine)
+        if self.state is RuntimeState.PLAYING and self._interpreter is not None:
+            self._run(self._interpreter)
             self._arm.end_of_frame()
-            self._look_at(self._machine)
-        for machine in self._secondaries:
-            self._run_secondary(machine)
+            self._handle_end_of_frame(self._interpreter)
+        for interpreter in self._secondaries:
+            self._run_secondary(interpreter)
         self._secondaries.clear()
 
     def _change_state(self) -> None:
-        if self.state is RuntimeState.STOPPING and self._arm.standing:
+        if self.state is RuntimeState.STOPPING and self._arm.at_rest:
             self.state = RuntimeState.STOPPED
         if self.state is RuntimeState.STOPPED:
             self._start_waiting()
-        elif self.state is RuntimeState.PAUSING and self._arm.standing:
+        elif self.state is RuntimeState.PAUSING and self._arm.at_rest:
             self.state = RuntimeState.PAUSED
         elif self.state is RuntimeState.RESUMING:
             self.state = RuntimeState.PLAYING
 
-    def _run(self, machine: Machine) -> None:
-        self._stepping = machine
+    def _run(self, interpreter: ScriptInterpreter) -> None:
+        self._stepping = interpreter
         try:
-            machine.step()
+            interpreter.step()
         except Exception as error:  # a defect of a function must not end the robot
             _log.exception('A function of program %s failed', self.name)
-            machine.error = RuntimeException(f'Internal error of the simulator: {error!r}')
+            interpreter.error = RuntimeException(f'Internal error of the simulator: {error!r}')
             self._stepping = None
-            machine.stop()
+            interpreter.stop()
         finally:
             self._stepping = None
 
-    def _look_at(self, machine: Machine) -> None:
+    def _handle_end_of_frame(self, interpreter: ScriptInterpreter) -> None:
         """See what the frame did to the program."""
-        if machine.error is not None:
-            error = machine.error
-            self._announce.exception(error.line, error.column, str(error))
-        if not machine.running or self.state is RuntimeState.STOPPING:
+        if interpreter.error is not None:
+            error = interpreter.error
+            self._messages.exception(error.line, error.column, str(error))
+        if not interpreter.running or self.state is RuntimeState.STOPPING:
             self._finish()
-        elif machine.paused:
+        elif interpreter.paused:
             self.pause()
 
-    def _run_secondary(self, machine: Machine) -> None:
+    def _run_secondary(self, interpreter: ScriptInterpreter) -> None:
         """Run a whole secondary program; what has not ended after one frame never does."""
-        self._run(machine)
-        error = machine.error
-        if machine.running:
-            machine.stop()
+        self._run(interpreter)
+        error = interpreter.error
+        if interpreter.running:
+            interpreter.stop()
             error = error or RuntimeException('Runtime is too much behind')
         if error is not None:
-            self._announce.key('SECONDARY_PROGRAM_EXCEPTION_XXX', str(error))
+            self._messages.key('SECONDARY_PROGRAM_EXCEPTION_XXX', str(error))

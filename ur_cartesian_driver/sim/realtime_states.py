@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from ur_cartesian_driver.protocol.realtime import packet_size, RealtimeData
 from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.outputs import getter
+from ur_cartesian_driver.sim.outputs import output_getter
 
 #: Field of the packet -> RTDE output with the same meaning.
 OUTPUTS: Mapping[str, str] = MappingProxyType(
@@ -63,7 +63,7 @@ class RealtimeStream:
         self._controller = controller
         self._size = packet_size(controller.config.version)
         self._getters = [
-            (field.name, getter(OUTPUTS[field.name], field.default))
+            (field.name, output_getter(OUTPUTS[field.name], field.default))
             for field in fields(RealtimeData)
             if field.name in OUTPUTS
         ]

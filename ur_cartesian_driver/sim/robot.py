@@ -26,7 +26,7 @@ from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.dashboard_session import DashboardSession
 from ur_cartesian_driver.sim.fault_text import parse_fault
 from ur_cartesian_driver.sim.faults import Fault
-from ur_cartesian_driver.sim.faulty_sockets import FaultySockets
+from ur_cartesian_driver.sim.faulty_sockets import ImpairedSockets
 from ur_cartesian_driver.sim.interpreter_session import InterpreterSession
 from ur_cartesian_driver.sim.modes import SafetyEvent
 from ur_cartesian_driver.sim.primary_session import PrimarySession, ScriptSession
@@ -105,8 +105,8 @@ class SimulatedRobot:
         self._loop: asyncio.AbstractEventLoop | None = None
         #: Called with the port and the bytes that a program's socket received, in our thread.
         self.on_socket_data: Callable[[int, bytes], None] | None = None
-        hampered = FaultySockets(sockets or TcpScriptSockets(self._on_socket_data))
-        self.controller = Controller(self.config, hampered)
+        impaired = ImpairedSockets(sockets or TcpScriptSockets(self._on_socket_data))
+        self.controller = Controller(self.config, impaired)
         taken_inputs: set[str] = set()
         self._rtde = TcpServer('RTDE', lambda: RtdeSession(self.controller, taken_inputs))
         self._primary = TcpServer('primary', lambda: PrimarySession(self.controller))
@@ -122,7 +122,7 @@ class SimulatedRobot:
             self._dashboard,
             self._interpreter,
         )
-        self.controller.faults.interfaces = {'sockets': hampered} | {
+        self.controller.faults.interfaces = {'sockets': impaired} | {
             server.name.lower().replace('-', ''): server for server in self._servers
         }
         self.inject(*self.config.faults)
@@ -239,10 +239,10 @@ class SimulatedRobot:
         while True:
             await self._clock.next_cycle()
             self.controller.step()
-            for session, connection in self._rtde.sessions:
+            for session, connection in self._rtde.session_connections:
                 for package in session.packages():
                     connection.write(package)
-            for client, line in self._interpreter.sessions:
+            for client, line in self._interpreter.session_connections:
                 line.write(client.answers())
             for message in stream.messages():
                 self._primary.broadcast(message)
@@ -407,9 +407,9 @@ def _snapshot(controller: Controller) -> RobotSnapshot:
         safety_mode=controller.safety.mode,
         runtime_state=programs.state,
         program=programs.name,
-        speed_slider=controller.slider,
+        speed_slider=controller.speed_slider,
         speed_scaling=motion.scaling,
-        digital_outputs=controller.signals.digital_out.packed(),
-        messages=tuple(controller.announcements.log),
+        digital_outputs=controller.io.digital_out.packed(),
+        messages=tuple(controller.messages.log),
         popups=tuple(popup.text for popup in controller.popups),
     )

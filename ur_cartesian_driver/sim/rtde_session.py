@@ -9,19 +9,19 @@ from math import floor
 
 from ur_cartesian_driver.protocol.rtde_fields import DataType
 from ur_cartesian_driver.protocol.rtde_packages import ControllerVersion, Recipe
-from ur_cartesian_driver.protocol.rtde_server import InputReceived, Output, RtdeServer
+from ur_cartesian_driver.protocol.rtde_server import InputReceived, OutputStream, RtdeServerCodec
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.inputs import apply_inputs
-from ur_cartesian_driver.sim.outputs import getter
+from ur_cartesian_driver.sim.outputs import output_getter
 
 
-class _Stream:
+class _OutputSchedule:
     """A recipe with the functions that compute its values, and how often it is due."""
 
-    def __init__(self, output: Output, maximum: float) -> None:
+    def __init__(self, output: OutputStream, maximum: float) -> None:
         self._recipe: Recipe = output.recipe
         self._getters = [
-            getter(name, _zero(data_type))
+            output_getter(name, _zero(data_type))
             for name, data_type in zip(output.recipe.names, output.recipe.types, strict=True)
         ]
         self._ratio = output.frequency / maximum
@@ -47,13 +47,13 @@ class RtdeSession:
         major, minor, bugfix, build = controller.config.version
         self._controller = controller
         self._maximum = 1.0 / controller.cycle
-        self._server = RtdeServer(
+        self._server = RtdeServerCodec(
             ControllerVersion(major=major, minor=minor, bugfix=bugfix, build=build),
             taken_inputs,
             self._maximum,
         )
-        self._outputs: list[Output] = []
-        self._streams: list[_Stream] = []
+        self._outputs: list[OutputStream] = []
+        self._streams: list[_OutputSchedule] = []
 
     def open(self) -> bytes:
         """Say nothing: the client begins."""
@@ -66,7 +66,7 @@ class RtdeSession:
                 apply_inputs(self._controller, event.recipe.named(event.values))
         if self._server.outputs != self._outputs:
             self._outputs = list(self._server.outputs)
-            self._streams = [_Stream(output, self._maximum) for output in self._outputs]
+            self._streams = [_OutputSchedule(output, self._maximum) for output in self._outputs]
         return self._server.data_to_send()
 
     def close(self) -> None:

@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.modes import SafetyEvent
-from ur_cartesian_driver.sim.uploads import Line, ProgramText
+from ur_cartesian_driver.sim.uploads import UploadedLine, UploadedProgram
 
 #: Error code of a script port that is read-only.
 READ_ONLY = 210
@@ -34,18 +34,18 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
 )
 
 
-def execute(controller: Controller, item: ProgramText | Line) -> None:
+def execute_command(controller: Controller, item: UploadedProgram | UploadedLine) -> None:
     """Do what a client has sent; answers are announcements to everybody."""
     if not controller.remote_control:
-        controller.announcements.error(
+        controller.messages.error(
             READ_ONLY, 0, 'Socket is read-only when the robot is in local (Teach pendant) control'
         )
-    elif isinstance(item, ProgramText):
+    elif isinstance(item, UploadedProgram):
         controller.programs.submit(item.text)
     elif item.text in _CONTROL:
         refusal = _CONTROL[item.text](controller)
         if refusal:
-            controller.announcements.text(f'{item.text}: refused, {refusal}.')
+            controller.messages.text(f'{item.text}: refused, {refusal}.')
     elif item.text.startswith('set speed '):
         _set_speed(controller, item.text.removeprefix('set speed '))
     else:
@@ -56,4 +56,4 @@ def _set_speed(controller: Controller, argument: str) -> None:
     try:
         controller.set_slider(float(argument))
     except ValueError:
-        controller.announcements.text(f'set speed: {argument!r} is no number.')
+        controller.messages.text(f'set speed: {argument!r} is no number.')

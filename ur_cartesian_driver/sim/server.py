@@ -15,17 +15,17 @@ import logging
 from typing import cast, Generic, Protocol, TypeVar
 
 from ur_cartesian_driver.motion.errors import ProtocolError
-from ur_cartesian_driver.sim.impairment import Hampered, Impairment
+from ur_cartesian_driver.sim.impairment import ImpairedConnection, Impairment
 
 _log = logging.getLogger(__name__)
 
 #: Bytes that a client may leave unread beside what the kernel holds.
-MOST_UNREAD = 1_000_000
+MAX_UNREAD_BYTES = 1_000_000
 #: From here on a client is spared states: many send their scripts and never read.
-MANY_UNREAD = 16_384
+MAX_UNREAD_BYTES_FOR_STATE = 16_384
 
 
-class Hangup(Exception):
+class HangUp(Exception):
     """Raised by a session to end its connection; what it carries is sent before."""
 
     def __init__(self, farewell: bytes = b'') -> None:
@@ -34,7 +34,7 @@ class Hangup(Exception):
         self.farewell = farewell
 
 
-class Session(Protocol):
+class ClientSession(Protocol):
     """One client's conversation."""
 
     def open(self) -> bytes:
@@ -45,17 +45,17 @@ class Session(Protocol):
         Take what came from the client, return the answer.
 
         :raises ProtocolError: the client talks nonsense; it is disconnected.
-        :raises Hangup: the conversation is over.
+        :raises HangUp: the conversation is over.
         """
 
     def close(self) -> None:
         """Give back what the client held."""
 
 
-S = TypeVar('S', bound=Session)
+S = TypeVar('S', bound=ClientSession)
 
 
-class _Connection(asyncio.Protocol, Generic[S]):
+class _ClientConnection(asyncio.Protocol, Generic[S]):
     """Moves bytes between a transport and a session."""
 
     def __init__(self, server: TcpServer[S]) -> None:
@@ -63,25 +63,25 @@ class _Connection(asyncio.Protocol, Generic[S]):
         self.session = server.make_session()
         self._transport: asyncio.Transport | None = None
         #: What is wrong with this connection; None, as always without faults: nothing.
-        self._hampered: Hampered | None = None
-        self._leaving = False
+        self._impaired: ImpairedConnection | None = None
+        self._closing_after_send = False
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         self._transport = cast(asyncio.Transport, transport)
         self._server.connections.add(self)
-        if self._server.refusing:
+        if self._server.refuses_connections:
             self._transport.abort()
             return
         if self._server.impairment is not None:
-            self.hamper(self._server.impairment)
+            self.impair_connection(self._server.impairment)
         self.write(self.session.open())
 
     def data_received(self, data: bytes) -> None:
-        if self._hampered is None:
-            self._hear(data)
+        if self._impaired is None:
+            self._handle_incoming(data)
         else:
-            self._hampered.hear(data, self._server.now)
-            self._transport_reading(self._hampered.unheard < MOST_UNREAD)
+            self._impaired.queue_incoming(data, self._server.now)
+            self._transport_reading(self._impaired.incoming_size < MAX_UNREAD_BYTES)
 
     def _transport_reading(self, wanted: bool) -> None:
         """Leave to the kernel, and so to the client, what is too much to hold back."""
@@ -92,10 +92,10 @@ class _Connection(asyncio.Protocol, Generic[S]):
         else:
             self._transport.pause_reading()
 
-    def _hear(self, data: bytes) -> None:
+    def _handle_incoming(self, data: bytes) -> None:
         try:
             self.write(self.session.feed(data))
-        except Hangup as hangup:
+        except HangUp as hangup:
             self.write(hangup.farewell)
             self._hang_up()
         except ProtocolError as error:
@@ -103,24 +103,24 @@ class _Connection(asyncio.Protocol, Generic[S]):
             self._hang_up()
 
     def _hang_up(self) -> None:
-        if self._hampered is not None and self._hampered.unsent:
-            self._leaving = True
+        if self._impaired is not None and self._impaired.outgoing_size:
+            self._closing_after_send = True
         elif self._transport is not None:
             self._transport.close()
 
     def write(self, data: bytes) -> None:
         """Send one piece; drop a client that does not read."""
-        if self._hampered is None:
+        if self._impaired is None:
             self._send(data)
             return
-        self._hampered.say(data, self._server.now)
-        if self._hampered.unsent > MOST_UNREAD:
+        self._impaired.queue_outgoing(data, self._server.now)
+        if self._impaired.outgoing_size > MAX_UNREAD_BYTES:
             self._drop_unread()
 
     def _send(self, data: bytes) -> None:
         if not data or self._transport is None or self._transport.is_closing():
             return
-        if self._transport.get_write_buffer_size() > MOST_UNREAD:
+        if self._transport.get_write_buffer_size() > MAX_UNREAD_BYTES:
             self._drop_unread()
             return
         self._transport.write(data)
@@ -131,31 +131,33 @@ class _Connection(asyncio.Protocol, Generic[S]):
 
     def write_state(self, data: bytes) -> None:
         """Send a piece that the next of its kind replaces, if the client has read the others."""
-        if self._transport is not None and (self._transport.get_write_buffer_size() < MANY_UNREAD):
+        if self._transport is not None and (
+            self._transport.get_write_buffer_size() < MAX_UNREAD_BYTES_FOR_STATE
+        ):
             self.write(data)
 
-    def hamper(self, impairment: Impairment | None) -> Hampered:
+    def impair_connection(self, impairment: Impairment | None) -> ImpairedConnection:
         """Let something be wrong with this connection."""
-        if self._hampered is None:
-            self._hampered = Hampered(impairment, self._server.now)
-        self._hampered.impairment = impairment
-        return self._hampered
+        if self._impaired is None:
+            self._impaired = ImpairedConnection(impairment, self._server.now)
+        self._impaired.impairment = impairment
+        return self._impaired
 
     def pump(self, now: float) -> bool:
         """Let go what is due; tell whether anything is still wrong."""
-        hampered = self._hampered
-        if hampered is None:
+        impaired = self._impaired
+        if impaired is None:
             return False
-        if data := hampered.heard(now):
-            self._hear(data)
-        self._transport_reading(hampered.unheard < MOST_UNREAD)
-        self._send(hampered.said(now))
-        if self._leaving and not hampered.unsent:
-            self._leaving = False
+        if data := impaired.due_incoming(now):
+            self._handle_incoming(data)
+        self._transport_reading(impaired.incoming_size < MAX_UNREAD_BYTES)
+        self._send(impaired.due_outgoing(now))
+        if self._closing_after_send and not impaired.outgoing_size:
+            self._closing_after_send = False
             self._hang_up()
-        if hampered.over:
-            self._hampered = None
-        return not hampered.over
+        if impaired.is_over:
+            self._impaired = None
+        return not impaired.is_over
 
     def abort(self) -> None:
         """Disconnect at once."""
@@ -180,7 +182,7 @@ class TcpServer(Generic[S]):
         """
         self.name = name
         self.make_session = make_session
-        self.connections: set[_Connection[S]] = set()
+        self.connections: set[_ClientConnection[S]] = set()
         self._server: asyncio.Server | None = None
         self.closing = False
         #: What a fault makes of all connections, and the controller's clock while one does [s].
@@ -194,12 +196,14 @@ class TcpServer(Generic[S]):
         return int(self._server.sockets[0].getsockname()[1])
 
     @property
-    def refusing(self) -> bool:
+    def refuses_connections(self) -> bool:
         """Whether who calls is hung up on: at the last moment, or by a fault."""
-        return self.closing or (self.impairment is not None and self.impairment.refusing)
+        return self.closing or (
+            self.impairment is not None and self.impairment.refuses_connections
+        )
 
     @property
-    def sessions(self) -> Iterator[tuple[S, _Connection[S]]]:
+    def session_connections(self) -> Iterator[tuple[S, _ClientConnection[S]]]:
         """The conversations with what they are written to."""
         return ((connection.session, connection) for connection in tuple(self.connections))
 
@@ -212,7 +216,7 @@ class TcpServer(Generic[S]):
         loop = asyncio.get_running_loop()
         self.closing = False
         try:
-            self._server = await loop.create_server(lambda: _Connection(self), host, port)
+            self._server = await loop.create_server(lambda: _ClientConnection(self), host, port)
         except OSError as error:
             raise OSError(
                 f'The {self.name} port {port} on {host} cannot be listened on: '
@@ -235,7 +239,7 @@ class TcpServer(Generic[S]):
         """Let this be wrong with all connections."""
         self.impairment, self.now = impairment, now
         for connection in self.connections:
-            connection.hamper(impairment)
+            connection.impair_connection(impairment)
 
     def pump(self, now: float) -> bool:
         """Let go what is due; tell whether this has to be called again in the next cycle."""
@@ -251,7 +255,7 @@ class TcpServer(Generic[S]):
     def freeze(self) -> None:
         """Make all connections half-open ones: neither hear nor say anything, do not hang up."""
         for connection in self.connections:
-            connection.hamper(self.impairment).frozen = True
+            connection.impair_connection(self.impairment).frozen = True
 
     def inject(self, data: bytes) -> None:
         """Say something that no session has said."""

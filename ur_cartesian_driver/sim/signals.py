@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 from ur_cartesian_driver.motion.pose import Vector6
 
-BITS, INTEGERS, FLOATS = 128, 48, 48
+REGISTER_BITS, REGISTER_INTEGERS, REGISTER_FLOATS = 128, 48, 48
 STANDARD, CONFIGURABLE, TOOL = 8, 8, 2
 #: Addresses of ports, which Modbus clients of a real robot share with its programs.
 PORTS = 256
@@ -28,9 +28,9 @@ def pack_bits(bits: list[bool]) -> int:
 class Registers:
     """One direction of the general purpose registers."""
 
-    bits: list[bool] = field(default_factory=lambda: [False] * BITS)
-    integers: list[int] = field(default_factory=lambda: [0] * INTEGERS)
-    floats: list[float] = field(default_factory=lambda: [0.0] * FLOATS)
+    bits: list[bool] = field(default_factory=lambda: [False] * REGISTER_BITS)
+    integers: list[int] = field(default_factory=lambda: [0] * REGISTER_INTEGERS)
+    floats: list[float] = field(default_factory=lambda: [0.0] * REGISTER_FLOATS)
 
 
 @dataclass(slots=True)
@@ -47,7 +47,7 @@ class DigitalPort:
 
 
 @dataclass(slots=True)
-class Signals:
+class ControllerIo:
     """All of them."""
 
     digital_in: DigitalPort = field(default_factory=DigitalPort)

@@ -19,15 +19,15 @@ import socket
 from ur_cartesian_driver.sim.script_sockets import SocketState
 
 #: Bytes taken from the kernel ahead of the program, and bytes that a slow peer may owe us.
-_LIMIT = 65_536
-_UNDER_WAY = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK, errno.EINTR)
+_MAX_BUFFERED = 65_536
+_IN_PROGRESS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK, errno.EINTR)
 _CONNECTED = (0, errno.EISCONN)
 
 _Address = tuple[str, int] | tuple[str, int, int, int]
 _Resolved = list[tuple[int, int, int, str, _Address]]
 
 
-class _Connection:
+class _ScriptConnection:
     """One socket: connecting, open, or closed by its peer with data left to read."""
 
     def __init__(self, port: int, on_data: Callable[[int, bytes], None] | None) -> None:
@@ -46,7 +46,7 @@ class _Connection:
         self._socket = socket.socket(family, kind, protocol)
         self._socket.setblocking(False)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._go_on_connecting()
+        self._continue_connecting()
 
     def poll(self) -> None:
         """Go on with what has not been finished."""
@@ -57,25 +57,25 @@ class _Connection:
             except OSError:
                 self.close()
         elif self.state is SocketState.CONNECTING and self._socket is not None:
-            self._go_on_connecting()
+            self._continue_connecting()
         elif self._outgoing:
             self._flush()
 
-    def _go_on_connecting(self) -> None:
+    def _continue_connecting(self) -> None:
         assert self._socket is not None
         assert self._target is not None
         error = self._socket.connect_ex(self._target)
         if error in _CONNECTED:
             self.state = SocketState.OPEN
-        elif error not in _UNDER_WAY:
+        elif error not in _IN_PROGRESS:
             self.close()
 
     def receive(self) -> None:
         """Take what the kernel has, up to the limit."""
-        while self.state is SocketState.OPEN and len(self.incoming) < _LIMIT:
+        while self.state is SocketState.OPEN and len(self.incoming) < _MAX_BUFFERED:
             assert self._socket is not None
             try:
-                data = self._socket.recv(_LIMIT)
+                data = self._socket.recv(_MAX_BUFFERED)
             except BlockingIOError:
                 return
             except OSError:
@@ -89,7 +89,7 @@ class _Connection:
 
     def send(self, data: bytes) -> bool:
         """Send now, keep what the kernel does not take; False when too much is kept already."""
-        if self.state is not SocketState.OPEN or len(self._outgoing) + len(data) > _LIMIT:
+        if self.state is not SocketState.OPEN or len(self._outgoing) + len(data) > _MAX_BUFFERED:
             return False
         self._outgoing += data
         self._flush()
@@ -128,13 +128,13 @@ class TcpScriptSockets:
         :param on_data: called with the peer's port and what came from it, as it is received.
         """
         self.on_data = on_data
-        self._connections: dict[str, _Connection] = {}
+        self._connections: dict[str, _ScriptConnection] = {}
         self._resolver: ThreadPoolExecutor | None = None
 
     def open(self, name: str, address: str, port: int) -> None:
         """Begin to connect; host names are looked up in a thread, for that may take seconds."""
         self.close(name)
-        connection = _Connection(port, self.on_data)
+        connection = _ScriptConnection(port, self.on_data)
         self._connections[name] = connection
         host = '127.0.0.1' if address == 'localhost' else address
         try:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 
 @dataclass(slots=True)
-class _Watch:
+class _InputWatch:
     period: float
     action: str
     last: float
@@ -20,12 +20,12 @@ class Watchdogs:
 
     def __init__(self) -> None:
         """Begin with none."""
-        self._watches: dict[str, _Watch] = {}
+        self._watches: dict[str, _InputWatch] = {}
 
     def watch(self, variable: str, frequency: float, action: str, now: float) -> None:
         """Watch an input from now on; a frequency of 0 ends it."""
         if frequency > 0.0:
-            self._watches[variable] = _Watch(1.0 / frequency, action, now)
+            self._watches[variable] = _InputWatch(1.0 / frequency, action, now)
         else:
             self._watches.pop(variable, None)
 

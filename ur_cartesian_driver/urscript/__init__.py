@@ -11,15 +11,15 @@ a robot are builtins, given by whoever runs it; `builtins` holds those that need
 
 from ur_cartesian_driver.urscript.builtins import core_builtins
 from ur_cartesian_driver.urscript.errors import CompileError, RuntimeException
-from ur_cartesian_driver.urscript.interpreter import Machine
-from ur_cartesian_driver.urscript.lines import Line
+from ur_cartesian_driver.urscript.interpreter import ScriptInterpreter
+from ur_cartesian_driver.urscript.lines import CompiledLine
 from ur_cartesian_driver.urscript.parser import parse
 from ur_cartesian_driver.urscript.scopes import Builtin
-from ur_cartesian_driver.urscript.syntax import Program
+from ur_cartesian_driver.urscript.syntax import ScriptProgram
 from ur_cartesian_driver.urscript.values import (
     Matrix,
-    Pose,
     RemoteObject,
+    ScriptPose,
     Struct,
     ThreadHandle,
     to_text,
@@ -29,13 +29,13 @@ from ur_cartesian_driver.urscript.values import (
 __all__ = [
     'Builtin',
     'CompileError',
-    'Line',
-    'Machine',
+    'CompiledLine',
     'Matrix',
-    'Pose',
-    'Program',
     'RemoteObject',
     'RuntimeException',
+    'ScriptInterpreter',
+    'ScriptPose',
+    'ScriptProgram',
     'Struct',
     'ThreadHandle',
     'Value',

@@ -22,7 +22,7 @@ from ur_cartesian_driver.urscript.values import (
     INT_MIN,
     is_number,
     Matrix,
-    Pose,
+    ScriptPose,
     Struct,
     to_text,
     type_name,
@@ -68,7 +68,7 @@ def _string(value: Value) -> str:
 
 
 def _numbers(value: Value) -> list[int | float]:
-    if type(value) is list or type(value) is Pose:
+    if type(value) is list or type(value) is ScriptPose:
         return [_number(item) for item in value]
     raise _wrong_type('a list of numbers', value)
 
@@ -110,10 +110,10 @@ def str_empty(str: Value) -> bool:
 
 def str_at(src: Value, index: Value) -> str:
     """Return one character."""
-    text, place = _string(src), _int(index)
-    if not 0 <= place < len(text):
-        raise RuntimeException(f'Index out of range: {place} in a string of {len(text)}')
-    return text[place]
+    text, position = _string(src), _int(index)
+    if not 0 <= position < len(text):
+        raise RuntimeException(f'Index out of range: {position} in a string of {len(text)}')
+    return text[position]
 
 
 def str_sub(src: Value, index: Value, len: Value = MAX_STRING) -> str:
@@ -235,7 +235,7 @@ def length(v: Value) -> int:
     """Return the number of items of a list or pose, of characters, or of rows."""
     if type(v) is Matrix:
         return v.shape[0]
-    if type(v) is list or type(v) is str or type(v) is Pose:
+    if type(v) is list or type(v) is str or type(v) is ScriptPose:
         return len(v)
     raise _wrong_type('a list or a string', v)
 
@@ -246,17 +246,19 @@ def get_list_length(v: Value) -> int:
 
 
 #: The manual names no limit; without one a program could take all the memory.
-LONGEST_LIST = 100_000
+MAX_LIST_LENGTH = 100_000
 
 
 def make_list(length: Value, initial_value: Value, capacity: Value = None) -> Value:
     """Return a list of equal items; its capacity is checked and otherwise without effect."""
     count = _int(length)
-    room = count if capacity is None else _int(capacity)
-    if not 0 <= count <= room:
-        raise RuntimeException(f'make_list: length {count} does not lie in 0..{room} (capacity)')
-    if room > LONGEST_LIST:
-        raise RuntimeException(f'make_list: more than {LONGEST_LIST} items are not possible')
+    max_items = count if capacity is None else _int(capacity)
+    if not 0 <= count <= max_items:
+        raise RuntimeException(
+            f'make_list: length {count} does not lie in 0..{max_items} (capacity)'
+        )
+    if max_items > MAX_LIST_LENGTH:
+        raise RuntimeException(f'make_list: more than {MAX_LIST_LENGTH} items are not possible')
     if type(initial_value) in (list, Matrix):
         raise RuntimeException('make_list: a list of lists is not possible')
     return make_list_value([copy(initial_value) for _ in range(count)])
@@ -302,14 +304,14 @@ def struct(**fields: Value) -> Struct:
 def integer_to_binary_list(x: Value) -> list[bool]:
     """Return the 32 bits of an int, the lowest first."""
     bits = _int(x)
-    return [bool(bits >> place & 1) for place in range(32)]
+    return [bool(bits >> position & 1) for position in range(32)]
 
 
 def binary_list_to_integer(l: Value) -> int:  # noqa: E741 (the manual's name)
     """Return the int whose bits are in the list, the lowest first; 32 bits make it signed."""
     if type(l) is not list or len(l) > 32 or any(type(bit) is not bool for bit in l):
         raise RuntimeException('binary_list_to_integer: at most 32 bools are needed')
-    unsigned = sum(1 << place for place, bit in enumerate(l) if bit)
+    unsigned = sum(1 << position for position, bit in enumerate(l) if bit)
     return unsigned - 2**32 if unsigned > INT_MAX else unsigned
 
 
@@ -330,11 +332,11 @@ def core_builtins(seed: int = 0) -> dict[str, Callable[..., Any]]:
         integer_to_binary_list, inv, length, log, make_list, norm, normalize, size, sqrt, str_at,
         str_cat, str_empty, str_find, str_len, str_sub, struct, to_num, to_str, transpose,
     )  # fmt: skip
-    of_float = {
+    float_functions = {
         'atan': math.atan, 'cos': math.cos, 'd2r': math.radians, 'r2d': math.degrees,
         'sin': math.sin, 'tan': math.tan,
     }  # fmt: skip
     table: dict[str, Callable[..., Any]] = {function.__name__: function for function in named}
-    table.update((name, _function_of_float(compute)) for name, compute in of_float.items())
+    table.update((name, _function_of_float(compute)) for name, compute in float_functions.items())
     table.update(pow=pow_, random=random_number)
     return table

@@ -21,9 +21,9 @@ from ur_cartesian_driver.urscript.values import ThreadHandle, Value
 #: Calls of the program's functions inside one another.
 MAX_CALL_DEPTH = 100
 
-Frame = list[Any]
-Steps = Generator[None, None, Value]
-Run = Callable[[Frame], Any]
+StackFrame = list[Any]
+ScriptSteps = Generator[None, None, Value]
+RunFunction = Callable[[StackFrame], Any]
 
 # What a statement says about how to go on.
 BREAK = 'break'
@@ -60,10 +60,10 @@ class Runtime(Protocol):
     def thread(self) -> Thread:
         """The thread that is running now."""
 
-    def exhausted(self, line: int, column: int) -> NoReturn:
+    def raise_budget_exceeded(self, line: int, column: int) -> NoReturn:
         """Raise, because the thread used up its frame without yielding."""
 
-    def spawn(self, procedure: Procedure) -> ThreadHandle:
+    def spawn(self, procedure: CompiledFunction) -> ThreadHandle:
         """Start a thread."""
 
     def alive(self, handle: Value) -> bool:
@@ -74,25 +74,25 @@ class Runtime(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Code:
+class CompiledNode:
     """A compiled node: how to run it, whether that can take time, and what it costs."""
 
-    run: Run
+    run: RunFunction
     suspends: bool = False
     weight: int = 1
 
 
 @dataclass(slots=True, kw_only=True)
-class Procedure:
+class CompiledFunction:
     """A compiled function or thread; filled after all have been made, as they call each other."""
 
     name: str
     suspends: bool
-    template: Frame
-    defaults: dict[int, Code] = field(default_factory=dict)
-    body: Code = Code(lambda frame: None)
+    template: StackFrame
+    defaults: dict[int, CompiledNode] = field(default_factory=dict)
+    body: CompiledNode = CompiledNode(lambda frame: None)
 
-    def steps(self) -> Steps:
+    def steps(self) -> ScriptSteps:
         """Run as the whole of a thread."""
         frame = self.template.copy()
         if self.body.suspends:
@@ -102,20 +102,22 @@ class Procedure:
         return None
 
 
-def sequence(parts: Sequence[Code], finish: Callable[[Frame, list[Value]], Value]) -> Code:
+def sequence(
+    parts: Sequence[CompiledNode], finish: Callable[[StackFrame, list[Value]], Value]
+) -> CompiledNode:
     """Evaluate parts from left to right, then combine their values."""
     runs = [part.run for part in parts]
 
-    def plain(frame: Frame) -> Value:
+    def plain(frame: StackFrame) -> Value:
         return finish(frame, [run(frame) for run in runs])
 
-    def plain_one(frame: Frame) -> Value:
+    def plain_one(frame: StackFrame) -> Value:
         return finish(frame, [first(frame)])
 
-    def plain_two(frame: Frame) -> Value:
+    def plain_two(frame: StackFrame) -> Value:
         return finish(frame, [first(frame), second(frame)])
 
-    def steps(frame: Frame) -> Steps:
+    def steps(frame: StackFrame) -> ScriptSteps:
         found = []
         for part in parts:
             value = (yield from part.run(frame)) if part.suspends else part.run(frame)
@@ -124,15 +126,19 @@ def sequence(parts: Sequence[Code], finish: Callable[[Frame, list[Value]], Value
 
     first, second = (*runs, plain, plain)[:2]
     chosen = {1: plain_one, 2: plain_two}.get(len(runs), plain)
-    return either(chosen, steps, parts)
+    return choose_runner(chosen, steps, parts)
 
 
-def either(plain: Run, steps: Run, parts: Sequence[Code]) -> Code:
+def choose_runner(
+    plain: RunFunction, steps: RunFunction, parts: Sequence[CompiledNode]
+) -> CompiledNode:
     """Choose the generator if one of the parts is one."""
     suspends = any(part.suspends for part in parts)
-    return Code(steps if suspends else plain, suspends, 1 + sum(part.weight for part in parts))
+    return CompiledNode(
+        steps if suspends else plain, suspends, 1 + sum(part.weight for part in parts)
+    )
 
 
-def too_deep(line: int, column: int) -> RuntimeException:
+def recursion_error(line: int, column: int) -> RuntimeException:
     """Return the error for a recursion without an end."""
     return RuntimeException('Function calls are nested too deeply.', line, column)

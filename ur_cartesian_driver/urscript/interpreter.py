@@ -21,19 +21,25 @@ from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from ur_cartesian_driver.urscript import syntax as tree
-from ur_cartesian_driver.urscript.closures import Procedure, ProgramHalted, Steps, too_deep, UNSET
+from ur_cartesian_driver.urscript.closures import (
+    CompiledFunction,
+    ProgramHalted,
+    recursion_error,
+    ScriptSteps,
+    UNSET,
+)
 from ur_cartesian_driver.urscript.compiler import compile_program
 from ur_cartesian_driver.urscript.errors import CompileError, RuntimeException
-from ur_cartesian_driver.urscript.lines import Lines
+from ur_cartesian_driver.urscript.lines import LineCompiler
 from ur_cartesian_driver.urscript.scopes import Builtin, resolve
 from ur_cartesian_driver.urscript.values import ThreadHandle, Value
 
-TOO_MUCH_TIME = (
+BUDGET_EXCEEDED = (
     'The program used too much time without instructing the robot what to do. '
     'Consider using a Wait or sync() in the loop.'
 )
 #: The manual names no limit; threads that start threads would soon take all time and memory.
-MOST_THREADS = 256
+MAX_THREADS = 256
 
 
 class _ThreadKilled(BaseException):
@@ -45,7 +51,7 @@ class _Thread:
     """A thread of the program; number 0 is the main thread."""
 
     number: int
-    steps: Steps
+    steps: ScriptSteps
     parent: _Thread | None
     depth: int = 0
     location: tuple[int, int] = (0, 0)
@@ -59,7 +65,7 @@ class _Thread:
         return thread is other
 
 
-class Machine:
+class ScriptInterpreter:
     """
     Runs one program; the controller calls `step` once per frame.
 
@@ -73,7 +79,7 @@ class Machine:
 
     def __init__(
         self,
-        program: tree.Program,
+        program: tree.ScriptProgram,
         builtins: Mapping[str, Builtin],
         *,
         instruction_budget: int = 100_000,
@@ -93,7 +99,7 @@ class Machine:
             scope = resolve(program, builtins)
             self._global_names = scope.globals
             self.globals: list[Any] = [UNSET] * len(scope.globals)
-            procedures: dict[int, Procedure] = {}
+            procedures: dict[int, CompiledFunction] = {}
             main = compile_program(scope, builtins, self, procedures)
         except RecursionError:
             text = f'syntax_error_on_line:{program.line}:{program.name}:'
@@ -103,7 +109,7 @@ class Machine:
         #: How many threads there have been; the next one gets this number.
         self.threads_started = 1
         #: Compiles lines that the program is given while it runs.
-        self.lines = Lines(scope, procedures, builtins, self)
+        self.lines = LineCompiler(scope, procedures, builtins, self)
 
     @property
     def running(self) -> bool:
@@ -180,7 +186,7 @@ class Machine:
         except RuntimeException as error:
             self.error, self._halted = error, True
         except RecursionError:
-            self.error, self._halted = too_deep(*thread.location), True
+            self.error, self._halted = recursion_error(*thread.location), True
         finally:
             self._current = None
         if ended:
@@ -201,16 +207,16 @@ class Machine:
 
     # What compiled code calls
 
-    def exhausted(self, line: int, column: int) -> NoReturn:
+    def raise_budget_exceeded(self, line: int, column: int) -> NoReturn:
         """Raise, because the thread used up its frame without yielding."""
-        raise RuntimeException(TOO_MUCH_TIME, line, column)
+        raise RuntimeException(BUDGET_EXCEEDED, line, column)
 
-    def spawn(self, procedure: Procedure) -> ThreadHandle:
+    def spawn(self, procedure: CompiledFunction) -> ThreadHandle:
         """Start a thread; it runs in this frame, after all that were started before."""
         if self._is_secondary:
             raise RuntimeException('A secondary program cannot start threads.')
-        if len(self._threads) >= MOST_THREADS:
-            raise RuntimeException(f'More than {MOST_THREADS} threads run at once.')
+        if len(self._threads) >= MAX_THREADS:
+            raise RuntimeException(f'More than {MAX_THREADS} threads run at once.')
         thread = _Thread(self.threads_started, procedure.steps(), self.thread)
         self.threads_started += 1
         self._threads.append(thread)
@@ -225,11 +231,11 @@ class Machine:
         target = self._find(handle)
         if target is None:
             return
-        doomed = [thread for thread in self._threads if thread.descends_from(target)]
-        for thread in doomed:
+        threads_to_kill = [thread for thread in self._threads if thread.descends_from(target)]
+        for thread in threads_to_kill:
             if thread.alive and thread is not self._current:
                 self._end(thread)
-        if self._current in doomed:
+        if self._current in threads_to_kill:
             raise _ThreadKilled
 
     def kill_since(self, number: int) -> None:

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ur_cartesian_driver.urscript import syntax as tree
-from ur_cartesian_driver.urscript.closures import Procedure, Runtime, Steps, UNSET
+from ur_cartesian_driver.urscript.closures import CompiledFunction, Runtime, ScriptSteps, UNSET
 from ur_cartesian_driver.urscript.compiler import compile_program
 from ur_cartesian_driver.urscript.errors import CompileError
 from ur_cartesian_driver.urscript.parser import parse_line
@@ -22,21 +22,21 @@ from ur_cartesian_driver.urscript.scopes import Builtin, resolve, Scope
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class CompiledLine:
     """A line that can be run in a thread of the program, once."""
 
-    steps: Steps
+    steps: ScriptSteps
     #: Names of the functions that it calls by itself, not within a function that it defines.
     calls: frozenset[str]
 
 
-class Lines:
+class LineCompiler:
     """Compiles the lines of one program and knows what they have made."""
 
     def __init__(
         self,
         program: Scope,
-        procedures: dict[int, Procedure],
+        procedures: dict[int, CompiledFunction],
         builtins: Mapping[str, Builtin],
         runtime: Runtime,
     ) -> None:
@@ -61,7 +61,7 @@ class Lines:
         self._procedures = dict(self._of_program)
         del self._runtime.globals[self._slots :]
 
-    def compile(self, text: str) -> Line:
+    def compile(self, text: str) -> CompiledLine:
         """
         Compile a line; nothing of it has run, but its functions are known from now on.
 
@@ -69,7 +69,7 @@ class Lines:
         """
         program = parse_line(text)
         try:
-            scope = resolve(program, self._builtins, around=self._scope)
+            scope = resolve(program, self._builtins, enclosing=self._scope)
             procedure = compile_program(scope, self._builtins, self._runtime, self._procedures)
         except RecursionError:
             raise CompileError(1, 1, 'syntax_error_on_line:1:', 'nested too deeply') from None
@@ -80,6 +80,6 @@ class Lines:
         calls = frozenset(
             node.call.function
             for node in program.body
-            if isinstance(node, tree.CallStatement) and isinstance(node.call, tree.Call)
+            if isinstance(node, tree.CallStatement) and isinstance(node.call, tree.CallExpression)
         )
-        return Line(procedure.steps(), calls)
+        return CompiledLine(procedure.steps(), calls)

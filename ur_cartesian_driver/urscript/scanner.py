@@ -35,7 +35,7 @@ _WORD = re.compile(r'[A-Za-z_][A-Za-z_0-9]*')
 _STRING = re.compile(r'"([^"\n]*)"')
 
 
-class Kind(Enum):
+class TokenKind(Enum):
     """What a token is."""
 
     NAME = 'name'
@@ -49,7 +49,7 @@ class Kind(Enum):
 class Token(NamedTuple):
     """A word of the text; `text` of a string is what stands between the quotes."""
 
-    kind: Kind
+    kind: TokenKind
     text: str
     line: int
     column: int
@@ -89,26 +89,26 @@ def _scan(text: str) -> Iterator[Token]:
                 line_start = text.rindex('\n', blank.start(), position) + 1
         column = position - line_start + 1
         if position == len(text):
-            yield Token(Kind.END, '', line, column)
+            yield Token(TokenKind.END, '', line, column)
             return
         kind, word, position = _token(text, position, line, column)
         yield Token(kind, word, line, column)
 
 
-def _token(text: str, start: int, line: int, column: int) -> tuple[Kind, str, int]:
+def _token(text: str, start: int, line: int, column: int) -> tuple[TokenKind, str, int]:
     """Return kind and text of the token at `start`, and where it ends."""
     if word := _WORD.match(text, start):
-        kind = Kind.KEYWORD if word.group() in KEYWORDS else Kind.NAME
+        kind = TokenKind.KEYWORD if word.group() in KEYWORDS else TokenKind.NAME
         return kind, word.group(), word.end()
     if number := _NUMBER.match(text, start):
         if _WORD.match(text, number.end()):
             raise syntax_error(text, line, column, 'a number ends in letters')
-        return Kind.NUMBER, number.group(), number.end()
+        return TokenKind.NUMBER, number.group(), number.end()
     if string := _STRING.match(text, start):
-        return Kind.STRING, string.group(1), string.end()
+        return TokenKind.STRING, string.group(1), string.end()
     for symbol in SYMBOLS:
         if text.startswith(symbol, start):
-            return Kind.SYMBOL, symbol, start + len(symbol)
+            return TokenKind.SYMBOL, symbol, start + len(symbol)
     if text[start] == '"':
         raise syntax_error(text, line, column, 'a string is not closed on its line')
     raise syntax_error(text, line, column, f'{text[start]!r} has no meaning here')

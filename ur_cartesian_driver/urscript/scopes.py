@@ -35,7 +35,7 @@ class Scope:
     """The names of one function, or (without a parent) of the program's body."""
 
     parent: Scope | None
-    owner: tree.Function | tree.Program
+    owner: tree.FunctionDefinition | tree.ScriptProgram
     globals: dict[str, int]
     locals: dict[str, int] = field(default_factory=dict)
     functions: dict[str, Scope] = field(default_factory=dict)
@@ -44,12 +44,12 @@ class Scope:
     suspends: bool = False
 
     @property
-    def definition(self) -> tree.Function | None:
+    def definition(self) -> tree.FunctionDefinition | None:
         """The function or thread; None for the body of the program."""
-        return self.owner if isinstance(self.owner, tree.Function) else None
+        return self.owner if isinstance(self.owner, tree.FunctionDefinition) else None
 
     @property
-    def body(self) -> tree.Block:
+    def body(self) -> tree.StatementBlock:
         """The statements."""
         return self.owner.body
 
@@ -70,7 +70,7 @@ class Scope:
 
 
 def resolve(
-    program: tree.Program, builtins: Mapping[str, Builtin], around: Scope | None = None
+    program: tree.ScriptProgram, builtins: Mapping[str, Builtin], enclosing: Scope | None = None
 ) -> Scope:
     """
     Check a program and return the scope of its body.
@@ -78,35 +78,39 @@ def resolve(
     :param around: of a program that this one is a later part of; it stays as it is.
     :raises CompileError: an unknown name or a call that does not fit, the first in the text.
     """
-    root = Scope(parent=around, owner=program, globals=dict(around.globals) if around else {})
+    root = Scope(
+        parent=enclosing, owner=program, globals=dict(enclosing.globals) if enclosing else {}
+    )
     _declare(root)
     for scope in root.walk():
         _assign_locals(scope)
-    _Check(builtins).block(root, program.body)
-    _spread_suspension(list(root.walk()))
+    _NameChecker(builtins).block(root, program.body)
+    _propagate_suspension(list(root.walk()))
     return root
 
 
-def _own_nodes(nodes: Iterable[tree.Node]) -> Iterator[tree.Node]:
+def _own_nodes(nodes: Iterable[tree.SyntaxNode]) -> Iterator[tree.SyntaxNode]:
     """Yield all nodes below, without entering function definitions."""
     for node in nodes:
         yield node
-        if not isinstance(node, tree.Function):
+        if not isinstance(node, tree.FunctionDefinition):
             yield from _own_nodes(tree.children(node))
 
 
 def _declare(scope: Scope) -> None:
     """Collect functions and globals of a scope and of all within it."""
     for node in _own_nodes(scope.body):
-        if isinstance(node, tree.Function):
+        if isinstance(node, tree.FunctionDefinition):
             inner = Scope(parent=scope, owner=node, globals=scope.globals)
             scope.functions[node.name] = inner
             _declare(inner)
-        elif isinstance(node, tree.Assign) and isinstance(node.target, tree.Name):
+        elif isinstance(node, tree.AssignStatement) and isinstance(
+            node.target, tree.NameExpression
+        ):
             _declare_global(scope, node, node.target.identifier)
 
 
-def _declare_global(scope: Scope, node: tree.Assign, name: str) -> None:
+def _declare_global(scope: Scope, node: tree.AssignStatement, name: str) -> None:
     if scope.definition is None or node.qualifier == 'global':
         scope.globals.setdefault(name, len(scope.globals))
 
@@ -117,7 +121,7 @@ def _assign_locals(scope: Scope) -> None:
         return
     names = [parameter.name for parameter in scope.definition.parameters]
     for node in _own_nodes(scope.body):
-        if isinstance(node, tree.Assign) and isinstance(node.target, tree.Name):
+        if isinstance(node, tree.AssignStatement) and isinstance(node.target, tree.NameExpression):
             name = node.target.identifier
             if node.qualifier == 'local' or (not node.qualifier and name not in scope.globals):
                 names.append(name)
@@ -125,7 +129,7 @@ def _assign_locals(scope: Scope) -> None:
         scope.locals.setdefault(name, len(scope.locals) + FIRST_LOCAL)
 
 
-def _spread_suspension(scopes: list[Scope]) -> None:
+def _propagate_suspension(scopes: list[Scope]) -> None:
     """Mark every function that calls one that takes time."""
     changed = True
     while changed:
@@ -142,64 +146,68 @@ def _signature(function: Builtin) -> inspect.Signature | None:
         return None
 
 
-def bind(definition: tree.Function, call: tree.Call) -> dict[str, tree.Argument]:
+def bind(
+    definition: tree.FunctionDefinition, call: tree.CallExpression
+) -> dict[str, tree.CallArgument]:
     """
     Match the arguments of a call with the parameters of a function of the program.
 
     :raises CompileError: too many, unknown, doubled or missing arguments.
     """
     parameters = [parameter.name for parameter in definition.parameters]
-    bound: dict[str, tree.Argument] = {}
+    bound: dict[str, tree.CallArgument] = {}
     for number, argument in enumerate(call.arguments):
         if argument.name is None and number >= len(parameters):
-            raise wrong_call(call, f'it takes at most {len(parameters)} arguments')
+            raise call_error(call, f'it takes at most {len(parameters)} arguments')
         name = argument.name or parameters[number]
         if name not in parameters:
-            raise wrong_call(call, f'it has no parameter {name!r}')
+            raise call_error(call, f'it has no parameter {name!r}')
         if name in bound:
-            raise wrong_call(call, f'the argument {name!r} is given twice')
+            raise call_error(call, f'the argument {name!r} is given twice')
         bound[name] = argument
     for parameter in definition.parameters:
         if parameter.default is None and parameter.name not in bound:
-            raise wrong_call(call, f'the argument {parameter.name!r} is missing')
+            raise call_error(call, f'the argument {parameter.name!r} is missing')
     return bound
 
 
-class _Check:
+class _NameChecker:
     """Walks the program in the order of the text."""
 
     def __init__(self, builtins: Mapping[str, Builtin]) -> None:
         self._builtins = builtins
 
-    def block(self, scope: Scope, nodes: Iterable[tree.Node]) -> None:
+    def block(self, scope: Scope, nodes: Iterable[tree.SyntaxNode]) -> None:
         """Check nodes and everything below them."""
         for node in nodes:
-            if isinstance(node, tree.Function):
+            if isinstance(node, tree.FunctionDefinition):
                 self._function(scope, node)
                 continue
-            if isinstance(node, tree.Name):
+            if isinstance(node, tree.NameExpression):
                 if node.identifier not in scope.locals and node.identifier not in scope.globals:
                     raise name_not_found(node.identifier, node.line, node.column)
-            elif isinstance(node, tree.Call):
+            elif isinstance(node, tree.CallExpression):
                 self._call(scope, node)
-            elif isinstance(node, tree.Run):
+            elif isinstance(node, tree.RunExpression):
                 self._run(scope, node)
-            elif isinstance(node, tree.Join | tree.Pause | tree.MethodCall):
+            elif isinstance(
+                node, tree.JoinStatement | tree.PauseStatement | tree.MethodCallExpression
+            ):
                 scope.suspends = True
             self.block(scope, tree.children(node))
 
-    def _function(self, scope: Scope, definition: tree.Function) -> None:
+    def _function(self, scope: Scope, definition: tree.FunctionDefinition) -> None:
         inner = scope.functions[definition.name]
         if inner.definition is not definition:  # replaced by a later one of the same name
             return
         self.block(inner, definition.parameters)
         self.block(inner, definition.body)
 
-    def _call(self, scope: Scope, call: tree.Call) -> None:
+    def _call(self, scope: Scope, call: tree.CallExpression) -> None:
         callee = scope.function(call.function)
         if callee is not None and callee.definition is not None:
             if callee.definition.kind == 'thread':
-                raise wrong_call(call, 'a thread is started by run')
+                raise call_error(call, 'a thread is started by run')
             scope.calls.append(callee)
             bind(callee.definition, call)
         elif call.function in self._builtins:
@@ -211,24 +219,24 @@ class _Check:
             raise name_not_found(call.function, call.line, call.column)
 
     @staticmethod
-    def _run(scope: Scope, run: tree.Run) -> None:
+    def _run(scope: Scope, run: tree.RunExpression) -> None:
         callee = scope.function(run.thread)
         if callee is None or callee.definition is None or callee.definition.kind != 'thread':
             raise name_not_found(run.thread, run.line, run.column)
 
 
-def _check_arguments(call: tree.Call, signature: inspect.Signature) -> None:
+def _check_arguments(call: tree.CallExpression, signature: inspect.Signature) -> None:
     positional = [argument for argument in call.arguments if argument.name is None]
     named = [argument.name for argument in call.arguments if argument.name is not None]
     if len(set(named)) != len(named):
-        raise wrong_call(call, 'an argument is named twice')
+        raise call_error(call, 'an argument is named twice')
     try:
         signature.bind(*positional, **dict.fromkeys(named))
     except TypeError as error:
-        raise wrong_call(call, str(error)) from None
+        raise call_error(call, str(error)) from None
 
 
-def wrong_call(call: tree.Call, reason: str) -> CompileError:
+def call_error(call: tree.CallExpression, reason: str) -> CompileError:
     """Return the error for a call whose arguments do not fit the function."""
     text = f'compile_error_wrong_arguments:{call.function}:'
     return CompileError(call.line, call.column, text, reason)

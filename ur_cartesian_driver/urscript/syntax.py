@@ -15,40 +15,40 @@ from typing import Literal as OneOf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Node:
+class SyntaxNode:
     """Anything that stands at a place in the text."""
 
     line: int
     column: int
 
 
-class Expression(Node):
+class Expression(SyntaxNode):
     """A node that has a value."""
 
     __slots__ = ()
 
 
-class Statement(Node):
+class Statement(SyntaxNode):
     """A node that does something."""
 
     __slots__ = ()
 
 
-Block = tuple[Statement, ...]
+StatementBlock = tuple[Statement, ...]
 
 
 # Expressions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Constant(Expression):
+class ConstantExpression(Expression):
     """A number, a string, True, False or None."""
 
     value: int | float | str | bool | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Name(Expression):
+class NameExpression(Expression):
     """A variable that is read, or assigned to when it is a target."""
 
     identifier: str
@@ -69,7 +69,7 @@ class PoseLiteral(Expression):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Unary(Expression):
+class UnaryExpression(Expression):
     """`-a`, `+a`, `not a`."""
 
     operator: str
@@ -77,7 +77,7 @@ class Unary(Expression):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Binary(Expression):
+class BinaryExpression(Expression):
     """Arithmetic or a comparison; both operands are always evaluated."""
 
     operator: str
@@ -86,7 +86,7 @@ class Binary(Expression):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Logical(Expression):
+class LogicalExpression(Expression):
     """`and`, `or`, `xor`: the first two evaluate the right side only where it matters."""
 
     operator: str
@@ -95,7 +95,7 @@ class Logical(Expression):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Argument(Node):
+class CallArgument(SyntaxNode):
     """One argument of a call; `name` is None for a positional one."""
 
     name: str | None
@@ -103,31 +103,31 @@ class Argument(Node):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Call(Expression):
+class CallExpression(Expression):
     """`name(arguments)`: a function of the program or a builtin."""
 
     function: str
-    arguments: tuple[Argument, ...]
+    arguments: tuple[CallArgument, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MethodCall(Expression):
+class MethodCallExpression(Expression):
     """`target.method(arguments)`, as remote procedure handles have it."""
 
     target: Expression
     method: str
-    arguments: tuple[Argument, ...]
+    arguments: tuple[CallArgument, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Run(Expression):
+class RunExpression(Expression):
     """`run name()`: starts a thread; its value is the handle."""
 
     thread: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Index(Expression):
+class IndexExpression(Expression):
     """`l[i]` or `m[row, column]`."""
 
     target: Expression
@@ -135,7 +135,7 @@ class Index(Expression):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Field(Expression):
+class FieldExpression(Expression):
     """`s.name`."""
 
     target: Expression
@@ -146,10 +146,10 @@ class Field(Expression):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Assign(Statement):
+class AssignStatement(Statement):
     """`target = value`; the target is a name, or a place inside a named variable."""
 
-    target: Name | Index | Field
+    target: NameExpression | IndexExpression | FieldExpression
     value: Expression
     qualifier: OneOf['', 'global', 'local']
 
@@ -162,88 +162,88 @@ class CallStatement(Statement):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Branch(Node):
+class ConditionalBlock(SyntaxNode):
     """A condition (of `if`, `elif`) or a value (of `case`) and what it guards."""
 
     condition: Expression
-    body: Block
+    body: StatementBlock
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class If(Statement):
+class IfStatement(Statement):
     """`if`, any number of `elif`, and `else` (empty when there is none)."""
 
-    branches: tuple[Branch, ...]
-    otherwise: Block
+    branches: tuple[ConditionalBlock, ...]
+    otherwise: StatementBlock
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Switch(Statement):
+class SwitchStatement(Statement):
     """`switch`: the first case that equals the subject runs, without falling through."""
 
     subject: Expression
-    cases: tuple[Branch, ...]
-    otherwise: Block
+    cases: tuple[ConditionalBlock, ...]
+    otherwise: StatementBlock
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class While(Statement):
+class WhileStatement(Statement):
     """A loop."""
 
     condition: Expression
-    body: Block
+    body: StatementBlock
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Break(Statement):
+class BreakStatement(Statement):
     """Leave the innermost loop."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Continue(Statement):
+class ContinueStatement(Statement):
     """Go on with the next turn of the innermost loop."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Return(Statement):
+class ReturnStatement(Statement):
     """Leave the function; without a value it returns None."""
 
     value: Expression | None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Halt(Statement):
+class HaltStatement(Statement):
     """End the whole program."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pause(Statement):
+class PauseStatement(Statement):
     """Pause the whole program until someone resumes it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Join(Statement):
+class JoinStatement(Statement):
     """Wait until a thread has ended."""
 
     handle: Expression
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Kill(Statement):
+class KillStatement(Statement):
     """End a thread and its children."""
 
     handle: Expression
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Critical(Statement):
+class CriticalStatement(Statement):
     """`enter_critical` or `exit_critical`."""
 
     enter: bool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Label(Statement):
+class LabelStatement(Statement):
     """`$ 12 "text"`: where a PolyScope program stands; no effect."""
 
     number: int
@@ -251,7 +251,7 @@ class Label(Statement):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Parameter(Node):
+class FunctionParameter(SyntaxNode):
     """A parameter of a function, with its default if it has one."""
 
     name: str
@@ -259,29 +259,29 @@ class Parameter(Node):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Function(Statement):
+class FunctionDefinition(Statement):
     """A `def` or a `thread`."""
 
     name: str
     kind: OneOf['def', 'thread']
-    parameters: tuple[Parameter, ...]
-    body: Block
+    parameters: tuple[FunctionParameter, ...]
+    body: StatementBlock
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Program(Node):
+class ScriptProgram(SyntaxNode):
     """What is sent to a controller: `def` (primary) or `sec` (secondary), with its name."""
 
     name: str
     kind: OneOf['def', 'sec']
-    body: Block
+    body: StatementBlock
 
 
-def children(node: Node) -> Iterator[Node]:
+def children(node: SyntaxNode) -> Iterator[SyntaxNode]:
     """Yield the nodes directly below `node`, in the order of the text."""
     for field in fields(node):
         value = getattr(node, field.name)
-        if isinstance(value, Node):
+        if isinstance(value, SyntaxNode):
             yield value
         elif isinstance(value, tuple):
             yield from value

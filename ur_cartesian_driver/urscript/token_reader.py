@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import TypedDict, TypeVar
 
 from ur_cartesian_driver.urscript.errors import CompileError
-from ur_cartesian_driver.urscript.scanner import Kind, scan, syntax_error, Token
+from ur_cartesian_driver.urscript.scanner import scan, syntax_error, Token, TokenKind
 
 #: Blocks, brackets and signs inside one another.
 MAX_NESTING = 50
@@ -19,16 +19,16 @@ MAX_CHAIN = 100
 T = TypeVar('T')
 
 
-class Place(TypedDict):
+class SourcePosition(TypedDict):
     """The position arguments of a node."""
 
     line: int
     column: int
 
 
-def place(token: Token) -> Place:
+def source_position(token: Token) -> SourcePosition:
     """Return the position of a token as arguments of a node."""
-    return Place(line=token.line, column=token.column)
+    return SourcePosition(line=token.line, column=token.column)
 
 
 class TokenReader:
@@ -50,13 +50,15 @@ class TokenReader:
 
     def _advance(self) -> Token:
         token = self._token
-        if token.kind is not Kind.END:
+        if token.kind is not TokenKind.END:
             self._next += 1
         return token
 
     def _at(self, *texts: str) -> bool:
         """Tell whether the next token is one of these keywords or symbols."""
-        return self._token.kind in (Kind.KEYWORD, Kind.SYMBOL) and self._token.text in texts
+        return (
+            self._token.kind in (TokenKind.KEYWORD, TokenKind.SYMBOL) and self._token.text in texts
+        )
 
     def _match(self, *texts: str) -> Token | None:
         return self._advance() if self._at(*texts) else None
@@ -66,14 +68,14 @@ class TokenReader:
             raise self.error(f'{text!r} is missing before {self._found()}')
         return self._advance()
 
-    def _expect_kind(self, kind: Kind) -> Token:
+    def _expect_kind(self, kind: TokenKind) -> Token:
         if self._token.kind is not kind:
             raise self.error(f'a {kind.value} is missing before {self._found()}')
         return self._advance()
 
     def _found(self) -> str:
         token = self._token
-        return token.kind.value if token.kind is Kind.END else repr(token.text)
+        return token.kind.value if token.kind is TokenKind.END else repr(token.text)
 
     def _same_line(self) -> bool:
         """Tell whether the next token stands on the line of the one before it."""

@@ -33,7 +33,7 @@ INT_MIN = -(2**31)
 INT_MAX = 2**31 - 1
 
 
-class Pose(NamedTuple):
+class ScriptPose(NamedTuple):
     """A position [m] and a rotation vector [rad]."""
 
     x: float
@@ -86,7 +86,7 @@ def type_name(value: Value) -> str:
     """Return the name of a value's type as a URScript programmer knows it."""
     names: dict[type, str] = {
         int: 'int', float: 'float', bool: 'bool', str: 'string', list: 'list',
-        Pose: 'pose', Matrix: 'matrix', Struct: 'struct', ThreadHandle: 'thread',
+        ScriptPose: 'pose', Matrix: 'matrix', Struct: 'struct', ThreadHandle: 'thread',
         type(None): 'none',
     }  # fmt: skip
     return names.get(type(value), type(value).__name__)
@@ -122,12 +122,12 @@ def make_list(items: Sequence[Value]) -> Value:
     return [copy(item) for item in items] if Struct in kinds else list(items)
 
 
-def make_pose(items: Sequence[Value]) -> Pose:
+def make_pose(items: Sequence[Value]) -> ScriptPose:
     """Return the value of `p[items]`."""
     for item in items:
         if not is_number(item):
             raise RuntimeException(f'Type error: a pose cannot hold {type_name(item)}')
-    return Pose(*(float(item) for item in items))
+    return ScriptPose(*(float(item) for item in items))
 
 
 # Truth and order
@@ -325,7 +325,7 @@ def set_part(container: Value, path: Sequence[Key], value: Value) -> Value:
     if isinstance(key, str):
         _fields(container, key)[key] = value
         return container
-    if type(container) is Pose:
+    if type(container) is ScriptPose:
         items = list(container)
         items[_position(_items(container, key) and key[0], 6)] = value
         return make_pose(items)
@@ -357,7 +357,7 @@ def _fields(container: Value, name: str) -> dict[str, Value]:
 
 
 def _items(container: Value, key: tuple[Value, ...]) -> Value:
-    if type(container) is not list and type(container) is not Pose:
+    if type(container) is not list and type(container) is not ScriptPose:
         raise RuntimeException(f'Type error: {type_name(container)} cannot be indexed')
     if len(key) != 1:
         raise RuntimeException(f'Type error: {type_name(container)} has one index, not two')
@@ -385,7 +385,7 @@ def to_text(value: Value) -> str:
         return _float_text(value)
     if kind is list:
         return f'[{_join(value)}]'
-    if kind is Pose:
+    if kind is ScriptPose:
         return f'p[{_join(value)}]'
     if kind is Matrix:
         return f'[{_join(value.rows)}]'

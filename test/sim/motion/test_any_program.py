@@ -76,7 +76,7 @@ def test_arm_never_jumps_and_comes_to_rest(recorder, program):
             r.step(scale)
             count += 1
             if r.generator.fault is not None:
-                r.generator.halt_hard()
+                r.generator.stop_at_once()
                 r.generator.clear_fault()
                 break
             assert count < 50000

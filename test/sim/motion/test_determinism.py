@@ -6,7 +6,7 @@ from hypothesis import given, Phase, settings
 from hypothesis import strategies as st
 import pytest
 
-from ur_cartesian_driver.protocol.rtde import Ready, RtdeClient
+from ur_cartesian_driver.protocol.rtde import HandshakeDone, RtdeClientCodec
 from ur_cartesian_driver.sim import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.rtde_session import RtdeSession
@@ -44,10 +44,10 @@ def packets(body, changes, cycles=400):
     """Return the bytes that an RTDE client reads while a program runs."""
     controller = Controller(SimulatorConfig())
     session = RtdeSession(controller, set())
-    client = RtdeClient(OUTPUTS, ['speed_slider_mask', 'speed_slider_fraction'])
+    client = RtdeClientCodec(OUTPUTS, ['speed_slider_mask', 'speed_slider_fraction'])
     data, ready = client.start(), []
     while not ready:
-        ready = [e for e in client.feed(session.feed(data)) if isinstance(e, Ready)]
+        ready = [e for e in client.feed(session.feed(data)) if isinstance(e, HandshakeDone)]
         data = client.data_to_send()
     program = ''.join(f'  {line}\n' for line in ('home = get_target_joint_positions()', *body))
     controller.programs.submit(f'def any():\n{program}end\n')
@@ -57,7 +57,7 @@ def packets(body, changes, cycles=400):
             session.feed(ready[0].inputs[0].pack([1, slider[cycle]]))
         controller.step()
         sent += b''.join(session.packages())
-    return sent, list(controller.announcements.log)
+    return sent, list(controller.messages.log)
 
 
 @pytest.mark.slow

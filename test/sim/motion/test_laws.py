@@ -236,13 +236,13 @@ def onwards(g, first, second, one, two):
 def test_blend_starts_and_ends_at_its_radius(recorder, first, second, one, two, radius):
     r = recorder()
     g = r.generator
-    corner, q = waypoint(g, first, one)
+    make_blend, q = waypoint(g, first, one)
     r.run(MOVES[first](g, one, radius))
     entered = len(r.poses)
     r.run(onwards(g, first, second, one, two))
     assume(g.fault is None and not g.warnings)
     assume(np.abs(r.speeds()).max() < 0.99 * pi)
-    away = np.linalg.norm(r.positions - corner.position, axis=1)
+    away = np.linalg.norm(r.positions - make_blend.position, axis=1)
     assume(away[0] > radius and away[-1] > radius)
     fastest = np.linalg.norm(r.tool_speeds(), axis=1).max() * CYCLE
     # The call returns in the last cycle before the border.

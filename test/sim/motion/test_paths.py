@@ -12,13 +12,13 @@ import pytest
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector, rotate
 from ur_cartesian_driver.sim.motion import MotionError
 from ur_cartesian_driver.sim.motion.paths import (
-    Arc,
-    corner,
-    Fillet,
-    head_within,
-    JointLine,
-    Line,
-    tail_within,
+    CircularMovePath,
+    end_within_radius,
+    FilletBlendPath,
+    JointMovePath,
+    LinearMovePath,
+    make_blend,
+    start_within_radius,
 )
 
 numbers = st.floats(-1.0, 1.0)
@@ -33,7 +33,7 @@ def array(pose):
 
 @given(poses, poses, fractions)
 def test_line_is_straight_even_and_turns_the_shortest_way(a, b, f):
-    line = Line(a, b)
+    line = LinearMovePath(a, b)
     assume(line.length > 1e-3)
     place = line.at(f * line.length)
     assert array(place) == pytest.approx((1.0 - f) * array(a) + f * array(b), abs=1e-12)
@@ -43,12 +43,12 @@ def test_line_is_straight_even_and_turns_the_shortest_way(a, b, f):
 
 def test_length_of_a_line_is_the_larger_of_distance_and_angle():
     start = Pose()
-    assert Line(start, Pose.from_rotation_vector((0.3, 0.0, 0.0, 0.1, 0.0, 0.0))).length == (
-        pytest.approx(0.3)
-    )
-    assert Line(start, Pose.from_rotation_vector((0.3, 0.0, 0.0, 0.7, 0.0, 0.0))).length == (
-        pytest.approx(0.7)
-    )
+    assert LinearMovePath(
+        start, Pose.from_rotation_vector((0.3, 0.0, 0.0, 0.1, 0.0, 0.0))
+    ).length == (pytest.approx(0.3))
+    assert LinearMovePath(
+        start, Pose.from_rotation_vector((0.3, 0.0, 0.0, 0.7, 0.0, 0.0))
+    ).length == (pytest.approx(0.7))
 
 
 @given(
@@ -64,7 +64,7 @@ def test_arc_runs_on_the_circle_through_its_points(start, radius, axis, angle, a
     first = Pose(on_circle(0.0), start.quaternion)
     last = Pose(on_circle(angle), frame.quaternion)
     via = on_circle(angle * (0.2 + 0.6 * at))
-    arc = Arc(first, via, last, fixed)
+    arc = CircularMovePath(first, via, last, fixed)
     assert arc.radius == pytest.approx(radius, rel=1e-7)
     assert arc.angle == pytest.approx(angle, rel=1e-7)
     place = arc.at(f * arc.length)
@@ -77,7 +77,7 @@ def test_arc_runs_on_the_circle_through_its_points(start, radius, axis, angle, a
 @given(fractions)
 def test_fixed_arc_keeps_the_orientation_to_the_tangent(f):
     start = Pose((1.0, 0.0, 0.0), quaternion_from_rotation_vector((0.3, -0.2, 0.9)))
-    arc = Arc(start, (0.0, 1.0, 0.0), Pose((-1.0, 0.0, 0.0)), True)
+    arc = CircularMovePath(start, (0.0, 1.0, 0.0), Pose((-1.0, 0.0, 0.0)), True)
     place = arc.at(f * arc.length)
     turn = quaternion_from_rotation_vector((0.0, 0.0, pi * f))
     for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
@@ -88,7 +88,7 @@ def test_fixed_arc_keeps_the_orientation_to_the_tangent(f):
 
 def test_unconstrained_arc_turns_from_start_to_end_whatever_is_at_the_via():
     end = Pose((-1.0, 0.0, 0.0), quaternion_from_rotation_vector((0.0, 0.0, 1.0)))
-    arc = Arc(Pose((1.0, 0.0, 0.0)), (0.0, 1.0, 0.0), end, False)
+    arc = CircularMovePath(Pose((1.0, 0.0, 0.0)), (0.0, 1.0, 0.0), end, False)
     middle = arc.at(0.5 * arc.length)
     assert middle.quaternion == pytest.approx(quaternion_from_rotation_vector((0.0, 0.0, 0.5)))
     assert arc.at(inf) == end
@@ -106,7 +106,7 @@ def test_unconstrained_arc_turns_from_start_to_end_whatever_is_at_the_via():
 )
 def test_points_that_make_no_circle_are_refused(via, end, text):
     with pytest.raises(MotionError, match=text):
-        Arc(Pose(), via, Pose(end), False)
+        CircularMovePath(Pose(), via, Pose(end), False)
 
 
 def two_lines(direction, turn, lengths, rotations=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))):
@@ -119,7 +119,7 @@ def two_lines(direction, turn, lengths, rotations=((0.0, 0.0, 0.0), (0.0, 0.0, 0
         (b * cos(direction + turn), b * sin(direction + turn), 0.0),
         quaternion_from_rotation_vector(rb),
     )
-    return Line(start, Pose()), Line(Pose(), end)
+    return LinearMovePath(start, Pose()), LinearMovePath(Pose(), end)
 
 
 angles = st.floats(0.05, 3.0)
@@ -137,9 +137,9 @@ corners = st.builds(
 @given(corners, st.floats(0.01, 0.09), st.booleans(), fractions)
 def test_corner_is_tangent_to_both_legs_and_stays_inside(legs, radius, circular, f):
     before, after = legs
-    tail, head = tail_within(before, radius), head_within(after, radius)
-    turn = corner(before, tail, after, head, circular)
-    assert isinstance(turn, Fillet) == circular
+    tail, head = end_within_radius(before, radius), start_within_radius(after, radius)
+    turn = make_blend(before, tail, after, head, circular)
+    assert isinstance(turn, FilletBlendPath) == circular
     into = array(before.end) - array(before.start)
     onwards = array(after.end) - array(after.start)
     into, onwards = into / np.linalg.norm(into), onwards / np.linalg.norm(onwards)
@@ -167,7 +167,7 @@ def test_corner_is_tangent_to_both_legs_and_stays_inside(legs, radius, circular,
 @given(angles, st.floats(0.01, 0.09), fractions)
 def test_fillet_is_a_circle_and_evenly_passed(turn, radius, f):
     before, after = two_lines(0.3, turn, (1.0, 1.0))
-    fillet = corner(before, radius, after, radius, True)
+    fillet = make_blend(before, radius, after, radius, True)
     assert np.linalg.norm(array(fillet.at(f)) - np.array(fillet.centre)) == pytest.approx(
         fillet.radius, abs=1e-12
     )
@@ -177,12 +177,12 @@ def test_fillet_is_a_circle_and_evenly_passed(turn, radius, f):
 
 def test_fillet_of_a_right_angle_has_the_blend_radius():
     before, after = two_lines(0.0, pi / 2, (1.0, 1.0))
-    assert corner(before, 0.05, after, 0.05, True).radius == pytest.approx(0.05)
+    assert make_blend(before, 0.05, after, 0.05, True).radius == pytest.approx(0.05)
 
 
 def test_legs_that_go_straight_on_have_no_fillet():
     before, after = two_lines(0.3, 0.0, (1.0, 1.0))
-    assert not isinstance(corner(before, 0.05, after, 0.05, True), Fillet)
+    assert not isinstance(make_blend(before, 0.05, after, 0.05, True), FilletBlendPath)
 
 
 joints = st.tuples(*[numbers] * 6)
@@ -190,8 +190,8 @@ joints = st.tuples(*[numbers] * 6)
 
 @given(joints, joints, st.floats(0.01, 0.1))
 def test_blend_of_a_joint_line_begins_at_the_radius_of_the_tool(arm, a, b, radius):
-    line = JointLine(a, b, arm.forward)
-    tail, head = tail_within(line, radius), head_within(line, radius)
+    line = JointMovePath(a, b, arm.forward)
+    tail, head = end_within_radius(line, radius), start_within_radius(line, radius)
     assume(tail is not None and head is not None)
     assert line.pose(line.length - tail).distance_to(arm.forward(b)) == pytest.approx(
         radius, abs=1e-9
@@ -201,9 +201,9 @@ def test_blend_of_a_joint_line_begins_at_the_radius_of_the_tool(arm, a, b, radiu
 
 @given(joints, joints, joints, fractions)
 def test_corner_of_two_joint_lines_stays_in_their_plane_and_between_them(arm, a, b, c, f):
-    before, after = JointLine(a, b, arm.forward), JointLine(b, c, arm.forward)
+    before, after = JointMovePath(a, b, arm.forward), JointMovePath(b, c, arm.forward)
     assume(min(before.length, after.length) > 0.1)
-    turn = corner(before, 0.05, after, 0.04, False)
+    turn = make_blend(before, 0.05, after, 0.04, False)
     w, p = np.array(b), np.array(turn.at(f))
     into, onwards = w - before.at(before.length - 0.05), np.array(after.at(0.04)) - w
     assert p - w == pytest.approx(-((1.0 - f) ** 2) * into + f * f * onwards, abs=1e-12)
@@ -211,6 +211,6 @@ def test_corner_of_two_joint_lines_stays_in_their_plane_and_between_them(arm, a,
 
 
 def test_leg_that_does_not_leave_the_radius_has_no_border():
-    line = Line(Pose(), Pose((0.05, 0.0, 0.0)))
-    assert head_within(line, 0.05) is None
-    assert tail_within(line, 0.06) is None
+    line = LinearMovePath(Pose(), Pose((0.05, 0.0, 0.0)))
+    assert start_within_radius(line, 0.05) is None
+    assert end_within_radius(line, 0.06) is None

@@ -214,7 +214,7 @@ def test_power_cut_keeps_the_target_where_it_is(recorder):
     move = r.generator.movej((1.5, *HOME[1:]))
     r.step(times=300)
     q = r.generator.q
-    r.generator.halt_hard()
+    r.generator.stop_at_once()
     assert r.generator.q == q
     assert r.generator.qd == STILL
     assert move.aborted

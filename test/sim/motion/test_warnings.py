@@ -107,7 +107,7 @@ def test_joint_motion_keeps_the_limit_of_the_tool_speed(recorder, way, limit, na
 
 
 def test_warnings_reach_the_clients_of_the_primary_interface(bench):
-    messages = bench.controller.announcements.pending
+    messages = bench.controller.messages.pending
     messages.clear()
     log = bench.run("""
 pose = get_target_tcp_pose()

@@ -26,7 +26,7 @@ from ur_cartesian_driver.sim.builtins.motion import ModeBuiltins, MotionBuiltins
 from ur_cartesian_driver.sim.builtins.poses import PoseBuiltins
 from ur_cartesian_driver.sim.builtins.process import PathOffsetBuiltins, ProcessBuiltins
 from ur_cartesian_driver.sim.builtins.sockets import SocketBuiltins
-from ur_cartesian_driver.sim.builtins.state import PeopleBuiltins, RobotBuiltins, TimeBuiltins
+from ur_cartesian_driver.sim.builtins.state import PendantBuiltins, RobotBuiltins, TimeBuiltins
 from ur_cartesian_driver.urscript import core_builtins
 from ur_cartesian_driver.urscript.errors import RuntimeException
 
@@ -36,21 +36,21 @@ if TYPE_CHECKING:
 Builtins = Mapping[str, Any]
 
 
-def builtins_of(controller: Controller) -> Builtins:
+def controller_builtins(controller: Controller) -> Builtins:
     """Return all functions of a primary program."""
     groups = (
-        DigitalBuiltins(controller.signals),
-        AnalogBuiltins(controller.signals),
-        RegisterBuiltins(controller.signals),
+        DigitalBuiltins(controller.io),
+        AnalogBuiltins(controller.io),
+        RegisterBuiltins(controller.io),
         KinematicsBuiltins(controller),
         ModeBuiltins(controller),
         MotionBuiltins(controller),
         PathOffsetBuiltins(controller),
-        PortBuiltins(controller.signals),
+        PortBuiltins(controller.io),
         PoseBuiltins(),
         ProcessBuiltins(controller),
         SocketBuiltins(controller.sockets, lambda: controller.time),
-        PeopleBuiltins(controller),
+        PendantBuiltins(controller),
         RobotBuiltins(controller),
         TimeBuiltins(controller),
     )
@@ -60,15 +60,17 @@ def builtins_of(controller: Controller) -> Builtins:
     return found
 
 
-def timeless(builtins: Builtins) -> Builtins:
+def refuse_timed_functions(builtins: Builtins) -> Builtins:
     """Return the functions of a secondary program: what takes time raises."""
     return {
-        name: _refusing(name, function) if inspect.isgeneratorfunction(function) else function
+        name: _refusing_function(name, function)
+        if inspect.isgeneratorfunction(function)
+        else function
         for name, function in builtins.items()
     }
 
 
-def _refusing(name: str, function: Any) -> Any:
+def _refusing_function(name: str, function: Any) -> Any:
     @functools.wraps(function)
     def refuse(*arguments: Any, **named: Any) -> None:
         raise RuntimeException(f'{name} takes time, which a secondary program does not have.')

@@ -9,8 +9,7 @@ from typing import Any
 
 from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.urscript.errors import RuntimeException
-from ur_cartesian_driver.urscript.values import is_number, type_name, Value
-from ur_cartesian_driver.urscript.values import Pose as ScriptPose
+from ur_cartesian_driver.urscript.values import is_number, ScriptPose, type_name, Value
 
 
 def number(value: Value, name: str) -> float:

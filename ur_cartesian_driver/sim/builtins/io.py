@@ -5,7 +5,13 @@
 from __future__ import annotations
 
 from ur_cartesian_driver.sim.builtins.arguments import index, number, whole
-from ur_cartesian_driver.sim.signals import BITS, FLOATS, INTEGERS, PORTS, Signals
+from ur_cartesian_driver.sim.state.controller_io import (
+    ControllerIo,
+    PORTS,
+    REGISTER_BITS,
+    REGISTER_FLOATS,
+    REGISTER_INTEGERS,
+)
 from ur_cartesian_driver.urscript.errors import RuntimeException
 from ur_cartesian_driver.urscript.values import INT_MAX, INT_MIN, truth, Value
 
@@ -13,21 +19,21 @@ from ur_cartesian_driver.urscript.values import INT_MAX, INT_MIN, truth, Value
 class DigitalBuiltins:
     """Digital inputs and outputs, and flags."""
 
-    def __init__(self, signals: Signals) -> None:
+    def __init__(self, io: ControllerIo) -> None:
         """Work on these signals."""
-        self._signals = signals
+        self._io = io
 
     def set_standard_digital_out(self, n: Value, b: Value) -> None:
         """Set one of 8."""
-        self._signals.digital_out.standard[index(n, 'n', 8)] = truth(b)
+        self._io.digital_out.standard[index(n, 'n', 8)] = truth(b)
 
     def set_configurable_digital_out(self, n: Value, b: Value) -> None:
         """Set one of 8."""
-        self._signals.digital_out.configurable[index(n, 'n', 8)] = truth(b)
+        self._io.digital_out.configurable[index(n, 'n', 8)] = truth(b)
 
     def set_tool_digital_out(self, n: Value, b: Value) -> None:
         """Set one of 2."""
-        self._signals.digital_out.tool[index(n, 'n', 2)] = truth(b)
+        self._io.digital_out.tool[index(n, 'n', 2)] = truth(b)
 
     def set_digital_out(self, n: Value, b: Value) -> None:
         """Set standard 0-7, or tool 0-1 as 8-9: the old numbering."""
@@ -39,57 +45,57 @@ class DigitalBuiltins:
 
     def get_standard_digital_out(self, n: Value) -> bool:
         """Read one of 8."""
-        return self._signals.digital_out.standard[index(n, 'n', 8)]
+        return self._io.digital_out.standard[index(n, 'n', 8)]
 
     def get_configurable_digital_out(self, n: Value) -> bool:
         """Read one of 8."""
-        return self._signals.digital_out.configurable[index(n, 'n', 8)]
+        return self._io.digital_out.configurable[index(n, 'n', 8)]
 
     def get_tool_digital_out(self, n: Value) -> bool:
         """Read one of 2."""
-        return self._signals.digital_out.tool[index(n, 'n', 2)]
+        return self._io.digital_out.tool[index(n, 'n', 2)]
 
     def get_digital_out(self, n: Value) -> bool:
         """Read with the old numbering."""
-        outputs = self._signals.digital_out
+        outputs = self._io.digital_out
         return (outputs.standard + outputs.tool)[index(n, 'n', 10)]
 
     def get_standard_digital_in(self, n: Value) -> bool:
         """Read one of 8."""
-        return self._signals.digital_in.standard[index(n, 'n', 8)]
+        return self._io.digital_in.standard[index(n, 'n', 8)]
 
     def get_configurable_digital_in(self, n: Value) -> bool:
         """Read one of 8."""
-        return self._signals.digital_in.configurable[index(n, 'n', 8)]
+        return self._io.digital_in.configurable[index(n, 'n', 8)]
 
     def get_tool_digital_in(self, n: Value) -> bool:
         """Read one of 2."""
-        return self._signals.digital_in.tool[index(n, 'n', 2)]
+        return self._io.digital_in.tool[index(n, 'n', 2)]
 
     def get_digital_in(self, n: Value) -> bool:
         """Read with the old numbering."""
-        inputs = self._signals.digital_in
+        inputs = self._io.digital_in
         return (inputs.standard + inputs.tool)[index(n, 'n', 10)]
 
     def set_flag(self, n: Value, b: Value) -> None:
         """Set one of 32 flags, which survive the program."""
-        self._signals.flags[index(n, 'n', 32)] = truth(b)
+        self._io.flags[index(n, 'n', 32)] = truth(b)
 
     def get_flag(self, n: Value) -> bool:
         """Read a flag."""
-        return self._signals.flags[index(n, 'n', 32)]
+        return self._io.flags[index(n, 'n', 32)]
 
 
 class AnalogBuiltins:
     """Analog inputs and outputs and the tool's supply."""
 
-    def __init__(self, signals: Signals) -> None:
+    def __init__(self, io: ControllerIo) -> None:
         """Work on these signals."""
-        self._signals = signals
+        self._io = io
 
     def set_standard_analog_out(self, n: Value, f: Value) -> None:
         """Set to a fraction 0..1 of the range."""
-        self._signals.set_analog_out(index(n, 'n', 2), number(f, 'f'))
+        self._io.set_analog_out(index(n, 'n', 2), number(f, 'f'))
 
     def set_analog_out(self, n: Value, f: Value) -> None:
         """Do as `set_standard_analog_out`: the old name."""
@@ -97,7 +103,7 @@ class AnalogBuiltins:
 
     def get_standard_analog_out(self, n: Value) -> float:
         """Read [V or A]."""
-        return self._signals.analog_out[index(n, 'n', 2)]
+        return self._io.analog_out[index(n, 'n', 2)]
 
     def get_analog_out(self, n: Value) -> float:
         """Read [V or A]: the old name."""
@@ -105,30 +111,30 @@ class AnalogBuiltins:
 
     def get_standard_analog_in(self, n: Value) -> float:
         """Read [V or A]."""
-        return self._signals.analog_in[index(n, 'n', 2)]
+        return self._io.analog_in[index(n, 'n', 2)]
 
     def get_tool_analog_in(self, n: Value) -> float:
         """Read [V or A]."""
-        return self._signals.tool_analog_in[index(n, 'n', 2)]
+        return self._io.tool_analog_in[index(n, 'n', 2)]
 
     def get_analog_in(self, n: Value) -> float:
         """Read standard 0-1, or tool 0-1 as 2-3: the old numbering."""
-        return (self._signals.analog_in + self._signals.tool_analog_in)[index(n, 'n', 4)]
+        return (self._io.analog_in + self._io.tool_analog_in)[index(n, 'n', 4)]
 
     def set_analog_outputdomain(self, port: Value, domain: Value) -> None:
         """Choose 0 = current, 1 = voltage."""
-        self._signals.analog_out_voltage[index(port, 'port', 2)] = bool(whole(domain, 'domain'))
+        self._io.analog_out_voltage[index(port, 'port', 2)] = bool(whole(domain, 'domain'))
 
     def set_standard_analog_input_domain(self, port: Value, domain: Value) -> None:
         """Choose 0 = current, 1 = voltage."""
-        self._signals.analog_in_voltage[index(port, 'port', 2)] = bool(whole(domain, 'domain'))
+        self._io.analog_in_voltage[index(port, 'port', 2)] = bool(whole(domain, 'domain'))
 
     def set_tool_voltage(self, voltage: Value) -> None:
         """Set the tool's supply to 0, 12 or 24 V; a float will do."""
         volts = whole(voltage, 'voltage')
         if volts not in (0, 12, 24):
             raise RuntimeException(f'voltage is {volts}; it must be 0, 12 or 24')
-        self._signals.tool_voltage = volts
+        self._io.tool_voltage = volts
 
     def set_tool_communication(
         self,
@@ -145,71 +151,69 @@ class AnalogBuiltins:
 class PortBuiltins:
     """Ports: on a robot Modbus clients see them, here they are memory that survives programs."""
 
-    def __init__(self, signals: Signals) -> None:
+    def __init__(self, io: ControllerIo) -> None:
         """Work on these signals."""
-        self._signals = signals
+        self._io = io
 
     def read_port_bit(self, address: Value) -> bool:
         """Read one of 256."""
-        return self._signals.port_bits[index(address, 'address', PORTS)]
+        return self._io.port_bits[index(address, 'address', PORTS)]
 
     def read_port_register(self, address: Value) -> int:
         """Read one of 256."""
-        return self._signals.port_registers[index(address, 'address', PORTS)]
+        return self._io.port_registers[index(address, 'address', PORTS)]
 
     def write_port_bit(self, address: Value, value: Value) -> None:
         """Write one of 256."""
-        self._signals.port_bits[index(address, 'address', PORTS)] = truth(value)
+        self._io.port_bits[index(address, 'address', PORTS)] = truth(value)
 
     def write_port_register(self, address: Value, value: Value) -> None:
         """Write one of 256, with 16 bits each."""
-        self._signals.port_registers[index(address, 'address', PORTS)] = index(
-            value, 'value', 2**16
-        )
+        self._io.port_registers[index(address, 'address', PORTS)] = index(value, 'value', 2**16)
 
 
 class RegisterBuiltins:
     """General purpose registers: what RTDE clients write is read-only here."""
 
-    def __init__(self, signals: Signals) -> None:
+    def __init__(self, io: ControllerIo) -> None:
         """Work on these signals."""
-        self._in, self._out = signals.inputs, signals.outputs
+        self._in, self._out = io.inputs, io.outputs
 
     def read_input_boolean_register(self, address: Value) -> bool:
         """Read one of 128."""
-        return self._in.bits[index(address, 'address', BITS)]
+        return self._in.bits[index(address, 'address', REGISTER_BITS)]
 
     def read_input_integer_register(self, address: Value) -> int:
         """Read one of 48."""
-        return self._in.integers[index(address, 'address', INTEGERS)]
+        return self._in.integers[index(address, 'address', REGISTER_INTEGERS)]
 
     def read_input_float_register(self, address: Value) -> float:
         """Read one of 48."""
-        return self._in.floats[index(address, 'address', FLOATS)]
+        return self._in.floats[index(address, 'address', REGISTER_FLOATS)]
 
     def read_output_boolean_register(self, address: Value) -> bool:
         """Read one of 128."""
-        return self._out.bits[index(address, 'address', BITS)]
+        return self._out.bits[index(address, 'address', REGISTER_BITS)]
 
     def read_output_integer_register(self, address: Value) -> int:
         """Read one of 48."""
-        return self._out.integers[index(address, 'address', INTEGERS)]
+        return self._out.integers[index(address, 'address', REGISTER_INTEGERS)]
 
     def read_output_float_register(self, address: Value) -> float:
         """Read one of 48."""
-        return self._out.floats[index(address, 'address', FLOATS)]
+        return self._out.floats[index(address, 'address', REGISTER_FLOATS)]
 
     def write_output_boolean_register(self, address: Value, value: Value) -> None:
         """Write one of 128."""
-        self._out.bits[index(address, 'address', BITS)] = truth(value)
+        self._out.bits[index(address, 'address', REGISTER_BITS)] = truth(value)
 
     def write_output_integer_register(self, address: Value, value: Value) -> None:
         """Write one of 48."""
         number_ = whole(value, 'value')
         if not INT_MIN <= number_ <= INT_MAX:
             raise RuntimeException(f'value is {number_}; it must fit into 32 bits')
-        self._out.integers[index(address, 'address', INTEGERS)] = number_
+        self._out.integers[index(address, 'address', REGISTER_INTEGERS)] = number_
 
     def write_output_float_register(self, address: Value, value: Value) -> None:
         """Write one of 48."""
-        self._out.floats[index(address, 'address', FLOATS)] = number(value, 'value')
+        self._out.floats[index(address, 'address', REGISTER_FLOATS)] = number(value, 'value')

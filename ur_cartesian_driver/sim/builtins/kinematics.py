@@ -10,8 +10,7 @@ from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector6
 from ur_cartesian_driver.sim.builtins.arguments import is_pose, pose, script_pose, six
 from ur_cartesian_driver.urscript.errors import RuntimeException
-from ur_cartesian_driver.urscript.values import Pose as ScriptPose
-from ur_cartesian_driver.urscript.values import Value
+from ur_cartesian_driver.urscript.values import ScriptPose, Value
 
 if TYPE_CHECKING:
     from ur_cartesian_driver.sim.controller import Controller

@@ -40,15 +40,15 @@ Steps = Generator[None, None, None]
 HARD_STOP = 15.0
 
 
-class HandGuided(Enum):
+class FreedriveState(Enum):
     """Who moves the arm instead of the program's moves."""
 
-    NOBODY = ''
+    OFF = ''
     FREEDRIVE = 'freedrive'
     TEACH = 'teach mode'
 
 
-class Ownership:
+class MotionOwnership:
     """Which thread moves the arm."""
 
     def __init__(self, motion: MotionGenerator) -> None:
@@ -131,9 +131,9 @@ class MotionBuiltins:
 
     def _take(self, waypoint: Pose | None = None) -> None:
         """Own the motion, which leads to a waypoint unless it is a stream."""
-        guided = self._controller.hand_guided
-        if guided is not HandGuided.NOBODY:
-            raise RuntimeException(f'The robot cannot move: it is in {guided.value}.')
+        freedrive = self._controller.freedrive
+        if freedrive is not FreedriveState.OFF:
+            raise RuntimeException(f'The robot cannot move: it is in {freedrive.value}.')
         self._ownership.take(self._controller.programs.current_thread)
         self._controller.waypoint = waypoint
 
@@ -248,10 +248,10 @@ class MotionBuiltins:
     def speedl(self, xd: Value, a: Value, t: Value = None, aRot: Value = 'a') -> Steps:
         """Go to a speed of the tool; return after a time, or when it is reached."""
         twist, acceleration, time = six(xd, 'xd'), positive(a, 'a'), _duration(t)
-        turning = acceleration if aRot == 'a' else positive(aRot, 'aRot')
+        angular_acceleration = acceleration if aRot == 'a' else positive(aRot, 'aRot')
         self._take()
         yield from self._ownership.run(
-            lambda: self._motion.speedl(twist, acceleration, time, turning)
+            lambda: self._motion.speedl(twist, acceleration, time, angular_acceleration)
         )
 
     def stopj(self, a: Value) -> Steps:
@@ -263,9 +263,11 @@ class MotionBuiltins:
     def stopl(self, a: Value, aRot: Value = 'a') -> Steps:
         """Brake the tool on its tangent; return at rest."""
         acceleration = positive(a, 'a')
-        turning = acceleration if aRot == 'a' else positive(aRot, 'aRot')
+        angular_acceleration = acceleration if aRot == 'a' else positive(aRot, 'aRot')
         self._ownership.take(self._controller.programs.current_thread)
-        yield from self._ownership.run(lambda: self._motion.stopl(acceleration, turning))
+        yield from self._ownership.run(
+            lambda: self._motion.stopl(acceleration, angular_acceleration)
+        )
 
     def direct_torque(
         self,
@@ -295,11 +297,11 @@ class ModeBuiltins:
         """Let the arm be moved by hand."""
         if freeAxes is not None:
             six(freeAxes, 'freeAxes')
-        self._controller.hand_guided = HandGuided.FREEDRIVE
+        self._controller.freedrive = FreedriveState.FREEDRIVE
 
     def end_freedrive_mode(self) -> None:
         """End it; harmless when there is none."""
-        self._controller.hand_guided = HandGuided.NOBODY
+        self._controller.freedrive = FreedriveState.OFF
 
     def get_freedrive_status(self) -> int:
         """Return 0, which is normal operation: no hand ever pushes the arm near a singularity."""
@@ -307,11 +309,11 @@ class ModeBuiltins:
 
     def teach_mode(self) -> None:
         """Let the arm be moved by hand."""
-        self._controller.hand_guided = HandGuided.TEACH
+        self._controller.freedrive = FreedriveState.TEACH
 
     def end_teach_mode(self) -> None:
         """End it; harmless when there is none."""
-        self._controller.hand_guided = HandGuided.NOBODY
+        self._controller.freedrive = FreedriveState.OFF
 
     def force_mode(
         self, task_frame: Value, selection_vector: Value, wrench: Value, type: Value, limits: Value

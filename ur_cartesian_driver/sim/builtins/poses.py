@@ -24,8 +24,7 @@ from ur_cartesian_driver.sim.builtins.arguments import (
     three,
 )
 from ur_cartesian_driver.urscript import core_builtins
-from ur_cartesian_driver.urscript.values import Pose as ScriptPose
-from ur_cartesian_driver.urscript.values import Value
+from ur_cartesian_driver.urscript.values import ScriptPose, Value
 
 _invert_matrix = core_builtins()['inv']
 

@@ -16,8 +16,7 @@ from ur_cartesian_driver.motion.pose import Vector6
 from ur_cartesian_driver.sim.builtins.arguments import not_negative, number, pose, six, whole
 from ur_cartesian_driver.sim.controller_state import PathOffset
 from ur_cartesian_driver.urscript.errors import RuntimeException
-from ur_cartesian_driver.urscript.values import Pose as ScriptPose
-from ur_cartesian_driver.urscript.values import Value
+from ur_cartesian_driver.urscript.values import ScriptPose, Value
 
 if TYPE_CHECKING:
     from ur_cartesian_driver.sim.controller import Controller
@@ -58,10 +57,10 @@ class PathOffsetBuiltins:
     def _limited(self, offset: Vector6) -> Vector6:
         state = self._state
         x, y, z = (
-            max(-state.most_translation, min(state.most_translation, item)) for item in offset[:3]
+            max(-state.max_translation, min(state.max_translation, item)) for item in offset[:3]
         )
         rx, ry, rz = (
-            max(-state.most_rotation, min(state.most_rotation, item)) for item in offset[3:]
+            max(-state.max_rotation, min(state.max_rotation, item)) for item in offset[3:]
         )
         return x, y, z, rx, ry, rz
 
@@ -78,8 +77,8 @@ class PathOffsetBuiltins:
 
     def path_offset_set_max_offset(self, transLimit: Value, rotLimit: Value) -> None:
         """Set the limits [m, rad]."""
-        self._state.most_translation = not_negative(transLimit, 'transLimit')
-        self._state.most_rotation = not_negative(rotLimit, 'rotLimit')
+        self._state.max_translation = not_negative(transLimit, 'transLimit')
+        self._state.max_rotation = not_negative(rotLimit, 'rotLimit')
 
 
 def _frame(type: Value) -> int:

@@ -20,7 +20,7 @@ from ur_cartesian_driver.urscript.values import INT_MAX, INT_MIN, to_text, Value
 
 CONNECT_TIMEOUT = 2.0
 #: Values in one read of numbers, and characters in one string.
-MOST_NUMBERS, MOST_CHARACTERS = 30, 1023
+MAX_NUMBERS, MAX_CHARACTERS = 30, 1023
 
 T = TypeVar('T')
 
@@ -163,8 +163,8 @@ class SocketBuiltins:
 
 def _count(value: Value) -> int:
     count = whole(value, 'number')
-    if not 0 <= count <= MOST_NUMBERS:
-        raise RuntimeException(f'number is {count}; a read takes at most {MOST_NUMBERS} values')
+    if not 0 <= count <= MAX_NUMBERS:
+        raise RuntimeException(f'number is {count}; a read takes at most {MAX_NUMBERS} values')
     return count
 
 
@@ -202,7 +202,7 @@ def _between(before: bytes, after: bytes) -> Callable[[bytearray], bytes | None]
         if start < 0 or not received:
             return None
         start += len(before)
-        end = received.find(after, start) if after else min(len(received), start + MOST_CHARACTERS)
+        end = received.find(after, start) if after else min(len(received), start + MAX_CHARACTERS)
         if end < 0:
             return None
         data = bytes(received[start:end])

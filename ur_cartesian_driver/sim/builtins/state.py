@@ -57,17 +57,17 @@ class TimeBuiltins:
 
     def interpreter_mode(self, clearQueueOnEnter: Value = True, clearOnEnd: Value = True) -> Steps:
         """Execute what the clients of the interpreter port send, until it is ended."""
-        yield from self._controller.interpreter.run(
+        yield from self._controller.interpreter_mode.run(
             clear_queue=truth(clearQueueOnEnter), clear_on_end=truth(clearOnEnd)
         )
 
     def end_interpreter(self) -> None:
         """End the interpreter mode after the statement that is being executed."""
-        self._controller.interpreter.end()
+        self._controller.interpreter_mode.end()
 
     def clear_interpreter(self) -> None:
         """Forget what statements have made after the one that is being executed."""
-        self._controller.interpreter.clear()
+        self._controller.interpreter_mode.clear()
 
     def rtde_set_watchdog(
         self, variable_name: Value, min_frequency: Value, action: Value = 'pause'
@@ -80,7 +80,7 @@ class TimeBuiltins:
         )
 
 
-class PeopleBuiltins:
+class PendantBuiltins:
     """Messages and popups."""
 
     def __init__(self, controller: Controller) -> None:
@@ -89,7 +89,7 @@ class PeopleBuiltins:
 
     def textmsg(self, s1: Value, s2: Value = '') -> None:
         """Write to the log: all clients of the primary interface see it."""
-        self._controller.announcements.text(to_text(s1) + to_text(s2))
+        self._controller.messages.text(to_text(s1) + to_text(s2))
 
     def popup(
         self,
@@ -134,7 +134,7 @@ class RobotBuiltins:
 
     def get_actual_joint_positions_history(self, steps: Value = 0) -> list[float]:
         """Return the actual positions some cycles ago [rad]."""
-        return list(self._controller.past_joints(whole(steps, 'steps')))
+        return list(self._controller.joint_history(whole(steps, 'steps')))
 
     def get_target_joint_speeds(self) -> list[float]:
         """Return the target speeds [rad/s]."""

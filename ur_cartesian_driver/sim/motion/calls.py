@@ -10,44 +10,51 @@ from typing import NamedTuple
 
 from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.sim.motion.moves import MotionError, Move
-from ur_cartesian_driver.sim.motion.paths import Leg
-from ur_cartesian_driver.sim.motion.track import Law
+from ur_cartesian_driver.sim.motion.path_motion import ProfileParameters
+from ur_cartesian_driver.sim.motion.paths import MovePath
 
 #: Arguments of C171: of waypoints that were skipped, and of blends that are none, by the move.
-SKIPPED = {'movej': 4, 'optimovej': 4, 'movel': 11, 'optimovel': 11, 'movec': 0, 'movep': 9}
-TOO_SMALL = {'movec': 1, 'movep': 10}
+BLEND_SKIPPED_ARGUMENTS = {
+    'movej': 4,
+    'optimovej': 4,
+    'movel': 11,
+    'optimovel': 11,
+    'movec': 0,
+    'movep': 9,
+}
+BLEND_TOO_SMALL_ARGUMENTS = {'movec': 1, 'movep': 10}
 
 
-class Start(NamedTuple):
+class PathStart(NamedTuple):
     """Where a leg begins: joint positions [rad], and T_base_tcp."""
 
     q: Vector6
     pose: Pose
 
 
-class Call(NamedTuple):
+class MotionCall(NamedTuple):
     """A call of a path motion, to be resolved where the leg begins."""
 
     name: str
-    leg: Callable[[Start], Leg]
-    law: Callable[[Leg, Start], Law]
+    move_path: Callable[[PathStart], MovePath]
+    parameters: Callable[[MovePath, PathStart], ProfileParameters]
     radius: float
     move: Move
 
 
-def constant_speed(a: float, v: float, r: float) -> Law:
+def constant_speed_parameters(a: float, v: float, r: float) -> ProfileParameters:
     """Return the law of movep: to stand in the waypoint from full speed, v^2 = 2 b r."""
     braking = max(a, v * v / (2.0 * r)) if r > 0.0 else None
-    return Law(acceleration=a, speed=v, braking=braking)
+    return ProfileParameters(acceleration=a, speed=v, braking=braking)
 
 
-def check_law(name: str, law: Law) -> None:
+def check_profile_parameters(name: str, parameters: ProfileParameters) -> None:
     """Refuse what no arm can be driven by."""
-    if not 0.0 <= law.time < inf:
-        raise MotionError(f'{name}: the time is {law.time:g} s, it must be 0 or more.')
-    if law.time > 0.0:
+    if not 0.0 <= parameters.time < inf:
+        raise MotionError(f'{name}: the time is {parameters.time:g} s, it must be 0 or more.')
+    if parameters.time > 0.0:
         return
-    for word, value in (('acceleration', law.acceleration), ('speed', law.speed)):
+    for word, value in (('acceleration', parameters.acceleration), ('speed', parameters.speed)):
         if not 0.0 < value < inf:
             raise MotionError(f'{name}: the {word} is {value:g}, it must be above 0.')
 

@@ -26,10 +26,10 @@ from ur_cartesian_driver.motion.pose import (
 )
 from ur_cartesian_driver.sim.motion.moves import MotionError
 
-Place: TypeAlias = Vector6 | Pose
+Setpoint: TypeAlias = Vector6 | Pose
 
 # Legs shorter than this are none, their ends differ by rounding [m, rad].
-_NO_WAY = 1e-9
+_MIN_LENGTH = 1e-9
 # Three points of an arc nearer than this [m], or in line within this sine, make no circle.
 _COINCIDENT = 1e-6
 _COLLINEAR = 1e-6
@@ -41,15 +41,15 @@ _ON_BORDER = 1e-12
 _STRAIGHT = 1e-6
 
 
-class Path(Protocol):
+class MotionPath(Protocol):
     """What both legs and corners can do."""
 
-    def at(self, s: float) -> Place:
+    def at(self, s: float) -> Setpoint:
         """Return the place at the path parameter."""
         ...
 
 
-class Leg(Protocol):
+class MovePath(Protocol):
     """The way to one waypoint."""
 
     @property
@@ -57,7 +57,7 @@ class Leg(Protocol):
         """The largest path parameter."""
         ...
 
-    def at(self, s: float) -> Place:
+    def at(self, s: float) -> Setpoint:
         """Return the place, the exact waypoint from ``length`` on."""
         ...
 
@@ -66,7 +66,7 @@ class Leg(Protocol):
         ...
 
 
-class JointLine:
+class JointMovePath:
     """
     A straight line in joint space [rad]; all joints share the path parameter.
 
@@ -76,16 +76,16 @@ class JointLine:
     def __init__(self, start: Vector6, end: Vector6, forward: Callable[[Vector6], Pose]) -> None:
         """Take the leading axis: the one with the longest way."""
         self.start, self.end, self._forward = start, end, forward
-        self._way = tuple(b - a for a, b in zip(start, end, strict=True))
-        length = max(abs(way) for way in self._way)
-        self.length = length if length > _NO_WAY else 0.0
+        self._travel = tuple(b - a for a, b in zip(start, end, strict=True))
+        length = max(abs(travel) for travel in self._travel)
+        self.length = length if length > _MIN_LENGTH else 0.0
 
     def at(self, s: float) -> Vector6:
         """Return the joint positions [rad]."""
         if s >= self.length:
             return self.end
         f = s / self.length
-        a, w = self.start, self._way
+        a, w = self.start, self._travel
         return (
             a[0] + f * w[0],
             a[1] + f * w[1],
@@ -100,7 +100,7 @@ class JointLine:
         return self._forward(self.at(s))
 
 
-class Line:
+class LinearMovePath:
     """
     A straight line of the tool with the shortest rotation.
 
@@ -113,7 +113,7 @@ class Line:
         self.start, self.end = start, end
         self.distance = start.distance_to(end)
         length = max(self.distance, start.angle_to(end))
-        self.length = length if length > _NO_WAY else 0.0
+        self.length = length if length > _MIN_LENGTH else 0.0
 
     def at(self, s: float) -> Pose:
         """Return T_base_tcp."""
@@ -122,7 +122,7 @@ class Line:
     pose = at
 
 
-class Arc:
+class CircularMovePath:
     """
     A circle through three points.
 
@@ -148,14 +148,14 @@ class Arc:
         self._y = _cross(self.normal, self._x)
         self.angle = self._angle_of(end.position)
         self.start, self._fixed = start, fixed
-        self.end = self._place(self.angle) if fixed else end
+        self.end = self._setpoint(self.angle) if fixed else end
         self.length = self.radius * self.angle
         if not fixed:
             self.length = max(self.length, start.angle_to(end))
 
     def at(self, s: float) -> Pose:
         """Return T_base_tcp."""
-        return self.end if s >= self.length else self._place(self.angle * s / self.length)
+        return self.end if s >= self.length else self._setpoint(self.angle * s / self.length)
 
     pose = at
 
@@ -164,7 +164,7 @@ class Arc:
         r = _minus(point, self.centre)
         return atan2(_dot(r, self._y), _dot(r, self._x)) % (2.0 * pi)
 
-    def _place(self, angle: float) -> Pose:
+    def _setpoint(self, angle: float) -> Pose:
         position = _plus(
             self.centre,
             _plus(
@@ -179,7 +179,7 @@ class Arc:
         return Pose(position, self.start.interpolate(self.end, fraction).quaternion)
 
 
-class JointCorner:
+class JointBlendPath:
     """
     Two joint legs at once: one brakes to the waypoint while the next one sets out.
 
@@ -187,7 +187,9 @@ class JointCorner:
     legs are left and met on their tangent, a parabola between straight lines.
     """
 
-    def __init__(self, before: JointLine, tail: float, after: JointLine, head: float) -> None:
+    def __init__(
+        self, before: JointMovePath, tail: float, after: JointMovePath, head: float
+    ) -> None:
         """Blend the last ``tail`` of one leg with the first ``head`` of the next."""
         self._before, self._after, self._tail, self._head = before, after, tail, head
         self.entry_rate, self.exit_rate = 2.0 * tail, 2.0 * head
@@ -209,7 +211,7 @@ class JointCorner:
         )
 
 
-class ToolCorner:
+class ToolBlendPath:
     """
     The same of two poses: positions add, rotations follow each other.
 
@@ -217,7 +219,7 @@ class ToolCorner:
     the parabola with the waypoint as its control point, inside the corner.
     """
 
-    def __init__(self, before: Leg, tail: float, after: Leg, head: float) -> None:
+    def __init__(self, before: MovePath, tail: float, after: MovePath, head: float) -> None:
         """Blend the last ``tail`` of one leg with the first ``head`` of the next."""
         self._before, self._after, self._tail, self._head = before, after, tail, head
         self._waypoint = before.pose(before.length)
@@ -236,17 +238,19 @@ class ToolCorner:
         )
 
 
-class Fillet:
+class FilletBlendPath:
     """
     A circular arc tangent to two straight legs at equal distances d from the waypoint.
 
     Where the direction turns by phi its radius is d / tan(phi/2): d itself in a right angle.
-    The orientation is that of :class:`ToolCorner`, the position runs evenly.
+    The orientation is that of :class:`ToolBlendPath`, the position runs evenly.
     """
 
-    def __init__(self, before: Line, tail: float, after: Line, head: float) -> None:
+    def __init__(
+        self, before: LinearMovePath, tail: float, after: LinearMovePath, head: float
+    ) -> None:
         """Blend the last ``tail`` of one line with the first ``head`` of the next."""
-        self._turn = ToolCorner(before, tail, after, head)
+        self._turn = ToolBlendPath(before, tail, after, head)
         entry = before.pose(before.length - tail).position
         waypoint = before.end.position
         into = _unit(_minus(waypoint, entry))
@@ -278,49 +282,55 @@ class Fillet:
         )
 
 
-Corner: TypeAlias = JointCorner | ToolCorner | Fillet
+BlendPath: TypeAlias = JointBlendPath | ToolBlendPath | FilletBlendPath
 
 
-def fillet_angle(before: Line, after: Line) -> float:
+def fillet_angle(before: LinearMovePath, after: LinearMovePath) -> float:
     """Return by how much the direction turns [rad]."""
     a = _unit(_minus(before.end.position, before.start.position))
     b = _unit(_minus(after.end.position, after.start.position))
     return 2.0 * atan2(_norm(_minus(a, b)), _norm(_plus(a, b)))
 
 
-def corner(before: Leg, tail: float, after: Leg, head: float, circular: bool) -> Corner:
+def make_blend(
+    before: MovePath, tail: float, after: MovePath, head: float, circular: bool
+) -> BlendPath:
     """
     Join two legs: joint lines in joint space, all others in the tool's space.
 
     :param circular: by a circle, where both are lines that meet at an angle.
     """
-    if isinstance(before, JointLine) and isinstance(after, JointLine):
-        return JointCorner(before, tail, after, head)
+    if isinstance(before, JointMovePath) and isinstance(after, JointMovePath):
+        return JointBlendPath(before, tail, after, head)
     if (
         circular
-        and isinstance(before, Line)
-        and isinstance(after, Line)
+        and isinstance(before, LinearMovePath)
+        and isinstance(after, LinearMovePath)
         and _STRAIGHT < fillet_angle(before, after) < pi - _STRAIGHT
     ):
-        return Fillet(before, tail, after, head)
-    return ToolCorner(before, tail, after, head)
+        return FilletBlendPath(before, tail, after, head)
+    return ToolBlendPath(before, tail, after, head)
 
 
-def head_within(leg: Leg, radius: float) -> float | None:
+def start_within_radius(move_path: MovePath, radius: float) -> float | None:
     """Return the parameter at which the tool is ``radius`` [m] from the leg's beginning."""
-    if isinstance(leg, Line):
-        return leg.length * radius / leg.distance if leg.distance > radius else None
-    return _leave(leg.pose, radius, leg.length)
+    if isinstance(move_path, LinearMovePath):
+        return (
+            move_path.length * radius / move_path.distance if move_path.distance > radius else None
+        )
+    return _exit_parameter(move_path.pose, radius, move_path.length)
 
 
-def tail_within(leg: Leg, radius: float) -> float | None:
+def end_within_radius(move_path: MovePath, radius: float) -> float | None:
     """Return how much before the end (as parameter) the tool is ``radius`` [m] from the end."""
-    if isinstance(leg, Line):
-        return head_within(leg, radius)
-    return _leave(lambda s: leg.pose(leg.length - s), radius, leg.length)
+    if isinstance(move_path, LinearMovePath):
+        return start_within_radius(move_path, radius)
+    return _exit_parameter(
+        lambda s: move_path.pose(move_path.length - s), radius, move_path.length
+    )
 
 
-def _leave(pose: Callable[[float], Pose], radius: float, length: float) -> float | None:
+def _exit_parameter(pose: Callable[[float], Pose], radius: float, length: float) -> float | None:
     """Return the first parameter at which the pose is ``radius`` [m] from its origin."""
     origin = pose(0.0).position
     low, f_low = 0.0, -radius

@@ -39,7 +39,7 @@ class _Phase:
 
 
 @dataclass(frozen=True, slots=True)
-class Profile:
+class MotionProfile:
     """
     Progress ``s(t)`` from 0 at time 0 to ``length`` at ``duration`` [s], never backwards.
 
@@ -54,13 +54,13 @@ class Profile:
         """Return the progress; 0 before the beginning, ``length`` from the end on."""
         if time >= self.duration:
             return self.length
-        phase = self._phase(max(time, 0.0))
+        phase = self._phase_at(max(time, 0.0))
         return min(max(phase.position_after(max(time, 0.0) - phase.time), 0.0), self.length)
 
     def speed(self, time: float) -> float:
         """Return ds/dt within [0, duration]; never negative."""
         time = min(max(time, 0.0), self.duration)
-        phase = self._phase(time)
+        phase = self._phase_at(time)
         return max(phase.speed_after(time - phase.time), 0.0)
 
     def time_at(self, progress: float) -> float:
@@ -80,7 +80,7 @@ class Profile:
                 high = middle
         return high
 
-    def _phase(self, time: float) -> _Phase:
+    def _phase_at(self, time: float) -> _Phase:
         found = self.phases[0]
         for phase in self.phases[1:]:
             if phase.time > time:
@@ -89,7 +89,9 @@ class Profile:
         return found
 
 
-def _chain(length: float, speed: float, phases: Iterable[tuple[float, float, float]]) -> Profile:
+def _chain(
+    length: float, speed: float, phases: Iterable[tuple[float, float, float]]
+) -> MotionProfile:
     """Join phases given as (duration, acceleration at the beginning, jerk)."""
     time = position = 0.0
     chain: list[_Phase] = []
@@ -99,7 +101,7 @@ def _chain(length: float, speed: float, phases: Iterable[tuple[float, float, flo
         time += duration
         position = phase.position_after(duration)
         speed = phase.speed_after(duration)
-    return Profile(length, time, tuple(chain))
+    return MotionProfile(length, time, tuple(chain))
 
 
 def trapezoid(
@@ -108,7 +110,7 @@ def trapezoid(
     speed: float,
     start_speed: float = 0.0,
     braking: float | None = None,
-) -> Profile:
+) -> MotionProfile:
     """
     Accelerate, cruise, brake to rest.
 
@@ -120,7 +122,7 @@ def trapezoid(
     """
     b = braking or acceleration
     if length <= 0.0:
-        return Profile(0.0, 0.0, (_Phase(0.0, 0.0, 0.0, 0.0, 0.0),))
+        return MotionProfile(0.0, 0.0, (_Phase(0.0, 0.0, 0.0, 0.0, 0.0),))
     if start_speed * start_speed >= 2.0 * b * length:
         return _chain(
             length,
@@ -150,7 +152,7 @@ def timed_cruise(length: float, duration: float, start_speed: float = 0.0) -> fl
     return (length - 0.5 * start_speed * x) / (duration - 0.5 * (x + y))
 
 
-def timed(length: float, duration: float, start_speed: float = 0.0) -> Profile:
+def timed(length: float, duration: float, start_speed: float = 0.0) -> MotionProfile:
     """
     Arrive at rest after exactly ``duration`` [s]: a third each to speed up, cruise and brake.
 
@@ -158,7 +160,7 @@ def timed(length: float, duration: float, start_speed: float = 0.0) -> Profile:
     choice. From rest: c = 1.5 d/T, a = 4.5 d/T^2.
     """
     if length <= 0.0:
-        return Profile(0.0, duration, (_Phase(0.0, 0.0, 0.0, 0.0, 0.0),))
+        return MotionProfile(0.0, duration, (_Phase(0.0, 0.0, 0.0, 0.0, 0.0),))
     x, y = _timed_ramps(length, duration, start_speed)
     c = timed_cruise(length, duration, start_speed)
     return _chain(
@@ -175,7 +177,7 @@ def _timed_ramps(length: float, duration: float, start_speed: float) -> tuple[fl
     return min(ramp_time, length / start_speed), ramp_time
 
 
-def ramp(length: float, start_speed: float, end_speed: float) -> Profile:
+def ramp(length: float, start_speed: float, end_speed: float) -> MotionProfile:
     """Change the speed evenly over the length: T = 2 d / (v0 + v1)."""
     duration = 2.0 * length / (start_speed + end_speed)
     return _chain(length, start_speed, [(duration, (end_speed - start_speed) / duration, 0.0)])
@@ -183,7 +185,7 @@ def ramp(length: float, start_speed: float, end_speed: float) -> Profile:
 
 def s_curve(
     length: float, acceleration: float, speed: float, jerk: float, start_speed: float = 0.0
-) -> Profile:
+) -> MotionProfile:
     """
     Accelerate, cruise, brake to rest with limited jerk.
 
@@ -194,7 +196,7 @@ def s_curve(
         return trapezoid(length, acceleration, speed)
 
     def distance(cruise: float) -> float:
-        return _s_distance(start_speed, cruise, acceleration, jerk) + _s_distance(
+        return _s_curve_distance(start_speed, cruise, acceleration, jerk) + _s_curve_distance(
             cruise, 0.0, acceleration, jerk
         )
 
@@ -212,14 +214,14 @@ def s_curve(
         length,
         start_speed,
         [
-            *_s_ramp(start_speed, peak, acceleration, jerk),
+            *_s_curve_ramp(start_speed, peak, acceleration, jerk),
             (cruise, 0.0, 0.0),
-            *_s_ramp(peak, 0.0, acceleration, jerk),
+            *_s_curve_ramp(peak, 0.0, acceleration, jerk),
         ],
     )
 
 
-def _s_times(change: float, acceleration: float, jerk: float) -> tuple[float, float]:
+def _s_curve_times(change: float, acceleration: float, jerk: float) -> tuple[float, float]:
     """Return the times of rising (and of falling), and of constant acceleration."""
     if change >= acceleration * acceleration / jerk:
         rise = acceleration / jerk
@@ -227,14 +229,14 @@ def _s_times(change: float, acceleration: float, jerk: float) -> tuple[float, fl
     return sqrt(change / jerk), 0.0
 
 
-def _s_distance(start: float, end: float, acceleration: float, jerk: float) -> float:
-    rise, hold = _s_times(abs(end - start), acceleration, jerk)
+def _s_curve_distance(start: float, end: float, acceleration: float, jerk: float) -> float:
+    rise, hold = _s_curve_times(abs(end - start), acceleration, jerk)
     return 0.5 * (start + end) * (2.0 * rise + hold)
 
 
-def _s_ramp(
+def _s_curve_ramp(
     start: float, end: float, acceleration: float, jerk: float
 ) -> list[tuple[float, float, float]]:
-    rise, hold = _s_times(abs(end - start), acceleration, jerk)
+    rise, hold = _s_curve_times(abs(end - start), acceleration, jerk)
     j = jerk if end >= start else -jerk
     return [(rise, 0.0, j), (hold, j * rise, 0.0), (rise, j * rise, -j)]

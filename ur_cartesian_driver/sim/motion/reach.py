@@ -16,8 +16,8 @@ from ur_cartesian_driver.motion.pose import (
     Vector6,
 )
 from ur_cartesian_driver.sim.motion.moves import MotionFault
-from ur_cartesian_driver.sim.motion.paths import Leg
-from ur_cartesian_driver.sim.motion.track import Law
+from ur_cartesian_driver.sim.motion.path_motion import ProfileParameters
+from ur_cartesian_driver.sim.motion.paths import MovePath
 
 # Assumptions, the robot's numbers are not published:
 #: What optimove's fractions are of [rad/s^2] and [rad/s^3]; also bounds servoj.
@@ -26,7 +26,7 @@ MAX_JOINT_JERK = 400.0
 #: The greatest limit of the tool's speed that the safety settings allow [m/s].
 MAX_TOOL_SPEED = 5.0
 #: How hard a joint can brake before the end of its range [rad/s^2].
-LIMIT_BRAKING = 10.0
+LIMIT_DECELERATION = 10.0
 #: Joint travel per tool travel [rad/m, rad/rad] beyond which the arm counts as singular.
 SINGULAR_RATE = 1000.0
 
@@ -37,10 +37,10 @@ _AT_LIMIT = 0.02
 _SAMPLES = 8
 
 #: No arm reaches so far [m].
-_FAR = 1e3
+_MAX_DISTANCE = 1e3
 
 
-class Reach:
+class JointKinematics:
     """
     The joints of one arm, and what they can do in one cycle.
 
@@ -56,15 +56,18 @@ class Reach:
 
     def joints(self, T_base_flange: Pose, q_near: Vector6) -> Vector6 | None:
         """Return the nearest solution within the limits."""
-        if not max(map(abs, T_base_flange.position)) < _FAR:
+        if not max(map(abs, T_base_flange.position)) < _MAX_DISTANCE:
             return None  # absurd speeds lead there; squares of such numbers overflow
         return nearest(self._arm, T_base_flange, q_near)
 
-    def changes_sides(self, q: Vector6, q_next: Vector6) -> bool:
+    def changes_branch(self, q: Vector6, q_next: Vector6) -> bool:
         """Return whether shoulder, elbow or wrist 2 go over to their other solution."""
-        return any(a * b < 0.0 for a, b in zip(self._sides(q), self._sides(q_next), strict=True))
+        return any(
+            a * b < 0.0
+            for a, b in zip(self._branch_signs(q), self._branch_signs(q_next), strict=True)
+        )
 
-    def _sides(self, q: Vector6) -> tuple[float, float, float]:
+    def _branch_signs(self, q: Vector6) -> tuple[float, float, float]:
         """
         Return three numbers whose signs are the branch.
 
@@ -79,7 +82,7 @@ class Reach:
             sin(q[4]),
         )
 
-    def overspeed(self, q: Vector6, q_before: Vector6) -> float:
+    def overspeed_factor(self, q: Vector6, q_before: Vector6) -> float:
         """
         Return by which factor the way to ``q`` is too long for one cycle; inf: no way.
 
@@ -87,22 +90,24 @@ class Reach:
         the end of its range: v^2 = 2 a x.
         """
         worst = 0.0
-        for new, old, fastest, (low, high) in zip(
+        for new, old, fastest_parameters, (low, high) in zip(
             q, q_before, self._speeds, self._limits, strict=True
         ):
-            way = abs(new - old)
-            if way < NO_CHANGE:
+            travel = abs(new - old)
+            if travel < NO_CHANGE:
                 continue
-            room = high - old if new > old else old - low
-            allowed = fastest * self._cycle
-            if 2.0 * LIMIT_BRAKING * room < fastest * fastest:
-                if room <= NO_CHANGE:
+            margin = high - old if new > old else old - low
+            allowed = fastest_parameters * self._cycle
+            if 2.0 * LIMIT_DECELERATION * margin < fastest_parameters * fastest_parameters:
+                if margin <= NO_CHANGE:
                     return inf
-                allowed = min(allowed, room, sqrt(2.0 * LIMIT_BRAKING * room) * self._cycle)
-            worst = max(worst, way / allowed)
+                allowed = min(
+                    allowed, margin, sqrt(2.0 * LIMIT_DECELERATION * margin) * self._cycle
+                )
+            worst = max(worst, travel / allowed)
         return worst
 
-    def why_not(self, q: Vector6, q_next: Vector6 | None) -> MotionFault:
+    def motion_fault(self, q: Vector6, q_next: Vector6 | None) -> MotionFault:
         """Return why the way from ``q`` to ``q_next`` (None: no solution) cannot be gone."""
         for i, (position, (low, high)) in enumerate(zip(q, self._limits, strict=True)):
             if position - low < _AT_LIMIT or high - position < _AT_LIMIT:
@@ -133,17 +138,21 @@ class Reach:
             ),
         )
 
-    def fastest(self, leg: Leg, q: Vector6, T_tcp_flange: Pose, a: float, v: float) -> Law:
+    def fastest_parameters(
+        self, move_path: MovePath, q: Vector6, T_tcp_flange: Pose, a: float, v: float
+    ) -> ProfileParameters:
         """
         Return the fastest law of a leg that no joint minds, times fractions of it.
 
         Joint travel per path is taken from a few samples, from ``q`` on.
         """
-        step = leg.length / _SAMPLES or 1.0
+        step = move_path.length / _SAMPLES or 1.0
         speed = acceleration = inf
         for i in range(1, _SAMPLES + 1):
-            place = leg.at(leg.length * i / _SAMPLES)
-            after = self.joints(place @ T_tcp_flange, q) if isinstance(place, Pose) else place
+            setpoint = move_path.at(move_path.length * i / _SAMPLES)
+            after = (
+                self.joints(setpoint @ T_tcp_flange, q) if isinstance(setpoint, Pose) else setpoint
+            )
             if after is None:
                 break
             for x, y, limit in zip(q, after, self._speeds, strict=True):
@@ -154,16 +163,16 @@ class Reach:
         if speed == inf:
             speed = acceleration = 1.0  # The leg will fail where it begins.
         jerk = acceleration * MAX_JOINT_JERK / MAX_JOINT_ACCELERATION
-        return Law(acceleration=a * acceleration, speed=v * speed, jerk=jerk)
+        return ProfileParameters(acceleration=a * acceleration, speed=v * speed, jerk=jerk)
 
 
 def is_singular(q_before: Vector6, q: Vector6, before: Pose, pose: Pose) -> bool:
     """Return whether joints turn too much for the way of the tool."""
-    way = before.distance_to(pose) + before.angle_to(pose)
-    return lead(q, q_before) > SINGULAR_RATE * way
+    travel = before.distance_to(pose) + before.angle_to(pose)
+    return max_joint_difference(q, q_before) > SINGULAR_RATE * travel
 
 
-def lead(a: Vector6, b: Vector6) -> float:
+def max_joint_difference(a: Vector6, b: Vector6) -> float:
     """Return the largest difference of a joint."""
     return max(
         abs(a[0] - b[0]),
@@ -175,7 +184,7 @@ def lead(a: Vector6, b: Vector6) -> float:
     )
 
 
-def rate_of(after: Vector6, before: Vector6, rate: float) -> Vector6:
+def difference_rate(after: Vector6, before: Vector6, rate: float) -> Vector6:
     """Return the difference times the rate [1/s]."""
     return (
         (after[0] - before[0]) * rate,

@@ -21,17 +21,17 @@ from ur_cartesian_driver.motion.pose import (
     Vector3,
     Vector6,
 )
-from ur_cartesian_driver.sim.motion.paths import Place
+from ur_cartesian_driver.sim.motion.paths import Setpoint
 
 _JointState: TypeAlias = tuple[Vector6, Vector6, float]
 _ToolState: TypeAlias = tuple[Pose, Vector6, float]
-_NOTHING = 1e-12
+_MIN_SPEED = 1e-12
 _ROUNDING = 1e-9
 _STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(slots=True)
-class JointSpeed:
+class JointSpeedMotion:
     """
     speedj: the leading axis changes its speed at ``acceleration``, all reach theirs together.
 
@@ -46,12 +46,20 @@ class JointSpeed:
     elapsed: float = 0.0
     real_time = False
 
-    def preview(self, h: float) -> tuple[Place, _JointState]:
+    def preview(self, h: float) -> tuple[Setpoint, _JointState]:
         """Return the place and state after ``h`` seconds; the mean speed carries."""
         change = _minus(self.target, self.qd)
-        lead = max(map(abs, change))
-        full = h if lead <= _NOTHING else min(h, lead / self.acceleration)
-        part = 1.0 if lead <= self.acceleration * h else self.acceleration * h / lead
+        max_joint_difference = max(map(abs, change))
+        full = (
+            h
+            if max_joint_difference <= _MIN_SPEED
+            else min(h, max_joint_difference / self.acceleration)
+        )
+        part = (
+            1.0
+            if max_joint_difference <= self.acceleration * h
+            else self.acceleration * h / max_joint_difference
+        )
         qd = self.target if part >= 1.0 else _add(self.qd, change, part)
         # The change takes ``full`` seconds at the mean of both speeds, the rest is even.
         q = _add(_add(_add(self.q, self.qd, 0.5 * full), qd, 0.5 * full), qd, h - full)
@@ -62,7 +70,7 @@ class JointSpeed:
         self.q, self.qd, self.elapsed = state
 
     @property
-    def over(self) -> bool:
+    def is_over(self) -> bool:
         """Whether the call may return."""
         if self.duration is None:  # at the speed already: hold it for a cycle, as any call does
             return self.elapsed > 0.0 and self.qd == self.target
@@ -70,7 +78,7 @@ class JointSpeed:
 
 
 @dataclass(slots=True)
-class Servo:
+class ServoMotion:
     """
     servoj: qdd = gain (q_target - (q + lookahead qd)), limited.
 
@@ -90,7 +98,7 @@ class Servo:
     elapsed: float = 0.0
     real_time = False
 
-    def preview(self, h: float) -> tuple[Place, _JointState]:
+    def preview(self, h: float) -> tuple[Setpoint, _JointState]:
         """Return the place and state after ``h`` seconds (semi-implicit Euler)."""
         bound = self.max_acceleration
         qd = _six(
@@ -107,13 +115,13 @@ class Servo:
         self.q, self.qd, self.elapsed = state
 
     @property
-    def over(self) -> bool:
+    def is_over(self) -> bool:
         """Whether the call may return."""
         return self.elapsed >= self.duration - _ROUNDING
 
 
 @dataclass(slots=True)
-class JointStop:
+class JointStopMotion:
     """stopj: the leading axis brakes at ``acceleration`` [rad/s^2], all stand at the same time."""
 
     q: Vector6
@@ -121,7 +129,7 @@ class JointStop:
     acceleration: float
     real_time = True
 
-    def preview(self, h: float) -> tuple[Place, _JointState]:
+    def preview(self, h: float) -> tuple[Setpoint, _JointState]:
         """Return the place and state after ``h`` seconds."""
         time = max(map(abs, self.qd)) / self.acceleration
         if time <= h:
@@ -136,13 +144,13 @@ class JointStop:
         self.q, self.qd, _ = state
 
     @property
-    def over(self) -> bool:
+    def is_over(self) -> bool:
         """Whether the arm stands."""
         return self.qd == _STILL
 
 
 @dataclass(slots=True)
-class ToolSpeed:
+class ToolSpeedMotion:
     """
     speedl: the tool's speed changes at ``acceleration``, its rotation at ``acceleration_rot``.
 
@@ -158,12 +166,12 @@ class ToolSpeed:
     elapsed: float = 0.0
     real_time = False
 
-    def preview(self, h: float) -> tuple[Place, _ToolState]:
+    def preview(self, h: float) -> tuple[Setpoint, _ToolState]:
         """Return the place and state after ``h`` seconds."""
         twist = _approach_twist(
             self.twist, self.target, self.acceleration * h, self.acceleration_rot * h
         )
-        pose = _moved(self.pose, self.twist, twist, h)
+        pose = _integrated_pose(self.pose, self.twist, twist, h)
         return pose, (pose, twist, self.elapsed + h)
 
     def accept(self, state: Any) -> None:
@@ -171,7 +179,7 @@ class ToolSpeed:
         self.pose, self.twist, self.elapsed = state
 
     @property
-    def over(self) -> bool:
+    def is_over(self) -> bool:
         """Whether the call may return."""
         if self.duration is None:  # at the speed already: hold it for a cycle, as any call does
             return self.elapsed > 0.0 and self.twist == self.target
@@ -179,7 +187,7 @@ class ToolSpeed:
 
 
 @dataclass(slots=True)
-class ToolStop:
+class ToolStopMotion:
     """stopl: the tool brakes along its tangent, its rotation at ``acceleration_rot``."""
 
     pose: Pose
@@ -188,12 +196,12 @@ class ToolStop:
     acceleration_rot: float
     real_time = True
 
-    def preview(self, h: float) -> tuple[Place, _ToolState]:
+    def preview(self, h: float) -> tuple[Setpoint, _ToolState]:
         """Return the place and state after ``h`` seconds."""
         twist = _approach_twist(
             self.twist, _STILL, self.acceleration * h, self.acceleration_rot * h
         )
-        pose = _moved(self.pose, self.twist, twist, h)
+        pose = _integrated_pose(self.pose, self.twist, twist, h)
         return pose, (pose, twist, 0.0)
 
     def accept(self, state: Any) -> None:
@@ -201,7 +209,7 @@ class ToolStop:
         self.pose, self.twist, _ = state
 
     @property
-    def over(self) -> bool:
+    def is_over(self) -> bool:
         """Whether the arm stands."""
         return self.twist == _STILL
 
@@ -222,7 +230,7 @@ def _approach(now: Vector3, target: Vector3, step: float) -> Vector3:
     return (now[0] + f * x, now[1] + f * y, now[2] + f * z)
 
 
-def _moved(pose: Pose, before: Vector6, after: Vector6, h: float) -> Pose:
+def _integrated_pose(pose: Pose, before: Vector6, after: Vector6, h: float) -> Pose:
     """Move a pose for ``h`` seconds at the mean of two twists."""
     half = 0.5 * h
     vx, vy, vz, wx, wy, wz = (half * (a + b) for a, b in zip(before, after, strict=True))

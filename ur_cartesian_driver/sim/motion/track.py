@@ -16,9 +16,16 @@ from typing import Any
 
 from ur_cartesian_driver.motion.pose import distance
 from ur_cartesian_driver.sim.motion.moves import Move
-from ur_cartesian_driver.sim.motion.paths import corner, head_within, Leg, Path, Place, tail_within
+from ur_cartesian_driver.sim.motion.paths import (
+    end_within_radius,
+    make_blend,
+    MotionPath,
+    MovePath,
+    Setpoint,
+    start_within_radius,
+)
 from ur_cartesian_driver.sim.motion.profile import (
-    Profile,
+    MotionProfile,
     ramp,
     s_curve,
     timed,
@@ -29,13 +36,13 @@ from ur_cartesian_driver.sim.motion.profile import (
 # Ends of pieces nearer than this are reached [s]: sums of cycles miss them by rounding.
 _ROUNDING = 1e-9
 # Speeds and ways below this are none, in the units of any leg.
-_NOTHING = 1e-9
+_MIN_SPEED = 1e-9
 # What is left after a corner is driven at most this much faster than the mean, to be in time.
-_CATCH_UP = 2.0
+_MAX_CATCH_UP = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Law:
+class ProfileParameters:
     """
     How a move wants its leg to be driven, in the leg's unit (rad or m) per second.
 
@@ -50,7 +57,7 @@ class Law:
     jerk: float | None = None
     braking: float | None = None
 
-    def profile(self, length: float, start_speed: float = 0.0) -> Profile:
+    def profile(self, length: float, start_speed: float = 0.0) -> MotionProfile:
         """Return the profile of a way, to rest."""
         if self.time > 0.0:
             return timed(length, self.time, start_speed)
@@ -60,7 +67,7 @@ class Law:
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class PathSection:
     """
     One path under one profile.
 
@@ -69,13 +76,13 @@ class Piece:
     :param halt: whether a cycle has to end exactly there.
     """
 
-    path: Path
-    profile: Profile
+    path: MotionPath
+    profile: MotionProfile
     offset: float
     stop: float
     halt: bool = False
 
-    def at(self, time: float) -> Place:
+    def at(self, time: float) -> Setpoint:
         """Return the place; the exact end of the path at the end of the profile."""
         if time >= self.profile.duration:
             return self.path.at(inf)
@@ -83,49 +90,49 @@ class Piece:
 
 
 @dataclass(frozen=True, slots=True)
-class Tip:
+class LastMove:
     """
     The last leg of a track and what a follower must know of it.
 
     :param entry: time of its profile at which its blend begins; its end without a blend.
     """
 
-    leg: Leg
-    law: Law
+    move_path: MovePath
+    parameters: ProfileParameters
     radius: float
     entry: float
     call: Move
 
 
 @dataclass(slots=True)
-class Track:
+class PathMotion:
     """
     Pieces to follow and how far the arm is: time [s] in the profile of piece ``index``.
 
-    The last piece is always the leg of ``tip``.
+    The last piece is always the leg of ``last_move``.
     """
 
-    pieces: tuple[Piece, ...]
-    tip: Tip
+    sections: tuple[PathSection, ...]
+    last_move: LastMove
     index: int = 0
     time: float = 0.0
     real_time = False
 
-    def preview(self, h: float) -> tuple[Place, tuple[int, float]]:
+    def preview(self, h: float) -> tuple[Setpoint, tuple[int, float]]:
         """Return the place after ``h`` more seconds [s of the profile]."""
         i, t = self.index, self.time
         while True:
-            piece = self.pieces[i]
-            left = piece.stop - t
+            section = self.sections[i]
+            left = section.stop - t
             if h < left - _ROUNDING:
                 t += h
                 break
-            last = i + 1 == len(self.pieces)
-            if last or (piece.halt and left > _ROUNDING):
-                t = piece.stop
+            last = i + 1 == len(self.sections)
+            if last or (section.halt and left > _ROUNDING):
+                t = section.stop
                 break
             h, i, t = max(h - left, 0.0), i + 1, 0.0
-        return self.pieces[i].at(t), (i, t)
+        return self.sections[i].at(t), (i, t)
 
     def accept(self, state: Any) -> None:
         """Go to a state that ``preview`` returned."""
@@ -134,27 +141,39 @@ class Track:
     @property
     def finished(self) -> bool:
         """Whether the last waypoint is reached."""
-        return self.index + 1 == len(self.pieces) and self.time >= self.pieces[-1].stop
+        return self.index + 1 == len(self.sections) and self.time >= self.sections[-1].stop
 
     def may_return(self, cycle: float) -> bool:
         """Return whether one more cycle enters the blend, or the waypoint is reached."""
-        if self.index + 1 < len(self.pieces):
+        if self.index + 1 < len(self.sections):
             return False
-        if self.tip.radius > 0.0:
-            return self.time + cycle >= self.tip.entry - _ROUNDING
+        if self.last_move.radius > 0.0:
+            return self.time + cycle >= self.last_move.entry - _ROUNDING
         return self.finished
 
 
-def from_rest(leg: Leg, law: Law, radius: float, call: Move) -> Track:
+def start_from_rest(
+    move_path: MovePath, parameters: ProfileParameters, radius: float, call: Move
+) -> PathMotion:
     """Return the track of one leg, begun and ended at rest."""
-    profile = law.profile(leg.length)
-    piece = Piece(leg, profile, 0.0, profile.duration)
-    return Track((piece,), Tip(leg, law, radius, _entry(piece, leg, radius), call))
+    profile = parameters.profile(move_path.length)
+    section = PathSection(move_path, profile, 0.0, profile.duration)
+    return PathMotion(
+        (section,),
+        LastMove(
+            move_path, parameters, radius, _blend_entry_time(section, move_path, radius), call
+        ),
+    )
 
 
-def joined(
-    track: Track, leg: Leg, law: Law, radius: float, call: Move, circular: bool
-) -> tuple[Track, bool]:
+def append_move_path(
+    path_motion: PathMotion,
+    move_path: MovePath,
+    parameters: ProfileParameters,
+    radius: float,
+    call: Move,
+    circular: bool,
+) -> tuple[PathMotion, bool]:
     """
     Return the track with one more leg, blended where that is possible, and whether it is.
 
@@ -163,54 +182,68 @@ def joined(
     does not leave the blend: then the arm stops at the waypoint. (Both legs share the speed
     through the corner, and a short one would be driven by the other's.)
     """
-    last, tip, ahead = track.pieces[-1], track.tip, track.pieces[track.index : -1]
-    now = track.time if track.index + 1 == len(track.pieces) else 0.0
-    leave = max(now, tip.entry)
-    tail = tip.leg.length - last.offset - last.profile.at(leave)
+    last, last_move, ahead = (
+        path_motion.sections[-1],
+        path_motion.last_move,
+        path_motion.sections[path_motion.index : -1],
+    )
+    now = path_motion.time if path_motion.index + 1 == len(path_motion.sections) else 0.0
+    leave = max(now, last_move.entry)
+    tail = last_move.move_path.length - last.offset - last.profile.at(leave)
     speed = last.profile.speed(leave)
     head = None
-    if speed > _NOTHING and tail > _NOTHING:
-        reach = distance(tip.leg.pose(tip.leg.length - tail).position, tip.leg.pose(inf).position)
-        head = head_within(leg, min(reach, tip.radius))
+    if speed > _MIN_SPEED and tail > _MIN_SPEED:
+        blend_distance = distance(
+            last_move.move_path.pose(last_move.move_path.length - tail).position,
+            last_move.move_path.pose(inf).position,
+        )
+        head = start_within_radius(move_path, min(blend_distance, last_move.radius))
     if head is None:
-        rest = from_rest(leg, law, radius, call)
-        pieces = (*ahead, replace(last, halt=True), *rest.pieces)
-        return Track(pieces, rest.tip, 0, track.time), False
-    turn = corner(tip.leg, tail, leg, head, circular)
-    through, after = _corner_profiles(
-        (turn.entry_rate, turn.exit_rate),
+        rest = start_from_rest(move_path, parameters, radius, call)
+        sections = (*ahead, replace(last, halt=True), *rest.sections)
+        return PathMotion(sections, rest.last_move, 0, path_motion.time), False
+    blend = make_blend(last_move.move_path, tail, move_path, head, circular)
+    through, after = _blend_profiles(
+        (blend.entry_rate, blend.exit_rate),
         speed,
         last.profile.duration - leave,
-        tip.law,
-        law,
+        last_move.parameters,
+        parameters,
         head,
-        leg.length - head,
+        move_path.length - head,
     )
-    end = Piece(leg, after, head, after.duration)
-    pieces = (*ahead, replace(last, stop=leave), Piece(turn, through, 0.0, through.duration), end)
-    new_tip = Tip(leg, law, radius, _entry(end, leg, radius), call)
-    return Track(pieces, new_tip, 0, track.time), True
+    end = PathSection(move_path, after, head, after.duration)
+    sections = (
+        *ahead,
+        replace(last, stop=leave),
+        PathSection(blend, through, 0.0, through.duration),
+        end,
+    )
+    new_last_move = LastMove(
+        move_path, parameters, radius, _blend_entry_time(end, move_path, radius), call
+    )
+    return PathMotion(sections, new_last_move, 0, path_motion.time), True
 
 
-def _entry(piece: Piece, leg: Leg, radius: float) -> float:
+def _blend_entry_time(section: PathSection, move_path: MovePath, radius: float) -> float:
     """Return the time at which the leg comes within the radius [m] of its end."""
     if radius <= 0.0:
-        return piece.stop
-    tail = tail_within(leg, radius)
+        return section.stop
+    tail = end_within_radius(move_path, radius)
     if tail is None:
         return 0.0
-    return piece.profile.time_at(leg.length - tail - piece.offset)
+    return section.profile.time_at(move_path.length - tail - section.offset)
 
 
-def _corner_profiles(
+def _blend_profiles(
     rates: tuple[float, float],
     speed: float,
     remaining: float,
-    before: Law,
-    after: Law,
+    before: ProfileParameters,
+    after: ProfileParameters,
     head: float,
     rest: float,
-) -> tuple[Profile, Profile]:
+) -> tuple[MotionProfile, MotionProfile]:
     """
     Return the profiles of the corner (0 to 1) and of the rest of the leg behind it.
 
@@ -240,10 +273,12 @@ def _corner_profiles(
     u1 = min(cruise / exit_rate, stoppable / exit_rate, max(u0, allowed))
     through = ramp(1.0, u0, u1)
     if after.time > 0.0:
-        least = time * rest / (whole + head) / _CATCH_UP
-        after = replace(after, time=max(time - through.duration, least))
+        min_time = time * rest / (whole + head) / _MAX_CATCH_UP
+        after = replace(after, time=max(time - through.duration, min_time))
     return through, after.profile(rest, u1 * exit_rate)
 
 
-def _acceleration(law: Law) -> float:
-    return inf if law.time > 0.0 else max(law.acceleration, law.braking or 0.0)
+def _acceleration(parameters: ProfileParameters) -> float:
+    return (
+        inf if parameters.time > 0.0 else max(parameters.acceleration, parameters.braking or 0.0)
+    )
