@@ -18,15 +18,16 @@ from processes import Child, node, simulator
 from ros_client import goal_message, TimedClient
 from wire_tap import marks_until_first_point, wire_tap
 
-from ur_cartesian_driver.driver import channel
+from ur_cartesian_driver.driver.ipc import channel
 from ur_cartesian_driver.execution import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
-from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.protocol.reverse import TrajectoryAction
-from ur_cartesian_driver.protocol.trajectory import encode_points
-from ur_cartesian_driver.ros.convert import goal_from_message
-from ur_cartesian_driver.ros.frames import Frames
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.planning import planner as plan
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
+from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
+from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
+from ur_cartesian_driver.ros.tf.known_frames import Frames
 
 POINTS = 1_000
 #: How long each goal moves before it is cancelled [s].

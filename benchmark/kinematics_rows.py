@@ -15,7 +15,7 @@ import paths
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse_rows import all_solutions, solve_path
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.pose import pose_from_row, Vector6
 
 NAME = 'kinematics, poses of a path per second'

@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal import Goal, Segment, Waypoint
 from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.sim.config import HOME
+from ur_cartesian_driver.sim.simulator_config import HOME
 
 MODEL = 'ur5e'
 #: Distance of two points [m]; a block of so many along x and along y.

@@ -27,8 +27,12 @@ from ur_cartesian_driver.driver import ConnectionState, Driver, DriverConfig
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.primitive import MoveL
 from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.protocol.registers import POINTS_BEGUN
-from ur_cartesian_driver.protocol.trajectory import encode_points, POINT_FIELDS, POINT_SIZE
+from ur_cartesian_driver.protocol.program.registers import POINTS_BEGUN
+from ur_cartesian_driver.protocol.program.trajectory_points import (
+    encode_points,
+    POINT_FIELDS,
+    POINT_SIZE,
+)
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 NAME = 'points a second'

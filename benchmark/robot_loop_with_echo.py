@@ -23,10 +23,10 @@ import sys
 
 from processes import HOST
 
-from ur_cartesian_driver.driver.robot_loop import serve
-from ur_cartesian_driver.protocol.reverse import MESSAGE_SIZE, trajectory, TrajectoryAction
-from ur_cartesian_driver.protocol.rtde import OUTPUT_TYPES, Recipe
-from ur_cartesian_driver.robot.state_recipe import robot_state_from_rtde, STATE_FIELDS
+from ur_cartesian_driver.driver.loop.robot_loop import serve
+from ur_cartesian_driver.protocol.program.reverse import MESSAGE_SIZE, trajectory, TrajectoryAction
+from ur_cartesian_driver.protocol.rtde.rtde_client import OUTPUT_TYPES, Recipe
+from ur_cartesian_driver.robot.rtde.state_recipe import robot_state_from_rtde, STATE_FIELDS
 from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
 #: The variable of the environment that names the port to dial.

@@ -18,7 +18,7 @@ import time
 from figures import Figure, percentile
 from processes import Child, cpu_seconds, empty_loop, HOST, lateness, PERIOD, simulator
 
-from ur_cartesian_driver.protocol.rtde import DataReceived, RtdeClientCodec
+from ur_cartesian_driver.protocol.rtde.rtde_client import DataReceived, RtdeClientCodec
 
 BENCHMARK = 'RTDE at 500 Hz in real time'
 QUICK_SECONDS = 3.0

@@ -39,16 +39,17 @@ from processes import answer_calls, Child, child, HOST, PERIOD, simulator
 import robot_loop_with_echo
 from wire_tap import Relay, RelayDirection, TAP_HOST
 
-from ur_cartesian_driver.driver import Driver, DriverConfig, host
+from ur_cartesian_driver.driver import Driver, DriverConfig
+from ur_cartesian_driver.driver.loop import host
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.protocol.reverse import TrajectoryAction
-from ur_cartesian_driver.protocol.rtde import OUTPUT_TYPES, Recipe
-from ur_cartesian_driver.robot.state_recipe import STATE_FIELDS
+from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
+from ur_cartesian_driver.protocol.rtde.rtde_client import OUTPUT_TYPES, Recipe
+from ur_cartesian_driver.robot.rtde.state_recipe import STATE_FIELDS
 from ur_cartesian_driver.sim import SimulatedRobot
-from ur_cartesian_driver.sim.rtde_session import RtdeSession
+from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 
 NAME = 'violated tolerance'
 #: So far the tool is pushed aside, and so far it may be [m].

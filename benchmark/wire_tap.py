@@ -22,7 +22,7 @@ import time
 
 from processes import answer_calls, Child, child, HOST
 
-from ur_cartesian_driver.protocol.reverse import ControlMode, ReverseDecoder
+from ur_cartesian_driver.protocol.program.reverse import ControlMode, ReverseDecoder
 
 TAP_HOST = '127.0.0.2'
 PORTS = ('reverse_port', 'trajectory_port', 'script_command_port')

@@ -16,8 +16,8 @@ from enum import Enum
 from pathlib import Path
 from typing import TypeAlias
 
-import ur_cartesian_driver.execution.servo_stream as servo_stream
-import ur_cartesian_driver.execution.states as states
+import ur_cartesian_driver.execution.goal.states as states
+import ur_cartesian_driver.execution.servo.servo_stream as servo_stream
 from ur_cartesian_driver.robot import lifecycle
 
 DIAGRAMS = Path(__file__).resolve().parents[1] / 'doc' / 'diagrams'
@@ -37,13 +37,13 @@ def pages() -> dict[str, str]:
         ),
         'trajectory.md': page(
             'A goal on its way through the robot program',
-            'ur_cartesian_driver/execution/states.py',
+            'ur_cartesian_driver/execution/goal/states.py',
             goal(),
             [signal.name for signal in states.GoalSignal],
         ),
         'servo.md': page(
             'Streaming of set-points',
-            'ur_cartesian_driver/execution/servo_stream.py',
+            'ur_cartesian_driver/execution/servo/servo_stream.py',
             servo(),
             [change.name for change in servo_stream.ServoEvent],
         ),

@@ -46,13 +46,14 @@ def a_goal(
     async def happens(cell: Any) -> Any:
         from ur_cartesian_driver.cli.commands import goal_file
         from ur_cartesian_driver.kinematics.chain import Arm
-        from ur_cartesian_driver.kinematics.robots import robot_model
+        from ur_cartesian_driver.kinematics.robot_models import robot_model
         from ur_cartesian_driver.motion.goal import ExecutionMode
-        from ur_cartesian_driver.planning import plan, PlanningOptions
+        from ur_cartesian_driver.planning import planner as plan
+        from ur_cartesian_driver.planning import PlanningOptions
         from ur_cartesian_driver.ros.client import load_goal
-        from ur_cartesian_driver.ros.convert import goal_from_message
-        from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames
-        from ur_cartesian_driver.sim.fault_text import parse_fault
+        from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
+        from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
+        from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
 
         state = cell.memory.read()
         goal = goal_from_message(
@@ -143,8 +144,8 @@ def draw(name: str) -> Path:
     """Record and draw; return the file of the picture."""
     from PIL import Image
 
-    from ur_cartesian_driver.cli import plot
-    from ur_cartesian_driver.driver.recording import Recording
+    from ur_cartesian_driver.cli import recording_plot as plot
+    from ur_cartesian_driver.driver.recordings.recording import Recording
 
     drawing = CHECKOUT / 'doc' / f'execution_{name}.png'
     with tempfile.TemporaryDirectory() as directory:

@@ -21,15 +21,16 @@ from ur_cartesian_driver.cli import main, parser
 from ur_cartesian_driver.cli.commands import code_text, goal_file, simulator_config
 from ur_cartesian_driver.driver import ConnectionState, Driver, DriverConfig
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning import planner as plan
+from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal
-from ur_cartesian_driver.ros.convert import goal_from_message
-from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames
+from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
+from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.sim import SimulatedRobot
-from ur_cartesian_driver.sim.faults import AfterTime
+from ur_cartesian_driver.sim.faults.injector import AfterTime
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(

@@ -129,13 +129,14 @@ def test_send_goal_is_the_goal_of_the_square_example(send_goal):
 
 
 def test_send_goal_passes_planning_from_home_and_takes_ten_seconds(send_goal):
-    from ur_cartesian_driver.cli.plans import stationary_state
+    from ur_cartesian_driver.cli.validate_command import stationary_state
     from ur_cartesian_driver.kinematics.chain import Arm
-    from ur_cartesian_driver.kinematics.robots import robot_model
-    from ur_cartesian_driver.planning import plan, PlanningOptions
+    from ur_cartesian_driver.kinematics.robot_models import robot_model
+    from ur_cartesian_driver.planning import planner as plan
+    from ur_cartesian_driver.planning import PlanningOptions
     from ur_cartesian_driver.ros.client import load_goal
-    from ur_cartesian_driver.ros.convert import goal_from_message
-    from ur_cartesian_driver.ros.frames import Frames
+    from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
+    from ur_cartesian_driver.ros.tf.known_frames import Frames
     from ur_cartesian_driver.sim import HOME
 
     arm = Arm(robot_model('ur5e'))
@@ -146,13 +147,14 @@ def test_send_goal_passes_planning_from_home_and_takes_ten_seconds(send_goal):
 
 
 def test_plain_goal_passes_planning_from_home():
-    from ur_cartesian_driver.cli.plans import stationary_state
+    from ur_cartesian_driver.cli.validate_command import stationary_state
     from ur_cartesian_driver.kinematics.chain import Arm
-    from ur_cartesian_driver.kinematics.robots import robot_model
-    from ur_cartesian_driver.planning import plan, PlanningOptions
+    from ur_cartesian_driver.kinematics.robot_models import robot_model
+    from ur_cartesian_driver.planning import planner as plan
+    from ur_cartesian_driver.planning import PlanningOptions
     from ur_cartesian_driver.ros.client import load_goal
-    from ur_cartesian_driver.ros.convert import goal_from_message
-    from ur_cartesian_driver.ros.frames import Frames
+    from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
+    from ur_cartesian_driver.ros.tf.known_frames import Frames
     from ur_cartesian_driver.sim import HOME
 
     (body,) = blocks(CHECKOUT / 'doc' / 'goals.md', 'yaml')
@@ -163,9 +165,9 @@ def test_plain_goal_passes_planning_from_home():
 
 def test_what_where_prints_is_a_point_of_a_goal():
     from ur_cartesian_driver.cli.commands import point_as_yaml
-    from ur_cartesian_driver.cli.plans import stationary_state
+    from ur_cartesian_driver.cli.validate_command import stationary_state
     from ur_cartesian_driver.kinematics.chain import Arm
-    from ur_cartesian_driver.kinematics.robots import robot_model
+    from ur_cartesian_driver.kinematics.robot_models import robot_model
     from ur_cartesian_driver.ros.client import load_goal
     from ur_cartesian_driver.sim import HOME
 
@@ -284,7 +286,7 @@ def test_commands_exist(document):
 
 
 def check_parameters(words):
-    from ur_cartesian_driver.ros.parameters import DECLARATIONS
+    from ur_cartesian_driver.ros.parameters.node_parameters import DECLARATIONS
 
     known = {declaration.name for declaration in DECLARATIONS}
     given = {word.split(':=')[0] for word in words if ':=' in word}
@@ -360,7 +362,7 @@ def test_every_error_code_is_described_with_its_number():
 
 
 def test_every_parameter_that_is_named_as_one_exists():
-    from ur_cartesian_driver.ros.parameters import defaults
+    from ur_cartesian_driver.ros.parameters.node_parameters import defaults
 
     named = [
         name
@@ -386,7 +388,7 @@ def test_every_example_is_listed():
 
 
 def test_every_robot_model_is_listed():
-    from ur_cartesian_driver.kinematics.robots import MODELS
+    from ur_cartesian_driver.kinematics.robot_models import MODELS
 
     (section,) = re.findall(
         r'^## Robots\n(.*?)^## ', README.read_text(encoding='utf-8'), re.DOTALL | re.MULTILINE

@@ -19,9 +19,13 @@ import pytest
 
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.msg import DriverStatus
+from ur_cartesian_driver.robot.driver_status import required_action
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.recovery import next_step, RecoverySituation, RecoveryStep
-from ur_cartesian_driver.robot.status import required_action
+from ur_cartesian_driver.robot.services.recovery_steps import (
+    next_step,
+    RecoverySituation,
+    RecoveryStep,
+)
 from ur_cartesian_driver.robot.transport import dial, error_reason, TcpConnection, TcpListener
 
 CHECKOUT = Path(__file__).resolve().parents[1]

@@ -12,8 +12,8 @@ import pytest
 from ur_cartesian_driver.driver import Driver, DriverConfig
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.protocol.rtde import DataReceived, RtdeClientCodec
-from ur_cartesian_driver.protocol.trajectory import POINT_SIZE
+from ur_cartesian_driver.protocol.program.trajectory_points import POINT_SIZE
+from ur_cartesian_driver.protocol.rtde.rtde_client import DataReceived, RtdeClientCodec
 
 READY = 10.0
 

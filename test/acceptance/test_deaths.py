@@ -26,7 +26,7 @@ from waiting import wait_for
 
 from ur_cartesian_driver.cli.demo import process
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.protocol.rtde import DataReceived, RtdeClientCodec
+from ur_cartesian_driver.protocol.rtde.rtde_client import DataReceived, RtdeClientCodec
 from ur_cartesian_driver.ros.client import GoalClient, load_goal
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]

@@ -20,7 +20,7 @@ from robot_in_memory import RobotInMemory
 
 from ur_cartesian_driver.kinematics.inverse import nearest, solutions
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
-from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidPosture, NearSingularity
 from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import (
@@ -30,7 +30,8 @@ from ur_cartesian_driver.motion.pose import (
     quaternion_from_rotation_vector,
 )
 from ur_cartesian_driver.motion.primitive import MoveJ
-from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning import planner as plan
+from ur_cartesian_driver.planning import PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

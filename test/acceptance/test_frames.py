@@ -18,7 +18,7 @@ import pytest
 from waiting import wait_for
 
 from ur_cartesian_driver.driver import ConnectionState
-from ur_cartesian_driver.kinematics.robots import MODELS
+from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, quaternion_from_rotation_vector

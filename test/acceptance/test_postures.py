@@ -7,12 +7,16 @@ from math import cos, pi, sin
 import pytest
 
 from ur_cartesian_driver.kinematics.inverse import nearest
-from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL
-from ur_cartesian_driver.protocol.trajectory import decode_point, motion_type, MotionType
+from ur_cartesian_driver.protocol.program.trajectory_points import (
+    decode_point,
+    motion_type,
+    MotionType,
+)
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

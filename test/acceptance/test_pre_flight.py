@@ -23,7 +23,7 @@ import pytest
 from random_goals import random_case
 from robot_in_memory import RobotInMemory
 
-from ur_cartesian_driver.kinematics.robots import MODELS
+from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.goal import SegmentType
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]

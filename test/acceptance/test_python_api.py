@@ -10,7 +10,7 @@ import threading
 import pytest
 from waiting import wait_for
 
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Tolerance, Waypoint
 

@@ -16,7 +16,10 @@ from waiting import wait_for
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.program import wrap_in_program
-from ur_cartesian_driver.protocol.primary import PrimaryDecoder, RuntimeExceptionMessage
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
+    PrimaryDecoder,
+    RuntimeExceptionMessage,
+)
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]

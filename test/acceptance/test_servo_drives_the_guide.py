@@ -17,7 +17,7 @@ from ur_cartesian_driver.execution import (
     WriteServo,
 )
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import CancelRequested, ServoReceived, StateReceived
 from ur_cartesian_driver.motion.goal import ExecutionMode, Tolerance

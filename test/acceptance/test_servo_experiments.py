@@ -13,7 +13,7 @@ from servo_cell import CYCLE
 from servo_experiments import buffered, HEIGHT, unbuffered
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

@@ -9,23 +9,24 @@ import pytest
 import robot_cell
 from robot_cell import run_cell
 
-from ur_cartesian_driver.driver.channel import MotionProgress, ServoProgress
+from ur_cartesian_driver.driver.ipc.channel import MotionProgress, ServoProgress
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
 from ur_cartesian_driver.motion.servo import ServoActivity
-from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning import planner as plan
+from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 from ur_cartesian_driver.planning.spline.spline_points import tool_points
-from ur_cartesian_driver.protocol import registers
-from ur_cartesian_driver.protocol.rtde import RtdeClientCodec
+from ur_cartesian_driver.protocol.program import registers
+from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.resources import share_path
-from ur_cartesian_driver.robot.rtde_connection import RtdeConnection
+from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 from ur_cartesian_driver.ros.client import load_goal
-from ur_cartesian_driver.ros.convert import goal_from_message
-from ur_cartesian_driver.ros.frames import ArmSnapshot, Frames
+from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
+from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

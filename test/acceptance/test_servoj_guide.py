@@ -16,12 +16,16 @@ from socket import create_connection
 import pytest
 
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.protocol.rtde import DataReceived, HandshakeDone, RtdeClientCodec
+from ur_cartesian_driver.protocol.rtde.rtde_client import (
+    DataReceived,
+    HandshakeDone,
+    RtdeClientCodec,
+)
 from ur_cartesian_driver.sim import SimulatorConfig
-from ur_cartesian_driver.sim.builtins.motion import FreedriveState
+from ur_cartesian_driver.sim.builtins.motion_builtins import FreedriveState
 from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.rtde_session import RtdeSession
-from ur_cartesian_driver.sim.uploads import UploadDecoder
+from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
+from ur_cartesian_driver.sim.programs.script_upload import UploadDecoder
 
 pytestmark = pytest.mark.slow
 

@@ -9,7 +9,7 @@ from waiting import wait_for
 
 from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.goal import Goal, OutputKind, Waypoint
-from ur_cartesian_driver.protocol.rtde import RtdeClientCodec
+from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

@@ -14,17 +14,18 @@ from robot_cell import REVERSE, RTDE, run_cell
 from virtual_network import hand_over
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType, Tolerance, Waypoint
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.protocol.reverse import ReverseDecoder, TrajectoryAction
-from ur_cartesian_driver.protocol.rtde import OUTPUT_TYPES, Recipe
-from ur_cartesian_driver.protocol.rtde_packages import RtdeFrameBuffer
-from ur_cartesian_driver.robot.state_recipe import OPTIONAL_FIELDS, REQUIRED_FIELDS
-from ur_cartesian_driver.sim.faults import (
+from ur_cartesian_driver.planning import planner as plan
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.protocol.program.reverse import ReverseDecoder, TrajectoryAction
+from ur_cartesian_driver.protocol.rtde.rtde_client import OUTPUT_TYPES, Recipe
+from ur_cartesian_driver.protocol.rtde.rtde_packages import RtdeFrameBuffer
+from ur_cartesian_driver.robot.rtde.state_recipe import OPTIONAL_FIELDS, REQUIRED_FIELDS
+from ur_cartesian_driver.sim.faults.injector import (
     AfterDistance,
     AfterTime,
     DeviationFault,

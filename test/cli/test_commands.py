@@ -12,11 +12,12 @@ import sys
 import pytest
 import yaml
 
-from ur_cartesian_driver.cli import main, picture
+from ur_cartesian_driver.cli import feedback_plot as picture
+from ur_cartesian_driver.cli import main
 from ur_cartesian_driver.cli.commands import goal_file
-from ur_cartesian_driver.cli.plans import stationary_state
+from ur_cartesian_driver.cli.validate_command import stationary_state
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, robot_model
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model
 from ur_cartesian_driver.ros.client import load_goal
 
 EXAMPLES = ['postures', 'seam', 'square']

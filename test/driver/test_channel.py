@@ -8,15 +8,16 @@ import threading
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.driver import channel, DriverConfig, DriverStatus
+from ur_cartesian_driver.driver import DriverConfig, DriverStatus
+from ur_cartesian_driver.driver.ipc import channel
 from ur_cartesian_driver.execution import AnswerAppend, MotionJob
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.robot.driver_status import LinkGaps
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.services import service_calls
-from ur_cartesian_driver.robot.status import LinkGaps
 
 MESSAGES = [
     channel.Configure(config=DriverConfig(robot_ip='10.0.0.1', headless_mode=True)),

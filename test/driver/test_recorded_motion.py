@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from robot_cell import CYCLE, run_cell
 
-from ur_cartesian_driver.driver.recording import Recording
+from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import (
     ExecutionMode,
@@ -24,8 +24,14 @@ from ur_cartesian_driver.motion.goal import (
     ZERO6,
 )
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.sim.faults import AfterDistance, EventFault, FaultEvent, SpeedSliderFault
+from ur_cartesian_driver.planning import planner as plan
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.sim.faults.injector import (
+    AfterDistance,
+    EventFault,
+    FaultEvent,
+    SpeedSliderFault,
+)
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

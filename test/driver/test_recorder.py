@@ -30,23 +30,25 @@ from synthetic_recording import (
     Warnings,
 )
 
-from ur_cartesian_driver.driver import DriverConfig, recording_format
-from ur_cartesian_driver.driver.recorder import (
+from ur_cartesian_driver.driver import DriverConfig
+from ur_cartesian_driver.driver.recordings import recording_format
+from ur_cartesian_driver.driver.recordings.recorder import (
     BUFFER_COUNT,
     BUFFER_ROWS,
     motion_metadata,
     plan_metadata,
     Recorder,
 )
-from ur_cartesian_driver.driver.recording import Recording
-from ur_cartesian_driver.driver.recording_folder import enforce_quota, recording_name
+from ur_cartesian_driver.driver.recordings.recording import Recording
+from ur_cartesian_driver.driver.recordings.recording_folder import enforce_quota, recording_name
 from ur_cartesian_driver.execution import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState, RuntimeState, SafetyMode
-from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning import planner as plan
+from ur_cartesian_driver.planning import PlanningOptions
 
 # ---- what is in a file --------------------------------------------------------------------------
 
@@ -267,7 +269,7 @@ def test_the_oldest_recordings_make_room_and_other_files_stay(tmp_path):
 
 KILLED = """
 import os, pickle, signal, sys, time
-from ur_cartesian_driver.driver.recorder import BUFFER_COUNT, Recorder
+from ur_cartesian_driver.driver.recordings.recorder import BUFFER_COUNT, Recorder
 directory, scene = sys.argv[1:]
 with open(scene, 'rb') as file:
     order, head, packets = pickle.load(file)

@@ -6,9 +6,10 @@ import asyncio
 import os
 import socket
 
-from ur_cartesian_driver.driver import channel, DriverConfig
-from ur_cartesian_driver.driver.robot_loop import MAX_UNREAD, RobotLoop
-from ur_cartesian_driver.driver.snapshot import create, StateMemory
+from ur_cartesian_driver.driver import DriverConfig
+from ur_cartesian_driver.driver.ipc import channel
+from ur_cartesian_driver.driver.ipc.state_memory import create, StateMemory
+from ur_cartesian_driver.driver.loop.robot_loop import MAX_UNREAD, RobotLoop
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 

@@ -19,7 +19,7 @@ from ur_cartesian_driver.execution import (
     SendControl,
     SendPoints,
 )
-from ur_cartesian_driver.execution.states import GoalState, TRANSITIONS
+from ur_cartesian_driver.execution.goal.states import GoalState, TRANSITIONS
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
@@ -34,7 +34,7 @@ from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyStatus
-from ur_cartesian_driver.protocol.reverse import TrajectoryAction
+from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 POINTS = 3
 NOZZLE = Pose((0.0, 0.0, 0.1), (0.0, 0.0, 0.0, 1.0))

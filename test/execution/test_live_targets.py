@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from ur_cartesian_driver.execution.live_targets import LiveSettings, LiveTargets
-from ur_cartesian_driver.execution.target_follower import OnlineTrajectoryGenerator
+from ur_cartesian_driver.execution.live.live_targets import LiveSettings, LiveTargets
+from ur_cartesian_driver.execution.live.online_trajectory import OnlineTrajectoryGenerator
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 
 ARM = Arm(robot_model('ur5e'))

@@ -19,7 +19,7 @@ from ur_cartesian_driver.execution import (
     SetTemporaryTcp,
     WriteServo,
 )
-from ur_cartesian_driver.execution.states import GoalState
+from ur_cartesian_driver.execution.goal.states import GoalState
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,

@@ -12,19 +12,19 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution.servo_clock import ServoClock
-from ur_cartesian_driver.execution.servo_source import SplineSetpoints
-from ur_cartesian_driver.execution.servo_stream import (
+from ur_cartesian_driver.execution.servo.servo_clock import ServoClock
+from ur_cartesian_driver.execution.servo.servo_stream import (
     ServoEvent,
     ServoPhase,
     ServoSettings,
     ServoStream,
     TRANSITIONS,
 )
+from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.primitive import Spline
 from ur_cartesian_driver.motion.servo import ServoActivity, ServoFeedback
-from ur_cartesian_driver.protocol.registers import SERVO_INPUTS, ServoMode
+from ur_cartesian_driver.protocol.program.registers import SERVO_INPUTS, ServoMode
 
 STEP = 0.002
 DEPTH = 250

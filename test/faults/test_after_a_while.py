@@ -8,7 +8,7 @@ import pytest
 import robot_cell
 from robot_cell import run_cell
 
-from ur_cartesian_driver.execution.observer import STALL_TIMEOUT
+from ur_cartesian_driver.execution.goal.monitor import STALL_TIMEOUT
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import IOCommand, OutputKind
 from ur_cartesian_driver.motion.state import RuntimeState

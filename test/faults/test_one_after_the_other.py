@@ -8,7 +8,7 @@ from joint_trace import JointTrace
 import pytest
 from robot_cell import run_cell
 
-from ur_cartesian_driver.driver.channel import CancelMotion
+from ur_cartesian_driver.driver.ipc.channel import CancelMotion
 from ur_cartesian_driver.motion.errors import ErrorCode
 
 pytestmark = pytest.mark.slow

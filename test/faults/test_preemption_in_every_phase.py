@@ -7,10 +7,10 @@ from joint_trace import JointTrace
 import pytest
 from robot_cell import CYCLE, run_cell
 
-from ur_cartesian_driver.driver.channel import CancelMotion
+from ur_cartesian_driver.driver.ipc.channel import CancelMotion
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.planning.stop_prediction import predict_stop
-from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
+from ur_cartesian_driver.protocol.program.reverse import ControlMode, TrajectoryAction
 
 pytestmark = pytest.mark.slow
 START, CANCEL = TrajectoryAction.START, TrajectoryAction.CANCEL

@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import DhTable, MODELS
+from ur_cartesian_driver.kinematics.robot_models import DhTable, MODELS
 
 GOLDEN = Path(__file__).parent / 'golden'
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm, pinocchio_model
-from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, MODELS
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, MODELS
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 
 UR5E = MODELS['ur5e']

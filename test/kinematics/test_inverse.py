@@ -21,7 +21,7 @@ from ur_cartesian_driver.kinematics.inverse import (
     solutions,
 )
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
-from ur_cartesian_driver.kinematics.robots import MODELS
+from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.pose import Pose
 
 UR5E = Arm(MODELS['ur5e'])

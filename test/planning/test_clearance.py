@@ -12,7 +12,7 @@ import pytest
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
 from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes
-from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, MODELS
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, MODELS
 from ur_cartesian_driver.motion.errors import CODES, CollisionPredicted, ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose

@@ -13,14 +13,14 @@ import pytest
 from robot_in_memory import RobotInMemory
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.goal import OutputKind
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, Spline, SwitchOutput
 from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.program import wrap_in_program
-from ur_cartesian_driver.protocol.trajectory import MAX_PENDING_OUTPUTS
+from ur_cartesian_driver.protocol.program.trajectory_points import MAX_PENDING_OUTPUTS
 
 HOME = (0.3, -1.4, 1.5, -1.6, -1.5, 0.2)
 STEP = 0.002

@@ -10,7 +10,7 @@ from robot_in_memory import REVERSE, RobotInMemory, TRAJECTORY
 
 from ur_cartesian_driver.motion.primitive import MoveJ
 from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
-from ur_cartesian_driver.protocol.registers import (
+from ur_cartesian_driver.protocol.program.registers import (
     InputDouble,
     InputInteger,
     OutputDouble,
@@ -18,14 +18,14 @@ from ur_cartesian_driver.protocol.registers import (
     ServoMode,
     SyncState,
 )
-from ur_cartesian_driver.protocol.reverse import (
+from ur_cartesian_driver.protocol.program.reverse import (
     buffered_servo,
     keepalive,
     trajectory,
     TrajectoryAction,
 )
-from ur_cartesian_driver.protocol.trajectory import encode_points
-from ur_cartesian_driver.sim.builtins.motion import FreedriveState
+from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
+from ur_cartesian_driver.sim.builtins.motion_builtins import FreedriveState
 
 pytestmark = pytest.mark.slow
 

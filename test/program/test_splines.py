@@ -17,7 +17,7 @@ from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.pose import IDENTITY
 from ur_cartesian_driver.motion.primitive import MoveJ, Spline
 from ur_cartesian_driver.program import wrap_in_program
-from ur_cartesian_driver.protocol.trajectory import encode_points
+from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 
 START = np.array([0.3, -1.4, 1.5, -1.6, -1.5, 0.2])
 SIZE = np.array([0.5, 0.3, 0.4, 0.5, 0.4, 0.8])

@@ -28,9 +28,9 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveL,
     Spline,
 )
-from ur_cartesian_driver.protocol.dialects import DIALECTS, NEWEST_DIALECT
-from ur_cartesian_driver.protocol.reverse import trajectory, TrajectoryAction
-from ur_cartesian_driver.protocol.trajectory import (
+from ur_cartesian_driver.protocol.program.dialects import DIALECTS, NEWEST_DIALECT
+from ur_cartesian_driver.protocol.program.reverse import trajectory, TrajectoryAction
+from ur_cartesian_driver.protocol.program.trajectory_points import (
     decode_point,
     encode_fields,
     encode_point,

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.protocol.realtime import (
+from ur_cartesian_driver.protocol.client_interfaces.realtime import (
     decode_packet,
     packet_size,
     PACKET_SIZES,

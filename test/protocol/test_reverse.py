@@ -13,7 +13,7 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.protocol.framing import to_fixed
-from ur_cartesian_driver.protocol.reverse import (
+from ur_cartesian_driver.protocol.program.reverse import (
     ControlMode,
     freedrive,
     FreedriveAction,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
-from ur_cartesian_driver.protocol.rtde import (
+from ur_cartesian_driver.protocol.rtde.rtde_client import (
     ControllerVersion,
     DataType,
     decode_reply,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from ur_cartesian_driver.protocol.rtde import (
+from ur_cartesian_driver.protocol.rtde.rtde_client import (
     DataPackage,
     DataType,
     decode_reply,

@@ -11,7 +11,7 @@ import pytest
 from random_frames import RANDOM_FRAMES
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
-from ur_cartesian_driver.protocol.rtde import (
+from ur_cartesian_driver.protocol.rtde.rtde_client import (
     ControllerVersion,
     DataPackage,
     decode_reply,
@@ -20,7 +20,7 @@ from ur_cartesian_driver.protocol.rtde import (
     SetupInputs,
     SetupOutputs,
 )
-from ur_cartesian_driver.protocol.rtde_server import RtdeServerCodec
+from ur_cartesian_driver.protocol.rtde.rtde_server import RtdeServerCodec
 
 VERSION = ControllerVersion(major=5, minor=21, bugfix=0)
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.protocol.script_command import (
+from ur_cartesian_driver.protocol.program.script_command import (
     COMMAND_SIZE,
     decode,
     encode,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
-from ur_cartesian_driver.protocol.script_sender import reply, REQUEST, RequestDecoder
+from ur_cartesian_driver.protocol.program.script_sender import reply, REQUEST, RequestDecoder
 
 
 def test_the_bytes():

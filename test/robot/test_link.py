@@ -10,10 +10,10 @@ import logging
 import pytest
 
 from ur_cartesian_driver.motion.state import RobotState, RuntimeState
+from ur_cartesian_driver.robot.driver_status import DriverStatus
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.link import LOG_DELAY, RobotLink
-from ur_cartesian_driver.robot.settings import LinkSettings
-from ur_cartesian_driver.robot.status import DriverStatus
+from ur_cartesian_driver.robot.link_settings import LinkSettings
 
 
 class Ear:

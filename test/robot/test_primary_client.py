@@ -8,7 +8,7 @@ from math import nan
 
 from virtual_network import HOST, VirtualLoop
 
-from ur_cartesian_driver.protocol import primary
+from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
 from ur_cartesian_driver.robot.primary_client import PrimaryCallbacks, PrimaryClient
 
 PORT = 30001

@@ -9,11 +9,11 @@ import itertools
 import pytest
 
 from ur_cartesian_driver.motion.events import TrajectoryResult
-from ur_cartesian_driver.protocol import reverse
-from ur_cartesian_driver.protocol.script_sender import REQUEST
+from ur_cartesian_driver.protocol.program import reverse
+from ur_cartesian_driver.protocol.program.script_sender import REQUEST
 from ur_cartesian_driver.robot import transport
-from ur_cartesian_driver.robot.program_sockets import ProgramCallbacks, ProgramSockets
-from ur_cartesian_driver.robot.settings import LinkSettings
+from ur_cartesian_driver.robot.link_settings import LinkSettings
+from ur_cartesian_driver.robot.program.program_sockets import ProgramCallbacks, ProgramSockets
 from ur_cartesian_driver.robot.transport import (
     MAX_LINES,
     plain_address,

@@ -6,7 +6,7 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
-from ur_cartesian_driver.robot.state_recipe import (
+from ur_cartesian_driver.robot.rtde.state_recipe import (
     in_recipe_order,
     OPTIONAL_FIELDS,
     REQUIRED_FIELDS,

@@ -10,7 +10,7 @@ from rclpy.duration import Duration
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.msg import MotionSegment
-from ur_cartesian_driver.ros import action_server
+from ur_cartesian_driver.ros.goals import action_server
 
 pytestmark = pytest.mark.slow
 SUCCEEDED, ABORTED, CANCELED = (

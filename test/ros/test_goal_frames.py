@@ -12,8 +12,8 @@ from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
-from ur_cartesian_driver.ros.reports import duration_message, pose_message
-from ur_cartesian_driver.ros.transforms import TransformLookup
+from ur_cartesian_driver.ros.messages.feedback_messages import duration_message, pose_message
+from ur_cartesian_driver.ros.tf.tf_lookup import TransformLookup
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 pytestmark = pytest.mark.slow

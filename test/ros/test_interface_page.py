@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from ur_cartesian_driver.ros.state_publisher import tf_messages
+from ur_cartesian_driver.ros.state.state_publisher import tf_messages
 
 PAGE = Path(__file__).resolve().parents[2] / 'doc' / 'ros_interface.md'
 pytestmark = [

@@ -16,7 +16,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64
 from std_srvs.srv import Trigger
 
-from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.msg import (
     DriverStatus,
@@ -28,8 +28,8 @@ from ur_cartesian_driver.msg import (
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros.client import GoalClient, load_goal
-from ur_cartesian_driver.ros.parameters import ParameterError
-from ur_cartesian_driver.ros.state_publisher import LATCHED_QOS, STATE_QOS
+from ur_cartesian_driver.ros.parameters.node_parameters import ParameterError
+from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS, STATE_QOS
 
 pytestmark = pytest.mark.slow
 

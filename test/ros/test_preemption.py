@@ -11,7 +11,7 @@ from rclpy.duration import Duration
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
-from ur_cartesian_driver.ros.reports import duration_message, pose_message
+from ur_cartesian_driver.ros.messages.feedback_messages import duration_message, pose_message
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 pytestmark = pytest.mark.slow

@@ -14,14 +14,13 @@ from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector, rotate
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, SafetyMode
 from ur_cartesian_driver.msg import IOStates, ToolData
-from ur_cartesian_driver.robot.signal_stream import (
+from ur_cartesian_driver.robot.rtde.signal_stream import (
     OPTIONAL_FIELDS,
     REQUIRED_FIELDS,
     signals_from_rtde,
 )
-from ur_cartesian_driver.ros.diagnostics import LEVELS
-from ur_cartesian_driver.ros.reports import joint_state_message
-from ur_cartesian_driver.ros.state_messages import (
+from ur_cartesian_driver.ros.messages.feedback_messages import joint_state_message
+from ur_cartesian_driver.ros.messages.state_messages import (
     io_states_message,
     robot_mode_message,
     safety_mode_message,
@@ -29,6 +28,7 @@ from ur_cartesian_driver.ros.state_messages import (
     tool_data_message,
     wrench_message,
 )
+from ur_cartesian_driver.ros.state.diagnostics import LEVELS
 
 STAMP = Time(sec=5)
 #: The tool looks down: its z is -z of the base, its x is x.

@@ -11,8 +11,8 @@ from robot_ports import FREE
 
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.sim import SimulatedRobot
-from ur_cartesian_driver.sim.config import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 
 
 class Bench:

@@ -17,8 +17,8 @@ import pytest
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.sim.builtins import controller_builtins, refuse_timed_functions
-from ur_cartesian_driver.sim.modes import SafetyEvent
-from ur_cartesian_driver.urscript.values import ScriptPose
+from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
+from ur_cartesian_driver.urscript.script_values import ScriptPose
 
 HERE = Path(__file__).parent
 PROGRAMS = sorted((HERE / 'programs').rglob('*.script'))
@@ -130,7 +130,7 @@ def value(function, position, item):
 def rotation(function, numbers):
     """Return what a result turns by, however it is written."""
     if function == 'rotvec2rpy':
-        from ur_cartesian_driver.sim.builtins.poses import PoseBuiltins
+        from ur_cartesian_driver.sim.builtins.pose_builtins import PoseBuiltins
 
         numbers = PoseBuiltins().rpy2rotvec(list(numbers))
     return Pose((0.0, 0.0, 0.0), quaternion_from_rotation_vector(tuple(numbers[-3:])))

@@ -11,11 +11,14 @@ import pytest
 import yaml
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import MODELS, robot_model
-from ur_cartesian_driver.protocol.primary import KinematicsInfo, PrimaryDecoder
+from ur_cartesian_driver.kinematics.robot_models import MODELS, robot_model
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
+    KinematicsInfo,
+    PrimaryDecoder,
+)
 from ur_cartesian_driver.sim import Controller, SimulatorConfig
 from ur_cartesian_driver.sim.calibration import random_calibration, read_calibration
-from ur_cartesian_driver.sim.primary_states import PrimaryStream
+from ur_cartesian_driver.sim.interfaces.primary_stream import PrimaryStream
 
 UR5E = robot_model('ur5e')
 NAMES = ('shoulder', 'upper_arm', 'forearm', 'wrist_1', 'wrist_2', 'wrist_3')

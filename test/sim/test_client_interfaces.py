@@ -13,10 +13,14 @@ import time
 import pytest
 
 from ur_cartesian_driver.motion.state import RobotMode, RuntimeState
-from ur_cartesian_driver.protocol.primary import PrimaryDecoder, RobotStateFrame, VersionMessage
-from ur_cartesian_driver.protocol.realtime import RealtimeData, RealtimeDecoder
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
+    PrimaryDecoder,
+    RobotStateFrame,
+    VersionMessage,
+)
+from ur_cartesian_driver.protocol.client_interfaces.realtime import RealtimeData, RealtimeDecoder
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
-from ur_cartesian_driver.sim.config import HOME
+from ur_cartesian_driver.sim.simulator_config import HOME
 
 FREE = {'rtde_port': 0, 'primary_port': 0, 'dashboard_port': 0}
 INTERFACES = ('primary', 'secondary', 'realtime')

@@ -9,11 +9,11 @@ import re
 import pytest
 
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.sim.config import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.dashboard_session import COMMANDS, DashboardSession
-from ur_cartesian_driver.sim.modes import SafetyEvent
-from ur_cartesian_driver.sim.server import HangUp
+from ur_cartesian_driver.sim.interfaces.dashboard_session import COMMANDS, DashboardSession
+from ur_cartesian_driver.sim.interfaces.tcp_server import HangUp
+from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
+from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 #: Command, the answer that the manufacturer's client library wants, and the minor versions of
 #: PolyScope 3 and 5 from which on that library sends it; None: in none.

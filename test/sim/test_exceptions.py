@@ -4,7 +4,7 @@
 
 import pytest
 
-from ur_cartesian_driver.protocol.primary import (
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     KeyMessage,
     RuntimeExceptionMessage,
 )

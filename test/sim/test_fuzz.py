@@ -20,7 +20,7 @@ import struct
 
 import pytest
 
-from ur_cartesian_driver.protocol.rtde_fields import OUTPUT_TYPES
+from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.robot import Ports
 

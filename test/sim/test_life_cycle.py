@@ -7,7 +7,7 @@ from math import dist
 import pytest
 
 from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
-from ur_cartesian_driver.sim.modes import SafetyEvent
+from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 LONG_MOVE = 'movej([1.5, -1.57, 1.57, -1.57, -1.57, 0], a=2, v=1)'
 LONG_LINE = 'movel(pose_trans(get_actual_tcp_pose(), p[0, 0, 0.1, 0, 0, 0]), a=0.5, v=0.1)'

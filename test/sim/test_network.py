@@ -15,7 +15,7 @@ from rtde_requests import setup_outputs, START, VERSION_2
 from waiting import wait_for
 
 from ur_cartesian_driver.motion.state import SafetyMode
-from ur_cartesian_driver.protocol.primary import (
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     TextMessage,
 )
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig

@@ -12,22 +12,22 @@ import pytest
 
 from ur_cartesian_driver.motion.state import RobotMode, SafetyMode
 from ur_cartesian_driver.sim.clock import RealClock
-from ur_cartesian_driver.sim.config import SimulatorConfig
-from ur_cartesian_driver.sim.modes import (
+from ur_cartesian_driver.sim.interfaces.primary_commands import execute_command
+from ur_cartesian_driver.sim.programs.rtde_watchdog import Watchdogs
+from ur_cartesian_driver.sim.programs.script_upload import (
+    UploadDecoder,
+    UploadedLine,
+    UploadedProgram,
+    UploadTooLong,
+)
+from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
+from ur_cartesian_driver.sim.state.power_and_safety import (
     ArmPower,
     SAFETY_TRANSITIONS,
     SafetyEvent,
     SafetySystem,
     STATUS_BITS,
 )
-from ur_cartesian_driver.sim.script_commands import execute_command
-from ur_cartesian_driver.sim.uploads import (
-    UploadDecoder,
-    UploadedLine,
-    UploadedProgram,
-    UploadTooLong,
-)
-from ur_cartesian_driver.sim.watchdog import Watchdogs
 
 STREAM = (
     b'power on\r\n\n# nothing\ndef a():\n\tif True:\n\t\tb = "end"\n\tend\n# c\nend\n\n'

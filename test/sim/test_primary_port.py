@@ -11,7 +11,7 @@ from robot_ports import FREE, Primary, Wire
 from waiting import wait_for
 
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.protocol.primary import (
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     ConfigurationData,
     ErrorCodeMessage,
     KeyMessage,

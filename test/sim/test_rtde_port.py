@@ -200,7 +200,7 @@ def test_an_unknown_output_is_not_found(robot):
 
 
 def test_all_known_outputs_are_streamed(robot):
-    from ur_cartesian_driver.protocol.rtde_fields import OUTPUT_TYPES
+    from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES
 
     with Wire(robot.ports.rtde) as wire:
         wire.send(VERSION_2 + setup_outputs(*OUTPUT_TYPES) + START)
@@ -238,7 +238,7 @@ def test_a_client_that_talks_nonsense_is_disconnected_and_the_others_are_not(rob
 
 @pytest.mark.slow
 def test_a_client_that_does_not_read_is_dropped_and_stalls_nobody():
-    from ur_cartesian_driver.protocol.rtde_fields import OUTPUT_TYPES
+    from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES
 
     with (
         SimulatedRobot(SimulatorConfig(**FREE, rate=0.0)) as robot,

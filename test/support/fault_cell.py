@@ -10,11 +10,11 @@ from virtual_network import HOST
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.protocol.registers import SERVO_INPUTS
-from ur_cartesian_driver.protocol.rtde import RtdeClientCodec
+from ur_cartesian_driver.protocol.program.registers import SERVO_INPUTS
+from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.rtde_connection import RtdeConnection
-from ur_cartesian_driver.sim.modes import OPERATIONAL
+from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
+from ur_cartesian_driver.sim.state.power_and_safety import OPERATIONAL
 
 #: How long the arm is watched after somebody has unlocked or played, and a goal that waits [s].
 WATCHED = 0.2

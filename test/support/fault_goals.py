@@ -16,10 +16,10 @@ import robot_cell
 from robot_cell import CYCLE, RobotCell
 
 from ur_cartesian_driver.driver.appender import encode_plan
-from ur_cartesian_driver.driver.live import stationary_job, stationary_plan
+from ur_cartesian_driver.driver.live_session import stationary_job, stationary_plan
 from ur_cartesian_driver.execution import AppendJob
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import (
     ExecutionMode,
@@ -32,12 +32,13 @@ from ur_cartesian_driver.motion.goal import (
 )
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning import planner as plan
+from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
-from ur_cartesian_driver.protocol.dialects import NEWEST_DIALECT
-from ur_cartesian_driver.protocol.reverse import ControlMode, TrajectoryAction
-from ur_cartesian_driver.sim.builtins.motion import FreedriveState
+from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT
+from ur_cartesian_driver.protocol.program.reverse import ControlMode, TrajectoryAction
+from ur_cartesian_driver.sim.builtins.motion_builtins import FreedriveState
 
 #: Side of the way around two corners, and size of the blends there [m].
 SIDE, BLEND = 0.05, 0.015

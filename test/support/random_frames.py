@@ -4,7 +4,7 @@
 
 from hypothesis import strategies as st
 
-from ur_cartesian_driver.protocol.rtde import PackageType
+from ur_cartesian_driver.protocol.rtde.rtde_client import PackageType
 
 
 def framed(kind, payload):

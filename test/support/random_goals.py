@@ -15,7 +15,7 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest, solutions
-from ur_cartesian_driver.kinematics.robots import JOINT_NAMES
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.goal import ArcMode, Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import (
     IDENTITY,

@@ -15,7 +15,8 @@ import os
 
 from virtual_network import HOST, LoopClock, ProgramNetwork, VirtualLoop
 
-from ur_cartesian_driver.driver.channel import (
+from ur_cartesian_driver.driver.ipc import state_memory
+from ur_cartesian_driver.driver.ipc.channel import (
     AppendAnswered,
     AppendToMotion,
     CancelMotion,
@@ -31,15 +32,14 @@ from ur_cartesian_driver.driver.channel import (
     StatusChanged,
     unpack,
 )
-from ur_cartesian_driver.driver.config import DriverConfig
-from ur_cartesian_driver.driver.ipc import state_memory
-from ur_cartesian_driver.driver.robot_loop import RobotLoop
+from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
+from ur_cartesian_driver.driver.loop.robot_loop import RobotLoop
 from ur_cartesian_driver.execution import job_from_plan
-from ur_cartesian_driver.protocol.reverse import MESSAGE_SIZE, ReverseMessage
-from ur_cartesian_driver.protocol.script_sender import REQUEST
-from ur_cartesian_driver.protocol.trajectory import encode_points
+from ur_cartesian_driver.protocol.program.reverse import MESSAGE_SIZE, ReverseMessage
+from ur_cartesian_driver.protocol.program.script_sender import REQUEST
+from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
+from ur_cartesian_driver.robot.driver_status import DriverStatus
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.status import DriverStatus
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 CYCLE = 0.008

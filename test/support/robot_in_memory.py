@@ -17,12 +17,15 @@ from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState, RuntimeState
 from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
-from ur_cartesian_driver.protocol.reverse import keepalive, trajectory, TrajectoryAction
-from ur_cartesian_driver.protocol.trajectory import encode_points, TrajectoryResultDecoder
-from ur_cartesian_driver.sim.config import SimulatorConfig
+from ur_cartesian_driver.protocol.program.reverse import keepalive, trajectory, TrajectoryAction
+from ur_cartesian_driver.protocol.program.trajectory_points import (
+    encode_points,
+    TrajectoryResultDecoder,
+)
 from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.modes import OPERATIONAL, SafetyEvent
-from ur_cartesian_driver.sim.script_sockets import MemorySockets
+from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
+from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets
+from ur_cartesian_driver.sim.state.power_and_safety import OPERATIONAL, SafetyEvent
 
 REVERSE, TRAJECTORY, COMMAND = 1, 2, 3
 #: What the controller may say while all is well: that a movep is slower than asked for.

@@ -7,7 +7,7 @@ from __future__ import annotations
 import socket
 import struct
 
-from ur_cartesian_driver.protocol.primary import PrimaryDecoder
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import PrimaryDecoder
 
 FREE = {'rtde_port': 0, 'primary_port': 0, 'dashboard_port': 0}
 HOST = '127.0.0.1'

@@ -10,15 +10,19 @@ test may vary; so it needs no real time and is always the same.
 from collections import deque
 from pathlib import Path
 
-from ur_cartesian_driver.execution.servo_stream import ServoSettings
+from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings
 from ur_cartesian_driver.motion.servo import ServoFeedback
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.protocol import registers
-from ur_cartesian_driver.protocol.rtde import DataReceived, HandshakeDone, RtdeClientCodec
+from ur_cartesian_driver.protocol.program import registers
+from ur_cartesian_driver.protocol.rtde.rtde_client import (
+    DataReceived,
+    HandshakeDone,
+    RtdeClientCodec,
+)
 from ur_cartesian_driver.sim import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.rtde_session import RtdeSession
-from ur_cartesian_driver.sim.uploads import UploadDecoder
+from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
+from ur_cartesian_driver.sim.programs.script_upload import UploadDecoder
 
 GUIDE = Path(__file__).parents[1] / 'acceptance' / 'programs' / 'servoj_guide.script'
 CYCLE = 0.002

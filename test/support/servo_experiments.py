@@ -16,12 +16,12 @@ from math import pi, sin
 import numpy as np
 from servo_cell import CYCLE, GUIDE, GuideCell
 
-from ur_cartesian_driver.execution.servo_stream import ServoPhase, ServoSettings, ServoStream
+from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoSettings, ServoStream
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.protocol.registers import ServoMode, SyncState
+from ur_cartesian_driver.protocol.program.registers import ServoMode, SyncState
 
 UNBUFFERED = GUIDE.with_name('servoj_unbuffered.script')
 #: How far up the tool goes [m], and how long there and back takes [s].

@@ -17,7 +17,7 @@ import contextlib
 import errno
 import selectors
 
-from ur_cartesian_driver.sim.script_sockets import SocketState
+from ur_cartesian_driver.sim.sockets.script_sockets import SocketState
 
 HOST = '127.0.0.1'
 _FIRST_FREE_PORT = 40_001

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.urscript import CompileError, parse
-from ur_cartesian_driver.urscript import syntax as tree
-from ur_cartesian_driver.urscript.scanner import KEYWORDS, SYMBOLS
-from ur_cartesian_driver.urscript.token_reader import MAX_CHAIN, MAX_NESTING
+from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
+from ur_cartesian_driver.urscript.parsing.scanner import KEYWORDS, SYMBOLS
+from ur_cartesian_driver.urscript.parsing.token_reader import MAX_CHAIN, MAX_NESTING
 
 
 def program(body: str) -> str:

@@ -13,7 +13,7 @@ import sys
 from time import monotonic
 from typing import Any
 
-from ur_cartesian_driver.kinematics.robots import (
+from ur_cartesian_driver.kinematics.robot_models import (
     DhTable,
     JOINT_NAMES,
     robot_model,
@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.resources import share_path
-from ur_cartesian_driver.robot.probe import read_state
+from ur_cartesian_driver.robot.rtde.probe import read_state
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.calibration import random_calibration, read_calibration
 

@@ -12,9 +12,9 @@ Plan, execute and stop Cartesian motions of one robot, from plain Python.
 """
 
 from ur_cartesian_driver.driver.api import Driver
-from ur_cartesian_driver.driver.config import DriverConfig
-from ur_cartesian_driver.driver.motion import MotionHandle
+from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
+from ur_cartesian_driver.driver.motion_handle import MotionHandle
+from ur_cartesian_driver.robot.driver_status import DriverStatus
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.status import DriverStatus
 
 __all__ = ['ConnectionState', 'Driver', 'DriverConfig', 'DriverStatus', 'MotionHandle']

@@ -12,10 +12,10 @@ import itertools
 import threading
 from types import TracebackType
 
-from ur_cartesian_driver.driver import channel, host
 from ur_cartesian_driver.driver.appender import Appender, encode_plan
 from ur_cartesian_driver.driver.callbacks import LOG, run_callback
-from ur_cartesian_driver.driver.channel import (
+from ur_cartesian_driver.driver.ipc import channel
+from ur_cartesian_driver.driver.ipc.channel import (
     AppendAnswered,
     CallAnswered,
     CallRobot,
@@ -39,19 +39,20 @@ from ur_cartesian_driver.driver.channel import (
     TemporaryTcpRestored,
     TemporaryTcpSet,
 )
-from ur_cartesian_driver.driver.config import DriverConfig
-from ur_cartesian_driver.driver.live import (
+from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
+from ur_cartesian_driver.driver.live_session import (
     check_target,
     InteractiveMotions,
     stationary_job,
 )
-from ur_cartesian_driver.driver.motion import ActiveMotion, MotionHandle, OnProgress
-from ur_cartesian_driver.driver.recorder import plan_metadata
-from ur_cartesian_driver.driver.services import RobotServices
+from ur_cartesian_driver.driver.loop import host
+from ur_cartesian_driver.driver.motion_handle import ActiveMotion, MotionHandle, OnProgress
+from ur_cartesian_driver.driver.recordings.recorder import plan_metadata
+from ur_cartesian_driver.driver.robot_services import RobotServices
 from ur_cartesian_driver.execution import AnswerAppend, job_from_plan, MotionJob, same_tcp
-from ur_cartesian_driver.execution.trajectory import STOP_TIMEOUT
+from ur_cartesian_driver.execution.goal.goal_machine import STOP_TIMEOUT
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import DhTable, robot_model
+from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
 from ur_cartesian_driver.motion.errors import (
     code_of,
     ErrorCode,
@@ -66,20 +67,21 @@ from ur_cartesian_driver.motion.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.servo import ServoReport
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning import planner as plan
+from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_first_part
 from ur_cartesian_driver.planning.stop_prediction import predict_stop
 from ur_cartesian_driver.program.render import has_feature
-from ur_cartesian_driver.protocol.trajectory import encode_points
-from ur_cartesian_driver.robot.calls import ServiceAnswer, ServiceCall
-from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.status import (
+from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
+from ur_cartesian_driver.robot.driver_status import (
     DriverStatus,
     is_paused,
     is_stopped,
     LinkGaps,
     timestamped,
 )
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, ServiceCall
 
 #: Pause before a robot loop that died is replaced [s]: what ends it may end the next one too.
 RESTART_PAUSE = 0.5

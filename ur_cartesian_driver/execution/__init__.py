@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What to do next: pure state machines, fed with events and the time, answering with commands."""
 
-from ur_cartesian_driver.execution.commands import (
+from ur_cartesian_driver.execution.goal.append_machine import AppendMachine, AppendSettings
+from ur_cartesian_driver.execution.goal.goal_commands import (
     AnswerAppend,
     EnterServo,
     Finish,
@@ -19,13 +20,12 @@ from ur_cartesian_driver.execution.commands import (
     StopProgram,
     WriteServo,
 )
+from ur_cartesian_driver.execution.goal.goal_machine import GoalMachine
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, job_from_plan, MotionJob
-from ur_cartesian_driver.execution.servo import SERVO_LINK, ServoMachine
-from ur_cartesian_driver.execution.servo_source import SetpointSource
-from ur_cartesian_driver.execution.servo_stream import ServoSettings
-from ur_cartesian_driver.execution.stream import AppendMachine, AppendSettings
-from ur_cartesian_driver.execution.tcp_loan import same_tcp, TemporaryTcp
-from ur_cartesian_driver.execution.trajectory import GoalMachine
+from ur_cartesian_driver.execution.goal.temporary_tcp import same_tcp, TemporaryTcp
+from ur_cartesian_driver.execution.servo.servo_machine import SERVO_LINK, ServoMachine
+from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings
+from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
 
 __all__ = [
     'SERVO_LINK',

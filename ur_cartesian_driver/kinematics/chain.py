@@ -19,7 +19,7 @@ from typing import Any, Generic, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.robots import DhTable, JOINT_NAMES, RobotModel
+from ur_cartesian_driver.kinematics.robot_models import DhTable, JOINT_NAMES, RobotModel
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 
 #: A number: one pose's, or one for each pose of a batch.

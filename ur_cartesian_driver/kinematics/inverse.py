@@ -24,7 +24,7 @@ from ur_cartesian_driver.kinematics.closed_form import (
     wrist_solutions,
 )
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of, IdealArm
-from ur_cartesian_driver.kinematics.robots import JOINT_NAMES, PositionLimits
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, PositionLimits
 from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion, Vector3
 from ur_cartesian_driver.motion.primitive import Joints
 

@@ -27,8 +27,9 @@ from importlib.resources import files
 from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.goal import OutputKind
-from ur_cartesian_driver.protocol import registers, reverse, script_command, trajectory
 from ur_cartesian_driver.protocol.framing import FIXED_POINT
+from ur_cartesian_driver.protocol.program import registers, reverse, script_command
+from ur_cartesian_driver.protocol.program import trajectory_points as trajectory
 
 PROGRAM_NAME = 'ur_cartesian_driver'
 

@@ -25,28 +25,18 @@ import logging
 from math import inf
 from typing import NoReturn
 
-from ur_cartesian_driver.kinematics.robots import DhTable, MODELS
+from ur_cartesian_driver.kinematics.robot_models import DhTable, MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.events import Event, LinkLost, StateReceived, TrajectoryEnded
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.program import PROGRAM_NAME, ProgramSettings, render, wrap_in_program
-from ur_cartesian_driver.protocol import primary
-from ur_cartesian_driver.protocol.dialects import NEWEST_DIALECT
-from ur_cartesian_driver.protocol.reverse import TrajectoryAction
-from ur_cartesian_driver.protocol.rtde import ControllerVersion
-from ur_cartesian_driver.robot.chronicle import mode_changes
-from ur_cartesian_driver.robot.evidence import LinkEventLog
-from ur_cartesian_driver.robot.first_start import ProgramAutoStart
-from ur_cartesian_driver.robot.goal_tcp import TemporaryTcpSetter
-from ur_cartesian_driver.robot.lifecycle import ConnectionEvent, ConnectionState, next_state
-from ur_cartesian_driver.robot.primary_client import PrimaryCallbacks, PrimaryClient
-from ur_cartesian_driver.robot.program_sockets import ProgramCallbacks, ProgramSockets
-from ur_cartesian_driver.robot.settings import LinkSettings
-from ur_cartesian_driver.robot.signal_stream import SignalStream
-from ur_cartesian_driver.robot.state_stream import StateStream
-from ur_cartesian_driver.robot.status import (
+from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
+from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT
+from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
+from ur_cartesian_driver.protocol.rtde.rtde_client import ControllerVersion
+from ur_cartesian_driver.robot.driver_status import (
     DriverStatus,
     has_ended,
     is_paused,
@@ -54,6 +44,16 @@ from ur_cartesian_driver.robot.status import (
     required_action,
     timestamped,
 )
+from ur_cartesian_driver.robot.event_log import mode_changes
+from ur_cartesian_driver.robot.lifecycle import ConnectionEvent, ConnectionState, next_state
+from ur_cartesian_driver.robot.link_event_log import LinkEventLog
+from ur_cartesian_driver.robot.link_settings import LinkSettings
+from ur_cartesian_driver.robot.primary_client import PrimaryCallbacks, PrimaryClient
+from ur_cartesian_driver.robot.program.auto_start import ProgramAutoStart
+from ur_cartesian_driver.robot.program.program_sockets import ProgramCallbacks, ProgramSockets
+from ur_cartesian_driver.robot.program.tcp_setter import TemporaryTcpSetter
+from ur_cartesian_driver.robot.rtde.signal_stream import SignalStream
+from ur_cartesian_driver.robot.rtde.state_stream import StateStream
 from ur_cartesian_driver.robot.transport import Backoff
 
 #: In these states nobody knows the robot, or it is the wrong one: the reason is the message.

@@ -13,9 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NoReturn
 
-from ur_cartesian_driver.kinematics.robots import DhTable
+from ur_cartesian_driver.kinematics.robot_models import DhTable
 from ur_cartesian_driver.motion.errors import ProtocolError, RemoteProtocolError
-from ur_cartesian_driver.protocol import primary
+from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
 from ur_cartesian_driver.protocol.framing import to_single_line
 from ur_cartesian_driver.robot.transport import Backoff, dial, TcpConnection
 

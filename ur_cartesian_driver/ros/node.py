@@ -28,21 +28,21 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
 from ur_cartesian_driver.driver import Driver
-from ur_cartesian_driver.ros.action_server import CartesianActionServer
-from ur_cartesian_driver.ros.append_points import AppendService
-from ur_cartesian_driver.ros.parameters import (
+from ur_cartesian_driver.ros.goals.action_server import CartesianActionServer
+from ur_cartesian_driver.ros.live.live_topics import (
+    FreedriveService,
+    LiveTargetSubscriber,
+    ServoStatePublisher,
+)
+from ur_cartesian_driver.ros.parameters.node_parameters import (
     as_overrides,
     declare_parameters,
     ParameterError,
     ParameterValue,
 )
-from ur_cartesian_driver.ros.services import CommandServices
-from ur_cartesian_driver.ros.servo_topics import (
-    FreedriveService,
-    LiveTargetSubscriber,
-    ServoStatePublisher,
-)
-from ur_cartesian_driver.ros.state_publisher import StatePublisher
+from ur_cartesian_driver.ros.services.append_service import AppendService
+from ur_cartesian_driver.ros.services.command_services import CommandServices
+from ur_cartesian_driver.ros.state.state_publisher import StatePublisher
 
 #: How often the driver hears that the executor of the node is alive, at least [s].
 HEARTBEAT_PERIOD = 0.5

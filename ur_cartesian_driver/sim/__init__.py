@@ -7,10 +7,10 @@ A simulated UR controller: it interprets the URScript it is sent and knows nothi
 the same without network and clock, for tests that count cycles.
 """
 
-from ur_cartesian_driver.sim.config import HOME, SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.robot import Ports, RobotSnapshot, SimulatedRobot
-from ur_cartesian_driver.sim.script_sockets import MemorySockets
+from ur_cartesian_driver.sim.simulator_config import HOME, SimulatorConfig
+from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets
 
 __all__ = [
     'HOME',

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.kinematics.robots import DhTable, RobotModel
+from ur_cartesian_driver.kinematics.robot_models import DhTable, RobotModel
 
 Array = NDArray[np.float64]
 

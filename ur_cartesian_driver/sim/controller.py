@@ -21,14 +21,20 @@ from ur_cartesian_driver.motion.state import (
     SafetyMode,
     SafetyStatus,
 )
-from ur_cartesian_driver.sim.actual import ActualMotion
 from ur_cartesian_driver.sim.builtins import controller_builtins
-from ur_cartesian_driver.sim.builtins.motion import FreedriveState, MotionOwnership
-from ur_cartesian_driver.sim.config import SimulatorConfig
-from ur_cartesian_driver.sim.controller_state import Payload, Popup, ProcessState
-from ur_cartesian_driver.sim.faults import FaultInjector
-from ur_cartesian_driver.sim.interpreter import InterpreterMode
-from ur_cartesian_driver.sim.modes import (
+from ur_cartesian_driver.sim.builtins.motion_builtins import FreedriveState, MotionOwnership
+from ur_cartesian_driver.sim.faults.injector import FaultInjector
+from ur_cartesian_driver.sim.motion import MotionGenerator
+from ur_cartesian_driver.sim.motion.actual_motion import ActualMotion
+from ur_cartesian_driver.sim.programs.interpreter_mode import InterpreterMode
+from ur_cartesian_driver.sim.programs.program_runner import ProgramRunner
+from ur_cartesian_driver.sim.programs.rtde_watchdog import Watchdogs
+from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
+from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets, ScriptSockets
+from ur_cartesian_driver.sim.state.controller_io import ControllerIo
+from ur_cartesian_driver.sim.state.controller_messages import ControllerMessages
+from ur_cartesian_driver.sim.state.controller_state import Payload, Popup, ProcessState
+from ur_cartesian_driver.sim.state.power_and_safety import (
     ArmPower,
     OPERATIONAL,
     POWERLESS,
@@ -36,13 +42,7 @@ from ur_cartesian_driver.sim.modes import (
     SafetySystem,
     STATUS_BITS,
 )
-from ur_cartesian_driver.sim.motion import MotionGenerator
-from ur_cartesian_driver.sim.programs import ProgramRunner
-from ur_cartesian_driver.sim.script_sockets import MemorySockets, ScriptSockets
-from ur_cartesian_driver.sim.state.controller_io import ControllerIo
-from ur_cartesian_driver.sim.state.controller_messages import ControllerMessages
-from ur_cartesian_driver.sim.watchdog import Watchdogs
-from ur_cartesian_driver.urscript.errors import RuntimeException
+from ur_cartesian_driver.urscript.script_errors import RuntimeException
 
 #: The controller's clock at the start [s]: clients of RTDE take a controller that has been up for
 #: less than 40 s for one that is still booting.

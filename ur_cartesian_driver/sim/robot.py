@@ -21,21 +21,21 @@ from typing import Any, TypeVar
 from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
 from ur_cartesian_driver.sim.clock import Clock, Lateness, RealClock, VirtualClock
-from ur_cartesian_driver.sim.config import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.dashboard_session import DashboardSession
-from ur_cartesian_driver.sim.fault_text import parse_fault
-from ur_cartesian_driver.sim.faults import Fault
-from ur_cartesian_driver.sim.faulty_sockets import ImpairedSockets
-from ur_cartesian_driver.sim.interpreter_session import InterpreterSession
-from ur_cartesian_driver.sim.modes import SafetyEvent
-from ur_cartesian_driver.sim.primary_session import PrimarySession, ScriptSession
-from ur_cartesian_driver.sim.primary_states import PrimaryStream
-from ur_cartesian_driver.sim.realtime_states import RealtimeStream
-from ur_cartesian_driver.sim.rtde_session import RtdeSession
-from ur_cartesian_driver.sim.script_sockets import ScriptSockets
-from ur_cartesian_driver.sim.server import TcpServer
-from ur_cartesian_driver.sim.tcp_script_sockets import TcpScriptSockets
+from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
+from ur_cartesian_driver.sim.faults.impaired_sockets import ImpairedSockets
+from ur_cartesian_driver.sim.faults.injector import Fault
+from ur_cartesian_driver.sim.interfaces.dashboard_session import DashboardSession
+from ur_cartesian_driver.sim.interfaces.interpreter_session import InterpreterSession
+from ur_cartesian_driver.sim.interfaces.primary_session import PrimarySession, ScriptSession
+from ur_cartesian_driver.sim.interfaces.primary_stream import PrimaryStream
+from ur_cartesian_driver.sim.interfaces.realtime_stream import RealtimeStream
+from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
+from ur_cartesian_driver.sim.interfaces.tcp_server import TcpServer
+from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
+from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets
+from ur_cartesian_driver.sim.sockets.tcp_script_sockets import TcpScriptSockets
+from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
 T = TypeVar('T')
 

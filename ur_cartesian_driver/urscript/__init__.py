@@ -9,14 +9,14 @@ closures (`closures`, `expressions`, `compiler`), to threads that run frame by f
 a robot are builtins, given by whoever runs it; `builtins` holds those that need no robot.
 """
 
-from ur_cartesian_driver.urscript.builtins import core_builtins
-from ur_cartesian_driver.urscript.errors import CompileError, RuntimeException
-from ur_cartesian_driver.urscript.interpreter import ScriptInterpreter
-from ur_cartesian_driver.urscript.lines import CompiledLine
-from ur_cartesian_driver.urscript.parser import parse
-from ur_cartesian_driver.urscript.scopes import Builtin
-from ur_cartesian_driver.urscript.syntax import ScriptProgram
-from ur_cartesian_driver.urscript.values import (
+from ur_cartesian_driver.urscript.compiling.scopes import Builtin
+from ur_cartesian_driver.urscript.core_builtins import core_builtins
+from ur_cartesian_driver.urscript.parsing.parser import parse
+from ur_cartesian_driver.urscript.parsing.syntax_tree import ScriptProgram
+from ur_cartesian_driver.urscript.running.line_compiler import CompiledLine
+from ur_cartesian_driver.urscript.running.script_interpreter import ScriptInterpreter
+from ur_cartesian_driver.urscript.script_errors import CompileError, RuntimeException
+from ur_cartesian_driver.urscript.script_values import (
     Matrix,
     RemoteObject,
     ScriptPose,

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.sim.motion import MotionGenerator
 

@@ -6,10 +6,10 @@ from hypothesis import given, Phase, settings
 from hypothesis import strategies as st
 import pytest
 
-from ur_cartesian_driver.protocol.rtde import HandshakeDone, RtdeClientCodec
+from ur_cartesian_driver.protocol.rtde.rtde_client import HandshakeDone, RtdeClientCodec
 from ur_cartesian_driver.sim import SimulatorConfig
 from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.rtde_session import RtdeSession
+from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 
 OUTPUTS = (
     'timestamp',

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.robots import robot_model
+from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
 HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)

@@ -9,7 +9,10 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.protocol.primary import ErrorCodeMessage, ReportLevel
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
+    ErrorCodeMessage,
+    ReportLevel,
+)
 
 HOME = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
 CYCLE = 0.002

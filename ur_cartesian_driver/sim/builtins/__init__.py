@@ -15,20 +15,24 @@ import inspect
 from typing import Any, TYPE_CHECKING
 
 from ur_cartesian_driver.sim.builtins.arguments import builtins_in
-from ur_cartesian_driver.sim.builtins.io import (
+from ur_cartesian_driver.sim.builtins.io_builtins import (
     AnalogBuiltins,
     DigitalBuiltins,
     PortBuiltins,
     RegisterBuiltins,
 )
-from ur_cartesian_driver.sim.builtins.kinematics import KinematicsBuiltins
-from ur_cartesian_driver.sim.builtins.motion import ModeBuiltins, MotionBuiltins
-from ur_cartesian_driver.sim.builtins.poses import PoseBuiltins
-from ur_cartesian_driver.sim.builtins.process import PathOffsetBuiltins, ProcessBuiltins
-from ur_cartesian_driver.sim.builtins.sockets import SocketBuiltins
-from ur_cartesian_driver.sim.builtins.state import PendantBuiltins, RobotBuiltins, TimeBuiltins
+from ur_cartesian_driver.sim.builtins.kinematics_builtins import KinematicsBuiltins
+from ur_cartesian_driver.sim.builtins.motion_builtins import ModeBuiltins, MotionBuiltins
+from ur_cartesian_driver.sim.builtins.pose_builtins import PoseBuiltins
+from ur_cartesian_driver.sim.builtins.process_builtins import PathOffsetBuiltins, ProcessBuiltins
+from ur_cartesian_driver.sim.builtins.robot_builtins import (
+    PendantBuiltins,
+    RobotBuiltins,
+    TimeBuiltins,
+)
+from ur_cartesian_driver.sim.builtins.socket_builtins import SocketBuiltins
 from ur_cartesian_driver.urscript import core_builtins
-from ur_cartesian_driver.urscript.errors import RuntimeException
+from ur_cartesian_driver.urscript.script_errors import RuntimeException
 
 if TYPE_CHECKING:
     from ur_cartesian_driver.sim.controller import Controller

@@ -8,8 +8,8 @@ from math import isfinite
 from typing import Any
 
 from ur_cartesian_driver.motion.pose import Pose, Vector6
-from ur_cartesian_driver.urscript.errors import RuntimeException
-from ur_cartesian_driver.urscript.values import is_number, ScriptPose, type_name, Value
+from ur_cartesian_driver.urscript.script_errors import RuntimeException
+from ur_cartesian_driver.urscript.script_values import is_number, ScriptPose, type_name, Value
 
 
 def number(value: Value, name: str) -> float:

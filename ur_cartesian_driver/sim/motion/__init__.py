@@ -7,7 +7,7 @@ Pure and deterministic: no clock, no sockets. :class:`MotionGenerator` is the do
 functions of time, geometry is a function of a path parameter, and servo laws integrate speeds.
 """
 
-from ur_cartesian_driver.sim.motion.generator import MotionGenerator
+from ur_cartesian_driver.sim.motion.motion_generator import MotionGenerator
 from ur_cartesian_driver.sim.motion.moves import MotionError, MotionFault, MotionWarning, Move
 
 __all__ = ['MotionError', 'MotionFault', 'MotionGenerator', 'MotionWarning', 'Move']

@@ -1,0 +1,149 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Plans for robot programs of other ages: other words for the same motion, or a refusal."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+
+from ur_cartesian_driver.kinematics.inverse import nearest
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import NotAvailable
+from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, OptimoveJ, OptimoveL
+from ur_cartesian_driver.planning import planner as plan
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.protocol.program.dialects import DIALECTS
+from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
+
+OLD = ('2.0', '2.10')
+
+
+def planned(cell, name, *points, **options):
+    """Return the plan of (pose, segment, time, posture from the solution?) in a dialect."""
+    waypoints = []
+    for pose, _, time, has_posture in points:
+        q = nearest(cell.arm, pose @ cell.T_flange_tcp.inverse(), cell.state.actual_q)
+        waypoints.append(
+            Waypoint(
+                pose=pose,
+                time=time,
+                posture=Posture(names=JOINT_NAMES, values=q) if has_posture else Posture(),
+            )
+        )
+    goal = Goal(waypoints=tuple(waypoints), segments=tuple(p[1] for p in points))
+    made = plan(goal, cell.state, cell.arm, PlanningOptions(dialect=DIALECTS[name], **options))
+    # Whatever was planned can be said.
+    encode_points((s.primitive for s in made.segments), DIALECTS[name])
+    return made
+
+
+JOINT = Segment(type=SegmentType.JOINT)
+
+
+@pytest.mark.parametrize('name', DIALECTS)
+def test_a_joint_move_arrives_in_the_same_solution(cell, name):
+    made = planned(cell, name, (cell.pose(y=0.05), JOINT, 0.0, True))
+    (segment,) = made.segments
+    assert isinstance(segment.primitive, MoveJ)
+    if name in OLD:
+        assert segment.primitive.target == segment.joints
+        assert segment.primitive.q_near is None
+        assert '-> MOVEJ ' in segment.note
+        assert f'wire dialect {name} has no q_near' in segment.note
+    else:
+        assert segment.primitive.target == cell.pose(y=0.05)
+        assert segment.primitive.q_near == pytest.approx(segment.joints)
+        assert '-> MOVEJ_POSE ' in segment.note
+
+
+@pytest.mark.parametrize('name', OLD)
+def test_without_calibration_a_joint_move_is_refused_and_a_line_is_not(cell, name):
+    planned(cell, name, (cell.pose(y=0.05), Segment(), 0.0, False), calibration_known=False)
+    with pytest.raises(NotAvailable, match=f'wire dialect {name} .*calibration'):
+        planned(cell, name, (cell.pose(y=0.05), JOINT, 0.0, False), calibration_known=False)
+
+
+@pytest.mark.parametrize('name', OLD)
+def test_lines_and_arcs_go_as_poses_and_without_hint(cell, name):
+    made = planned(
+        cell,
+        name,
+        (cell.pose(y=0.05), Segment(), 0.0, True),
+        (
+            cell.pose(x=0.05, y=0.1),
+            Segment(type=SegmentType.CIRCULAR, via=cell.pose(x=0.015, y=0.085)),
+            0.0,
+            True,
+        ),
+    )
+    line, arc = (s.primitive for s in made.segments)
+    assert isinstance(line, MoveL)
+    assert line.q_near is None
+    assert isinstance(arc, MoveC)
+    assert isinstance(arc.target, Pose)
+    assert any(f'wire dialect {name} has no arcs with joint positions' in r for r in made.remarks)
+
+
+@pytest.mark.parametrize(
+    ('name', 'kind', 'primitive'),
+    [
+        ('2.0', SegmentType.OPTIMIZED_JOINT, None),
+        ('2.0', SegmentType.OPTIMIZED_LINEAR, None),
+        ('2.10', SegmentType.OPTIMIZED_JOINT, OptimoveJ),
+        ('2.10', SegmentType.OPTIMIZED_LINEAR, OptimoveL),
+    ],
+)
+def test_optimized_moves_came_after_2_0(cell, name, kind, primitive):
+    points = (cell.pose(y=0.05), Segment(type=kind), 0.0, True)
+    if primitive is None:
+        with pytest.raises(NotAvailable, match=r'segments\[0\].type .* wire dialect 2.0 .*LINEAR'):
+            planned(cell, name, points)
+    else:
+        (segment,) = planned(cell, name, points).segments
+        assert isinstance(segment.primitive, primitive)
+
+
+def test_times_are_kept_by_speeds_where_programs_count_in_milliseconds(cell):
+    points = [
+        (cell.pose(y=0.05), Segment(), 0.7504, False),
+        (cell.pose(y=0.05, z=0.05), JOINT, 1.9, False),
+        (cell.pose(z=0.05, turn=(0.0, 0.0, 0.6)), Segment(), 3.7, False),
+    ]
+    made = planned(cell, '2.0', *points)
+    assert [s.primitive.duration for s in made.segments] == [0.0] * 3
+    times = [0.0, *(p[2] for p in points)]
+    for segment, (before, after) in zip(made.segments, pairwise(times), strict=True):
+        assert segment.duration == pytest.approx(after - before, rel=1e-6)
+    assert any('times are kept by speeds' in remark for remark in made.remarks)
+    for name in ('2.10', '2.12', '2.14'):
+        newer = planned(cell, name, *points)
+        assert newer.segments[0].primitive.duration == pytest.approx(0.7504)
+
+
+def test_no_time_is_sent_to_such_a_program_for_a_line_that_mostly_turns(cell):
+    points = (cell.pose(y=0.01, turn=(0.0, 0.0, 0.8)), Segment(), 0.0, False)
+    old, new = planned(cell, '2.0', points), planned(cell, '2.14', points)
+    assert new.segments[0].primitive.duration > 0.0
+    assert old.segments[0].primitive.duration == 0.0
+    assert old.duration == pytest.approx(new.duration)
+
+
+def test_blends_are_planned_as_the_wire_carries_them(cell):
+    points = [
+        (cell.pose(y=0.05), Segment(blend_radius=0.0056), 0.0, False),
+        (cell.pose(y=0.05, x=0.05), Segment(blend_radius=0.0004), 0.0, False),
+        (cell.pose(y=0.1, x=0.05), Segment(), 0.0, False),
+    ]
+    made = planned(cell, '2.0', *points)
+    assert [s.primitive.blend_radius for s in made.segments] == [0.005, 0.0, 0.0]
+    assert [r for r in made.remarks if 'blend of 5 mm instead of 5.6 mm' in r]
+    newer = planned(cell, '2.10', *points)
+    assert [s.primitive.blend_radius for s in newer.segments] == [0.0056, 0.0004, 0.0]
+
+
+def test_only_the_newest_is_told_to_set_a_tcp():
+    assert [name for name, dialect in DIALECTS.items() if dialect.supports_tcp_change] == ['2.14']
+    assert replace(PlanningOptions(), dialect=DIALECTS['2.0']).dialect.name == '2.0'

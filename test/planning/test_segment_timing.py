@@ -1,0 +1,266 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Speeds and times: the limits that hold, and that the planned times come true.
+
+The second part drives the primitives of a plan with the motion generator of the simulated
+controller, which shares nothing with the planner.
+"""
+
+from __future__ import annotations
+
+from math import pi
+
+from hypothesis import given
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+
+from ur_cartesian_driver.kinematics.inverse import nearest
+from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
+from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ
+from ur_cartesian_driver.planning import planner as plan
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning.geometry.speed_profile import (
+    cruise_speed_for,
+    profile_for_time,
+    trapezoid,
+)
+from ur_cartesian_driver.sim.motion import MotionGenerator
+
+TYPE = SegmentType
+OPTIONS = PlanningOptions()
+CYCLE = 0.002
+
+positive = st.floats(0.01, 10.0)
+
+
+@given(length=positive, velocity=positive, acceleration=positive)
+def test_a_trapezoid_takes_the_time_of_the_textbook(length, velocity, acceleration):
+    long = length > velocity**2 / acceleration
+    expected = (
+        length / velocity + velocity / acceleration
+        if long
+        else 2.0 * (length / acceleration) ** 0.5
+    )
+    assert trapezoid(length, velocity, acceleration).duration == pytest.approx(expected)
+
+
+@given(length=positive, duration=positive, acceleration=positive)
+def test_the_derived_speed_takes_exactly_the_time(length, duration, acceleration):
+    speed = cruise_speed_for(length, duration, acceleration, 2)
+    if speed is None:
+        assert acceleration * duration**2 < 4.0 * length * (1.0 + 1e-9)
+    else:
+        assert trapezoid(length, speed, acceleration).duration == pytest.approx(duration)
+
+
+@given(length=positive, duration=positive, before=st.booleans(), after=st.booleans())
+def test_time_rises_with_the_way_from_nothing_to_the_duration(length, duration, before, after):
+    profile = profile_for_time(length, duration, before, after)
+    assert profile.duration == pytest.approx(duration)
+    times = [profile.time_at(length * k / 20) for k in range(21)]
+    assert times == sorted(times)
+    assert times[0] == 0.0
+    assert times[-1] == pytest.approx(duration)
+
+
+def one(cell, options=OPTIONS, segment=None, **point):
+    """Return the plan of a goal of one point."""
+    goal = Goal(waypoints=(cell.point(**point),), segments=(segment,) if segment else ())
+    made = plan(goal, cell.state, cell.arm, options)
+    return made.segments[0], made.remarks
+
+
+def test_speed_comes_from_the_segment_else_the_twist_else_the_default(cell):
+    twist = (0.0, 0.12, 0.0, 0.0, 0.0, 0.5)
+    assert one(cell, x=0.1)[0].primitive.velocity == OPTIONS.linear_velocity
+    assert one(cell, x=0.1, twist=twist)[0].primitive.velocity == pytest.approx(0.12)
+    assert (
+        one(cell, x=0.1, twist=twist, segment=Segment(velocity=0.15, acceleration=0.7))[
+            0
+        ].primitive.velocity
+        == 0.15
+    )
+    turn = one(cell, turn=(0.0, 0.0, 0.3), twist=twist)[0].primitive
+    assert (turn.velocity, turn.duration) == (pytest.approx(0.5), 0.0)
+    joint = one(cell, x=0.1, twist=twist, segment=Segment(type=TYPE.JOINT))
+    assert joint[0].primitive.velocity <= OPTIONS.joint_velocity
+    assert any('twist is ignored' in remark for remark in joint[1])
+
+
+def test_a_line_that_turns_more_than_it_moves_is_sent_with_a_time(cell):
+    segment, _ = one(cell, x=0.1, turn=(0.0, 0.0, pi / 2))
+    assert segment.primitive.duration == pytest.approx(1.5 * (pi / 2) / 0.5)
+    assert 'it turns on the way' in segment.note
+
+
+@pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.PROCESS])
+def test_speeds_are_slowed_to_the_largest_tool_speed_and_it_is_said(cell, kind):
+    segment, remarks = one(cell, x=0.1, segment=Segment(type=kind, velocity=0.6))
+    assert segment.primitive.velocity == pytest.approx(0.25)
+    assert remarks[0] == 'point 0: slowed from 0.6 to 0.25 m/s by max_tool_speed = 0.25 m/s'
+    free = one(
+        cell, PlanningOptions(max_tool_speed=0.0), x=0.1, segment=Segment(type=kind, velocity=0.6)
+    )
+    assert free[0].primitive.velocity == 0.6
+
+
+def test_joint_moves_keep_to_the_speed_of_the_joints(cell):
+    options = PlanningOptions(max_tool_speed=0.0)
+    segment, remarks = one(cell, options, x=0.1, segment=Segment(type=TYPE.JOINT, velocity=9.0))
+    assert segment.primitive.velocity == pytest.approx(cell.arm.model.max_joint_speed[0])
+    assert '_joint, 3.142 rad/s' in remarks[0]
+
+
+@pytest.mark.parametrize(
+    ('kind', 'time', 'limit'),
+    [
+        (TYPE.LINEAR, 0.5, 'max_tool_speed = 0.25 m/s'),
+        (TYPE.PROCESS, 0.3, 'max_tool_speed = 0.25 m/s'),
+        (TYPE.JOINT, 0.3, 'max_tool_speed = 0.25 m/s'),
+    ],
+)
+def test_times_that_are_too_short_are_refused_with_the_numbers_or_slowed(cell, kind, time, limit):
+    with pytest.raises(TooFast) as caught:
+        one(cell, x=0.1, time=time, segment=Segment(type=kind))
+    text = str(caught.value)
+    assert text.startswith('trajectory.points[0].time_from_start gives the segment')
+    assert limit in text
+    segment, remarks = one(
+        cell, PlanningOptions(on_too_fast='slow'), x=0.1, time=time, segment=Segment(type=kind)
+    )
+    assert segment.duration > time
+    assert f'instead of {time:.3f} s' in remarks[0]
+    at_least = float(text.split('at least ')[1].split(' s')[0])
+    again, _ = one(cell, x=0.1, time=at_least + 1e-3, segment=Segment(type=kind))
+    assert again.duration == pytest.approx(at_least, abs=2e-3)
+
+
+def test_an_acceleration_of_its_own_that_is_too_low_for_the_time_is_refused(cell):
+    arc = Segment(type=TYPE.CIRCULAR, via=cell.pose(0.05, 0.05), acceleration=0.1)
+    with pytest.raises(TooFast, match=r'0\.100 m/s\^2'):
+        one(cell, x=0.1, time=2.0, segment=arc)
+
+
+def test_a_speed_that_the_wire_would_round_to_nothing_is_refused(cell):
+    with pytest.raises(InvalidGoal, match='less than the 1e-05'):
+        one(cell, x=0.0002, time=2000.0, segment=Segment(type=TYPE.PROCESS))
+
+
+# -- driven by the motion generator of the simulated controller -----------------------------------
+
+
+def drive(made, cell):
+    """Return time, position and speed of the tool in every cycle."""
+    robot = MotionGenerator(cell.arm, CYCLE, made.start)
+    robot.T_flange_tcp = cell.T_flange_tcp
+    rows = []
+    for segment in made.segments:
+        move = begin(robot, segment.primitive, cell)
+        while not move.returned:
+            step(robot, rows)
+    while robot.moving:
+        step(robot, rows)
+    assert robot.q == pytest.approx(made.segments[-1].joints, abs=1e-6)
+    return np.array(rows)
+
+
+def step(robot, rows):
+    robot.step(1.0)
+    assert robot.fault is None
+    rows.append(
+        (CYCLE * (len(rows) + 1), *robot.T_base_tcp.position, np.linalg.norm(robot.tcp_twist[:3]))
+    )
+
+
+def begin(robot, move, cell):
+    a, v, r = move.acceleration, move.velocity, move.blend_radius
+
+    def joints():
+        return nearest(cell.arm, move.target @ cell.T_flange_tcp.inverse(), move.q_near)
+
+    def pose(target):
+        return target if isinstance(target, Pose) else cell.tool(target)
+
+    match move:
+        case MoveJ():
+            return robot.movej(joints(), a, v, move.duration, r)
+        case MoveL():
+            return robot.movel(move.target, a, v, move.duration, r)
+        case MoveP():
+            return robot.movep(move.target, a, v, r)
+        case MoveC():
+            return robot.movec(pose(move.via), pose(move.target), a, v, r, int(move.mode))
+        case OptimoveJ():
+            return robot.optimovej(joints(), a, v, r)
+        case _:
+            return robot.optimovel(move.target, a, v, r)
+
+
+def away(made, rows):
+    """Return how far the tool gets away from the reference path [m]."""
+    path = made.reference.poses[:, :3]
+    a, d = path[:-1], np.diff(path, axis=0)
+    length = np.maximum(np.einsum('ij,ij->i', d, d), 1e-18)
+    worst = 0.0
+    for place in rows[:, 1:4]:
+        u = np.clip(np.einsum('ij,ij->i', place - a, d) / length, 0.0, 1.0)
+        worst = max(worst, float(np.linalg.norm(a + u[:, None] * d - place, axis=1).min()))
+    return worst
+
+
+CORNERS = ((0.1, 0.0), (0.1, 0.2), (-0.1, 0.2), (-0.1, 0.0), (0.1, 0.0))
+
+
+def round_trip(cell, kind, radius, timed_by, turn=0.0):
+    points = tuple(
+        cell.point(x, y, 0.02 * i, time=timed_by * (i + 1), turn=(0.0, 0.0, turn * (i % 2)))
+        for i, (x, y) in enumerate(CORNERS)
+    )
+    vias = ((0.05, 0.05), (0.15, 0.1), (0.0, 0.25), (-0.15, 0.1), (0.0, -0.05))
+    return Goal(
+        waypoints=points,
+        segments=tuple(
+            Segment(
+                type=kind,
+                blend_radius=radius,
+                via=cell.pose(*via) if kind == TYPE.CIRCULAR else None,
+            )
+            for via in vias
+        ),
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('turn', [0.0, 0.9])
+@pytest.mark.parametrize(('radius', 'within'), [(0.0, 0.01), (0.02, 0.05)])
+@pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.JOINT, TYPE.PROCESS, TYPE.CIRCULAR])
+def test_times_are_met_on_the_planned_path_within_the_tool_speed(cell, kind, radius, within, turn):
+    made = plan(round_trip(cell, kind, radius, 4.0, turn), cell.state, cell.arm, OPTIONS)
+    rows = drive(made, cell)
+    assert rows[-1, 0] == pytest.approx(20.0, rel=within)
+    assert made.duration == pytest.approx(20.0, rel=1e-3)
+    assert rows[:, 4].max() <= 0.25 + 1e-6
+    assert away(made, rows[::5]) < (30e-6 if kind != TYPE.CIRCULAR else 200e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('radius', [0.0, 0.02])
+@pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.JOINT, TYPE.PROCESS, TYPE.CIRCULAR])
+def test_without_times_the_expected_time_is_near(cell, kind, radius):
+    made = plan(round_trip(cell, kind, radius, 0.0), cell.state, cell.arm, OPTIONS)
+    rows = drive(made, cell)
+    assert rows[-1, 0] == pytest.approx(made.duration, rel=0.1 if radius else 0.01)
+    assert rows[:, 4].max() <= 0.25 + 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('kind', [TYPE.OPTIMIZED_LINEAR, TYPE.OPTIMIZED_JOINT])
+def test_optimized_moves_keep_to_the_tool_speed(cell, kind):
+    made = plan(round_trip(cell, kind, 0.0, 0.0), cell.state, cell.arm, OPTIONS)
+    rows = drive(made, cell)
+    assert rows[:, 4].max() <= 0.25 * 1.02
+    assert rows[-1, 0] == pytest.approx(made.duration, rel=0.35)

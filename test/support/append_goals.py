@@ -1,0 +1,145 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Goals with an open end in a cell in virtual time, and producers of their points."""
+
+from math import cos, pi, sin
+
+from ur_cartesian_driver.driver.appender import Appender, encode_plan
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.goal import Segment, Waypoint
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.planning import planner as plan
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning.append.append_planner import plan_first_part
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
+from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT
+
+BLEND = Segment(blend_radius=0.01, velocity=0.2, acceleration=1.0)
+
+
+def moved(pose, *offset):
+    """A pose moved along base axes [m]."""
+    return Pose(tuple(a + b for a, b in zip(pose.position, offset, strict=True)), pose.quaternion)
+
+
+def corners(home, first, count):
+    """Points on the corners of a square of 40 mm beside the tool, round and round."""
+    return [
+        Waypoint(pose=moved(home, 0.04 * (k // 2 % 2), 0.04 * ((k + 1) // 2 % 2), 0.0))
+        for k in range(first, first + count)
+    ]
+
+
+def circle(home, first, count, *, step=0.1, radius=0.05, round_in=4.0):
+    """Points with times and twists on a circle that begins at the tool, at rest and faster."""
+    rate = 2.0 * pi / round_in
+    points = []
+    for k in range(first, first + count):
+        # The first round begins with a ramp of a second, along which the angle grows as t^2.
+        t = step * k
+        angle, speed = (0.5 * rate * t * t, rate * t) if t < 1.0 else (rate * (t - 0.5), rate)
+        points.append(
+            Waypoint(
+                time=t,
+                pose=moved(home, radius * sin(angle), radius * (1.0 - cos(angle)), 0.0),
+                twist=(
+                    radius * speed * cos(angle),
+                    radius * speed * sin(angle),
+                    0.0,
+                    0.0,
+                    0.0,
+                    0.0,
+                ),
+            )
+        )
+    return points
+
+
+class AppendMotion:
+    """A goal with an open end on its way, and who appends to it."""
+
+    def __init__(self, cell, goal, **options):
+        self._cell, self._owner = cell, cell.owner
+        self._arm = Arm(robot_model(cell.robot.config.model))
+        self._options = PlanningOptions(**{'max_tool_speed': 1.0, 'max_points': 5000} | options)
+        part = plan_first_part(
+            plan(goal, cell.memory.read(), self._arm, self._options), self._arm, self._options
+        )
+        self.home = cell.memory.read().actual_tcp_pose
+        self.appender = Appender(
+            len(self._owner.motions) + 1,
+            part,
+            dialect=NEWEST_DIALECT,
+            send=self._owner.send,
+            progress=self._newest,
+            planning_inputs=lambda: (self._arm, self._options),
+        )
+        points, job = encode_plan(part, NEWEST_DIALECT)
+        self.motion = self._owner.run(points, job)
+
+    def _newest(self):
+        return self.motion.progress[-1] if self.motion.progress else None
+
+    @property
+    def points(self):
+        return self.appender.points
+
+    @property
+    def outcome(self):
+        return self.motion.outcome
+
+    @property
+    def progress(self):
+        return self.motion.progress[-1]
+
+    @property
+    def ahead(self):
+        """How many points the arm has not come to."""
+        return self.points - (self.progress.waypoint if self.motion.progress else 0)
+
+    async def append(self, waypoints=(), segments=(), io_commands=(), *, last=False):
+        """Append as the Python API does, but wait as a coroutine."""
+        offers = self.appender.offers(
+            AppendedPoints(
+                waypoints=tuple(waypoints),
+                segments=tuple(segments),
+                io_commands=tuple(io_commands),
+                last=last,
+            )
+        )
+        try:
+            offer = next(offers)
+            while True:
+                self._owner.send(offer)
+                await self._cell.until(lambda: self._owner.answers)
+                offer = offers.send(self._owner.answers.pop())
+        except StopIteration as end:
+            return end.value
+
+    async def until(self, condition, bound=30.0):
+        """Wait for a condition, or the end of the goal; return whether it has come."""
+        await self._cell.until(lambda: condition() or self.outcome, bound)
+        return self.outcome is None
+
+    async def ended(self, bound=60.0):
+        await self._cell.until(lambda: self.outcome is not None, bound)
+        return self.outcome
+
+
+def clear_network_log(cell):
+    """Let the network in memory forget what was sent on it, which tests can look at."""
+    for end in cell.loop.ends:
+        end.received.clear()
+        end.peer.received.clear()
+
+
+def retained_sizes(cell):
+    """Return what the robot loop keeps of the goal that runs: records, rows of path, messages."""
+    loop = cell.loop_task.get_coro().cr_frame.f_locals['self']
+    observer = loop._machine._observer
+    return {
+        'records': observer._records.kept,
+        'rows': len(observer._tracker.path.time),
+        'unsent': len(loop._points),
+    }

@@ -1,0 +1,339 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+``ur-cartesian plot``: a recorded motion as a picture, and as a table for other programs.
+
+On the left the path, planned and executed; on the right, over time, how far off the tool was, how
+fast, what the controller made of the speed, and what happened.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.driver.recordings.recording import Recording
+from ur_cartesian_driver.driver.recordings.recording_format import OUTPUT_NAMES, PART_SUFFIX
+from ur_cartesian_driver.motion.state import RuntimeState
+
+#: No picture shows more packets.
+MAX_ROWS = 6000
+#: More points than that are not numbered.
+MAX_NUMBERED_POINTS = 12
+_AXES = 'xyz'
+#: From above, unless the height is that much more than the smaller width.
+_VIEW_WEIGHTS = np.array([1.0, 1.0, 0.4])
+_PLANNED, _TARGET, _ACTUAL, _MARK = '#9aa5b1', '#1f77b4', '#c8372d', '#2a9d5c'
+#: Events that are marked in all charts.
+_MARKED_EVENTS = {'cancel': '#e08a00', 'safety': '#c8372d', 'robot': '#c8372d', 'end': '#333333'}
+
+
+def plot(arguments: argparse.Namespace) -> int:
+    """Draw a recording, or write its table."""
+    file = newest_recording(Path(arguments.file))
+    if arguments.csv:
+        write_table(Recording.load(file), Path(arguments.csv))
+        print(f'table: {arguments.csv}')
+    if arguments.output or not arguments.csv:
+        picture = Path(arguments.output or file.with_suffix('.png'))
+        draw(Recording.load(file, MAX_ROWS), picture)
+        print(f'picture: {picture}')
+    return 0
+
+
+def newest_recording(path: Path) -> Path:
+    """
+    Return a recording: the path, or the newest one in a directory of recordings.
+
+    :raises OSError: there is none.
+    """
+    if path.is_dir() and path.suffix != PART_SUFFIX:
+        found = sorted(path.glob('*_points*.npz')) or sorted(path.glob(f'*_points*{PART_SUFFIX}'))
+        if not found:
+            raise OSError(f'there is no recording in {path}; see the parameter record_directory')
+        return found[-1]
+    return path
+
+
+# ---- the table ------------------------------------------------------------------------------
+
+
+def write_table(recording: Recording, file: Path) -> None:
+    """Write all packets as comma-separated values, and the deviation from the plan."""
+    deviation = recording.deviation()
+    columns: dict[str, NDArray[Any]] = {'time': recording.time}
+    for name, axes in (
+        ('actual_pose', _POSE),
+        ('target_pose', _POSE),
+        ('actual_twist', _TWIST),
+        ('target_twist', _TWIST),
+        ('actual_q', '012345'),
+        ('target_q', '012345'),
+        ('actual_qd', '012345'),
+        ('target_qd', '012345'),
+        ('analog_output', '01'),
+    ):
+        values = getattr(recording, name)
+        columns |= {f'{name}_{axis}': values[:, i] for i, axis in enumerate(axes)}
+    for name in (
+        'lag',
+        'buffered',
+        'speed_scaling',
+        'slider',
+        'digital_output',
+        'points_begun',
+        'waypoint',
+        'robot_mode',
+        'safety_mode',
+        'runtime_state',
+    ):
+        columns[name] = getattr(recording, name)
+    columns |= {
+        'deviation_position': deviation.position,
+        'deviation_angle': deviation.angle,
+        'planned_time': deviation.planned_time,
+    }
+    with open(file, 'w', newline='', encoding='utf-8') as opened:
+        writer = csv.writer(opened)
+        writer.writerow(columns)
+        writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+
+
+_POSE = ('x', 'y', 'z', 'qx', 'qy', 'qz', 'qw')
+_TWIST = ('x', 'y', 'z', 'rx', 'ry', 'rz')
+
+
+# ---- the picture ----------------------------------------------------------------------------
+
+
+def draw(recording: Recording, picture: Path, title: str = '') -> None:
+    """
+    Draw a recording.
+
+    :param picture: its suffix decides the format.
+    :raises OSError: matplotlib is not installed, or the picture cannot be written.
+    """
+    try:
+        import matplotlib
+    except ImportError:
+        raise OSError(
+            'no picture without matplotlib; install it (extra `plot`), or take --csv'
+        ) from None
+    matplotlib.use('Agg')
+    from matplotlib import pyplot
+
+    with matplotlib.rc_context(
+        {
+            'font.size': 9.0,
+            'axes.spines.top': False,
+            'axes.spines.right': False,
+            'axes.grid': True,
+            'grid.alpha': 0.25,
+            'legend.frameon': False,
+            'legend.fontsize': 8.0,
+            'axes.titlesize': 9.0,
+            'path.simplify_threshold': 0.5,
+        }
+    ):
+        figure = pyplot.figure(figsize=(12.0, 7.2), layout='constrained')
+        figure.suptitle(title or _title(recording), fontsize=11.0)
+        left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.0, 1.35))[0]
+        _draw_path(left, recording)
+        _draw_time(right, recording)
+        figure.savefig(picture, dpi=100)
+        pyplot.close(figure)
+
+
+def _title(recording: Recording) -> str:
+    metadata = recording.metadata
+    outcome = metadata['outcome']
+    ended = f'{outcome["name"]}: {outcome["text"]}' if outcome else 'the recording was cut off'
+    return (
+        f'{metadata["robot"].get("model") or "robot"}, {metadata["execution"]}, '
+        f'{metadata["points"]} point{"" if metadata["points"] == 1 else "s"}, '
+        f'{metadata["created"][:19].replace("T", " ")} UTC\n{ended[:150]}'
+    )
+
+
+def _draw_path(figure: Any, recording: Recording) -> None:
+    """Draw the path in space and from above, or from the side where it goes up and down most."""
+    planned, actual = recording.planned_pose[:, :3], recording.actual_pose[:, :3]
+    space, flat = figure.add_subplot(2, 1, 1, projection='3d'), figure.add_subplot(2, 1, 2)
+    low, high = (side(np.vstack((planned, actual)), axis=0) for side in (np.min, np.max))
+    extent = high - low
+    a, b = sorted(np.argsort(extent * _VIEW_WEIGHTS)[1:].tolist())
+    for axes, columns in ((space, [0, 1, 2]), (flat, [a, b])):
+        axes.plot(
+            *planned[:, columns].T,
+            color=_PLANNED,
+            linewidth=4.0,
+            alpha=0.6,
+            solid_capstyle='round',
+            label='planned',
+        )
+        axes.plot(*actual[:, columns].T, color=_ACTUAL, linewidth=1.0, label='executed')
+        axes.scatter(
+            *recording.points[:, columns].T, s=12.0, color='#333333', zorder=3, label='points'
+        )
+    flat.scatter(
+        *_switch_places(recording)[:, [a, b]].T,
+        s=40.0,
+        marker='d',
+        color=_MARK,
+        zorder=4,
+        label='an output switched',
+    )
+    if len(recording.points) <= MAX_NUMBERED_POINTS:
+        for number, point in enumerate(recording.points):
+            flat.annotate(str(number), point[[a, b]], xytext=(4, 4), textcoords='offset points')
+    space.set(xlabel='x [m]', ylabel='y [m]', zlabel='z [m]')
+    space.tick_params(labelsize=7.0, pad=0.0)
+    space.yaxis.labelpad = space.zaxis.labelpad = 8.0
+    space.locator_params(nbins=4)
+    span = np.maximum(extent, 0.25 * max(extent.max(), 1e-3))
+    for axis, name in enumerate(_AXES):
+        middle = 0.5 * (low[axis] + high[axis])
+        getattr(space, f'set_{name}lim')(middle - 0.6 * span[axis], middle + 0.6 * span[axis])
+    space.set_box_aspect(span, zoom=0.85)
+    flat.set(xlabel=f'{_AXES[a]} [m]', ylabel=f'{_AXES[b]} [m]')
+    flat.set_aspect('equal', adjustable='datalim')
+    handles, labels = flat.get_legend_handles_labels()
+    shown = len(handles) if len(_switch_places(recording)) else -1
+    figure.legend(handles[:shown], labels[:shown], loc='upper left', ncols=4)
+
+
+def _switch_places(recording: Recording) -> NDArray[np.float64]:
+    """Return where the tool was when a digital output was reported to have switched."""
+    digital = recording.digital_output
+    changed = (digital[1:] != digital[:-1]) & (digital[:-1] >= 0)
+    return np.asarray(recording.actual_pose[1:][changed])
+
+
+def _draw_time(figure: Any, recording: Recording) -> None:
+    """Draw what there is over time."""
+    rows = _timeline(recording)
+    deviation, speed, scaling, line = figure.subplots(
+        4, 1, sharex=True, height_ratios=(1.0, 1.0, 0.8, 0.35 + 0.16 * len(rows))
+    )
+    time = recording.time
+    _draw_deviation(deviation, recording)
+    speed.plot(
+        time,
+        np.linalg.norm(recording.target_twist[:, :3], axis=1),
+        color=_TARGET,
+        linewidth=2.4,
+        alpha=0.5,
+        label="controller's target",
+    )
+    speed.plot(time, recording.tool_speed, color=_ACTUAL, linewidth=0.9, label='tool')
+    speed.set_ylabel('tool speed\n[m/s]')
+    speed.set_ylim(bottom=0.0)
+    _draw_scaling(scaling, recording)
+    _draw_timeline(line, recording, rows)
+    line.set_xlabel('time [s]')
+    for axes in (deviation, speed, scaling):
+        for at, kind, _ in recording.events:
+            if kind in _MARKED_EVENTS:
+                axes.axvline(at, color=_MARKED_EVENTS[kind], linewidth=0.8, linestyle=':')
+
+
+def _draw_deviation(axes: Any, recording: Recording) -> None:
+    deviation = recording.deviation()
+    axes.plot(
+        recording.time,
+        1e3 * deviation.target_position,
+        color=_TARGET,
+        linewidth=2.4,
+        alpha=0.5,
+        label="controller's target",
+    )
+    axes.plot(recording.time, 1e3 * deviation.position, color=_ACTUAL, linewidth=0.9, label='tool')
+    axes.set_ylabel('distance from\nthe plan [mm]')
+    axes.set_ylim(0.0, 1.15 * max(0.05, 1e3 * np.nan_to_num(deviation.position).max()))
+    axes.legend(loc='upper right', ncols=2)
+
+
+def _draw_scaling(axes: Any, recording: Recording) -> None:
+    time = recording.time
+    axes.plot(
+        time, 100.0 * recording.slider, color=_PLANNED, linewidth=3.0, alpha=0.6, label='slider'
+    )
+    axes.plot(
+        time,
+        100.0 * recording.speed_scaling,
+        color='#333333',
+        linewidth=1.0,
+        label='speed scaling',
+    )
+    axes.set_ylabel('speed\n[%]')
+    axes.set_ylim(0.0, 108.0)
+    lags = bool(np.isfinite(recording.lag).any())
+    if lags or recording.metadata.get('keep_open'):
+        other = axes.twinx()
+        if lags:
+            other.plot(time, 1e3 * recording.lag, color=_ACTUAL, linewidth=0.9, label='lag')
+        other.plot(time, 1e3 * recording.buffered, color=_TARGET, linewidth=0.9, label='buffered')
+        other.set_ylabel('[ms]')
+        other.set_ylim(bottom=0.0)
+        other.grid(visible=False)
+        other.spines['right'].set_visible(True)
+        other.legend(loc='lower right', ncols=2)
+    axes.legend(loc='lower left', ncols=2)
+
+
+def _timeline(recording: Recording) -> list[tuple[str, NDArray[np.float64]]]:
+    """Return what is on or off over time, or between (0 to 1): outputs, pauses of the program."""
+    digital, rows = recording.digital_output, []
+    for bit, name in enumerate(OUTPUT_NAMES):
+        is_on = (digital >= 0) & (digital >> bit & 1 > 0)
+        if is_on.any():
+            rows.append((name.replace(' digital output', ''), is_on.astype(np.float64)))
+    for channel, values in enumerate(np.nan_to_num(recording.analog_output).T):
+        if np.ptp(values) > 0.0:
+            rows.append((f'analog {channel}, to {values.max():.3g}', values / values.max()))
+    paused = recording.runtime_state == RuntimeState.PAUSED
+    return [*rows, ('paused', paused.astype(np.float64))] if paused.any() else rows
+
+
+def _draw_timeline(
+    axes: Any, recording: Recording, rows: list[tuple[str, NDArray[np.float64]]]
+) -> None:
+    """Draw points, outputs and pauses as lines of one chart."""
+    time, points = (
+        recording.time,
+        [(at, text.rsplit(' ', 1)[-1]) for at, kind, text in recording.events if kind == 'point'],
+    )
+    axes.plot([at for at, _ in points], [0.0] * len(points), '|', color='#333333', markersize=9.0)
+    if len(points) <= MAX_NUMBERED_POINTS:
+        for at, number in points:
+            axes.annotate(
+                number, (at, 0.0), xytext=(3, 2), textcoords='offset points', fontsize=7.0
+            )
+    for height, (name, share) in enumerate(rows, start=1):
+        axes.fill_between(
+            time,
+            height - 0.3,
+            height - 0.3 + 0.6 * share,
+            step='post',
+            color='#e08a00' if name == 'paused' else _MARK,
+            linewidth=0.0,
+        )
+    axes.set_yticks(range(len(rows) + 1), ['to point', *(name for name, _ in rows)])
+    axes.set_ylim(-0.6, len(rows) + 0.6)
+    for at, kind, text in recording.events:
+        if kind in _MARKED_EVENTS:
+            axes.axvline(at, color=_MARKED_EVENTS[kind], linewidth=0.8, linestyle=':')
+            if kind != 'end':
+                axes.annotate(
+                    text[:60] or kind,
+                    (at, len(rows) + 0.2),
+                    xytext=(3, 0),
+                    textcoords='offset points',
+                    fontsize=7.0,
+                    color=_MARKED_EVENTS[kind],
+                )

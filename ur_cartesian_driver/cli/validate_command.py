@@ -1,0 +1,86 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+``ur-cartesian validate``: what the driver would say of a goal, without driver and robot.
+
+What the driver reads from the robot is said on the command line: model, calibration, where the
+arm stands and its TCP. Frames that only tf2 knows are not known here.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from dataclasses import replace
+import sys
+from time import time_ns
+
+from ur_cartesian_driver.cli.commands import calibration, code_text, read_goal
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.robot_models import robot_model
+from ur_cartesian_driver.motion.errors import code_of, GoalRefused
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.sim import SimulatorConfig
+
+
+def validate(arguments: argparse.Namespace) -> int:
+    """Plan a goal from where the arm is said to stand, and print the plan."""
+    from ur_cartesian_driver.planning import planner as plan
+    from ur_cartesian_driver.preview import postures, table
+    from ur_cartesian_driver.ros.messages import goal_conversion as convert
+    from ur_cartesian_driver.ros.parameters.parameter_files import read_settings
+    from ur_cartesian_driver.ros.tf import known_frames as frames
+
+    settings = read_settings(arguments.params_file, arguments.param)
+    model = robot_model(arguments.ur_type or settings.driver.ur_type)
+    arm = Arm(model, calibration(arguments, model))
+    T_flange_tcp = Pose.from_rotation_vector(arguments.tcp) if arguments.tcp else IDENTITY
+    state = stationary_state(arm, arguments.joints or SimulatorConfig().q, T_flange_tcp)
+    dialect = settings.driver.dialect
+    options = replace(
+        settings.planning,
+        dialect=dialect,
+        allow_tcp_change=settings.planning.allow_tcp_change and dialect.supports_tcp_change,
+    )
+    message = read_goal(arguments)
+    try:
+        goal = convert.goal_from_message(
+            message,
+            settings.frames,
+            now=time_ns(),
+            snapshot=frames.ArmSnapshot.of(state),
+            time_tolerance=settings.node.goal_time_tolerance,
+        )
+        found = plan(goal, state, arm, options)
+    except GoalRefused as refusal:
+        print(f'refused, {code_text(code_of(refusal))}: {refusal}', file=sys.stderr)
+        return 1
+    print(
+        f'{model.name}{" with its calibration" if arm.calibrated else ""}, joints '
+        f'{_numbers(state.actual_q)} rad, TCP {_numbers(T_flange_tcp.rotation_vector())}'
+    )
+    print(table(found))
+    if arguments.postures:
+        print(postures(found))
+    print(*found.report, sep='\n')
+    return 0
+
+
+def stationary_state(arm: Arm, q: tuple[float, ...], T_flange_tcp: Pose = IDENTITY) -> RobotState:
+    """Return the state of an arm that stands still."""
+    a, b, c, d, e, f = q
+    joints = (a, b, c, d, e, f)
+    pose = arm.forward(joints) @ T_flange_tcp
+    return RobotState(
+        timestamp=0.0,
+        actual_q=joints,
+        target_q=joints,
+        actual_tcp_pose=pose,
+        target_tcp_pose=pose,
+        T_flange_tcp=T_flange_tcp,
+    )
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return ' '.join(f'{value:.4g}' for value in values)

@@ -1,0 +1,230 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A goal that is continued while it runs, from the side of its owner.
+
+Points are planned here, in the thread that appends them, and offered to the robot loop. That takes
+all of them or none: it alone knows whether the motion has been closed in the meantime. If it has,
+they are planned again, from rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+import itertools
+import threading
+from typing import TypeAlias
+
+from ur_cartesian_driver.driver.ipc.channel import AppendToMotion
+from ur_cartesian_driver.execution import AnswerAppend, AppendJob, job_from_plan, MotionJob
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.events import Progress
+from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_append
+from ur_cartesian_driver.planning.append.appendable_goal import AppendableGoal, AppendedPoints
+from ur_cartesian_driver.protocol.program.dialects import Dialect
+from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
+
+#: How long the robot loop may take to an answer [s]; it stops the arm when it hangs for so long.
+ANSWER_TIMEOUT = 5.0
+#: So many times as many points as one message may hold can be ahead of the arm.
+MESSAGES_AHEAD = 2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AppendResult:
+    """Points that a goal has taken."""
+
+    #: How many it has now.
+    points: int
+    #: What becomes of them.
+    text: str
+
+
+Offers: TypeAlias = Generator[AppendToMotion, AnswerAppend, AppendResult]
+
+
+def encode_plan(part: AppendPlan, dialect: Dialect) -> tuple[bytes, MotionJob]:
+    """Return the records of a part, and what the machine needs of it."""
+    plan = part.plan
+    job = job_from_plan(plan, dialect, start_time=part.since, ending_records=part.ending)
+    return (encode_points(plan.instructions, dialect), replace(job, due=part.end_time))
+
+
+class Appender:
+    """What the driver knows of a goal with an open end; thread-safe."""
+
+    def __init__(
+        self,
+        motion: int,
+        opened: AppendPlan,
+        *,
+        dialect: Dialect,
+        planning_inputs: Callable[[], tuple[Arm, PlanningOptions]],
+        send: Callable[[AppendToMotion], None],
+        progress: Callable[[], Progress | None],
+        timeout: float = ANSWER_TIMEOUT,
+    ) -> None:
+        """
+        Prepare.
+
+        :param planning_inputs: for planning, as they are then.
+        :param progress: the newest report of the motion.
+        :param timeout: how long to wait for an answer [s].
+        """
+        self._timeout = timeout
+        self._motion, self._dialect = motion, dialect
+        self._arm_and_options, self._send, self._progress = planning_inputs, send, progress
+        self._goal: AppendableGoal = opened.next_goal
+        self._is_open = True
+        # One request after the other: each begins where the one before ends.
+        self._append_lock = threading.Lock()
+        # Guards what follows.
+        self._lock = threading.Lock()
+        self._pending_answers: dict[int, Future[AnswerAppend]] = {}
+        #: Why nothing can be appended any more; empty = it can.
+        self._ended = ''
+        self._numbers = itertools.count(1)
+
+    @property
+    def points(self) -> int:
+        """How many the goal has."""
+        return self._goal.points
+
+    def append(self, new_points: AppendedPoints) -> AppendResult:
+        """
+        Plan points and have them taken, all or none; it takes as long as the planning.
+
+        :raises GoalRefused: they are not taken, and the goal is as it was.
+        """
+        with self._append_lock:
+            offers = self.offers(new_points)
+            try:
+                offer = next(offers)
+                while True:
+                    offer = offers.send(self._send_offer(offer))
+            except StopIteration as end:
+                appended: AppendResult = end.value
+                return appended
+
+    def offers(self, new_points: AppendedPoints) -> Offers:
+        """
+        Return what is offered to the robot loop, one by one, for an addition.
+
+        Each offer is to be sent, and its answer to be sent in here.
+
+        :raises GoalRefused: as of :meth:`append`.
+        """
+        if not self._is_open:
+            raise RobotNotReady('The last points of the goal were said to be the last.')
+        appended = yield from (
+            self._append(new_points) if new_points.waypoints else self._close(new_points)
+        )
+        self._is_open = not new_points.last
+        return appended
+
+    def _close(self, new_points: AppendedPoints) -> Offers:
+        if not new_points.last:
+            raise InvalidGoal('points', 'is empty', 'give at least one point, or set last')
+        answer = yield self._offer(None, b'', 0)
+        if answer.refusal:
+            raise RobotNotReady(answer.refusal)
+        return AppendResult(
+            points=self.points, text=(f'The goal ends with the {self.points} points that it has.')
+        )
+
+    def _append(self, new_points: AppendedPoints) -> Offers:
+        arm, options = self._arm_and_options()
+        self._check_ahead(len(new_points.waypoints), options)
+        before = self._goal
+        for from_rest in (False, True) if not self._is_at_rest() else (True,):
+            part = plan_append(before, new_points, arm, options, from_rest=from_rest)
+            points, job = encode_plan(part, self._dialect)
+            answer = yield self._offer(job, points, part.records_before)
+            if not answer.refusal:
+                self._goal = part.next_goal
+                return AppendResult(
+                    points=part.next_goal.points,
+                    text=part.text
+                    + (_from_rest(part.next_goal.last_client_time > 0.0) if from_rest else ''),
+                )
+            if not answer.replan_from_rest:
+                break
+        raise RobotNotReady(answer.refusal)
+
+    def _is_at_rest(self) -> bool:
+        """Tell whether the arm surely rests behind all points that the goal has."""
+        progress = self._progress()
+        return (
+            progress is not None
+            and progress.awaiting_points
+            and progress.points_received == self.points
+        )
+
+    def _check_ahead(self, count: int, options: PlanningOptions) -> None:
+        progress = self._progress()
+        ahead = self.points - (progress.waypoint if progress is not None else 0)
+        max_ahead = MESSAGES_AHEAD * options.max_points
+        if ahead + count > max_ahead:
+            raise InvalidGoal(
+                'points',
+                f'would make {ahead + count} points that the arm has not reached, more '
+                f'than {max_ahead} = {MESSAGES_AHEAD} max_points',
+                'append them when it has come further (feedback: point_index)',
+            )
+
+    def _offer(self, job: MotionJob | None, points: bytes, behind: int) -> AppendToMotion:
+        return AppendToMotion(
+            motion=self._motion,
+            points=points,
+            append_job=AppendJob(number=next(self._numbers), records_before=behind, job=job),
+        )
+
+    def _send_offer(self, offer: AppendToMotion) -> AnswerAppend:
+        """Send an offer and wait for its answer."""
+        number = offer.append_job.number
+        with self._lock:
+            if self._ended:
+                return AnswerAppend(number=number, refusal=self._ended)
+            future = self._pending_answers[number] = Future()
+        self._send(offer)
+        try:
+            return future.result(self._timeout)
+        except TimeoutError:
+            # It may have taken them all the same; so nobody knows where more would begin.
+            self._ended = 'The robot loop has not answered: nothing can be appended any more.'
+            return AnswerAppend(number=number, refusal=self._ended)
+        finally:
+            with self._lock:
+                self._pending_answers.pop(number, None)
+
+    # ---- told by the driver -------------------------------------------------------------------
+
+    def answer(self, answer: AnswerAppend) -> None:
+        """Take the answer of the robot loop."""
+        with self._lock:
+            future = self._pending_answers.get(answer.number)
+        if future is not None:
+            future.set_result(answer)
+
+    def end(self) -> None:
+        """Take note that the motion has ended; who waits for an answer gets that one."""
+        with self._lock:
+            self._ended = 'The goal has ended.'
+            pending, self._pending_answers = self._pending_answers, {}
+        for number, future in pending.items():
+            if not future.done():
+                future.set_result(AnswerAppend(number=number, refusal=self._ended))
+
+
+def _from_rest(timed: bool) -> str:
+    """
+    Return what is said where the motion had been closed.
+
+    Not how much later: the arm may have waited, and may still wait.
+    """
+    clause = ', later than their times say' if timed else ''
+    return f' The motion had come to rest before them, and goes on from there{clause}.'

@@ -1,0 +1,84 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the owner of a driver sets."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ur_cartesian_driver.execution.goal.monitor import MAX_PLAN_DEVIATION
+from ur_cartesian_driver.robot.link_settings import LinkSettings
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriverConfig(LinkSettings):
+    """How to reach the robot, and how to run the loop that does; the defaults fit a real robot."""
+
+    #: Port of the dashboard on the robot; PolyScope X has none.
+    dashboard_port: int = 29999
+    #: How far the controller's own target may be from the plan, corners apart [m], [rad]; 0 = any.
+    max_plan_deviation: float = MAX_PLAN_DEVIATION[0]
+    max_plan_deviation_angle: float = MAX_PLAN_DEVIATION[1]
+    #: A robot whose calibration moves the flange by more is warned of [m]; 0 = never.
+    max_calibration_difference: float = 0.01
+    #: What becomes of a goal when the robot makes a protective or safeguard stop: ``abort``, or
+    #: ``continue`` when somebody has unlocked the robot and plays its program.
+    after_robot_stop: str = 'abort'
+    #: Of goals with keep_open: planned time of the motion that the robot is given ahead [s]; ...
+    keep_open_horizon: float = 1.0
+    #: ... how long before it runs out the motion is brought to rest if nothing else comes [s]; ...
+    keep_open_margin: float = 0.2
+    #: ... and how long the goal then waits for more points until it ends [s]; 0 = without end.
+    keep_open_timeout: float = 30.0
+    #: SERVO: motion time that is under way to the arm, so how long nothing may come through [s].
+    servo_target_lag: float = 0.04
+    #: SERVO: the robot program stops the arm when a joint is farther from its set-point [rad].
+    servo_max_divergence: float = 0.3
+    #: Progress reports per second.
+    feedback_rate: float = 25.0
+    #: The arm is stopped when the owner of the driver is silent for that long [s].
+    node_timeout: float = 5.0
+    #: Where each motion is recorded, a file each (doc/recordings.md); empty = nowhere.
+    record_directory: str = ''
+    #: What recordings may take together [MB]; the oldest ones are removed.
+    record_max_size: float = 2000.0
+    #: ``process`` (robust) or ``thread`` (light: tests and scripts).
+    robot_loop: str = 'process'
+
+    def __post_init__(self) -> None:
+        """
+        Refuse values that cannot work together.
+
+        :raises ValueError: names the field, its value and the bound.
+        """
+        LinkSettings.__post_init__(self)  # super() does not work in a class with slots
+        if self.robot_loop not in ('process', 'thread'):
+            raise ValueError(
+                f"robot_loop is {self.robot_loop!r}, it has to be 'process' or 'thread'."
+            )
+        if self.after_robot_stop not in ('abort', 'continue'):
+            raise ValueError(
+                f'after_robot_stop is {self.after_robot_stop!r}, it has to be '
+                "'abort' or 'continue'."
+            )
+        self._require_positive(
+            'feedback_rate', 'node_timeout', 'keep_open_margin', 'record_max_size'
+        )
+        if not self.keep_open_horizon >= 2.0 * self.keep_open_margin:
+            raise ValueError(
+                f'keep_open_horizon is {self.keep_open_horizon}, it has to be at least '
+                f'twice keep_open_margin = {self.keep_open_margin}.'
+            )
+        self._require_within('servo_target_lag', 0.008, 0.2)
+        self._require_within('servo_max_divergence', 0.01, 3.0)
+        if not self.keep_open_timeout >= 0.0:
+            raise ValueError(
+                f'keep_open_timeout is {self.keep_open_timeout}, it must not be negative.'
+            )
+        for name in (
+            'max_plan_deviation',
+            'max_plan_deviation_angle',
+            'max_calibration_difference',
+        ):
+            if not getattr(self, name) >= 0.0:
+                raise ValueError(f'{name} is {getattr(self, name)}, it must not be negative.')

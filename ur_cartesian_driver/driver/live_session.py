@@ -1,0 +1,275 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Sessions of live targets, from the side of their owner; and the arm in the hands of a person.
+
+Both are motions like that of a goal: there is one at a time, it is cancelled in the same way, and
+has one outcome. Only where it goes is told while it runs.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from math import isfinite, sqrt
+
+import numpy as np
+
+from ur_cartesian_driver.driver.ipc.channel import LiveSetup
+from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
+from ur_cartesian_driver.driver.motion_handle import MotionHandle, OnProgress
+from ur_cartesian_driver.execution import MotionJob
+from ur_cartesian_driver.execution.live.live_targets import LiveSettings
+from ur_cartesian_driver.execution.live.online_trajectory import LiveLimits
+from ur_cartesian_driver.execution.live.workspace_guard import KeepOutPlane, LiveWorkspace
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
+from ur_cartesian_driver.motion.plan import Plan, ReferencePath
+from ur_cartesian_driver.motion.pose import Pose, pose_rows
+from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.workspace import parse_planes
+from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT
+
+#: How far the square of a quaternion's length may be from 1.
+UNIT_TOLERANCE = 1e-3
+
+
+class LiveSession:
+    """A session that runs."""
+
+    def __init__(self, motion: MotionHandle, send: Callable[[int, Pose, float], None]) -> None:
+        """Be made by :meth:`~.api.Driver.start_live_session`."""
+        #: To wait for its end, or to cancel it.
+        self.motion = motion
+        self._send = send
+
+    def set_target(self, T_base_tcp: Pose, *, age: float = 0.0) -> None:
+        """
+        Go to another target from now on; in a session that has ended it means nothing.
+
+        :param T_base_tcp: where the active TCP is to be, in the robot's base.
+        :param age: how long ago that was true [s].
+        :raises InvalidGoal: the target is malformed, or too far away; the one before stays.
+        """
+        self._send(self.motion.number, T_base_tcp, age)
+
+
+class InteractiveMotions(ABC):
+    """Motions that are led while they run, as methods of a driver."""
+
+    config: DriverConfig
+    options: PlanningOptions
+    _live: LiveSession | None = None
+    _freedrive: MotionHandle | None = None
+
+    @property
+    @abstractmethod
+    def arm(self) -> Arm:
+        """The arm's kinematics."""
+
+    @property
+    @abstractmethod
+    def state(self) -> RobotState | None:
+        """The newest robot state."""
+
+    @abstractmethod
+    def _start_stationary(
+        self,
+        plan: Plan,
+        on_progress: OnProgress | None,
+        *,
+        live: LiveSetup | None = None,
+        freedrive: bool = False,
+    ) -> MotionHandle:
+        """Begin a motion that goes nowhere by itself."""
+
+    @abstractmethod
+    def _send_target(self, number: int, T_base_tcp: Pose, age: float) -> None:
+        """Check a target, and send it to a session."""
+
+    def start_live_session(self, T_base_tcp: Pose, *, age: float = 0.0) -> LiveSession:
+        """
+        Go to a target, and to others that are told while the arm moves; return at once.
+
+        The tool goes straight, with bounded speed and acceleration (``live_target_*`` of the
+        options), to the newest target that is not too old.
+
+        :param T_base_tcp: where the active TCP is to be, in the robot's base.
+        :param age: how long ago that was true [s].
+        :raises InvalidGoal: the target is malformed, or too far away.
+        :raises RobotNotReady: the robot cannot take a motion now, or one is running.
+        """
+        state = self._state_for('follow live targets')
+        check_target(T_base_tcp, state, self.options)
+        motion = self._start_stationary(
+            stationary_plan(state), None, live=live_setup(self.arm, state.target_q, self.options)
+        )
+        self._live = LiveSession(motion, self._send_target)
+        self._live.set_target(T_base_tcp, age=age)
+        return self._live
+
+    def send_live_target(self, T_base_tcp: Pose, *, age: float = 0.0) -> MotionHandle:
+        """
+        Go to a target: the next one of the session that runs, or the first of a new one.
+
+        :returns: the session, as a motion; it ends ``live_target_timeout`` after the last target.
+        :raises GoalRefused: as of :meth:`start_live_session`.
+        """
+        if self._live is None or self._live.motion.done():
+            return self.start_live_session(T_base_tcp, age=age).motion
+        self._live.set_target(T_base_tcp, age=age)
+        return self._live.motion
+
+    def start_freedrive(self, on_active: Callable[[], None] = lambda: None) -> MotionHandle:
+        """
+        Let a person guide the arm by hand, until the motion that is returned is cancelled.
+
+        Only where ``allow_freedrive`` of the configuration was set when the robot program began.
+
+        :param on_active: called, now and then, from when the arm can be guided.
+        :raises RobotNotReady: it is not allowed, or something else has the arm.
+        """
+        state = self._state_for('let the arm be guided')
+        if not self.config.allow_freedrive:
+            raise RobotNotReady(
+                'Nobody may guide the arm: allow_freedrive is false; set it to true, '
+                'and start the driver again.'
+            )
+        self._freedrive = self._start_stationary(
+            stationary_plan(state), lambda _: on_active(), freedrive=True
+        )
+        return self._freedrive
+
+    @property
+    def is_freedrive_active(self) -> bool:
+        """Tell whether a person guides the arm."""
+        return self._freedrive is not None and not self._freedrive.done()
+
+    def _state_for(self, what: str) -> RobotState:
+        """
+        Return the newest state.
+
+        :raises RobotNotReady: there is none, or the robot program cannot do this.
+        """
+        if self.config.dialect is not NEWEST_DIALECT:
+            raise RobotNotReady(
+                f'Only the robot program of this driver can {what}; wire_dialect '
+                f'says that another one, {self.config.wire_dialect}, runs.'
+            )
+        state = self.state
+        if state is None:
+            raise RobotNotReady('The robot does not report its state.')
+        return state
+
+
+def check_pose(pose: Pose) -> None:
+    """
+    Refuse what is no pose.
+
+    :raises InvalidGoal: a number is not finite, or the quaternion is not of length 1.
+    """
+    for name, values in (('position', pose.position), ('orientation', pose.quaternion)):
+        if not all(map(isfinite, values)):
+            raise InvalidGoal(f'The {name} of the target', f'is {values}, which is not finite')
+    squared_norm = sum(v * v for v in pose.quaternion)
+    if abs(squared_norm - 1.0) > UNIT_TOLERANCE:
+        raise InvalidGoal(
+            'The orientation of the target',
+            f'has length {sqrt(squared_norm):.6g}; a unit quaternion is needed',
+            'divide it by its length',
+        )
+
+
+def check_target(T_base_tcp: Pose, state: RobotState, options: PlanningOptions) -> None:
+    """
+    Refuse a target that cannot be meant.
+
+    :raises InvalidGoal: it is malformed, or farther than ``max_approach_distance`` from the tool.
+    """
+    check_pose(T_base_tcp)
+    distance, max_distance = (
+        T_base_tcp.distance_to(state.actual_tcp_pose),
+        options.max_approach_distance,
+    )
+    if 0.0 < max_distance < distance:
+        raise InvalidGoal(
+            'The target',
+            f'is {distance:.4g} m away from the tool, max_approach_distance is {max_distance:g} m',
+            'approach it by a goal, or raise the parameter',
+        )
+
+
+def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
+    """
+    Return how targets are followed by the parameters.
+
+    :param start: where the arm stands [rad].
+    """
+    max_speed = options.live_target_linear_velocity
+    if options.max_tool_speed > 0.0:
+        max_speed = min(max_speed, options.max_tool_speed)
+    a, b, c, d, e, f = (
+        min(speed, options.live_target_joint_velocity) for speed in arm.model.max_joint_speed
+    )
+    limits = LiveLimits(
+        linear_velocity=max_speed,
+        linear_acceleration=options.live_target_linear_acceleration,
+        angular_velocity=options.live_target_angular_velocity,
+        angular_acceleration=options.live_target_angular_acceleration,
+        joint_velocity=(a, b, c, d, e, f),
+        singularity_margins=(
+            options.singularity_margin_wrist,
+            options.singularity_margin_elbow,
+            options.singularity_margin_shoulder,
+        ),
+        workspace=LiveWorkspace(
+            planes=tuple(
+                KeepOutPlane(
+                    name=plane.name, point=plane.point, normal=plane.normal, margin=plane.margin
+                )
+                for plane in parse_planes(options.workspace_planes)
+            ),
+            # Capsules are thicker than the arm: they stop it only where they refuse goals.
+            min_clearance=options.min_clearance if options.self_collision == 'refuse' else None,
+            tool_radius=options.tool_radius,
+        ),
+    )
+    return LiveSetup(
+        settings=LiveSettings(
+            limits=limits,
+            max_age=options.live_target_max_age,
+            timeout=options.live_target_timeout,
+        ),
+        ur_type=arm.model.name,
+        geometry=arm.geometry,
+        start=start,
+    )
+
+
+def stationary_plan(state: RobotState) -> Plan:
+    """Return the plan of a motion that goes nowhere by itself."""
+    here = state.target_tcp_pose
+    return Plan(
+        goal=Goal(waypoints=(Waypoint(pose=here),), execution=ExecutionMode.SERVO),
+        segments=(),
+        reference=ReferencePath(
+            poses=pose_rows((here, here)), point=np.zeros(2, dtype=np.int32), time=np.zeros(2)
+        ),
+        start=state.target_q,
+        T_flange_active=state.T_flange_tcp,
+        execution=ExecutionMode.SERVO,
+    )
+
+
+def stationary_job(plan: Plan) -> MotionJob:
+    """Return the order of such a plan: there is nothing on the wire."""
+    return MotionJob(
+        points=1,
+        reference=plan.reference,
+        duration=0.0,
+        T_flange_active=plan.T_flange_active,
+        execution=plan.execution,
+    )

@@ -1,0 +1,127 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Where the robot loop runs: in a process of its own, or in a thread. Nothing else knows which.
+
+The process is started afresh (not forked: the owner may be a ROS node full of threads) and gets
+two open descriptors, the pipe and the shared memory. When it dies its sockets close and the robot
+program stops the arm; when the owner dies the pipe ends and it stops the arm itself.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import os
+import socket
+import subprocess
+import sys
+import threading
+from typing import Protocol
+
+from ur_cartesian_driver.driver.ipc import state_memory
+from ur_cartesian_driver.driver.loop.robot_loop import serve
+
+#: The module that the process runs.
+MODULE = 'ur_cartesian_driver.driver'
+#: A robot loop that says nothing for that long hangs [s]; it says something every 0.5 s.
+SILENCE_TIMEOUT = 5.0
+#: How long the robot loop may need to stop the arm and end, before it is ended [s].
+JOIN_TIMEOUT = 2.0
+
+
+class LoopHost(Protocol):
+    """Something that runs a robot loop."""
+
+    #: The owner's end of the pipe, blocking; it times out after :data:`SILENCE_TIMEOUT`.
+    pipe: socket.socket
+    #: The owner's view of the newest robot state.
+    memory: state_memory.StateMemory
+
+    def join(self) -> None:
+        """End the loop, if need be by force, and release everything."""
+
+
+def start(robot_loop: str) -> LoopHost:
+    """Start a robot loop in a ``process`` or a ``thread``."""
+    return ProcessHost() if robot_loop == 'process' else ThreadHost()
+
+
+class ProcessHost:
+    """The loop in a process of its own."""
+
+    def __init__(self) -> None:
+        """Start the process."""
+        self.pipe, loop_end = socket.socketpair()
+        self.pipe.settimeout(SILENCE_TIMEOUT)
+        descriptor = state_memory.create()
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, '-m', MODULE, str(loop_end.fileno()), str(descriptor)],
+                pass_fds=(loop_end.fileno(), descriptor),
+                env=_environment(),
+                stdin=subprocess.DEVNULL,
+                # Ctrl-C is for the owner, which then ends us in order.
+                start_new_session=True,
+            )
+            self.memory = state_memory.StateMemory(descriptor)
+        finally:
+            loop_end.close()
+            os.close(descriptor)
+
+    @property
+    def pid(self) -> int:
+        """Return the process's id."""
+        return self._process.pid
+
+    def join(self) -> None:
+        """End the process."""
+        self.pipe.close()
+        try:
+            self._process.wait(JOIN_TIMEOUT)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self.memory.close()
+
+
+class ThreadHost:
+    """The loop in a thread of the owner's process."""
+
+    def __init__(self) -> None:
+        """Start the thread."""
+        self.pipe, loop_end = socket.socketpair()
+        self.pipe.settimeout(SILENCE_TIMEOUT)
+        descriptor = state_memory.create()
+        self.memory = state_memory.StateMemory(descriptor)
+        self._thread = threading.Thread(
+            target=self._run, args=(loop_end, descriptor), name='robot loop', daemon=True
+        )
+        self._thread.start()
+
+    @staticmethod
+    def _run(pipe: socket.socket, descriptor: int) -> None:
+        try:
+            asyncio.run(serve(pipe, descriptor))
+        finally:
+            os.close(descriptor)
+
+    def join(self) -> None:
+        """End the thread; one that hangs ends when it comes to itself, as the pipe is closed."""
+        self.pipe.close()
+        self._thread.join(JOIN_TIMEOUT)
+        self.memory.close()
+
+
+def _environment() -> dict[str, str]:
+    """Return an environment in which the process finds this very package."""
+    path = os.pathsep.join(entry for entry in sys.path if entry)
+    return {**os.environ, 'PYTHONPATH': path}
+
+
+def main() -> None:
+    """Run the loop in this process; the arguments are the two descriptors."""
+    gc.freeze()  # what the imports made stays: the collector would look at it in mid-motion
+    pipe, descriptor = (int(argument) for argument in sys.argv[1:])
+    with socket.socket(fileno=pipe) as connection:
+        asyncio.run(serve(connection, descriptor))

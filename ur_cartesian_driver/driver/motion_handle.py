@@ -1,0 +1,138 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""A running motion from its two sides: what its owner can do, and what the driver says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from dataclasses import replace
+
+from ur_cartesian_driver.driver.appender import Appender, AppendResult
+from ur_cartesian_driver.driver.callbacks import run_callback
+from ur_cartesian_driver.driver.ipc.channel import CancelMotion, Request, TemporaryTcpSet
+from ur_cartesian_driver.motion.errors import RobotNotReady
+from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.goal import IOCommand, Segment, Waypoint
+from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
+
+OnProgress = Callable[[Progress], None]
+
+
+class MotionHandle:
+    """A running motion; its outcome comes whatever happens to the robot."""
+
+    def __init__(
+        self, number: int, outcome: Future[Outcome], send: Callable[[Request], None]
+    ) -> None:
+        """Be made by :meth:`~.api.Driver.start`."""
+        self.number = number
+        self._outcome, self._send = outcome, send
+        #: How it is continued; None = it is as long as it is. Set by the driver.
+        self.appender: Appender | None = None
+        #: The newest report, None before the first.
+        self.progress: Progress | None = None
+
+    def cancel(self) -> None:
+        """Ask the arm to stop; the outcome follows when it stands. May be called twice."""
+        self._send(CancelMotion(motion=self.number))
+
+    def preempt(self, by: str = 'a newer motion') -> None:
+        """
+        Ask the arm to stop, as :meth:`cancel` does, because another motion is to follow.
+
+        :param by: which one, as part of the outcome's sentence.
+        """
+        self._send(CancelMotion(motion=self.number, preempted_by=by))
+
+    def append(
+        self,
+        waypoints: Sequence[Waypoint],
+        segments: Sequence[Segment] = (),
+        io_commands: Sequence[IOCommand] = (),
+        *,
+        last: bool = False,
+    ) -> AppendResult:
+        """
+        Let points follow while the goal runs; it was started with ``keep_open``.
+
+        They are checked and planned here, so this takes a while; do not call it from callbacks.
+
+        :param waypoints: with times from the start of the goal, in its frame.
+        :param segments: none, or one for each point.
+        :param io_commands: their waypoints are numbered from the start of the goal.
+        :param last: nothing follows; without points: the goal ends where it is known to end.
+        :raises GoalRefused: nothing was taken, and the goal is as it was; the text says why.
+        """
+        if self.appender is None:
+            raise RobotNotReady('The goal was sent without keep_open: nothing can be appended.')
+        return self.appender.append(
+            AppendedPoints(
+                waypoints=tuple(waypoints),
+                segments=tuple(segments),
+                io_commands=tuple(io_commands),
+                last=last,
+            )
+        )
+
+    def done(self) -> bool:
+        """Tell whether the outcome is there."""
+        return self._outcome.done()
+
+    def result(self, timeout: float | None = None) -> Outcome:
+        """
+        Wait for the outcome.
+
+        :raises TimeoutError: it did not come within ``timeout`` [s]; the motion goes on.
+        """
+        return self._outcome.result(timeout)
+
+    def add_done_callback(self, callback: Callable[[Outcome], None]) -> None:
+        """Call back with the outcome, from the driver's reader thread or at once."""
+        self._outcome.add_done_callback(lambda future: callback(future.result()))
+
+
+class ActiveMotion:
+    """The driver's side of a motion: its progress, and its only end."""
+
+    def __init__(
+        self,
+        number: int,
+        plan: Plan,
+        on_progress: OnProgress | None,
+        send: Callable[[Request], None],
+    ) -> None:
+        """
+        Prepare.
+
+        :param send: takes what the owner of the motion asks for.
+        """
+        self._outcome: Future[Outcome] = Future()
+        self._on_progress = on_progress
+        self._plan_report = plan.report
+        #: What the owner holds.
+        self.motion = MotionHandle(number, self._outcome, send)
+        #: The TCP that the robot has as long as this motion runs.
+        self.temporary_tcp = (
+            None
+            if plan.T_flange_tcp is None
+            else TemporaryTcpSet(
+                T_flange_original=plan.T_flange_active, T_flange_temporary=plan.T_flange_tcp
+            )
+        )
+
+    def report(self, progress: Progress) -> None:
+        """Take a report of the robot loop."""
+        self.motion.progress = progress
+        if self._on_progress is not None:
+            run_callback(self._on_progress, progress)
+
+    def end(self, outcome: Outcome) -> None:
+        """Give the outcome; only the first one counts."""
+        if self.motion.appender is not None:
+            self.motion.appender.end()
+        if not self._outcome.done():
+            self._outcome.set_result(
+                replace(outcome, report=(*self._plan_report, *outcome.report))
+            )

@@ -1,0 +1,353 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Records every motion: a file each, written while it runs.
+
+Between two packets there are 2 ms, and disks take longer than that whenever they like. So a packet
+is put into memory that is there already (a few microseconds), and a thread of its own writes what
+is full. There is a fixed number of such pieces: a disk that is too slow loses rows, which the
+recording says, and neither time of the motion nor memory. A recording that cannot be written ends
+with one sentence, and the motion goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, fields
+from datetime import datetime, UTC
+import json
+from math import inf, nan
+from pathlib import Path
+from queue import Empty, SimpleQueue
+import threading
+from time import sleep
+from typing import Any
+
+import numpy as np
+
+from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
+from ur_cartesian_driver.driver.recordings import recording_format as disk
+from ur_cartesian_driver.driver.recordings.recording_folder import RecordingFolder
+from ur_cartesian_driver.execution import MotionJob
+from ur_cartesian_driver.motion.events import Outcome
+from ur_cartesian_driver.motion.plan import Plan, ReferencePath
+from ur_cartesian_driver.motion.signals import Signals
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.planning import PlanningOptions
+
+#: Rows of a piece of memory, how many there are, and the longest time until one is written [s]:
+#: what a killed process loses.
+BUFFER_ROWS, BUFFER_COUNT, FLUSH_PERIOD = 256, 8, 0.5
+#: So much may wait for the disk; notes and pieces of the plan beyond are left out.
+MAX_PENDING_JOBS = 1000
+#: How long whoever makes a file pauses behind each small part of it [s]: a thread that wants the
+#: interpreter from one that never pauses waits 5 ms and more for it.
+YIELD_PAUSE = 0.0002
+#: Lines of a plan's report that are kept.
+MAX_REPORT_LINES = 1000
+MEGABYTE = 1_000_000
+
+
+def plan_metadata(plan: Plan, options: PlanningOptions) -> str:
+    """Return what only the owner of the plan knows of it, as JSON: its report, the options."""
+    lines = plan.report
+    if len(lines) > MAX_REPORT_LINES:
+        lines = (*lines[:MAX_REPORT_LINES], f'... and {len(lines) - MAX_REPORT_LINES} more lines')
+    return json.dumps(
+        {
+            'report': lines,
+            'frame_id': plan.goal.frame_id,
+            'controlled_frame': plan.goal.controlled_frame,
+            'planning': _parameters(options),
+        },
+        default=str,
+    )
+
+
+def motion_metadata(
+    job: MotionJob,
+    *,
+    robot: Mapping[str, str],
+    parameters: DriverConfig,
+    plan_metadata_json: str = '',
+    mode: str = '',
+) -> dict[str, Any]:
+    """
+    Return the metadata of a motion that begins now.
+
+    :param robot: what is known of the robot.
+    :param parameters: those of the driver, a dataclass.
+    :param plan_metadata_json: what :func:`plan_metadata` has said.
+    :param mode: what leads the arm, where that is no plan.
+    """
+    known = json.loads(plan_metadata_json) if plan_metadata_json else {}
+    planning = known.pop('planning', {})
+    return {
+        'format': disk.FORMAT,
+        'created': datetime.now(UTC).isoformat(timespec='milliseconds'),
+        'robot': dict(robot),
+        'execution': mode or job.execution.name,
+        'points': 0 if mode else int(job.reference.point[-1]) + 1,
+        'duration': job.duration,
+        'due': job.due,
+        'keep_open': job.keep_open,
+        'T_base_frame': job.T_base_frame.row(),
+        'T_flange_tcp': (job.T_flange_tcp or job.T_flange_active).row(),
+        'T_tcp_controlled': job.T_tcp_controlled.row(),
+        'path_tolerance': asdict(job.path_tolerance),
+        'goal_tolerance': asdict(job.goal_tolerance),
+        **known,
+        'parameters': {**_parameters(parameters), **planning},
+        'outcome': None,
+        'rows_left_out': 0,
+        'trouble': '',
+    }
+
+
+class Recorder:
+    """Takes what happens, from one thread; writes it in another."""
+
+    def __init__(self, directory: str, max_size: float, warn: Callable[[str], None]) -> None:
+        """
+        Prepare; nothing happens before :meth:`start`.
+
+        :param directory: where the files go; empty = nothing is recorded.
+        :param max_size: of all of them together [MB]; the oldest ones are removed.
+        :param warn: takes a sentence, on the writer's thread.
+        """
+        self._directory, self._max_size, self._warn = directory, max_size * MEGABYTE, warn
+        self._last_warning = ''
+        #: Who writes while a motion runs, and who makes a file of it afterwards, slowly.
+        self._writer: _Worker | None = None
+        self._finisher: _Worker | None = None
+        self._is_closing = False
+        #: The motion that runs: its folder, belonging to the writer but for ``left_out``.
+        self._folder: RecordingFolder | None = None
+        # Memory for rows: the piece that is being filled, how far, and those that are free.
+        self._buffer, self._used = bytearray(), 0
+        self._free_buffers: SimpleQueue[bytearray] = SimpleQueue()
+        #: Of the motion: when it began by the controller's clock, the newest packet from then on,
+        #: and when the piece is handed over at the latest [s].
+        self._start_time = self._time = self._flush_due = 0.0
+        self._digital, self._analog = -1, (nan, nan)
+        #: The count of the goal before, as long as the robot reports it.
+        self._stale_points_begun: int | None = None
+
+    @property
+    def is_recording(self) -> bool:
+        """Tell whether a motion is being recorded."""
+        return self._folder is not None
+
+    # ---- what happens -------------------------------------------------------------------------
+
+    def start(self, job: MotionJob, metadata: dict[str, Any], state: RobotState) -> None:
+        """
+        Begin the recording of a motion.
+
+        :param metadata: the metadata, see :func:`motion_metadata`.
+        :param state: the newest packet: time 0 is its time.
+        """
+        if not self._directory:
+            return
+        if self._writer is None:
+            self._start_workers()
+        self._folder = folder = RecordingFolder(
+            Path(self._directory).expanduser(), metadata, self._max_size, self._warn_once
+        )
+        self._start_time, self._time, self._flush_due, self._used = (
+            state.timestamp,
+            0.0,
+            FLUSH_PERIOD,
+            0,
+        )
+        self._stale_points_begun = state.points_begun
+        self._submit(folder, folder.open)
+        if metadata['points']:
+            self.add_plan(job.reference, -inf)
+        count = metadata['points']
+        self.add_event(
+            'start', f'{metadata["execution"]}, {count} point{"" if count == 1 else "s"}'
+        )
+        self.add_state(state)
+
+    def add_plan(self, reference: ReferencePath, since: float) -> None:
+        """
+        Take the planned path, or a piece that takes the place of its end.
+
+        :param since: from when on [s].
+        """
+        if (folder := self._folder) is None:
+            return
+        rows = np.empty(len(reference.time), dtype=disk.PLANNED_DTYPE)
+        rows['time'], rows['pose'] = reference.time, reference.poses
+        rows['point'] = reference.point
+        self._submit(folder, lambda: folder.write_plan(rows, since))
+
+    def add_state(
+        self, state: RobotState, waypoint: int = -1, buffered: float = nan, lag: float = nan
+    ) -> None:
+        """
+        Take a packet.
+
+        :param waypoint: the goal's point that the arm is on its way to.
+        :param buffered: motion that it has before it [s].
+        :param lag: of the arm behind what it is sent [s]; NaN = unknown.
+        """
+        if (folder := self._folder) is None:
+            return
+        points_begun = state.points_begun
+        if points_begun == self._stale_points_begun:
+            points_begun = 0
+        else:
+            self._stale_points_begun = None
+        self._time = time = state.timestamp - self._start_time
+        disk.EXECUTED_STRUCT.pack_into(
+            self._buffer,
+            self._used,
+            time,
+            *state.actual_tcp_pose.row(),
+            *state.target_tcp_pose.row(),
+            *state.actual_tcp_twist,
+            *state.target_tcp_twist,
+            *state.actual_q,
+            *state.target_q,
+            *state.actual_qd,
+            *state.target_qd,
+            lag,
+            buffered,
+            state.speed_scaling,
+            state.target_speed_fraction,
+            *self._analog,
+            self._digital,
+            points_begun,
+            waypoint,
+            state.robot_mode,
+            state.safety_mode,
+            state.runtime_state,
+        )
+        self._used += disk.EXECUTED_STRUCT.size
+        if self._used == len(self._buffer) or time >= self._flush_due:
+            self._flush(folder)
+
+    def add_signals(self, signals: Signals) -> None:
+        """Take the newest outputs."""
+        out = signals.outputs
+        flags = (*out.standard, *out.configurable, *out.tool)
+        self._digital = sum(1 << i for i, flag in enumerate(flags) if flag)
+        self._analog = (signals.analog_outputs[0].value, signals.analog_outputs[1].value)
+
+    def add_event(self, kind: str, text: str) -> None:
+        """Take an event that no column shows."""
+        if (folder := self._folder) is not None:
+            event = self._time, kind, text
+            self._submit(folder, lambda: folder.write_event(event))
+
+    def end(self, outcome: Outcome) -> None:
+        """End the recording; its file is there soon after."""
+        if (folder := self._folder) is None:
+            return
+        self._flush(folder)
+        self.add_event('end', f'{outcome.code.name}: {outcome.text}')
+        self._folder = None
+        known = {
+            'code': outcome.code.value,
+            'name': outcome.code.name,
+            'text': outcome.text,
+            'report': outcome.report,
+        }
+        self._submit(folder, lambda: folder.close(known), is_last=True)
+        if (writer := self._writer) is not None and (finisher := self._finisher) is not None:
+            writer.submit(
+                lambda: finisher.submit(
+                    lambda: folder.run_guarded(lambda: folder.finish(self._yield_cpu))
+                )
+            )
+
+    def close(self, timeout: float) -> None:
+        """Wait until everything is written, so long [s]; what has not ended stays a folder."""
+        if (folder := self._folder) is not None:
+            self._flush(folder)
+            self._folder = None
+            self._submit(folder, folder.abandon, is_last=True)
+        self._is_closing = True
+        if self._writer is not None and self._finisher is not None:
+            self._writer.end(timeout)
+            self._finisher.end(timeout)
+        self._writer = self._finisher = None
+
+    # ---- inside -------------------------------------------------------------------------------
+
+    def _flush(self, folder: RecordingFolder) -> None:
+        """Have the rows written, and go on in another piece of memory."""
+        buffer, used = self._buffer, self._used
+        self._used, self._flush_due = 0, self._time + FLUSH_PERIOD
+        try:
+            self._buffer = self._free_buffers.get_nowait()
+        except Empty:  # all wait for the disk: these rows are lost
+            folder.lost_rows += used // disk.EXECUTED_STRUCT.size
+            return
+
+        def write() -> None:
+            folder.run_guarded(lambda: folder.write_rows(memoryview(buffer)[:used]))
+            self._free_buffers.put(buffer)
+
+        if self._writer is not None:
+            self._writer.submit(write)  # of these there are no more than pieces
+
+    def _submit(
+        self, folder: RecordingFolder, work: Callable[[], None], is_last: bool = False
+    ) -> None:
+        """Have something done by the writer, unless too much waits already."""
+        writer = self._writer
+        if writer is not None and (is_last or writer.jobs.qsize() < MAX_PENDING_JOBS):
+            writer.submit(lambda: folder.run_guarded(work))
+
+    def _start_workers(self) -> None:
+        size = BUFFER_ROWS * disk.EXECUTED_STRUCT.size
+        self._buffer = bytearray(size)
+        for _ in range(BUFFER_COUNT - 1):
+            self._free_buffers.put(bytearray(size))
+        self._is_closing = False
+        self._writer, self._finisher = _Worker('recorder'), _Worker('recorder, finishing')
+
+    def _yield_cpu(self) -> None:
+        """Let the robot loop have the interpreter at once, should it want it."""
+        if not self._is_closing:
+            sleep(YIELD_PAUSE)
+
+    def _warn_once(self, sentence: str) -> None:
+        """Say what is wrong; once, not with each motion."""
+        if sentence != self._last_warning:
+            self._last_warning = sentence
+            self._warn(sentence)
+
+
+class _Worker:
+    """A thread that does one thing after the other; it does not keep the process alive."""
+
+    def __init__(self, name: str) -> None:
+        self.jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._work, name=name, daemon=True)
+        self._thread.start()
+
+    def submit(self, job: Callable[[], None]) -> None:
+        """Have something done."""
+        self.jobs.put(job)
+
+    def end(self, timeout: float) -> None:
+        """Wait until all is done, so long [s]."""
+        self.jobs.put(None)
+        self._thread.join(timeout)
+
+    def _work(self) -> None:
+        while (job := self.jobs.get()) is not None:
+            job()
+
+
+def _parameters(options: DriverConfig | PlanningOptions) -> dict[str, Any]:
+    """Return the fields of a dataclass that JSON can hold."""
+    return {
+        f.name: value
+        for f in fields(options)
+        if isinstance(value := getattr(options, f.name), bool | int | float | str | tuple)
+    }

@@ -1,0 +1,214 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What was recorded of a motion, for looking at it.
+
+``numpy.load`` opens the same files without this package; here the arrays have names and types, a
+recording that was cut off by the end of its process can be read too, and the executed path is
+compared with the planned one as the driver itself does it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+import json
+from pathlib import Path
+from typing import Any, TypeAlias
+import zipfile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.driver.recordings import recording_format as disk
+from ur_cartesian_driver.driver.recordings.recording_format import Event
+from ur_cartesian_driver.execution.monitoring.path_tracker import PathTracker, tracker_speed
+from ur_cartesian_driver.motion.plan import ReferencePath
+from ur_cartesian_driver.motion.pose import pose_from_row
+
+Floats: TypeAlias = NDArray[np.float64]
+Integers: TypeAlias = NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RecordedDeviation:
+    """How far the tool was from the planned path; n rows, as the recording has."""
+
+    #: (n,) of the measured pose, [m] and [rad].
+    position: Floats
+    angle: Floats
+    #: (n,) of the controller's own target, [m] and [rad].
+    target_position: Floats
+    target_angle: Floats
+    #: (n,) when the plan, at full speed, is where the target is [s].
+    planned_time: Floats
+    #: (n,) the goal's point that this place leads to.
+    waypoint: Integers
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Recording:
+    """
+    One motion: n packets of the robot, m samples of the plan.
+
+    Poses are those of the TCP in the robot's base: x y z [m], unit quaternion x y z w. Twists are
+    linear [m/s] and angular [rad/s] in base axes.
+    """
+
+    #: What was asked for and how it ended; see doc/recordings.md.
+    metadata: Mapping[str, Any]
+    events: list[Event] = field(repr=False)
+    #: (n,) controller's clock from the start of the motion [s].
+    time: Floats = field(repr=False)
+    #: (n, 7), measured and the controller's target.
+    actual_pose: Floats = field(repr=False)
+    target_pose: Floats = field(repr=False)
+    #: (n, 6)
+    actual_twist: Floats = field(repr=False)
+    target_twist: Floats = field(repr=False)
+    #: (n, 6) [rad], [rad/s]
+    actual_q: Floats = field(repr=False)
+    target_q: Floats = field(repr=False)
+    actual_qd: Floats = field(repr=False)
+    target_qd: Floats = field(repr=False)
+    #: (n,) [s] how far the arm is behind what it is sent, and what the robot holds; NaN = unknown.
+    lag: Floats = field(repr=False)
+    buffered: Floats = field(repr=False)
+    #: (n,) 0 to 1: what the controller runs at, and the slider.
+    speed_scaling: Floats = field(repr=False)
+    slider: Floats = field(repr=False)
+    #: (n, 2) [A] or [V]; NaN = unknown.
+    analog_output: Floats = field(repr=False)
+    #: (n,) bits: 0-7 standard, 8-15 configurable, 16-17 tool; -1 = unknown.
+    digital_output: Integers = field(repr=False)
+    #: (n,) motions that the robot program has begun, and the goal's point that the last one leads
+    #: to; -1 = it has not said.
+    points_begun: Integers = field(repr=False)
+    waypoint: Integers = field(repr=False)
+    #: (n,) numbers of the controller.
+    robot_mode: Integers = field(repr=False)
+    safety_mode: Integers = field(repr=False)
+    runtime_state: Integers = field(repr=False)
+    #: (m,) [s], (m, 7), (m,) index of the goal's point that the sample leads to.
+    planned_time: Floats = field(repr=False)
+    planned_pose: Floats = field(repr=False)
+    planned_point: Integers = field(repr=False)
+
+    @classmethod
+    def load(cls, path: str | Path, max_rows: int = 0) -> Recording:
+        """
+        Read a recording.
+
+        :param path: a file ``.npz``, or the folder ``.part`` of a motion that runs, or whose
+            process was killed.
+        :param max_rows: read every second, third, ... packet of a longer one; 0 = all.
+        :raises OSError: it is not there.
+        :raises ValueError: it is no recording.
+        """
+        path = Path(path)
+        return _from_folder(path, max_rows) if path.is_dir() else _from_file(path, max_rows)
+
+    @property
+    def tool_speed(self) -> Floats:
+        """(n,) measured speed of the TCP [m/s]."""
+        return np.asarray(np.linalg.norm(self.actual_twist[:, :3], axis=1))
+
+    @property
+    def reference(self) -> ReferencePath:
+        """The planned path."""
+        return ReferencePath(
+            poses=self.planned_pose, point=self.planned_point, time=self.planned_time
+        )
+
+    @property
+    def points(self) -> Floats:
+        """(k, 7) the planned poses at the goal's points, in the middle of a corner's blend."""
+        last = np.flatnonzero(np.diff(self.planned_point, append=-1))
+        return np.asarray(self.planned_pose[last])
+
+    def deviation(self) -> RecordedDeviation:
+        """
+        Compare with the plan, packet by packet.
+
+        The target is followed along the path, only ever forwards; the measured pose is compared
+        with the place nearest to it around there. So a path that crosses itself is followed in
+        the right order, and a robot that is slowed down is not off it. Where there was no plan,
+        as for live targets, the numbers are NaN.
+        """
+        rows = np.full((len(self.time), 6), np.nan)
+        if len(self.planned_time) > 1:
+            self._compare(PathTracker(self.reference), rows)
+        position, angle, target_position, target_angle, time, waypoint = rows.T
+        return RecordedDeviation(
+            position=position,
+            angle=angle,
+            target_position=target_position,
+            target_angle=target_angle,
+            planned_time=time,
+            waypoint=np.where(np.isnan(waypoint), -1.0, waypoint).astype(np.int32),
+        )
+
+    def _compare(self, tracker: PathTracker, rows: Floats) -> None:
+        """Fill in the columns of a deviation."""
+        elapsed, max_speed_before = 0.0, 0.0
+        for i in range(len(rows)):
+            twist = tuple(self.target_twist[i].tolist())
+            max_speed = tracker_speed(twist)
+            if i:
+                elapsed = float(self.time[i] - self.time[i - 1])
+            target, actual = (
+                pose_from_row(poses[i]) for poses in (self.target_pose, self.actual_pose)
+            )
+            tracker.update(target, 2.0 * elapsed * max(max_speed, max_speed_before))
+            max_speed_before = max_speed
+            desired, reached = tracker.desired(actual, twist), tracker.pose()
+            rows[i] = (
+                desired.distance_to(actual),
+                desired.angle_to(actual),
+                reached.distance_to(target),
+                reached.angle_to(target),
+                tracker.time(),
+                tracker.waypoint(),
+            )
+
+
+def _from_file(path: Path, max_rows: int) -> Recording:
+    if path.is_file() and not zipfile.is_zipfile(path):
+        raise ValueError(f'{path} is no recording: it is no file of NumPy arrays (.npz)')
+    try:
+        with np.load(path) as file:
+            metadata, times, kinds, texts = (
+                file[name] for name in ('metadata', 'event_time', 'event_kind', 'event_text')
+            )
+            step = _step(len(file['time']), max_rows)
+            columns = {
+                name: file[name] if name.startswith('planned_') else file[name][::step]
+                for name in _COLUMNS
+            }
+    except KeyError as error:
+        raise ValueError(f'{path} is no recording: {error.args[0]}') from None
+    events = [
+        (float(time), str(kind), str(text))
+        for time, kind, text in zip(times, kinds, texts, strict=True)
+    ]
+    return Recording(metadata=json.loads(metadata.item()), events=events, **columns)
+
+
+def _from_folder(path: Path, max_rows: int) -> Recording:
+    rows, plan = (
+        np.load(path / name, mmap_mode='r') for name in (disk.EXECUTED_FILE, disk.PLANNED_FILE)
+    )
+    metadata = json.loads((path / disk.METADATA_FILE).read_text(encoding='utf-8'))
+    step = _step(len(rows), max_rows)
+    columns = {name: np.array(rows[name][::step]) for name in disk.EXECUTED_DTYPE.names or ()}
+    columns |= {f'planned_{name}': np.array(plan[name]) for name in disk.PLANNED_DTYPE.names or ()}
+    return Recording(
+        metadata=metadata, events=disk.merge_events(disk.read_events(path), rows), **columns
+    )
+
+
+def _step(rows: int, max_rows: int) -> int:
+    return max(1, -(-rows // max_rows)) if max_rows else 1
+
+
+_COLUMNS = tuple(f.name for f in fields(Recording) if f.name not in ('metadata', 'events'))

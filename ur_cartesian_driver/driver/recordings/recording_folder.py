@@ -1,0 +1,200 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The folder into which a running motion is recorded, and the room that recordings take.
+
+All of it may take as long as the disk likes, so nothing of it is called by the robot loop itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from datetime import datetime
+import fcntl
+import json
+from pathlib import Path
+import re
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.driver.recordings import recording_format as disk
+
+#: Names of recordings; other files in the directory are nobody's business.
+_RECORDING_NAME = re.compile(r'\d{8}-\d{6}-\d{3}_[a-z_]+_\d+_points(_\d+)?\.(npz|part)')
+
+#: Times nearer to each other than this are one [s].
+SAME_TIME = 5e-7
+
+
+def recording_name(metadata: dict[str, Any]) -> str:
+    """Return the name of a recording, from when and what it is: they sort by time."""
+    begun = datetime.fromisoformat(metadata['created'])
+    return (
+        f'{begun:%Y%m%d-%H%M%S}-{begun.microsecond // 1000:03d}_'
+        f'{metadata["execution"].lower()}_{metadata["points"]}_points'
+    )
+
+
+class RecordingFolder:
+    """One motion on its way to the disk; once something failed it only forgets what it is told."""
+
+    def __init__(
+        self,
+        directory: Path,
+        metadata: dict[str, Any],
+        max_size: float,
+        warn: Callable[[str], None],
+    ) -> None:
+        """
+        Prepare; nothing is written before :meth:`open`.
+
+        :param max_size: of all recordings together [bytes]; a motion may take half of it.
+        :param warn: takes a sentence when something is wrong.
+        """
+        self._directory, self._metadata, self._max_size, self._warn = (
+            directory,
+            metadata,
+            max_size,
+            warn,
+        )
+        self._is_broken = False
+        #: When the samples of the plan that came last are due.
+        self._last_times: NDArray[np.float64] = np.empty(0)
+        #: How many rows were lost because the disk was too slow.
+        self.lost_rows = 0
+
+    def open(self) -> None:
+        """Make the files."""
+        self._directory.mkdir(parents=True, exist_ok=True)
+        self._path = _new(self._directory / f'{recording_name(self._metadata)}{disk.PART_SUFFIX}')
+        self._rows = disk.GrowingArray(self._path / disk.EXECUTED_FILE, disk.EXECUTED_DTYPE)
+        # Says that we live; it goes with the process, however that ends.
+        fcntl.flock(self._rows.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        self._plan = disk.GrowingArray(self._path / disk.PLANNED_FILE, disk.PLANNED_DTYPE)
+        self._events = open(self._path / disk.EVENTS_FILE, 'xb', buffering=0)  # noqa: SIM115  # open until close()
+        self._write_metadata()
+
+    def write_rows(self, rows: memoryview) -> None:
+        """Append packets, until there is no room for more."""
+        if self._metadata['trouble']:
+            return
+        if (self._rows.count + 1) * disk.EXECUTED_STRUCT.size > self._max_size / 2.0:
+            self._metadata['trouble'] = (
+                f'The recording of this motion ends after {self._rows.count} packets, half of '
+                f'record_max_size = {self._max_size / 1e6:g} MB.'
+            )
+            self._warn(self._metadata['trouble'])
+            return
+        self._rows.append(rows, len(rows) // disk.EXECUTED_STRUCT.size)
+
+    def write_plan(self, rows: NDArray[np.void], since: float) -> None:
+        """
+        Append samples of the planned path, in the place of those after a time [s].
+
+        These are among the samples that came last: a goal with an open end gives up its ending.
+        """
+        kept_samples = int(np.searchsorted(self._last_times, since + SAME_TIME, side='right'))
+        rows = rows[np.searchsorted(rows['time'], since + SAME_TIME, side='right') :]
+        self._plan.count -= len(self._last_times) - kept_samples
+        self._plan.append(rows.tobytes(), len(rows))
+        self._last_times = rows['time']
+
+    def write_event(self, event: disk.Event) -> None:
+        """Append a note."""
+        time, kind, text = event
+        self._events.write(json.dumps([time, kind, text[: disk.MAX_EVENT_TEXT]]).encode() + b'\n')
+
+    def close(self, outcome: dict[str, Any]) -> None:
+        """Write what is only known at the end."""
+        self._metadata.update(outcome=outcome, rows_left_out=self.lost_rows)
+        self._write_metadata()
+
+    def finish(self, yield_cpu: Callable[[], None]) -> None:
+        """
+        Make one file out of all this, and room for the next.
+
+        :param yield_cpu: called often, to let others work.
+        """
+        disk.finish(self._path, yield_cpu)
+        self._close_files()  # not before: till then it is ours
+        enforce_quota(self._directory, self._max_size, yield_cpu)
+
+    def abandon(self) -> None:
+        """Leave it as it is."""
+        self._close_files()
+
+    def run_guarded(self, work: Callable[[], None]) -> None:
+        """Do one of the above, and say so if it fails."""
+        if self._is_broken:
+            return
+        try:
+            work()
+        except (OSError, ValueError) as error:
+            self._is_broken = True
+            self._close_files()
+            reason = error.strerror if isinstance(error, OSError) else error
+            self._warn(
+                f'A motion is not recorded, or not to its end: {reason} '
+                f'({self._directory}); see to record_directory.'
+            )
+
+    def _write_metadata(self) -> None:
+        (self._path / disk.METADATA_FILE).write_text(json.dumps(self._metadata), encoding='utf-8')
+
+    def _close_files(self) -> None:
+        for name in ('_rows', '_plan', '_events'):
+            if hasattr(self, name):
+                getattr(self, name).close()
+
+
+def _new(path: Path) -> Path:
+    """Make a folder; one of that name may be there, of another arm for example."""
+    for number in range(1, 100):
+        found = path if number == 1 else path.with_stem(f'{path.stem}_{number}')
+        if found.with_suffix('.npz').exists():
+            continue
+        with suppress(FileExistsError):
+            found.mkdir()
+            return found
+    raise FileExistsError(f'there are many recordings of the name {path.stem} already')
+
+
+# ---- what is there already ------------------------------------------------------------------
+
+
+def enforce_quota(
+    directory: Path, max_size: float, yield_cpu: Callable[[], None] = lambda: None
+) -> None:
+    """
+    Finish what a process that was killed has left, then remove the oldest recordings.
+
+    :param max_size: what they may take together [bytes].
+    :param yield_cpu: called often, to let others work.
+    """
+    recordings = sorted(
+        path for path in directory.iterdir() if _RECORDING_NAME.fullmatch(path.name)
+    )
+    for path in recordings:
+        if path.suffix == disk.PART_SUFFIX and not _is_written(path):
+            with suppress(OSError, ValueError):
+                disk.finish(path, yield_cpu)
+    recordings = [
+        path for path in sorted(directory.glob('*.npz')) if _RECORDING_NAME.fullmatch(path.name)
+    ]
+    sizes = [path.stat().st_size for path in recordings]
+    while recordings and sum(sizes) > max_size:
+        recordings.pop(0).unlink(missing_ok=True)
+        sizes.pop(0)
+
+
+def _is_written(folder: Path) -> bool:
+    """Tell whether somebody is writing it, or nobody can tell."""
+    try:
+        with open(folder / disk.EXECUTED_FILE, 'rb') as rows:
+            fcntl.flock(rows, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    return False

@@ -1,0 +1,75 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a driver can ask its robot for beside motions, as methods; also of the node."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from concurrent.futures import Future
+
+from ur_cartesian_driver.motion.goal import OutputKind
+from ur_cartesian_driver.motion.pose import Pose, Vector3
+from ur_cartesian_driver.motion.signals import AnalogDomain
+from ur_cartesian_driver.robot.services.service_calls import (
+    DashboardCall,
+    DashboardLineCall,
+    RecoverCall,
+    ServiceAnswer,
+    ServiceCall,
+    SetOutputCall,
+    SetPayloadCall,
+    SetSpeedSliderCall,
+    SetTcpCall,
+    ZeroFtSensorCall,
+)
+
+
+class RobotServices(ABC):
+    """
+    Each method waits for its answer, which comes within 40 s, that of a recovery within 120 s.
+
+    A refusal is an answer too. A value that nobody could send raises
+    :class:`~ur_cartesian_driver.motion.errors.LocalProtocolError`.
+    """
+
+    @abstractmethod
+    def call(self, call: ServiceCall) -> Future[ServiceAnswer]:
+        """Ask the robot for something and return at once; the answer comes in any case."""
+
+    def dashboard(self, command: str, argument: str = '') -> ServiceAnswer:
+        """Give a command to the dashboard: ``power on``, ``load`` with the name of a file ..."""
+        return self.call(DashboardCall(command=command, argument=argument)).result()
+
+    def dashboard_line(self, line: str) -> ServiceAnswer:
+        """Send any line to the dashboard and fetch the line that it answers."""
+        return self.call(DashboardLineCall(line=line)).result()
+
+    def set_tcp(self, T_flange_tcp: Pose) -> ServiceAnswer:
+        """Set the active TCP."""
+        return self.call(SetTcpCall(T_flange_tcp=T_flange_tcp)).result()
+
+    def set_payload(self, mass: float, cog: Vector3 = (0.0, 0.0, 0.0)) -> ServiceAnswer:
+        """Set mass [kg] and centre of gravity [m] (in the flange) of what the flange carries."""
+        return self.call(SetPayloadCall(mass=mass, cog=cog)).result()
+
+    def zero_ftsensor(self) -> ServiceAnswer:
+        """Take the force and torque that are measured now as zero."""
+        return self.call(ZeroFtSensorCall()).result()
+
+    def set_digital_output(self, kind: OutputKind, pin: int, high: bool) -> ServiceAnswer:
+        """Set a digital output."""
+        return self.call(SetOutputCall(kind=kind, pin=pin, value=float(high))).result()
+
+    def set_analog_output(self, pin: int, fraction: float, domain: AnalogDomain) -> ServiceAnswer:
+        """Set an analog output to a fraction of its range: 4-20 mA or 0-10 V."""
+        return self.call(
+            SetOutputCall(kind=OutputKind.STANDARD_ANALOG, pin=pin, value=fraction, domain=domain)
+        ).result()
+
+    def set_speed_slider(self, fraction: float) -> ServiceAnswer:
+        """Move the speed slider, 0 (the arm stands) to 1."""
+        return self.call(SetSpeedSliderCall(fraction=fraction)).result()
+
+    def recover(self) -> ServiceAnswer:
+        """Bring a stopped robot back to where it takes goals, as far as software may."""
+        return self.call(RecoverCall()).result()

@@ -1,0 +1,129 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What a machine wants done; the owner of the sockets does it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.servo import ServoReport
+from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SendControl:
+    """Send a trajectory action on the reverse socket."""
+
+    action: TrajectoryAction
+    count: int = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SendPoints:
+    """Send the records ``first`` up to, not including, ``end`` on the trajectory socket."""
+
+    first: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SetTemporaryTcp:
+    """Set the robot's TCP for the time of a goal."""
+
+    T_flange_tcp: Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RestoreTcp:
+    """Put back the TCP that the robot had before :class:`SetTemporaryTcp`."""
+
+    T_flange_tcp: Pose
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopProgram:
+    """End the robot program, whatever it does: the arm must not go on by itself."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportProgress:
+    """Tell where the motion is."""
+
+    progress: Progress
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AnswerAppend:
+    """Tell whether points are taken; either they all are, or the goal is as it was."""
+
+    number: int
+    #: Why not; empty = they are.
+    refusal: str = ''
+    #: Plan them from where the arm is going to rest, and they are taken: the goal has been closed.
+    replan_from_rest: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OpenServo:
+    """Take the RTDE inputs of the buffered servo, and report what the robot says of it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnterServo:
+    """Have the robot program listen to these inputs."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WriteServo:
+    """Write the inputs of the buffered servo, in the order of ``registers.SERVO_INPUTS``."""
+
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeaveServo:
+    """Have the robot program brake and listen no more, and give the inputs back."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReportServo:
+    """Tell how the streaming of set-points is going."""
+
+    report: ServoReport
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogWarning:
+    """Write a sentence into the log: something a person may want to look at."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finish:
+    """The goal has ended."""
+
+    outcome: Outcome
+
+
+GoalCommand: TypeAlias = (
+    SendControl
+    | SendPoints
+    | SetTemporaryTcp
+    | RestoreTcp
+    | StopProgram
+    | ReportProgress
+    | AnswerAppend
+    | OpenServo
+    | EnterServo
+    | WriteServo
+    | LeaveServo
+    | ReportServo
+    | LogWarning
+    | Finish
+)

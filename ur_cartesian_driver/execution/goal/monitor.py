@@ -1,0 +1,340 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What the packets of the robot show of one goal: how far it is, and whether it is what was planned.
+
+It only looks. What follows from a deviation in the present state, the machine decides
+(:mod:`~.goal_machine`).
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
+from ur_cartesian_driver.execution.goal.states import GoalSignal
+from ur_cartesian_driver.execution.goal.wire_records import WireRecords
+from ur_cartesian_driver.execution.monitoring.path_tracker import PathTracker, tracker_speed
+from ur_cartesian_driver.execution.monitoring.speed_check import SpeedCheck
+from ur_cartesian_driver.execution.monitoring.tolerance_check import ToleranceCheck
+from ur_cartesian_driver.motion.events import Progress
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
+from ur_cartesian_driver.motion.rigid_body import shift_reference_point
+from ur_cartesian_driver.motion.state import RobotState, RuntimeState
+
+#: How far the arm may have gone from where the plan begins until it is armed [m], [rad].
+START_POSITION_TOLERANCE, START_ANGLE_TOLERANCE = 0.001, 0.01
+#: How long the target may stand still in the middle of a goal that nothing holds [s].
+STALL_TIMEOUT = 2.0
+#: How much longer than planned it may stand where the plan itself waits, if that is longer [s].
+STALL_MARGIN = 1.0
+#: Rows of a path that differ by less are one place, at which the plan waits [m], [rad].
+SAME_POSE = 1e-9
+#: How far the controller's own target may be from the plan [m], [rad].
+MAX_PLAN_DEVIATION = (0.002, 0.02)
+
+
+class GoalMonitor:
+    """The newest packet, the place on the path, and what is held against them."""
+
+    def __init__(
+        self, job: MotionJob, records: WireRecords, max_plan_deviation: tuple[float, float]
+    ) -> None:
+        """
+        Prepare for an order.
+
+        :param records: those of the order.
+        :param max_plan_deviation: how far the controller's own target may be from the plan [m],
+            [rad]; 0 = any way, any angle.
+        """
+        self._order, self._records = job, records
+        self._start = pose_from_row(job.reference.poses[0])
+        self._tracker = PathTracker(job.reference)
+        self._speed_check = SpeedCheck(job.reference) if job.has_speed_profile else None
+        self._path_check = ToleranceCheck(job.path_tolerance, job.T_base_frame)
+        self._goal_check = ToleranceCheck(job.goal_tolerance, job.T_base_frame)
+        self._checks_tcp = job.T_tcp_controlled == IDENTITY
+        self._max_plan_deviation = max_plan_deviation
+        self._clearly_allowed = tuple(limit or inf for limit in max_plan_deviation)
+        #: Whether the robot program has read START: it has begun a point, or the target moves.
+        self._has_begun = False
+        #: The count of the goal before, as long as the robot reports it; None afterwards.
+        self._stale_begun: int | None = None
+        #: How many motions of the goal the robot had begun in trajectories before this one.
+        self._motions_before = 0
+        #: By how many motions the controller's target may be behind the one that was begun last.
+        self.lag_motions = 0
+        #: How long the target has stood still while nothing held it [s].
+        self._stalled_time = 0.0
+        #: The same of the controller's own time, and how much of that the plan itself may stand.
+        self._stalled_scaled, self._stall_timeout = 0.0, _stall_timeout(job)
+        #: The newest packet; None before the first.
+        self.latest: RobotState | None = None
+        #: Time since the start in which the controller's own clock ran [s].
+        self.scaled_time = 0.0
+
+    # ---- what goes on -------------------------------------------------------------------------
+
+    def start(self, state: RobotState) -> None:
+        """Take note that START is sent, and which count of points the robot reports until then."""
+        self._stale_begun = state.points_begun
+
+    def update(self, state: RobotState, *, moving: bool) -> None:
+        """Take a packet; while the goal moves the arm: also time, and place on the path."""
+        before, self.latest = self.latest, state
+        if not moving:
+            return
+        passed = 0.0
+        if before is not None:
+            passed = max(0.0, state.timestamp - before.timestamp)
+            if state.runtime_state is not RuntimeState.PAUSED:
+                self.scaled_time += passed * state.speed_scaling
+        self._track(before, state, passed)
+        if _stands_still(before, state):
+            self._stalled_time += passed
+            self._stalled_scaled += passed * state.speed_scaling
+        else:
+            self._stalled_time = self._stalled_scaled = 0.0
+
+    def finish(self, time: float = inf) -> None:
+        """Take note that the robot program has reported the end, or the rest at a time [s]."""
+        self._tracker.finish(time)
+
+    def append(self, job: MotionJob, records_before: int) -> None:
+        """Take note of what comes behind so many records."""
+        self._tracker.append(job.reference, self._records.end_time(records_before))
+        self._records.append(job, records_before)
+        self._order = job
+        self._stall_timeout = max(self._stall_timeout, _stall_timeout(job))
+        if self.latest is not None:
+            self._records.forget(self.records_begun(self.latest) - 2)
+
+    def resume(self, state: RobotState, sent: int) -> None:
+        """Take note that the motion goes on from rest, behind so many records."""
+        self.start(state)
+        self._motions_before = self._records.motions_before(sent)
+        self._stalled_time = self._stalled_scaled = 0.0
+        self.scaled_time = self._tracker.time()  # waiting is nobody's delay
+
+    def _track(self, before: RobotState | None, state: RobotState, passed: float) -> None:
+        """Find the place on the path."""
+        begun, fastest = self._motions_begun(state), tracker_speed(state.target_tcp_twist)
+        self._has_begun = self._has_begun or begun > self._motions_before or fastest > 0.0
+        if before is not None:  # it may have braked since
+            fastest = max(fastest, tracker_speed(before.target_tcp_twist))
+        self._tracker.update(
+            state.target_tcp_pose,
+            2.0 * passed * fastest,
+            self._records.running_waypoints(begun, self.lag_motions),
+        )
+
+    # ---- how far it is ------------------------------------------------------------------------
+
+    def time(self) -> float:
+        """Return the planned time of the place where the arm is [s]."""
+        return self._tracker.time()
+
+    def waypoint(self) -> int:
+        """Return the point that the arm is on its way to."""
+        return self._tracker.waypoint()
+
+    def buffered(self, sent: int) -> float:
+        """Return how much planned time of what was sent the arm has before it [s]."""
+        return max(0.0, self._records.end_time(sent) - self._tracker.time())
+
+    def records_begun(self, state: RobotState) -> int:
+        """Return how many records of this goal the robot has begun at least."""
+        return max(
+            self._records.begun_records(self._motions_begun(state)),
+            self._records.count_before_waypoint(self.waypoint()),
+        )
+
+    def _motions_begun(self, state: RobotState) -> int:
+        """
+        Return how many motions of this goal the robot has begun; 0 = unknown.
+
+        The register keeps the count of the goal before until the robot program has read START, so
+        it is believed once it changes.
+        """
+        if not self._order.reports_points_begun or state.points_begun == self._stale_begun:
+            return self._motions_before
+        self._stale_begun = None
+        return self._motions_before + state.points_begun
+
+    def awaits_count(self) -> bool:
+        """Tell whether the program has not reported a point of this goal since START."""
+        return self._stale_begun is not None
+
+    def progress(self, sent: int, *, at_end: bool, waits: bool = False) -> Progress:
+        """
+        Return a report about the newest packet.
+
+        :param sent: how many records were sent to the robot.
+        :param at_end: whether the arm should be at the end, and not on its way.
+        :param waits: whether it rests until more points come.
+        """
+        state, job = self.latest, self._order
+        assert state is not None
+        seen = shift_reference_point(state, job.T_tcp_controlled)
+        time = self._tracker.time()
+        desired = self._tracker.pose() if at_end else self._desired(state)
+        return Progress(
+            waypoint=self._tracker.waypoint(),
+            fraction=1.0 if job.duration <= 0.0 else min(1.0, time / job.duration),
+            desired_pose=desired @ job.T_tcp_controlled,
+            desired_twist=seen.target_tcp_twist,
+            desired_acceleration=seen.target_tcp_acceleration,
+            actual_pose=seen.actual_tcp_pose,
+            actual_twist=seen.actual_tcp_twist,
+            actual_acceleration=seen.actual_tcp_acceleration,
+            actual_q=state.actual_q,
+            time=time,
+            time_remaining=max(0.0, job.duration - time),
+            speed_scaling=state.speed_scaling,
+            points_received=self._records.points,
+            buffered=self.buffered(sent),
+            timestamp=state.timestamp,
+            awaiting_points=waits,
+        )
+
+    def _desired(self, state: RobotState) -> Pose:
+        """Return where the tool should be on its way: around its progress."""
+        return self._tracker.desired(state.actual_tcp_pose, state.target_tcp_twist)
+
+    # ---- whether it is what was planned -------------------------------------------------------
+
+    def start_offset(self, state: RobotState) -> str | None:
+        """Return a clause that says how far the arm is from where the plan begins, or None."""
+        return self._offset_clause(self._start, state.actual_tcp_pose)
+
+    def rest_offset(self, state: RobotState) -> str | None:
+        """Return a clause that says how far the arm is from where it waits, or None."""
+        return self._offset_clause(self._tracker.pose(), state.target_tcp_pose)
+
+    def _offset_clause(self, start: Pose, pose: Pose) -> str | None:
+        distance, angle = start.distance_to(pose), start.angle_to(pose)
+        if distance <= START_POSITION_TOLERANCE and angle <= START_ANGLE_TOLERANCE:
+            return None
+        return (
+            f'the arm is {distance:.4f} m and {angle:.4f} rad away from where the plan begins: '
+            'it moved meanwhile'
+        )
+
+    def find_fault(
+        self, state: RobotState, *, may_stand_still: bool = False
+    ) -> tuple[GoalSignal, str] | None:
+        """
+        Return what is wrong on the way, with a clause for the outcome's text, or None.
+
+        :param may_stand_still: an arm that stands waits for nothing that was lost.
+        """
+        return (
+            self._plan_deviation(state)
+            or self._speed_violation(state)
+            or (None if may_stand_still else self._stall_fault())
+            or self._path_violation(state)
+        )
+
+    def missed_end(self, state: RobotState) -> str:
+        """Return that the controller's target is not at the end, as a clause, or nothing."""
+        off = [
+            value
+            for value, limit in zip(
+                self._tracker.deviation(state.target_tcp_pose),
+                self._max_plan_deviation,
+                strict=True,
+            )
+            if 0.0 < limit < value
+        ]
+        return (
+            ''
+            if not off
+            else (
+                f'the robot program reports the end {off[0]:.4f} m or rad away from the last '
+                'point: it left out motions that it does not know; set wire_dialect to the '
+                'version of that program'
+            )
+        )
+
+    def goal_violation(self, state: RobotState) -> str | None:
+        """Return a clause that says how far the arm is outside the goal tolerance, or None."""
+        return self._violation(self._goal_check, self._tracker.pose(), state)
+
+    def _plan_deviation(self, state: RobotState) -> tuple[GoalSignal, str] | None:
+        """Return that the controller does something else than the plan, or None."""
+        if not self._has_begun or self._tracker.is_within(*self._clearly_allowed):
+            return None
+        for name, unit, value, limit in zip(
+            ('max_plan_deviation', 'max_plan_deviation_angle'),
+            ('m', 'rad'),
+            self._tracker.deviation(state.target_tcp_pose),
+            self._max_plan_deviation,
+            strict=True,
+        ):
+            if 0.0 < limit < value:
+                return GoalSignal.DEVIATION, (
+                    f'the controller itself left the plan by {value:.6f} {unit}, {name} is '
+                    f'{limit:.6f} {unit}: the arm is on another branch, or something else than '
+                    'this goal moves it'
+                )
+        return None
+
+    def _speed_violation(self, state: RobotState) -> tuple[GoalSignal, str] | None:
+        """Return that a program which tells no progress goes much faster or slower, or None."""
+        if self._speed_check is None or self._stale_begun is None:
+            return None
+        clause = self._speed_check.violation(
+            state.target_tcp_twist, self.scaled_time, self._tracker.time()
+        )
+        return None if clause is None else (GoalSignal.DEVIATION, clause)
+
+    def _stall_fault(self) -> tuple[GoalSignal, str] | None:
+        """Return that the arm stands for no reason, or None."""
+        if self._stalled_time < STALL_TIMEOUT or self._stalled_scaled < self._stall_timeout:
+            return None
+        return GoalSignal.STALLED, (
+            f'the arm has stood still for {self._stalled_time:.3g} s, nothing holds it, and the '
+            'robot program has not reported the end: a message to it or from it was lost, so it '
+            'was ended'
+        )
+
+    def _path_violation(self, state: RobotState) -> tuple[GoalSignal, str] | None:
+        if not (self._path_check and self._has_begun):
+            return None
+        clause = self._violation(self._path_check, self._desired(state), state)
+        if clause is None:
+            return None
+        return GoalSignal.VIOLATION, f'on the way to point {self._tracker.waypoint()} {clause}'
+
+    def _violation(self, check: ToleranceCheck, desired: Pose, state: RobotState) -> str | None:
+        """Return what a check says of the controlled frame; ``desired`` is of the TCP."""
+        if self._checks_tcp:
+            return check.violation(desired, state)
+        T_tcp_controlled = self._order.T_tcp_controlled
+        return check.violation(
+            desired @ T_tcp_controlled, shift_reference_point(state, T_tcp_controlled)
+        )
+
+
+def _stands_still(before: RobotState | None, state: RobotState) -> bool:
+    """Tell whether the target stands although neither slider nor pause holds it."""
+    return (
+        before is not None
+        and state.target_q == before.target_q
+        and state.target_tcp_pose == before.target_tcp_pose
+        and state.speed_scaling > 0.0
+        and state.target_speed_fraction > 0.0
+        and state.runtime_state is RuntimeState.PLAYING
+    )
+
+
+def _stall_timeout(job: MotionJob) -> float:
+    """Return for how long the arm may stand in a motion, of the controller's time [s]."""
+    path = job.reference
+    still = (np.abs(np.diff(path.poses, axis=0)) < SAME_POSE).all(axis=1)
+    # A wait may have several rows: those that follow each other count as one.
+    waits = np.bincount(np.cumsum(~still), weights=np.where(still, np.diff(path.time), 0.0))
+    longest = max(float(waits.max(initial=0.0)), job.output_delay)
+    return longest + STALL_MARGIN if longest > 0.0 else 0.0

@@ -1,0 +1,166 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the machine is told of a goal: less than the plan, as it crosses to another process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.goal import ExecutionMode, Tolerance
+from ur_cartesian_driver.motion.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
+from ur_cartesian_driver.motion.primitive import OptimoveJ, OptimoveL, Spline, SwitchOutput
+from ur_cartesian_driver.protocol.program.dialects import Dialect, NEWEST_DIALECT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MotionJob:
+    """What of a plan the machine needs; small to send to another process."""
+
+    #: How many records there are on the wire: motions and outputs.
+    points: int
+    reference: ReferencePath
+    #: Expected time at full speed [s].
+    duration: float
+    #: When the last point is due [s]; None where the goal names no times.
+    due: float | None = None
+    #: How long after the end of the motion the last output is switched [s]; ``due`` contains it.
+    output_delay: float = 0.0
+    T_base_frame: Pose = IDENTITY
+    #: The TCP that the plan found, the one that it needs (None = that one), and where the
+    #: controlled frame is behind it.
+    T_flange_active: Pose = IDENTITY
+    T_flange_tcp: Pose | None = None
+    T_tcp_controlled: Pose = IDENTITY
+    path_tolerance: Tolerance = field(default_factory=Tolerance)
+    goal_tolerance: Tolerance = field(default_factory=Tolerance)
+    #: 0 = the default, negative = without end [s].
+    goal_time_tolerance: float = 0.0
+    #: Whether the robot program tells how many points it has begun; if not, nobody looks there.
+    reports_points_begun: bool = True
+    #: Whether the plan knows its speeds: not those of OPTIMIZED moves.
+    has_speed_profile: bool = True
+    execution: ExecutionMode = ExecutionMode.PRIMITIVES
+    #: (records,) the waypoint of the goal that each record leads to, or belongs to; empty = each
+    #: record is the motion to the waypoint of its number.
+    waypoint: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
+    #: (records,) which of them are motions: these the robot program counts; empty = all.
+    is_motion: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
+    #: (records,) when each is planned to end [s]; outputs: as the motion that they belong to.
+    #: Empty = where the reference arrives at their points.
+    end_times: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    #: (records,) when the robot program asks for the record behind it [s]: where it ends, or
+    #: where its blend begins. Empty = at ``ends``.
+    request_times: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    #: Whether more may come behind it (keep_open).
+    keep_open: bool = False
+    #: Of an open one: how many records at its end take the arm to rest where nothing else comes.
+    ending_records: int = 0
+    #: SERVO: the joints over time.
+    spline: JointSpline | None = None
+
+    def __post_init__(self) -> None:
+        """Fill in what is left empty."""
+
+        def fill(name: str, value: NDArray[Any]) -> None:
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, value)
+
+        fill('waypoint', np.arange(self.points, dtype=np.int32))
+        fill('is_motion', np.ones(self.points, dtype=np.bool_))
+        rows = np.searchsorted(self.reference.point, self.waypoint, side='right') - 1
+        fill('end_times', self.reference.time[np.maximum(rows, 0)])
+        fill('request_times', self.end_times)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class AppendJob:
+    """What comes behind the records that a goal with an open end has."""
+
+    #: By which its answer is known.
+    number: int
+    #: How many records stay in front of it; the ending that was planned there is given up.
+    records_before: int
+    #: Times count from the start of the goal, rows of the reference from behind those that stay.
+    #: None = nothing comes any more, and the goal ends where it is known to end.
+    job: MotionJob | None
+
+
+def job_from_plan(
+    plan: Plan,
+    dialect: Dialect = NEWEST_DIALECT,
+    *,
+    start_time: float = 0.0,
+    ending_records: int = 0,
+) -> MotionJob:
+    """
+    Return what of a plan the machine needs, for a robot program of this dialect.
+
+    :param start_time: when its first segment begins [s]; not 0 for what continues a goal.
+    :param ending_records: see :class:`MotionJob`.
+    """
+    goal = plan.goal
+    times, output_delay = goal.waypoints[-1].time, _last_output_delay(plan)
+    waypoints = [
+        segment.waypoint for segment in plan.segments for _ in range(1 + len(segment.outputs))
+    ]
+    duration = start_time + plan.duration
+    end_times = start_time + np.cumsum([segment.duration for segment in plan.segments])
+    request_times = end_times - [_blend_lead_time(segment) for segment in plan.segments]
+    records = [1 + len(segment.outputs) for segment in plan.segments]
+    splines = [
+        segment.primitive for segment in plan.segments if isinstance(segment.primitive, Spline)
+    ]
+    return MotionJob(
+        points=len(waypoints),
+        reference=plan.reference,
+        duration=duration,
+        # What was slowed as the owner wants it (on_too_fast) is not late by that.
+        due=max(times, duration) + output_delay if times > 0.0 else None,
+        output_delay=output_delay,
+        T_base_frame=goal.T_base_frame,
+        T_flange_active=plan.T_flange_active,
+        T_flange_tcp=plan.T_flange_tcp,
+        T_tcp_controlled=plan.T_tcp_controlled,
+        path_tolerance=goal.path_tolerance,
+        goal_tolerance=goal.goal_tolerance,
+        goal_time_tolerance=goal.goal_time_tolerance,
+        reports_points_begun=dialect is NEWEST_DIALECT,
+        keep_open=goal.keep_open,
+        ending_records=ending_records,
+        has_speed_profile=not (
+            goal.keep_open
+            or any(
+                isinstance(segment.primitive, OptimoveJ | OptimoveL) for segment in plan.segments
+            )
+        ),
+        execution=plan.execution,
+        waypoint=np.array(waypoints, dtype=np.int32),
+        is_motion=np.array(
+            [not isinstance(instruction, SwitchOutput) for instruction in plan.instructions]
+        ),
+        end_times=np.repeat(end_times, records),
+        request_times=np.repeat(request_times, records),
+        spline=JointSpline.of(plan.start, splines)
+        if plan.execution is ExecutionMode.SERVO
+        else None,
+    )
+
+
+def _last_output_delay(plan: Plan) -> float:
+    """Return how long after the end of the motion the last output is switched [s]."""
+    return max((output.delay for output in plan.segments[-1].outputs), default=0.0)
+
+
+def _blend_lead_time(segment: PlannedSegment) -> float:
+    """Return how long before the end of a motion its blend begins, rather too long [s]."""
+    radius = 0.0 if isinstance(segment.primitive, Spline) else segment.primitive.blend_radius
+    if radius <= 0.0:
+        return 0.0
+    # The tool is slower before than in the blend, but for the one that it comes out of.
+    return segment.duration * min(1.0, radius / max(segment.length, radius))

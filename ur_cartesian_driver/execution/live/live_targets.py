@@ -1,0 +1,132 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A session of live targets: what becomes of targets that come too late, twice, or no more.
+
+The newest target is the one with the newest stamp, in whatever order they come in. It is followed
+until it is ``max_age`` old; then the arm brakes, stands, and waits. A newer one continues. When
+none has come for ``timeout`` the session is over. All times are of one steady clock and come in as
+arguments; where the set-points go is the business of the machine that asks for them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import inf
+
+from ur_cartesian_driver.execution.live.online_trajectory import (
+    LiveLimits,
+    OnlineTrajectoryGenerator,
+)
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.primitive import Joints
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveSettings:
+    """
+    How a session goes about targets; the defaults are those of ``config/driver.yaml``.
+
+    :raises ValueError: a time is not positive.
+    """
+
+    limits: LiveLimits = field(default_factory=LiveLimits)
+    #: How old a target may be that is followed [s].
+    max_age: float = 0.2
+    #: The session is over when no target has come for so long [s].
+    timeout: float = 2.0
+
+    def __post_init__(self) -> None:
+        """Check the times."""
+        for name in ('max_age', 'timeout'):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f'{name} is {getattr(self, name)}; it must be positive')
+
+
+class LiveTargets:
+    """The source of the set-points of a session."""
+
+    def __init__(self, generator: OnlineTrajectoryGenerator, settings: LiveSettings) -> None:
+        """Begin with no target."""
+        self.generator = generator
+        #: How many targets were followed, and how many came in after a newer one or too old.
+        self.accepted = self.dropped = 0
+        #: How often the arm was stopped because the newest target was too old.
+        self.pauses = 0
+        self._settings = settings
+        self._stamp = -inf
+        self._last_came = inf
+        self._is_over = False
+        # The first wording of each reason.
+        self._reasons: dict[str, str] = {}
+
+    def add(self, T_base_tcp: Pose, age: float, now: float) -> None:
+        """
+        Take a target.
+
+        :param age: how long ago it was true [s].
+        """
+        stamp = now - max(0.0, age)
+        self._last_came = now
+        if stamp <= self._stamp or not age <= self._settings.max_age:  # NaN is no age
+            self.dropped += 1
+            return
+        self._stamp = stamp
+        self.accepted += 1
+        self._is_over = False
+        self.generator.set_target(T_base_tcp)
+
+    def update(self, now: float) -> None:
+        """Let time pass: see whether the newest target is too old, and whether it was the last."""
+        generator = self.generator
+        if generator.target is not None and now - self._stamp > self._settings.max_age:
+            # An arm that rests where it was to be is not stopped by that.
+            self.pauses += not generator.arrived
+            generator.clear_target()
+        self._last_came = min(self._last_came, now)
+        self._is_over = now - self._last_came > self._settings.timeout
+
+    def next(self, dt: float) -> Joints:
+        """Return the set-point [rad] that follows ``dt`` [s] of nominal time after the last."""
+        if dt <= 0.0:
+            return self.generator.q
+        q = self.generator.step(dt)
+        if reason := self.generator.blocked:
+            self._reasons.setdefault(_without_numbers(reason), reason)
+        return q
+
+    @property
+    def done(self) -> bool:
+        """Tell whether the session is over: no targets any more, and the arm stands."""
+        return self._is_over and self.generator.at_rest
+
+    @property
+    def blocked(self) -> str:
+        """Why the arm does not go to the newest target, as a clause; empty: it does."""
+        return self.generator.blocked
+
+    @property
+    def report(self) -> tuple[str, ...]:
+        """What the session was, in lines for people."""
+        lines = [
+            '1 target was followed'
+            if self.accepted == 1
+            else f'{self.accepted} targets were followed'
+        ]
+        if self.dropped:
+            lines.append(
+                f'{self.dropped} came after a newer one or were older than '
+                f'{self._settings.max_age:g} s, and were left out'
+            )
+        if self.pauses:
+            times = 'once' if self.pauses == 1 else f'{self.pauses} times'
+            lines.append(
+                f'the arm was stopped {times} because the newest target was older than '
+                f'{self._settings.max_age:g} s'
+            )
+        return (*lines, *(f'the arm was stopped: {reason}' for reason in self._reasons.values()))
+
+
+def _without_numbers(reason: str) -> str:
+    """Return what of a reason stays the same when the target trembles."""
+    return ' '.join(word for word in reason.split() if not word[:1].isdigit())

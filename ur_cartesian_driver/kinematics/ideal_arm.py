@@ -1,0 +1,125 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The ideal arm that is most like a given one: where the closed form of the inverse can begin.
+
+The closed form needs axes that are exactly parallel or perpendicular, which those of a calibrated
+arm are not. Its DH table does not show directly how close they come: the axes of the shoulder
+lift, the elbow and wrist 1 are so nearly parallel that their common normals may lie metres away,
+so that d2, d3 and d4 are large and cancel, and theta 2 to 4 mean little one by one. Therefore the
+ideal arm is fitted to where the flange really goes: six lengths and six joint offsets by least
+squares.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames
+from ur_cartesian_driver.kinematics.robot_models import DhTable
+from ur_cartesian_driver.motion.pose import (
+    conjugate,
+    multiply,
+    Pose,
+    rotation_vector_from_quaternion,
+    Vector6,
+)
+
+_SAMPLES = 24
+_ITERATIONS = 5
+
+
+@dataclass(frozen=True, slots=True)
+class IdealArm:
+    """Lengths [m] of an ideal arm, and what its joints show more than the real ones [rad]."""
+
+    d1: float
+    a2: float
+    a3: float
+    d4: float
+    d5: float
+    d6: float
+    offsets: Vector6
+    #: How far from there the real flange is, root mean square [m]; 0 for a nominal arm.
+    misfit: float
+
+
+@lru_cache(maxsize=64)
+def ideal_arm_of(arm: Arm) -> IdealArm:
+    """Return the ideal arm most like this one; for a nominal arm that is the arm itself."""
+    lengths = _nominal_lengths(arm)
+    offsets = np.zeros(6)
+    misfit = 0.0
+    if arm.calibrated:
+        lengths, offsets, misfit = _fit(arm, lengths)
+    d1, a2, a3, d4, d5, d6 = (float(v) for v in lengths)
+    o1, o2, o3, o4, o5, o6 = (float(v) for v in offsets)
+    return IdealArm(d1, a2, a3, d4, d5, d6, (o1, o2, o3, o4, o5, o6), misfit)
+
+
+def _nominal_lengths(arm: Arm) -> NDArray[np.float64]:
+    a, d = arm.model.geometry.a, arm.model.geometry.d
+    return np.array([d[0], a[1], a[2], d[3], d[4], d[5]])
+
+
+def _fit(
+    arm: Arm, lengths: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Gauss-Newton over samples spread through the joint space; linear but for the last digits."""
+    samples = np.random.default_rng(1).uniform(-np.pi, np.pi, (_SAMPLES, 6))
+    targets = [arm.forward(q) for q in samples]
+    offsets = np.zeros(6)
+    misfit = 0.0
+    for _ in range(_ITERATIONS):
+        ideal = _arm_with_lengths(arm, lengths)
+        frames = [ideal.frames(q + offsets) for q in samples]
+        rows = np.concatenate([_derivatives(f) for f in frames])
+        errors = np.concatenate(
+            [
+                _twist(ideal.forward(q + offsets), target)
+                for q, target in zip(samples, targets, strict=True)
+            ]
+        )
+        step = np.linalg.lstsq(rows, errors, rcond=None)[0]
+        left = (errors - rows @ step).reshape(_SAMPLES, 6)[:, :3]
+        misfit = sqrt(float(np.sum(left**2)) / _SAMPLES)
+        lengths, offsets = lengths + step[:6], offsets + step[6:]
+    return lengths, offsets, misfit
+
+
+def _arm_with_lengths(arm: Arm, lengths: NDArray[np.float64]) -> Arm:
+    d1, a2, a3, d4, d5, d6 = (float(v) for v in lengths)
+    return Arm(arm.model, DhTable(a=(0.0, a2, a3, 0.0, 0.0, 0.0), d=(d1, 0.0, 0.0, d4, d5, d6)))
+
+
+def _derivatives(frames: ChainFrames) -> NDArray[np.float64]:
+    """
+    Return the derivatives (6, 12) of the flange by d1 a2 a3 d4 d5 d6 and the six joint positions.
+
+    A length d moves the flange along its joint's axis. A length a moves it along the link: the
+    origins of links 2 and 3 lie on it.
+    """
+    origins, axes = np.array(frames.origins), np.array(frames.axes)
+    point = np.array(frames.position)
+    derivatives = np.zeros((6, 12))
+    for column, joint in ((0, 0), (3, 3), (4, 4), (5, 5)):
+        derivatives[:3, column] = axes[joint]
+    for column, joint in ((1, 1), (2, 2)):
+        link = origins[joint + 1] - origins[joint]
+        derivatives[:3, column] = -link / np.linalg.norm(link)  # a2 and a3 are negative
+    derivatives[:3, 6:] = np.cross(axes, point - origins).T
+    derivatives[3:, 6:] = axes.T
+    return derivatives
+
+
+def _twist(T_base_from: Pose, T_base_to: Pose) -> NDArray[np.float64]:
+    """Return the way from one pose to another: translation, rotation vector, both in base."""
+    turn = rotation_vector_from_quaternion(
+        multiply(T_base_to.quaternion, conjugate(T_base_from.quaternion))
+    )
+    return np.concatenate([np.subtract(T_base_to.position, T_base_from.position), turn])

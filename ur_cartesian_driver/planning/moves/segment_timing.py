@@ -1,0 +1,516 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How fast each segment goes: from the times of the goal, from its speeds, or from the defaults.
+
+``movel`` and ``movej`` take a time on the wire. ``movec`` and ``movep`` do not: their speed is
+derived so that the time is met. All of it is about the quantity that leads a segment, see
+:mod:`~.speed_limits`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil, hypot, inf, sqrt
+
+from ur_cartesian_driver.kinematics.robot_models import RobotModel
+from ur_cartesian_driver.motion.errors import InvalidGoal, TooFast
+from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.planning.geometry.speed_profile import (
+    cruise_speed_for,
+    min_duration,
+    peak_speed_and_acceleration,
+    profile_for_time,
+    SpeedProfile,
+    trapezoid,
+)
+from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
+from ur_cartesian_driver.planning.moves.speed_limits import (
+    is_blended,
+    leading_quantity,
+    speed_limits,
+    speed_unit,
+    SpeedLimits,
+    translates,
+)
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.validate import is_optimized, point_field
+
+#: The lowest speed that the wire carries well enough: it counts in millionths.
+MIN_SPEED = 1e-5
+#: What an OPTIMIZED move is taken to accelerate with at fraction 1 [rad/s^2]; the robot's own
+#: limits are not published. It only serves to say about how long such a move takes.
+_OPTIMIZED_JOINT_ACCELERATION = 40.0
+_FROM_TIME = 'its time_from_start says so'
+#: Motions whose messages have a time.
+_TIMED_ON_WIRE = (SegmentType.LINEAR, SegmentType.JOINT)
+#: Rounds in which speeds and the times in corners are made to agree.
+_MAX_ITERATIONS = 12
+
+
+def schedule(
+    geometries: Sequence[SegmentGeometry], options: PlanningOptions, model: RobotModel
+) -> list[SegmentTiming]:
+    """
+    Return the timing of every leg.
+
+    :raises TooFast: a time needs more speed or acceleration than the limits allow.
+    :raises InvalidGoal: a speed is too low for the wire.
+    """
+    measures = [leading_quantity(geometry) for geometry in geometries]
+    timings = [
+        _first_guess(geometry, length, unit, options, model)
+        for geometry, (length, unit) in zip(geometries, measures, strict=True)
+    ]
+    derived = [
+        k
+        for k, geometry in enumerate(geometries)
+        if geometry.time is not None and not _takes_time(geometry.kind, options)
+    ]
+    # The time in a corner depends on the speeds on both of its sides, so go round a few times.
+    for _ in range(_MAX_ITERATIONS if any(is_blended(geometries[k]) for k in derived) else 1):
+        changed = 0.0
+        for k in derived:
+            new = _by_speed_for_time(
+                geometries[k], measures[k], _blend_time(geometries, timings, k), options, model
+            )
+            changed = max(changed, abs(new.velocity / timings[k].velocity - 1.0))
+            timings[k] = new
+        if changed < 1e-6:
+            break
+    for geometry, timing in zip(geometries, timings, strict=True):
+        _check_wire(geometry, timing, options)
+    for k in range(1, len(geometries)):
+        if geometries[k].before is not None and geometries[k].time is None:
+            timings[k] = _after_blend(geometries, timings, k)
+    blend_times = [
+        blend_duration(geometries[k], timings[k], geometries[k + 1], timings[k + 1])
+        if geometries[k].after is not None
+        else 0.0
+        for k in range(len(geometries))
+    ]
+    return [
+        _with_duration(geometry, timing, before, after)
+        for geometry, timing, before, after in zip(
+            geometries, timings, [0.0, *blend_times[:-1]], blend_times, strict=True
+        )
+    ]
+
+
+def _check_wire(
+    geometry: SegmentGeometry, timing: SegmentTiming, options: PlanningOptions
+) -> None:
+    """Refuse what would be zero on the wire, or next to it, and times that it does not carry."""
+    if timing.wire_time > options.max_segment_time:
+        raise InvalidGoal(
+            point_field(geometry.index),
+            f'would be approached in {timing.wire_time:.4g} s, more than '
+            f'max_segment_time = {options.max_segment_time:.0f} s',
+            'raise velocity or acceleration',
+        )
+    if timing.wire_time > 0.0:
+        return
+    unit = speed_unit(timing.unit)
+    for value, name in ((timing.velocity, unit), (timing.acceleration, f'{unit}^2')):
+        if value < MIN_SPEED:
+            raise InvalidGoal(
+                point_field(geometry.index),
+                f'would be approached with {value:.2g} {name}, less than '
+                f'the {MIN_SPEED:g} that the robot can be told',
+                'give it less time' if geometry.time else 'raise velocity or acceleration',
+            )
+
+
+def _after_blend(
+    geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming], k: int
+) -> SegmentTiming:
+    """
+    Return the timing of a leg that comes out of a corner no faster than both legs accelerate.
+
+    In the corner the way of the first leg ends as r1 (1 - s)^2, that of the second begins as
+    r2 s^2, so s' may grow to sqrt(a / 2r) of either.
+    """
+    before, old = timings[k - 1].profile, timings[k].profile
+    r1 = (1.0 - geometries[k - 1].u_after) * before.length / geometries[k - 1].share
+    r2 = geometries[k].u_before * old.length / geometries[k].share
+    blend_rate = max(
+        before.leave / (2.0 * r1), sqrt(min(before.acceleration / r1, old.acceleration / r2) / 2.0)
+    )
+    enter = min(
+        timings[k].velocity,
+        2.0 * r2 * blend_rate,
+        sqrt(2.0 * old.acceleration * old.length + old.leave**2),
+    )
+    profile = trapezoid(
+        old.length,
+        timings[k].velocity,
+        old.acceleration,
+        enter,
+        0.5 * old.leave**2 / old.acceleration,
+    )
+    return _with_profile(timings[k], profile)
+
+
+def _with_duration(
+    geometry: SegmentGeometry, timing: SegmentTiming, before: float, after: float
+) -> SegmentTiming:
+    """
+    Return the timing with its expected duration, half of each corner included.
+
+    :param before: time in the corners before and after it [s].
+    """
+    time_in_blends, profile = 0.5 * (before + after), timing.profile
+    if timing.wire_time > 0.0 and time_in_blends > 0.0:
+        # What is sent as a time is kept in sum: corners are shorter, so what is left has longer.
+        left = max(timing.wire_time - time_in_blends, 0.05 * timing.wire_time)
+        profile = profile_for_time(profile.length, left, *_rests_at_ends(geometry))
+    return _with_profile(timing, profile, profile.duration + time_in_blends, after)
+
+
+def _with_profile(
+    timing: SegmentTiming, profile: SpeedProfile, duration: float = 0.0, blend_time: float = 0.0
+) -> SegmentTiming:
+    """Return the timing with another profile; ``replace`` takes twice as long, for each leg."""
+    return SegmentTiming(
+        velocity=timing.velocity,
+        acceleration=timing.acceleration,
+        wire_time=timing.wire_time,
+        unit=timing.unit,
+        profile=profile,
+        duration=duration,
+        blend_time=blend_time,
+        reason=timing.reason,
+        remark=timing.remark,
+    )
+
+
+def _takes_time(kind: SegmentType, options: PlanningOptions) -> bool:
+    """
+    Tell whether the wire carries a time for a motion.
+
+    Never in the dialect that counts in milliseconds: a robot program that counts in microseconds
+    would run a segment a thousand times too fast, and nobody can ask a program how it counts.
+    """
+    return kind in _TIMED_ON_WIRE and not options.dialect.is_coarse
+
+
+def _own_acceleration(geometry: SegmentGeometry) -> float:
+    """Return the acceleration of a timed leg that the goal may choose, 0 = it has none."""
+    return 0.0 if geometry.kind in _TIMED_ON_WIRE else geometry.segment.acceleration
+
+
+def _rests_at_ends(geometry: SegmentGeometry) -> tuple[bool, bool]:
+    return geometry.before is None, geometry.after is None
+
+
+def _stop_distance(geometry: SegmentGeometry, length: float) -> float:
+    """Return how far behind its end between corners the robot plans to stop, see trapezoid."""
+    if geometry.after is not None and geometry.kind == SegmentType.PROCESS:
+        return inf
+    return length * (1.0 - geometry.u_after)
+
+
+def _first_guess(
+    geometry: SegmentGeometry,
+    length: float,
+    unit: str,
+    options: PlanningOptions,
+    model: RobotModel,
+) -> SegmentTiming:
+    if geometry.time is None:
+        return _by_speed(geometry, length, unit, options, model)
+    if _takes_time(geometry.kind, options):
+        return _by_time(geometry, length, unit, options, model)
+    return _by_speed_for_time(geometry, (length, unit), 0.0, options, model, strict=False)
+
+
+# -- speeds ---------------------------------------------------------------------------------------
+
+
+def _by_speed(
+    geometry: SegmentGeometry,
+    length: float,
+    unit: str,
+    options: PlanningOptions,
+    model: RobotModel,
+) -> SegmentTiming:
+    """Return the timing of a leg without a time."""
+    wanted, reason = _wanted_speed(geometry, unit, options)
+    acceleration = geometry.segment.acceleration or _default_acceleration(geometry, unit, options)
+    limits = speed_limits(geometry, length, options, model)
+    if not is_optimized(geometry.kind):
+        acceleration = min(acceleration, limits.acceleration)
+    turn_leads = geometry.kind == SegmentType.LINEAR and unit == 'rad' and translates(geometry)
+    if turn_leads:
+        return _turning_line(geometry, length, wanted, acceleration, reason, options)
+    velocity = min(wanted, limits.speed)
+    remark = ''
+    if velocity < wanted:
+        remark = (
+            f'point {geometry.index}: slowed from {wanted:.3g} to {velocity:.3g} '
+            f'{speed_unit(unit)} by {limits.name}'
+        )
+    rate = acceleration
+    if is_optimized(geometry.kind):
+        rate *= _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed)
+    profile = trapezoid(
+        length * geometry.share,
+        velocity,
+        rate,
+        inf if geometry.before else 0.0,
+        _stop_distance(geometry, length),
+    )
+    return SegmentTiming(
+        velocity=velocity,
+        acceleration=acceleration,
+        wire_time=0.0,
+        unit=unit,
+        profile=profile,
+        duration=profile.duration,
+        reason=reason,
+        remark=remark,
+    )
+
+
+def _wanted_speed(
+    geometry: SegmentGeometry, unit: str, options: PlanningOptions
+) -> tuple[float, str]:
+    """Return the speed that the goal asks for, and the words for where it comes from."""
+    if geometry.segment.velocity > 0.0:
+        return geometry.segment.velocity, 'its velocity says so'
+    if is_optimized(geometry.kind):
+        return options.optimized_velocity, 'that is the default speed'
+    if geometry.kind == SegmentType.JOINT:
+        return options.joint_velocity, 'that is the default speed'
+    twist = geometry.waypoint.twist
+    speed = hypot(*twist[:3]) if translates(geometry) else hypot(*twist[3:])
+    if speed > 0.0:
+        return speed, 'its twist says so'
+    if not translates(geometry):
+        return options.angular_velocity, 'that is the default speed'
+    if unit == 'rad' and geometry.kind != SegmentType.LINEAR:
+        # One number for both: as rad/s the turn may have more, but never more than the tool may.
+        fastest = options.max_tool_speed or options.angular_velocity
+        return (
+            max(options.linear_velocity, min(options.angular_velocity, fastest)),
+            'it turns more than it moves',
+        )
+    return options.linear_velocity, 'that is the default speed'
+
+
+def _default_acceleration(geometry: SegmentGeometry, unit: str, options: PlanningOptions) -> float:
+    if is_optimized(geometry.kind):
+        return options.optimized_acceleration
+    if geometry.kind == SegmentType.JOINT:
+        return options.joint_acceleration
+    return options.linear_acceleration if translates(geometry) else options.angular_acceleration
+
+
+def _turning_line(
+    geometry: SegmentGeometry,
+    angle: float,
+    velocity: float,
+    acceleration: float,
+    reason: str,
+    options: PlanningOptions,
+) -> SegmentTiming:
+    """
+    Return the timing of a line on which the turn leads.
+
+    The robot's one number would turn the tool as slowly as it moves: a time is sent in which
+    the tool keeps its speed [m/s] and turns no faster than the default.
+    """
+    remark = ''
+    if 0.0 < options.max_tool_speed < velocity:
+        remark = (
+            f'point {geometry.index}: slowed from {velocity:.3g} to {options.max_tool_speed:.3g} '
+            'm/s by max_tool_speed'
+        )
+        velocity = options.max_tool_speed
+    time = max(
+        min_duration(geometry.path.length, velocity, acceleration),
+        min_duration(angle, options.angular_velocity, options.angular_acceleration),
+    )
+    profile = profile_for_time(
+        angle * geometry.share, time * geometry.share, *_rests_at_ends(geometry)
+    )
+    wire_time = time
+    if not _takes_time(geometry.kind, options):
+        velocity, wire_time = profile.cruise, 0.0
+        _, acceleration = peak_speed_and_acceleration(angle, time)
+    return SegmentTiming(
+        velocity=velocity,
+        acceleration=acceleration,
+        wire_time=wire_time,
+        unit='rad',
+        profile=profile,
+        duration=time,
+        reason=f'{reason} and it turns on the way',
+        remark=remark,
+    )
+
+
+# -- times ----------------------------------------------------------------------------------------
+
+
+def _by_time(
+    geometry: SegmentGeometry,
+    length: float,
+    unit: str,
+    options: PlanningOptions,
+    model: RobotModel,
+) -> SegmentTiming:
+    """Return the timing of a leg for which the wire carries the time."""
+    assert geometry.time is not None
+    limits = speed_limits(geometry, length, options, model)
+    min_time = min_duration(length, limits.speed, limits.acceleration)
+    time, remark = geometry.time, ''
+    if time < min_time * (1.0 - 1e-9):
+        time, remark = _slow_or_refuse(geometry, length, unit, min_time, limits, options)
+    profile = profile_for_time(
+        length * geometry.share, time * geometry.share, *_rests_at_ends(geometry)
+    )
+    # The robot ignores speed and acceleration when it has a time; they say what it will need.
+    velocity, acceleration = peak_speed_and_acceleration(length, time)
+    return SegmentTiming(
+        velocity=velocity,
+        acceleration=acceleration,
+        wire_time=time,
+        unit=unit,
+        profile=profile,
+        duration=time,
+        reason=_FROM_TIME,
+        remark=remark,
+    )
+
+
+def _by_speed_for_time(
+    geometry: SegmentGeometry,
+    measured: tuple[float, str],
+    time_in_blends: float,
+    options: PlanningOptions,
+    model: RobotModel,
+    strict: bool = True,
+) -> SegmentTiming:
+    """
+    Return the timing of a leg that has to meet a time by its speed.
+
+    :param in_corners: the part of the time that passes in the corners at its ends [s].
+    :param strict: whether a time that is too short is refused (not in a first guess).
+    """
+    assert geometry.time is not None
+    length, unit = measured
+    limits = speed_limits(geometry, length, options, model)
+    distance, stop_distance = length * geometry.share, _stop_distance(geometry, length)
+    bound = _max_acceleration(geometry, limits)
+    time, remark = geometry.time, ''
+    min_time = time_in_blends + _min_time_by_speed(geometry, distance, limits.speed, bound)
+    if strict and time < min_time * (1.0 - 1e-9):
+        time, remark = _slow_or_refuse(geometry, length, unit, min_time, limits, options)
+    between = max(time - time_in_blends, 0.05 * time)
+    acceleration = _own_acceleration(geometry) or max(
+        _default_acceleration(geometry, unit, options),
+        # A third each of speeding up, cruising and braking; and no braking before a blend.
+        min(bound, 4.5 * distance / between**2),
+        min(
+            bound, (distance / between) ** 2 / stop_distance if 0.0 < stop_distance < inf else 0.0
+        ),
+    )
+    velocity = cruise_speed_for(distance, between, acceleration, sum(_rests_at_ends(geometry)))
+    if velocity is None:  # only before the corners are known, or within rounding
+        velocity = 2.0 * distance / between
+    profile = trapezoid(
+        distance, velocity, acceleration, inf if geometry.before else 0.0, stop_distance
+    )
+    return SegmentTiming(
+        velocity=velocity,
+        acceleration=acceleration,
+        wire_time=0.0,
+        unit=unit,
+        profile=profile,
+        duration=time,
+        reason=_FROM_TIME,
+        remark=remark,
+    )
+
+
+def _slow_or_refuse(
+    geometry: SegmentGeometry,
+    length: float,
+    unit: str,
+    min_time: float,
+    limits: SpeedLimits,
+    options: PlanningOptions,
+) -> tuple[float, str]:
+    """Return the time that the limits allow and the remark, or refuse."""
+    assert geometry.time is not None
+    if min_time > options.max_segment_time:
+        raise TooFast(
+            point_field(geometry.index, 'time_from_start'),
+            f'gives the segment {geometry.time:.3f} s, but because of {limits.name} it takes '
+            f'{min_time:.0f} s, more than max_segment_time = {options.max_segment_time:.0f} s',
+            'go around the place where it has to be slow, or use a JOINT segment',
+        )
+    if options.on_too_fast == 'slow':
+        return min_time, (
+            f'point {geometry.index}: takes {min_time:.3f} s instead of {geometry.time:.3f} s, '
+            f'because of {limits.name}'
+        )
+    speed, acceleration = peak_speed_and_acceleration(length, geometry.time)
+    raise TooFast(
+        point_field(geometry.index, 'time_from_start'),
+        f'gives the segment {geometry.time:.3f} s for {length:.3f} {unit}, which needs up to '
+        f'{speed:.3f} {speed_unit(unit)} and {acceleration:.3f} {speed_unit(unit)}^2; '
+        f'allowed are {limits.speed:.3f} {speed_unit(unit)} ({limits.name}) and '
+        f'{_max_acceleration(geometry, limits):.3f} {speed_unit(unit)}^2',
+        f'give it at least {ceil(1e3 * min_time) / 1e3:.3f} s, or set on_too_fast to slow',
+    )
+
+
+def _min_time_by_speed(
+    geometry: SegmentGeometry, distance: float, speed: float, acceleration: float
+) -> float:
+    """Return the shortest time between the corners of a leg that is sent as a speed."""
+    ramps = sum(_rests_at_ends(geometry))
+    peak = min(speed, sqrt(2.0 * acceleration * distance / ramps)) if ramps else speed
+    return distance / peak + 0.5 * ramps * peak / acceleration
+
+
+def _max_acceleration(geometry: SegmentGeometry, limits: SpeedLimits) -> float:
+    """Return the largest acceleration that a time may lead to."""
+    if own := _own_acceleration(geometry):
+        return min(own, limits.acceleration)
+    return limits.acceleration
+
+
+# -- corners --------------------------------------------------------------------------------------
+
+
+def _blend_time(
+    geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming], k: int
+) -> float:
+    """Return the time that a leg spends in its halves of the corners at its ends [s]."""
+    time = 0.0
+    if geometries[k].before is not None:
+        time += blend_duration(geometries[k - 1], timings[k - 1], geometries[k], timings[k]) / 2.0
+    if geometries[k].after is not None:
+        time += blend_duration(geometries[k], timings[k], geometries[k + 1], timings[k + 1]) / 2.0
+    return time
+
+
+def blend_duration(
+    first: SegmentGeometry,
+    timing: SegmentTiming,
+    second: SegmentGeometry,
+    next_timing: SegmentTiming,
+) -> float:
+    """Return the time in the corner between two legs [s]; the tool's speed changes evenly."""
+    assert first.after is not None
+    speeds = (
+        timing.profile.leave * first.path.length / timing.profile.length * first.share
+        + next_timing.profile.enter
+        * second.path.length
+        / next_timing.profile.length
+        * second.share
+    )
+    return 2.0 * first.after.length / max(speeds, 1e-9)

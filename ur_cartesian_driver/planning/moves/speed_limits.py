@@ -1,0 +1,125 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What leads a segment, and how fast that may be.
+
+The robot has one speed for the translation and the turn of the tool, in m/s and rad/s, which
+neither may exceed; so the quantity that *leads* a segment is the larger of both numbers (for joint
+moves the joint that turns farthest). Tool, joints and accelerations bound it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, RobotModel
+from ur_cartesian_driver.motion.goal import ArcMode, SegmentType
+from ur_cartesian_driver.planning.geometry.curves import ArcCurve, JointLineCurve, SAME_POSITION
+from ur_cartesian_driver.planning.moves.segment_geometry import JointSpeedBound, SegmentGeometry
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.validate import is_optimized
+
+#: Where the robot stands at the first point already, the way there counts as this.
+_MIN_LENGTH = 1e-9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpeedLimits:
+    """The largest speed of the leading quantity, what sets it, and the largest acceleration."""
+
+    speed: float
+    name: str
+    acceleration: float
+
+
+def leading_quantity(geometry: SegmentGeometry) -> tuple[float, str]:
+    """
+    Return the length of the leading quantity and its unit (m or rad; s for OPTIMIZED moves).
+
+    OPTIMIZED moves are measured by the time that they would take with some joint at its limit
+    everywhere.
+    """
+    path = geometry.path
+    if is_optimized(geometry.kind):
+        length, unit = geometry.speed_bound.time_at_limits, 's'
+    elif isinstance(path, JointLineCurve):
+        length, unit = max(path.travel), 'rad'
+    elif path.length >= path.angle or (isinstance(path, ArcCurve) and path.mode == ArcMode.FIXED):
+        length, unit = path.length, 'm'
+    else:
+        length, unit = path.angle, 'rad'
+    return max(length, _MIN_LENGTH), unit
+
+
+def speed_limits(
+    geometry: SegmentGeometry, length: float, options: PlanningOptions, model: RobotModel
+) -> SpeedLimits:
+    """Return what bounds the leading quantity of a leg."""
+    tool = inf
+    if options.max_tool_speed > 0.0 and translates(geometry):
+        tool = options.max_tool_speed / _tool_travel_per_unit(geometry, length)
+    speed, name = tool, f'max_tool_speed = {options.max_tool_speed:g} m/s'
+    if geometry.kind == SegmentType.JOINT and isinstance(geometry.path, JointLineCurve):
+        for k, travel_of_joint in enumerate(geometry.path.travel):
+            if (
+                travel_of_joint > 0.0
+                and model.max_joint_speed[k] * length / travel_of_joint < speed
+            ):
+                speed = model.max_joint_speed[k] * length / travel_of_joint
+                name = f'the limit of {JOINT_NAMES[k]}, {model.max_joint_speed[k]:.3f} rad/s'
+        speed, name = _limit_in_blends(geometry, length, speed, name)
+        return SpeedLimits(speed=speed, name=name, acceleration=options.max_joint_acceleration)
+    if not is_optimized(geometry.kind):
+        min_time = geometry.speed_bound.time
+        if min_time > 0.0 and length / min_time < speed:
+            speed, name = length / min_time, _joint_limit(geometry.speed_bound)
+    bound = (
+        options.max_linear_acceleration * length / geometry.path.length
+        if translates(geometry)
+        else inf
+    )
+    if geometry.path.angle > 0.0:
+        bound = min(bound, options.max_angular_acceleration * length / geometry.path.angle)
+    return SpeedLimits(speed=speed, name=name, acceleration=bound)
+
+
+def _limit_in_blends(
+    geometry: SegmentGeometry, length: float, speed: float, name: str
+) -> tuple[float, str]:
+    """Return the bound of a joint move, whose joints may turn faster where it is blended."""
+    min_time = geometry.speed_bound.time
+    if is_blended(geometry) and min_time > 0.0 and length / min_time < speed * (1.0 - 1e-9):
+        return length / min_time, _joint_limit(geometry.speed_bound)
+    return speed, name
+
+
+def _joint_limit(speed_bound: JointSpeedBound) -> str:
+    return (
+        f'the speed limits of the joints, {JOINT_NAMES[speed_bound.joint]} at '
+        f'{100.0 * speed_bound.fraction:.0f} % of the way'
+    )
+
+
+def _tool_travel_per_unit(geometry: SegmentGeometry, length: float) -> float:
+    """Return the most metres that the tool goes per unit of the leading quantity."""
+    path = geometry.path
+    if is_optimized(geometry.kind):  # the tool is fastest where the joints have the least to do
+        length = max(geometry.speed_bound.shortest_time, _MIN_LENGTH)
+    uneven = path.unevenness if isinstance(path, JointLineCurve) else 1.0
+    return path.length * uneven / length
+
+
+def is_blended(geometry: SegmentGeometry) -> bool:
+    """Tell whether a leg has a corner at one of its ends."""
+    return geometry.before is not None or geometry.after is not None
+
+
+def translates(geometry: SegmentGeometry) -> bool:
+    """Tell whether the tool's position changes; if not the leg only turns it."""
+    return geometry.path.length > SAME_POSITION
+
+
+def speed_unit(unit: str) -> str:
+    """Return the unit of speeds of a quantity in a unit."""
+    return 'of the limits' if unit == 's' else f'{unit}/s'

@@ -1,0 +1,306 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Outputs on the way: from a command of the goal to a record behind the right motion.
+
+The robot program reads a record when the motion before it returns, at its stop or where its blend
+begins, and switches the output when the tool gets to a place. So the time of a command (that of
+its point, and its offset) is turned into a place on the planned path, and the record stands behind
+the last motion that has returned by then. A robot that is slowed down switches at the same places.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+
+import numpy as np
+
+from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.goal import Goal, IOCommand, OutputKind
+from ur_cartesian_driver.motion.plan import PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.pose import conjugate, Pose, pose_from_row, rotate, Vector6
+from ur_cartesian_driver.motion.primitive import Spline, SwitchOutput
+from ur_cartesian_driver.planning.geometry.pose_rows import Floats
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT
+from ur_cartesian_driver.protocol.program.trajectory_points import MAX_PENDING_OUTPUTS
+
+#: The longest time after a point [s].
+MAX_OUTPUT_OFFSET = 60.0
+
+_OUTPUTS = {
+    OutputKind.STANDARD_DIGITAL: ('standard digital output', 8),
+    OutputKind.CONFIGURABLE_DIGITAL: ('configurable digital output', 8),
+    OutputKind.TOOL_DIGITAL: ('tool digital output', 2),
+    OutputKind.STANDARD_ANALOG: ('standard analog output', 2),
+}
+# Two times nearer than this are one [s].
+_SAME_TIME = 1e-6
+# Half of the time over which a heading is looked for [s], and how long it may get.
+_DIRECTION_TIME, _MAX_DIRECTION_TIME = 0.002, 0.6
+# Where the tool moves by less than this the heading means nothing [m], [rad]; where it moves by
+# less than so much for a turn, it is that of the turn [m/rad].
+_MIN_MOTION = 1e-7
+_TURNING = 0.01
+# A tool that is less beyond a place when its record is read does not come round to it [m], [rad].
+_BEYOND = 1e-4
+
+
+def check_outputs(goal: Goal, options: PlanningOptions) -> None:
+    """
+    Check the commands by themselves.
+
+    :raises InvalidGoal: names field, value and bound.
+    :raises NotAvailable: the robot program is not ours.
+    """
+    if goal.io_commands and options.dialect is not NEWEST_DIALECT:
+        raise NotAvailable(
+            'io_commands',
+            'is not empty, and robot programs of wire dialect '
+            f'{options.dialect.name} switch no outputs on the way',
+            'leave it empty, or let the driver send its own robot program',
+        )
+    for i, command in enumerate(goal.io_commands):
+        _check(command, f'io_commands[{i}]', len(goal.waypoints))
+
+
+def _check(command: IOCommand, field: str, points: int) -> None:
+    name, pins = _OUTPUTS[command.output]
+    if not 0 <= command.waypoint < points:
+        raise InvalidGoal(
+            f'{field}.point_index',
+            f'is {command.waypoint}, and the points are 0 to {points - 1}',
+            'name one of these',
+        )
+    if not 0.0 <= command.offset <= MAX_OUTPUT_OFFSET:
+        raise InvalidGoal(
+            f'{field}.offset',
+            f'is {command.offset:g} s; it is 0 to {MAX_OUTPUT_OFFSET:g} s after the point',
+            'name a later point',
+        )
+    if not 0 <= command.pin < pins:
+        raise InvalidGoal(
+            f'{field}.pin',
+            f'is {command.pin}, and there are {name}s 0 to {pins - 1}',
+            'name one of these',
+        )
+    is_analog = command.output is OutputKind.STANDARD_ANALOG
+    if (
+        not isfinite(command.value)
+        or not 0.0 <= command.value <= 1.0
+        or (not is_analog and command.value not in (0.0, 1.0))
+    ):
+        raise InvalidGoal(
+            f'{field}.value',
+            f'is {command.value:g}; a {name} takes '
+            + ('0 to 1, the fraction of its range' if is_analog else '0 (off) or 1 (on)'),
+            'give one of these',
+        )
+
+
+def place_outputs(
+    segments: Sequence[PlannedSegment],
+    reference: ReferencePath,
+    commands: Sequence[IOCommand],
+    *,
+    blend_times: Sequence[float] = (),
+    start_time: float = 0.0,
+) -> tuple[PlannedSegment, ...]:
+    """
+    Return the segments with the outputs that are switched on the way, in their order in time.
+
+    :param reference: the path of the TCP; its times are those of the segments.
+    :param commands: their waypoints are numbered as those of the segments.
+    :param corners: the time in the corner after each segment [s]; empty = there are none.
+    :param since: when the first segment begins [s].
+    :raises InvalidGoal: no motion leads to a point, or too many outputs wait at one time.
+    """
+    if not commands:
+        return tuple(segments)
+    timed_path = _TimedPath(segments, reference, blend_times, start_time)
+    switches = sorted(
+        (timed_path.switch(command, f'io_commands[{i}]') for i, command in enumerate(commands)),
+        key=lambda found: found.time,
+    )
+    outputs: list[list[SwitchOutput]] = [[] for _ in segments]
+    notes = [segment.note for segment in segments]
+    for found in switches:
+        outputs[found.after_index].append(found.record)
+        notes[found.report_index] += f'; {found.text}'
+    for own, segment in zip(outputs, segments, strict=True):
+        if sum(record.trigger_pose is not None for record in own) > MAX_PENDING_OUTPUTS:
+            raise InvalidGoal(
+                'io_commands',
+                f'switches more than {MAX_PENDING_OUTPUTS} outputs between two motions, '
+                f'behind point {segment.waypoint}',
+                'add a point in between',
+            )
+    return tuple(
+        replace(segment, outputs=tuple(own), note=note) if own or note != segment.note else segment
+        for segment, own, note in zip(segments, outputs, notes, strict=True)
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _PlacedOutput:
+    """One output: when, behind which segment, and in which segment's line it is told."""
+
+    time: float
+    after_index: int
+    report_index: int
+    record: SwitchOutput
+    text: str
+
+
+class _TimedPath:
+    """The motions in time, and the path."""
+
+    def __init__(
+        self,
+        segments: Sequence[PlannedSegment],
+        reference: ReferencePath,
+        blend_times: Sequence[float],
+        start_time: float,
+    ) -> None:
+        """Note when each motion ends, and when it returns."""
+        self.segments, self.reference = segments, reference
+        self.ends: Floats = start_time + np.cumsum([segment.duration for segment in segments])
+        self.blend_times = np.array(blend_times or [0.0] * len(segments))
+        self.returns: Floats = self.ends - 0.5 * self.blend_times
+        self.index = {segment.waypoint: k for k, segment in enumerate(segments)}
+
+    def switch(self, command: IOCommand, field: str) -> _PlacedOutput:
+        """Return when and where a command is carried out."""
+        report_index = self.index.get(command.waypoint)
+        if report_index is None:
+            raise InvalidGoal(
+                f'{field}.point_index',
+                f'is {command.waypoint}, and no motion leads there: the robot stands there',
+                'set the output before',
+            )
+        time, last = float(self.ends[report_index]) + command.offset, len(self.segments) - 1
+        late = time - float(self.ends[last])
+        if command.offset <= _SAME_TIME:
+            after_index, trigger_time, where = (
+                report_index,
+                self._at_point(report_index),
+                self._where(report_index),
+            )
+        elif late > -_SAME_TIME:
+            after_index, trigger_time = last, None
+            where = f'{max(late, 0.0):.3f} s after the end'
+        else:
+            after_index, trigger_time, where = (
+                self._last_returned(time),
+                time,
+                f'{command.offset:.3f} s after it',
+            )
+        record = SwitchOutput(
+            output=command.output,
+            pin=command.pin,
+            value=command.value,
+            domain=command.domain,
+            delay=max(late, 0.0) if trigger_time is None and command.offset > _SAME_TIME else 0.0,
+        )
+        if trigger_time is not None:
+            record = self._at(record, trigger_time, float(self.returns[after_index]))
+        return _PlacedOutput(
+            time=time if trigger_time is None else trigger_time,
+            after_index=after_index,
+            report_index=report_index,
+            record=record,
+            text=f'switches {_describe_command(command)} {where}',
+        )
+
+    def _last_returned(self, time: float) -> int:
+        """Return the number of the last motion that has returned at a time [s]."""
+        return int(np.searchsorted(self.returns, time + _SAME_TIME, side='right')) - 1
+
+    def _passes(self, k: int) -> bool:
+        """Tell whether the arm moves at the end of a motion."""
+        piece = self.segments[k].primitive
+        return self.blend_times[k] > 0.0 or (isinstance(piece, Spline) and any(piece.velocities))
+
+    def _where(self, k: int) -> str:
+        if self.blend_times[k] > 0.0:
+            return 'in the middle of its corner'
+        return 'on passing it' if self._passes(k) else 'when it has stopped there'
+
+    def _at_point(self, k: int) -> float | None:
+        """Return when the tool is nearest to the end of a motion [s], None where it stops."""
+        if not self._passes(k):
+            return None
+        end, half = float(self.ends[k]), 0.5 * float(self.blend_times[k])
+        target = getattr(self.segments[k].primitive, 'target', None)
+        if half <= 0.0 or not isinstance(target, Pose):
+            return end
+        return self._nearest(np.array(target.position), end - half, end + half, end)
+
+    def _nearest(self, position: Floats, begin: float, end: float, middle: float) -> float:
+        """Return when the path is nearest to a position within a time, the middle if always."""
+        times, rows = self.reference.time, self.reference.poses
+        own = slice(
+            max(int(np.searchsorted(times, begin, side='right')) - 1, 0),
+            int(np.searchsorted(times, end)) + 1,
+        )
+        points, t = rows[own, :3], times[own]
+        chords = np.diff(points, axis=0)
+        square = (chords * chords).sum(axis=1)
+        if square.max(initial=0.0) < _MIN_MOTION**2:
+            return middle
+        along = ((position - points[:-1]) * chords).sum(axis=1) / np.maximum(square, 1e-300)
+        u = np.clip(along, 0.0, 1.0)
+        k = int(np.argmin(np.linalg.norm(points[:-1] + u[:, None] * chords - position, axis=1)))
+        return float(np.clip(t[k] + u[k] * (t[k + 1] - t[k]), begin, end))
+
+    def _at(self, record: SwitchOutput, time: float, read: float) -> SwitchOutput:
+        """Return a record with its place: where the tool is at a time, read at another [s]."""
+        trigger_pose, trigger_direction = self._pose(time), self._trigger_direction(time)
+        if trigger_direction is None:
+            return record
+        start = (trigger_pose.inverse() @ self._pose(read)).rotation_vector()
+        beyond = sum(a * b for a, b in zip(start, trigger_direction, strict=True))
+        return replace(
+            record,
+            trigger_pose=trigger_pose,
+            trigger_direction=trigger_direction,
+            starts_beyond=beyond > _BEYOND,
+        )
+
+    def _pose(self, time: float) -> Pose:
+        times, rows = self.reference.time, self.reference.poses
+        k = min(max(int(np.searchsorted(times, time)), 1), len(times) - 1)
+        before, span = float(times[k - 1]), float(times[k] - times[k - 1])
+        part = min(max((time - before) / span, 0.0), 1.0) if span > 0.0 else 1.0
+        return pose_from_row(rows[k - 1]).interpolate(pose_from_row(rows[k]), part)
+
+    def _trigger_direction(self, time: float) -> Vector6 | None:
+        """Return the direction of the path at a time, None where it stands."""
+        pose, half = self._pose(time), _DIRECTION_TIME
+        while half <= _MAX_DIRECTION_TIME:
+            a, b = self._pose(time - half), self._pose(time + half)
+            distance, angle = a.distance_to(b), a.angle_to(b)
+            if distance > max(_MIN_MOTION, _TURNING * angle):
+                x, y, z = rotate(
+                    conjugate(pose.quaternion),
+                    (
+                        b.position[0] - a.position[0],
+                        b.position[1] - a.position[1],
+                        b.position[2] - a.position[2],
+                    ),
+                )
+                return (x / distance, y / distance, z / distance, 0.0, 0.0, 0.0)
+            if angle > _MIN_MOTION:
+                *_, x, y, z = (a.inverse() @ b).rotation_vector()
+                return (0.0, 0.0, 0.0, x / angle, y / angle, z / angle)
+            half *= 4.0
+        return None
+
+
+def _describe_command(command: IOCommand) -> str:
+    name, _ = _OUTPUTS[command.output]
+    if command.output is OutputKind.STANDARD_ANALOG:
+        return f'{name} {command.pin} to {command.value:g} ({command.domain.name.lower()})'
+    return f'{name} {command.pin} {"on" if command.value else "off"}'

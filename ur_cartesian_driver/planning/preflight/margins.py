@@ -1,0 +1,253 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How far the arm stays away from where it cannot go: singularities, and the ends of its joints.
+
+The three singularities are where two solutions of the arm meet: the wrist straight (axes 4 and 6
+parallel), the elbow stretched or folded, the centre of the wrist above or below the shoulder. What
+is measured vanishes there: the angle of wrist 2, the angle of the elbow, and how far the centre of
+the wrist is in front of the plane of the axes 1 and 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.inverse import format_distinct
+from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import NearSingularity
+from ur_cartesian_driver.planning.geometry.pose_rows import Floats
+from ur_cartesian_driver.planning.geometry.samples import CurvePiece
+from ur_cartesian_driver.planning.geometry.tool_spline import ToolCurve
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.joint_path import describe_location, JointPath
+
+#: So near to a start at rest the arm may be singular [m], [rad] ...
+START_LENGTH = 0.001
+START_ANGLE = 0.01
+#: ... and farther on as long as it gets away from there, but for rounding.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class SingularityMeasure:
+    """A distance from a singularity, and how it is called."""
+
+    name: str
+    unit: str
+    option: str
+    #: What a reader can look at.
+    meaning: str
+    #: Distances are compared as parts of this.
+    scale: float
+
+
+SINGULARITY_MEASURES = (
+    SingularityMeasure(
+        'wrist',
+        'rad',
+        'singularity_margin_wrist',
+        'wrist_2_joint from where the axes 4 and 6 are parallel',
+        1.0,
+    ),
+    SingularityMeasure(
+        'elbow',
+        'rad',
+        'singularity_margin_elbow',
+        'elbow_joint from the stretched or folded arm',
+        1.0,
+    ),
+    SingularityMeasure(
+        'shoulder',
+        'm',
+        'singularity_margin_shoulder',
+        'the centre of the wrist from above or below the shoulder',
+        0.3,
+    ),
+)
+_SCALES = np.array([*(measure.scale for measure in SINGULARITY_MEASURES), 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class TightestMargin:
+    """What came nearest to its bound on a segment."""
+
+    name: str
+    value: float
+    unit: str
+    fraction: float
+    #: The value as a part of the scale of its quantity.
+    share: float
+
+    def __str__(self) -> str:
+        """Return it as a report says it."""
+        return f'{self.name} {self.value:.3g} {self.unit} at {100.0 * self.fraction:.0f} %'
+
+
+def singularity_distance_rows(arm: Arm, q: Floats) -> Floats:
+    """Return the three measures (n, 3) of configurations (n, 6), all >= 0, as in MEASURES."""
+    of = branch_measures(arm, q)
+    return np.stack(
+        (
+            np.arcsin(np.minimum(1.0, np.abs(of.wrist))),
+            np.arcsin(np.minimum(1.0, np.abs(of.elbow))),
+            np.abs(of.shoulder),
+        ),
+        axis=1,
+    )
+
+
+def joint_limit_distances(arm: Arm, q: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    """Return the least distance of a joint from an end of its range (n,) [rad], and which."""
+    low, high = np.array(arm.model.position_limits).T
+    distance = np.minimum(q - low, high - q)
+    joint = np.argmin(distance, axis=1)
+    return np.take_along_axis(distance, joint[:, None], axis=1)[:, 0], joint
+
+
+def near_singularity_refusal(
+    pieces: Sequence[CurvePiece],
+    joint_path: JointPath,
+    measures: Floats,
+    segments: NDArray[np.int32],
+    fractions: Floats,
+    options: PlanningOptions,
+) -> tuple[NearSingularity, int] | None:
+    """
+    Return the refusal of the first segment that is too near to a singularity, and which it is.
+
+    :param measures: (n, 3) of the places found.
+    :param segments: (n,) and ``fractions`` (n,) of them.
+    """
+    bounds = np.array(
+        [float(getattr(options, measure.option)) for measure in SINGULARITY_MEASURES]
+    )
+    near = measures < bounds
+    if not near.any():
+        return None
+    for segment in np.unique(segments[near.any(axis=1)]):
+        rows = np.flatnonzero(segments == segment)
+        near[rows] &= ~_is_leaving(pieces, joint_path, rows, measures)
+        if not near[rows].any():
+            continue
+        row, k = min(
+            ((int(r), int(c)) for r, c in np.argwhere(near[rows])),
+            key=lambda at: measures[rows[at[0]], at[1]] / bounds[at[1]],
+        )
+        measure, bound = SINGULARITY_MEASURES[k], float(bounds[k])
+        value = _format_below(float(measures[rows[row], k]), bound)
+        where = describe_location(int(segment), float(fractions[rows[row]]))
+        return NearSingularity(
+            f'{where} comes within {value} {measure.unit} of the {measure.name} singularity '
+            f'({measure.meaning}), and {measure.option} asks for {bound:g} {measure.unit}; keep '
+            'away from it, use a JOINT segment, or lower the parameter.'
+        ), int(segment)
+    return None
+
+
+def _format_below(value: float, bound: float) -> str:
+    """Return a value below its bound in few digits, and so that it reads as below."""
+    text = f'{round(value, 6):.3g}'  # what is smaller is rounding
+    return text if float(text) < bound else format_distinct(value, bound)[0]
+
+
+def _is_leaving(
+    pieces: Sequence[CurvePiece], joint_path: JointPath, rows: NDArray[np.intp], measures: Floats
+) -> NDArray[np.bool_]:
+    """
+    Tell which places (n, 3) of a segment are on the way out of a singularity it starts in.
+
+    Where the robot stands is not the goal's choice: so near to a start at rest nothing counts, nor
+    does what only grows from there.
+    """
+    piece = pieces[int(joint_path.piece[rows[0]])]
+    excused = np.zeros((len(rows), len(SINGULARITY_MEASURES)), dtype=np.bool_)
+    if isinstance(piece.curve, ToolCurve):
+        return excused  # splines have one start, see leaving_rows
+    if (
+        piece.begin > 0.0
+        or _is_blend(piece)
+        or (int(joint_path.piece[rows[0]]) != _first_of(pieces, piece.index))
+    ):
+        return excused  # it comes out of a corner
+    length, angle = piece.size
+    on_it = joint_path.piece[rows] == joint_path.piece[rows[0]]
+    t = joint_path.t[rows]
+    excused |= (on_it & (t * length <= START_LENGTH) & (t * angle <= START_ANGLE))[:, None]
+    grows = np.diff(measures[rows], axis=0, prepend=0.0) >= -_ROUNDING
+    excused |= np.logical_and.accumulate((grows & on_it[:, None]) | excused, axis=0)
+    return excused
+
+
+def is_leaving_rows(
+    measures: Floats, length: Floats, angle: Floats, *, rests: bool
+) -> NDArray[np.bool_]:
+    """
+    Tell which places (n, 3) of a whole motion are on the way out of a singularity it starts in.
+
+    :param length: (n,) the way since its start [m], and ``angle`` the turn [rad].
+    :param rests: whether it starts at rest.
+    """
+    at_start = (rests & (length <= START_LENGTH) & (angle <= START_ANGLE))[:, None]
+    grows = np.diff(measures, axis=0, prepend=0.0) >= -_ROUNDING
+    excused: NDArray[np.bool_] = np.logical_and.accumulate(grows | at_start, axis=0)
+    return excused
+
+
+def _first_of(pieces: Sequence[CurvePiece], index: int) -> int:
+    """Return the number of the first piece on which the tool is on the way to a waypoint."""
+    for number, piece in enumerate(pieces):
+        if piece.index == index or (piece.index == index - 1 and _is_blend(piece)):
+            return number
+    return -1
+
+
+def _is_blend(piece: CurvePiece) -> bool:
+    return hasattr(piece.curve, 'leave')
+
+
+def margins_by_segment(
+    arm: Arm, q: Floats, measures: Floats, segments: NDArray[np.int32], fractions: Floats
+) -> dict[int, TightestMargin]:
+    """
+    Return what comes nearest to its bound, by segment.
+
+    :param measures: (n, 3), inf where they do not count.
+    """
+    distance, joint = joint_limit_distances(arm, q)
+    values = np.concatenate([measures, distance[:, None]], axis=1)
+    shares = values / _SCALES
+    kind = np.argmin(shares, axis=1)
+    least = np.take_along_axis(shares, kind[:, None], axis=1)[:, 0]
+    order = np.lexsort((least, segments))
+    first = order[np.flatnonzero(np.diff(segments[order], prepend=segments[order[0]] - 1))]
+    columns = (
+        segments[first],
+        kind[first],
+        joint[first],
+        values[first, kind[first]],
+        fractions[first],
+        least[first],
+    )
+    return {
+        segment: TightestMargin(_name(k, j), value, _unit(k), fraction, share)
+        for segment, k, j, value, fraction, share in zip(
+            *(column.tolist() for column in columns), strict=True
+        )
+    }
+
+
+def _name(kind: int, joint: int) -> str:
+    if kind == len(SINGULARITY_MEASURES):
+        return f'the end of the range of {JOINT_NAMES[joint]}'
+    return SINGULARITY_MEASURES[kind].name
+
+
+def _unit(kind: int) -> str:
+    return 'rad' if kind == len(SINGULARITY_MEASURES) else SINGULARITY_MEASURES[kind].unit

@@ -1,0 +1,240 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+In which joint configuration the arm arrives, and why it cannot.
+
+The robot is told poses; which of up to eight configurations it takes follows from where it comes
+from. So the configuration is predicted segment by segment: along a straight line or an arc by
+following the inverse kinematics (:mod:`~.joint_path`), for a joint move by choosing the solution
+that is then sent along as ``q_near``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from math import degrees, dist, hypot, pi
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.closed_form_rows import BRANCHES
+from ur_cartesian_driver.kinematics.inverse import (
+    explain_unreachable,
+    format_distinct,
+    nearest,
+    nearest_to_posture,
+    solutions,
+)
+from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import (
+    GoalRefused,
+    JointLimitExceeded,
+    NearSingularity,
+    Unreachable,
+)
+from ur_cartesian_driver.motion.goal import Posture
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.primitive import Joints
+
+#: The named joints have to arrive this near to the chosen solution, turns included [rad].
+ARRIVAL_TOLERANCE = 0.01
+#: A continued configuration is one that no joint turns farther to than this [rad].
+_MAX_CONTINUED_STEP = 0.5
+#: Rounding of a configuration [rad].
+_ROUNDING = 1e-6
+# How near to the middle of its range a measure of a branch is, to compare the three [m].
+_ARM_LENGTH = 0.3
+
+
+class TcpKinematics:
+    """
+    One arm with one tool: the inverse kinematics of the TCP, with refusals that name the place.
+
+    :param arm: the kinematics.
+    :param T_flange_tcp: the active TCP.
+    """
+
+    def __init__(self, arm: Arm, T_flange_tcp: Pose) -> None:
+        """Prepare the way from the TCP back to the flange."""
+        self.arm = arm
+        self.T_flange_tcp = T_flange_tcp
+        self.T_tcp_flange = T_flange_tcp.inverse()
+
+    def flange(self, T_base_tcp: Pose) -> Pose:
+        """Return where the flange is when the TCP is there."""
+        return T_base_tcp @ self.T_tcp_flange
+
+    def solution(self, T_base_tcp: Pose, q_near: Joints) -> Joints | None:
+        """Return the solution nearest to a configuration, None if there is none."""
+        return nearest(self.arm, self.flange(T_base_tcp), q_near)
+
+    def nearest(self, T_base_tcp: Pose, q_near: Joints, where: str) -> Joints:
+        """
+        Return the solution nearest to a configuration.
+
+        :param place: what the text of a refusal begins with, ``trajectory.points[2].pose``.
+        :raises Unreachable: there is none.
+        :raises JointLimitExceeded: each of them is outside the range of a joint.
+        """
+        q = self.solution(T_base_tcp, q_near)
+        if q is None:
+            raise self.no_solution_error(T_base_tcp, where)
+        return q
+
+    def solve_posture(
+        self, T_base_tcp: Pose, named: dict[int, float], q_before: Joints, where: str
+    ) -> Joints:
+        """
+        Return the solution that a posture means.
+
+        Of all solutions those nearest in the named joints, of them the one nearest to the
+        configuration before. Raises as :meth:`nearest`.
+        """
+        # Where the arm is already as near as counts, that is the one.
+        if hypot(*(q_before[k] - value for k, value in named.items())) <= ARRIVAL_TOLERANCE:
+            here = self.solution(T_base_tcp, q_before)
+            if here is not None and dist(here, q_before) < _ROUNDING:
+                return here
+        q = nearest_to_posture(self.arm, self.flange(T_base_tcp), named, q_before)
+        if q is None:
+            raise self.no_solution_error(T_base_tcp, where)
+        return q
+
+    def no_solution_error(self, T_base_tcp: Pose, where: str, there: str = '') -> GoalRefused:
+        """
+        Tell why a pose has no solution: out of reach, or outside of the joints' ranges.
+
+        :param there: where the pose is, if not at the place.
+        """
+        T_base_flange = self.flange(T_base_tcp)
+        why = there + explain_unreachable(self.arm, T_base_flange)
+        if solutions(self.arm, T_base_flange):
+            return JointLimitExceeded(
+                f'{where} cannot be reached: {why}; turn the tool in another way.'
+            )
+        return Unreachable(
+            f'{where} cannot be reached: {why}; check the frame and the TCP, or '
+            'move the point or the robot.'
+        )
+
+    def discontinuity_error(
+        self,
+        T_base_tcp: Pose,
+        q: Joints,
+        q_next: Joints,
+        where: str,
+        poses_beyond: Iterable[Pose] = (),
+    ) -> GoalRefused:
+        """
+        Tell why the configuration cannot be continued: end of a range, or a singularity.
+
+        :param onward: where the tool would go from there, near to each other.
+        """
+        goes_on = self._continue_branch(T_base_tcp, q)
+        for k, (low, high) in enumerate(self.arm.model.position_limits):
+            if goes_on is not None and not low <= goes_on[k] <= high:
+                side = 1.0 if goes_on[k] > high else -1.0
+                far = side * max(
+                    side * at for at in self._joint_positions_beyond(k, goes_on, poses_beyond)
+                )
+                value, _ = format_distinct(far, high if side > 0.0 else low)
+                return JointLimitExceeded(
+                    f'{where} takes {JOINT_NAMES[k]} out of its range of {low:.4f} to {high:.4f} '
+                    f'rad, as far as {value} rad; start with this joint turned back, or go there '
+                    'with a JOINT segment.'
+                )
+        joint = max(range(6), key=lambda k: abs(q_next[k] - q[k]))
+        return NearSingularity(
+            f'{where} lies behind the {self.nearest_singularity(q)} singularity: '
+            f'{JOINT_NAMES[joint]} would have to turn '
+            f'by {degrees(abs(q_next[joint] - q[joint])):.0f} degrees at once; keep away from '
+            'it, or use a JOINT segment.'
+        )
+
+    def nearest_singularity(self, q: Joints) -> str:
+        """Return which singularity a configuration is nearest to: wrist, elbow or shoulder."""
+        measures = branch_measures(self.arm, np.array([q]))
+        distances = {
+            'wrist': abs(float(measures.wrist[0])),
+            'elbow': abs(float(measures.elbow[0])),
+            'shoulder': abs(float(measures.shoulder[0])) / _ARM_LENGTH,
+        }
+        return min(distances, key=lambda name: distances[name])
+
+    def describe_flips(self, q: Joints, q_other: Joints) -> str:
+        """Return what has to flip from one configuration to another, '' if nothing does."""
+        first, second = branch_measures(self.arm, np.array([q, q_other])).branch
+        a, b = BRANCHES[first], BRANCHES[second]
+        names = [
+            name
+            for name, x, y in zip(
+                ('a crossing of the shoulder', 'a flip of the elbow', 'a flip of the wrist'),
+                a,
+                b,
+                strict=True,
+            )
+            if x != y
+        ]
+        return ' and '.join(names)
+
+    def _joint_positions_beyond(
+        self, k: int, q: Joints, poses_beyond: Iterable[Pose]
+    ) -> Iterator[float]:
+        """Give the positions of a joint [rad] along a way, as far as it can be followed."""
+        yield q[k]
+        for pose in poses_beyond:
+            goes_on = self._continue_branch(pose, q)
+            if goes_on is None:
+                return
+            q = goes_on
+            yield q[k]
+
+    def _continue_branch(self, T_base_tcp: Pose, q: Joints) -> Joints | None:
+        """Return the solution next to a configuration, the limits of the joints aside."""
+
+        def around(found: Joints) -> Joints:
+            a, b, c, d, e, f = (
+                x + 2.0 * pi * round((y - x) / (2.0 * pi)) for x, y in zip(found, q, strict=True)
+            )
+            return (a, b, c, d, e, f)
+
+        every = (around(found) for found in solutions(self.arm, self.flange(T_base_tcp), q))
+        found = min(every, key=lambda found: dist(found, q), default=None)
+        if (
+            found is None
+            or max(abs(b - a) for a, b in zip(q, found, strict=True)) > _MAX_CONTINUED_STEP
+        ):
+            return None
+        return found
+
+
+def named_joints(posture: Posture, tf_prefix: str) -> dict[int, float]:
+    """Return the values [rad] of a checked posture by joint number."""
+    return {
+        JOINT_NAMES.index(name.removeprefix(tf_prefix)): value
+        for name, value in zip(posture.names, posture.values, strict=True)
+    }
+
+
+def full_posture(named: dict[int, float]) -> Joints | None:
+    """Return the configuration of a posture that names every joint, else None."""
+    if len(named) < 6:
+        return None
+    return (named[0], named[1], named[2], named[3], named[4], named[5])
+
+
+def describe_miss(q: Joints, chosen: Joints, named: dict[int, float]) -> str:
+    """
+    Return the clause that says which named joint does not arrive, empty if all do.
+
+    :param q: where the motion arrives.
+    :param chosen: the solution that the posture means.
+    """
+    for k in sorted(named):
+        if abs(q[k] - chosen[k]) > ARRIVAL_TOLERANCE:
+            return (
+                f'{JOINT_NAMES[k]} arrives at {q[k]:.3f} rad, and the solution for the '
+                f'posture has it at {chosen[k]:.3f} rad'
+            )
+    return ''

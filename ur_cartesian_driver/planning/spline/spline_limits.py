@@ -1,0 +1,146 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Whether tool and joints keep their limits along a spline, whose speed is known at each place.
+
+What is too fast can be slowed only as a whole: in f times the time the same way is gone with 1/f
+of the speeds and 1/f^2 of the accelerations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.differential_kinematics import joint_rates
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import TooFast
+from ur_cartesian_driver.planning.geometry.pose_rows import Floats
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.request.validate import point_field
+from ur_cartesian_driver.planning.spline.spline_path import SplinePath
+
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LimitExcess:
+    """What exceeds its limit by most."""
+
+    #: How many times the time would be enough.
+    factor: float
+    #: The point on the way to which it does, and the share of the time to it.
+    point: int
+    fraction: float
+    #: What it is, the most that is needed, what is allowed, and the unit of both.
+    what: str
+    needed: float
+    allowed: float
+    unit: str
+    #: Which limit.
+    name: str
+
+    def refusal(self, *, may_slow: bool = True) -> TooFast:
+        """
+        Return the refusal of the goal.
+
+        :param may_slow: whether the driver could give it more time.
+        """
+        return TooFast(
+            point_field(self.point, 'time_from_start'),
+            f'gives too little time: after {100.0 * self.fraction:.0f} % of it {self.what} needs '
+            f'{self.needed:.3f} {self.unit}, and allowed are {self.allowed:.3f} {self.unit} '
+            f'({self.name})',
+            f'give all points {ceil(1e3 * self.factor) / 1e3:.3f} times the time (and twists and '
+            f'accelerations to match){", or set on_too_fast to slow" if may_slow else ""}',
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Quantity:
+    what: str
+    #: (m,) its values, the limit, and 1 for speeds, 2 for accelerations.
+    values: Floats
+    limit: float
+    power: int
+    unit: str
+    name: str
+
+
+def worst_excess(
+    kinematics: TcpKinematics, path: SplinePath, options: PlanningOptions
+) -> LimitExcess | None:
+    """Return what exceeds its limit by most on a way, None if nothing does."""
+    worst: LimitExcess | None = None
+    for quantity in _quantities(kinematics, path, options):
+        row = int(np.argmax(quantity.values))
+        peak = float(quantity.values[row])
+        factor = (peak / quantity.limit) ** (1.0 / quantity.power)
+        if factor > max(1.0 + _ROUNDING, worst.factor if worst else 0.0):
+            worst = LimitExcess(
+                factor=factor,
+                point=int(path.points[row]),
+                fraction=float(path.u[row]),
+                what=quantity.what,
+                needed=peak,
+                allowed=quantity.limit,
+                unit=quantity.unit,
+                name=quantity.name,
+            )
+    return worst
+
+
+def _quantities(
+    kinematics: TcpKinematics, path: SplinePath, options: PlanningOptions
+) -> Iterator[_Quantity]:
+    begin, end = path.spline.times[path.piece], path.spline.times[path.piece + 1]
+    tool = path.spline.rows(path.piece, path.u * (end - begin))
+    qd, qdd = joint_rates(
+        kinematics.arm, kinematics.T_flange_tcp, path.q, tool.twists, tool.accelerations
+    )
+    if options.max_tool_speed > 0.0:
+        yield _Quantity(
+            'the tool',
+            _norms(tool.twists[:, :3]),
+            options.max_tool_speed,
+            1,
+            'm/s',
+            'max_tool_speed',
+        )
+    yield _Quantity(
+        'the tool',
+        _norms(tool.accelerations[:, :3]),
+        options.max_linear_acceleration,
+        2,
+        'm/s^2',
+        'max_linear_acceleration',
+    )
+    yield _Quantity(
+        'the tool',
+        _norms(tool.accelerations[:, 3:]),
+        options.max_angular_acceleration,
+        2,
+        'rad/s^2',
+        'max_angular_acceleration',
+    )
+    for k, (name, limit) in enumerate(
+        zip(JOINT_NAMES, kinematics.arm.model.max_joint_speed, strict=True)
+    ):
+        yield _Quantity(name, np.abs(qd[:, k]), limit, 1, 'rad/s', 'the limit of the joint')
+        yield _Quantity(
+            name,
+            np.abs(qdd[:, k]),
+            options.max_joint_acceleration,
+            2,
+            'rad/s^2',
+            'max_joint_acceleration',
+        )
+
+
+def _norms(vectors: Floats) -> Floats:
+    lengths: Floats = np.linalg.norm(vectors, axis=1)
+    return lengths

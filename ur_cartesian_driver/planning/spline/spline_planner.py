@@ -1,0 +1,375 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+From points with times, twists and accelerations to joint spline pieces: SPLINE and SERVO.
+
+Points -> the tool over time (:mod:`~.tool_spline`) -> the arm along it (:mod:`~.spline_path`) ->
+limits -> joint polynomials (:mod:`~.joint_polynomials`). A motion may be planned in parts, from
+where the one before ends: :func:`plan_spline` takes any :class:`SplineState`, also a moving one,
+and :func:`closing` brings such a motion to rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import degrees
+
+import numpy as np
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded
+from ur_cartesian_driver.motion.goal import Goal, ZERO6
+from ur_cartesian_driver.motion.joint_spline import JointSpline
+from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
+from ur_cartesian_driver.motion.polynomials import MotionRows
+from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.primitive import Joints, Spline
+from ur_cartesian_driver.planning.geometry.curves import tcp_rows
+from ur_cartesian_driver.planning.geometry.pose_rows import Floats
+from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
+from ur_cartesian_driver.planning.moves.reference_path import keep_hemisphere
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.preflight.clearance import Clearance, clearance_remarks
+from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
+from ur_cartesian_driver.planning.request.validate import point_field
+from ur_cartesian_driver.planning.spline.joint_polynomials import (
+    fit_joint_polynomials,
+    JointPolynomials,
+)
+from ur_cartesian_driver.planning.spline.spline_limits import worst_excess
+from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, SplinePath
+from ur_cartesian_driver.planning.spline.spline_points import point_remarks, tool_points
+
+#: What an angle counts as a length: tolerances of a tool spline are as much at this distance [m].
+ANGLE_TOLERANCE_RADIUS = 0.1
+# Places at which a closing piece is looked at, and how much shorter the next try is.
+_SAMPLES = 17
+_SHORTENING = 0.8
+_TRIES = 20
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SplineState:
+    """Where a motion in spline pieces is at the end of one, as the robot program carries it on."""
+
+    #: From the start of the motion [s].
+    time: float = 0.0
+    #: [rad], [rad/s], [rad/s^2]; behind a cubic piece the acceleration counts as 0.
+    q: Joints
+    qd: Vector6 = ZERO6
+    qdd: Vector6 = ZERO6
+
+    @classmethod
+    def after(cls, piece: Spline, time: float) -> SplineState:
+        """Return the state at the end of a piece that ends at a time [s]."""
+        return cls(
+            time=time, q=piece.target, qd=piece.velocities, qdd=piece.accelerations or ZERO6
+        )
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether the arm is not at rest."""
+        return any(self.qd) or any(self.qdd)
+
+    def rows(self) -> MotionRows:
+        """Return the joints in rows (1, 6)."""
+        return MotionRows(np.array([self.q]), np.array([self.qd]), np.array([self.qdd]))
+
+    def tool(self, arm: Arm, T_flange_tcp: Pose) -> ToolPoints:
+        """Return the TCP in base, one row."""
+        q, qd, qdd = self.rows()
+        twist, acceleration = tool_rates(arm, T_flange_tcp, q, qd, qdd)
+        return ToolPoints(
+            times=np.array([self.time]),
+            poses=tcp_rows(arm, T_flange_tcp, q),
+            twists=twist,
+            accelerations=acceleration,
+            quintic=True,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SplinePieces:
+    """A part of a motion that passed all checks."""
+
+    #: One for each piece; the note stands at the last piece to a point.
+    segments: tuple[PlannedSegment, ...]
+    #: Row 0 is the start; times are from the start of the motion.
+    reference: ReferencePath
+    remarks: tuple[str, ...]
+    #: At the last point.
+    end: SplineState
+    #: By how much all times were stretched, 1 = not.
+    stretch: float = 1.0
+
+
+def plan_spline(
+    start: SplineState,
+    goal: Goal,
+    arm: Arm,
+    T_flange_tcp: Pose,
+    options: PlanningOptions,
+    *,
+    first: int = 0,
+    tool_tips: Sequence[Pose] = (),
+) -> SplinePieces:
+    """
+    Return the pieces from a state to points.
+
+    :param goal: its waypoints are those behind the state, and their times are from the start of
+        the motion. With ``keep_open`` it may end moving; then the way on which :func:`closing`
+        brings it to rest is checked as well.
+    :param T_flange_tcp: the TCP of the motion.
+    :param first: the number of the first of the waypoints in the whole goal.
+    :param tools: where tools reach behind the flange, for collisions; empty = the TCP.
+    :raises GoalRefused: the subclass that fits; its text names point, quantity, value and bound.
+    """
+    kinematics = TcpKinematics(arm, T_flange_tcp)
+    points = tool_points(goal, start.tool(arm, T_flange_tcp))
+    path = solve_spline_path(
+        kinematics,
+        ToolSpline.through(points),
+        goal.waypoints,
+        start.q,
+        options,
+        first=first,
+        rests=not start.is_moving,
+    )
+    path, stretch, remarks_made = _fit_to_limits(kinematics, path, start, goal, options)
+    polynomials = fit_joint_polynomials(
+        kinematics,
+        path,
+        start.rows(),
+        points.quintic,
+        options.spline_tolerance,
+        options.spline_tolerance / ANGLE_TOLERANCE_RADIUS,
+    )
+    segments = tuple(_segments(path, polynomials, goal))
+    piece = segments[-1].primitive
+    assert isinstance(piece, Spline)
+    end = SplineState.after(piece, float(polynomials.times[-1]))
+    remarks_made += _clearance_remarks(
+        path, end, arm, tool_tips or (T_flange_tcp,), start, options
+    )
+    return SplinePieces(
+        segments=segments,
+        reference=_reference(path),
+        end=end,
+        stretch=stretch,
+        remarks=(
+            *point_remarks(goal, first),
+            *remarks_made,
+            _precision(polynomials),
+            _tightest_remark(path),
+        ),
+    )
+
+
+def end_state(plan: Plan) -> SplineState:
+    """Return where a plan of spline pieces ends."""
+    piece = plan.segments[-1].primitive
+    assert isinstance(piece, Spline)
+    return SplineState.after(piece, float(plan.reference.time[-1]))
+
+
+def plan_stop(state: SplineState, arm: Arm, deceleration: float) -> Spline:
+    """
+    Return the piece that brings a moving arm to rest, each joint on as it goes.
+
+    Velocities end as cubics with no acceleration at the end, so the joint that is the fastest
+    brakes 1.5 times as hard as on average. It brakes harder than it is told to where it would
+    leave the range of a joint or, being accelerated still, exceed its speed.
+
+    :param deceleration: of the fastest joint, at the most [rad/s^2].
+    :raises JointLimitExceeded: the end of a range is too near.
+    """
+    v, a = np.array(state.qd), np.array(state.qdd)
+    speed = np.maximum(arm.model.max_joint_speed, np.abs(v))
+    T = max(1.5 * float(np.abs(v).max()) / deceleration, _SAMPLES * 1e-3)
+    for _ in range(_TRIES):
+        T = round(T, 6)
+        target = np.array(state.q) + 0.5 * T * v + T**2 / 12.0 * a
+        piece = Spline(target=_six(target), velocities=ZERO6, accelerations=ZERO6, duration=T)
+        q, qd, _ = _rows_of(state, piece)
+        joint = _joint_outside_range(arm, q)
+        if joint is None and (np.abs(qd) <= speed * (1.0 + 1e-9)).all():
+            return piece
+        T *= _SHORTENING
+    raise JointLimitExceeded(
+        f'{JOINT_NAMES[joint or 0]} is so near to the end of its range, and so fast, that it '
+        'cannot be stopped before it; end the motion earlier.'
+    )
+
+
+def _rows_of(state: SplineState, piece: Spline) -> tuple[Floats, Floats, Floats]:
+    spline = JointSpline.of(state.q, [piece], velocities=state.qd, accelerations=state.qdd)
+    return spline.rows(np.linspace(0.0, piece.duration, _SAMPLES))
+
+
+def _joint_outside_range(arm: Arm, q: Floats) -> int | None:
+    """Return the joint that leaves its range, None if none does."""
+    low, high = np.array(arm.model.position_limits).T
+    outside = ((q < low - 1e-9) | (q > high + 1e-9)).any(axis=0)
+    return int(np.argmax(outside)) if outside.any() else None
+
+
+def _fit_to_limits(
+    kinematics: TcpKinematics,
+    path: SplinePath,
+    start: SplineState,
+    goal: Goal,
+    options: PlanningOptions,
+) -> tuple[SplinePath, float, list[str]]:
+    """Return the way in the time that the limits allow, the factor, and what is said of it."""
+    found = worst_excess(kinematics, path, options)
+    if found is None:
+        return path, 1.0, []
+    in_parts = start.is_moving or goal.keep_open
+    if options.on_too_fast != 'slow' or in_parts:
+        raise found.refusal(may_slow=not in_parts)
+    path = path.stretch_times(found.factor)
+    longest = int(np.argmax(np.diff(path.spline.times)))
+    time = float(np.diff(path.spline.times)[longest])
+    if time > options.max_segment_time:
+        raise InvalidGoal(
+            point_field(path.first + longest, 'time_from_start'),
+            f'would take {time:.0f} s because of {found.name}, more than max_segment_time = '
+            f'{options.max_segment_time:.0f} s',
+            'go around the place where it has to be slow',
+        )
+    return (
+        path,
+        found.factor,
+        [
+            f'all times are stretched by {found.factor:.4g}, because of {found.name} = '
+            f'{found.allowed:.3f} {found.unit} of {found.what} on the way to point {found.point}: '
+            f'{path.spline.times[-1]:.3f} s in all'
+        ],
+    )
+
+
+def _segments(
+    path: SplinePath, polynomials: JointPolynomials, goal: Goal
+) -> Iterator[PlannedSegment]:
+    length = np.interp(polynomials.times, path.times, path.length)
+    angle = np.interp(polynomials.times, path.times, path.angle)
+    columns = (
+        polynomials.piece,
+        np.diff(polynomials.piece, append=-1) != 0,
+        np.diff(length),
+        np.diff(angle),
+        np.round(np.diff(polynomials.times), 6),
+        polynomials.q[1:],
+        polynomials.qd[1:],
+        polynomials.qdd[1:],
+    )
+    time_done, length_done, angle_done, count = 0.0, 0.0, 0.0, 0
+    for k, is_last, metres, radians, duration, q, qd, qdd in zip(
+        *(column.tolist() for column in columns), strict=True
+    ):
+        time_done, length_done, angle_done, count = (
+            time_done + duration,
+            length_done + metres,
+            angle_done + radians,
+            count + 1,
+        )
+        note = ''
+        if is_last:
+            note = _segment_note(path, goal, k, count, (length_done, angle_done, time_done))
+            time_done, length_done, angle_done, count = 0.0, 0.0, 0.0, 0
+        yield PlannedSegment(
+            primitive=Spline(
+                target=tuple(q),
+                velocities=tuple(qd),
+                duration=duration,
+                accelerations=tuple(qdd) if polynomials.quintic else None,
+            ),
+            waypoint=path.first + k,
+            length=metres,
+            angle=radians,
+            duration=duration,
+            joints=tuple(q),
+            note=note,
+        )
+
+
+def _segment_note(
+    path: SplinePath, goal: Goal, k: int, count: int, done: tuple[float, float, float]
+) -> str:
+    """Return the line of the segment to a point: ``done`` are its length, turn and time."""
+    length, angle, time = done
+    turn = f' and {degrees(angle):.1f} degrees' if degrees(angle) >= 0.05 else ''
+    speed = (
+        f'{length / time:.3f} m/s' if length > 1e-6 else f'{angle / time:.3f} rad/s'
+    ) + ' on average'
+    point = path.first + k
+    passes = (
+        'stops there'
+        if not any(goal.waypoints[k].twist)
+        or (k + 1 == len(goal.waypoints) and not goal.keep_open)
+        else 'passes it'
+    )
+    pieces = '1 piece' if count == 1 else f'{count} pieces'
+    return (
+        f'point {point}: SPLINE in {pieces}, {length:.3f} m{turn} in {time:.3f} s ({speed}), '
+        f'{passes}; nearest: {path.tightest_margin[point]}'
+    )
+
+
+def _clearance_remarks(
+    path: SplinePath,
+    end: SplineState,
+    arm: Arm,
+    tool_tips: Sequence[Pose],
+    start: SplineState,
+    options: PlanningOptions,
+) -> list[str]:
+    """Return what is said of collisions; behind a moving end the way to rest counts as well."""
+    q, points, u = path.q[1:], path.points[1:], path.u[1:]
+    if end.is_moving:
+        on = _rows_of(end, plan_stop(end, arm, options.keep_open_deceleration))[0]
+        q = np.concatenate([q, on])
+        points = np.concatenate([points, np.full(len(on), points[-1])])
+        u = np.concatenate([u, np.ones(len(on))])
+    remarks_made = (
+        line
+        for T_flange_tcp in tool_tips
+        for line in clearance_remarks(
+            Clearance(arm, T_flange_tcp, options).check(q, start.q), points, u
+        )
+    )
+    return list(dict.fromkeys(remarks_made))
+
+
+def _reference(path: SplinePath) -> ReferencePath:
+    poses = path.poses.copy()
+    keep_hemisphere(poses)
+    return ReferencePath(poses=poses, point=path.points, time=path.times)
+
+
+def _precision(polynomials: JointPolynomials) -> str:
+    kind = 'quintic' if polynomials.quintic else 'cubic'
+    return (
+        f'joints: {len(polynomials.piece)} {kind} pieces, along which the tool stays within '
+        f'{1e3 * polynomials.distance:.3f} mm and {polynomials.angle:.5f} rad of its spline'
+    )
+
+
+def _tightest_remark(path: SplinePath) -> str:
+    point, tightest_margin = min(path.tightest_margin.items(), key=lambda item: item[1].share)
+    return f'nearest of all: {tightest_margin} of the way to point {point}'
+
+
+def _six(values: Floats) -> Vector6:
+    a, b, c, d, e, f = values.tolist()
+    return (a, b, c, d, e, f)
+
+
+def stretch_times(goal: Goal, factor: float) -> Goal:
+    """Return a goal with all its times stretched."""
+    return replace(
+        goal, waypoints=tuple(replace(point, time=factor * point.time) for point in goal.waypoints)
+    )

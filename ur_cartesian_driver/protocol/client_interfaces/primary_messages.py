@@ -1,0 +1,538 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The primary interface: state and messages from the controller, programs and commands to it.
+
+To us: frames, big-endian. ``int32`` size of the whole frame, ``uint8`` type, body.
+
+* type 16, robot state: sub-packages, see `primary_state`; ten
+  times a second.
+* type 20, robot message: ``u64`` timestamp, ``i8`` source, ``u8`` message type, then
+
+  ====  ==================  ====================================================================
+  type  class               body (texts run to the end of the frame, without terminator)
+  ====  ==================  ====================================================================
+  0     TextMessage         text
+  3     VersionMessage      i8 length, name; u8 major, u8 minor, i32 bugfix, i32 build; date
+  5     SafetyModeMessage   i32 code, i32 argument, u8 safety mode, u32 type of the datum, 4 bytes
+                            datum (type 2: i32, 3: f32, else u32)
+  6     ErrorCodeMessage    i32 code, i32 argument, i32 level, u32 type of the datum, u32 datum;
+                            text
+  7     KeyMessage          i32 code, i32 argument; u8 length, title; text
+  10    RuntimeException    u32 line, u32 column (from 1); text
+  ====  ==================  ====================================================================
+
+* everything else is passed on as :class:`RawFrame`.
+
+To the controller: text. A line is a command; ``def`` or ``sec`` begins a program, which replaces
+the running one (``sec``: runs beside it) when its ``end`` has come.
+
+Obligations of a controller towards the manufacturer's library: the version message first on each
+connection; a frame in one piece and at most 4091 bytes long (checked here); never a sub-package
+that is too short; a safety-mode message on a change only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+import re
+import struct
+from typing import Any, ClassVar, TypeAlias
+
+from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
+    AdditionalInfo,
+    CalibrationData,
+    CartesianInfo,
+    ConfigurationData,
+    decode_sub_packages,
+    encode_sub_package,
+    ForceModeData,
+    ImmiData,
+    JointData,
+    KinematicsInfo,
+    MasterboardData,
+    pack,
+    RawSubPackage,
+    RobotModeData,
+    RobotType,
+    SAFETY_DATA,
+    SubPackage,
+    ToolCommunication,
+    ToolData,
+    ToolModeInfo,
+    unpack,
+)
+from ur_cartesian_driver.protocol.framing import decode_text, FrameBuffer, hex_text
+
+__all__ = [
+    'SAFETY_DATA',
+    'AdditionalInfo',
+    'CalibrationData',
+    'CartesianInfo',
+    'ConfigurationData',
+    'ErrorCodeMessage',
+    'ForceModeData',
+    'FrameType',
+    'ImmiData',
+    'JointData',
+    'KeyMessage',
+    'KinematicsInfo',
+    'MasterboardData',
+    'PrimaryCommand',
+    'PrimaryDecoder',
+    'PrimaryFrame',
+    'PrimaryMessage',
+    'RawFrame',
+    'RawMessage',
+    'RawSubPackage',
+    'ReportLevel',
+    'RobotModeData',
+    'RobotStateFrame',
+    'RobotType',
+    'RuntimeExceptionMessage',
+    'SafetyModeMessage',
+    'ScriptUploadDecoder',
+    'SubPackage',
+    'TextMessage',
+    'ToolCommunication',
+    'ToolData',
+    'ToolModeInfo',
+    'VersionMessage',
+    'decode_frame',
+    'encode_command',
+    'encode_message',
+    'encode_program',
+    'encode_state',
+]
+
+
+class FrameType(IntEnum):
+    """The type byte of a frame."""
+
+    ROBOT_STATE = 16
+    ROBOT_MESSAGE = 20
+
+
+class ReportLevel(IntEnum):
+    """How bad an error is; from 128 the same for developers."""
+
+    DEBUG = 0
+    INFO = 1
+    WARNING = 2
+    VIOLATION = 3
+    FAULT = 4
+    CRITICAL_FAULT = 5
+    DEVL_DEBUG = 128
+    DEVL_INFO = 129
+    DEVL_WARNING = 130
+    DEVL_VIOLATION = 131
+    DEVL_FAULT = 132
+    DEVL_CRITICAL_FAULT = 133
+
+
+#: Largest frame that the manufacturer's library can read.
+MAX_SENT_FRAME_SIZE = 4091
+#: Frames with the values of all variables of a program can be long.
+MAX_FRAME_SIZE = 1 << 20
+#: Sources of messages: the controller, and its motion control.
+SOURCE_CONTROLLER = -2
+SOURCE_MOTION = -3
+
+_HEADER = struct.Struct('>iB')
+_MESSAGE = struct.Struct('>QbB')
+_VERSION = struct.Struct('>BBii')
+_SAFETY = struct.Struct('>iiBI4s')
+_ERROR = struct.Struct('>iiiII')
+_KEY = struct.Struct('>iiB')
+_EXCEPTION = struct.Struct('>II')
+#: Type of a datum -> its layout, where it is not u32.
+_DATUM = {2: struct.Struct('>i'), 3: struct.Struct('>f')}
+_DATUM_DEFAULT = struct.Struct('>I')
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextMessage:
+    """A text from ``textmsg``."""
+
+    message_type: ClassVar = 0
+    timestamp: int = 0
+    source: int = SOURCE_MOTION
+    text: str
+
+    def body(self) -> bytes:
+        """Return what follows the message type."""
+        return self.text.encode()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VersionMessage:
+    """The software of the controller; the first message on a connection."""
+
+    message_type: ClassVar = 3
+    timestamp: int = 0
+    source: int = SOURCE_CONTROLLER
+    project: str = 'URControl'
+    major: int
+    minor: int
+    bugfix: int = 0
+    build: int = 0
+    date: str = ''
+
+    def body(self) -> bytes:
+        """Return what follows the message type."""
+        name = self.project.encode()
+        return (
+            pack(struct.Struct('>b'), len(name))
+            + name
+            + pack(_VERSION, self.major, self.minor, self.bugfix, self.build)
+            + self.date.encode()
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SafetyModeMessage:
+    """The safety mode changed to a number of :class:`SafetyMode`, or a newer one."""
+
+    message_type: ClassVar = 5
+    timestamp: int = 0
+    source: int = SOURCE_MOTION
+    code: int = 0
+    argument: int = 0
+    safety_mode: int
+    data_type: int = 0
+    data: int | float = 0
+
+    def body(self) -> bytes:
+        """Return what follows the message type."""
+        data = pack(_DATUM.get(self.data_type, _DATUM_DEFAULT), self.data)
+        return pack(_SAFETY, self.code, self.argument, self.safety_mode, self.data_type, data)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ErrorCodeMessage:
+    """An error of the controller; ``level`` is a number of :class:`ReportLevel`, or newer."""
+
+    message_type: ClassVar = 6
+    timestamp: int = 0
+    source: int = SOURCE_MOTION
+    code: int
+    argument: int = 0
+    level: int = ReportLevel.WARNING
+    data_type: int = 0
+    data: int = 0
+    text: str = ''
+
+    @property
+    def label(self) -> str:
+        """Return the error as the manuals write it, for example ``C209A0``."""
+        return f'C{self.code}A{self.argument}'
+
+    def body(self) -> bytes:
+        """Return what follows the message type."""
+        return (
+            pack(_ERROR, self.code, self.argument, self.level, self.data_type, self.data)
+            + self.text.encode()
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeyMessage:
+    """An event by name, as ``PROGRAM_XXX_STARTED`` or ``..._STOPPED`` with a program's name."""
+
+    message_type: ClassVar = 7
+    timestamp: int = 0
+    source: int = SOURCE_CONTROLLER
+    code: int = 0
+    argument: int = 0
+    title: str
+    text: str = ''
+
+    def body(self) -> bytes:
+        """Return what follows the message type."""
+        title = self.title.encode()
+        return pack(_KEY, self.code, self.argument, len(title)) + title + self.text.encode()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RuntimeExceptionMessage:
+    """A program did not compile or failed at a place (line and column from 1)."""
+
+    message_type: ClassVar = 10
+    timestamp: int = 0
+    source: int = SOURCE_MOTION
+    line: int
+    column: int
+    text: str
+
+    def body(self) -> bytes:
+        """Return what follows the message type."""
+        return pack(_EXCEPTION, self.line, self.column) + self.text.encode()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RawMessage:
+    """A message of another type, as it came."""
+
+    message_type: int
+    timestamp: int = 0
+    source: int = SOURCE_MOTION
+    content: bytes = b''
+
+    def body(self) -> bytes:
+        """Return what follows the message type."""
+        return self.content
+
+
+PrimaryMessage: TypeAlias = (
+    TextMessage
+    | VersionMessage
+    | SafetyModeMessage
+    | ErrorCodeMessage
+    | KeyMessage
+    | RuntimeExceptionMessage
+    | RawMessage
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotStateFrame:
+    """A robot state frame."""
+
+    packages: tuple[SubPackage, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RawFrame:
+    """A frame of another type, as it came."""
+
+    frame_type: int
+    body: bytes
+
+
+PrimaryFrame: TypeAlias = RobotStateFrame | PrimaryMessage | RawFrame
+
+
+def encode_state(packages: Iterable[SubPackage]) -> bytes:
+    """
+    Return a robot state frame.
+
+    :raises LocalProtocolError: a value does not fit, or the frame is too long.
+    """
+    return _frame(FrameType.ROBOT_STATE, b''.join(map(encode_sub_package, packages)))
+
+
+def encode_message(message: PrimaryMessage) -> bytes:
+    """
+    Return a robot message frame.
+
+    :raises LocalProtocolError: a value does not fit, or the frame is too long.
+    """
+    head = pack(_MESSAGE, message.timestamp, message.source, message.message_type)
+    return _frame(FrameType.ROBOT_MESSAGE, head + message.body())
+
+
+def decode_frame(data: bytes) -> PrimaryFrame:
+    """
+    Return the content of one whole frame; the size field is not looked at.
+
+    :raises RemoteProtocolError: something is shorter than it must be.
+    """
+    _, frame_type = unpack(_HEADER, data, 'primary frame')
+    body = data[_HEADER.size :]
+    if frame_type == FrameType.ROBOT_STATE:
+        return RobotStateFrame(packages=decode_sub_packages(body))
+    if frame_type == FrameType.ROBOT_MESSAGE:
+        return _decode_message(body)
+    return RawFrame(frame_type=frame_type, body=body)
+
+
+class PrimaryDecoder:
+    """Reads what the controller sends."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._frames = FrameBuffer(
+            size_width=4, min_size=_HEADER.size, max_size=MAX_FRAME_SIZE, what='primary frame'
+        )
+
+    def feed(self, data: bytes) -> list[PrimaryFrame]:
+        """
+        Take bytes from the controller (none at all = its end) and return the frames in them.
+
+        :raises RemoteProtocolError: a size is impossible, something is too short, or the stream
+            ended inside a frame.
+        """
+        return [decode_frame(frame) for frame in self._frames.feed(data)]
+
+
+def _frame(frame_type: FrameType, body: bytes) -> bytes:
+    size = _HEADER.size + len(body)
+    if size > MAX_SENT_FRAME_SIZE:
+        raise LocalProtocolError(
+            f'A primary frame has {size} bytes, but clients read {MAX_SENT_FRAME_SIZE} at most.'
+        )
+    return _HEADER.pack(size, frame_type) + body
+
+
+def _decode_message(body: bytes) -> PrimaryMessage:
+    timestamp, source, message_type = unpack(_MESSAGE, body, 'robot message')
+    content = body[_MESSAGE.size :]
+    head = {'timestamp': timestamp, 'source': source}
+    reader = _MESSAGES.get(message_type)
+    if reader is None:
+        return RawMessage(message_type=message_type, content=content, **head)
+    return reader(content, head)
+
+
+def _version_message(content: bytes, head: dict[str, Any]) -> VersionMessage:
+    (length,) = unpack(struct.Struct('>b'), content, 'version message')
+    if length < 0:
+        raise RemoteProtocolError(
+            f'A version message has a name of {length} bytes: {hex_text(content)}.'
+        )
+    end = 1 + length
+    major, minor, bugfix, build = unpack(_VERSION, content, 'version message', end)
+    return VersionMessage(
+        project=decode_text(content[1:end]),
+        major=major,
+        minor=minor,
+        bugfix=bugfix,
+        build=build,
+        date=decode_text(content[end + _VERSION.size :]),
+        **head,
+    )
+
+
+def _safety_mode_message(content: bytes, head: dict[str, Any]) -> SafetyModeMessage:
+    code, argument, mode, data_type, data = unpack(_SAFETY, content, 'safety mode message')
+    (datum,) = _DATUM.get(data_type, _DATUM_DEFAULT).unpack(data)
+    return SafetyModeMessage(
+        code=code, argument=argument, safety_mode=mode, data_type=data_type, data=datum, **head
+    )
+
+
+def _error_code_message(content: bytes, head: dict[str, Any]) -> ErrorCodeMessage:
+    code, argument, level, data_type, data = unpack(_ERROR, content, 'error code message')
+    return ErrorCodeMessage(
+        code=code,
+        argument=argument,
+        level=level,
+        data_type=data_type,
+        data=data,
+        text=decode_text(content[_ERROR.size :]),
+        **head,
+    )
+
+
+def _key_message(content: bytes, head: dict[str, Any]) -> KeyMessage:
+    code, argument, length = unpack(_KEY, content, 'key message')
+    end = _KEY.size + length
+    if len(content) < end:
+        raise RemoteProtocolError(
+            f'A key message has a title of {length} bytes, but is shorter: {hex_text(content)}.'
+        )
+    return KeyMessage(
+        code=code,
+        argument=argument,
+        title=decode_text(content[_KEY.size : end]),
+        text=decode_text(content[end:]),
+        **head,
+    )
+
+
+def _runtime_exception(content: bytes, head: dict[str, Any]) -> RuntimeExceptionMessage:
+    line, column = unpack(_EXCEPTION, content, 'runtime exception message')
+    return RuntimeExceptionMessage(
+        line=line, column=column, text=decode_text(content[_EXCEPTION.size :]), **head
+    )
+
+
+_MESSAGES: Mapping[int, Callable[[bytes, dict[str, Any]], PrimaryMessage]] = {
+    TextMessage.message_type: lambda content, head: TextMessage(text=decode_text(content), **head),
+    VersionMessage.message_type: _version_message,
+    SafetyModeMessage.message_type: _safety_mode_message,
+    ErrorCodeMessage.message_type: _error_code_message,
+    KeyMessage.message_type: _key_message,
+    RuntimeExceptionMessage.message_type: _runtime_exception,
+}
+
+
+class PrimaryCommand(Enum):
+    """Commands of one line that need no program."""
+
+    POWER_ON = 'power on'
+    POWER_OFF = 'power off'
+    #: Power on, if need be, and release the brakes.
+    RUN = 'set robotmode run'
+    UNLOCK_PROTECTIVE_STOP = 'set unlock protective stop'
+    STOP_PROGRAM = 'stop program'
+
+
+def encode_command(line: PrimaryCommand) -> bytes:
+    """Return the bytes of a command."""
+    return line.value.encode() + b'\n'
+
+
+def encode_program(program_text: str) -> bytes:
+    """Return the bytes that make the controller run a program."""
+    return program_text.encode() + b'\n'
+
+
+#: Longest program that is believed [bytes]; it bounds the memory.
+MAX_PROGRAM_SIZE = 4 << 20
+
+_FIRST_WORD = re.compile(r'\s*(\w+)')
+_PROGRAM_WORDS = frozenset({'def', 'sec'})
+_BLOCK_WORDS = frozenset({'def', 'sec', 'thread', 'if', 'while', 'for', 'switch'})
+
+
+class ScriptUploadDecoder:
+    """
+    Reads what a client sends to the controller: commands and whole programs.
+
+    A program ends with the ``end`` that closes its ``def`` or ``sec``, whatever its indentation.
+    One that is cut off by the end of the stream is passed on as it is, and will not compile.
+    """
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._rest = b''
+        self._program: list[str] = []
+        self._size = 0
+        self._depth = 0
+
+    def feed(self, data: bytes) -> list[str]:
+        """
+        Take bytes from a client (none at all = its end) and return commands and programs.
+
+        :raises RemoteProtocolError: a program or line is too long to be meant.
+        """
+        *lines, self._rest = (self._rest + (data or b'\n')).split(b'\n')
+        texts = [text for line in lines if (text := self._line(line)) is not None]
+        if self._size + len(self._rest) > MAX_PROGRAM_SIZE:
+            raise RemoteProtocolError(
+                f'A program is longer than {MAX_PROGRAM_SIZE} bytes: {hex_text(self._rest)}.'
+            )
+        if not data and self._program:
+            texts.append(self._take())
+        return texts
+
+    def _line(self, data: bytes) -> str | None:
+        """Return the command or program that a line completes."""
+        line = decode_text(data.removesuffix(b'\r'))
+        match = _FIRST_WORD.match(line)
+        word = match.group(1) if match else ''
+        if not self._program and word not in _PROGRAM_WORDS:
+            return line.strip() or None
+        self._program.append(line)
+        self._size += len(data) + 1
+        self._depth += (word in _BLOCK_WORDS) - (word == 'end')
+        return None if self._depth else self._take()
+
+    def _take(self) -> str:
+        text = '\n'.join(self._program) + '\n'
+        self._program, self._size, self._depth = [], 0, 0
+        return text

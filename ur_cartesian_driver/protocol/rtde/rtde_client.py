@@ -1,0 +1,458 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+RTDE, the client: agree on what is streamed, then turn data packages into values.
+
+::
+
+    NEW --start()--> V 2 --refused--> V 1
+                      |                |
+                      +-------+--------+
+                              v
+                              v  (controller version; it bounds the frequency)
+                              |
+                              O  (outputs; again without the optional ones that are NOT_FOUND)
+                              |
+                              I  (inputs, once for each group; none: skipped)
+                              |
+                              S  (start)
+                              |
+                            READY --> data packages, texts
+
+The client opens no socket and knows no time. Whoever owns the socket sends ``data_to_send()``
+after each ``feed()``, and gives up when ``state`` stands still for too long (the controller
+answers within a second).
+
+Real controllers send text messages at any time, and data before the reply to S; a data package
+counts as that reply. Up to five other packages out of turn are reported and borne in each state.
+
+The packages themselves, with the controller's side of them, are in
+:mod:`~ur_cartesian_driver.protocol.rtde.rtde_packages` and can be imported from here too; what a
+controller does with a whole connection is in `rtde_server`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import TypeAlias
+
+from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType, INPUT_TYPES, OUTPUT_TYPES
+from ur_cartesian_driver.protocol.rtde.rtde_packages import (
+    Acknowledgement,
+    ControllerVersion,
+    DataPackage,
+    decode_reply,
+    decode_request,
+    GetControllerVersion,
+    IN_USE,
+    LATEST_PROTOCOL_VERSION,
+    NOT_FOUND,
+    PackageType,
+    PauseStreaming,
+    Recipe,
+    RequestProtocolVersion,
+    RtdeFrameBuffer,
+    RtdeReply,
+    RtdeRequest,
+    RtdeTextMessage,
+    RtdeValue,
+    RtdeValues,
+    SetupInputs,
+    SetupInputsReply,
+    SetupOutputs,
+    SetupOutputsReply,
+    StartStreaming,
+)
+
+__all__ = [
+    'INPUT_TYPES',
+    'IN_USE',
+    'LATEST_PROTOCOL_VERSION',
+    'NOT_FOUND',
+    'OUTPUT_TYPES',
+    'Acknowledgement',
+    'ControllerVersion',
+    'DataPackage',
+    'DataReceived',
+    'DataType',
+    'FieldsNotFound',
+    'GetControllerVersion',
+    'HandshakeDone',
+    'InputsInUse',
+    'PackageType',
+    'PauseStreaming',
+    'Recipe',
+    'RequestProtocolVersion',
+    'RtdeClientCodec',
+    'RtdeEvent',
+    'RtdeFrameBuffer',
+    'RtdeReply',
+    'RtdeRequest',
+    'RtdeState',
+    'RtdeTextMessage',
+    'RtdeValue',
+    'RtdeValues',
+    'SetupInputs',
+    'SetupInputsReply',
+    'SetupOutputs',
+    'SetupOutputsReply',
+    'StartStreaming',
+    'UnexpectedPackage',
+    'decode_reply',
+    'decode_request',
+    'max_frequency',
+]
+
+#: How many packages out of turn are borne in each state of the handshake.
+MAX_UNEXPECTED_PACKAGES = 5
+
+
+class FieldsNotFound(RemoteProtocolError):
+    """The controller does not know a field that is needed."""
+
+    def __init__(self, kind: str, names: Sequence[str], version: ControllerVersion) -> None:
+        """Build the sentence from the names and the controller's version."""
+        super().__init__(
+            f'The robot does not know the RTDE {kind} {", ".join(names)}; its software is '
+            f'{version}, which may be too old.'
+        )
+        self.names = tuple(names)
+
+
+class InputsInUse(RemoteProtocolError):
+    """Another client or fieldbus writes an input that we need."""
+
+    def __init__(self, names: Sequence[str]) -> None:
+        """Build the sentence from the names."""
+        super().__init__(
+            f'The RTDE inputs {", ".join(names)} are in use by another client; end it, or disable '
+            'EtherNet/IP, PROFINET or MODBUS in the installation of the robot.'
+        )
+        self.names = tuple(names)
+
+
+class RtdeState(Enum):
+    """What the client waits for."""
+
+    NEW = 'start()'
+    PROTOCOL_VERSION = 'the answer to the protocol version'
+    CONTROLLER_VERSION = 'the version of the controller'
+    OUTPUTS = 'the types of the outputs'
+    INPUTS = 'the types of the inputs'
+    START = 'the start of the data'
+    READY = 'data'
+    BROKEN = 'nothing, an error came before'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HandshakeDone:
+    """
+    The handshake is over and data come.
+
+    :param frequency: what was asked for [Hz]; version 1 has one frequency only.
+    :param outputs: what the data packages contain.
+    :param missing: optional outputs that this controller does not know.
+    :param inputs: one recipe for each group, to ``pack`` values with.
+    """
+
+    protocol_version: int
+    controller_version: ControllerVersion
+    frequency: float
+    outputs: Recipe
+    missing: tuple[str, ...]
+    inputs: tuple[Recipe, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DataReceived:
+    """Values in the order of ``Ready.outputs``; vectors are tuples."""
+
+    values: RtdeValues
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class UnexpectedPackage:
+    """A package that nobody asked for; of no consequence, but worth a line in a log."""
+
+    package: RtdeReply
+
+
+RtdeEvent: TypeAlias = HandshakeDone | DataReceived | RtdeTextMessage | UnexpectedPackage
+
+
+def max_frequency(version: ControllerVersion) -> float:
+    """Return the rate of the controller [Hz]: 125 before software 5, 500 since."""
+    return 125.0 if version.major < 5 else 500.0
+
+
+class RtdeClientCodec:
+    """One RTDE connection, seen from the client; use it once."""
+
+    def __init__(
+        self,
+        outputs: Sequence[str],
+        inputs: Sequence[str] = (),
+        frequency: float = 0.0,
+        optional_outputs: Iterable[str] = (),
+        input_groups: Sequence[Sequence[str]] = (),
+    ) -> None:
+        """
+        Say what is wanted.
+
+        :param outputs: names of what shall be streamed, in order.
+        :param inputs: names of what will be written, in one package.
+        :param frequency: [Hz]; 0 = as fast as the controller can.
+        :param optional_outputs: which of the outputs the controller need not know.
+        :param input_groups: further groups of inputs, each written in a package of its own.
+        :raises LocalProtocolError: no outputs, a name twice, or an impossible frequency.
+        """
+        self._groups = [tuple(group) for group in (inputs, *input_groups) if group]
+        for names in (outputs, [name for group in self._groups for name in group]):
+            duplicates = sorted({name for name in names if list(names).count(name) > 1})
+            if duplicates:
+                raise LocalProtocolError(
+                    f'{", ".join(duplicates)} stands twice in an RTDE recipe.'
+                )
+        if not outputs or not 0.0 <= frequency <= 500.0:
+            raise LocalProtocolError(
+                f'An RTDE connection needs outputs and a frequency of 0 to 500 Hz, but '
+                f'{len(outputs)} outputs and {frequency!r} Hz were asked for.'
+            )
+        self.state = RtdeState.NEW
+        self._outputs = tuple(outputs)
+        self._optional = frozenset(optional_outputs)
+        self._missing: tuple[str, ...] = ()
+        self._frequency = frequency
+        self._version = LATEST_PROTOCOL_VERSION
+        self._controller = ControllerVersion(major=0, minor=0, bugfix=0)
+        self._recipe: Recipe | None = None
+        self._inputs: list[Recipe] = []
+        self._unexpected = 0
+        self._frames = RtdeFrameBuffer()
+        self._to_send = b''
+
+    def start(self) -> bytes:
+        """
+        Begin the handshake and return the first bytes to send.
+
+        :raises LocalProtocolError: it was started before.
+        """
+        if self.state is not RtdeState.NEW:
+            raise LocalProtocolError('An RtdeClientCodec serves one connection; make a new one.')
+        self._send_request(
+            RtdeState.PROTOCOL_VERSION, RequestProtocolVersion(version=self._version)
+        )
+        return self.data_to_send()
+
+    def data_to_send(self) -> bytes:
+        """Return the bytes that are due, once."""
+        data, self._to_send = self._to_send, b''
+        return data
+
+    def values_in(self, data: bytes) -> RtdeValues | None:
+        """
+        Return the values where the bytes are one data package and no more, as nearly always.
+
+        None otherwise: then they are for :meth:`feed`, which is slower.
+        """
+        if self._recipe is None or self.state is not RtdeState.READY or not self._frames.is_empty:
+            return None
+        return self._recipe.unpack_frame(data)
+
+    def feed(self, data: bytes) -> list[RtdeEvent]:
+        """
+        Take bytes from the controller (none at all = its end) and return what happened.
+
+        :raises RemoteProtocolError: the controller broke the rules or closed the connection too
+            early, does not know a field (:class:`FieldsNotFound`), or another client writes an
+            input (:class:`InputsInUse`). The client is of no use after that.
+        :raises LocalProtocolError: this controller cannot stream at the frequency asked for.
+        """
+        if self.state is RtdeState.BROKEN:
+            raise RemoteProtocolError('The RTDE connection is broken; open a new one.')
+        try:
+            frames = self._frames.feed(data)
+            if not data and self.state is not RtdeState.READY:
+                raise RemoteProtocolError(
+                    f'The robot closed the RTDE connection, expected was {self.state.value}.'
+                )
+            return [event for frame in frames for event in self._frame(frame)]
+        except (RemoteProtocolError, LocalProtocolError):
+            self.state = RtdeState.BROKEN
+            raise
+
+    def _frame(self, frame: bytes) -> list[RtdeEvent]:
+        # The way of 500 frames a second.
+        if (
+            self._recipe is not None
+            and frame[2] == PackageType.DATA_PACKAGE
+            and (self.state is RtdeState.READY)
+        ):
+            return [DataReceived(self._recipe.unpack(frame[3:]))]
+        reply = decode_reply(frame, self._version)
+        if isinstance(reply, RtdeTextMessage):
+            return [reply]
+        if self.state is RtdeState.START and isinstance(reply, DataPackage):
+            return [*self._ready(), *self._frame(frame)]
+        expected, handle = self._handlers().get(self.state, (None, None))
+        if handle is None or PackageType(frame[2]) is not expected:
+            return self._handle_unexpected(reply)
+        return handle(reply)
+
+    def _handlers(
+        self,
+    ) -> dict[RtdeState, tuple[PackageType, Callable[[RtdeReply], list[RtdeEvent]]]]:
+        """Return state -> the package that it waits for, and what is done with it."""
+        return {
+            RtdeState.PROTOCOL_VERSION: (
+                PackageType.REQUEST_PROTOCOL_VERSION,
+                self._on_protocol_version,
+            ),
+            RtdeState.CONTROLLER_VERSION: (
+                PackageType.GET_URCONTROL_VERSION,
+                self._on_controller_version,
+            ),
+            RtdeState.OUTPUTS: (PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS, self._on_outputs),
+            RtdeState.INPUTS: (PackageType.CONTROL_PACKAGE_SETUP_INPUTS, self._on_inputs),
+            RtdeState.START: (PackageType.CONTROL_PACKAGE_START, self._on_start),
+        }
+
+    def _send_request(self, state: RtdeState, request: RtdeRequest) -> list[RtdeEvent]:
+        """Send a request and wait for its answer."""
+        self.state = state
+        self._unexpected = 0
+        self._to_send += request.encode()
+        return []
+
+    def _handle_unexpected(self, reply: RtdeReply) -> list[RtdeEvent]:
+        is_late_start = (
+            self.state is RtdeState.READY
+            and isinstance(reply, Acknowledgement)
+            and reply.type is PackageType.CONTROL_PACKAGE_START
+        )
+        if is_late_start:  # the data overtook the reply
+            return self._on_start(reply)
+        if self.state is not RtdeState.READY:
+            self._unexpected += 1
+            if self._unexpected > MAX_UNEXPECTED_PACKAGES:
+                raise RemoteProtocolError(
+                    f'The robot sent {self._unexpected} RTDE packages out of turn, expected was '
+                    f'{self.state.value}; the last one was {reply!r:.200}.'
+                )
+        return [UnexpectedPackage(package=reply)]
+
+    def _on_protocol_version(self, reply: RtdeReply) -> list[RtdeEvent]:
+        if _require_accepted(reply):
+            return self._send_request(RtdeState.CONTROLLER_VERSION, GetControllerVersion())
+        if self._version == 1:
+            raise RemoteProtocolError('The robot speaks neither version 2 nor version 1 of RTDE.')
+        self._version = 1
+        return self._send_request(RtdeState.PROTOCOL_VERSION, RequestProtocolVersion(version=1))
+
+    def _on_controller_version(self, reply: RtdeReply) -> list[RtdeEvent]:
+        assert isinstance(reply, ControllerVersion)
+        self._controller = reply
+        limit = max_frequency(reply)
+        if self._frequency > limit:
+            raise LocalProtocolError(
+                f'The robot, software {reply}, streams at {limit:g} Hz at most, but '
+                f'{self._frequency:g} Hz were asked for.'
+            )
+        self._frequency = self._frequency or limit
+        return self._request_outputs()
+
+    def _request_outputs(self) -> list[RtdeEvent]:
+        frequency = None if self._version == 1 else self._frequency
+        return self._send_request(
+            RtdeState.OUTPUTS, SetupOutputs(names=self._outputs, frequency=frequency)
+        )
+
+    def _on_outputs(self, reply: RtdeReply) -> list[RtdeEvent]:
+        assert isinstance(reply, SetupOutputsReply)
+        names = self._outputs
+        _check_count(reply.types, names)
+        missing = [n for n, text in zip(names, reply.types, strict=True) if text == NOT_FOUND]
+        needed = [name for name in missing if name not in self._optional]
+        if needed or len(missing) == len(names):
+            raise FieldsNotFound('outputs', needed or missing, self._controller)
+        if missing:
+            self._missing += tuple(missing)
+            self._outputs = tuple(name for name in names if name not in missing)
+            return self._request_outputs()
+        types = [
+            _type(name, text, OUTPUT_TYPES.get(name))
+            for name, text in zip(names, reply.types, strict=True)
+        ]
+        self._recipe = Recipe(names, types, reply.recipe_id)
+        return self._request_inputs()
+
+    def _request_inputs(self) -> list[RtdeEvent]:
+        """Ask for the next group of inputs, or start when all are agreed."""
+        if len(self._inputs) < len(self._groups):
+            return self._send_request(
+                RtdeState.INPUTS, SetupInputs(names=self._groups[len(self._inputs)])
+            )
+        return self._send_request(RtdeState.START, StartStreaming())
+
+    def _on_inputs(self, reply: RtdeReply) -> list[RtdeEvent]:
+        assert isinstance(reply, SetupInputsReply)
+        names = self._groups[len(self._inputs)]
+        _check_count(reply.types, names)
+        answers = list(zip(names, reply.types, strict=True))
+        if missing := [name for name, text in answers if text == NOT_FOUND]:
+            raise FieldsNotFound('inputs', missing, self._controller)
+        if taken := [name for name, text in answers if text == IN_USE]:
+            raise InputsInUse(taken)
+        types = [_type(name, text, INPUT_TYPES.get(name)) for name, text in answers]
+        self._inputs.append(Recipe(names, types, reply.recipe_id))
+        return self._request_inputs()
+
+    def _on_start(self, reply: RtdeReply) -> list[RtdeEvent]:
+        if not _require_accepted(reply):
+            raise RemoteProtocolError('The robot refused to start the RTDE data.')
+        return [] if self.state is RtdeState.READY else self._ready()
+
+    def _ready(self) -> list[RtdeEvent]:
+        assert self._recipe is not None
+        self.state = RtdeState.READY
+        return [
+            HandshakeDone(
+                protocol_version=self._version,
+                controller_version=self._controller,
+                frequency=self._frequency,
+                outputs=self._recipe,
+                missing=self._missing,
+                inputs=tuple(self._inputs),
+            )
+        ]
+
+
+def _require_accepted(reply: RtdeReply) -> bool:
+    return isinstance(reply, Acknowledgement) and reply.accepted
+
+
+def _check_count(types: Sequence[str], names: Sequence[str]) -> None:
+    if len(types) != len(names):
+        raise RemoteProtocolError(
+            f'The robot answered {len(types)} types to {len(names)} RTDE fields: '
+            f'{", ".join(types):.200}.'
+        )
+
+
+def _type(name: str, text: str, expected_type: DataType | None) -> DataType:
+    """
+    Return the type that the controller states.
+
+    A controller that answers something else (the manufacturer's test server repeats the names) is
+    believed to mean the usual type.
+    """
+    if text in DataType.__members__:
+        return DataType[text]
+    if expected_type is None:
+        raise RemoteProtocolError(
+            f'The robot says that the RTDE field {name} is of type {text!r:.60}, which is unknown.'
+        )
+    return expected_type

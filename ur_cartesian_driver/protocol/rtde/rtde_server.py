@@ -1,0 +1,224 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+RTDE, the controller: one connection of a client, seen from the robot.
+
+It answers requests as a controller does and keeps the agreed recipes. When and with which values
+data packages are sent is up to its owner, who knows the time::
+
+    for data in socket: events = server.feed(data); socket.send(server.data_to_send())
+    if server.streaming:
+        for output in server.outputs: socket.send(output.recipe.pack(values))
+
+* A client may agree on several output recipes; each has its own id and frequency. In version 1 it
+  has one, without an id.
+* An unknown field makes the whole recipe invalid: types with ``NOT_FOUND``, id 0, nothing agreed.
+* An input belongs to one client: everybody else is told ``IN_USE``. The client itself may have it
+  in several recipes, one for each kind of command it sends. The set of taken names is shared by
+  all connections; ``close()`` gives ours back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+import math
+
+from ur_cartesian_driver.motion.errors import RemoteProtocolError
+from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType, INPUT_TYPES, OUTPUT_TYPES
+from ur_cartesian_driver.protocol.rtde.rtde_packages import (
+    Acknowledgement,
+    ControllerVersion,
+    DataPackage,
+    decode_request,
+    GetControllerVersion,
+    IN_USE,
+    LATEST_PROTOCOL_VERSION,
+    NOT_FOUND,
+    PackageType,
+    PauseStreaming,
+    Recipe,
+    RequestProtocolVersion,
+    RtdeFrameBuffer,
+    RtdeReply,
+    RtdeTextMessage,
+    RtdeValues,
+    SetupInputs,
+    SetupInputsReply,
+    SetupOutputs,
+    SetupOutputsReply,
+    StartStreaming,
+)
+
+#: Recipe ids are bytes and 0 means invalid.
+MAX_RECIPES = 255
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputStream:
+    """What a client wants to be sent, and how often [Hz]."""
+
+    recipe: Recipe
+    frequency: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputReceived:
+    """A client wrote values, in the order of the recipe."""
+
+    recipe: Recipe
+    values: RtdeValues
+
+
+class RtdeServerCodec:
+    """One connection, seen from the controller."""
+
+    def __init__(
+        self,
+        version: ControllerVersion,
+        taken_inputs: set[str],
+        frequency: float = 500.0,
+        output_types: Mapping[str, DataType] = OUTPUT_TYPES,
+        input_types: Mapping[str, DataType] = INPUT_TYPES,
+    ) -> None:
+        """
+        Wait for requests.
+
+        :param taken_inputs: inputs that some client writes; shared by all connections.
+        :param frequency: the rate of the controller [Hz], and the greatest that a client gets.
+        """
+        self.streaming = False
+        self.outputs: list[OutputStream] = []
+        self._inputs: list[Recipe] = []
+        self._version = version
+        self._protocol = LATEST_PROTOCOL_VERSION
+        self._taken = taken_inputs
+        self._frequency = frequency
+        self._output_types = output_types
+        self._input_types = input_types
+        self._frames = RtdeFrameBuffer()
+        self._to_send = b''
+
+    @property
+    def protocol_version(self) -> int:
+        """Return the version that was agreed."""
+        return self._protocol
+
+    def data_to_send(self) -> bytes:
+        """Return the answers that are due, once."""
+        data, self._to_send = self._to_send, b''
+        return data
+
+    def feed(self, data: bytes) -> list[InputReceived | RtdeTextMessage]:
+        """
+        Take bytes from the client (none at all = its end) and return what it wrote.
+
+        :raises RemoteProtocolError: the client broke the rules; close the connection.
+        """
+        events: list[InputReceived | RtdeTextMessage] = []
+        for frame in self._frames.feed(data):
+            request = decode_request(frame, self._protocol)
+            if isinstance(request, RtdeTextMessage):
+                events.append(request)
+            elif isinstance(request, DataPackage):
+                events.append(self._input(request))
+            else:
+                self._to_send += self._answer(request).encode()
+        return events
+
+    def close(self) -> None:
+        """Give back the inputs of this client."""
+        self.streaming = False
+        for recipe in self._inputs:
+            self._taken.difference_update(recipe.names)
+        self._inputs.clear()
+
+    def _answer(
+        self,
+        request: RequestProtocolVersion
+        | GetControllerVersion
+        | SetupOutputs
+        | SetupInputs
+        | StartStreaming
+        | PauseStreaming,
+    ) -> RtdeReply:
+        match request:
+            case RequestProtocolVersion():
+                known = 1 <= request.version <= LATEST_PROTOCOL_VERSION
+                self._protocol = request.version if known else self._protocol
+                return Acknowledgement(type=PackageType.REQUEST_PROTOCOL_VERSION, accepted=known)
+            case GetControllerVersion():
+                return self._version
+            case SetupOutputs():
+                return self._set_up_outputs(request)
+            case SetupInputs():
+                return self._set_up_inputs(request)
+            case StartStreaming():
+                self.streaming = True
+                return Acknowledgement(type=PackageType.CONTROL_PACKAGE_START, accepted=True)
+            case PauseStreaming():
+                self.streaming = False
+                return Acknowledgement(type=PackageType.CONTROL_PACKAGE_PAUSE, accepted=True)
+
+    def _set_up_outputs(self, request: SetupOutputs) -> SetupOutputsReply:
+        types = [self._output_types.get(name) for name in request.names]
+        known = [data_type for data_type in types if data_type is not None]
+        valid = len(known) == len(types) > 0
+        if self._protocol == 1:
+            self.outputs.clear()
+        recipe_id = None if self._protocol == 1 else len(self.outputs) + 1 if valid else 0
+        if valid:
+            _check_number(self.outputs)
+            self.outputs.append(
+                OutputStream(
+                    recipe=Recipe(request.names, known, recipe_id),
+                    frequency=self._granted_frequency(request.frequency),
+                )
+            )
+        return SetupOutputsReply(
+            types=tuple(t.name if t else NOT_FOUND for t in types), recipe_id=recipe_id
+        )
+
+    def _granted_frequency(self, frequency: float | None) -> float:
+        """Return the frequency that a client gets [Hz]."""
+        if frequency is None or not math.isfinite(frequency) or frequency <= 0.0:
+            return self._frequency
+        return min(frequency, self._frequency)
+
+    def _set_up_inputs(self, request: SetupInputs) -> SetupInputsReply:
+        texts = []
+        own_names = {name for recipe in self._inputs for name in recipe.names}
+        for name in request.names:
+            data_type = self._input_types.get(name)
+            texts.append(
+                NOT_FOUND
+                if data_type is None
+                else IN_USE
+                if name in self._taken - own_names
+                else data_type.name
+            )
+        recipe_id = 0
+        if texts and NOT_FOUND not in texts and IN_USE not in texts:
+            _check_number(self._inputs)
+            recipe_id = len(self._inputs) + 1
+            types = [self._input_types[name] for name in request.names]
+            self._inputs.append(Recipe(request.names, types, recipe_id))
+            self._taken.update(request.names)
+        return SetupInputsReply(types=tuple(texts), recipe_id=recipe_id)
+
+    def _input(self, data: DataPackage) -> InputReceived:
+        """Read an input package; a client with one recipe may give it any id."""
+        if not self._inputs:
+            raise RemoteProtocolError('An RTDE client wrote inputs before it had set them up.')
+        number = data.recipe_id if len(self._inputs) > 1 else 1
+        if not 1 <= number <= len(self._inputs):
+            raise RemoteProtocolError(
+                f'An RTDE client wrote recipe {number}, but it set up 1 to {len(self._inputs)}.'
+            )
+        recipe = self._inputs[number - 1]
+        return InputReceived(recipe=recipe, values=recipe.unpack(data.payload))
+
+
+def _check_number(recipes: Sequence[object]) -> None:
+    if len(recipes) >= MAX_RECIPES:
+        raise RemoteProtocolError(f'An RTDE client asked for more than {MAX_RECIPES} recipes.')

@@ -1,0 +1,95 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The first start of the robot program: when the arm is ready, and nothing else runs there.
+
+Later the driver starts nothing by itself: whoever switches the robot on, or stopped it, stands
+beside it, and says when the program may run.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from ur_cartesian_driver.motion.state import RobotMode, RobotState, RobotStatus
+from ur_cartesian_driver.robot.driver_status import DriverStatus, has_ended
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from ur_cartesian_driver.robot.link_settings import LinkSettings
+
+#: Modes of an arm that can be switched on.
+_UNPOWERED_MODES = frozenset({RobotMode.POWER_OFF, RobotMode.POWER_ON, RobotMode.IDLE})
+#: How long it may take [s].
+POWER_UP_TIMEOUT = 30.0
+
+
+class ProgramAutoStart:
+    """One upload of the program on the first connection, or none."""
+
+    def __init__(
+        self,
+        settings: LinkSettings,
+        *,
+        pending: bool,
+        power_up: Callable[[], bool],
+        upload: Callable[[], None],
+        warn: Callable[[str], None],
+    ) -> None:
+        """
+        Prepare; nothing happens before :meth:`review`.
+
+        :param pending: whether it is still to come.
+        :param power_up: switches the arm on and releases its brakes; False = it cannot be told to.
+        :param upload: sends the robot program.
+        :param warn: a line for the log.
+        """
+        self._settings = settings
+        self._pending = pending
+        self._power_up, self._upload, self._warn = power_up, upload, warn
+        self._powering_up = False
+
+    def review(self, robot: RobotState, status: DriverStatus, *, program_connected: bool) -> None:
+        """Start the program, or say why not, once the robot is known."""
+        if not self._pending or status.state not in (
+            ConnectionState.CONNECTED,
+            ConnectionState.STOPPED,
+        ):
+            return
+        if self._is_waiting_for_power(robot, status):
+            return
+        self._pending = False
+        if not self._settings.headless_mode or program_connected:
+            return
+        if status.state is ConnectionState.STOPPED or robot.robot_mode is not RobotMode.RUNNING:
+            self._warn(f'the robot program is not started: {status.message}')
+        elif robot.robot_status & RobotStatus.PROGRAM_RUNNING or not has_ended(robot):
+            self._warn(
+                'the robot program is not started: another program runs on the robot, or '
+                'is paused; stop it, then call resend_robot_program'
+            )
+        else:
+            self._upload()
+
+    def _is_waiting_for_power(self, robot: RobotState, status: DriverStatus) -> bool:
+        """Switch the arm on, where that is wanted; tell whether the program has to wait for it."""
+        s = self._settings
+        if (
+            not (s.auto_power and s.headless_mode)
+            or robot.robot_mode not in _UNPOWERED_MODES
+            or status.state is ConnectionState.STOPPED
+        ):
+            return False
+        if not self._powering_up and self._power_up():
+            self._powering_up = True
+            self._warn('auto_power: the arm is switched on and its brakes are released')
+            asyncio.get_running_loop().call_later(POWER_UP_TIMEOUT, self._give_up_power)
+        return True
+
+    def _give_up_power(self) -> None:
+        """Start nothing by itself any more, if the arm did not come up."""
+        if self._pending:
+            self._pending = False
+            self._warn(
+                f'auto_power: the arm is not running after {POWER_UP_TIMEOUT:g} s; '
+                'is the robot in remote control?'
+            )

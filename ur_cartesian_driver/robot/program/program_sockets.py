@@ -1,0 +1,248 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The ports on which the robot calls us: three sockets of the robot program, and the script sender.
+
+The robot program dials the trajectory port, the script command port and the reverse port, in this
+order, and is connected when it holds all three. They live and die together: a program that lost
+one of them has ended or is about to, so the others are closed, and a program that calls again
+finds all ports free.
+
+The script sender is apart from that: there a program with the External Control node asks for the
+text of ours.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from math import inf
+from typing import NoReturn
+
+from ur_cartesian_driver.motion.errors import ProtocolError
+from ur_cartesian_driver.motion.events import TrajectoryResult
+from ur_cartesian_driver.protocol.program import reverse, script_sender
+from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
+from ur_cartesian_driver.protocol.program.trajectory_points import TrajectoryResultDecoder
+from ur_cartesian_driver.robot.link_settings import LinkSettings
+from ur_cartesian_driver.robot.transport import TcpConnection, TcpListener
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProgramCallbacks:
+    """Who is told what; all of it on the event loop."""
+
+    #: A robot program holds all its sockets.
+    connected: Callable[[], None]
+    #: It does not any more, and why.
+    lost: Callable[[str], None]
+    #: It reported the end of a trajectory.
+    result: Callable[[TrajectoryResult], None]
+    #: Somebody was turned away, and why.
+    warning: Callable[[str], None]
+
+
+class ProgramSockets:
+    """The robot program as seen from here."""
+
+    def __init__(self, settings: LinkSettings, listener: ProgramCallbacks) -> None:
+        """Prepare; :meth:`open` listens."""
+        self._settings = settings
+        self._listener = listener
+        #: What the script sender hands out; empty = nothing, the robot has its own program.
+        self.text = ''
+        #: A goal runs: its keepalives are another message.
+        self.is_executing = False
+        #: It goes through the buffered servo, whose keepalives are yet another one.
+        self.servo = False
+        #: The program is paused and reads nothing: it is not sent more than it can read at once,
+        #: because a START must not stand behind the keepalives of an hour.
+        self.is_paused = False
+        #: The robot reports that no program runs: who holds the sockets has gone without a word,
+        #: as behind a cable that was cut, and whoever calls may have them.
+        self.ended = False
+        self.connected = False
+        #: The longest pause between two keepalives since somebody reset it [s].
+        self.max_keepalive_gap = 0.0
+        #: When the last keepalive was sent to the program that is there, or was last [s].
+        self.last_keepalive = -inf
+        #: Where the ports are open.
+        self._host = ''
+        self._read_timeout = round(1000.0 * settings.robot_receive_timeout)
+        self._results = TrajectoryResultDecoder()
+        self._requests = script_sender.RequestDecoder()
+        self._trajectory = self._program_port('trajectory_port', self._on_results)
+        self._commands = self._program_port('script_command_port', _ignore)
+        self._reverse = self._program_port('reverse_port', _ignore)
+        self._sender = TcpListener(
+            'script_sender_port',
+            on_open=self._on_sender_open,
+            on_data=self._on_request,
+            on_closed=_ignore,
+            on_refused=listener.warning,
+        )
+        self._program_ports = (self._trajectory, self._commands, self._reverse)
+
+    def _program_port(self, name: str, on_data: Callable[[bytes], None]) -> TcpListener:
+        return TcpListener(
+            name,
+            on_open=self._on_open,
+            on_data=on_data,
+            on_closed=partial(self._on_closed, name),
+            on_refused=self._listener.warning,
+            is_taken=lambda: self.connected and not self.ended,
+        )
+
+    @property
+    def ports(self) -> Mapping[str, int]:
+        """The ports that are open, by the name of their parameter."""
+        return {port.name: port.port for port in (*self._program_ports, self._sender)}
+
+    async def open(self, host: str, allowed: frozenset[str]) -> None:
+        """
+        Listen on all ports that are not open yet.
+
+        :param host: our address; where it is another one than before, all ports move there.
+        :param allowed: addresses that may call.
+        :raises OSError: a port is taken; the text names the parameter to change.
+        """
+        if host != self._host:
+            self.drop(f'our address is {host} now')
+            for port in (*self._program_ports, self._sender):
+                port.close()
+            self._host = host
+        for port in (*self._program_ports, self._sender):
+            if not port.is_open:
+                await port.open(host, getattr(self._settings, port.name), allowed)
+
+    def close(self) -> None:
+        """Tell the robot program to stop the arm and end, and close all ports."""
+        self.send_stop()
+        for port in (*self._program_ports, self._sender):
+            port.close()
+
+    # ---- what goes out ------------------------------------------------------------------------
+
+    def send_control(self, action: TrajectoryAction, count: int) -> None:
+        """Send a trajectory action."""
+        self._send(
+            reverse.trajectory(action, count, self._read_timeout, dialect=self._settings.dialect)
+        )
+
+    def send_points(self, data: bytes) -> None:
+        """Send trajectory points."""
+        if self._trajectory.connection is not None:
+            self._trajectory.connection.send(data)
+
+    def send_command(self, data: bytes) -> bool:
+        """Send a single command; False where no robot program would read it."""
+        return (
+            self.connected
+            and self._commands.connection is not None
+            and self._commands.connection.send(data)
+        )
+
+    def drop(self, reason: str) -> None:
+        """Hang up on a program, and say that it is lost."""
+        for port in self._program_ports:
+            port.disconnect()
+        if self.connected:
+            self.connected = False
+            self._listener.lost(reason)
+
+    def send_stop(self) -> None:
+        """Ask the robot program to stop the arm and to end."""
+        self._send(reverse.stop())
+
+    async def keep_alive(self) -> NoReturn:
+        """Send the message that keeps the robot program running at a steady pace."""
+        loop = asyncio.get_running_loop()
+        due = last = loop.time()
+        was_paused = False
+        while True:
+            last, before = loop.time(), last
+            self.max_keepalive_gap = max(self.max_keepalive_gap, last - before)
+            if not (self.is_paused and was_paused):  # one more, for the read that is under way
+                self._send_keepalive()
+            was_paused = self.is_paused
+            due = max(due + self._settings.keepalive_period, loop.time())
+            await asyncio.sleep(due - loop.time())
+
+    def send_servo(self, on: bool) -> None:
+        """Have the program enter the buffered servo, or leave it and stand."""
+        self.servo = on
+        self._send(
+            reverse.buffered_servo(self._read_timeout)
+            if on
+            else reverse.keepalive(self._read_timeout)
+        )
+
+    def _send_keepalive(self) -> None:
+        if self.servo:
+            self.send_servo(True)
+        elif self.is_executing:
+            self.send_control(TrajectoryAction.NOOP, 0)
+        else:
+            self._send(reverse.keepalive(self._read_timeout))
+        if self.connected:
+            self.last_keepalive = asyncio.get_running_loop().time()
+
+    def _send(self, message: reverse.ReverseMessage) -> None:
+        if self.connected and self._reverse.connection is not None:
+            self._reverse.connection.send(message.encode())
+
+    # ---- what comes in ------------------------------------------------------------------------
+
+    def _on_open(self, connection: TcpConnection) -> None:
+        if self.connected:
+            self.connected = False
+            self._listener.lost('another robot program calls')
+        called = [port.connection for port in self._program_ports].index(connection)
+        for port in self._program_ports[called + 1 :]:
+            port.disconnect()  # a stranger, or a program that died while it connected
+        if connection is self._trajectory.connection:
+            self._results = TrajectoryResultDecoder()
+        if all(port.connection is not None for port in self._program_ports):
+            self.connected = True
+            self._listener.connected()
+
+    def _on_closed(self, name: str, reason: str) -> None:
+        """Take the loss of one of the program's sockets as the loss of all of them."""
+        self.drop(f'{name}: {reason}')
+
+    def _on_results(self, data: bytes) -> None:
+        try:
+            for result in self._results.feed(data):
+                self._listener.result(result)
+        except ProtocolError as error:
+            assert self._trajectory.connection is not None
+            self._trajectory.connection.abort(str(error))
+
+    def _on_sender_open(self, _: TcpConnection) -> None:
+        self._requests = script_sender.RequestDecoder()
+
+    def _on_request(self, data: bytes) -> None:
+        """Answer the External Control node that asks for the program."""
+        connection = self._sender.connection
+        assert connection is not None
+        try:
+            wanted = self._requests.feed(data)
+        except ProtocolError as error:
+            self._sender.warn_limited(str(error))
+            connection.abort(str(error))
+            return
+        if not self.text:
+            self._sender.warn_limited(
+                'the robot asks for a robot program, but wire_dialect says that it has an older '
+                'one of its own; leave wire_dialect out to have ours run'
+            )
+            return
+        for _ in range(wanted):
+            if not connection.send(script_sender.reply(self.text)):
+                return
+
+
+def _ignore(_: object) -> None:
+    """Take no notice."""

@@ -1,0 +1,71 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Who sets the TCP of a goal, and who puts it back.
+
+When it is due, and for how long, is decided elsewhere (:mod:`~ur_cartesian_driver.execution`).
+"""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.state import RobotState, RuntimeState
+from ur_cartesian_driver.program.secondary_program import tcp_program
+from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
+from ur_cartesian_driver.protocol.program import script_command
+from ur_cartesian_driver.protocol.program.script_command import TcpPersistence
+from ur_cartesian_driver.robot.driver_status import is_paused
+from ur_cartesian_driver.robot.primary_client import PrimaryClient
+from ur_cartesian_driver.robot.program.program_sockets import ProgramSockets
+
+#: A program runs, whoever sent it.
+_RUNNING_STATES = frozenset({RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.RESUMING})
+
+
+class TemporaryTcpSetter:
+    """The two ways to set a TCP: by the robot program, or by a program of its own."""
+
+    def __init__(
+        self, program: ProgramSockets, primary_client: PrimaryClient, *, headless_mode: bool
+    ) -> None:
+        """
+        Prepare.
+
+        :param headless_mode: whether we may send programs.
+        """
+        self._program, self._primary = program, primary_client
+        self._headless_mode = headless_mode
+        #: The robot program that is connected is the one that has set it.
+        self._program_remembers = False
+
+    def set_temporary(self, T_flange_tcp: Pose) -> None:
+        """Have the robot program set the TCP for the time of a goal."""
+        self._program_remembers = True
+        self._send(T_flange_tcp, TcpPersistence.TEMPORARY)
+
+    def restore(self, T_flange_tcp: Pose, robot: RobotState) -> None:
+        """
+        Have the TCP put back to what it was before a goal.
+
+        The robot program does it where it is there, not paused, and remembers that TCP to the last
+        digit. Else a program of its own does, where we may send one, but never beside a program of
+        somebody else; and where we may not, the robot program by the digits of the wire.
+        """
+        listens = self._program.connected and not is_paused(robot)
+        if listens and (self._program_remembers or not self._headless_mode):
+            self._send(T_flange_tcp, TcpPersistence.RESTORE)
+        elif self._headless_mode and (listens or robot.runtime_state not in _RUNNING_STATES):
+            self._primary.send(primary.encode_program(tcp_program(T_flange_tcp.rotation_vector())))
+
+    def program_lost(self) -> None:
+        """Take note that the robot program is gone, and with it what it remembers."""
+        self._program_remembers = False
+
+    def _send(self, T_flange_tcp: Pose, persistence: TcpPersistence) -> None:
+        self._program.send_command(
+            script_command.encode(
+                script_command.SetTcpOffsetCommand(
+                    offset=T_flange_tcp.rotation_vector(), persistence=persistence
+                )
+            )
+        )

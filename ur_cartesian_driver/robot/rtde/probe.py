@@ -1,0 +1,38 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One look at a robot: dial RTDE, take one packet, hang up. Nothing is written or started."""
+
+from __future__ import annotations
+
+import asyncio
+
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.robot.rtde.state_stream import StateStream
+
+
+async def read_state(host: str, port: int) -> RobotState:
+    """
+    Return the state of a robot.
+
+    :raises OSError: nobody answers, or not as a robot.
+    """
+    states: list[RobotState] = []
+    first = asyncio.Event()
+
+    def take(state: RobotState) -> None:
+        states.append(state)
+        first.set()
+
+    stream = StateStream(10.0, take)
+    waiting = asyncio.create_task(first.wait())
+    try:
+        await stream.open(host, port)
+        ended = asyncio.create_task(stream.ended())
+        await asyncio.wait({waiting, ended}, return_when=asyncio.FIRST_COMPLETED)
+        ended.cancel()
+        if not states:
+            raise OSError(f'{host} port {port}: {ended.result()}')
+        return states[0]
+    finally:
+        waiting.cancel()
+        stream.close()

@@ -1,0 +1,132 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One RTDE connection: agree on what is streamed and written, then values both ways."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+
+from ur_cartesian_driver.motion.errors import ProtocolError
+from ur_cartesian_driver.protocol.rtde.rtde_client import (
+    ControllerVersion,
+    DataReceived,
+    HandshakeDone,
+    Recipe,
+    RtdeClientCodec,
+    RtdeEvent,
+    RtdeValue,
+    RtdeValues,
+)
+from ur_cartesian_driver.robot.transport import dial, TcpConnection
+
+#: How long the robot may take to agree on what it streams [s].
+ANSWER_TIMEOUT = 2.0
+#: A robot that streams nothing for that long is lost [s].
+SILENCE_TIMEOUT = 1.0
+
+
+class RtdeConnection:
+    """Used once, from one event loop: open it, wait for its end, close it."""
+
+    def __init__(
+        self,
+        client: RtdeClientCodec,
+        on_values: Callable[[Sequence[str], RtdeValues], None],
+        *,
+        silence: float = SILENCE_TIMEOUT,
+    ) -> None:
+        """
+        Prepare a connection.
+
+        :param client: says what is streamed and written.
+        :param on_values: a packet came in, with the names of its fields and what is in them; also
+            before :meth:`open` returns.
+        :param silence: the longest pause between two packets [s].
+        """
+        self._client = client
+        self._on_values = on_values
+        self._silence = silence
+        self._names: tuple[str, ...] = ()
+        self._inputs: tuple[Recipe, ...] = ()
+        self._last_packet = 0.0
+        self._version: ControllerVersion | None = None
+        self._answered = asyncio.Event()  # by a version or by hanging up
+        self._closed: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+        self._connection = TcpConnection(self._on_data, self._on_closed)
+
+    @property
+    def local_address(self) -> str:
+        """Return the address at which the robot sees us."""
+        return self._connection.local_address
+
+    @property
+    def peer_address(self) -> str:
+        """Return the robot's address as a number, where it was dialled by name."""
+        return self._connection.peer_address
+
+    async def open(self, host: str, port: int) -> ControllerVersion:
+        """
+        Connect, agree on the recipe, and return the version of the controller's software.
+
+        :raises OSError: nobody answers, or not as a robot; the text names host and port.
+        """
+        await dial(self._connection, host, port)
+        self._connection.send(self._client.start())
+        try:
+            async with asyncio.timeout(ANSWER_TIMEOUT):
+                await self._answered.wait()
+        except TimeoutError:
+            raise OSError(
+                f'{host} port {port} does not answer as an RTDE server; it may be no robot'
+            ) from None
+        if self._version is None:
+            raise OSError(f'{host} port {port} (RTDE): {self._closed.result()}')
+        self._last_packet = asyncio.get_running_loop().time()
+        return self._version
+
+    def write(self, values: Mapping[str, RtdeValue]) -> None:
+        """Write all inputs of the first group, by name."""
+        self._connection.send(self._inputs[0].pack_named(values))
+
+    async def ended(self) -> str:
+        """Wait until the connection breaks or the robot falls silent; return why, as a clause."""
+        loop = asyncio.get_running_loop()
+        while loop.time() - self._last_packet < self._silence:
+            await asyncio.wait({self._closed}, timeout=self._silence / 10.0)
+            if self._closed.done():
+                return self._closed.result()
+        return f'the robot sent nothing for {self._silence:g} s'
+
+    def close(self) -> None:
+        """Hang up."""
+        self._connection.close()
+
+    def _on_data(self, data: bytes) -> None:
+        try:
+            values = self._client.values_in(data)
+            if values is not None:
+                self._take_values(values)
+                return
+            for event in self._client.feed(data):
+                self._take(event)
+        except ProtocolError as error:
+            self._connection.abort(str(error))
+            return
+        self._connection.send(self._client.data_to_send())
+
+    def _take(self, event: RtdeEvent) -> None:
+        if isinstance(event, DataReceived):
+            self._take_values(event.values)
+        elif isinstance(event, HandshakeDone):
+            self._names, self._inputs = event.outputs.names, event.inputs
+            self._version = event.controller_version
+            self._answered.set()
+
+    def _take_values(self, values: RtdeValues) -> None:
+        self._on_values(self._names, values)  # first, because a CANCEL may follow from it
+        self._last_packet = asyncio.get_running_loop().time()
+
+    def _on_closed(self, reason: str) -> None:
+        self._closed.set_result(reason)
+        self._answered.set()

@@ -1,0 +1,128 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The RTDE connection of streamed set-points: opened for a goal, closed behind it.
+
+Inputs belong to the client that asked for them, so they are held no longer than they are needed.
+Whoever had them last, a goal of ours maybe, gives them back when the controller finds its
+connection closed; until then they are asked for again and again, for a short while.
+
+What the robot program reports of the set-points comes on the same connection, so the packets that
+every other goal waits for stay as they are.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from ur_cartesian_driver.motion.servo import ServoFeedback
+from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.protocol.program.registers import SERVO_INPUTS, SERVO_OUTPUTS
+from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec, RtdeValues
+from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
+
+SERVO_FIELDS = ('timestamp', 'speed_scaling', 'runtime_state', *SERVO_OUTPUTS)
+#: For so long is it tried to get the inputs, and so long is the pause between two attempts [s].
+OPEN_TIMEOUT, RETRY_PERIOD = 0.2, 0.02
+
+
+class ServoConnection:
+    """Used once, from one event loop: run it, write to it, close it."""
+
+    def __init__(self, on_feedback: Callable[[ServoFeedback], None]) -> None:
+        """
+        Prepare a connection.
+
+        :param on_feedback: a packet came in.
+        """
+        self._on_feedback = on_feedback
+        self._is_open = True
+        self._attempt: _Attempt | None = None
+
+    async def run(self, host: str, port: int, on_end: Callable[[str], None]) -> None:
+        """
+        Open it, and serve until it ends or is closed.
+
+        :param on_end: it could not be opened, or was lost, and why; not after
+            :meth:`close`.
+        """
+        loop = asyncio.get_running_loop()
+        give_up, reason = loop.time() + OPEN_TIMEOUT, ''
+        while self._is_open:
+            self._attempt = attempt = _Attempt(self._on_row)
+            reason = await attempt.serve(host, port)
+            if attempt.has_inputs or loop.time() >= give_up:
+                break
+            await asyncio.sleep(RETRY_PERIOD)
+        if self._is_open:
+            self._is_open = False
+            on_end(reason)
+
+    def write_row(self, values: Sequence[float]) -> None:
+        """Write all inputs in their order, if the connection is there."""
+        if self._is_open and self._attempt is not None:
+            self._attempt.write_row(values)
+
+    def close(self) -> None:
+        """Hang up, behind what was written."""
+        self._is_open = False
+        if self._attempt is not None:
+            self._attempt.close()
+
+    def _on_row(self, _: Sequence[str], values: RtdeValues) -> None:
+        if self._is_open:
+            self._on_feedback(feedback_from_rtde(values))
+
+
+class _Attempt(RtdeConnection):
+    """One connection to the robot, which may not give the inputs."""
+
+    def __init__(self, on_values: Callable[[Sequence[str], RtdeValues], None]) -> None:
+        super().__init__(RtdeClientCodec(outputs=SERVO_FIELDS, inputs=SERVO_INPUTS), on_values)
+        self._is_wanted = True
+
+    @property
+    def has_inputs(self) -> bool:
+        """Whether the robot has given them."""
+        return bool(self._inputs)
+
+    async def serve(self, host: str, port: int) -> str:
+        """Serve until it ends, and return why."""
+        try:
+            await self.open(host, port)
+            # Whoever has closed it meanwhile could not hang up yet.
+            return await self.ended() if self._is_wanted else ''
+        except OSError as error:
+            return str(error)
+        finally:
+            self.close()
+
+    def write_row(self, values: Sequence[float]) -> None:
+        """Write all inputs in their order, once they are there."""
+        if self._inputs:
+            self._connection.send(self._inputs[0].pack(values))
+
+    def close(self) -> None:
+        """Hang up, behind what was written."""
+        self._is_wanted = False
+        super().close()
+
+
+def feedback_from_rtde(values: tuple[Any, ...]) -> ServoFeedback:
+    """Return a packet with the values of :data:`SERVO_FIELDS`."""
+    timestamp, scaling, state, mode, sequence, lag, done, repeats, skipped, size, over = values
+    return ServoFeedback(
+        timestamp=timestamp,
+        speed_scaling=scaling,
+        playing=state == RuntimeState.PLAYING,
+        mode=mode,
+        last_sequence=sequence,
+        lag=lag,
+        setpoints_done=done,
+        repeats=repeats,
+        skipped=skipped,
+        buffer_size=size,
+        overflows=over,
+    )

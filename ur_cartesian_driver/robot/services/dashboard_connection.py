@@ -1,0 +1,188 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The dashboard of a robot: one line out, one line in, then the connection is closed again.
+
+A new connection for each request costs a millisecond, and there is nothing that a late answer to
+the request before could be mistaken for. What a refusal means is said in our own words, as the
+dashboard often only says that it failed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from ur_cartesian_driver.motion.errors import ProtocolError
+from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.protocol.dashboard import (
+    COMMAND_SPECS,
+    DashboardGreeting,
+    DashboardReply,
+    encode_line,
+    MAX_LINE_LENGTH,
+)
+from ur_cartesian_driver.protocol.dashboard import DashboardClientCodec as Codec
+from ur_cartesian_driver.protocol.framing import LineBuffer
+from ur_cartesian_driver.protocol.rtde.rtde_client import ControllerVersion
+from ur_cartesian_driver.robot.transport import dial, TcpConnection
+
+#: How long the dashboard may take to greet, and to answer [s].
+ANSWER_TIMEOUT = 5.0
+#: The first software without a dashboard.
+POLYSCOPE_X = 10
+#: What serves instead there; a command that is not named is for a person at the pendant.
+REPLACEMENTS: Mapping[str, str] = MappingProxyType(
+    {
+        **dict.fromkeys(
+            ('power on', 'brake release', 'unlock protective stop'),
+            'call recover, or do it on the pendant',
+        ),
+        'robotmode': 'the topic robot_mode tells it',
+        **dict.fromkeys(('safetymode', 'safetystatus'), 'the topic safety_mode tells it'),
+        **dict.fromkeys(('running', 'programState'), 'the diagnostics tell it'),
+        **dict.fromkeys(
+            ('PolyscopeVersion', 'version', 'get robot model'), 'the topic status tells it'
+        ),
+    }
+)
+
+#: Begins the answer to an unlock that comes too early.
+TOO_EARLY = 'Cannot unlock protective stop'
+
+
+class DashboardConnection:
+    """Asks the dashboard, from one event loop; several requests at once are fine."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Prepare; every request connects by itself."""
+        self._host, self._port = host, port
+
+    async def request(self, command: str, argument: str = '') -> DashboardReply:
+        """
+        Give a command and return the answer.
+
+        :raises OSError: the dashboard does not answer.
+        :raises ProtocolError: it answers nonsense.
+        """
+        codec = Codec()
+        replies: list[DashboardReply] = []
+        await self._exchange(
+            codec.send(command, argument),
+            lambda data: replies.extend(
+                event for event in codec.feed(data) if not isinstance(event, DashboardGreeting)
+            ),
+            lambda: bool(replies),
+        )
+        return replies[0]
+
+    async def request_raw(self, line: str) -> str:
+        """
+        Send any line and return the one that comes back.
+
+        :raises OSError: the dashboard does not answer.
+        :raises ProtocolError: it answers nonsense.
+        """
+        buffer = LineBuffer(MAX_LINE_LENGTH)
+        lines: list[str] = []
+        await self._exchange(
+            encode_line(line), lambda data: lines.extend(buffer.feed(data)), lambda: len(lines) > 1
+        )
+        return lines[1]  # the first one is the greeting
+
+    async def _exchange(
+        self, request: bytes, feed: Callable[[bytes], None], answered: Callable[[], bool]
+    ) -> None:
+        """Send a request and feed what comes back until it is answered."""
+        ended: asyncio.Future[str] = asyncio.get_running_loop().create_future()
+        errors: list[ProtocolError] = []
+
+        def take(data: bytes) -> None:
+            try:
+                feed(data)
+            except ProtocolError as error:
+                errors.append(error)
+            if (errors or answered()) and not ended.done():
+                ended.set_result('')
+
+        def close(reason: str) -> None:
+            if not ended.done():
+                ended.set_result(reason)
+
+        connection = TcpConnection(take, close)
+        where = f'{self._host} port {self._port} (dashboard)'
+        try:
+            await dial(connection, self._host, self._port)
+            connection.send(request)
+            async with asyncio.timeout(ANSWER_TIMEOUT):
+                reason = await ended
+        except TimeoutError:
+            raise OSError(f'{where} does not answer within {ANSWER_TIMEOUT:g} s') from None
+        finally:
+            connection.close()
+        if errors:
+            raise errors[0]
+        if not answered():
+            raise OSError(f'{where}: {reason}')
+
+
+def unavailable_reason(command: str, version: ControllerVersion) -> str:
+    """Return why the software of a robot does not have a command; empty when it has it."""
+    if version.major >= POLYSCOPE_X:
+        return (
+            'PolyScope X has no dashboard server, so this service is not available with '
+            f'software {version}; {REPLACEMENTS.get(command, "do it on the pendant")}.'
+        )
+    spec = COMMAND_SPECS[command]
+    if spec.is_available((version.major, version.minor)):
+        return ''
+    since = spec.cb3 if version.major < 5 else spec.e_series
+    if since is None:
+        return f'The dashboard of this robot, software {version}, has no command {command!r}.'
+    return (
+        f'The dashboard command {command!r} needs software {since[0]}.{since[1]} or newer, '
+        f'but the robot runs {version}.'
+    )
+
+
+def explain_refusal(
+    command: str, answer: str, robot: RobotState | None, remote_control: bool | None
+) -> str:
+    """
+    Return what a refusal of the dashboard means.
+
+    :param answer: its words.
+    :param remote_control: whether clients may control the robot; None = it cannot be known.
+    """
+    return f'The robot refuses {command!r} and says: {answer.rstrip(".")}. ' + _reason(
+        command, answer, robot, remote_control
+    )
+
+
+def _reason(
+    command: str, answer: str, robot: RobotState | None, remote_control: bool | None
+) -> str:
+    if remote_control is False:
+        return 'It is in local control: switch it to remote control on the pendant.'
+    if answer.startswith(TOO_EARLY):
+        return 'Wait until 5 s have passed since the stop, look for its cause, then try again.'
+    if answer.startswith('No program loaded'):
+        return 'Load one with load_program, or on the pendant.'
+    if 'File not found' in answer:
+        return 'The name counts from the folder of programs on the robot.'
+    if robot is None:
+        return 'Its state is not known, as there is no RTDE connection.'
+    if robot.safety_mode not in (SafetyMode.NORMAL, SafetyMode.REDUCED):
+        return f'The safety system is in mode {robot.safety_mode.name}: clear that first.'
+    if command == 'play' and robot.robot_mode is not RobotMode.RUNNING:
+        return f'The arm is in mode {robot.robot_mode.name}: release the brakes first.'
+    if command == 'play':
+        return 'Is a program loaded (load_program), and no window open on the pendant?'
+    if command == 'pause' and robot.runtime_state is not RuntimeState.PLAYING:
+        return 'No program is running.'
+    if command in ('load', 'load installation') and robot.runtime_state is not (
+        RuntimeState.STOPPED
+    ):
+        return 'A program is running: stop it first.'
+    return f'Robot mode {robot.robot_mode.name}, program {robot.runtime_state.name}.'

@@ -1,0 +1,122 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Commands of the dashboard as calls: possible, done, and seen to be done."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from ur_cartesian_driver.motion.errors import DriverError
+from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.robot.services.dashboard_connection import (
+    DashboardConnection,
+    explain_refusal,
+    unavailable_reason,
+)
+from ur_cartesian_driver.robot.services.link_interface import (
+    describe_modes,
+    LinkInterface,
+    wait_for_state,
+)
+from ur_cartesian_driver.robot.services.service_calls import (
+    DashboardCall,
+    DashboardLineCall,
+    failed,
+    ServiceAnswer,
+    succeeded,
+)
+
+#: How long the robot may take to do what it is asked for [s]: powering up takes a while.
+POWER_TIMEOUT = 30.0
+EFFECT_TIMEOUT = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class ExpectedEffect:
+    """How it is seen that the robot has done something."""
+
+    is_reached: Callable[[RobotState], bool]
+    timeout: float
+    #: What it shall be, for the sentence that says that it is not.
+    target_mode: str
+
+
+#: Dashboard commands that take a while, by what they lead to.
+EXPECTED_EFFECTS: Mapping[str, ExpectedEffect] = {
+    'power on': ExpectedEffect(
+        lambda r: r.robot_mode in (RobotMode.IDLE, RobotMode.RUNNING), POWER_TIMEOUT, 'IDLE'
+    ),
+    'power off': ExpectedEffect(
+        lambda r: r.robot_mode is RobotMode.POWER_OFF, EFFECT_TIMEOUT, 'POWER_OFF'
+    ),
+    'brake release': ExpectedEffect(
+        lambda r: r.robot_mode is RobotMode.RUNNING, POWER_TIMEOUT, 'RUNNING'
+    ),
+    'unlock protective stop': ExpectedEffect(
+        lambda r: r.safety_mode is not SafetyMode.PROTECTIVE_STOP, EFFECT_TIMEOUT, 'unlocked'
+    ),
+    'restart safety': ExpectedEffect(
+        lambda r: r.safety_mode not in (SafetyMode.VIOLATION, SafetyMode.FAULT),
+        POWER_TIMEOUT,
+        'restarted',
+    ),
+    'play': ExpectedEffect(
+        lambda r: r.runtime_state is RuntimeState.PLAYING, EFFECT_TIMEOUT, 'PLAYING'
+    ),
+    'pause': ExpectedEffect(
+        lambda r: r.runtime_state is RuntimeState.PAUSED, EFFECT_TIMEOUT, 'PAUSED'
+    ),
+    'stop': ExpectedEffect(
+        lambda r: r.runtime_state is RuntimeState.STOPPED, EFFECT_TIMEOUT, 'STOPPED'
+    ),
+}
+
+
+class DashboardService:
+    """The dashboard of a robot, from one event loop; several calls at a time."""
+
+    def __init__(self, host: str, port: int, robot: LinkInterface) -> None:
+        """Prepare; every call connects by itself."""
+        self._client = DashboardConnection(host, port)
+        self._robot = robot
+
+    async def request(self, call: DashboardCall) -> ServiceAnswer:
+        """Give a command, and wait until the robot has done it."""
+        version = self._robot.version
+        if version is not None and (reason := unavailable_reason(call.command, version)):
+            return failed(reason)
+        reply = await self._client.request(call.command, call.argument)
+        if not reply.ok:
+            return failed(
+                explain_refusal(
+                    call.command, reply.text, self._robot.robot, await self.remote_control()
+                )
+            )
+        effect = EXPECTED_EFFECTS.get(call.command)
+        if effect is not None and not await wait_for_state(
+            self._robot, effect.is_reached, effect.timeout
+        ):
+            return failed(
+                f'The robot answers {reply.text!r}, but is not {effect.target_mode} after '
+                f'{effect.timeout:g} s: {describe_modes(self._robot)}'
+            )
+        return succeeded(reply.value or reply.text)
+
+    async def request_raw(self, call: DashboardLineCall) -> ServiceAnswer:
+        """Send any line and return the one that comes back."""
+        version = self._robot.version
+        if version is not None and (reason := unavailable_reason('quit', version)):
+            return failed(reason)
+        return succeeded(await self._client.request_raw(call.line))
+
+    async def remote_control(self) -> bool | None:
+        """Return whether clients may control the robot; None = it cannot be known."""
+        version = self._robot.version
+        if version is None or unavailable_reason('is in remote control', version):
+            return None
+        try:
+            reply = await self._client.request('is in remote control')
+        except (OSError, DriverError):
+            return None
+        return {'true': True, 'false': False}.get(reply.value or '')

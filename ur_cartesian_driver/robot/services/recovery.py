@@ -1,0 +1,196 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Goes the way of a stopped robot back, one step of the tables of recovery after the other."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Mapping
+
+from ur_cartesian_driver.motion.errors import DriverError
+from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
+from ur_cartesian_driver.robot.services.dashboard_connection import POLYSCOPE_X, TOO_EARLY
+from ur_cartesian_driver.robot.services.dashboard_service import (
+    DashboardService,
+    EFFECT_TIMEOUT,
+    EXPECTED_EFFECTS,
+    ExpectedEffect,
+)
+from ur_cartesian_driver.robot.services.link_interface import (
+    describe_modes,
+    LinkInterface,
+    POLL_PERIOD,
+    wait_for_state,
+)
+from ur_cartesian_driver.robot.services.recovery_steps import (
+    next_step,
+    NextStep,
+    RecoverySituation,
+    RecoveryStep,
+    STEP_NAMES,
+)
+from ur_cartesian_driver.robot.services.service_calls import (
+    DashboardCall,
+    failed,
+    ServiceAnswer,
+    succeeded,
+)
+
+#: How long a robot may be on its way without another step [s].
+STEP_TIMEOUT = 35.0
+#: The same for a robot that is not connected, and never was meanwhile [s].
+DISCONNECTED_TIMEOUT = 2.0
+#: How long the reports of a robot may contradict each other after a change [s].
+SETTLING_TIMEOUT = 0.3
+#: How often an unlock that came too early is repeated [s].
+UNLOCK_RETRY_PERIOD = 0.5
+
+#: Dashboard commands of the steps of a recovery; the last one does it.
+STEP_COMMANDS: Mapping[RecoveryStep, tuple[str, ...]] = {
+    RecoveryStep.UNLOCK: ('close safety popup', 'close popup', 'unlock protective stop'),
+    RecoveryStep.RESTART_SAFETY: ('close safety popup', 'restart safety'),
+    RecoveryStep.POWER_ON: ('power on',),
+    RecoveryStep.RELEASE_BRAKES: ('brake release',),
+    RecoveryStep.STOP_PROGRAM: ('stop',),
+    RecoveryStep.PLAY: ('close popup', 'play'),
+}
+#: The same through the primary interface, where there is no dashboard.
+PRIMARY_COMMANDS: Mapping[RecoveryStep, primary.PrimaryCommand] = {
+    RecoveryStep.UNLOCK: primary.PrimaryCommand.UNLOCK_PROTECTIVE_STOP,
+    RecoveryStep.POWER_ON: primary.PrimaryCommand.POWER_ON,
+    RecoveryStep.RELEASE_BRAKES: primary.PrimaryCommand.RUN,
+    RecoveryStep.STOP_PROGRAM: primary.PrimaryCommand.STOP_PROGRAM,
+}
+
+
+class RecoveryRunner:
+    """One at a time."""
+
+    def __init__(
+        self,
+        robot: LinkInterface,
+        dashboard: DashboardService,
+        send_program: Callable[[], Awaitable[ServiceAnswer]],
+        *,
+        headless: bool,
+    ) -> None:
+        """
+        Prepare.
+
+        :param send_program: uploads the robot program and waits until it has called.
+        :param headless: that is how the program comes; else a program on the robot asks for it.
+        """
+        self._robot, self._dashboard = robot, dashboard
+        self._send_program, self._headless = send_program, headless
+        self._is_running = False
+
+    async def run(self) -> ServiceAnswer:
+        """Go it to its end, or to where a person has to act; the text tells what was done."""
+        if self._is_running:
+            return failed('A recovery is under way already.')
+        self._is_running = True
+        try:
+            return await self._step_by_step()
+        finally:
+            self._is_running = False
+
+    async def _step_by_step(self) -> ServiceAnswer:
+        done: list[str] = []
+        remote = await self._dashboard.remote_control()
+        loop = asyncio.get_running_loop()
+        last_step_time = loop.time()
+        while True:
+            upcoming = await self._settled_step(remote)
+            if upcoming.step is RecoveryStep.DONE:
+                return succeeded(_report(done, upcoming.text))
+            if upcoming.step is RecoveryStep.OPERATOR:
+                return failed(_report(done, upcoming.text))
+            if upcoming.step is RecoveryStep.WAIT:
+                # A robot that was never there will not come by waiting.
+                lost = self._robot.robot is None and not done
+                if loop.time() - last_step_time > (DISCONNECTED_TIMEOUT if lost else STEP_TIMEOUT):
+                    return failed(_report(done, upcoming.text or describe_modes(self._robot)))
+                await asyncio.sleep(POLL_PERIOD)
+                continue
+            if STEP_NAMES[upcoming.step] in done:
+                return failed(
+                    _report(done, f'The robot needs a person: {describe_modes(self._robot)}')
+                )
+            try:
+                answer = await self._do(upcoming.step)
+            except (OSError, DriverError) as error:
+                answer = failed(str(error))
+            if not answer.ok:
+                return failed(
+                    _report(done, f'Could not {STEP_NAMES[upcoming.step]}: {answer.text}')
+                )
+            done.append(STEP_NAMES[upcoming.step])
+            last_step_time = loop.time()
+
+    async def _settled_step(self, remote: bool | None) -> NextStep:
+        """
+        Return the next step; one for a person only when it stays so.
+
+        Sockets and reports of the robot tell of a change one after the other, and a program that
+        has just been started has not called yet.
+        """
+        loop = asyncio.get_running_loop()
+        upcoming = next_step(self._situation(remote))
+        end = loop.time() + SETTLING_TIMEOUT
+        while upcoming.step is RecoveryStep.OPERATOR and loop.time() < end:
+            await asyncio.sleep(POLL_PERIOD)
+            upcoming = next_step(self._situation(remote))
+        return upcoming
+
+    def _situation(self, remote: bool | None) -> RecoverySituation:
+        robot = self._robot
+        return RecoverySituation(
+            connection=robot.status.state,
+            message=robot.status.message,
+            robot=robot.robot,
+            program_connected=robot.program_connected,
+            headless=self._headless,
+            remote_control=remote,
+        )
+
+    async def _do(self, step: RecoveryStep) -> ServiceAnswer:
+        """Do one step and wait until it is done."""
+        if step is RecoveryStep.SEND_PROGRAM:
+            return await self._send_program()
+        version = self._robot.version
+        *before, command = STEP_COMMANDS[step]
+        if version is not None and version.major >= POLYSCOPE_X and step in PRIMARY_COMMANDS:
+            return await self._do_without_dashboard(step, EXPECTED_EFFECTS[command])
+        for line in before:
+            await self._dashboard.request(DashboardCall(command=line))
+        answer = await self._dashboard.request(DashboardCall(command=command))
+        while not answer.ok and TOO_EARLY in answer.text:
+            await asyncio.sleep(UNLOCK_RETRY_PERIOD)
+            answer = await self._dashboard.request(DashboardCall(command=command))
+        if (
+            answer.ok
+            and step is RecoveryStep.PLAY
+            and not await wait_for_state(
+                self._robot, lambda _: self._robot.program_connected, EFFECT_TIMEOUT
+            )
+        ):
+            return failed(
+                'it plays, but has not come to its External Control node within '
+                f'{EFFECT_TIMEOUT:g} s.'
+            )
+        return answer
+
+    async def _do_without_dashboard(
+        self, step: RecoveryStep, effect: ExpectedEffect
+    ) -> ServiceAnswer:
+        for _ in range(2):  # an unlock is refused for 5 s after the stop
+            if not self._robot.send_primary(PRIMARY_COMMANDS[step]):
+                return failed('there is no connection to the primary interface of the robot.')
+            if await wait_for_state(self._robot, effect.is_reached, effect.timeout):
+                return succeeded('')
+        return failed(f'the robot is not {effect.target_mode}; {describe_modes(self._robot)}')
+
+
+def _report(done: list[str], text: str) -> str:
+    """Return a sentence with what was done before."""
+    return f'{text} Done: {", ".join(done)}.' if done else text

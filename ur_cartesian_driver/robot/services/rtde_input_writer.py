@@ -1,0 +1,124 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Write to the RTDE inputs of a robot, once, and see that it has taken effect.
+
+Each time through a connection of its own: inputs belong to the client that asked for them, until
+it hangs up, and fieldbuses and other programs shall have them back at once. What was written stays
+as it is.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import isclose
+from typing import Any
+
+from ur_cartesian_driver.motion.goal import OutputKind
+from ur_cartesian_driver.motion.signals import AnalogDomain
+from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec, RtdeValue, RtdeValues
+from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
+from ur_cartesian_driver.robot.services.service_calls import SetOutputCall, SetSpeedSliderCall
+
+#: How long the robot may take to show what was written [s].
+EFFECT_TIMEOUT = 1.0
+
+_DIGITAL: Mapping[OutputKind, tuple[str, int]] = {
+    OutputKind.STANDARD_DIGITAL: ('standard_digital_output', 0),
+    OutputKind.CONFIGURABLE_DIGITAL: ('configurable_digital_output', 8),
+    OutputKind.TOOL_DIGITAL: ('tool_digital_output', 16),
+}
+#: Range of an analog output: its least and greatest value [A], [V].
+RANGES: Mapping[AnalogDomain, tuple[float, float]] = {
+    AnalogDomain.CURRENT: (0.004, 0.020),
+    AnalogDomain.VOLTAGE: (0.0, 10.0),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InputWrite:
+    """
+    What is written, and how its effect is seen.
+
+    :param inputs: values by the names of RTDE inputs.
+    :param outputs: names of the RTDE outputs that show the effect.
+    :param done: tells from these whether it is there.
+    """
+
+    inputs: Mapping[str, RtdeValue]
+    outputs: tuple[str, ...]
+    done: Callable[[Mapping[str, Any]], bool]
+
+
+def speed_slider_write(call: SetSpeedSliderCall) -> InputWrite:
+    """Return how the speed slider is moved."""
+    return InputWrite(
+        inputs={'speed_slider_mask': 1, 'speed_slider_fraction': call.fraction},
+        outputs=('target_speed_fraction',),
+        # The pendant shows whole percents.
+        done=lambda values: isclose(values['target_speed_fraction'], call.fraction, abs_tol=0.006),
+    )
+
+
+def output_write(call: SetOutputCall) -> InputWrite:
+    """Return how an output is set."""
+    return _analog(call) if call.is_analog else _digital(call)
+
+
+def _digital(call: SetOutputCall) -> InputWrite:
+    name, first_bit = _DIGITAL[call.kind]
+    return InputWrite(
+        inputs={f'{name}_mask': 1 << call.pin, name: round(call.value) << call.pin},
+        outputs=('actual_digital_output_bits',),
+        done=lambda values: (
+            (values['actual_digital_output_bits'] >> (first_bit + call.pin)) & 1
+            == round(call.value)
+        ),
+    )
+
+
+def _analog(call: SetOutputCall) -> InputWrite:
+    low, high = RANGES[call.domain]
+    expected = low + call.value * (high - low)
+    shown = f'standard_analog_output{call.pin}'
+    return InputWrite(
+        inputs={
+            'standard_analog_output_mask': 1 << call.pin,
+            'standard_analog_output_type': call.domain << call.pin,
+            f'standard_analog_output_{call.pin}': call.value,
+        },
+        outputs=(shown, 'analog_io_types'),
+        done=lambda values: (
+            isclose(values[shown], expected, abs_tol=0.02 * (high - low))
+            and values['analog_io_types'] >> (2 + call.pin) & 1 == call.domain
+        ),
+    )
+
+
+async def write_inputs(host: str, port: int, input_write: InputWrite) -> bool:
+    """
+    Write, and tell whether the effect was seen.
+
+    :raises OSError: there is no connection, or another client has the inputs.
+    """
+    done = asyncio.Event()
+
+    def check(names: Sequence[str], values: RtdeValues) -> None:
+        if input_write.done(dict(zip(names, values, strict=True))):
+            done.set()
+
+    connection = RtdeConnection(
+        RtdeClientCodec(outputs=input_write.outputs, inputs=tuple(input_write.inputs)), check
+    )
+    try:
+        await connection.open(host, port)
+        connection.write(input_write.inputs)
+        async with asyncio.timeout(EFFECT_TIMEOUT):
+            await done.wait()
+    except TimeoutError:
+        return False
+    finally:
+        connection.close()
+    return True

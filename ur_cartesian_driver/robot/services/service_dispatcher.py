@@ -1,0 +1,283 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Carries out what the owner of a driver asks a robot for beside motions.
+
+Each call goes the way that the robot has for it: the dashboard, a single command to the robot
+program, or RTDE inputs. It is done when the robot reports that it is, and ends within
+:data:`CALL_TIMEOUT` whatever the robot does, or within :data:`RECOVERY_TIMEOUT`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from math import dist, isnan
+
+from ur_cartesian_driver.motion.errors import DriverError
+from ur_cartesian_driver.motion.pose import angle_between, normalize, Pose
+from ur_cartesian_driver.motion.state import RobotState, RuntimeState
+from ur_cartesian_driver.protocol.program import script_command
+from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from ur_cartesian_driver.robot.link_settings import LinkSettings
+from ur_cartesian_driver.robot.services import rtde_input_writer
+from ur_cartesian_driver.robot.services.dashboard_service import DashboardService, EFFECT_TIMEOUT
+from ur_cartesian_driver.robot.services.link_interface import LinkInterface, wait_for_state
+from ur_cartesian_driver.robot.services.recovery import RecoveryRunner
+from ur_cartesian_driver.robot.services.service_calls import (
+    DashboardCall,
+    DashboardLineCall,
+    failed,
+    RecoverCall,
+    SendProgramCall,
+    ServiceAnswer,
+    ServiceCall,
+    SetOutputCall,
+    SetPayloadCall,
+    SetSpeedSliderCall,
+    SetTcpCall,
+    succeeded,
+    ZeroFtSensorCall,
+)
+
+#: No call takes longer [s], but Recover, which takes several steps.
+CALL_TIMEOUT = 40.0
+RECOVERY_TIMEOUT = 120.0
+#: How long a setting may take to be reported [s].
+SETTING_TIMEOUT = 1.0
+#: How far a TCP may be from the one that was set [m], [rad]: it goes through 32-bit integers.
+TCP_TOLERANCE = 1e-5
+#: The same of mass and centre of gravity [kg, m].
+PAYLOAD_TOLERANCE = 1e-4
+
+#: The first software of robots with a force sensor.
+E_SERIES = 5
+
+#: Dashboard commands that only ask: also a robot that must not be moved answers them.
+QUERY_COMMANDS = frozenset(
+    {
+        'running',
+        'robotmode',
+        'safetymode',
+        'safetystatus',
+        'get loaded program',
+        'isProgramSaved',
+        'programState',
+        'PolyscopeVersion',
+        'version',
+        'getUserRole',
+        'get operational mode',
+        'is in remote control',
+        'get serial number',
+        'get robot model',
+    }
+)
+
+#: Dashboard commands that change how the arm moves, or where it is thought to be.
+INTERFERING_COMMANDS = frozenset({'load', 'load installation', 'restart safety'})
+
+
+class ServiceDispatcher:
+    """Answers calls, from one event loop; several at a time, but one recovery."""
+
+    def __init__(self, settings: LinkSettings, dashboard_port: int, robot: LinkInterface) -> None:
+        """Prepare; nothing is sent before the first call."""
+        self._settings = settings
+        self._robot = robot
+        self._dashboard = DashboardService(settings.robot_ip, dashboard_port, robot)
+        self._recovery = RecoveryRunner(
+            robot, self._dashboard, self._send_program, headless=settings.headless_mode
+        )
+        self._pending_settings = 0
+
+    @property
+    def is_changing_settings(self) -> bool:
+        """Tell whether something that a goal counts on is being set right now."""
+        return self._pending_settings > 0
+
+    async def dispatch(self, call: ServiceCall) -> ServiceAnswer:
+        """Carry out a call; what goes wrong is an answer too."""
+        bound = RECOVERY_TIMEOUT if isinstance(call, RecoverCall) else CALL_TIMEOUT
+        try:
+            async with asyncio.timeout(bound):
+                return self._refusal(call) or await self._execute(call)
+        except TimeoutError:
+            return failed(f'The robot has not done it within {bound:g} s.')
+        except (OSError, DriverError) as error:
+            return failed(f'{str(error).rstrip(".")}.')
+
+    async def _execute(self, call: ServiceCall) -> ServiceAnswer:
+        match call:
+            case DashboardCall():
+                return await self._dashboard.request(call)
+            case DashboardLineCall():
+                return await self._dashboard.request_raw(call)
+            case SetTcpCall() | SetPayloadCall():
+                return await self._set(call)
+            case ZeroFtSensorCall():
+                return self._zero_ftsensor()
+            case SetOutputCall():
+                return await self._write(
+                    rtde_input_writer.output_write(call), 'The output is set.'
+                )
+            case SetSpeedSliderCall():
+                return await self._write(
+                    rtde_input_writer.speed_slider_write(call),
+                    f'The speed slider is at {call.fraction:.0%}.',
+                )
+            case SendProgramCall():
+                return await self._send_program()
+            case RecoverCall():
+                return await self._recovery.run()
+
+    def _refusal(self, call: ServiceCall) -> ServiceAnswer | None:
+        """Refuse what must not be done now."""
+        status = self._robot.status
+        if isinstance(call, DashboardCall) and call.command in QUERY_COMMANDS:
+            return None
+        if status.state is ConnectionState.REFUSED:
+            return failed(status.message)
+        if isinstance(call, SetTcpCall) and self._robot.tcp_restore_pending:
+            return failed(
+                'The TCP that a goal has lent is being put back; try again when the status '
+                'is READY.'
+            )
+        if status.state is ConnectionState.EXECUTING and (
+            isinstance(call, SetTcpCall | SetPayloadCall | SendProgramCall)
+            or (isinstance(call, DashboardCall) and call.command in INTERFERING_COMMANDS)
+        ):
+            return failed(
+                'A goal is running, and this would disturb it; wait for its end or cancel '
+                'it, then try again.'
+            )
+        return None
+
+    # ---- robot program ------------------------------------------------------------------------
+
+    def _command(self, command: script_command.AnyScriptCommand) -> ServiceAnswer | None:
+        """Send a command to the robot program; an answer only if it cannot be sent."""
+        robot = self._robot.robot
+        if robot is not None and robot.runtime_state is not RuntimeState.PLAYING:
+            return failed(
+                f'The robot program does not read commands now, it is '
+                f'{robot.runtime_state.name}. {self._robot.status.message}'.rstrip()
+            )
+        if not self._robot.send_command(script_command.encode(command)):
+            return failed(
+                'The robot program does not run, and it is what does this. '
+                f'{self._robot.status.message}'.rstrip()
+            )
+        return None
+
+    def _zero_ftsensor(self) -> ServiceAnswer:
+        version = self._robot.version
+        if version is not None and version.major < E_SERIES:
+            return failed(
+                f'A CB3 robot (software {version}) has no force sensor to be zeroed: '
+                'it works forces out from the currents of its joints.'
+            )
+        return self._command(script_command.ZeroFtSensorCommand()) or succeeded(
+            'The robot program was told to zero the force sensor.'
+        )
+
+    async def _set(self, call: SetTcpCall | SetPayloadCall) -> ServiceAnswer:
+        """Set something; no goal begins meanwhile."""
+        self._pending_settings += 1
+        try:
+            return await (
+                self._set_tcp(call) if isinstance(call, SetTcpCall) else self._set_payload(call)
+            )
+        finally:
+            self._pending_settings -= 1
+
+    async def _set_tcp(self, call: SetTcpCall) -> ServiceAnswer:
+        wanted = Pose(call.T_flange_tcp.position, normalize(call.T_flange_tcp.quaternion))
+
+        def is_reported(robot: RobotState) -> bool:
+            there = robot.T_flange_tcp
+            return (
+                dist(there.position, wanted.position) < TCP_TOLERANCE
+                and angle_between(there.quaternion, wanted.quaternion) < TCP_TOLERANCE
+            )
+
+        refusal = self._command(
+            script_command.SetTcpOffsetCommand(offset=wanted.rotation_vector())
+        )
+        if refusal is not None:
+            return refusal
+        if await wait_for_state(self._robot, is_reported, SETTING_TIMEOUT):
+            return succeeded('The TCP is set.')
+        return failed(
+            f'The robot does not report the new TCP within {SETTING_TIMEOUT:g} s: its '
+            'program may not know that command, or its software not report TCPs; set it on '
+            'the pendant.'
+        )
+
+    async def _set_payload(self, call: SetPayloadCall) -> ServiceAnswer:
+        refusal = self._command(script_command.SetPayloadCommand(mass=call.mass, cog=call.cog))
+        if refusal is not None:
+            return refusal
+        signals, rate = self._robot.signals, self._settings.io_publish_rate
+        if signals is None:
+            return succeeded(
+                'The payload was sent; nothing reports it while inputs and outputs are not '
+                'reported (io_publish_rate).'
+            )
+        if isnan(signals.payload):
+            return succeeded('The payload was sent; the software of the robot does not report it.')
+        within = SETTING_TIMEOUT + 1.0 / rate
+        if await wait_for_state(self._robot, lambda _: self._has_payload(call), within):
+            return succeeded('The payload is set.')
+        return failed(
+            f'The robot does not report the new payload within {within:g} s: its program '
+            'may not know that command; set it on the pendant.'
+        )
+
+    def _has_payload(self, call: SetPayloadCall) -> bool:
+        signals = self._robot.signals
+        return (
+            signals is not None
+            and dist((signals.payload, *signals.payload_cog), (call.mass, *call.cog))
+            < PAYLOAD_TOLERANCE
+        )
+
+    async def _send_program(self) -> ServiceAnswer:
+        if not self._settings.headless_mode:
+            return failed(
+                'The parameter headless_mode is false: play a program with External '
+                'Control on the pendant.'
+            )
+        if self._robot.robot is None:
+            return failed(self._robot.status.message)
+        replaces = self._robot.program_connected
+        self._robot.upload_program()
+        if replaces:  # its predecessor hangs up first
+            await wait_for_state(
+                self._robot, lambda _: not self._robot.program_connected, SETTING_TIMEOUT
+            )
+        if await wait_for_state(
+            self._robot,
+            lambda _: self._robot.status.state is ConnectionState.READY,
+            EFFECT_TIMEOUT,
+        ):
+            return succeeded('The robot program runs.')
+        needed = self._robot.status.message
+        if await self._dashboard.remote_control() is False:
+            needed = 'The robot is in local control: switch it to remote control, then try again.'
+        return failed(
+            f'The robot program has not called within {EFFECT_TIMEOUT:g} s. {needed}'.rstrip()
+        )
+
+    # ---- RTDE inputs --------------------------------------------------------------------------
+
+    async def _write(
+        self, input_write: rtde_input_writer.InputWrite, success: str
+    ) -> ServiceAnswer:
+        if await rtde_input_writer.write_inputs(
+            self._settings.robot_ip, self._settings.rtde_port, input_write
+        ):
+            return succeeded(success)
+        return failed(
+            'The robot took the value, but does not report it within '
+            f'{rtde_input_writer.EFFECT_TIMEOUT:g} s; is it in local control, or does something '
+            'else set the same?'
+        )

@@ -1,0 +1,226 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+From a goal message to :class:`~ur_cartesian_driver.motion.goal.Goal`: the way into the driver.
+
+Only what the message alone can get wrong is refused here: numbers that stand for nothing and
+names of frames. Whether the goal makes sense is decided by the planning, which knows no messages.
+A goal of 20,000 points comes through here in one plain loop; every attribute that is looked up
+there counts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from enum import IntEnum
+from typing import Any, TypeAlias, TypeVar
+
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.goal import (
+    ArcMode,
+    ExecutionMode,
+    Goal,
+    IOCommand,
+    OutputKind,
+    Posture,
+    Segment,
+    SegmentType,
+    Tolerance,
+    Waypoint,
+    ZERO6,
+)
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector3, Vector6
+from ur_cartesian_driver.motion.signals import AnalogDomain
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
+from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
+
+#: Generated message classes carry no types.
+Message: TypeAlias = Any
+_Enum = TypeVar('_Enum', bound=IntEnum)
+
+_NO_POSTURE = Posture()
+
+
+def goal_from_message(
+    message: Message,
+    frames: Frames,
+    *,
+    now: int,
+    snapshot: ArmSnapshot | None = None,
+    time_tolerance: float = 0.0,
+) -> Goal:
+    """
+    Return the goal of a ``FollowCartesianTrajectory.Goal``.
+
+    :param now: time of the node's clock when the goal was received [ns].
+    :param snapshot: where the arm stands, None while it is unknown.
+    :param time_tolerance: what a ``goal_time_tolerance`` of zero means [s].
+    :raises InvalidGoal: a frame is unknown or an enumeration has no such value; the text names
+        the field.
+    :raises RobotNotReady: a frame moves with the arm, and nobody knows where that stands.
+    """
+    trajectory = message.trajectory
+    return resolve_frames(
+        Goal(
+            waypoints=tuple(map(_waypoint, trajectory.points)),
+            segments=tuple(
+                _segment(segment, f'segments[{i}]') for i, segment in enumerate(message.segments)
+            ),
+            frame_id=trajectory.header.frame_id,
+            age=_age(trajectory.header.stamp, now),
+            path_tolerance=_tolerance(message.path_tolerance),
+            goal_tolerance=_tolerance(message.goal_tolerance),
+            goal_time_tolerance=seconds(message.goal_time_tolerance) or time_tolerance,
+            execution=_member(ExecutionMode, message.execution, 'execution'),
+            io_commands=tuple(
+                _io_command(command, f'io_commands[{i}]')
+                for i, command in enumerate(message.io_commands)
+            ),
+            keep_open=message.keep_open,
+        ),
+        trajectory,
+        frames,
+        now=now,
+        snapshot=snapshot,
+    )
+
+
+def appended_points_from_message(message: Message) -> AppendedPoints:
+    """
+    Return what an ``AppendPoints.Request`` appends.
+
+    :raises InvalidGoal: an enumeration has no such value; the text names the field.
+    """
+    return AppendedPoints(
+        waypoints=tuple(map(_waypoint, message.points)),
+        segments=tuple(
+            _segment(segment, f'segments[{i}]') for i, segment in enumerate(message.segments)
+        ),
+        io_commands=tuple(
+            _io_command(command, f'io_commands[{i}]')
+            for i, command in enumerate(message.io_commands)
+        ),
+        last=message.last,
+    )
+
+
+def resolve_frames(
+    goal: Goal, trajectory: Message, frames: Frames, *, now: int, snapshot: ArmSnapshot | None
+) -> Goal:
+    """
+    Return a goal whose frames are where they are at this moment.
+
+    A stamp in the future is looked at when it has come; until then the newest transforms do.
+
+    :param trajectory: the ``CartesianTrajectory`` from which the goal was made.
+    :param now: time of the node's clock [ns].
+    :raises InvalidGoal: a frame is unknown.
+    :raises RobotNotReady: it moves with the arm, and nobody knows where that stands.
+    """
+    stamp = nanoseconds(trajectory.header.stamp)
+    T_flange_controlled = frames.T_flange_frame(trajectory.controlled_frame, snapshot)
+    return replace(
+        goal,
+        T_base_frame=frames.T_base_frame(
+            trajectory.header.frame_id, snapshot, at=stamp if stamp <= now else 0
+        ),
+        T_flange_controlled=T_flange_controlled,
+        # Empty: the active TCP, by whatever name it was given.
+        controlled_frame='' if T_flange_controlled is None else trajectory.controlled_frame,
+    )
+
+
+def seconds(duration: Message) -> float:
+    """Return a ``Duration`` or ``Time`` as seconds, rounded only once, so nanoseconds survive."""
+    return nanoseconds(duration) / 1_000_000_000
+
+
+def nanoseconds(time: Message) -> int:
+    """Return a ``Duration`` or ``Time`` in nanoseconds."""
+    return int(time.sec) * 1_000_000_000 + int(time.nanosec)
+
+
+def _age(stamp: Message, now: int) -> float | None:
+    """Return how old a stamp is [s]; None for no stamp at all."""
+    sent = nanoseconds(stamp)
+    return None if sent == 0 else (now - sent) / 1_000_000_000
+
+
+def _waypoint(point: Message) -> Waypoint:
+    time = point.time_from_start
+    return Waypoint(
+        time=(time.sec * 1_000_000_000 + time.nanosec) / 1_000_000_000,
+        pose=_pose(point.pose),
+        twist=_six(point.twist),
+        acceleration=_six(point.acceleration),
+        jerk=_six(point.jerk),
+        posture=_posture(point.posture),
+    )
+
+
+def _pose(pose: Message) -> Pose:
+    p, q = pose.position, pose.orientation
+    return Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
+
+
+def _three(vector: Message) -> Vector3:
+    return (vector.x, vector.y, vector.z)
+
+
+def _six(twist: Message) -> Vector6:
+    """Return a ``Twist`` or ``Accel``; the zero of nearly all points is one shared tuple."""
+    u, v = twist.linear, twist.angular
+    values = (u.x, u.y, u.z, v.x, v.y, v.z)
+    return values if any(values) else ZERO6
+
+
+def _posture(posture: Message) -> Posture:
+    names, values = posture.posture_joint_names, posture.posture_joint_values
+    if not names and not values:
+        return _NO_POSTURE
+    return Posture(names=tuple(names), values=tuple(values))
+
+
+def _segment(segment: Message, field: str) -> Segment:
+    type_ = _member(SegmentType, segment.type, f'{field}.type')
+    via: Pose | None = _pose(segment.via)
+    if type_ is not SegmentType.CIRCULAR and via == IDENTITY:
+        via = None  # left alone; another value is kept, so that it is refused and not ignored
+    return Segment(
+        type=type_,
+        blend_radius=segment.blend_radius,
+        velocity=segment.velocity,
+        acceleration=segment.acceleration,
+        via=via,
+        via_posture=_posture(segment.via_posture),
+        arc_mode=_member(ArcMode, segment.arc_mode, f'{field}.arc_mode'),
+    )
+
+
+def _io_command(command: Message, field: str) -> IOCommand:
+    return IOCommand(
+        waypoint=command.point_index,
+        offset=seconds(command.offset),
+        output=_member(OutputKind, command.output, f'{field}.output'),
+        pin=command.pin,
+        value=command.value,
+        domain=_member(AnalogDomain, command.analog_domain, f'{field}.analog_domain'),
+    )
+
+
+def _tolerance(tolerance: Message) -> Tolerance:
+    return Tolerance(
+        position=_three(tolerance.position_error),
+        orientation=_three(tolerance.orientation_error),
+        twist=_six(tolerance.twist_error),
+        acceleration=_six(tolerance.acceleration_error),
+    )
+
+
+def _member(enum: type[_Enum], value: int, field: str) -> _Enum:
+    """Return the member with a value, or say which there are."""
+    try:
+        return enum(value)
+    except ValueError:
+        names = ', '.join(f'{member.name} ({member.value})' for member in enum)
+        raise InvalidGoal(field, f'is {value}', f'it is one of {names}') from None

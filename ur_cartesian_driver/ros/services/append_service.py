@@ -1,0 +1,137 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The service that appends points to a goal that is being carried out (keep_open).
+
+Points are planned in a thread of their own, one request after the other, so neither the executor
+nor the feedback waits for them; the response is sent when they are taken, or refused.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import Future, ThreadPoolExecutor
+from hashlib import sha256
+import pickle
+import threading
+from typing import Any
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+
+from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNotReady
+from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
+from ur_cartesian_driver.ros.goals.action_server import CartesianActionServer, GoalRun
+from ur_cartesian_driver.ros.messages.goal_conversion import appended_points_from_message
+from ur_cartesian_driver.ros.services.command_services import DeferredService
+from ur_cartesian_driver.srv import AppendPoints
+
+#: How long a goal may take from its acceptance to its motion while points wait for it [s].
+BEGIN_TIMEOUT = 10.0
+
+#: How many requests may wait for their turn, with their points in memory.
+MAX_WAITING_REQUESTS = 32
+
+SHUTDOWN_REFUSAL = 'The driver node is shutting down.'
+OVERLOAD_REFUSAL = (
+    f'{MAX_WAITING_REQUESTS} requests to append points wait; send this one again later.'
+)
+
+
+class AppendService:
+    """Serves ``~/append_points``."""
+
+    def __init__(self, node: Node, server: CartesianActionServer) -> None:
+        """Begin to serve."""
+        self._server = server
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix='append points')
+        self._slots = threading.Semaphore(MAX_WAITING_REQUESTS)
+        self._service = _AppendServiceServer(
+            node, AppendPoints, '~/append_points', self._handle, MutuallyExclusiveCallbackGroup()
+        )
+
+    def close(self) -> None:
+        """Take nothing any more; what is being planned comes to its end."""
+        self._thread.shutdown(cancel_futures=True)
+
+    def _handle(self, request: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        if not self._slots.acquire(blocking=False):
+            future.set_result(_refusal(OVERLOAD_REFUSAL))
+            return future
+
+        def answer(done: Future[Any]) -> None:
+            self._slots.release()
+            future.set_result(_refusal(SHUTDOWN_REFUSAL) if done.cancelled() else done.result())
+
+        try:
+            self._thread.submit(self._append, request).add_done_callback(answer)
+        except RuntimeError:  # the thread takes no more work
+            future.set_result(_refusal(SHUTDOWN_REFUSAL))
+        return future
+
+    def _append(self, request: Any) -> Any:
+        """Return the response to a request."""
+        run = self._server.find_run(bytes(request.goal_id.uuid))
+        if run is None:
+            return _refusal(
+                'There is no goal with this goal_id that is being carried out: it '
+                'has ended, or was never sent.'
+            )
+        try:
+            return self._append_to_run(run, request)
+        except DriverError as error:
+            return _refusal(str(error), run.points)
+        except Exception as error:
+            return _refusal(
+                f'The driver has a defect, {type(error).__name__}: {error}.', run.points
+            )
+
+    def _append_to_run(self, run: GoalRun, request: Any) -> Any:
+        """
+        Return the response to a request to a goal.
+
+        :raises GoalRefused: nothing was taken.
+        """
+        # Others may append to the goal that has the arm until then; nobody keeps them waiting.
+        motion = run.motion(0.0 if run.is_waiting else BEGIN_TIMEOUT)
+        if motion is None or motion.appender is None:
+            raise RobotNotReady(
+                'The goal does not move yet; append its points when it does.'
+                if motion is None
+                else 'The goal was sent without keep_open: nothing can be appended.'
+            )
+        new_points = appended_points_from_message(request)
+        request_key = request.first_index, _digest(new_points)
+        if run.last_append is not None and run.last_append[0] == request_key:
+            return run.last_append[1]  # it came twice
+        points = motion.appender.points
+        if request.first_index != points:
+            raise InvalidGoal(
+                'first_index',
+                f'is {request.first_index}, but the goal has {points} points',
+                f'append point {points} first'
+                if request.first_index > points
+                else f'go on with point {points}',
+            )
+        appended = motion.appender.append(new_points)
+        response = AppendPoints.Response(
+            accepted=True, message=appended.text, points_received=appended.points
+        )
+        run.last_append = (request_key, response)
+        return response
+
+
+class _AppendServiceServer(DeferredService):
+    """Promises responses."""
+
+    def _response(self, answer: Any) -> Any:
+        return answer
+
+
+def _digest(new_points: AppendedPoints) -> bytes:
+    """Return what tells additions apart; also where they contain NaN, which equals nothing."""
+    return sha256(pickle.dumps(new_points)).digest()
+
+
+def _refusal(text: str, points: int = 0) -> Any:
+    return AppendPoints.Response(accepted=False, message=text, points_received=points)

@@ -1,0 +1,222 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The topics that tell the state of the robot, published from a thread of their own.
+
+A timer of the executor would cost twice as much and wait behind every other callback. The thread
+also notices changes, so there is one place that publishes and nothing to lock.
+
+Names, types, units and rates: ``doc/ros_interface.md``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import threading
+from time import monotonic
+from types import ModuleType
+from typing import Any
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from rclpy.action.server import RCLError
+from rclpy.exceptions import InvalidHandle
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Float64
+
+from ur_cartesian_driver.driver import Driver
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
+from ur_cartesian_driver.motion.signals import Signals
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.msg import DriverStatus, IOStates, RobotMode, SafetyMode, ToolData
+from ur_cartesian_driver.ros.messages.feedback_messages import (
+    joint_state_message,
+    tcp_pose_message,
+)
+from ur_cartesian_driver.ros.messages.state_messages import (
+    io_states_message,
+    robot_mode_message,
+    safety_mode_message,
+    status_message,
+    tcp_transform,
+    tool_data_message,
+    wrench_message,
+)
+from ur_cartesian_driver.ros.parameters.node_parameters import Settings
+from ur_cartesian_driver.ros.state.diagnostics import diagnostics_message
+
+#: The newest value is enough, but a reliable subscriber shall be served too.
+STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+#: Who comes late gets the last value at once.
+LATCHED_QOS = QoSProfile(
+    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
+#: As tf2 wants it.
+TF_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+#: How often an unchanged status is confirmed [s].
+STATUS_PERIOD = 1.0
+#: How often a defect is told, at most [s].
+WARNING_PERIOD = 10.0
+
+
+def tf_messages() -> ModuleType | None:
+    """Return ``tf2_msgs.msg`` where it is installed; it does not come from PyPI."""
+    try:
+        return importlib.import_module('tf2_msgs.msg')
+    except ImportError:
+        return None
+
+
+class StatePublisher:
+    """Publishes the state of a driver from its start to :meth:`close`."""
+
+    def __init__(self, node: Node, driver: Driver, settings: Settings) -> None:
+        """Make the publishers; :meth:`start` begins to use them."""
+        self._clock = node.get_clock()
+        self._logger = node.get_logger()
+        self._driver = driver
+        self._period = 1.0 / settings.node.state_publish_rate
+        self._closed = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='state publisher', daemon=True)
+        self._state_topics = _StateTopics(node, settings)
+        self._status_topics = _StatusTopics(node)
+        self._io_topics = _IoTopics(node)
+        self._diagnostics_topic = _DiagnosticsTopic(node, settings.node.diagnostics_rate)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread; the publishers go with the node."""
+        self._closed.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _run(self) -> None:
+        """Publish at absolute deadlines; those that were missed are left out."""
+        due = monotonic()
+        while not self._closed.wait(max(0.0, due - monotonic())):
+            try:
+                self._publish(monotonic())
+            except (InvalidHandle, RCLError):
+                return  # ROS was shut down under the node
+            except Exception as error:
+                # One bad value must not silence all topics for good.
+                self._logger.error(
+                    f'The state of the robot is not published, because of a defect of the driver, '
+                    f'{type(error).__name__}: {error}.',
+                    throttle_duration_sec=WARNING_PERIOD,
+                )
+            due += self._period * max(1.0, (monotonic() - due) // self._period)
+
+    def _publish(self, now: float) -> None:
+        driver, stamp = self._driver, self._clock.now().to_msg()
+        state = driver.state
+        self._state_topics.publish(state, stamp)
+        self._status_topics.publish(driver, state, now, stamp)
+        self._io_topics.publish(driver.signals, stamp)
+        self._diagnostics_topic.publish(driver, now, stamp)
+
+
+class _StateTopics:
+    """What is published with each new state of the robot."""
+
+    def __init__(self, node: Node, settings: Settings) -> None:
+        self._joint_names = tuple(settings.planning.tf_prefix + name for name in JOINT_NAMES)
+        self._base, self._tcp = settings.frames.base, settings.frames.tcp
+        self._joint_states = node.create_publisher(JointState, 'joint_states', STATE_QOS)
+        self._tcp_pose = node.create_publisher(PoseStamped, '~/tcp_pose', STATE_QOS)
+        self._wrench = node.create_publisher(WrenchStamped, '~/wrench', STATE_QOS)
+        self._speed_scaling = node.create_publisher(Float64, '~/speed_scaling', STATE_QOS)
+        tf = tf_messages()
+        self._tf_message_type: Any = None if tf is None else tf.TFMessage
+        self._tf = None if tf is None else node.create_publisher(tf.TFMessage, '/tf', TF_QOS)
+        self._last: RobotState | None = None
+
+    def publish(self, state: RobotState | None, stamp: Time) -> None:
+        last, self._last = self._last, state
+        if state is None or (last is not None and state.timestamp == last.timestamp):
+            return
+        self._joint_states.publish(joint_state_message(state, self._joint_names, stamp))
+        self._tcp_pose.publish(tcp_pose_message(state, self._base, stamp))
+        self._wrench.publish(wrench_message(state, self._tcp, stamp))
+        self._speed_scaling.publish(Float64(data=state.speed_scaling))
+        if self._tf is not None:
+            self._tf.publish(
+                self._tf_message_type(
+                    transforms=[tcp_transform(state, self._base, self._tcp, stamp)]
+                )
+            )
+
+
+class _StatusTopics:
+    """What is published when it changes: latched."""
+
+    def __init__(self, node: Node) -> None:
+        self._status = node.create_publisher(DriverStatus, '~/status', LATCHED_QOS)
+        self._robot_mode = node.create_publisher(RobotMode, '~/robot_mode', LATCHED_QOS)
+        self._safety_mode = node.create_publisher(SafetyMode, '~/safety_mode', LATCHED_QOS)
+        self._program = node.create_publisher(Bool, '~/robot_program_running', LATCHED_QOS)
+        self._last: dict[Any, object] = {}
+        self._last_status_time = -STATUS_PERIOD
+
+    def publish(self, driver: Driver, state: RobotState | None, now: float, stamp: Time) -> None:
+        connection = driver.status
+        robot_mode = None if state is None else state.robot_mode
+        safety_mode = None if state is None else state.safety_mode
+        overdue = now - self._last_status_time >= STATUS_PERIOD
+        if self._is_new(self._status, (connection, robot_mode, safety_mode)) or overdue:
+            self._last_status_time = now
+            self._status.publish(status_message(connection, state, stamp))
+        if self._is_new(self._robot_mode, robot_mode):
+            self._robot_mode.publish(robot_mode_message(state))
+        if self._is_new(self._safety_mode, safety_mode):
+            self._safety_mode.publish(safety_mode_message(state))
+        if self._is_new(self._program, connection.program_running):
+            self._program.publish(Bool(data=connection.program_running))
+
+    def _is_new(self, topic: Any, value: object) -> bool:
+        """Tell whether a topic has another value than before, or none yet."""
+        if topic in self._last and self._last[topic] == value:
+            return False
+        self._last[topic] = value
+        return True
+
+
+class _IoTopics:
+    """Inputs, outputs and tool: when something of them changes, latched."""
+
+    def __init__(self, node: Node) -> None:
+        self._io_states = node.create_publisher(IOStates, '~/io_states', LATCHED_QOS)
+        self._tool_data = node.create_publisher(ToolData, '~/tool_data', LATCHED_QOS)
+        self._last: Signals | None = None
+
+    def publish(self, signals: Signals | None, stamp: Time) -> None:
+        last, self._last = self._last, signals
+        if signals is None or signals is last:
+            return
+        self._io_states.publish(io_states_message(signals, stamp))
+        self._tool_data.publish(tool_data_message(signals, stamp))
+
+
+class _DiagnosticsTopic:
+    """``/diagnostics``, at a rate of its own."""
+
+    def __init__(self, node: Node, rate: float) -> None:
+        self._name = node.get_fully_qualified_name().strip('/')
+        self._period = 1.0 / rate if rate > 0.0 else 0.0
+        self._topic = (
+            node.create_publisher(DiagnosticArray, '/diagnostics', STATE_QOS)
+            if rate > 0.0
+            else None
+        )
+        self._due = 0.0
+
+    def publish(self, driver: Driver, now: float, stamp: Time) -> None:
+        if self._topic is not None and now >= self._due:
+            self._due = now + self._period
+            self._topic.publish(diagnostics_message(driver, self._name, stamp))

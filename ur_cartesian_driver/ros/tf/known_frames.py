@@ -1,0 +1,217 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The frames that a goal may name: in which it is given, and which one it moves.
+
+Poses go to the robot in ``base``, the frame that its own controller counts in. ``base_link`` of
+the robot description is the same point turned by pi about z.
+
+``tool0`` is the controller's flange. ``flange`` of the robot description has the same origin and
+the axes of REP-103 (x forward), that is tool0 turned back by rpy (pi/2, 0, pi/2).
+``tool0_controller`` is the robot's active TCP. A goal that is given in one of these three is given
+from where the robot stands when it is planned: a relative motion.
+
+The parameter ``static_frames`` adds frames behind all of these. Frames that nobody has named so
+are looked up in tf2 where it is installed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+import copy
+from dataclasses import dataclass
+from math import isfinite, sqrt
+
+from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
+from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.ros.tf.tf_lookup import TransformLookup
+
+#: ``base_link`` in ``base``.
+T_BASE_BASE_LINK = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0))
+#: ``flange`` in ``tool0``: the inverse of rpy (pi/2, 0, pi/2), whose quaternion is (1, 1, 1, 1)/2.
+T_TOOL0_FLANGE = Pose((0.0, 0.0, 0.0), (-0.5, -0.5, -0.5, 0.5))
+
+BASE, BASE_LINK = 'base', 'base_link'
+TOOL0, FLANGE, TCP = 'tool0', 'flange', 'tool0_controller'
+
+_UNIT_TOLERANCE = 1e-3
+_FRAME_ID, _CONTROLLED = 'trajectory.header.frame_id', 'trajectory.controlled_frame'
+
+
+@dataclass(frozen=True, slots=True)
+class StaticFrame:
+    """A frame that does not move with respect to its parent."""
+
+    name: str
+    parent: str
+    T_parent_frame: Pose
+
+    @classmethod
+    def parse(cls, text: str) -> StaticFrame:
+        """
+        Read ``name parent x y z qx qy qz qw`` [m, unit quaternion].
+
+        :raises ValueError: the text has another form; the sentence says what is wrong.
+        """
+        words = text.split()
+        if len(words) != 9:
+            raise ValueError(
+                f'static_frames: "{text}" has {len(words)} words instead of 9; write '
+                '"name parent x y z qx qy qz qw" [m, unit quaternion].'
+            )
+        name, parent, *numbers = words
+        try:
+            x, y, z, qx, qy, qz, qw = (float(number) for number in numbers)
+        except ValueError as error:
+            raise ValueError(f'static_frames: "{name}": {error}.') from None
+        if not all(isfinite(v) for v in (x, y, z, qx, qy, qz, qw)):
+            raise ValueError(f'static_frames: "{name}" has a number that is not finite.')
+        length = sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
+        if abs(length - 1.0) > _UNIT_TOLERANCE:
+            raise ValueError(
+                f'static_frames: the quaternion {qx:g} {qy:g} {qz:g} {qw:g} of '
+                f'"{name}" has length {length:.4g} instead of 1; the order is x y z w.'
+            )
+        return cls(name, parent, Pose((x, y, z), normalize((qx, qy, qz, qw))))
+
+
+@dataclass(frozen=True, slots=True)
+class ArmSnapshot:
+    """Where the arm stands, and the TCP that it has."""
+
+    T_base_flange: Pose
+    T_flange_tcp: Pose
+
+    @classmethod
+    def of(cls, state: RobotState) -> ArmSnapshot:
+        """Return it by the robot's own report, which knows the arm's calibration."""
+        return cls(state.actual_tcp_pose @ state.T_flange_tcp.inverse(), state.T_flange_tcp)
+
+
+class Frames:
+    """The frames that are known to this driver, with the robot's ``tf_prefix`` in their names."""
+
+    def __init__(self, tf_prefix: str = '', static_frames: Iterable[StaticFrame] = ()) -> None:
+        """
+        Resolve all static frames down to the base, the flange or the TCP.
+
+        :raises ValueError: a static frame has an unknown parent, a name that is taken, or is its
+            own ancestor.
+        """
+        self.base = tf_prefix + BASE
+        self.tcp = tf_prefix + TCP
+        self.tool0 = tf_prefix + TOOL0
+        self._transforms: TransformLookup | None = None
+        resolved = _resolve_static_frames(
+            {
+                self.base: (self.base, IDENTITY),
+                tf_prefix + BASE_LINK: (self.base, T_BASE_BASE_LINK),
+                self.tool0: (self.tool0, IDENTITY),
+                tf_prefix + FLANGE: (self.tool0, T_TOOL0_FLANGE),
+                self.tcp: (self.tcp, IDENTITY),
+            },
+            static_frames,
+        )
+        self._T_base, self._T_flange, self._T_tcp = (
+            {name: T for name, (root, T) in resolved.items() if root == of}
+            for of in (self.base, self.tool0, self.tcp)
+        )
+
+    def with_transforms(self, transforms: TransformLookup | None) -> Frames:
+        """Return the same frames, and those of tf2."""
+        frames = copy.copy(self)
+        frames._transforms = transforms
+        return frames
+
+    def T_base_frame(self, name: str, snapshot: ArmSnapshot | None = None, at: int = 0) -> Pose:
+        """
+        Return where a frame is in the robot's base; the empty name is the base itself.
+
+        :param snapshot: for frames that move with the arm; None while nobody knows.
+        :param at: when, for frames of tf2 [ns]; 0 = as new as there is.
+        :raises InvalidGoal: the frame is unknown, or tf2 does not know where it is (any more).
+        :raises RobotNotReady: it moves with the arm, and nobody knows where that stands.
+        """
+        name = name or self.base
+        if name in self._T_base:
+            return self._T_base[name]
+        if name in self._T_flange:
+            return (
+                _require_snapshot(snapshot, _FRAME_ID, name).T_base_flange @ self._T_flange[name]
+            )
+        if name in self._T_tcp:
+            known = _require_snapshot(snapshot, _FRAME_ID, name)
+            return known.T_base_flange @ known.T_flange_tcp @ self._T_tcp[name]
+        if self._transforms is not None:
+            return self._transforms.T_target_source(_FRAME_ID, self.base, name, at)
+        raise InvalidGoal(
+            _FRAME_ID,
+            f'is "{name}", which is not a known frame',
+            f'known are {", ".join([*self._T_base, *self._T_flange, *self._T_tcp])}; others can '
+            'be named in the parameter static_frames',
+        )
+
+    def T_flange_frame(self, name: str, snapshot: ArmSnapshot | None = None) -> Pose | None:
+        """
+        Return where a controlled frame is behind the flange; None for the robot's active TCP.
+
+        :param snapshot: for frames behind the active TCP; None while nobody knows.
+        :raises InvalidGoal: there is no such frame, or it is not behind the flange.
+        :raises RobotNotReady: it is behind the TCP, and nobody knows where that is.
+        """
+        if name in ('', self.tcp):
+            return None
+        if name in self._T_flange:
+            return self._T_flange[name]
+        if name in self._T_tcp:
+            return _require_snapshot(snapshot, _CONTROLLED, name).T_flange_tcp @ self._T_tcp[name]
+        known = ', '.join([self.tcp, *self._T_flange, *list(self._T_tcp)[1:]])
+        if name in self._T_base:
+            raise InvalidGoal(
+                _CONTROLLED,
+                f'is "{name}", which does not move with the arm',
+                f'leave it empty for the active TCP of the robot, or name one of {known}',
+            )
+        if self._transforms is not None:
+            return self._transforms.T_static(_CONTROLLED, self.tool0, name)
+        raise InvalidGoal(
+            _CONTROLLED,
+            f'is "{name}", which is not a known frame',
+            f'leave it empty for the active TCP of the robot, or name one of {known}; others can '
+            f'be named in the parameter static_frames, with {self.tool0} as their parent',
+        )
+
+
+def _require_snapshot(snapshot: ArmSnapshot | None, field: str, name: str) -> ArmSnapshot:
+    if snapshot is None:
+        raise RobotNotReady(
+            f'{field} is "{name}", which moves with the arm, and the robot has '
+            'not said yet where it stands; wait for the connection to the robot.'
+        )
+    return snapshot
+
+
+def _resolve_static_frames(
+    known: Mapping[str, tuple[str, Pose]], static_frames: Iterable[StaticFrame]
+) -> dict[str, tuple[str, Pose]]:
+    """Return each frame's root and where it is there, whatever the order of the static ones."""
+    frames = dict(known)
+    waiting: dict[str, StaticFrame] = {}
+    for frame in static_frames:
+        if frame.name in frames or frame.name in waiting:
+            raise ValueError(f'static_frames: "{frame.name}" is there twice.')
+        waiting[frame.name] = frame
+    while waiting:
+        ready = [frame for frame in waiting.values() if frame.parent in frames]
+        if not ready:
+            frame = next(iter(waiting.values()))
+            raise ValueError(
+                f'static_frames: the parent "{frame.parent}" of "{frame.name}" does not lead '
+                f'to {", ".join(dict.fromkeys(root for root, _ in known.values()))}.'
+            )
+        for frame in ready:
+            root, T_root_parent = frames[frame.parent]
+            frames[frame.name] = root, T_root_parent @ frame.T_parent_frame
+            del waiting[frame.name]
+    return frames

@@ -1,0 +1,139 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Functions of a program between joints and poses, with the active TCP and this arm's geometry."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ur_cartesian_driver.kinematics.inverse import nearest
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector6
+from ur_cartesian_driver.sim.builtins.arguments import is_pose, pose, script_pose, six
+from ur_cartesian_driver.urscript.script_errors import RuntimeException
+from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.sim.controller import Controller
+
+
+def solve(
+    controller: Controller, T_base_tcp: Pose, T_flange_tcp: Pose, near: Vector6
+) -> Vector6 | None:
+    """Return the joints nearest to given ones that bring the TCP to a pose."""
+    found = nearest(controller.arm, T_base_tcp @ T_flange_tcp.inverse(), near)
+    return None if found is None else six(list(found), 'solution')
+
+
+def joints_of(controller: Controller, value: Value, function: str) -> Vector6:
+    """
+    Return joints as they are, and the solution of a pose that is nearest to where the arm is.
+
+    :raises RuntimeException: the pose cannot be reached.
+    """
+    if not is_pose(value):
+        return six(value, 'q')
+    motion = controller.motion
+    found = solve(controller, pose(value, 'pose'), motion.T_flange_tcp, six(list(motion.q), 'q'))
+    if found is None:
+        raise RuntimeException(
+            'The robot cannot reach the requested pose. Script function '
+            f'{function} is unable to find an inverse kinematics solution.'
+        )
+    return found
+
+
+def pose_of(controller: Controller, value: Value, name: str) -> Pose:
+    """Return a pose as it is, and the pose of the TCP that joints reach."""
+    if is_pose(value):
+        return pose(value, name)
+    return controller.arm.forward(six(value, name)) @ controller.motion.T_flange_tcp
+
+
+class KinematicsBuiltins:
+    """Forward and inverse kinematics."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Use the arm of this controller."""
+        self._controller = controller
+
+    def _tcp(self, tcp: Value) -> Pose:
+        return self._controller.motion.T_flange_tcp if tcp == 'active_tcp' else pose(tcp, 'tcp')
+
+    def _solve(self, x: Value, qnear: Value, tcp: Value) -> Vector6 | None:
+        near = list(self._controller.motion.q) if qnear is None else qnear
+        return solve(self._controller, pose(x, 'x'), self._tcp(tcp), six(near, 'qnear'))
+
+    def get_inverse_kin(
+        self,
+        x: Value,
+        qnear: Value = None,
+        maxPositionError: Value = 1e-10,
+        maxOrientationError: Value = 1e-10,
+        tcp: Value = 'active_tcp',
+    ) -> list[float]:
+        """Return the joints of a pose nearest to `qnear`, by default to the present ones."""
+        found = self._solve(x, qnear, tcp)
+        if found is None:
+            raise RuntimeException(
+                'The robot cannot reach the requested pose. Script function get_inverse_kin is '
+                'unable to find an inverse kinematics solution.'
+            )
+        return list(found)
+
+    def get_inverse_kin_has_solution(
+        self,
+        pose: Value,
+        qnear: Value = None,
+        maxPositionError: Value = 1e-10,
+        maxOrientationError: Value = 1e-10,
+        tcp: Value = 'active_tcp',
+    ) -> bool:
+        """Tell whether a pose can be reached."""
+        return self._solve(pose, qnear, tcp) is not None
+
+    def get_forward_kin(
+        self, q: Value = 'current_joint_positions', tcp: Value = 'active_tcp'
+    ) -> ScriptPose:
+        """Return the pose of the TCP at joints, by default the present ones."""
+        joints = self._controller.motion.q if q == 'current_joint_positions' else six(q, 'q')
+        return script_pose(self._controller.arm.forward(joints) @ self._tcp(tcp))
+
+    def is_within_safety_limits(self, pose: Value, qNear: Value = None) -> bool:
+        """Tell whether a pose can be reached, or joints lie within their limits."""
+        if is_pose(pose):
+            return self._solve(pose, qNear, 'active_tcp') is not None
+        limits = self._controller.arm.model.position_limits
+        return all(
+            low <= angle <= high
+            for angle, (low, high) in zip(six(pose, 'position'), limits, strict=True)
+        )
+
+    def get_actual_tcp_pose(self) -> ScriptPose:
+        """Return where the TCP is."""
+        return script_pose(self._controller.actual.T_base_tcp)
+
+    def get_target_tcp_pose(self) -> ScriptPose:
+        """Return where the TCP should be."""
+        return script_pose(self._controller.motion.T_base_tcp)
+
+    def get_target_waypoint(self) -> ScriptPose:
+        """Return where the running move leads to; without one, where the TCP should be."""
+        motion, waypoint = self._controller.motion, self._controller.waypoint
+        return script_pose(
+            waypoint if waypoint is not None and motion.moving else motion.T_base_tcp
+        )
+
+    def get_actual_tool_flange_pose(self) -> ScriptPose:
+        """Return where the flange is."""
+        return script_pose(self._controller.arm.forward(self._controller.actual.q))
+
+    def get_tcp_offset(self) -> ScriptPose:
+        """Return the active TCP in the flange frame."""
+        return script_pose(self._controller.motion.T_flange_tcp)
+
+    def set_tcp(self, pose: Value, tcp_name: Value = '') -> None:
+        """Set the active TCP."""
+        offset = six(pose, 'pose')
+        self._controller.motion.T_flange_tcp = (
+            Pose.from_rotation_vector(offset) if any(offset) else IDENTITY
+        )

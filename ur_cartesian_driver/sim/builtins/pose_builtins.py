@@ -1,0 +1,101 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Arithmetic on poses, as programs know it: rotation vectors at the border, quaternions inside."""
+
+from __future__ import annotations
+
+from math import asin, atan2, cos, dist, sin
+
+from ur_cartesian_driver.motion.pose import (
+    conjugate,
+    multiply,
+    Pose,
+    Quaternion,
+    quaternion_from_rotation_vector,
+    rotation_from_quaternion,
+    rotation_vector_from_quaternion,
+)
+from ur_cartesian_driver.sim.builtins.arguments import (
+    is_pose,
+    number,
+    pose,
+    script_pose,
+    six,
+    three,
+)
+from ur_cartesian_driver.urscript import core_builtins
+from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
+
+_invert_matrix = core_builtins()['inv']
+
+
+class PoseBuiltins:
+    """Functions that need nothing but their arguments."""
+
+    def pose_trans(self, p_from: Value, p_from_to: Value) -> ScriptPose:
+        """Return the composition T1 T2."""
+        return script_pose(pose(p_from, 'p_from') @ pose(p_from_to, 'p_from_to'))
+
+    def pose_inv(self, p_from: Value) -> ScriptPose:
+        """Return the inverse."""
+        return script_pose(pose(p_from, 'p_from').inverse())
+
+    def inv(self, m: Value) -> Value:
+        """Return the inverse of a pose or of a matrix."""
+        return self.pose_inv(m) if is_pose(m) else _invert_matrix(m)
+
+    def pose_add(self, p_1: Value, p_2: Value) -> ScriptPose:
+        """Return the sum of the positions with the rotation R1 R2."""
+        a, b = pose(p_1, 'p_1'), pose(p_2, 'p_2')
+        x, y, z = (i + j for i, j in zip(a.position, b.position, strict=True))
+        return script_pose(Pose((x, y, z), multiply(a.quaternion, b.quaternion)))
+
+    def pose_sub(self, p_to: Value, p_from: Value) -> ScriptPose:
+        """Return the difference of the positions with the rotation R_to R_from^-1."""
+        to, start = pose(p_to, 'p_to'), pose(p_from, 'p_from')
+        x, y, z = (i - j for i, j in zip(to.position, start.position, strict=True))
+        return script_pose(Pose((x, y, z), multiply(to.quaternion, conjugate(start.quaternion))))
+
+    def pose_dist(self, pose_from: Value, pose_to: Value) -> float:
+        """Return the length of `pose_sub` as six numbers."""
+        return dist(self.pose_sub(pose_to, pose_from), (0.0,) * 6)
+
+    def point_dist(self, p_from: Value, p_to: Value) -> float:
+        """Return the distance of the positions [m]."""
+        return pose(p_from, 'p_from').distance_to(pose(p_to, 'p_to'))
+
+    def interpolate_pose(self, p_from: Value, p_to: Value, alpha: Value) -> ScriptPose:
+        """Return the pose at a fraction of the way; fractions outside 0..1 extrapolate."""
+        start, to = pose(p_from, 'p_from'), pose(p_to, 'p_to')
+        return script_pose(start.interpolate(to, number(alpha, 'alpha')))
+
+    def rotvec2rpy(self, rotation_vector: Value) -> list[float]:
+        """Return roll, pitch, yaw of R = Rz(yaw) Ry(pitch) Rx(roll) [rad]."""
+        vector = three(rotation_vector, 'rotation_vector')
+        r = rotation_from_quaternion(quaternion_from_rotation_vector(vector))
+        if abs(r[6]) > 1.0 - 1e-12:  # gimbal lock: roll and yaw turn about one axis, yaw does all
+            return [0.0, -asin(max(-1.0, min(1.0, r[6]))), atan2(-r[1], r[4])]
+        return [atan2(r[7], r[8]), -asin(r[6]), atan2(r[3], r[0])]
+
+    def rpy2rotvec(self, rpy: Value) -> list[float]:
+        """Return the rotation vector [rad] of R = Rz(yaw) Ry(pitch) Rx(roll)."""
+        roll, pitch, yaw = three(rpy, 'rpy')
+        rotation = multiply(_about(2, yaw), multiply(_about(1, pitch), _about(0, roll)))
+        return list(rotation_vector_from_quaternion(rotation))
+
+    def wrench_trans(self, T_from_to: Value, w_from: Value) -> list[float]:
+        """Return a wrench given in one frame in the axes and about the origin of another."""
+        to_from = pose(T_from_to, 'T_from_to').inverse()
+        fx, fy, fz, tx, ty, tz = six(w_from, 'w_from')
+        turn = Pose((0.0, 0.0, 0.0), to_from.quaternion)
+        x, y, z = to_from.position
+        fx, fy, fz = turn.apply((fx, fy, fz))
+        tx, ty, tz = turn.apply((tx, ty, tz))
+        return [fx, fy, fz, tx + y * fz - z * fy, ty + z * fx - x * fz, tz + x * fy - y * fx]
+
+
+def _about(axis: int, angle: float) -> Quaternion:
+    """Return the rotation about x, y or z."""
+    q = [0.0, 0.0, 0.0, cos(0.5 * angle)]
+    q[axis] = sin(0.5 * angle)
+    return q[0], q[1], q[2], q[3]

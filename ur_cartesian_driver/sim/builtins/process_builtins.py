@@ -1,0 +1,147 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Functions around a process: path offsets, screws, limits of forces, what to do about errors.
+
+All of it is state: an arm without dynamics has no wrench to limit and no torque to hold with, and
+the path is that of the moves alone. Arguments are checked as on the robot. The state ends with
+the program.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ur_cartesian_driver.motion.pose import Vector6
+from ur_cartesian_driver.sim.builtins.arguments import not_negative, number, pose, six, whole
+from ur_cartesian_driver.sim.state.controller_state import PathOffset
+from ur_cartesian_driver.urscript.script_errors import RuntimeException
+from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.sim.controller import Controller
+
+#: Frames of a path offset: base, TCP, motion, world.
+_FRAMES = (1, 2, 3, 4)
+
+
+class PathOffsetBuiltins:
+    """A Cartesian offset on top of the moves: kept and reported, not applied."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Change the state of this controller."""
+        self._controller = controller
+
+    @property
+    def _state(self) -> PathOffset:
+        return self._controller.process.path_offset
+
+    def path_offset_enable(self) -> None:
+        """Begin; limits and filter stay as they are."""
+        self._state.enabled = True
+
+    def path_offset_disable(self, a: Value = 20) -> None:
+        """End; the offset is zero again."""
+        if number(a, 'a') <= 0.0:
+            raise RuntimeException(f'a is {a}; it must be greater than 0')
+        self._state.enabled = False
+        self._state.offsets.clear()
+
+    def path_offset_set(self, offset: Value, type: Value) -> None:
+        """Set the offset in a frame, cut to the limits along and about each axis."""
+        frame, wanted = _frame(type), six(offset, 'offset')
+        if not self._state.enabled:
+            raise RuntimeException('path_offset_set needs path_offset_enable before it.')
+        self._state.offsets[frame] = self._limited(wanted)
+
+    def _limited(self, offset: Vector6) -> Vector6:
+        state = self._state
+        x, y, z = (
+            max(-state.max_translation, min(state.max_translation, item)) for item in offset[:3]
+        )
+        rx, ry, rz = (
+            max(-state.max_rotation, min(state.max_rotation, item)) for item in offset[3:]
+        )
+        return x, y, z, rx, ry, rz
+
+    def path_offset_get(self, type: Value) -> ScriptPose:
+        """Return the offset in a frame."""
+        return ScriptPose(*self._state.offsets.get(_frame(type), (0.0,) * 6))
+
+    def path_offset_set_alpha_filter(self, alpha: Value) -> None:
+        """Set the coefficient of the filter, 0..1."""
+        coefficient = number(alpha, 'alpha')
+        if not 0.0 <= coefficient <= 1.0:
+            raise RuntimeException(f'alpha is {coefficient:g}; it must be within 0..1')
+        self._state.alpha = coefficient
+
+    def path_offset_set_max_offset(self, transLimit: Value, rotLimit: Value) -> None:
+        """Set the limits [m, rad]."""
+        self._state.max_translation = not_negative(transLimit, 'transLimit')
+        self._state.max_rotation = not_negative(rotLimit, 'rotLimit')
+
+
+def _frame(type: Value) -> int:
+    frame = whole(type, 'type')
+    if frame not in _FRAMES:
+        raise RuntimeException(f'type is {frame}; it must be 1, 2, 3 or 4')
+    return frame
+
+
+class ProcessBuiltins:
+    """Screws, forces and torques as states; the reaction to error codes is real."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Change the state of this controller."""
+        self._controller = controller
+
+    def screw_driving(self, f: Value, v_limit: Value) -> None:
+        """Push along the tool's z axis with a force [N], at most at a speed [m/s]."""
+        self._controller.process.screw_driving = (number(f, 'f'), not_negative(v_limit, 'v_limit'))
+
+    def end_screw_driving(self) -> None:
+        """End it; harmless when it has not begun."""
+        self._controller.process.screw_driving = None
+
+    def tool_wrench_limit_set(
+        self,
+        frame_offset: Value,
+        Fx: Value = None,
+        Fy: Value = None,
+        Fz: Value = None,
+        Mx: Value = None,
+        My: Value = None,
+        Mz: Value = None,
+    ) -> None:
+        """Limit forces [N] and torques [Nm] of acceleration in a frame of the flange."""
+        pose(frame_offset, 'frame_offset')
+        names = ('Fx', 'Fy', 'Fz', 'Mx', 'My', 'Mz')
+        given = zip(names, (Fx, Fy, Fz, Mx, My, Mz), strict=True)
+        self._controller.process.wrench_limits = {
+            name: not_negative(value, name) for name, value in given if value is not None
+        }
+
+    def tool_wrench_limit_disable(self) -> None:
+        """Remove the limits."""
+        self._controller.process.wrench_limits = {}
+
+    def high_holding_torque_enable(self) -> None:
+        """Hold a standing arm with more torque, as is the default."""
+        self._controller.process.high_holding_torque = True
+
+    def high_holding_torque_disable(self) -> None:
+        """Hold a standing arm with its normal torque, until the program ends."""
+        self._controller.process.high_holding_torque = False
+
+    def position_deviation_warning(self, enabled: Value, threshold: Value = 0.8) -> None:
+        """Accept a threshold within 0..1; target and actual position are one here."""
+        limit = number(threshold, 'threshold')
+        if not 0.0 <= limit <= 1.0:
+            raise RuntimeException(f'threshold is {limit:g}; it must be within 0..1')
+        self._controller.process.deviation_threshold = limit if enabled else None
+
+    def pause_on_error_code(self, code: Value, argument: Value = None) -> None:
+        """Pause the program when an error code occurs; without an argument, with any."""
+        self._controller.process.pause_on.add(
+            (whole(code, 'code'), None if argument is None else whole(argument, 'argument'))
+        )

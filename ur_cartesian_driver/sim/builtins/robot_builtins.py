@@ -1,0 +1,270 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Functions of a program about time, the robot's state, and people."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from math import isinf, pi
+from typing import TYPE_CHECKING
+
+from ur_cartesian_driver.sim.builtins.arguments import (
+    index,
+    not_negative,
+    number,
+    six,
+    text,
+    three,
+    whole,
+)
+from ur_cartesian_driver.sim.state.controller_state import Payload, Popup
+from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
+from ur_cartesian_driver.urscript.script_errors import RuntimeException
+from ur_cartesian_driver.urscript.script_values import Struct, to_text, truth, Value
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.sim.controller import Controller
+
+Steps = Generator[None, None, None]
+
+
+class TimeBuiltins:
+    """Time, and what takes time; neither is scaled by the speed slider."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Use the clock of this controller."""
+        self._controller = controller
+
+    def get_steptime(self) -> float:
+        """Return the cycle [s]."""
+        return self._controller.cycle
+
+    def sync(self) -> Steps:
+        """Use up the rest of the frame."""
+        yield
+
+    def sleep(self, t: Value) -> Steps:
+        """Wait for a time [s], whole frames, at least one."""
+        end = self._controller.time + not_negative(t, 't')
+        yield
+        while self._controller.time < end - 1e-9:
+            yield
+
+    def time(self, mode: Value = 0) -> Struct:
+        """Return the controller's clock as seconds and nanoseconds."""
+        nanoseconds = round(self._controller.time * 1e9)
+        return Struct({'sec': nanoseconds // 10**9, 'nanosec': nanoseconds % 10**9})
+
+    def interpreter_mode(self, clearQueueOnEnter: Value = True, clearOnEnd: Value = True) -> Steps:
+        """Execute what the clients of the interpreter port send, until it is ended."""
+        yield from self._controller.interpreter_mode.run(
+            clear_queue=truth(clearQueueOnEnter), clear_on_end=truth(clearOnEnd)
+        )
+
+    def end_interpreter(self) -> None:
+        """End the interpreter mode after the statement that is being executed."""
+        self._controller.interpreter_mode.end()
+
+    def clear_interpreter(self) -> None:
+        """Forget what statements have made after the one that is being executed."""
+        self._controller.interpreter_mode.clear()
+
+    def rtde_set_watchdog(
+        self, variable_name: Value, min_frequency: Value, action: Value = 'pause'
+    ) -> None:
+        """Watch how often an input is written; the watch ends with the program."""
+        self._controller.watch_input(
+            text(variable_name, 'variable_name'),
+            not_negative(min_frequency, 'min_frequency'),
+            text(action, 'action'),
+        )
+
+
+class PendantBuiltins:
+    """Messages and popups."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Announce through this controller."""
+        self._controller = controller
+
+    def textmsg(self, s1: Value, s2: Value = '') -> None:
+        """Write to the log: all clients of the primary interface see it."""
+        self._controller.messages.text(to_text(s1) + to_text(s2))
+
+    def popup(
+        self,
+        s: Value,
+        title: Value = 'Popup',
+        warning: Value = False,
+        error: Value = False,
+        blocking: Value = False,
+    ) -> Steps:
+        """Show a window; a blocking one holds its thread until it is closed."""
+        popup = Popup(
+            text=to_text(s),
+            title=to_text(title),
+            warning=truth(warning),
+            error=truth(error),
+            blocking=truth(blocking),
+        )
+        self._controller.show_popup(popup)
+        while popup.blocking and popup.open:
+            yield
+
+
+class RobotBuiltins:
+    """What the robot measures and is told about its tool."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Read and change the state of this controller."""
+        self._controller = controller
+        self._motion = controller.motion
+
+    def get_joint_positions(self) -> list[float]:
+        """Return the target positions [rad]: the old name, kept for old programs."""
+        return list(self._motion.q)
+
+    def get_target_joint_positions(self) -> list[float]:
+        """Return the target positions [rad]."""
+        return list(self._motion.q)
+
+    def get_actual_joint_positions(self) -> list[float]:
+        """Return the actual positions [rad]."""
+        return list(self._controller.actual.q)
+
+    def get_actual_joint_positions_history(self, steps: Value = 0) -> list[float]:
+        """Return the actual positions some cycles ago [rad]."""
+        return list(self._controller.joint_history(whole(steps, 'steps')))
+
+    def get_target_joint_speeds(self) -> list[float]:
+        """Return the target speeds [rad/s]."""
+        return list(self._controller.qd)
+
+    def get_actual_joint_speeds(self) -> list[float]:
+        """Return the actual speeds [rad/s]."""
+        return list(self._controller.actual.qd)
+
+    def get_target_joint_accelerations(self) -> list[float]:
+        """Return the target accelerations [rad/s^2]."""
+        return list(self._motion.qdd)
+
+    def get_actual_tcp_speed(self) -> list[float]:
+        """Return the twist of the TCP in base axes."""
+        return list(self._controller.actual.tcp_twist)
+
+    def get_target_tcp_speed(self) -> list[float]:
+        """Return the twist of the TCP in base axes."""
+        return list(self._controller.tcp_twist)
+
+    def get_tcp_force(self) -> list[float]:
+        """Return zeros: nothing is touched."""
+        return [0.0] * 6
+
+    def force(self) -> float:
+        """Return zero: nothing is touched."""
+        return 0.0
+
+    def get_joint_torques(self) -> list[float]:
+        """Return zeros: an arm without dynamics."""
+        return [0.0] * 6
+
+    def get_joint_temp(self, j: Value) -> float:
+        """Return room temperature."""
+        index(j, 'j', 6)
+        return 25.0
+
+    def get_controller_temp(self) -> float:
+        """Return room temperature."""
+        return 25.0
+
+    def zero_ftsensor(self) -> None:
+        """Do nothing: the sensor reads zero."""
+
+    def ft_rtde_input_enable(
+        self,
+        enable: Value,
+        sensor_mass: Value = 0,
+        sensor_measuring_offset: Value = None,
+        sensor_cog: Value = None,
+    ) -> None:
+        """Take the force of an external sensor from RTDE."""
+        self._controller.external_ft = truth(enable)
+
+    def enable_external_ft_sensor(
+        self,
+        enable: Value,
+        sensor_mass: Value = 0,
+        sensor_measuring_offset: Value = None,
+        sensor_cog: Value = None,
+    ) -> None:
+        """Take the force of an external sensor from RTDE: the old name."""
+        self._controller.external_ft = truth(enable)
+
+    def set_payload(self, m: Value, cog: Value = None) -> None:
+        """Set mass [kg] and centre of gravity [m]; the inertia becomes zero."""
+        centre = (0.0, 0.0, 0.0) if cog is None else three(cog, 'cog')
+        self._controller.payload = Payload(mass=not_negative(m, 'm'), cog=centre)
+
+    def set_target_payload(
+        self, m: Value, cog: Value, inertia: Value = None, transition_time: Value = 0
+    ) -> None:
+        """Set mass [kg], centre of gravity [m] and inertia [kg m^2], at once."""
+        not_negative(transition_time, 'transition_time')
+        matrix = (0.0,) * 6 if inertia is None else six(inertia, 'inertia')
+        if min(matrix[:3]) < 0.0 or max(abs(item) for item in matrix) > 133.0:
+            raise RuntimeException(
+                'inertia must lie within -133..133, and its first three items not below 0'
+            )
+        self._controller.payload = Payload(
+            mass=not_negative(m, 'm'), cog=three(cog, 'cog'), inertia=matrix
+        )
+
+    def get_target_payload(self) -> float:
+        """Return the mass [kg]."""
+        return self._controller.payload.mass
+
+    def get_target_payload_cog(self) -> list[float]:
+        """Return the centre of gravity [m]."""
+        return list(self._controller.payload.cog)
+
+    def get_target_payload_inertia(self) -> list[float]:
+        """Return the inertia [kg m^2]: Ixx, Iyy, Izz, Ixy, Ixz, Iyz."""
+        return list(self._controller.payload.inertia)
+
+    def set_gravity(self, d: Value) -> None:
+        """Set the direction away from the earth [m/s^2]."""
+        self._controller.gravity = three(d, 'd')
+
+    def set_pos(self, q: Value) -> None:
+        """Put the arm somewhere, which only a simulated one can do."""
+        self._controller.teleport(six(q, 'q'))
+
+    def reset_revolution_counter(self, qNear: Value = None) -> None:
+        """
+        Count the turns of joints without limits anew.
+
+        :param qNear: the count becomes the one nearest to these joints; left out, nothing changes.
+        """
+        if qNear is None:
+            return
+        near, limits = six(qNear, 'qNear'), self._controller.arm.model.position_limits
+        turn = 2.0 * pi
+        counted = [
+            q + turn * round((close - q) / turn) if isinf(high - low) else q
+            for q, close, (low, high) in zip(self._motion.q, near, limits, strict=True)
+        ]
+        if counted != list(self._motion.q):
+            self._controller.teleport(six(counted, 'q'))
+
+    def set_speed_slider_fraction(self, fraction: Value) -> None:
+        """Set the speed slider."""
+        self._controller.set_slider(number(fraction, 'fraction'))
+
+    def protective_stop(self) -> Steps:
+        """Stop as if something had been hit; what follows runs when somebody lets it go on."""
+        self._controller.safety_event(SafetyEvent.PROTECTIVE_STOP)
+        yield
+
+    def powerdown(self) -> None:
+        """Switch the arm off."""
+        self._controller.power_off()

@@ -1,0 +1,212 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Functions of a program on sockets.
+
+A timeout of zero or less waits for ever, so a connection that its peer has closed must end a read
+at once: the result is then that of a timeout. What has arrived of an incomplete value stays.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+import struct
+from typing import TypeVar
+
+from ur_cartesian_driver.sim.builtins.arguments import number, text, whole
+from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets, SocketState
+from ur_cartesian_driver.urscript.script_errors import RuntimeException
+from ur_cartesian_driver.urscript.script_values import INT_MAX, INT_MIN, to_text, Value
+
+CONNECT_TIMEOUT = 2.0
+#: Values in one read of numbers, and characters in one string.
+MAX_NUMBERS, MAX_CHARACTERS = 30, 1023
+
+T = TypeVar('T')
+
+
+class SocketBuiltins:
+    """All of them wait on the controller's clock, so they also work under the virtual one."""
+
+    def __init__(self, sockets: ScriptSockets, now: Callable[[], float]) -> None:
+        """
+        Use these sockets.
+
+        :param now: the controller's clock [s].
+        """
+        self._sockets = sockets
+        self._now = now
+
+    def socket_open(
+        self, address: Value, port: Value, socket_name: Value = 'socket_0'
+    ) -> Generator[None, None, bool]:
+        """Connect; give up after 2 s."""
+        name = text(socket_name, 'socket_name')
+        self._sockets.open(name, text(address, 'address'), whole(port, 'port'))
+        deadline = self._now() + CONNECT_TIMEOUT
+        while self._sockets.state(name) is SocketState.CONNECTING:
+            if self._now() >= deadline:
+                self._sockets.close(name)
+                break
+            yield
+        return self._sockets.state(name) is SocketState.OPEN
+
+    def socket_close(self, socket_name: Value = 'socket_0') -> None:
+        """Close; a name that is not open is no error."""
+        self._sockets.close(text(socket_name, 'socket_name'))
+
+    def _wait(
+        self, name: Value, timeout: Value, take: Callable[[bytearray], T | None]
+    ) -> Generator[None, None, T | None]:
+        """Return what `take` finds in the received bytes; None for a timeout or a closed peer."""
+        limit = number(timeout, 'timeout')
+        deadline = self._now() + limit if limit > 0.0 else float('inf')
+        name_ = text(name, 'socket_name')
+        while True:
+            found = take(self._sockets.received(name_))
+            if found is not None:
+                return found
+            if self._now() >= deadline or self._sockets.state(name_) is not SocketState.OPEN:
+                return None
+            yield
+
+    def socket_read_binary_integer(
+        self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2
+    ) -> Generator[None, None, list[int]]:
+        """Read 32 bit integers in network order: [n, v1 .. vn], or [0, -1 .. -1]."""
+        count = _count(number)
+        data = yield from self._wait(socket_name, timeout, _exactly(4 * count))
+        if data is None:
+            return [0] + [-1] * count
+        return [count, *struct.unpack(f'>{count}i', data)]
+
+    def socket_read_byte_list(
+        self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2
+    ) -> Generator[None, None, list[int]]:
+        """Read bytes: [n, v1 .. vn], or [0, -1 .. -1]."""
+        count = _count(number)
+        data = yield from self._wait(socket_name, timeout, _exactly(count))
+        return [0] + [-1] * count if data is None else [count, *data]
+
+    def socket_read_ascii_float(
+        self, number: Value, socket_name: Value = 'socket_0', timeout: Value = 2
+    ) -> Generator[None, None, list[float]]:
+        """Read numbers written as `(1.4, 2)`: [n, v1 .. vn], or [0, nan .. nan]."""
+        count = _count(number)
+        data = yield from self._wait(socket_name, timeout, _through(b')'))
+        try:
+            values = [float(item) for item in (data or b'').decode().strip('() \r\n').split(',')]
+        except ValueError:
+            values = []
+        if len(values) != count:
+            return [0.0] + [float('nan')] * count
+        return [float(count), *values]
+
+    def socket_read_string(
+        self,
+        socket_name: Value = 'socket_0',
+        prefix: Value = '',
+        suffix: Value = '',
+        interpret_escape: Value = False,
+        timeout: Value = 2,
+    ) -> Generator[None, None, str]:
+        """Read what is there, or what stands between a prefix and a suffix; '' for a timeout."""
+        before, after = (_bytes(prefix, interpret_escape), _bytes(suffix, interpret_escape))
+        data = yield from self._wait(socket_name, timeout, _between(before, after))
+        return '' if data is None else data.decode('latin-1')
+
+    def socket_read_line(
+        self, socket_name: Value = 'socket_0', timeout: Value = 2
+    ) -> Generator[None, None, str]:
+        """Read up to the end of the line; the result is without it."""
+        data = yield from self._wait(socket_name, timeout, _through(b'\n'))
+        return '' if data is None else data.decode('latin-1').rstrip('\r\n')
+
+    def socket_get_var(
+        self, name: Value, socket_name: Value = 'socket_0'
+    ) -> Generator[None, None, int]:
+        """Ask for a variable by `GET name`, expect `name value`; 0 for a timeout."""
+        self._send(f'GET {text(name, "name")}\n'.encode('latin-1'), socket_name)
+        answer = yield from self.socket_read_line(socket_name)
+        try:
+            return int(float(answer.split()[1]))
+        except (IndexError, ValueError):
+            return 0
+
+    def socket_set_var(self, name: Value, value: Value, socket_name: Value = 'socket_0') -> None:
+        """Send `SET name value`."""
+        line = f'SET {text(name, "name")} {whole(value, "value")}\n'
+        self._send(line.encode('latin-1'), socket_name)
+
+    def socket_send_int(self, value: Value, socket_name: Value = 'socket_0') -> bool:
+        """Send a 32 bit integer in network order."""
+        integer = whole(value, 'value')
+        if not INT_MIN <= integer <= INT_MAX:
+            raise RuntimeException(f'value is {integer}; it must fit into 32 bits')
+        return self._send(struct.pack('>i', integer), socket_name)
+
+    def socket_send_byte(self, value: Value, socket_name: Value = 'socket_0') -> bool:
+        """Send the lowest 8 bits."""
+        return self._send(bytes([whole(value, 'value') & 0xFF]), socket_name)
+
+    def socket_send_string(self, str: Value, socket_name: Value = 'socket_0') -> bool:
+        """Send the text of a value."""
+        return self._send(to_text(str).encode('latin-1', 'replace'), socket_name)
+
+    def socket_send_line(self, str: Value, socket_name: Value = 'socket_0') -> bool:
+        """Send the text of a value and a line end."""
+        return self._send((to_text(str) + '\n').encode('latin-1', 'replace'), socket_name)
+
+    def _send(self, data: bytes, socket_name: Value) -> bool:
+        return self._sockets.send(text(socket_name, 'socket_name'), data)
+
+
+def _count(value: Value) -> int:
+    count = whole(value, 'number')
+    if not 0 <= count <= MAX_NUMBERS:
+        raise RuntimeException(f'number is {count}; a read takes at most {MAX_NUMBERS} values')
+    return count
+
+
+def _bytes(value: Value, interpret_escape: Value) -> bytes:
+    raw = text(value, 'prefix or suffix').encode('latin-1', 'replace')
+    return raw.decode('unicode_escape').encode('latin-1', 'replace') if interpret_escape else raw
+
+
+def _exactly(size: int) -> Callable[[bytearray], bytes | None]:
+    def take(received: bytearray) -> bytes | None:
+        if len(received) < size:
+            return None
+        data = bytes(received[:size])
+        del received[:size]
+        return data
+
+    return take
+
+
+def _through(end: bytes) -> Callable[[bytearray], bytes | None]:
+    def take(received: bytearray) -> bytes | None:
+        at = received.find(end)
+        if at < 0:
+            return None
+        data = bytes(received[: at + len(end)])
+        del received[: at + len(end)]
+        return data
+
+    return take
+
+
+def _between(before: bytes, after: bytes) -> Callable[[bytearray], bytes | None]:
+    def take(received: bytearray) -> bytes | None:
+        start = received.find(before)
+        if start < 0 or not received:
+            return None
+        start += len(before)
+        end = received.find(after, start) if after else min(len(received), start + MAX_CHARACTERS)
+        if end < 0:
+            return None
+        data = bytes(received[start:end])
+        del received[: end + len(after)]
+        return data
+
+    return take

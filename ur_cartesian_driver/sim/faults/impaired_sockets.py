@@ -1,0 +1,121 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The sockets that programs open, with the faults of connections between them and the program."""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.sim.faults.impairment import ImpairedConnection, Impairment
+from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets, SocketState
+
+#: Bytes that are held back before the rest is left to the kernel, and so to the peer.
+_MAX_INCOMING = 65_536
+
+
+class ImpairedSockets:
+    """
+    Other script sockets, which may be impaired; see :class:`~.script_sockets.ScriptSockets`.
+
+    As long as nothing is wrong every call goes straight through.
+    """
+
+    def __init__(self, sockets: ScriptSockets) -> None:
+        """Take the sockets that really connect."""
+        self._sockets = sockets
+        self._impairment: Impairment | None = None
+        self._now = 0.0
+        self._names: set[str] = set()
+        self._impaired: dict[str, ImpairedConnection] = {}
+        self._arrived: dict[str, bytearray] = {}
+
+    def open(self, name: str, address: str, port: int) -> None:
+        """Begin to connect, unless a fault keeps the program from it."""
+        self.close(name)
+        if self._impairment is not None and self._impairment.refuses_connections:
+            return
+        self._names.add(name)
+        if self._impairment is not None:
+            self._impair_socket(name)
+        self._sockets.open(name, address, port)
+
+    def state(self, name: str) -> SocketState:
+        """Return the state of a name."""
+        return self._sockets.state(name)
+
+    def received(self, name: str) -> bytearray:
+        """Return what has arrived; what was delayed comes before what was not."""
+        if name in self._impaired:
+            return self._arrived[name]
+        return self._sockets.received(name)
+
+    def send(self, name: str, data: bytes) -> bool:
+        """Send; what a fault swallows counts as sent."""
+        if name not in self._impaired:
+            return self._sockets.send(name, data)
+        if self._sockets.state(name) is not SocketState.OPEN:
+            return False
+        self._impaired[name].queue_outgoing(data, self._now)
+        return True
+
+    def close(self, name: str) -> None:
+        """Close one."""
+        self._names.discard(name)
+        self._impaired.pop(name, None)
+        self._arrived.pop(name, None)
+        self._sockets.close(name)
+
+    def close_all(self) -> None:
+        """Close all."""
+        self._names.clear()
+        self._impaired.clear()
+        self._arrived.clear()
+        self._sockets.close_all()
+
+    def poll(self) -> None:
+        """Go on with connecting and sending."""
+        self._sockets.poll()
+
+    # As faults see it: an Impairable
+
+    def impair(self, impairment: Impairment | None, now: float) -> None:
+        """Let this be wrong with all sockets."""
+        self._impairment, self._now = impairment, now
+        for name in self._names:
+            self._impair_socket(name)
+
+    def pump(self, now: float) -> bool:
+        """Let go what is due; tell whether this has to be called again in the next cycle."""
+        self._now = now
+        for name, impaired in tuple(self._impaired.items()):
+            self._pump(name, impaired)
+        return self._impairment is not None or bool(self._impaired)
+
+    def drop(self) -> None:
+        """Cut all sockets; the program finds them closed."""
+        self.close_all()
+
+    def freeze(self) -> None:
+        """Neither hear nor say anything on the sockets that there are."""
+        for name in self._names:
+            self._impair_socket(name).frozen = True
+
+    def inject(self, data: bytes) -> None:
+        """Say something that no program has said."""
+        for name in self._names:
+            self.send(name, data)
+
+    def _impair_socket(self, name: str) -> ImpairedConnection:
+        impaired = self._impaired.setdefault(name, ImpairedConnection(self._impairment, self._now))
+        impaired.impairment = self._impairment
+        self._arrived.setdefault(name, bytearray())
+        return impaired
+
+    def _pump(self, name: str, impaired: ImpairedConnection) -> None:
+        arrived = self._arrived[name]
+        if impaired.incoming_size < _MAX_INCOMING and (incoming := self._sockets.received(name)):
+            impaired.queue_incoming(bytes(incoming), self._now)
+            incoming.clear()
+        arrived += impaired.due_incoming(self._now)
+        if data := impaired.due_outgoing(self._now):
+            self._sockets.send(name, data)
+        if impaired.is_over and not arrived:
+            del self._impaired[name], self._arrived[name]

@@ -1,0 +1,59 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What clients may send to a script port besides programs: one line each.
+
+A line that is none of the control commands is a statement: it is compiled as a program of its own,
+which replaces the running one, as on the robot. In local control all of it is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.programs.script_upload import UploadedLine, UploadedProgram
+from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
+
+#: Error code of a script port that is read-only.
+READ_ONLY = 210
+
+_CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
+    {
+        'power on': Controller.power_on,
+        'power off': Controller.power_off,
+        'set robotmode run': Controller.release_brakes,
+        'set unlock protective stop': lambda controller: controller.safety_event(
+            SafetyEvent.UNLOCK
+        ),
+        'stop program': lambda controller: controller.programs.stop(),
+        'pause program': lambda controller: controller.programs.pause(),
+        'resume program': lambda controller: controller.programs.play(),
+    }
+)
+
+
+def execute_command(controller: Controller, item: UploadedProgram | UploadedLine) -> None:
+    """Do what a client has sent; answers are announcements to everybody."""
+    if not controller.remote_control:
+        controller.messages.error(
+            READ_ONLY, 0, 'Socket is read-only when the robot is in local (Teach pendant) control'
+        )
+    elif isinstance(item, UploadedProgram):
+        controller.programs.submit(item.text)
+    elif item.text in _CONTROL:
+        refusal = _CONTROL[item.text](controller)
+        if refusal:
+            controller.messages.text(f'{item.text}: refused, {refusal}.')
+    elif item.text.startswith('set speed '):
+        _set_speed(controller, item.text.removeprefix('set speed '))
+    else:
+        controller.programs.submit(f'def unnamed():\n{item.text}\nend\n', line_offset=1)
+
+
+def _set_speed(controller: Controller, argument: str) -> None:
+    try:
+        controller.set_slider(float(argument))
+    except ValueError:
+        controller.messages.text(f'set speed: {argument!r} is no number.')

@@ -1,0 +1,49 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+One client of an interface that takes scripts: primary, secondary, real-time.
+
+What it sends is the same on all three, programs and commands; what it gets differs, comes unasked,
+and is not its session's business, apart from a greeting.
+"""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.interfaces.primary_commands import execute_command
+from ur_cartesian_driver.sim.interfaces.primary_stream import version_frame
+from ur_cartesian_driver.sim.interfaces.tcp_server import HangUp
+from ur_cartesian_driver.sim.programs.script_upload import UploadDecoder, UploadTooLong
+
+
+class ScriptSession:
+    """A :class:`~.server.Session`."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Wait for programs."""
+        self._controller = controller
+        self._uploads = UploadDecoder()
+
+    def open(self) -> bytes:
+        """Say nothing: the first state comes in this cycle."""
+        return b''
+
+    def close(self) -> None:
+        """Forget what came of an unfinished program."""
+
+    def feed(self, data: bytes) -> bytes:
+        """Do what is complete; what there is to say goes to all clients."""
+        try:
+            for item in self._uploads.feed(data):
+                execute_command(self._controller, item)
+        except UploadTooLong:
+            raise HangUp from None
+        return b''
+
+
+class PrimarySession(ScriptSession):
+    """A client of the primary or secondary interface, which begin with the version."""
+
+    def open(self) -> bytes:
+        """Introduce the controller: clients wait for this before anything else."""
+        return version_frame(self._controller)

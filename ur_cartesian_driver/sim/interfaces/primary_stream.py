@@ -1,0 +1,178 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The robot state on the primary and secondary interface, ten times a second, and the greeting."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ur_cartesian_driver.motion.state import RobotMode, RobotStatus, RuntimeState, SafetyMode
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
+    AdditionalInfo,
+    CalibrationData,
+    CartesianInfo,
+    ConfigurationData,
+    encode_message,
+    encode_state,
+    ForceModeData,
+    JointData,
+    KinematicsInfo,
+    MasterboardData,
+    RobotModeData,
+    SAFETY_DATA,
+    SubPackage,
+    ToolCommunication,
+    ToolData,
+    ToolModeInfo,
+    VersionMessage,
+)
+from ur_cartesian_driver.sim.controller import Controller
+
+#: States per second.
+STATE_RATE = 10.0
+#: Greatest joint acceleration that is reported [rad/s^2], as a recorded UR5e does.
+_JOINT_ACCELERATION = 40.0
+_EMERGENCY = frozenset({SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP})
+#: What stands for an endless joint on the wire, which has no infinity [rad].
+_UNLIMITED = 1e6
+
+
+def version_frame(controller: Controller) -> bytes:
+    """Return the message that comes first on every connection."""
+    major, minor, bugfix, build = controller.config.version
+    return encode_message(
+        VersionMessage(
+            major=major,
+            minor=minor,
+            bugfix=bugfix,
+            build=build,
+            date='2026-01-01, 00:00:00',
+            timestamp=round(controller.time * 1e6),
+        )
+    )
+
+
+class PrimaryStream:
+    """What clients get unasked: messages at once, states at their rate."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Compute once what never changes."""
+        self._controller = controller
+        self._constant = (_kinematics(controller), _configuration(controller))
+        self._cycles_per_state = max(1, round(1.0 / (STATE_RATE * controller.cycle)))
+
+    def messages(self) -> Iterator[bytes]:
+        """Yield what has been announced since the last cycle."""
+        for message in self._controller.messages.take():
+            yield encode_message(message)
+
+    @property
+    def is_due(self) -> bool:
+        """Whether this is one of the cycles in which the state is sent."""
+        return self._controller.cycles % self._cycles_per_state == 0
+
+    def state(self) -> bytes:
+        """Return a state frame, its sub-packages in the order of a recorded UR5e."""
+        controller = self._controller
+        kinematics, configuration = self._constant
+        packages: tuple[SubPackage, ...] = (
+            _mode(controller),
+            _joints(controller),
+            _cartesian(controller),
+            kinematics,
+            CalibrationData(),
+            _masterboard(controller),
+            _tool(controller),
+            configuration,
+            ForceModeData(),
+            AdditionalInfo(),
+            SAFETY_DATA,
+            ToolCommunication(),
+            ToolModeInfo(),
+        )
+        return encode_state(packages)
+
+
+def _mode(controller: Controller) -> RobotModeData:
+    state, safety = controller.programs.state, controller.safety.mode
+    paused = state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
+    return RobotModeData(
+        timestamp=round(controller.time * 1e6),
+        power_on=bool(controller.robot_status & RobotStatus.POWER_ON),
+        emergency_stopped=safety in _EMERGENCY,
+        protective_stopped=safety is SafetyMode.PROTECTIVE_STOP,
+        program_running=controller.programs.running and not paused,
+        program_paused=paused,
+        robot_mode=controller.power.mode,
+        target_speed_fraction=controller.speed_slider,
+        speed_scaling=controller.motion.scaling,
+    )
+
+
+def _joints(controller: Controller) -> JointData:
+    motion = controller.motion
+    mode = 253 if controller.power.mode is RobotMode.RUNNING else 239
+    return JointData(
+        q_actual=controller.actual.q,
+        q_target=motion.q,
+        qd_actual=controller.actual.qd,
+        voltage=(48.0,) * 6,
+        temperature=(25.0,) * 6,
+        mode=(mode,) * 6,
+    )
+
+
+def _cartesian(controller: Controller) -> CartesianInfo:
+    motion = controller.motion
+    return CartesianInfo(
+        tcp_pose=controller.actual.T_base_tcp.rotation_vector(),
+        tcp_offset=motion.T_flange_tcp.rotation_vector(),
+    )
+
+
+def _masterboard(controller: Controller) -> MasterboardData:
+    io = controller.io
+    ain, aout = io.analog_in_voltage, io.analog_out_voltage
+    return MasterboardData(
+        digital_input_bits=io.digital_in.packed(),
+        digital_output_bits=io.digital_out.packed(),
+        analog_input_range=(int(ain[0]), int(ain[1])),
+        analog_input=(io.analog_in[0], io.analog_in[1]),
+        analog_output_domain=(int(aout[0]), int(aout[1])),
+        analog_output=(io.analog_out[0], io.analog_out[1]),
+        temperature=25.0,
+        safety_mode=controller.safety.mode,
+    )
+
+
+def _tool(controller: Controller) -> ToolData:
+    io = controller.io
+    return ToolData(
+        analog_input=(io.tool_analog_in[0], io.tool_analog_in[1]),
+        voltage_48v=48.0,
+        output_voltage=io.tool_voltage,
+        temperature=25.0,
+    )
+
+
+def _kinematics(controller: Controller) -> KinematicsInfo:
+    geometry = controller.arm.geometry
+    return KinematicsInfo(theta=geometry.theta, a=geometry.a, d=geometry.d, alpha=geometry.alpha)
+
+
+def _configuration(controller: Controller) -> ConfigurationData:
+    model, geometry = controller.arm.model, controller.arm.model.geometry
+    limits = [
+        (max(low, -_UNLIMITED), min(high, _UNLIMITED)) for low, high in model.position_limits
+    ]
+    a, b, c, d, e, f = limits
+    s1, s2, s3, s4, s5, s6 = ((speed, _JOINT_ACCELERATION) for speed in model.max_joint_speed)
+    return ConfigurationData(
+        position_limits=(a, b, c, d, e, f),
+        motion_limits=(s1, s2, s3, s4, s5, s6),
+        a=geometry.a,
+        d=geometry.d,
+        alpha=geometry.alpha,
+        theta=geometry.theta,
+        robot_type=model.wire_type,
+    )

@@ -1,0 +1,253 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What each RTDE output means in the simulated controller.
+
+Target and actual are one, unless a fault makes them differ: the arm follows without error. Its
+links weigh nothing; only the payload does. Outputs that would need more (currents, temperatures,
+encoders) have fixed, plausible values; those that are not zero stand in :data:`FIXED`, apart from
+those that are computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import hypot
+from types import MappingProxyType
+from typing import Any, TYPE_CHECKING
+
+from ur_cartesian_driver.motion.pose import IDENTITY, Vector3, Vector6
+from ur_cartesian_driver.motion.state import RobotMode
+from ur_cartesian_driver.sim.motion.point_motion import (
+    dot,
+    flange_point,
+    moments_for,
+    point_motion,
+)
+from ur_cartesian_driver.sim.state.controller_io import (
+    pack_bits,
+    REGISTER_BITS,
+    REGISTER_FLOATS,
+    REGISTER_INTEGERS,
+    Registers,
+)
+
+if TYPE_CHECKING:
+    from ur_cartesian_driver.sim.controller import Controller
+
+Getter = Callable[['Controller'], Any]
+
+_ZERO6: Vector6 = (0.0,) * 6
+_NO_FORCE: Vector6 = (0.0,) * 6
+#: ``joint_mode`` and ``tool_mode``; numbers of the controller.
+_RUNNING, _IDLE, _POWER_OFF = 253, 255, 239
+#: Of the supply of the arm [V], and what an arm at rest takes [A].
+_VOLTAGE, _CURRENT = 48.0, 0.5
+
+
+def _elbow(controller: Controller) -> Vector3:
+    """Return where the elbow is: the third joint [m]."""
+    return controller.arm.frames(controller.motion.q).origins[2]
+
+
+def _elbow_velocity(controller: Controller) -> Vector3:
+    """Return how fast the elbow is [m/s]; the first two joints move it."""
+    motion = controller.motion
+    frames = controller.arm.frames(motion.q)
+    return point_motion(frames, motion.qd, motion.qdd, frames.origins[2], 2).velocity
+
+
+def _tcp_acceleration(controller: Controller) -> Vector6:
+    """Return linear and angular acceleration of the TCP [m/s^2, rad/s^2]."""
+    motion = controller.motion
+    if not any(motion.qd) and not any(motion.qdd):
+        return _ZERO6  # most arms stand most of the time
+    frames = controller.arm.frames(motion.q)
+    tcp = point_motion(
+        frames, motion.qd, motion.qdd, flange_point(frames, motion.T_flange_tcp.position)
+    )
+    return (*tcp.acceleration, *tcp.angular_acceleration)
+
+
+def _accelerometer(controller: Controller) -> Vector3:
+    """Return what a sensor in the flange feels, weight included, in its axes [m/s^2]."""
+    motion = controller.motion
+    frames = controller.arm.frames(motion.q)
+    acceleration = point_motion(frames, motion.qd, motion.qdd, frames.position).acceleration
+    ex, ey, ez, _, _, _ = controller.actual.acceleration_error
+    specific_force = _sum(_sum(acceleration, (ex, ey, ez)), controller.gravity)
+    return (
+        dot(specific_force, frames.x),
+        dot(specific_force, frames.y),
+        dot(specific_force, frames.z),
+    )
+
+
+def _payload_moments(controller: Controller) -> Vector6:
+    """Return the joint moments that carry and accelerate the payload, a point mass [Nm]."""
+    mass, motion = controller.payload.mass, controller.motion
+    if mass == 0.0 or controller.power.mode is not RobotMode.RUNNING:
+        return _ZERO6
+    frames = controller.arm.frames(motion.q)
+    centre = flange_point(frames, controller.payload.cog)
+    acceleration = point_motion(frames, motion.qd, motion.qdd, centre).acceleration
+    x, y, z = _sum(acceleration, controller.gravity)
+    return moments_for(frames, centre, (mass * x, mass * y, mass * z))
+
+
+def _sum(a: Vector3, b: Vector3) -> Vector3:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+def _powered(controller: Controller) -> bool:
+    return controller.power.mode >= RobotMode.POWER_ON
+
+
+def _tool_mode(controller: Controller) -> int:
+    return _RUNNING if _powered(controller) else _POWER_OFF
+
+
+def _joint_mode(controller: Controller) -> int:
+    """Return the mode of each joint: the brakes hold until the arm is RUNNING."""
+    if controller.power.mode is RobotMode.RUNNING:
+        return _RUNNING
+    return _IDLE if _powered(controller) else _POWER_OFF
+
+
+def _actual_acceleration(controller: Controller) -> Vector6:
+    x, y, z, rx, ry, rz = (
+        target + error
+        for target, error in zip(
+            _tcp_acceleration(controller), controller.actual.acceleration_error, strict=True
+        )
+    )
+    return x, y, z, rx, ry, rz
+
+
+def _tcp(controller: Controller) -> Vector6:
+    return controller.motion.T_base_tcp.rotation_vector()
+
+
+def _scaled_momentum(controller: Controller) -> float:
+    return controller.payload.mass * hypot(*controller.tcp_twist[:3])
+
+
+#: Outputs that are computed.
+COMPUTED: Mapping[str, Getter] = MappingProxyType(
+    {
+        'timestamp': lambda c: c.time,
+        'control_step': lambda c: c.cycles,
+        'target_q': lambda c: c.motion.q,
+        'actual_q': lambda c: c.actual.q,
+        'target_qd': lambda c: c.qd,
+        'actual_qd': lambda c: c.actual.qd,
+        'target_qdd': lambda c: c.motion.qdd,
+        'target_TCP_pose': _tcp,
+        'actual_TCP_pose': lambda c: c.actual.T_base_tcp.rotation_vector(),
+        'target_TCP_speed': lambda c: c.tcp_twist,
+        'actual_TCP_speed': lambda c: c.actual.tcp_twist,
+        'tcp_offset': lambda c: (
+            _ZERO6
+            if c.motion.T_flange_tcp is IDENTITY
+            else c.motion.T_flange_tcp.rotation_vector()
+        ),
+        'speed_scaling': lambda c: c.motion.scaling,
+        'target_speed_fraction': lambda c: c.speed_slider,
+        'robot_mode': lambda c: c.power.mode,
+        'safety_mode': lambda c: c.safety.mode,
+        'safety_status': lambda c: c.safety.mode,
+        'runtime_state': lambda c: c.programs.state,
+        'robot_status_bits': lambda c: c.robot_status,
+        'safety_status_bits': lambda c: c.safety_status,
+        'joint_mode': lambda c: (_joint_mode(c),) * 6,
+        'tool_mode': _tool_mode,
+        'actual_joint_voltage': lambda c: (_VOLTAGE if _powered(c) else 0.0,) * 6,
+        'actual_robot_voltage': lambda c: _VOLTAGE if _powered(c) else 0.0,
+        'actual_robot_current': lambda c: _CURRENT if _powered(c) else 0.0,
+        'target_moment': _payload_moments,
+        'actual_current_as_torque': _payload_moments,
+        'target_TCP_acceleration': _tcp_acceleration,
+        'actual_TCP_acceleration': _actual_acceleration,
+        'actual_tool_accelerometer': _accelerometer,
+        'elbow_velocity': _elbow_velocity,
+        'actual_momentum': _scaled_momentum,
+        'payload': lambda c: c.payload.mass,
+        'payload_cog': lambda c: c.payload.cog,
+        'payload_inertia': lambda c: c.payload.inertia,
+        'target_gravity': lambda c: c.gravity,
+        'actual_TCP_force': lambda c: c.io.external_force if c.external_ft else _NO_FORCE,
+        'ft_raw_wrench': lambda c: c.io.external_force if c.external_ft else _NO_FORCE,
+        'tcp_force_scalar': lambda c: hypot(*c.io.external_force[:3]) if c.external_ft else 0.0,
+        'actual_digital_input_bits': lambda c: c.io.digital_in.packed(),
+        'actual_digital_output_bits': lambda c: c.io.digital_out.packed(),
+        'actual_configurable_digital_input_bits': lambda c: pack_bits(
+            c.io.digital_in.configurable
+        ),
+        'actual_configurable_digital_output_bits': lambda c: pack_bits(
+            c.io.digital_out.configurable
+        ),
+        'analog_io_types': lambda c: c.io.analog_types(),
+        'standard_analog_input0': lambda c: c.io.analog_in[0],
+        'standard_analog_input1': lambda c: c.io.analog_in[1],
+        'standard_analog_output0': lambda c: c.io.analog_out[0],
+        'standard_analog_output1': lambda c: c.io.analog_out[1],
+        'tool_analog_input0': lambda c: c.io.tool_analog_in[0],
+        'tool_analog_input1': lambda c: c.io.tool_analog_in[1],
+        'tool_output_voltage': lambda c: c.io.tool_voltage,
+        'elbow_position': _elbow,
+    }
+)
+
+#: Outputs that never change, because nothing behind them is simulated.
+FIXED: Mapping[str, Any] = MappingProxyType(
+    {
+        'joint_temperatures': (25.0,) * 6,
+        'actual_main_voltage': _VOLTAGE,
+        'tool_temperature': 25.0,
+    }
+)
+
+
+def _register_getters(prefix: str, of: Callable[[Controller], Registers]) -> dict[str, Getter]:
+    """Return what reads each register of one direction."""
+
+    def item(values: Callable[[Controller], list[Any]], i: int) -> Getter:
+        return lambda controller: values(controller)[i]
+
+    return {
+        f'{prefix}_bit_registers0_to_31': lambda c: pack_bits(of(c).bits[:32]),
+        f'{prefix}_bit_registers32_to_63': lambda c: pack_bits(of(c).bits[32:64]),
+        **{
+            f'{prefix}_bit_register_{i}': item(lambda c: of(c).bits, i)
+            for i in range(64, REGISTER_BITS)
+        },
+        **{
+            f'{prefix}_int_register_{i}': item(lambda c: of(c).integers, i)
+            for i in range(REGISTER_INTEGERS)
+        },
+        **{
+            f'{prefix}_double_register_{i}': item(lambda c: of(c).floats, i)
+            for i in range(REGISTER_FLOATS)
+        },
+    }
+
+
+REGISTERS: Mapping[str, Getter] = MappingProxyType(
+    {
+        **_register_getters('input', lambda c: c.io.inputs),
+        **_register_getters('output', lambda c: c.io.outputs),
+    }
+)
+
+
+def output_getter(name: str, zero: Any) -> Getter:
+    """
+    Return what computes an output.
+
+    :param zero: its value if nothing of it is simulated.
+    """
+    found = COMPUTED.get(name) or REGISTERS.get(name)
+    if found is not None:
+        return found
+    value = FIXED.get(name, zero)
+    return lambda _controller: value

@@ -1,0 +1,89 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""One RTDE client: its share of the data of each cycle, and what its inputs do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import floor
+
+from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion, Recipe
+from ur_cartesian_driver.protocol.rtde.rtde_server import (
+    InputReceived,
+    OutputStream,
+    RtdeServerCodec,
+)
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.interfaces.rtde_input_effects import apply_inputs
+from ur_cartesian_driver.sim.interfaces.rtde_output_values import output_getter
+
+
+class _OutputSchedule:
+    """A recipe with the functions that compute its values, and how often it is due."""
+
+    def __init__(self, output: OutputStream, maximum: float) -> None:
+        self._recipe: Recipe = output.recipe
+        self._getters = [
+            output_getter(name, _zero(data_type))
+            for name, data_type in zip(output.recipe.names, output.recipe.types, strict=True)
+        ]
+        self._ratio = output.frequency / maximum
+
+    def is_due(self, cycle: int) -> bool:
+        """Tell whether this is one of the cycles; they are spread evenly."""
+        return self._ratio >= 1.0 or floor(cycle * self._ratio) > floor((cycle - 1) * self._ratio)
+
+    def package(self, controller: Controller) -> bytes:
+        """Return the frame of this cycle."""
+        return self._recipe.pack([get(controller) for get in self._getters])
+
+
+class RtdeSession:
+    """A :class:`~.server.Session`."""
+
+    def __init__(self, controller: Controller, taken_inputs: set[str]) -> None:
+        """
+        Wait for requests.
+
+        :param taken_inputs: inputs that some client writes; shared by all sessions.
+        """
+        major, minor, bugfix, build = controller.config.version
+        self._controller = controller
+        self._maximum = 1.0 / controller.cycle
+        self._server = RtdeServerCodec(
+            ControllerVersion(major=major, minor=minor, bugfix=bugfix, build=build),
+            taken_inputs,
+            self._maximum,
+        )
+        self._outputs: list[OutputStream] = []
+        self._streams: list[_OutputSchedule] = []
+
+    def open(self) -> bytes:
+        """Say nothing: the client begins."""
+        return b''
+
+    def feed(self, data: bytes) -> bytes:
+        """Answer requests and apply inputs."""
+        for event in self._server.feed(data):
+            if isinstance(event, InputReceived):
+                apply_inputs(self._controller, event.recipe.named(event.values))
+        if self._server.outputs != self._outputs:
+            self._outputs = list(self._server.outputs)
+            self._streams = [_OutputSchedule(output, self._maximum) for output in self._outputs]
+        return self._server.data_to_send()
+
+    def close(self) -> None:
+        """Let others write what this client wrote."""
+        self._server.close()
+
+    def packages(self) -> Iterator[bytes]:
+        """Yield the data packages that are due in this cycle."""
+        if self._server.streaming:
+            for stream in self._streams:
+                if stream.is_due(self._controller.cycles):
+                    yield stream.package(self._controller)
+
+
+def _zero(data_type: DataType) -> float | tuple[float, ...]:
+    return 0 if data_type.length == 1 else (0,) * data_type.length

@@ -1,0 +1,274 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Listening on a TCP port for any number of clients of one kind.
+
+What is said is decided by a session, which knows no sockets: bytes in, bytes out. A client that
+does not read what it gets is dropped, so that it can stall neither the cycle nor the others.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterator
+import logging
+from typing import cast, Generic, Protocol, TypeVar
+
+from ur_cartesian_driver.motion.errors import ProtocolError
+from ur_cartesian_driver.sim.faults.impairment import ImpairedConnection, Impairment
+
+_log = logging.getLogger(__name__)
+
+#: Bytes that a client may leave unread beside what the kernel holds.
+MAX_UNREAD_BYTES = 1_000_000
+#: From here on a client is spared states: many send their scripts and never read.
+MAX_UNREAD_BYTES_FOR_STATE = 16_384
+
+
+class HangUp(Exception):
+    """Raised by a session to end its connection; what it carries is sent before."""
+
+    def __init__(self, farewell: bytes = b'') -> None:
+        """Take the last bytes to send."""
+        super().__init__(farewell)
+        self.farewell = farewell
+
+
+class ClientSession(Protocol):
+    """One client's conversation."""
+
+    def open(self) -> bytes:
+        """Return what is sent unasked at the start."""
+
+    def feed(self, data: bytes) -> bytes:
+        """
+        Take what came from the client, return the answer.
+
+        :raises ProtocolError: the client talks nonsense; it is disconnected.
+        :raises HangUp: the conversation is over.
+        """
+
+    def close(self) -> None:
+        """Give back what the client held."""
+
+
+S = TypeVar('S', bound=ClientSession)
+
+
+class _ClientConnection(asyncio.Protocol, Generic[S]):
+    """Moves bytes between a transport and a session."""
+
+    def __init__(self, server: TcpServer[S]) -> None:
+        self._server = server
+        self.session = server.make_session()
+        self._transport: asyncio.Transport | None = None
+        #: What is wrong with this connection; None, as always without faults: nothing.
+        self._impaired: ImpairedConnection | None = None
+        self._closing_after_send = False
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        self._transport = cast(asyncio.Transport, transport)
+        self._server.connections.add(self)
+        if self._server.refuses_connections:
+            self._transport.abort()
+            return
+        if self._server.impairment is not None:
+            self.impair_connection(self._server.impairment)
+        self.write(self.session.open())
+
+    def data_received(self, data: bytes) -> None:
+        if self._impaired is None:
+            self._handle_incoming(data)
+        else:
+            self._impaired.queue_incoming(data, self._server.now)
+            self._transport_reading(self._impaired.incoming_size < MAX_UNREAD_BYTES)
+
+    def _transport_reading(self, wanted: bool) -> None:
+        """Leave to the kernel, and so to the client, what is too much to hold back."""
+        if self._transport is None or self._transport.is_closing():
+            return
+        if wanted:
+            self._transport.resume_reading()
+        else:
+            self._transport.pause_reading()
+
+    def _handle_incoming(self, data: bytes) -> None:
+        try:
+            self.write(self.session.feed(data))
+        except HangUp as hangup:
+            self.write(hangup.farewell)
+            self._hang_up()
+        except ProtocolError as error:
+            _log.warning('%s client disconnected: %s', self._server.name, error)
+            self._hang_up()
+
+    def _hang_up(self) -> None:
+        if self._impaired is not None and self._impaired.outgoing_size:
+            self._closing_after_send = True
+        elif self._transport is not None:
+            self._transport.close()
+
+    def write(self, data: bytes) -> None:
+        """Send one piece; drop a client that does not read."""
+        if self._impaired is None:
+            self._send(data)
+            return
+        self._impaired.queue_outgoing(data, self._server.now)
+        if self._impaired.outgoing_size > MAX_UNREAD_BYTES:
+            self._drop_unread()
+
+    def _send(self, data: bytes) -> None:
+        if not data or self._transport is None or self._transport.is_closing():
+            return
+        if self._transport.get_write_buffer_size() > MAX_UNREAD_BYTES:
+            self._drop_unread()
+            return
+        self._transport.write(data)
+
+    def _drop_unread(self) -> None:
+        _log.warning('%s client dropped: it does not read', self._server.name)
+        self.abort()
+
+    def write_state(self, data: bytes) -> None:
+        """Send a piece that the next of its kind replaces, if the client has read the others."""
+        if self._transport is not None and (
+            self._transport.get_write_buffer_size() < MAX_UNREAD_BYTES_FOR_STATE
+        ):
+            self.write(data)
+
+    def impair_connection(self, impairment: Impairment | None) -> ImpairedConnection:
+        """Let something be wrong with this connection."""
+        if self._impaired is None:
+            self._impaired = ImpairedConnection(impairment, self._server.now)
+        self._impaired.impairment = impairment
+        return self._impaired
+
+    def pump(self, now: float) -> bool:
+        """Let go what is due; tell whether anything is still wrong."""
+        impaired = self._impaired
+        if impaired is None:
+            return False
+        if data := impaired.due_incoming(now):
+            self._handle_incoming(data)
+        self._transport_reading(impaired.incoming_size < MAX_UNREAD_BYTES)
+        self._send(impaired.due_outgoing(now))
+        if self._closing_after_send and not impaired.outgoing_size:
+            self._closing_after_send = False
+            self._hang_up()
+        if impaired.is_over:
+            self._impaired = None
+        return not impaired.is_over
+
+    def abort(self) -> None:
+        """Disconnect at once."""
+        if self._transport is not None:
+            self._transport.abort()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._transport = None
+        self._server.connections.discard(self)
+        self.session.close()
+
+
+class TcpServer(Generic[S]):
+    """One listening port and its clients."""
+
+    def __init__(self, name: str, make_session: Callable[[], S]) -> None:
+        """
+        Listen nowhere yet.
+
+        :param name: of the interface, for the log.
+        :param make_session: called for each client.
+        """
+        self.name = name
+        self.make_session = make_session
+        self.connections: set[_ClientConnection[S]] = set()
+        self._server: asyncio.Server | None = None
+        self.closing = False
+        #: What a fault makes of all connections, and the controller's clock while one does [s].
+        self.impairment: Impairment | None = None
+        self.now = 0.0
+
+    @property
+    def port(self) -> int:
+        """The port that is listened on."""
+        assert self._server is not None
+        return int(self._server.sockets[0].getsockname()[1])
+
+    @property
+    def refuses_connections(self) -> bool:
+        """Whether who calls is hung up on: at the last moment, or by a fault."""
+        return self.closing or (
+            self.impairment is not None and self.impairment.refuses_connections
+        )
+
+    @property
+    def session_connections(self) -> Iterator[tuple[S, _ClientConnection[S]]]:
+        """The conversations with what they are written to."""
+        return ((connection.session, connection) for connection in tuple(self.connections))
+
+    async def listen(self, host: str, port: int) -> None:
+        """
+        Start to listen.
+
+        :raises OSError: the port is taken; the text names interface and port.
+        """
+        loop = asyncio.get_running_loop()
+        self.closing = False
+        try:
+            self._server = await loop.create_server(lambda: _ClientConnection(self), host, port)
+        except OSError as error:
+            raise OSError(
+                f'The {self.name} port {port} on {host} cannot be listened on: '
+                f'{error.strerror or error}. Choose another port, or 0 for any free one.'
+            ) from error
+
+    def broadcast(self, data: bytes) -> None:
+        """Send the same piece to all clients."""
+        for connection in tuple(self.connections):
+            connection.write(data)
+
+    def broadcast_state(self, data: bytes) -> None:
+        """Send the same piece to all clients that read what they are sent."""
+        for connection in tuple(self.connections):
+            connection.write_state(data)
+
+    # As faults see it: an Impairable
+
+    def impair(self, impairment: Impairment | None, now: float) -> None:
+        """Let this be wrong with all connections."""
+        self.impairment, self.now = impairment, now
+        for connection in self.connections:
+            connection.impair_connection(impairment)
+
+    def pump(self, now: float) -> bool:
+        """Let go what is due; tell whether this has to be called again in the next cycle."""
+        self.now = now
+        held = [connection.pump(now) for connection in tuple(self.connections)]
+        return self.impairment is not None or any(held)
+
+    def drop(self) -> None:
+        """Cut all connections."""
+        for connection in tuple(self.connections):
+            connection.abort()
+
+    def freeze(self) -> None:
+        """Make all connections half-open ones: neither hear nor say anything, do not hang up."""
+        for connection in self.connections:
+            connection.impair_connection(self.impairment).frozen = True
+
+    def inject(self, data: bytes) -> None:
+        """Say something that no session has said."""
+        self.broadcast(data)
+
+    async def close(self) -> None:
+        """Stop listening and disconnect everybody."""
+        if self._server is None:
+            return
+        self.closing = True
+        self._server.close()
+        for connection in tuple(self.connections):
+            connection.abort()
+        await asyncio.sleep(0)  # the loop reports an abort in its next turn
+        await self._server.wait_closed()
+        self._server = None

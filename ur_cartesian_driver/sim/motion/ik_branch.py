@@ -1,0 +1,108 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Which of its solutions the arm has: the one that it comes to on its way from where it is.
+
+Beside a singularity the solution on the other side is the nearer one after a long step, while an
+arm that passes there swings round and stays on its side. So where a step changes sides it is
+looked at in shorter ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import ceil, log2
+
+from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.sim.motion.joint_kinematics import JointKinematics, max_joint_difference
+from ur_cartesian_driver.sim.motion.move_paths import JointMovePath, MovePath, Setpoint
+
+# The rest of a leg is walked in so many steps, or in shorter ones, down to this part of it, so
+# that none turns a joint by more [rad].
+_WALK_STEPS = 8
+_MIN_WALK_STEP = 1e-4
+_MAX_JOINT_STEP = 0.3
+# Steps in which the arm changes sides are cut to this length [m, rad].
+_FINE = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class IkBranchTracker:
+    """An arm that stands somewhere, and where it comes to from there."""
+
+    kinematics: JointKinematics
+    q: Vector6
+    T_base_tcp: Pose
+    T_tcp_flange: Pose
+
+    def joints(self, setpoint: Setpoint) -> Vector6 | None:
+        """Return the nearest joints at a place; None: there are none."""
+        return self._nearest(setpoint, self.q)
+
+    def after(
+        self, setpoint: Setpoint, h: float, step: Callable[[float], Setpoint]
+    ) -> Vector6 | None:
+        """
+        Return the joints at a place that a step of ``h`` seconds leads to.
+
+        :param step: where a shorter one leads to [s].
+        """
+        q = self.joints(setpoint)
+        if (
+            q is None
+            or not isinstance(setpoint, Pose)
+            or not self.kinematics.changes_branch(self.q, q)
+        ):
+            return q
+        travel = self.T_base_tcp.distance_to(setpoint) + self.T_base_tcp.angle_to(setpoint)
+        return self._joints_after_steps(step, self.q, 0.0, h, ceil(log2(max(travel / _FINE, 1.0))))
+
+    def joints_at_end_of(self, move_path: MovePath) -> Vector6 | None:
+        """Return the joints that the arm will have at the end of a leg, or None: a jump."""
+        if isinstance(move_path, JointMovePath):
+            return move_path.end
+        here, there = self.T_base_tcp, move_path.pose(move_path.length)
+        q, done, step = self.q, 0.0, 1.0 / _WALK_STEPS
+        while done < 1.0:
+            after = self._nearest(here.interpolate(there, min(done + step, 1.0)), q)
+            if after is not None and max_joint_difference(after, q) <= _MAX_JOINT_STEP:
+                q, done, step = after, done + step, min(2.0 * step, 1.0 / _WALK_STEPS)
+            elif step < _MIN_WALK_STEP:
+                return None
+            else:
+                step *= 0.5
+        return q
+
+    def _joints_after_steps(
+        self,
+        step: Callable[[float], Setpoint],
+        q: Vector6,
+        begin: float,
+        end: float,
+        halvings: int,
+    ) -> Vector6 | None:
+        """
+        Return the joints at the end of a step, come to in small steps where the arm changes sides.
+
+        :param q: the joints at ``begin``, which like ``end`` counts from now [s].
+        """
+        setpoint = step(end)
+        after = self._nearest(setpoint, q)
+        if (
+            halvings <= 0
+            or after is None
+            or not isinstance(setpoint, Pose)
+            or not self.kinematics.changes_branch(q, after)
+        ):
+            return after
+        middle = 0.5 * (begin + end)
+        half = self._joints_after_steps(step, q, begin, middle, halvings - 1)
+        if half is None:
+            return None
+        return self._joints_after_steps(step, half, middle, end, halvings - 1)
+
+    def _nearest(self, setpoint: Setpoint, q: Vector6) -> Vector6 | None:
+        if not isinstance(setpoint, Pose):
+            return setpoint
+        return self.kinematics.joints(setpoint @ self.T_tcp_flange, q)

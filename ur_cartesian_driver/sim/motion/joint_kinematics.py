@@ -1,0 +1,205 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the joints can do: inverse kinematics, speed and position limits, singularities."""
+
+from __future__ import annotations
+
+from math import cos, inf, sin, sqrt
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.kinematics.inverse import nearest
+from ur_cartesian_driver.motion.pose import (
+    conjugate,
+    multiply,
+    Pose,
+    rotation_vector_from_quaternion,
+    Vector6,
+)
+from ur_cartesian_driver.sim.motion.move_paths import MovePath
+from ur_cartesian_driver.sim.motion.moves import MotionFault
+from ur_cartesian_driver.sim.motion.path_motion import ProfileParameters
+
+# Assumptions, the robot's numbers are not published:
+#: What optimove's fractions are of [rad/s^2] and [rad/s^3]; also bounds servoj.
+MAX_JOINT_ACCELERATION = 40.0
+MAX_JOINT_JERK = 400.0
+#: The greatest limit of the tool's speed that the safety settings allow [m/s].
+MAX_TOOL_SPEED = 5.0
+#: How hard a joint can brake before the end of its range [rad/s^2].
+LIMIT_DECELERATION = 10.0
+#: Joint travel per tool travel [rad/m, rad/rad] beyond which the arm counts as singular.
+SINGULAR_RATE = 1000.0
+
+#: Joint changes below this are rounding [rad].
+NO_CHANGE = 1e-9
+# As near to its limit a joint is the reason why there is no solution [rad].
+_AT_LIMIT = 0.02
+_SAMPLES = 8
+
+#: No arm reaches so far [m].
+_MAX_DISTANCE = 1e3
+
+
+class JointKinematics:
+    """
+    The joints of one arm, and what they can do in one cycle.
+
+    :param cycle: [s].
+    """
+
+    def __init__(self, arm: Arm, cycle: float) -> None:
+        """Take the limits of the arm's model."""
+        self._arm, self._cycle = arm, cycle
+        self._speeds, self._limits = arm.model.max_joint_speed, arm.model.position_limits
+        nominal = arm.model.geometry
+        self._lengths = nominal.a[1], nominal.a[2], nominal.d[4]
+
+    def joints(self, T_base_flange: Pose, q_near: Vector6) -> Vector6 | None:
+        """Return the nearest solution within the limits."""
+        if not max(map(abs, T_base_flange.position)) < _MAX_DISTANCE:
+            return None  # absurd speeds lead there; squares of such numbers overflow
+        return nearest(self._arm, T_base_flange, q_near)
+
+    def changes_branch(self, q: Vector6, q_next: Vector6) -> bool:
+        """Return whether shoulder, elbow or wrist 2 go over to their other solution."""
+        return any(
+            a * b < 0.0
+            for a, b in zip(self._branch_signs(q), self._branch_signs(q_next), strict=True)
+        )
+
+    def _branch_signs(self, q: Vector6) -> tuple[float, float, float]:
+        """
+        Return three numbers whose signs are the branch.
+
+        How far the wrist centre is in front of the shoulder [m], of the nominal arm (near enough
+        for a sign); the sines of elbow and wrist 2.
+        """
+        upper_arm, forearm, wrist = self._lengths
+        angle = q[1] + q[2]
+        return (
+            upper_arm * cos(q[1]) + forearm * cos(angle) + wrist * sin(angle + q[3]),
+            sin(q[2]),
+            sin(q[4]),
+        )
+
+    def overspeed_factor(self, q: Vector6, q_before: Vector6) -> float:
+        """
+        Return by which factor the way to ``q`` is too long for one cycle; inf: no way.
+
+        A joint may be as fast as its limit says, and no faster than it can still brake before
+        the end of its range: v^2 = 2 a x.
+        """
+        worst = 0.0
+        for new, old, fastest_parameters, (low, high) in zip(
+            q, q_before, self._speeds, self._limits, strict=True
+        ):
+            travel = abs(new - old)
+            if travel < NO_CHANGE:
+                continue
+            margin = high - old if new > old else old - low
+            allowed = fastest_parameters * self._cycle
+            if 2.0 * LIMIT_DECELERATION * margin < fastest_parameters * fastest_parameters:
+                if margin <= NO_CHANGE:
+                    return inf
+                allowed = min(
+                    allowed, margin, sqrt(2.0 * LIMIT_DECELERATION * margin) * self._cycle
+                )
+            worst = max(worst, travel / allowed)
+        return worst
+
+    def motion_fault(self, q: Vector6, q_next: Vector6 | None) -> MotionFault:
+        """Return why the way from ``q`` to ``q_next`` (None: no solution) cannot be gone."""
+        for i, (position, (low, high)) in enumerate(zip(q, self._limits, strict=True)):
+            if position - low < _AT_LIMIT or high - position < _AT_LIMIT:
+                return MotionFault(
+                    code=191,
+                    argument=1,
+                    text=(
+                        f'Joint position limit: joint {i} stands at {position:.4f} rad and would '
+                        f'leave [{low:.4f}, {high:.4f}].'
+                    ),
+                )
+        if q_next is None:
+            return MotionFault(
+                code=154,
+                argument=0,
+                text=(
+                    'Position in singularity: the path goes on where there is no inverse '
+                    'kinematics solution.'
+                ),
+            )
+        joint = max(range(6), key=lambda i: abs(q[i] - q_next[i]))
+        return MotionFault(
+            code=204,
+            argument=7,
+            text=(
+                'Robot approaching singularity: acceleration threshold failed, joint '
+                f'{joint} would have to turn at once.'
+            ),
+        )
+
+    def fastest_parameters(
+        self, move_path: MovePath, q: Vector6, T_tcp_flange: Pose, a: float, v: float
+    ) -> ProfileParameters:
+        """
+        Return the fastest law of a leg that no joint minds, times fractions of it.
+
+        Joint travel per path is taken from a few samples, from ``q`` on.
+        """
+        step = move_path.length / _SAMPLES or 1.0
+        speed = acceleration = inf
+        for i in range(1, _SAMPLES + 1):
+            setpoint = move_path.at(move_path.length * i / _SAMPLES)
+            after = (
+                self.joints(setpoint @ T_tcp_flange, q) if isinstance(setpoint, Pose) else setpoint
+            )
+            if after is None:
+                break
+            for x, y, limit in zip(q, after, self._speeds, strict=True):
+                rate = max(abs(y - x), NO_CHANGE) / step
+                speed = min(speed, limit / rate)
+                acceleration = min(acceleration, MAX_JOINT_ACCELERATION / rate)
+            q = after
+        if speed == inf:
+            speed = acceleration = 1.0  # The leg will fail where it begins.
+        jerk = acceleration * MAX_JOINT_JERK / MAX_JOINT_ACCELERATION
+        return ProfileParameters(acceleration=a * acceleration, speed=v * speed, jerk=jerk)
+
+
+def is_singular(q_before: Vector6, q: Vector6, before: Pose, pose: Pose) -> bool:
+    """Return whether joints turn too much for the way of the tool."""
+    travel = before.distance_to(pose) + before.angle_to(pose)
+    return max_joint_difference(q, q_before) > SINGULAR_RATE * travel
+
+
+def max_joint_difference(a: Vector6, b: Vector6) -> float:
+    """Return the largest difference of a joint."""
+    return max(
+        abs(a[0] - b[0]),
+        abs(a[1] - b[1]),
+        abs(a[2] - b[2]),
+        abs(a[3] - b[3]),
+        abs(a[4] - b[4]),
+        abs(a[5] - b[5]),
+    )
+
+
+def difference_rate(after: Vector6, before: Vector6, rate: float) -> Vector6:
+    """Return the difference times the rate [1/s]."""
+    return (
+        (after[0] - before[0]) * rate,
+        (after[1] - before[1]) * rate,
+        (after[2] - before[2]) * rate,
+        (after[3] - before[3]) * rate,
+        (after[4] - before[4]) * rate,
+        (after[5] - before[5]) * rate,
+    )
+
+
+def twist_between(before: Pose, after: Pose, rate: float) -> Vector6:
+    """Return the mean twist between two poses, base axes."""
+    (ax, ay, az), (bx, by, bz) = before.position, after.position
+    wx, wy, wz = rotation_vector_from_quaternion(
+        multiply(after.quaternion, conjugate(before.quaternion))
+    )
+    return ((bx - ax) * rate, (by - ay) * rate, (bz - az) * rate, wx * rate, wy * rate, wz * rate)

@@ -1,0 +1,66 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Calls of path motions before they are resolved, and what they may ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from typing import NamedTuple
+
+from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.sim.motion.move_paths import MovePath
+from ur_cartesian_driver.sim.motion.moves import MotionError, Move
+from ur_cartesian_driver.sim.motion.path_motion import ProfileParameters
+
+#: Arguments of C171: of waypoints that were skipped, and of blends that are none, by the move.
+BLEND_SKIPPED_ARGUMENTS = {
+    'movej': 4,
+    'optimovej': 4,
+    'movel': 11,
+    'optimovel': 11,
+    'movec': 0,
+    'movep': 9,
+}
+BLEND_TOO_SMALL_ARGUMENTS = {'movec': 1, 'movep': 10}
+
+
+class PathStart(NamedTuple):
+    """Where a leg begins: joint positions [rad], and T_base_tcp."""
+
+    q: Vector6
+    pose: Pose
+
+
+class MotionCall(NamedTuple):
+    """A call of a path motion, to be resolved where the leg begins."""
+
+    name: str
+    move_path: Callable[[PathStart], MovePath]
+    parameters: Callable[[MovePath, PathStart], ProfileParameters]
+    radius: float
+    move: Move
+
+
+def constant_speed_parameters(a: float, v: float, r: float) -> ProfileParameters:
+    """Return the law of movep: to stand in the waypoint from full speed, v^2 = 2 b r."""
+    braking = max(a, v * v / (2.0 * r)) if r > 0.0 else None
+    return ProfileParameters(acceleration=a, speed=v, braking=braking)
+
+
+def check_profile_parameters(name: str, parameters: ProfileParameters) -> None:
+    """Refuse what no arm can be driven by."""
+    if not 0.0 <= parameters.time < inf:
+        raise MotionError(f'{name}: the time is {parameters.time:g} s, it must be 0 or more.')
+    if parameters.time > 0.0:
+        return
+    for word, value in (('acceleration', parameters.acceleration), ('speed', parameters.speed)):
+        if not 0.0 < value < inf:
+            raise MotionError(f'{name}: the {word} is {value:g}, it must be above 0.')
+
+
+def check_fractions(name: str, a: float, v: float) -> None:
+    """Refuse optimove's acceleration and velocity outside (0, 1]."""
+    for word, value in (('acceleration', a), ('velocity', v)):
+        if not 0.0 < value <= 1.0:
+            raise MotionError(f'{name}: {word} is {value:g}, it must be a fraction in (0, 1].')

@@ -1,0 +1,284 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Legs and corners strung together, each with its profile: what the arm follows.
+
+The robot knows one move ahead at most: the next call comes when the arm enters the blend. So each
+leg is planned to end at rest in its waypoint; a call that comes in time cuts the leg at the border
+of the blend and puts corner and next leg in the place of the rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf, sqrt
+from typing import Any
+
+from ur_cartesian_driver.motion.pose import distance
+from ur_cartesian_driver.sim.motion.motion_profile import (
+    MotionProfile,
+    ramp,
+    s_curve,
+    timed,
+    timed_cruise,
+    trapezoid,
+)
+from ur_cartesian_driver.sim.motion.move_paths import (
+    end_within_radius,
+    make_blend,
+    MotionPath,
+    MovePath,
+    Setpoint,
+    start_within_radius,
+)
+from ur_cartesian_driver.sim.motion.moves import Move
+
+# Ends of pieces nearer than this are reached [s]: sums of cycles miss them by rounding.
+_ROUNDING = 1e-9
+# Speeds and ways below this are none, in the units of any leg.
+_MIN_SPEED = 1e-9
+# What is left after a corner is driven at most this much faster than the mean, to be in time.
+_MAX_CATCH_UP = 2.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ProfileParameters:
+    """
+    How a move wants its leg to be driven, in the leg's unit (rad or m) per second.
+
+    :param time: [s], counts instead of speed and acceleration unless 0.
+    :param jerk: bounded, for an S-curve; None = trapezoid.
+    :param braking: at the end, where it differs from the acceleration.
+    """
+
+    acceleration: float
+    speed: float
+    time: float = 0.0
+    jerk: float | None = None
+    braking: float | None = None
+
+    def profile(self, length: float, start_speed: float = 0.0) -> MotionProfile:
+        """Return the profile of a way, to rest."""
+        if self.time > 0.0:
+            return timed(length, self.time, start_speed)
+        if self.jerk is not None:
+            return s_curve(length, self.acceleration, self.speed, self.jerk, start_speed)
+        return trapezoid(length, self.acceleration, self.speed, start_speed, self.braking)
+
+
+@dataclass(frozen=True, slots=True)
+class PathSection:
+    """
+    One path under one profile.
+
+    :param offset: path parameter at which the profile begins.
+    :param stop: time of the profile at which the next piece takes over.
+    :param halt: whether a cycle has to end exactly there.
+    """
+
+    path: MotionPath
+    profile: MotionProfile
+    offset: float
+    stop: float
+    halt: bool = False
+
+    def at(self, time: float) -> Setpoint:
+        """Return the place; the exact end of the path at the end of the profile."""
+        if time >= self.profile.duration:
+            return self.path.at(inf)
+        return self.path.at(self.offset + self.profile.at(time))
+
+
+@dataclass(frozen=True, slots=True)
+class LastMove:
+    """
+    The last leg of a track and what a follower must know of it.
+
+    :param entry: time of its profile at which its blend begins; its end without a blend.
+    """
+
+    move_path: MovePath
+    parameters: ProfileParameters
+    radius: float
+    entry: float
+    call: Move
+
+
+@dataclass(slots=True)
+class PathMotion:
+    """
+    Pieces to follow and how far the arm is: time [s] in the profile of piece ``index``.
+
+    The last piece is always the leg of ``last_move``.
+    """
+
+    sections: tuple[PathSection, ...]
+    last_move: LastMove
+    index: int = 0
+    time: float = 0.0
+    real_time = False
+
+    def preview(self, h: float) -> tuple[Setpoint, tuple[int, float]]:
+        """Return the place after ``h`` more seconds [s of the profile]."""
+        i, t = self.index, self.time
+        while True:
+            section = self.sections[i]
+            left = section.stop - t
+            if h < left - _ROUNDING:
+                t += h
+                break
+            last = i + 1 == len(self.sections)
+            if last or (section.halt and left > _ROUNDING):
+                t = section.stop
+                break
+            h, i, t = max(h - left, 0.0), i + 1, 0.0
+        return self.sections[i].at(t), (i, t)
+
+    def accept(self, state: Any) -> None:
+        """Go to a state that ``preview`` returned."""
+        self.index, self.time = state
+
+    @property
+    def finished(self) -> bool:
+        """Whether the last waypoint is reached."""
+        return self.index + 1 == len(self.sections) and self.time >= self.sections[-1].stop
+
+    def may_return(self, cycle: float) -> bool:
+        """Return whether one more cycle enters the blend, or the waypoint is reached."""
+        if self.index + 1 < len(self.sections):
+            return False
+        if self.last_move.radius > 0.0:
+            return self.time + cycle >= self.last_move.entry - _ROUNDING
+        return self.finished
+
+
+def start_from_rest(
+    move_path: MovePath, parameters: ProfileParameters, radius: float, call: Move
+) -> PathMotion:
+    """Return the track of one leg, begun and ended at rest."""
+    profile = parameters.profile(move_path.length)
+    section = PathSection(move_path, profile, 0.0, profile.duration)
+    return PathMotion(
+        (section,),
+        LastMove(
+            move_path, parameters, radius, _blend_entry_time(section, move_path, radius), call
+        ),
+    )
+
+
+def append_move_path(
+    path_motion: PathMotion,
+    move_path: MovePath,
+    parameters: ProfileParameters,
+    radius: float,
+    call: Move,
+    circular: bool,
+) -> tuple[PathMotion, bool]:
+    """
+    Return the track with one more leg, blended where that is possible, and whether it is.
+
+    The corner begins at the blend radius, or where the arm is if the call comes late, and ends as
+    far behind the waypoint. It is not blended when the arm already stands, or when the new leg
+    does not leave the blend: then the arm stops at the waypoint. (Both legs share the speed
+    through the corner, and a short one would be driven by the other's.)
+    """
+    last, last_move, ahead = (
+        path_motion.sections[-1],
+        path_motion.last_move,
+        path_motion.sections[path_motion.index : -1],
+    )
+    now = path_motion.time if path_motion.index + 1 == len(path_motion.sections) else 0.0
+    leave = max(now, last_move.entry)
+    tail = last_move.move_path.length - last.offset - last.profile.at(leave)
+    speed = last.profile.speed(leave)
+    head = None
+    if speed > _MIN_SPEED and tail > _MIN_SPEED:
+        blend_distance = distance(
+            last_move.move_path.pose(last_move.move_path.length - tail).position,
+            last_move.move_path.pose(inf).position,
+        )
+        head = start_within_radius(move_path, min(blend_distance, last_move.radius))
+    if head is None:
+        rest = start_from_rest(move_path, parameters, radius, call)
+        sections = (*ahead, replace(last, halt=True), *rest.sections)
+        return PathMotion(sections, rest.last_move, 0, path_motion.time), False
+    blend = make_blend(last_move.move_path, tail, move_path, head, circular)
+    through, after = _blend_profiles(
+        (blend.entry_rate, blend.exit_rate),
+        speed,
+        last.profile.duration - leave,
+        last_move.parameters,
+        parameters,
+        head,
+        move_path.length - head,
+    )
+    end = PathSection(move_path, after, head, after.duration)
+    sections = (
+        *ahead,
+        replace(last, stop=leave),
+        PathSection(blend, through, 0.0, through.duration),
+        end,
+    )
+    new_last_move = LastMove(
+        move_path, parameters, radius, _blend_entry_time(end, move_path, radius), call
+    )
+    return PathMotion(sections, new_last_move, 0, path_motion.time), True
+
+
+def _blend_entry_time(section: PathSection, move_path: MovePath, radius: float) -> float:
+    """Return the time at which the leg comes within the radius [m] of its end."""
+    if radius <= 0.0:
+        return section.stop
+    tail = end_within_radius(move_path, radius)
+    if tail is None:
+        return 0.0
+    return section.profile.time_at(move_path.length - tail - section.offset)
+
+
+def _blend_profiles(
+    rates: tuple[float, float],
+    speed: float,
+    remaining: float,
+    before: ProfileParameters,
+    after: ProfileParameters,
+    head: float,
+    rest: float,
+) -> tuple[MotionProfile, MotionProfile]:
+    """
+    Return the profiles of the corner (0 to 1) and of the rest of the leg behind it.
+
+    The corner's rate changes evenly from that of the entry to that of the next leg's cruising
+    speed, where three bounds allow: it does not grow beyond what keeps both legs' parts within
+    their accelerations (r1'' = 2 r1 u'^2 <= a, so u'^2 <= a / 2r), and the rest of the leg must
+    suffice to brake. A trapezoid enters with v <= sqrt(2 a r), which fulfils the first anyway.
+
+    Times are kept in sum: what the move before had left until it would have stood in its
+    waypoint is added to the time of the next one.
+
+    :param rates: path units of the legs per unit of the corner's parameter, at entry and exit.
+    :param speed: at the entry; ``remaining`` [s]: until the rest in the waypoint.
+    :param head: the new leg's way within the corner; ``rest``: behind it.
+    """
+    entry_rate, exit_rate = rates
+    u0 = speed / entry_rate
+    time = after.time + remaining
+    whole = head + rest
+    if after.time > 0.0:
+        cruise = timed_cruise(whole + head, time, u0 * exit_rate)
+        acceleration, stoppable = 4.5 * whole / after.time**2, inf
+    else:
+        cruise, acceleration = after.speed, after.acceleration
+        stoppable = sqrt(2.0 * (after.braking or acceleration) * rest)
+    allowed = sqrt(min(_acceleration(before) / entry_rate, acceleration / exit_rate))
+    u1 = min(cruise / exit_rate, stoppable / exit_rate, max(u0, allowed))
+    through = ramp(1.0, u0, u1)
+    if after.time > 0.0:
+        min_time = time * rest / (whole + head) / _MAX_CATCH_UP
+        after = replace(after, time=max(time - through.duration, min_time))
+    return through, after.profile(rest, u1 * exit_rate)
+
+
+def _acceleration(parameters: ProfileParameters) -> float:
+    return (
+        inf if parameters.time > 0.0 else max(parameters.acceleration, parameters.braking or 0.0)
+    )

@@ -1,0 +1,169 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Interpreter mode: a program that waits for statements and executes what clients send, in order.
+
+A statement is compiled and numbered as it arrives and answered by `ack: <number>: <statement>`, or
+by `discard: <reason>: <statement>`, and is executed when those before it have been. While no
+program is in interpreter mode statements wait, without an answer; they also wait behind one that
+clears or ends it, because they could name what is about to be forgotten. Commands are executed at
+once, also in front of statements that wait.
+
+Decided where nothing is documented: statements while no program runs are discarded, and `abort`
+and `skipbuffer` are acknowledged with the number of the last statement.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Generator, Mapping
+
+from ur_cartesian_driver.sim.builtins.motion_builtins import MotionOwnership
+from ur_cartesian_driver.sim.programs.program_runner import ProgramRunner
+from ur_cartesian_driver.urscript import (
+    CompiledLine,
+    CompileError,
+    RuntimeException,
+    ScriptInterpreter,
+)
+
+#: Statements that wait to be compiled or executed; a robot takes about as many.
+MAX_QUEUED_STATEMENTS = 500
+#: What statements must not be compiled behind before it has been executed.
+_CLOSING = frozenset({'clear_interpreter', 'end_interpreter'})
+
+AnswerCallback = Callable[[str], None]
+ModeSteps = Generator[None, None, None]
+
+
+class InterpreterMode:
+    """The statements of all clients, and how far they have got."""
+
+    def __init__(self, programs: ProgramRunner, ownership: MotionOwnership) -> None:
+        """
+        Begin with no statements.
+
+        :param programs: whose machine compiles and runs the statements.
+        :param ownership: of the motion, which `abort` stops.
+        """
+        self._programs = programs
+        self._ownership = ownership
+        self._commands: Mapping[str, Callable[[], str]] = {
+            'abort': self._abort,
+            'skipbuffer': self._skip,
+            'statelastexecuted': lambda: f'state: {self._executed}',
+            'statelastinterpreted': lambda: f'state: {self._interpreted}',
+            'statelastcleared': lambda: f'state: {self._cleared}',
+            'stateunexecuted': lambda: f'state: {len(self._queue)}',
+        }
+        self._queue: deque[tuple[int, CompiledLine]] = deque()
+        self._uncompiled: deque[tuple[str, AnswerCallback]] = deque()
+        self.end_of_program()
+
+    def end_of_program(self) -> None:
+        """Forget everything and count from 1 again."""
+        self._interpreter: ScriptInterpreter | None = None
+        self._interpreted = self._executed = self._cleared = 0
+        self._closing = self._clear_wanted = self._end_wanted = False
+        self._queue.clear()
+        self._discard_queued('the program has ended')
+
+    # What clients send
+
+    def receive(self, statement: str, answer: AnswerCallback) -> None:
+        """
+        Take one line.
+
+        :param answer: called with the answer, now or when the line is compiled.
+        """
+        command = self._commands.get(statement.strip())
+        if command is not None:
+            answer(f'{command()}: {statement.strip()}')
+        elif not self._programs.running:
+            answer(f'discard: no program is running: {statement}')
+        elif len(self._queue) + len(self._uncompiled) >= MAX_QUEUED_STATEMENTS:
+            answer(
+                f'discard: more than {MAX_QUEUED_STATEMENTS} statements are waiting: {statement}'
+            )
+        elif statement.strip():
+            self._uncompiled.append((statement, answer))
+            self._compile_queued()
+
+    def _abort(self) -> str:
+        self._ownership.abort()
+        return f'ack: {self._interpreted}'
+
+    def _skip(self) -> str:
+        self._queue.clear()
+        self._closing = False  # what would have cleared or ended the mode may be gone
+        self._compile_queued()
+        return f'ack: {self._interpreted}'
+
+    def _compile_queued(self) -> None:
+        """Compile and answer what waits, up to a statement that clears or ends the mode."""
+        while self._interpreter is not None and self._uncompiled and not self._closing:
+            statement, answer = self._uncompiled.popleft()
+            try:
+                line = self._interpreter.lines.compile(statement)
+            except CompileError as error:
+                answer(f'discard: {error.text.rstrip(":")}: {statement}')
+                continue
+            self._interpreted += 1
+            self._queue.append((self._interpreted, line))
+            self._closing = bool(line.calls & _CLOSING)
+            answer(f'ack: {self._interpreted}: {statement}')
+
+    def _discard_queued(self, reason: str) -> None:
+        while self._uncompiled:
+            statement, answer = self._uncompiled.popleft()
+            answer(f'discard: {reason}: {statement}')
+
+    # What programs call
+
+    def run(self, clear_queue: bool, clear_on_end: bool) -> ModeSteps:
+        """
+        Execute statements until one, or another thread, ends the mode.
+
+        :param clear_queue: discard the statements that have been waiting.
+        :param clear_on_end: forget what the statements have made when the mode ends.
+        :raises RuntimeException: not in the main thread, or inside a statement.
+        """
+        interpreter = self._programs.interpreter
+        if interpreter is None or interpreter.current_thread != 0 or self._interpreter is not None:
+            raise RuntimeException('interpreter_mode is only possible in the main thread, once.')
+        if clear_queue:
+            self._discard_queued('the queue was cleared')
+        self._interpreter = interpreter
+        self._end_wanted = self._clear_wanted = self._closing = False
+        first_thread = interpreter.threads_started
+        self._compile_queued()
+        while not self._end_wanted:
+            if self._queue:
+                self._executed, line = self._queue.popleft()
+                yield from line.steps
+            else:
+                yield
+            if self._clear_wanted:
+                self._forget(interpreter, first_thread)
+        self._queue.clear()
+        if clear_on_end:
+            self._forget(interpreter, first_thread)
+        self._interpreter = None
+
+    def end(self) -> None:
+        """Let the mode end after the statement that is being executed."""
+        self._end_wanted = True
+
+    def clear(self) -> None:
+        """Let everything be forgotten after the statement that is being executed."""
+        self._clear_wanted = True
+
+    def _forget(self, interpreter: ScriptInterpreter, first_thread: int) -> None:
+        """Forget what statements have made, the threads that they have started included."""
+        interpreter.kill_since(first_thread)
+        interpreter.lines.forget()
+        self._queue.clear()
+        self._cleared = self._interpreted
+        self._closing = self._clear_wanted = False
+        if not self._end_wanted:
+            self._compile_queued()

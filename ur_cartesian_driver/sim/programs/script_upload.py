@@ -1,0 +1,94 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What clients write to the script ports, cut into programs and single lines.
+
+A program begins with `def` or `sec` in column 1 and may come in any number of pieces. It ends with
+`end` in column 1, as the robot's manual wants it, where everything between is indented. Programs
+whose indentation has been lost exist too; those end where as many blocks have ended as begun. (To
+count in indented programs as well would leave one that lacks an `end` without any answer.)
+Everything else is one line each: a command, or a statement.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+from ur_cartesian_driver.urscript.parsing.scanner import scan, TokenKind
+from ur_cartesian_driver.urscript.script_errors import CompileError
+
+#: A program longer than this is no program [bytes].
+MAX_UPLOAD_SIZE = 16 * 1024 * 1024
+
+_BLOCKS = frozenset({'def', 'sec', 'thread', 'if', 'while', 'switch'})
+
+
+@dataclass(frozen=True, slots=True)
+class UploadedProgram:
+    """A whole program, ready to be compiled."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class UploadedLine:
+    """One line that belongs to no program."""
+
+    text: str
+
+
+class UploadTooLong(Exception):
+    """Somebody sends without end."""
+
+
+class UploadDecoder:
+    """Cuts one connection's stream; feed it whatever arrives."""
+
+    def __init__(self) -> None:
+        """Begin outside of any program."""
+        self._rest = b''
+        self._program: list[str] = []
+        self._size = 0
+        self._open_blocks = 0
+        self._indented = True
+
+    def feed(self, data: bytes) -> list[UploadedProgram | UploadedLine]:
+        """
+        Return what is complete now.
+
+        :raises UploadTooLong: a line or program exceeds 16 MiB.
+        """
+        *lines, self._rest = (self._rest + data).split(b'\n')
+        found = [item for line in lines if (item := self._line(line)) is not None]
+        if self._size + len(self._rest) > MAX_UPLOAD_SIZE:
+            raise UploadTooLong
+        return found
+
+    def _line(self, data: bytes) -> UploadedProgram | UploadedLine | None:
+        line = data.decode('latin-1').rstrip('\r')
+        if not self._program:
+            if not line.startswith(('def ', 'sec ')):
+                bare = line.strip()
+                return UploadedLine(bare) if bare and not bare.startswith('#') else None
+            self._size, self._open_blocks, self._indented = 0, 0, True
+        elif line[:1] not in ('', ' ', '\t', '#') and line.rstrip() != 'end':
+            self._indented = False
+        self._program.append(line)
+        self._size += len(data)
+        self._open_blocks += _block_balance(line)
+        if line.rstrip() != 'end' or not (self._indented or self._open_blocks <= 0):
+            return None
+        text = '\n'.join(self._program) + '\n'
+        self._program, self._size = [], 0
+        return UploadedProgram(text)
+
+
+@lru_cache(maxsize=1024)  # clients send the same program again and again
+def _block_balance(line: str) -> int:
+    """Return how many more blocks a line opens than it closes."""
+    try:
+        words = [token.text for token in scan(line) if token.kind is TokenKind.KEYWORD]
+    except CompileError:
+        return 0  # the compiler will say what is wrong
+    return sum(word in _BLOCKS for word in words) - words.count('end')

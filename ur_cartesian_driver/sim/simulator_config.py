@@ -1,0 +1,143 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What can be chosen about a simulated robot; frozen, and checked when it is made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import pi
+from typing import Literal
+
+from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model, RobotModel
+from ur_cartesian_driver.motion.pose import Vector6
+from ur_cartesian_driver.sim.faults.injector import Fault
+
+#: Upright enough to move anywhere, away from every singularity [rad].
+HOME: Vector6 = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
+
+_PRIMARY_PORT = 30001
+_DEFAULT_VERSIONS = {'CB3': '3.15.8', 'e': '5.21.0'}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatorConfig:
+    """
+    One simulated robot; every default is what a test or a first try wants.
+
+    :raises ValueError: a model, version, frequency or power state does not exist.
+    """
+
+    #: One of :data:`ur_cartesian_driver.kinematics.robot_models.MODELS`.
+    model: str = 'ur5e'
+    #: Where the servers listen. Nothing is reachable from other machines unless asked for.
+    host: str = '127.0.0.1'
+    #: Version of the robot's software; empty = 5.21.0, or 3.15.8 for a CB3 model.
+    polyscope: str = ''
+    #: Ports; 0 = any free one.
+    rtde_port: int = 30004
+    primary_port: int = _PRIMARY_PORT
+    dashboard_port: int = 29999
+    #: None = 30002 and 30003 beside a primary interface on 30001, any free ones beside another:
+    #: who gives the robot a port of his own is not alone on this computer.
+    secondary_port: int | None = None
+    realtime_port: int | None = None
+    #: Statements for programs in interpreter mode; None = 30020 or any free one, as above.
+    interpreter_port: int | None = None
+    #: Joint positions at start [rad].
+    q: Vector6 = HOME
+    power: Literal['running', 'off'] = 'running'
+    #: False = local control: the primary interface takes no scripts.
+    remote_control: bool = True
+    #: Denavit-Hartenberg parameters of this arm; None = the nominal ones of the model.
+    geometry: DhTable | None = None
+    #: Cycles per second; None = 500, or 125 for a CB3 model.
+    frequency: float | None = None
+    #: Unlocking is refused this long after a protective stop [s]. A real robot insists on 5 s.
+    unlock_delay: float = 5.0
+    #: From `power on` to IDLE, and from IDLE to RUNNING [s]; a real arm takes about ten times as
+    #: long, which teaches a test nothing.
+    power_on_time: float = 0.5
+    brake_release_time: float = 0.5
+    #: How fast time passes against the wall clock; 0 = as fast as it can.
+    rate: float = 1.0
+    #: What goes wrong, as `sim.faults.injector` or in words; times count from
+    #: the first cycle.
+    faults: Sequence[Fault | str] = ()
+    #: Programs that the dashboard can load: file name -> URScript.
+    programs: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Reject what cannot be simulated, naming the field."""
+        model = self.robot_model  # raises for an unknown name
+        if self.power not in ('running', 'off'):
+            raise ValueError(f"power is {self.power!r}; use 'running' or 'off'.")
+        if self.frequency is not None and not 1.0 <= self.frequency <= 1000.0:
+            raise ValueError(f'frequency is {self.frequency} Hz; use 1 to 1000 Hz.')
+        if self.rate < 0.0:
+            raise ValueError(f'rate is {self.rate}; use 1 for real time, 0 for no waiting.')
+        for name in (
+            'rtde_port',
+            'primary_port',
+            'dashboard_port',
+            'secondary_port',
+            'realtime_port',
+            'interpreter_port',
+        ):
+            port = getattr(self, name)
+            if port is not None and not 0 <= port <= 65535:
+                raise ValueError(f'{name} is {port}; use 0 (any free one) to 65535.')
+        if len(self.q) != 6:
+            raise ValueError(f'q has {len(self.q)} values; give one for each of the 6 joints.')
+        if (self.version[0] >= 5) == (model.series == 'CB3'):
+            raise ValueError(
+                f'polyscope {self.polyscope} does not run a {self.model}; use 3.x '
+                'for CB3 models and 5.x for all others.'
+            )
+
+    @property
+    def robot_model(self) -> RobotModel:
+        """Return the table row of the model."""
+        return robot_model(self.model)
+
+    @property
+    def version(self) -> tuple[int, int, int, int]:
+        """
+        Return major, minor, bugfix, build.
+
+        :raises ValueError: the text is not two to four numbers with dots between them.
+        """
+        series = 'CB3' if self.robot_model.series == 'CB3' else 'e'
+        text = self.polyscope or _DEFAULT_VERSIONS[series]
+        parts = text.split('.')
+        if not 2 <= len(parts) <= 4 or not all(part.isdigit() for part in parts):
+            raise ValueError(f'polyscope is {text!r}; write it like 5.21 or 5.21.0.')
+        major, minor, bugfix, build = [int(part) for part in parts] + [0] * (4 - len(parts))
+        return major, minor, bugfix, build
+
+    @property
+    def listening_secondary_port(self) -> int:
+        """Return the port for the secondary interface; 0 = any free one."""
+        return self._port_beside_primary(self.secondary_port, 1)
+
+    @property
+    def listening_realtime_port(self) -> int:
+        """Return the port for the real-time interface; 0 = any free one."""
+        return self._port_beside_primary(self.realtime_port, 2)
+
+    @property
+    def listening_interpreter_port(self) -> int:
+        """Return the port for statements in interpreter mode; 0 = any free one."""
+        return self._port_beside_primary(self.interpreter_port, 19)
+
+    def _port_beside_primary(self, chosen: int | None, distance: int) -> int:
+        if chosen is not None:
+            return chosen
+        return _PRIMARY_PORT + distance if self.primary_port == _PRIMARY_PORT else 0
+
+    @property
+    def cycle(self) -> float:
+        """Return the controller's cycle [s]: 2 ms, for CB3 models 8 ms."""
+        if self.frequency is not None:
+            return 1.0 / self.frequency
+        return 0.008 if self.robot_model.series == 'CB3' else 0.002

@@ -1,0 +1,193 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The sockets of programs over real TCP, polled by the controller's cycle.
+
+They are not served by the event loop, because a program may read only in its own cycle: what it
+has not asked for stays in the kernel, and a program that stands still stops its peer (TCP's flow
+control), as on the real robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+import contextlib
+import errno
+import socket
+
+from ur_cartesian_driver.sim.sockets.script_sockets import SocketState
+
+#: Bytes taken from the kernel ahead of the program, and bytes that a slow peer may owe us.
+_MAX_BUFFERED = 65_536
+_IN_PROGRESS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK, errno.EINTR)
+_CONNECTED = (0, errno.EISCONN)
+
+_Address = tuple[str, int] | tuple[str, int, int, int]
+_Resolved = list[tuple[int, int, int, str, _Address]]
+
+
+class _ScriptConnection:
+    """One socket: connecting, open, or closed by its peer with data left to read."""
+
+    def __init__(self, port: int, on_data: Callable[[int, bytes], None] | None) -> None:
+        self.state = SocketState.CONNECTING
+        self.incoming = bytearray()
+        self._outgoing = bytearray()
+        self._port = port
+        self._on_data = on_data
+        self._socket: socket.socket | None = None
+        self._target: _Address | None = None
+        self.resolving: Future[_Resolved] | None = None
+
+    def connect(self, resolved: _Resolved) -> None:
+        """Start to connect to the first address."""
+        family, kind, protocol, _, self._target = resolved[0]
+        self._socket = socket.socket(family, kind, protocol)
+        self._socket.setblocking(False)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._continue_connecting()
+
+    def poll(self) -> None:
+        """Go on with what has not been finished."""
+        if self.resolving is not None and self.resolving.done():
+            resolving, self.resolving = self.resolving, None
+            try:
+                self.connect(resolving.result())
+            except OSError:
+                self.close()
+        elif self.state is SocketState.CONNECTING and self._socket is not None:
+            self._continue_connecting()
+        elif self._outgoing:
+            self._flush()
+
+    def _continue_connecting(self) -> None:
+        assert self._socket is not None
+        assert self._target is not None
+        error = self._socket.connect_ex(self._target)
+        if error in _CONNECTED:
+            self.state = SocketState.OPEN
+        elif error not in _IN_PROGRESS:
+            self.close()
+
+    def receive(self) -> None:
+        """Take what the kernel has, up to the limit."""
+        while self.state is SocketState.OPEN and len(self.incoming) < _MAX_BUFFERED:
+            assert self._socket is not None
+            try:
+                data = self._socket.recv(_MAX_BUFFERED)
+            except BlockingIOError:
+                return
+            except OSError:
+                data = b''
+            if not data:
+                self.close()
+                return
+            self.incoming += data
+            if self._on_data is not None:
+                self._on_data(self._port, data)
+
+    def send(self, data: bytes) -> bool:
+        """Send now, keep what the kernel does not take; False when too much is kept already."""
+        if self.state is not SocketState.OPEN or len(self._outgoing) + len(data) > _MAX_BUFFERED:
+            return False
+        self._outgoing += data
+        self._flush()
+        return self.state is SocketState.OPEN
+
+    def _flush(self) -> None:
+        assert self._socket is not None
+        try:
+            sent = self._socket.send(self._outgoing)
+            del self._outgoing[:sent]
+        except BlockingIOError:
+            return
+        except OSError:
+            self.close()
+
+    def close(self) -> None:
+        """Close; data that has arrived can still be read."""
+        self.state = SocketState.CLOSED
+        if self.resolving is not None:
+            self.resolving.cancel()
+            self.resolving = None
+        if self._socket is not None:
+            with contextlib.suppress(OSError):
+                self._socket.close()
+            self._socket = None
+        self._outgoing.clear()
+
+
+class TcpScriptSockets:
+    """Named TCP connections; see :class:`~.script_sockets.ScriptSockets`."""
+
+    def __init__(self, on_data: Callable[[int, bytes], None] | None = None) -> None:
+        """
+        Begin with none.
+
+        :param on_data: called with the peer's port and what came from it, as it is received.
+        """
+        self.on_data = on_data
+        self._connections: dict[str, _ScriptConnection] = {}
+        self._resolver: ThreadPoolExecutor | None = None
+
+    def open(self, name: str, address: str, port: int) -> None:
+        """Begin to connect; host names are looked up in a thread, for that may take seconds."""
+        self.close(name)
+        connection = _ScriptConnection(port, self.on_data)
+        self._connections[name] = connection
+        host = '127.0.0.1' if address == 'localhost' else address
+        try:
+            resolved = socket.getaddrinfo(
+                host, port, type=socket.SOCK_STREAM, flags=socket.AI_NUMERICHOST
+            )
+        except (OSError, OverflowError):
+            connection.resolving = self._lookup(address, port)
+            return
+        try:
+            # A Python without IPv6 gives other addresses, which connecting refuses.
+            connection.connect(resolved)  # type: ignore[arg-type]
+        except (OSError, OverflowError):
+            connection.close()
+
+    def _lookup(self, address: str, port: int) -> Future[_Resolved]:
+        if self._resolver is None:
+            self._resolver = ThreadPoolExecutor(1, thread_name_prefix='ur-sim-resolver')
+        # The same as above.
+        return self._resolver.submit(socket.getaddrinfo, address, port, type=socket.SOCK_STREAM)  # type: ignore[arg-type]
+
+    def state(self, name: str) -> SocketState:
+        """Return the state of a name."""
+        connection = self._connections.get(name)
+        return connection.state if connection else SocketState.CLOSED
+
+    def received(self, name: str) -> bytearray:
+        """Return what has arrived on a name."""
+        connection = self._connections.get(name)
+        if connection is None:
+            return bytearray()
+        connection.receive()
+        return connection.incoming
+
+    def send(self, name: str, data: bytes) -> bool:
+        """Send on a name."""
+        connection = self._connections.get(name)
+        return connection is not None and connection.send(data)
+
+    def close(self, name: str) -> None:
+        """Close one."""
+        if connection := self._connections.pop(name, None):
+            connection.close()
+
+    def close_all(self) -> None:
+        """Close all, and end the look-ups."""
+        for name in list(self._connections):
+            self.close(name)
+        if self._resolver is not None:
+            self._resolver.shutdown(wait=False, cancel_futures=True)
+            self._resolver = None
+
+    def poll(self) -> None:
+        """Go on with connecting and sending."""
+        for connection in self._connections.values():
+            connection.poll()

@@ -1,0 +1,124 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the controller tells all clients of the primary interface, and its log for people."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+from ur_cartesian_driver.motion.state import SafetyMode
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
+    ErrorCodeMessage,
+    KeyMessage,
+    PrimaryMessage,
+    RawMessage,
+    ReportLevel,
+    RuntimeExceptionMessage,
+    SafetyModeMessage,
+    TextMessage,
+)
+from ur_cartesian_driver.sim.state.controller_state import Popup
+
+#: Messages that wait to be sent, and lines that are remembered.
+_MAX_LOG_LINES = 10_000
+#: Longest text in a message [bytes]: a frame must stay below 4092.
+_MAX_TEXT_LENGTH = 4000
+
+_POPUP = 2
+
+
+class ControllerMessages:
+    """Collects messages; whoever has clients takes them once per cycle."""
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        """
+        Begin with nothing to say.
+
+        :param now: the controller's clock [s].
+        """
+        self._now = now
+        self.pending: deque[PrimaryMessage] = deque(maxlen=_MAX_LOG_LINES)
+        #: Called with code and argument of each error.
+        self.on_error: Callable[[int, int], None] | None = None
+        #: What programs wrote and what went wrong, as lines for people.
+        self.log: deque[str] = deque(maxlen=_MAX_LOG_LINES)
+
+    def take(self) -> list[PrimaryMessage]:
+        """Return what has been announced since the last time."""
+        messages = list(self.pending)
+        self.pending.clear()
+        return messages
+
+    def note(self, text: str) -> None:
+        """Write to the log only."""
+        self.log.append(text)
+
+    def text(self, text: str) -> None:
+        """Announce a text of a program, or of the controller."""
+        self.log.append(text)
+        self.pending.append(TextMessage(timestamp=self._stamp(), text=_cut(text)))
+
+    def key(self, title: str, text: str) -> None:
+        """Announce an event of a program's life."""
+        self.pending.append(KeyMessage(timestamp=self._stamp(), title=title, text=_cut(text)))
+
+    def exception(self, line: int, column: int, text: str) -> None:
+        """Announce why a program does not start, or ended; line and column from 1."""
+        self.log.append(f'{line}:{column}: {text}')
+        self.pending.append(
+            RuntimeExceptionMessage(
+                timestamp=self._stamp(), line=max(0, line), column=max(0, column), text=_cut(text)
+            )
+        )
+
+    def error(self, code: int, argument: int, text: str) -> None:
+        """Announce an error code; a protective stop, too, is a warning to the controller."""
+        message = ErrorCodeMessage(
+            timestamp=self._stamp(),
+            code=code,
+            argument=argument,
+            level=ReportLevel.WARNING,
+            text=_cut(text),
+        )
+        self.log.append(f'{message.label}: {text}')
+        self.pending.append(message)
+        if self.on_error is not None:
+            self.on_error(code, argument)
+
+    def safety_mode(self, mode: SafetyMode) -> None:
+        """Announce that the safety mode has changed."""
+        self.pending.append(SafetyModeMessage(timestamp=self._stamp(), safety_mode=mode))
+
+    def popup(self, popup: Popup) -> None:
+        """
+        Announce a window.
+
+        Body: u32 request, u8 type of the request, flags warning, error, blocking, u8 length of
+        the title, title, text.
+        """
+        title = popup.title.encode()[:255]
+        flags = bytes([0, popup.warning, popup.error, popup.blocking])
+        self.pending.append(
+            RawMessage(
+                message_type=_POPUP,
+                timestamp=self._stamp(),
+                content=bytes(4)
+                + flags
+                + bytes([len(title)])
+                + title
+                + popup.text.encode()[: _MAX_TEXT_LENGTH - 255],
+            )
+        )
+
+    def _stamp(self) -> int:
+        return round(self._now() * 1e6)
+
+
+def _cut(text: str) -> str:
+    """Return as much of a text as a message can hold."""
+    return (
+        text
+        if len(text) < _MAX_TEXT_LENGTH // 4
+        else text.encode()[:_MAX_TEXT_LENGTH].decode(errors='ignore')
+    )

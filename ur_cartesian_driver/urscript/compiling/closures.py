@@ -1,0 +1,144 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What compiled code is, and what it asks of the machine that runs it.
+
+The code of an expression or statement is a function of the frame (the list of a function's local
+values). What cannot take time is a plain function; what can (a generator builtin, `join`, a call
+of a function that contains one) is a generator function, and only this is reached by
+`yield from`. The code of a statement returns None to go on, or one of the signals below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NoReturn, Protocol
+
+from ur_cartesian_driver.urscript.script_errors import RuntimeException
+from ur_cartesian_driver.urscript.script_values import ThreadHandle, Value
+
+#: Calls of the program's functions inside one another.
+MAX_CALL_DEPTH = 100
+
+StackFrame = list[Any]
+ScriptSteps = Generator[None, None, Value]
+RunFunction = Callable[[StackFrame], Any]
+
+# What a statement says about how to go on.
+BREAK = 'break'
+CONTINUE = 'continue'
+RETURN = 'return'
+
+
+class _Unset:
+    """The value of a variable before its first assignment."""
+
+
+UNSET = _Unset()
+
+
+class ProgramHalted(BaseException):
+    """Unwinds the running thread because the whole program ends; not an error."""
+
+
+class Thread(Protocol):
+    """What compiled code needs of the thread that runs it."""
+
+    depth: int
+    location: tuple[int, int]
+
+
+class Runtime(Protocol):
+    """What compiled code needs of the machine that runs it."""
+
+    fuel: int
+    paused: bool
+    globals: list[Any]
+
+    @property
+    def thread(self) -> Thread:
+        """The thread that is running now."""
+
+    def raise_budget_exceeded(self, line: int, column: int) -> NoReturn:
+        """Raise, because the thread used up its frame without yielding."""
+
+    def spawn(self, procedure: CompiledFunction) -> ThreadHandle:
+        """Start a thread."""
+
+    def alive(self, handle: Value) -> bool:
+        """Tell whether a value is the handle of a thread that has not ended."""
+
+    def kill(self, handle: Value) -> None:
+        """End a thread, if the value is the handle of one."""
+
+
+@dataclass(frozen=True, slots=True)
+class CompiledNode:
+    """A compiled node: how to run it, whether that can take time, and what it costs."""
+
+    run: RunFunction
+    suspends: bool = False
+    weight: int = 1
+
+
+@dataclass(slots=True, kw_only=True)
+class CompiledFunction:
+    """A compiled function or thread; filled after all have been made, as they call each other."""
+
+    name: str
+    suspends: bool
+    template: StackFrame
+    defaults: dict[int, CompiledNode] = field(default_factory=dict)
+    body: CompiledNode = CompiledNode(lambda frame: None)
+
+    def steps(self) -> ScriptSteps:
+        """Run as the whole of a thread."""
+        frame = self.template.copy()
+        if self.body.suspends:
+            yield from self.body.run(frame)
+        else:
+            self.body.run(frame)
+        return None
+
+
+def sequence(
+    parts: Sequence[CompiledNode], finish: Callable[[StackFrame, list[Value]], Value]
+) -> CompiledNode:
+    """Evaluate parts from left to right, then combine their values."""
+    runs = [part.run for part in parts]
+
+    def plain(frame: StackFrame) -> Value:
+        return finish(frame, [run(frame) for run in runs])
+
+    def plain_one(frame: StackFrame) -> Value:
+        return finish(frame, [first(frame)])
+
+    def plain_two(frame: StackFrame) -> Value:
+        return finish(frame, [first(frame), second(frame)])
+
+    def steps(frame: StackFrame) -> ScriptSteps:
+        found = []
+        for part in parts:
+            value = (yield from part.run(frame)) if part.suspends else part.run(frame)
+            found.append(value)
+        return finish(frame, found)
+
+    first, second = (*runs, plain, plain)[:2]
+    chosen = {1: plain_one, 2: plain_two}.get(len(runs), plain)
+    return choose_runner(chosen, steps, parts)
+
+
+def choose_runner(
+    plain: RunFunction, steps: RunFunction, parts: Sequence[CompiledNode]
+) -> CompiledNode:
+    """Choose the generator if one of the parts is one."""
+    suspends = any(part.suspends for part in parts)
+    return CompiledNode(
+        steps if suspends else plain, suspends, 1 + sum(part.weight for part in parts)
+    )
+
+
+def recursion_error(line: int, column: int) -> RuntimeException:
+    """Return the error for a recursion without an end."""
+    return RuntimeException('Function calls are nested too deeply.', line, column)

@@ -1,0 +1,242 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+What each name means, decided before anything runs.
+
+The rules: what the body of the program assigns is global, however it is marked. In a function or
+thread `local x = ...` makes x a local of the whole function, `global x = ...` makes a global of
+the program, and a bare assignment writes the global of that name if the program has one anywhere
+and makes a local otherwise. A function does not see the locals of the function around it; what it
+does see are the functions around it, wherever in the text they are defined. If a name is defined
+twice in one place the later definition holds, since exported programs include a file twice.
+
+The same walk finds unknown names, calls that do not fit, and which functions can take time: only
+those need a Python generator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+import inspect
+from typing import Any
+
+from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
+from ur_cartesian_driver.urscript.script_errors import CompileError, name_not_found
+
+Builtin = Callable[..., Any]
+
+#: Slot 0 of a frame holds the return value.
+FIRST_LOCAL = 1
+
+
+@dataclass(slots=True, kw_only=True)
+class Scope:
+    """The names of one function, or (without a parent) of the program's body."""
+
+    parent: Scope | None
+    owner: tree.FunctionDefinition | tree.ScriptProgram
+    globals: dict[str, int]
+    locals: dict[str, int] = field(default_factory=dict)
+    functions: dict[str, Scope] = field(default_factory=dict)
+    #: Functions called from here, and whether something here takes time by itself.
+    calls: list[Scope] = field(default_factory=list)
+    suspends: bool = False
+
+    @property
+    def definition(self) -> tree.FunctionDefinition | None:
+        """The function or thread; None for the body of the program."""
+        return self.owner if isinstance(self.owner, tree.FunctionDefinition) else None
+
+    @property
+    def body(self) -> tree.StatementBlock:
+        """The statements."""
+        return self.owner.body
+
+    def function(self, name: str) -> Scope | None:
+        """Find a function or thread of the program by name."""
+        scope: Scope | None = self
+        while scope is not None:
+            if name in scope.functions:
+                return scope.functions[name]
+            scope = scope.parent
+        return None
+
+    def walk(self) -> Iterator[Scope]:
+        """Yield this scope and all within it."""
+        yield self
+        for inner in self.functions.values():
+            yield from inner.walk()
+
+
+def resolve(
+    program: tree.ScriptProgram, builtins: Mapping[str, Builtin], enclosing: Scope | None = None
+) -> Scope:
+    """
+    Check a program and return the scope of its body.
+
+    :param around: of a program that this one is a later part of; it stays as it is.
+    :raises CompileError: an unknown name or a call that does not fit, the first in the text.
+    """
+    root = Scope(
+        parent=enclosing, owner=program, globals=dict(enclosing.globals) if enclosing else {}
+    )
+    _declare(root)
+    for scope in root.walk():
+        _assign_locals(scope)
+    _NameChecker(builtins).block(root, program.body)
+    _propagate_suspension(list(root.walk()))
+    return root
+
+
+def _own_nodes(nodes: Iterable[tree.SyntaxNode]) -> Iterator[tree.SyntaxNode]:
+    """Yield all nodes below, without entering function definitions."""
+    for node in nodes:
+        yield node
+        if not isinstance(node, tree.FunctionDefinition):
+            yield from _own_nodes(tree.children(node))
+
+
+def _declare(scope: Scope) -> None:
+    """Collect functions and globals of a scope and of all within it."""
+    for node in _own_nodes(scope.body):
+        if isinstance(node, tree.FunctionDefinition):
+            inner = Scope(parent=scope, owner=node, globals=scope.globals)
+            scope.functions[node.name] = inner
+            _declare(inner)
+        elif isinstance(node, tree.AssignStatement) and isinstance(
+            node.target, tree.NameExpression
+        ):
+            _declare_global(scope, node, node.target.identifier)
+
+
+def _declare_global(scope: Scope, node: tree.AssignStatement, name: str) -> None:
+    if scope.definition is None or node.qualifier == 'global':
+        scope.globals.setdefault(name, len(scope.globals))
+
+
+def _assign_locals(scope: Scope) -> None:
+    """Give a slot to each parameter and each local variable."""
+    if scope.definition is None:
+        return
+    names = [parameter.name for parameter in scope.definition.parameters]
+    for node in _own_nodes(scope.body):
+        if isinstance(node, tree.AssignStatement) and isinstance(node.target, tree.NameExpression):
+            name = node.target.identifier
+            if node.qualifier == 'local' or (not node.qualifier and name not in scope.globals):
+                names.append(name)
+    for name in names:
+        scope.locals.setdefault(name, len(scope.locals) + FIRST_LOCAL)
+
+
+def _propagate_suspension(scopes: list[Scope]) -> None:
+    """Mark every function that calls one that takes time."""
+    changed = True
+    while changed:
+        changed = False
+        for scope in scopes:
+            if not scope.suspends and any(callee.suspends for callee in scope.calls):
+                scope.suspends = changed = True
+
+
+def _signature(function: Builtin) -> inspect.Signature | None:
+    try:
+        return inspect.signature(function)
+    except (TypeError, ValueError):
+        return None
+
+
+def bind(
+    definition: tree.FunctionDefinition, call: tree.CallExpression
+) -> dict[str, tree.CallArgument]:
+    """
+    Match the arguments of a call with the parameters of a function of the program.
+
+    :raises CompileError: too many, unknown, doubled or missing arguments.
+    """
+    parameters = [parameter.name for parameter in definition.parameters]
+    bound: dict[str, tree.CallArgument] = {}
+    for number, argument in enumerate(call.arguments):
+        if argument.name is None and number >= len(parameters):
+            raise call_error(call, f'it takes at most {len(parameters)} arguments')
+        name = argument.name or parameters[number]
+        if name not in parameters:
+            raise call_error(call, f'it has no parameter {name!r}')
+        if name in bound:
+            raise call_error(call, f'the argument {name!r} is given twice')
+        bound[name] = argument
+    for parameter in definition.parameters:
+        if parameter.default is None and parameter.name not in bound:
+            raise call_error(call, f'the argument {parameter.name!r} is missing')
+    return bound
+
+
+class _NameChecker:
+    """Walks the program in the order of the text."""
+
+    def __init__(self, builtins: Mapping[str, Builtin]) -> None:
+        self._builtins = builtins
+
+    def block(self, scope: Scope, nodes: Iterable[tree.SyntaxNode]) -> None:
+        """Check nodes and everything below them."""
+        for node in nodes:
+            if isinstance(node, tree.FunctionDefinition):
+                self._function(scope, node)
+                continue
+            if isinstance(node, tree.NameExpression):
+                if node.identifier not in scope.locals and node.identifier not in scope.globals:
+                    raise name_not_found(node.identifier, node.line, node.column)
+            elif isinstance(node, tree.CallExpression):
+                self._call(scope, node)
+            elif isinstance(node, tree.RunExpression):
+                self._run(scope, node)
+            elif isinstance(
+                node, tree.JoinStatement | tree.PauseStatement | tree.MethodCallExpression
+            ):
+                scope.suspends = True
+            self.block(scope, tree.children(node))
+
+    def _function(self, scope: Scope, definition: tree.FunctionDefinition) -> None:
+        inner = scope.functions[definition.name]
+        if inner.definition is not definition:  # replaced by a later one of the same name
+            return
+        self.block(inner, definition.parameters)
+        self.block(inner, definition.body)
+
+    def _call(self, scope: Scope, call: tree.CallExpression) -> None:
+        callee = scope.function(call.function)
+        if callee is not None and callee.definition is not None:
+            if callee.definition.kind == 'thread':
+                raise call_error(call, 'a thread is started by run')
+            scope.calls.append(callee)
+            bind(callee.definition, call)
+        elif call.function in self._builtins:
+            if inspect.isgeneratorfunction(self._builtins[call.function]):
+                scope.suspends = True
+            if signature := _signature(self._builtins[call.function]):
+                _check_arguments(call, signature)
+        else:
+            raise name_not_found(call.function, call.line, call.column)
+
+    @staticmethod
+    def _run(scope: Scope, run: tree.RunExpression) -> None:
+        callee = scope.function(run.thread)
+        if callee is None or callee.definition is None or callee.definition.kind != 'thread':
+            raise name_not_found(run.thread, run.line, run.column)
+
+
+def _check_arguments(call: tree.CallExpression, signature: inspect.Signature) -> None:
+    positional = [argument for argument in call.arguments if argument.name is None]
+    named = [argument.name for argument in call.arguments if argument.name is not None]
+    if len(set(named)) != len(named):
+        raise call_error(call, 'an argument is named twice')
+    try:
+        signature.bind(*positional, **dict.fromkeys(named))
+    except TypeError as error:
+        raise call_error(call, str(error)) from None
+
+
+def call_error(call: tree.CallExpression, reason: str) -> CompileError:
+    """Return the error for a call whose arguments do not fit the function."""
+    text = f'compile_error_wrong_arguments:{call.function}:'
+    return CompileError(call.line, call.column, text, reason)

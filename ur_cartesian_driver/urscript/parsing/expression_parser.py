@@ -1,0 +1,189 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The rules of expressions, one method each, loosest binding first.
+
+The grammar stands at the head of :mod:`~ur_cartesian_driver.urscript.parsing.parser`.
+"""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
+from ur_cartesian_driver.urscript.parsing.scanner import TokenKind
+from ur_cartesian_driver.urscript.parsing.token_reader import (
+    MAX_CHAIN,
+    source_position,
+    SourcePosition,
+    TokenReader,
+)
+
+CONSTANTS = {'True': True, 'true': True, 'False': False, 'false': False, 'None': None}
+
+
+class ExpressionParser(TokenReader):
+    """Reads expressions."""
+
+    def _expression(self) -> tree.Expression:
+        """Read conjunction { ( "or" | "xor" ) conjunction }."""
+        left = self._conjunction()
+        for token in self._operators('or', 'xor'):
+            right = self._conjunction()
+            left = tree.LogicalExpression(
+                operator=token.text, left=left, right=right, **source_position(token)
+            )
+        return left
+
+    def _conjunction(self) -> tree.Expression:
+        """Read inversion { "and" inversion }."""
+        left = self._inversion()
+        for token in self._operators('and'):
+            right = self._inversion()
+            left = tree.LogicalExpression(
+                operator=token.text, left=left, right=right, **source_position(token)
+            )
+        return left
+
+    def _inversion(self) -> tree.Expression:
+        """Read "not" inversion | comparison."""
+        if token := self._match('not'):
+            with self._nested():
+                operand = self._inversion()
+            return tree.UnaryExpression(operator='not', operand=operand, **source_position(token))
+        return self._comparison()
+
+    def _comparison(self) -> tree.Expression:
+        """Read sum { ( "==" | "!=" | "<" | "<=" | ">" | ">=" ) sum }."""
+        left = self._sum()
+        for token in self._operators('==', '!=', '<', '<=', '>', '>='):
+            right = self._sum()
+            left = tree.BinaryExpression(
+                operator=token.text, left=left, right=right, **source_position(token)
+            )
+        return left
+
+    def _sum(self) -> tree.Expression:
+        """Read product { ( "+" | "-" ) product }."""
+        left = self._product()
+        for token in self._operators('+', '-'):
+            right = self._product()
+            left = tree.BinaryExpression(
+                operator=token.text, left=left, right=right, **source_position(token)
+            )
+        return left
+
+    def _product(self) -> tree.Expression:
+        """Read unary { ( "*" | "/" | "%" ) unary }."""
+        left = self._unary()
+        for token in self._operators('*', '/', '%'):
+            right = self._unary()
+            left = tree.BinaryExpression(
+                operator=token.text, left=left, right=right, **source_position(token)
+            )
+        return left
+
+    def _unary(self) -> tree.Expression:
+        """Read ("-" | "+") unary | "run" NAME "(" ")" | postfix."""
+        if token := self._match('-', '+'):
+            with self._nested():
+                operand = self._unary()
+            return tree.UnaryExpression(
+                operator=token.text, operand=operand, **source_position(token)
+            )
+        if self._match('run'):
+            name = self._expect_kind(TokenKind.NAME)
+            self._expect('(')
+            self._expect(')')
+            return tree.RunExpression(thread=name.text, **source_position(name))
+        return self._postfix()
+
+    def _postfix(self) -> tree.Expression:
+        """Read primary { "(" arguments ")" | "[" indices "]" | "." NAME }."""
+        value = self._primary()
+        for _ in range(MAX_CHAIN):
+            if self._at('.'):
+                value = self._field(value)
+            elif self._at('(') and isinstance(value, tree.NameExpression | tree.FieldExpression):
+                value = self._call(value)
+            elif self._at('['):
+                value = self._index(value)
+            else:
+                return value
+        raise self.error(f'more than {MAX_CHAIN} calls, indices or fields in a row')
+
+    def _field(self, target: tree.Expression) -> tree.FieldExpression:
+        """Read "." NAME, where a keyword is a name too."""
+        self._advance()
+        name = self._token
+        if name.kind not in (TokenKind.NAME, TokenKind.KEYWORD):
+            raise self.error(f'a name is missing before {self._found()}')
+        self._advance()
+        return tree.FieldExpression(target=target, name=name.text, **source_position(name))
+
+    def _call(
+        self, callee: tree.NameExpression | tree.FieldExpression
+    ) -> tree.CallExpression | tree.MethodCallExpression:
+        """Read "(" [ argument { "," argument } ] ")", positional arguments first."""
+        position = SourcePosition(line=callee.line, column=callee.column)
+        self._advance()
+        arguments = self._list(self._argument, ')')
+        named = [argument for argument in arguments if argument.name is not None]
+        if any(argument.name is None for argument in arguments[len(arguments) - len(named) :]):
+            raise self.error('a positional argument stands after a named one', self._previous)
+        if isinstance(callee, tree.NameExpression):
+            return tree.CallExpression(function=callee.identifier, arguments=arguments, **position)
+        return tree.MethodCallExpression(
+            target=callee.target, method=callee.name, arguments=arguments, **position
+        )
+
+    def _argument(self) -> tree.CallArgument:
+        """Read [ NAME "=" ] expression."""
+        start = self._token
+        following = self._tokens[min(self._next + 1, len(self._tokens) - 1)]
+        name = None
+        if (
+            start.kind is TokenKind.NAME
+            and following.kind is TokenKind.SYMBOL
+            and following.text == '='
+        ):
+            name = start.text
+            self._advance()
+            self._advance()
+        return tree.CallArgument(name=name, value=self._expression(), **source_position(start))
+
+    def _index(self, target: tree.Expression) -> tree.Expression:
+        """Read "[" expression [ "," expression ] "]"; six after the name p are a pose."""
+        start = self._advance()
+        items = self._list(self._expression, ']')
+        if (
+            isinstance(target, tree.NameExpression)
+            and target.identifier == 'p'
+            and len(items) == 6
+        ):
+            return tree.PoseLiteral(items=items, line=target.line, column=target.column)
+        if len(items) not in (1, 2):
+            raise self.error('an index has one or two parts, a pose p[...] has six', start)
+        return tree.IndexExpression(target=target, indices=items, **source_position(start))
+
+    def _primary(self) -> tree.Expression:
+        """Read NUMBER | STRING | constant | NAME | "(" expression ")" | "[" items "]"."""
+        token = self._token
+        if token.kind is TokenKind.NUMBER:
+            return tree.ConstantExpression(value=self._advance().number, **source_position(token))
+        if token.kind is TokenKind.STRING:
+            return tree.ConstantExpression(value=self._advance().text, **source_position(token))
+        if token.kind is TokenKind.NAME:
+            return tree.NameExpression(identifier=self._advance().text, **source_position(token))
+        if self._at(*CONSTANTS):
+            return tree.ConstantExpression(
+                value=CONSTANTS[self._advance().text], **source_position(token)
+            )
+        if self._match('['):
+            return tree.ListLiteral(
+                items=self._list(self._expression, ']'), **source_position(token)
+            )
+        if self._match('('):
+            items = self._list(self._expression, ')')
+            if len(items) != 1:
+                raise self.error('brackets hold one expression', token)
+            return items[0]
+        raise self.error(f'a value is missing before {self._found()}')

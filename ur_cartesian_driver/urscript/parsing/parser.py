@@ -1,0 +1,336 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Tokens to syntax tree: recursive descent, one method per rule.
+
+Programs and statements are read here, expressions in
+:mod:`~ur_cartesian_driver.urscript.parsing.expression_parser`.
+
+The language is free of lines: a statement ends where its expression cannot go on, so
+`a = 1 b = 2` are two statements and an operator at the end of a line continues it. Lines matter
+in two places only: the value of `return` stands on its line, and so do the texts of a label.
+
+    program     = ("def" | "sec") NAME "(" ")" ":" block "end"
+    block       = { statement }
+    statement   = function | if | switch | while | "break" | "continue" | return | "halt" | "pause"
+                | "enter_critical" | "exit_critical" | "join" unary | "kill" unary
+                | label | assignment | call
+    function    = ("def" | "thread") NAME "(" [ parameter { "," parameter } ] ")" ":" block "end"
+    parameter   = NAME [ "=" expression ]
+    if          = "if" expression ":" block { "elif" expression ":" block }
+                  [ "else" ":" block ] "end"
+    switch      = "switch" expression ":" { "case" expression ":" block [ "end" ] }
+                  [ "default" ":" block [ "end" ] ] "end"
+    while       = "while" expression ":" block "end"
+    return      = "return" [ expression ]
+    label       = "$" NUMBER STRING { STRING }
+    assignment  = [ "global" | "local" ] target "=" expression
+    target      = NAME { "[" expression [ "," expression ] "]" | "." NAME }
+    call        = postfix that ends in a call | "run" NAME "(" ")"
+    expression  = conjunction { ( "or" | "xor" ) conjunction }
+    conjunction = inversion { "and" inversion }
+    inversion   = "not" inversion | comparison
+    comparison  = sum { ( "==" | "!=" | "<" | "<=" | ">" | ">=" ) sum }
+    sum         = product { ( "+" | "-" ) product }
+    product     = unary { ( "*" | "/" | "%" ) unary }
+    unary       = ( "-" | "+" ) unary | "run" NAME "(" ")" | postfix
+    postfix     = primary { "(" arguments ")" | "[" expression [ "," expression ] "]" | "." NAME }
+    arguments   = [ argument { "," argument } ]
+    argument    = [ NAME "=" ] expression
+    primary     = NUMBER | STRING | "True" | "False" | "None" | NAME | "(" expression ")"
+                | "[" [ expression { "," expression } ] "]"
+                | "p" "[" expression { "," expression } "]"
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
+from ur_cartesian_driver.urscript.parsing.expression_parser import CONSTANTS, ExpressionParser
+from ur_cartesian_driver.urscript.parsing.scanner import Token, TokenKind
+from ur_cartesian_driver.urscript.parsing.token_reader import source_position
+
+
+def parse(text: str) -> tree.ScriptProgram:
+    """
+    Parse one program, with any blank lines and comments around it.
+
+    :raises CompileError: at the first token that fits no rule.
+    """
+    parser = Parser(text)
+    try:
+        return parser.program()
+    except RecursionError:
+        raise parser.error('the program is nested too deeply') from None
+
+
+def parse_line(text: str) -> tree.ScriptProgram:
+    """
+    Parse statements that belong to a program that runs already, as if they were one.
+
+    :raises CompileError: at the first token that fits no rule.
+    """
+    parser = Parser(text)
+    try:
+        return parser.line()
+    except RecursionError:
+        raise parser.error('the statement is nested too deeply') from None
+
+
+class Parser(ExpressionParser):
+    """Reads programs and statements."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._loops = 0
+
+    # Programs, functions and blocks
+
+    def program(self) -> tree.ScriptProgram:
+        """Read ("def" | "sec") NAME "(" ")" ":" block "end"."""
+        start = self._token
+        kind: Literal['def', 'sec']
+        if self._match('def'):
+            kind = 'def'
+        elif start.kind is TokenKind.NAME and start.text == 'sec':
+            self._advance()
+            kind = 'sec'
+        else:
+            raise self.error("a program begins with 'def' or 'sec'")
+        name = self._expect_kind(TokenKind.NAME).text
+        for symbol in '():':
+            self._expect(symbol)
+        body = self._block('end')
+        self._expect('end')
+        if self._token.kind is not TokenKind.END:
+            raise self.error('there is text after the end of the program')
+        return tree.ScriptProgram(name=name, kind=kind, body=body, **source_position(start))
+
+    def line(self) -> tree.ScriptProgram:
+        """Read { statement }, up to the end of the text."""
+        start = self._token
+        statements: list[tree.Statement] = []
+        while self._token.kind is not TokenKind.END:
+            statements.append(self._statement())
+        return tree.ScriptProgram(
+            name='line', kind='def', body=tuple(statements), **source_position(start)
+        )
+
+    def _block(self, *closing: str) -> tree.StatementBlock:
+        """Read { statement }, up to one of the keywords that close it."""
+        statements: list[tree.Statement] = []
+        with self._nested():
+            while not self._at(*closing):
+                if self._token.kind is TokenKind.END:
+                    raise self.error("an 'end' is missing")
+                statements.append(self._statement())
+        return tuple(statements)
+
+    def _function(self) -> tree.FunctionDefinition:
+        """Read ("def" | "thread") NAME "(" [ parameter { "," parameter } ] ")" ":" block "end"."""
+        kind: Literal['def', 'thread'] = 'def' if self._advance().text == 'def' else 'thread'
+        name = self._expect_kind(TokenKind.NAME)
+        self._expect('(')
+        parameters = self._list(self._parameter, ')')
+        if len({parameter.name for parameter in parameters}) < len(parameters):
+            raise self.error('two parameters have the same name', name)
+        if kind == 'thread' and parameters:
+            raise self.error('a thread takes no parameters', name)
+        self._expect(':')
+        loops, self._loops = self._loops, 0
+        body = self._block('end')
+        self._loops = loops
+        self._expect('end')
+        return tree.FunctionDefinition(
+            name=name.text, kind=kind, parameters=parameters, body=body, **source_position(name)
+        )
+
+    def _parameter(self) -> tree.FunctionParameter:
+        """Read NAME [ "=" expression ]."""
+        name = self._expect_kind(TokenKind.NAME)
+        default = self._expression() if self._match('=') else None
+        return tree.FunctionParameter(name=name.text, default=default, **source_position(name))
+
+    # Statements
+
+    def _statement(self) -> tree.Statement:
+        """Read the statement that the first token announces."""
+        token = self._token
+        rule = {
+            'def': self._function, 'thread': self._function, 'if': self._if,
+            'switch': self._switch, 'while': self._while, 'return': self._return,
+            'break': self._jump, 'continue': self._jump, 'halt': self._word,
+            'pause': self._word, 'enter_critical': self._word, 'exit_critical': self._word,
+            'join': self._thread_control, 'kill': self._thread_control, '$': self._label,
+        }.get(token.text)  # fmt: skip
+        if rule and token.kind in (TokenKind.KEYWORD, TokenKind.SYMBOL):
+            return rule()
+        return self._assignment_or_call()
+
+    def _if(self) -> tree.IfStatement:
+        """Read "if" expression ":" block { "elif" ... } [ "else" ":" block ] "end"."""
+        start = self._token
+        branches: list[tree.ConditionalBlock] = []
+        while keyword := self._match('if') if not branches else self._match('elif'):
+            condition = self._expression()
+            self._expect(':')
+            body = self._block('elif', 'else', 'end')
+            branches.append(
+                tree.ConditionalBlock(condition=condition, body=body, **source_position(keyword))
+            )
+        otherwise = self._else('else') if self._at('else') else ()
+        self._expect('end')
+        return tree.IfStatement(
+            branches=tuple(branches), otherwise=otherwise, **source_position(start)
+        )
+
+    def _else(self, keyword: str) -> tree.StatementBlock:
+        """Read ("else" | "default") ":" block."""
+        self._expect(keyword)
+        self._expect(':')
+        return self._block('end')
+
+    def _switch(self) -> tree.SwitchStatement:
+        """Read "switch" expression ":" { "case" ... } [ "default" ... ] "end"."""
+        start = self._advance()
+        subject = self._expression()
+        self._expect(':')
+        cases: list[tree.ConditionalBlock] = []
+        ends: bool | None = None
+        while keyword := self._match('case'):
+            value = self._expression()
+            self._expect(':')
+            body = self._block('case', 'default', 'end')
+            cases.append(
+                tree.ConditionalBlock(condition=value, body=body, **source_position(keyword))
+            )
+            ends = self._case_has_end(start) if ends is None else ends
+            if ends:
+                self._expect('end')
+        otherwise: tree.StatementBlock = ()
+        if self._at('default'):
+            otherwise = self._else('default')
+            if self._case_has_end(start) if ends is None else ends:
+                self._expect('end')
+        self._expect('end')
+        return tree.SwitchStatement(
+            subject=subject, cases=tuple(cases), otherwise=otherwise, **source_position(start)
+        )
+
+    def _case_has_end(self, switch: Token) -> bool:
+        """
+        Tell from the end of the first case whether cases have an `end` of their own.
+
+        Both styles occur. An `end` before another `end` could be either; then it belongs to the
+        switch if it stands in the column of the switch.
+        """
+        if not self._at('end'):
+            return False
+        following = self._tokens[self._next + 1]
+        if following.kind is not TokenKind.KEYWORD or following.text not in (
+            'case',
+            'default',
+            'end',
+        ):
+            return False
+        return following.text != 'end' or self._token.column != switch.column
+
+    def _while(self) -> tree.WhileStatement:
+        """Read "while" expression ":" block "end"."""
+        start = self._advance()
+        condition = self._expression()
+        self._expect(':')
+        self._loops += 1
+        body = self._block('end')
+        self._loops -= 1
+        self._expect('end')
+        return tree.WhileStatement(condition=condition, body=body, **source_position(start))
+
+    def _return(self) -> tree.ReturnStatement:
+        """Read "return" [ expression ]; a value stands on the line of the keyword."""
+        start = self._advance()
+        value = self._expression() if self._same_line() and self._starts_expression() else None
+        return tree.ReturnStatement(value=value, **source_position(start))
+
+    def _starts_expression(self) -> bool:
+        if self._token.kind in (TokenKind.KEYWORD, TokenKind.SYMBOL):
+            return self._at('(', '[', '-', '+', 'not', 'run', *CONSTANTS)
+        return self._token.kind is not TokenKind.END
+
+    def _jump(self) -> tree.Statement:
+        """Read "break" | "continue", inside a loop."""
+        token = self._advance()
+        if not self._loops:
+            raise self.error(f'{token.text!r} stands outside a loop', token)
+        return (tree.BreakStatement if token.text == 'break' else tree.ContinueStatement)(
+            **source_position(token)
+        )
+
+    def _word(self) -> tree.Statement:
+        """Read "halt" | "pause" | "enter_critical" | "exit_critical"."""
+        token = self._advance()
+        if token.text == 'halt':
+            return tree.HaltStatement(**source_position(token))
+        if token.text == 'pause':
+            return tree.PauseStatement(**source_position(token))
+        return tree.CriticalStatement(
+            enter=token.text == 'enter_critical', **source_position(token)
+        )
+
+    def _thread_control(self) -> tree.Statement:
+        """Read ("join" | "kill") unary."""
+        token = self._advance()
+        handle = self._unary()
+        return (tree.JoinStatement if token.text == 'join' else tree.KillStatement)(
+            handle=handle, **source_position(token)
+        )
+
+    def _label(self) -> tree.LabelStatement:
+        """Read "$" NUMBER STRING { STRING }, on one line."""
+        start = self._advance()
+        number = self._expect_kind(TokenKind.NUMBER)
+        text = self._expect_kind(TokenKind.STRING).text
+        while self._token.kind is TokenKind.STRING and self._same_line():
+            self._advance()
+        return tree.LabelStatement(number=int(number.number), text=text, **source_position(start))
+
+    def _assignment_or_call(self) -> tree.Statement:
+        """Read [ "global" | "local" ] target "=" expression | call."""
+        start = self._token
+        qualifier: Literal['', 'global', 'local'] = ''
+        if self._match('global'):
+            qualifier = 'global'
+        elif self._match('local'):
+            qualifier = 'local'
+        target = self._unary()
+        if qualifier and not isinstance(target, tree.NameExpression):
+            raise self.error(f'{qualifier!r} is followed by a name and a value', start)
+        if self._at('='):
+            return self._assignment(target, qualifier, start)
+        if qualifier:
+            raise self.error(f"'=' is missing before {self._found()}")
+        if not isinstance(
+            target, tree.CallExpression | tree.MethodCallExpression | tree.RunExpression
+        ):
+            at = self._token if self._same_line() else start
+            raise self.error('a statement is an assignment or a call', at)
+        return tree.CallStatement(call=target, **source_position(start))
+
+    def _assignment(
+        self, target: tree.Expression, qualifier: Literal['', 'global', 'local'], start: Token
+    ) -> tree.AssignStatement:
+        """Read the value; what stands before "=" must be a name or a place inside one."""
+        base: tree.Expression = target
+        while isinstance(base, tree.IndexExpression | tree.FieldExpression):
+            base = base.target
+        if not isinstance(base, tree.NameExpression):
+            raise self.error('only a variable or a part of one can be assigned to', start)
+        self._expect('=')
+        value = self._expression()
+        assert isinstance(
+            target, tree.NameExpression | tree.IndexExpression | tree.FieldExpression
+        )
+        return tree.AssignStatement(
+            target=target, value=value, qualifier=qualifier, **source_position(start)
+        )

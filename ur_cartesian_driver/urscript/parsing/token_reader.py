@@ -1,0 +1,117 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Reading tokens from left to right: what all rules of the grammar are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TypedDict, TypeVar
+
+from ur_cartesian_driver.urscript.parsing.scanner import scan, syntax_error, Token, TokenKind
+from ur_cartesian_driver.urscript.script_errors import CompileError
+
+#: Blocks, brackets and signs inside one another.
+MAX_NESTING = 50
+#: Operators of one precedence in a row; each makes the tree one node deeper.
+MAX_CHAIN = 100
+
+T = TypeVar('T')
+
+
+class SourcePosition(TypedDict):
+    """The position arguments of a node."""
+
+    line: int
+    column: int
+
+
+def source_position(token: Token) -> SourcePosition:
+    """Return the position of a token as arguments of a node."""
+    return SourcePosition(line=token.line, column=token.column)
+
+
+class TokenReader:
+    """The tokens of one text, and the place of the next one."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        self._tokens = scan(text)
+        self._next = 0
+        self._nesting = 0
+
+    @property
+    def _token(self) -> Token:
+        return self._tokens[self._next]
+
+    @property
+    def _previous(self) -> Token:
+        return self._tokens[self._next - 1]
+
+    def _advance(self) -> Token:
+        token = self._token
+        if token.kind is not TokenKind.END:
+            self._next += 1
+        return token
+
+    def _at(self, *texts: str) -> bool:
+        """Tell whether the next token is one of these keywords or symbols."""
+        return (
+            self._token.kind in (TokenKind.KEYWORD, TokenKind.SYMBOL) and self._token.text in texts
+        )
+
+    def _match(self, *texts: str) -> Token | None:
+        return self._advance() if self._at(*texts) else None
+
+    def _expect(self, text: str) -> Token:
+        if not self._at(text):
+            raise self.error(f'{text!r} is missing before {self._found()}')
+        return self._advance()
+
+    def _expect_kind(self, kind: TokenKind) -> Token:
+        if self._token.kind is not kind:
+            raise self.error(f'a {kind.value} is missing before {self._found()}')
+        return self._advance()
+
+    def _found(self) -> str:
+        token = self._token
+        return token.kind.value if token.kind is TokenKind.END else repr(token.text)
+
+    def _same_line(self) -> bool:
+        """Tell whether the next token stands on the line of the one before it."""
+        return self._token.line == self._previous.line
+
+    def error(self, reason: str, token: Token | None = None) -> CompileError:
+        """Return a syntax error at a token, by default the next one."""
+        at = token or self._token
+        return syntax_error(self._text, at.line, at.column, reason)
+
+    @contextmanager
+    def _nested(self) -> Iterator[None]:
+        """Bound the depth of what is inside something else."""
+        self._nesting += 1
+        if self._nesting > MAX_NESTING:
+            raise self.error(f'more than {MAX_NESTING} levels inside one another')
+        yield
+        self._nesting -= 1
+
+    def _list(self, item: Callable[[], T], close: str) -> tuple[T, ...]:
+        """Read `item { "," item }` up to the closing bracket; nothing at all is fine too."""
+        items: list[T] = []
+        with self._nested():
+            if not self._at(close):
+                items.append(item())
+                while self._match(','):
+                    items.append(item())
+        self._expect(close)
+        return tuple(items)
+
+    def _operators(self, *texts: str) -> Iterator[Token]:
+        """Yield the operators of one chain, which is bounded as it makes a tree as deep."""
+        for _ in range(MAX_CHAIN):
+            token = self._match(*texts)
+            if token is None:
+                return
+            yield token
+        if self._at(*texts):
+            raise self.error(f'more than {MAX_CHAIN} operators in a row')

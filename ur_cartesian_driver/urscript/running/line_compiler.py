@@ -1,0 +1,90 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Lines that a running program is given one by one, as in interpreter mode.
+
+A line is any number of statements, or definitions of functions. It sees the program's global
+variables and functions and those of the lines before it. A variable that it assigns and that the
+program does not have belongs to the lines; it and their functions can be forgotten, all at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ur_cartesian_driver.urscript.compiling.closures import (
+    CompiledFunction,
+    Runtime,
+    ScriptSteps,
+    UNSET,
+)
+from ur_cartesian_driver.urscript.compiling.compiler import compile_program
+from ur_cartesian_driver.urscript.compiling.scopes import Builtin, resolve, Scope
+from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
+from ur_cartesian_driver.urscript.parsing.parser import parse_line
+from ur_cartesian_driver.urscript.script_errors import CompileError
+
+
+@dataclass(frozen=True, slots=True)
+class CompiledLine:
+    """A line that can be run in a thread of the program, once."""
+
+    steps: ScriptSteps
+    #: Names of the functions that it calls by itself, not within a function that it defines.
+    calls: frozenset[str]
+
+
+class LineCompiler:
+    """Compiles the lines of one program and knows what they have made."""
+
+    def __init__(
+        self,
+        program: Scope,
+        procedures: dict[int, CompiledFunction],
+        builtins: Mapping[str, Builtin],
+        runtime: Runtime,
+    ) -> None:
+        """
+        Begin without lines.
+
+        :param program: the scope of the program's body.
+        :param procedures: the program's compiled functions, by the identity of their scopes.
+        """
+        self._program = program
+        self._of_program = procedures
+        self._builtins = builtins
+        self._runtime = runtime
+        self._slots = len(runtime.globals)
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget the variables and functions of all lines."""
+        self._scope = Scope(
+            parent=self._program, owner=self._program.owner, globals=dict(self._program.globals)
+        )
+        self._procedures = dict(self._of_program)
+        del self._runtime.globals[self._slots :]
+
+    def compile(self, text: str) -> CompiledLine:
+        """
+        Compile a line; nothing of it has run, but its functions are known from now on.
+
+        :raises CompileError: it is no line, or names something unknown.
+        """
+        program = parse_line(text)
+        try:
+            scope = resolve(program, self._builtins, enclosing=self._scope)
+            procedure = compile_program(scope, self._builtins, self._runtime, self._procedures)
+        except RecursionError:
+            raise CompileError(1, 1, 'syntax_error_on_line:1:', 'nested too deeply') from None
+        self._scope.globals = scope.globals
+        self._scope.functions.update(scope.functions)
+        variables = self._runtime.globals
+        variables.extend([UNSET] * (len(scope.globals) - len(variables)))
+        calls = frozenset(
+            node.call.function
+            for node in program.body
+            if isinstance(node, tree.CallStatement) and isinstance(node.call, tree.CallExpression)
+        )
+        return CompiledLine(procedure.steps(), calls)

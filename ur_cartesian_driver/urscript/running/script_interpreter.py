@@ -1,0 +1,251 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The machine that runs one program, a controller frame at a time.
+
+Threads are cooperative. In each frame every live thread runs, in the order in which they were
+started, until it takes time: calls something that yields, waits in `join`, or ends. A thread that
+is started runs in the same frame, after those before it. Nothing else switches threads, which is
+what gives critical sections their meaning: their statements cannot be interleaved, and a thread
+that takes time inside one lets the others run. A killed thread holds nothing that must be given
+back. A thread that evaluates more than the budget in one frame ends the program.
+
+The program ends when its main thread ends, and then all other threads end. A thread that ends by
+itself leaves the threads that it started running; one that is killed takes them along.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+from ur_cartesian_driver.urscript.compiling.closures import (
+    CompiledFunction,
+    ProgramHalted,
+    recursion_error,
+    ScriptSteps,
+    UNSET,
+)
+from ur_cartesian_driver.urscript.compiling.compiler import compile_program
+from ur_cartesian_driver.urscript.compiling.scopes import Builtin, resolve
+from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
+from ur_cartesian_driver.urscript.running.line_compiler import LineCompiler
+from ur_cartesian_driver.urscript.script_errors import CompileError, RuntimeException
+from ur_cartesian_driver.urscript.script_values import ThreadHandle, Value
+
+BUDGET_EXCEEDED = (
+    'The program used too much time without instructing the robot what to do. '
+    'Consider using a Wait or sync() in the loop.'
+)
+#: The manual names no limit; threads that start threads would soon take all time and memory.
+MAX_THREADS = 256
+
+
+class _ThreadKilled(BaseException):
+    """Unwinds a thread that has killed itself or one of its ancestors."""
+
+
+@dataclass(slots=True, eq=False)
+class _Thread:
+    """A thread of the program; number 0 is the main thread."""
+
+    number: int
+    steps: ScriptSteps
+    parent: _Thread | None
+    depth: int = 0
+    location: tuple[int, int] = (0, 0)
+    alive: bool = True
+
+    def descends_from(self, other: _Thread) -> bool:
+        """Tell whether this is the other thread or was started, however indirectly, by it."""
+        thread: _Thread | None = self
+        while thread is not None and thread is not other:
+            thread = thread.parent
+        return thread is other
+
+
+class ScriptInterpreter:
+    """
+    Runs one program; the controller calls `step` once per frame.
+
+    :param program: what `parse` returned.
+    :param builtins: the functions that the program can call. A plain function takes no time. In a
+        generator function each bare `yield` gives up the rest of the frame, and what it returns
+        is the value of the call. Arguments are passed by position and name as in Python.
+    :param instruction_budget: nodes of the tree that a thread may evaluate in one frame.
+    :raises CompileError: the program cannot run; nothing of it has.
+    """
+
+    def __init__(
+        self,
+        program: tree.ScriptProgram,
+        builtins: Mapping[str, Builtin],
+        *,
+        instruction_budget: int = 100_000,
+    ) -> None:
+        #: Called with the id of each thread that has ended, however it ended.
+        self.on_thread_end: Callable[[Hashable], None] | None = None
+        #: Set by the statement `pause`; until `resume` a step does nothing.
+        self.paused = False
+        #: The runtime exception that ended the program.
+        self.error: RuntimeException | None = None
+        self.fuel = 0
+        self._budget = instruction_budget
+        self._is_secondary = program.kind == 'sec'
+        self._current: _Thread | None = None
+        self._halted = False
+        try:
+            scope = resolve(program, builtins)
+            self._global_names = scope.globals
+            self.globals: list[Any] = [UNSET] * len(scope.globals)
+            procedures: dict[int, CompiledFunction] = {}
+            main = compile_program(scope, builtins, self, procedures)
+        except RecursionError:
+            text = f'syntax_error_on_line:{program.line}:{program.name}:'
+            reason = 'the program is nested too deeply'
+            raise CompileError(program.line, program.column, text, reason) from None
+        self._threads = [_Thread(0, main.steps(), None)]
+        #: How many threads there have been; the next one gets this number.
+        self.threads_started = 1
+        #: Compiles lines that the program is given while it runs.
+        self.lines = LineCompiler(scope, procedures, builtins, self)
+
+    @property
+    def running(self) -> bool:
+        """Whether the program has not ended; it is running before its first step too."""
+        return bool(self._threads)
+
+    @property
+    def thread(self) -> _Thread:
+        """The thread that is running now; for compiled code."""
+        assert self._current is not None
+        return self._current
+
+    @property
+    def current_thread(self) -> Hashable:
+        """Id of the thread whose builtin is being executed, None between steps."""
+        return None if self._current is None else self._current.number
+
+    @property
+    def location(self) -> tuple[int, int]:
+        """Line and column of the call that is being executed."""
+        return (0, 0) if self._current is None else self._current.location
+
+    @property
+    def variables(self) -> dict[str, Value]:
+        """The global variables that have a value."""
+        named = ((name, self.globals[slot]) for name, slot in self._global_names.items())
+        return {name: value for name, value in named if value is not UNSET}
+
+    def step(self) -> None:
+        """Run one frame: every live thread until it yields or ends."""
+        if self.paused:
+            return
+        for thread in self._threads:  # grows while threads are started
+            if thread.alive:
+                self._resume(thread)
+            if self._halted:
+                self.stop()
+                return
+        self._threads = [thread for thread in self._threads if thread.alive]
+
+    def resume(self) -> None:
+        """Go on after `pause`."""
+        self.paused = False
+
+    def stop(self) -> None:
+        """
+        End the program at once; builtins that wait see their generator closed.
+
+        Called by a builtin it ends the program as soon as that builtin yields or returns to the
+        scheduler, since a thread cannot be unwound from inside.
+        """
+        if self._current is not None:
+            self._halted = True
+            return
+        threads, self._threads = self._threads, []
+        for thread in threads:
+            if thread.alive:
+                self._end(thread)
+
+    def _resume(self, thread: _Thread) -> None:
+        """Let one thread run up to its next yield."""
+        self.fuel = self._budget
+        self._current = thread
+        ended = True
+        try:
+            next(thread.steps)
+            ended = False
+        except StopIteration:
+            self._halted = self._halted or thread.parent is None
+        except ProgramHalted:
+            self._halted = True
+        except _ThreadKilled:
+            ended = thread.alive
+        except RuntimeException as error:
+            self.error, self._halted = error, True
+        except RecursionError:
+            self.error, self._halted = recursion_error(*thread.location), True
+        finally:
+            self._current = None
+        if ended:
+            self._end(thread)
+
+    def _end(self, thread: _Thread) -> None:
+        """Close a thread, as itself, so that builtins see who they clean up for."""
+        thread.alive = False
+        previous, self._current = self._current, thread
+        try:
+            thread.steps.close()
+        except RuntimeException as error:  # a builtin failed to clean up
+            self.error = self.error or error
+        finally:
+            self._current = previous
+        if self.on_thread_end is not None:
+            self.on_thread_end(thread.number)
+
+    # What compiled code calls
+
+    def raise_budget_exceeded(self, line: int, column: int) -> NoReturn:
+        """Raise, because the thread used up its frame without yielding."""
+        raise RuntimeException(BUDGET_EXCEEDED, line, column)
+
+    def spawn(self, procedure: CompiledFunction) -> ThreadHandle:
+        """Start a thread; it runs in this frame, after all that were started before."""
+        if self._is_secondary:
+            raise RuntimeException('A secondary program cannot start threads.')
+        if len(self._threads) >= MAX_THREADS:
+            raise RuntimeException(f'More than {MAX_THREADS} threads run at once.')
+        thread = _Thread(self.threads_started, procedure.steps(), self.thread)
+        self.threads_started += 1
+        self._threads.append(thread)
+        return ThreadHandle(thread.number)
+
+    def alive(self, handle: Value) -> bool:
+        """Tell whether a value is the handle of a thread that has not ended."""
+        return self._find(handle) is not None
+
+    def kill(self, handle: Value) -> None:
+        """End a thread and all that it started; anything but the handle of one is ignored."""
+        target = self._find(handle)
+        if target is None:
+            return
+        threads_to_kill = [thread for thread in self._threads if thread.descends_from(target)]
+        for thread in threads_to_kill:
+            if thread.alive and thread is not self._current:
+                self._end(thread)
+        if self._current in threads_to_kill:
+            raise _ThreadKilled
+
+    def kill_since(self, number: int) -> None:
+        """End the threads that the current one has started from a number on, with theirs."""
+        for thread in tuple(self._threads):
+            if thread.parent is self._current and thread.number >= number:
+                self.kill(ThreadHandle(thread.number))
+
+    def _find(self, handle: Value) -> _Thread | None:
+        if type(handle) is not ThreadHandle:
+            return None
+        alive = (thread for thread in self._threads if thread.alive)
+        return next((thread for thread in alive if thread.number == handle.number), None)
