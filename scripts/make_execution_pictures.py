@@ -48,8 +48,7 @@ def a_goal(
         from ur_cartesian_driver.kinematics.chain import Arm
         from ur_cartesian_driver.kinematics.robot_models import robot_model
         from ur_cartesian_driver.motion.goal import ExecutionMode
-        from ur_cartesian_driver.planning import planner as plan
-        from ur_cartesian_driver.planning import PlanningOptions
+        from ur_cartesian_driver.planning import plan, PlanningOptions
         from ur_cartesian_driver.ros.client import load_goal
         from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
         from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames

@@ -14,8 +14,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.planning import planner as plan
-from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.preview import postures, sample, table
 
 ARM = Arm(robot_model('ur5e'))

@@ -37,9 +37,9 @@ pytestmark = pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has 
 SOURCES = [
     *PACKAGE.glob('robot/**/*.py'),
     *PACKAGE.glob('driver/**/*.py'),
-    PACKAGE / 'protocol' / 'rtde.py',
+    PACKAGE / 'protocol' / 'rtde' / 'rtde_client.py',
     PACKAGE / 'ros' / 'node.py',
-    *PACKAGE.glob('sim/*.py'),
+    *PACKAGE.glob('sim/**/*.py'),
 ]
 ROBOT_PROGRAM = PACKAGE / 'program' / 'driver.script'
 

@@ -30,8 +30,7 @@ from ur_cartesian_driver.motion.goal import (
     OutputKind,
     ZERO6,
 )
-from ur_cartesian_driver.planning import planner as plan
-from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

@@ -30,8 +30,7 @@ from ur_cartesian_driver.motion.pose import (
     quaternion_from_rotation_vector,
 )
 from ur_cartesian_driver.motion.primitive import MoveJ
-from ur_cartesian_driver.planning import planner as plan
-from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

@@ -19,8 +19,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType, Tolerance, Waypoint
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.planning import planner as plan
-from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.reverse import ReverseDecoder, TrajectoryAction
 from ur_cartesian_driver.protocol.rtde.rtde_client import OUTPUT_TYPES, Recipe
 from ur_cartesian_driver.protocol.rtde.rtde_packages import RtdeFrameBuffer

@@ -24,8 +24,7 @@ from ur_cartesian_driver.motion.goal import (
     ZERO6,
 )
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.planning import planner as plan
-from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.faults.injector import (
     AfterDistance,
     EventFault,

@@ -174,7 +174,9 @@ def test_the_target_is_compared_with_the_plan_apart_from_the_room_of_corners():
     corner = (0.4, 0.0, 0.2), (0.5, 0.0, 0.2), (0.5, 0.1, 0.2)
     beside = Pose((0.45, 0.0, 0.204), quaternion_from_rotation_vector((pi + 0.15, 0.0, 0.0)))
     for allowed, expected in ((None, (0.004, 0.15)), (blend_tolerance, (0.001, 0.05))):
-        tracker = PathTracker(path(*corner, **({} if allowed is None else {'room': allowed})))
+        tracker = PathTracker(
+            path(*corner, **({} if allowed is None else {'blend_tolerance': allowed}))
+        )
         tracker.update(beside, 0.2)
         assert tracker.deviation(beside) == pytest.approx(expected, abs=1e-6)
 

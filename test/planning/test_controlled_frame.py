@@ -16,8 +16,7 @@ from ur_cartesian_driver.motion.pose import (
     pose_from_row,
     quaternion_from_rotation_vector,
 )
-from ur_cartesian_driver.planning import planner as plan
-from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning import plan, PlanningOptions
 
 T_FLANGE_NOZZLE = Pose((0.03, -0.02, 0.15), quaternion_from_rotation_vector((0.4, -0.3, 0.2)))
 CHANGE = PlanningOptions(max_tool_speed=1.0)

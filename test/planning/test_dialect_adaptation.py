@@ -13,8 +13,7 @@ from ur_cartesian_driver.motion.errors import NotAvailable
 from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, OptimoveJ, OptimoveL
-from ur_cartesian_driver.planning import planner as plan
-from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.dialects import DIALECTS
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 

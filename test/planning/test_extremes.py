@@ -26,8 +26,7 @@ from ur_cartesian_driver.motion.goal import (
     Waypoint,
 )
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.planning import planner as plan
-from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 
 TYPE = SegmentType

@@ -30,8 +30,7 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveJ, MoveL
-from ur_cartesian_driver.planning import planner as plan
-from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.blend import BlendInput, blends
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve, JointLineCurve, LineCurve
 from ur_cartesian_driver.planning.geometry.samples import (

@@ -19,9 +19,8 @@ from ur_cartesian_driver.motion.goal import (
 )
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import SwitchOutput
-from ur_cartesian_driver.planning import planner as plan
-from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.planning.output_placement import MAX_OUTPUT_OFFSET
+from ur_cartesian_driver.planning import plan, PlanningOptions
+from ur_cartesian_driver.planning.request.io_commands import MAX_OUTPUT_OFFSET
 from ur_cartesian_driver.protocol.program.dialects import DIALECTS
 from ur_cartesian_driver.protocol.program.trajectory_points import (
     encode_points,

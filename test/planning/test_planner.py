@@ -29,8 +29,7 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.goal import ArcMode, Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ, OptimoveL
-from ur_cartesian_driver.planning import planner as plan
-from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning import plan, PlanningOptions
 
 TYPE = SegmentType
 OPTIONS = PlanningOptions()

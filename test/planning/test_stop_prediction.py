@@ -35,7 +35,7 @@ def state(qd, **changes):
 @pytest.mark.parametrize('qd', [(0.5, 0.0, 0.0, 0.0, 0.0, 0.0), (0.1, -0.4, 0.9, -1.2, 0.3, 0.05)])
 def test_the_arm_rests_where_the_controller_brings_it_to_rest(qd, deceleration):
     brakes = JointStopMotion(Q, qd, deceleration)
-    while not brakes.over:
+    while not brakes.is_over:
         brakes.accept(brakes.preview(0.0005)[1])
     rest = predict_stop(state(qd), ARM, deceleration)
     assert rest.actual_q == pytest.approx(brakes.q, abs=1e-9)

@@ -31,7 +31,8 @@ from ur_cartesian_driver.motion.goal import (
 )
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import check, PlanningOptions
-from ur_cartesian_driver.planning.request.validate import resolve_execution_mode, RULES
+from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
+from ur_cartesian_driver.planning.request.validate import RULES
 from ur_cartesian_driver.protocol.program.dialects import DIALECTS
 
 OPTIONS = PlanningOptions(max_points=10)

@@ -10,8 +10,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal import ExecutionMode
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, Spline
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.planning import check, PlanningOptions
-from ur_cartesian_driver.planning import planner as plan
+from ur_cartesian_driver.planning import check, plan, PlanningOptions
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message

@@ -23,8 +23,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import code_of, DriverError, ErrorCode
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.planning import planner as plan
-from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message

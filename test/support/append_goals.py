@@ -9,8 +9,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal import Segment, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.planning import planner as plan
-from ur_cartesian_driver.planning import PlanningOptions
+from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT

@@ -26,7 +26,7 @@ from ur_cartesian_driver.sim import SimulatorConfig
 
 def validate(arguments: argparse.Namespace) -> int:
     """Plan a goal from where the arm is said to stand, and print the plan."""
-    from ur_cartesian_driver.planning import planner as plan
+    from ur_cartesian_driver.planning import plan
     from ur_cartesian_driver.preview import postures, table
     from ur_cartesian_driver.ros.messages import goal_conversion as convert
     from ur_cartesian_driver.ros.parameters.parameter_files import read_settings

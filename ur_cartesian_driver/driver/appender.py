@@ -50,7 +50,9 @@ Offers: TypeAlias = Generator[AppendToMotion, AnswerAppend, AppendResult]
 def encode_plan(part: AppendPlan, dialect: Dialect) -> tuple[bytes, MotionJob]:
     """Return the records of a part, and what the machine needs of it."""
     plan = part.plan
-    job = job_from_plan(plan, dialect, start_time=part.since, ending_records=part.ending)
+    job = job_from_plan(
+        plan, dialect, start_time=part.start_time, ending_records=part.ending_records
+    )
     return (encode_points(plan.instructions, dialect), replace(job, due=part.end_time))
 
 

@@ -66,14 +66,14 @@ from ur_cartesian_driver.planning.request.dialect_adaptation import (
     adapt_to_dialect,
     explain_poses_only,
 )
-from ur_cartesian_driver.planning.request.validate import (
-    check,
+from ur_cartesian_driver.planning.request.goal_fields import (
     is_spline,
     is_timed,
     point_field,
     resolve_execution_mode,
     segment_field,
 )
+from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.planning.spline.spline_planner import (
     plan_spline,
     SplineState,

@@ -44,7 +44,8 @@ class LinkSettings:
     auto_power: bool = False
     #: Time between two messages on the reverse socket [s].
     keepalive_period: float = 0.02
-    #: Packets per second from the robot, at least :data:`MIN_RTDE_FREQUENCY`; 0 = as many as it can.
+    #: Packets per second from the robot, at least :data:`MIN_RTDE_FREQUENCY`; 0 = as many as it
+    #: can.
     rtde_frequency: float = 0.0
     #: How often inputs, outputs and tool are reported [Hz]; 0 = never.
     io_publish_rate: float = 25.0

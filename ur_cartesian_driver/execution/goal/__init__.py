@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One goal: its job, its table of states, its machine, and the monitor that compares robot and plan."""
+"""One goal: its job, its states, its machine, and the monitor of its motion."""

@@ -273,7 +273,7 @@ class AppendMachine(GoalMachine):
             *super()._outcome_report(),
             (
                 f'the motion was brought to rest {times}, the last time behind point '
-                f'{self._last_stop_point}, because no more points came in time; what was appended later '
-                'is later by as much as that took'
+                f'{self._last_stop_point}, because no more points came in time; what was appended '
+                'later is later by as much as that took'
             ),
         )

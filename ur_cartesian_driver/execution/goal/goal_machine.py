@@ -86,8 +86,8 @@ class GoalMachine:
         :param feedback_period: time between two progress reports [s].
         :param max_plan_deviation: how far the controller's own target may be from the plan [m],
             [rad]; 0 = any way, any angle.
-        :param resume_after_stop: a protective or safeguard stop holds the goal, as a pause does, until
-            somebody unlocks the robot and plays its program.
+        :param resume_after_stop: a protective or safeguard stop holds the goal, as a pause does,
+            until somebody unlocks the robot and plays its program.
         """
         self._ignored_stops = RESUMABLE_STOPS if resume_after_stop else NO_STOP
         self.job = job

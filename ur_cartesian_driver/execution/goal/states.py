@@ -13,36 +13,37 @@ means in the present state: the next state and how the goal ends, if it does.
   the arm by itself (safety, connection) ends the goal at once, because nothing that we could send
   would be read; a reason of ours to stop (cancel, preemption, tolerance)
   leads to CANCELLING.
-* **RUNNING_OUT**: of a goal that can be continued (keep_open) no more points came in time. What takes
-  the arm to rest at the last known point, or behind it, is on the wire, and the number of its
-  records. Points that come now wait for the SUCCESS of the program: they go on from rest.
-* **AWAITING_POINTS**: the arm is at rest there, and the program has no trajectory. APPENDED starts the
-  next one; NO_MORE_POINTS, the word that no points will come, leads to SETTLING. Without either the goal
-  ends after ``keep_open_timeout`` (TIMEOUT), as CANCELLED: it was given up, and nothing failed.
+* **RUNNING_OUT**: of a goal that can be continued (keep_open) no more points came in time. What
+  takes the arm to rest at the last known point, or behind it, is on the wire, and the number of
+  its records. Points that come now wait for the SUCCESS of the program: they go on from rest.
+* **AWAITING_POINTS**: the arm is at rest there, and the program has no trajectory. APPENDED starts
+  the next one; NO_MORE_POINTS, the word that no points will come, leads to SETTLING. Without
+  either the goal ends after ``keep_open_timeout`` (TIMEOUT), as CANCELLED: it was given up, and
+  nothing failed.
 * **SETTLING**: the program says that the last point is reached. The arm has to be inside the goal
   tolerance and at rest, within the goal's time tolerance. Where the controller's own target is
   elsewhere, the program left something out (DEVIATION).
-* **CANCELLING**: CANCEL is on the wire. The program brakes, discards the points that it has not run
-  and answers CANCELED. A SUCCESS in this state means that the last point was reached before the
-  program read the CANCEL; it is no answer, CANCELED still follows.
+* **CANCELLING**: CANCEL is on the wire. The program brakes, discards the points that it has not
+  run and answers CANCELED. A SUCCESS in this state means that the last point was reached before
+  the program read the CANCEL; it is no answer, CANCELED still follows.
 * **COMING_TO_REST**: the program has answered; the arm is coming to rest.
 * **RESTORING**: how the goal ends is decided, and nothing moves; the TCP of before is on the wire.
   The outcome waits until the robot reports it, so the next goal finds it. Goals that changed no
   TCP pass through at once.
-* **PROGRAM_LOST**: the robot program is gone. Programs end because the safety system, the power or the
-  whole controller has gone as well, and which of them we hear of first is chance: so for a
+* **PROGRAM_LOST**: the robot program is gone. Programs end because the safety system, the power or
+  the whole controller has gone as well, and which of them we hear of first is chance: so for a
   moment a deeper reason still counts.
 * **ENDED**: the outcome is out. Later events mean nothing.
 
-Everything has a bound: an answer that does not come in CANCELLING or COMING_TO_REST ends the goal after
-``STOP_TIMEOUT`` by ending the robot program. A program that somebody has paused reads nothing: the
-arm stands, and the goal ends as it was to end (UNANSWERED); an arm that still moves is a failure
-(TIMEOUT). A TCP that is not set in time ends the goal before it began; one that is not back in time,
-or not at the end because the robot stopped, is the business of whoever carries out the commands
-(the ``temporary_tcp`` of the machine). MOVING and RUNNING_OUT have none, because a speed slider at zero is no
-error; but an arm that stands for ``STALL_TIMEOUT`` while nothing holds it waits for something that
-will not come: a command or a result was lost (STALLED). RTDE packets that stop coming are a lost
-connection.
+Everything has a bound: an answer that does not come in CANCELLING or COMING_TO_REST ends the goal
+after ``STOP_TIMEOUT`` by ending the robot program. A program that somebody has paused reads
+nothing: the arm stands, and the goal ends as it was to end (UNANSWERED); an arm that still moves
+is a failure (TIMEOUT). A TCP that is not set in time ends the goal before it began; one that is
+not back in time, or not at the end because the robot stopped, is the business of whoever carries
+out the commands (the ``temporary_tcp`` of the machine). MOVING and RUNNING_OUT have none, because
+a speed slider at zero is no error; but an arm that stands for ``STALL_TIMEOUT`` while nothing
+holds it waits for something that will not come: a command or a result was lost (STALLED). RTDE
+packets that stop coming are a lost connection.
 """
 
 from __future__ import annotations
@@ -166,8 +167,9 @@ _WHILE_RUNNING: Mapping[GoalSignal, Transition] = MappingProxyType(
     }
 )
 
-#: What each signal means in each state. STARVING, APPENDED, NO_MORE_POINTS, ARMED, SETTLED, RESTORED,
-#: AT_REST, TIMEOUT and UNANSWERED are about the state they are given for: not possible in the others.
+#: What each signal means in each state. STARVING, APPENDED, NO_MORE_POINTS, ARMED, SETTLED,
+#: RESTORED, AT_REST, TIMEOUT and UNANSWERED are about the state they are given for: not possible
+#: in the others.
 TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = MappingProxyType(
     {
         GoalState.ARMING: {

@@ -55,7 +55,8 @@ class WireRecords:
         Return to which points the motion that was begun last and the one before it lead.
 
         :param motions: how many are begun; None is returned for 0.
-        :param lag_motions: so many motions earlier is the one before it, because the arm may be there.
+        :param lag_motions: so many motions earlier is the one before it, because the arm may be
+        there.
         """
         if motions <= self._first_motion:
             return None

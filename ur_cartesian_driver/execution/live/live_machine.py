@@ -3,9 +3,9 @@
 """
 The machine of a session of live targets, and the one that lets a person guide the arm.
 
-Both are goals of the buffered servo that go nowhere by themselves (:mod:`~.servo_machine`): they begin,
-are cancelled and end as any other, so nothing that can happen to a goal has to be thought of
-again.
+Both are goals of the buffered servo that go nowhere by themselves (:mod:`~.servo_machine`): they
+begin, are cancelled and end as any other, so nothing that can happen to a goal has to be thought
+of again.
 """
 
 from __future__ import annotations

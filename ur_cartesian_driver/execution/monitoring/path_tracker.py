@@ -98,8 +98,8 @@ class PathTracker:
     Follows the controller's target along the reference path, only ever forwards.
 
     Poses are compared as points of seven dimensions, position and twice the quaternion times
-    :data:`METRES_PER_RADIAN`: for small angles the distance of two quaternions is half the angle, so a
-    straight line in these coordinates is a straight line of the tool with a steady turn. The
+    :data:`METRES_PER_RADIAN`: for small angles the distance of two quaternions is half the angle,
+    so a straight line in these coordinates is a straight line of the tool with a steady turn. The
     search reaches as far as the target can have come since the last packet, and, where the robot
     program reports it, not beyond the point that it is running; so a path that crosses itself or
     goes back the way it came is followed in the right order.
@@ -195,9 +195,10 @@ class PathTracker:
         """
         Tell whether the target is surely no farther from its place than that [m], [rad].
 
-        A radian counts as :data:`METRES_PER_RADIAN` in :attr:`residual`. Half of it is given away, because the
-        straight line between two quaternions is not quite the turn from one to the other; where
-        they are so far apart that this matters, the line is farther from the target than that.
+        A radian counts as :data:`METRES_PER_RADIAN` in :attr:`residual`. Half of it is given away,
+        because the straight line between two quaternions is not quite the turn from one to the
+        other; where they are so far apart that this matters, the line is farther from the target
+        than that.
         """
         return self.residual <= 0.5 * min(distance, METRES_PER_RADIAN * angle)
 

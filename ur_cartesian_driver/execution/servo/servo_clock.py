@@ -12,9 +12,9 @@ L is the motion time in the robot's buffer, which the robot reports, and that of
 that it had not read when it made the report: so the delay of the wire is not taken for a lag that
 is missing, and the loop has nothing to oscillate with (an integrator with a proportional gain).
 
-With s for the true speed, L changes by ``rate - s``. The clock never lets L grow beyond ``max_lag``,
-whatever the rate: what is under way fits into the buffer even if the robot reads all of it at once
-and carries out nothing. That is why the buffer cannot overflow.
+With s for the true speed, L changes by ``rate - s``. The clock never lets L grow beyond
+``max_lag``, whatever the rate: what is under way fits into the buffer even if the robot reads all
+of it at once and carries out nothing. That is why the buffer cannot overflow.
 """
 
 from __future__ import annotations

@@ -12,8 +12,8 @@ go there but set-points, from a source, one for each packet of the robot (:mod:`
   somebody else has, or a program that does not answer, end the goal before anything moves;
 * MOVING begins with a full buffer and ends when the last set-point was carried out;
 * SETTLING holds that set-point until the arm is there and at rest;
-* in CANCELLING the mode IDLE is written instead of a CANCEL, and the program's leaving of the servo
-  is the answer.
+* in CANCELLING the mode IDLE is written instead of a CANCEL, and the program's leaving of the
+  servo is the answer.
 
 However the goal ends, the robot program is told to brake and listen no more, and the inputs are
 given back.
@@ -228,7 +228,10 @@ class ServoMachine(GoalMachine):
                 )
             )
         if self.stream.phase is ServoPhase.OPENING:
-            return f'the robot did not give its RTDE inputs within {TCP_TIMEOUT:g} s; nothing was moved'
+            return (
+                f'the robot did not give its RTDE inputs within {TCP_TIMEOUT:g} s; '
+                'nothing was moved'
+            )
         return (
             f'the robot program did not answer through its registers within {TCP_TIMEOUT:g} s: '
             'it is paused, or knows no buffered servo; nothing was moved'

@@ -37,8 +37,8 @@ from ur_cartesian_driver.planning.append.appendable_goal import (
     ReplannablePoint,
 )
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
+from ur_cartesian_driver.planning.geometry.pose_rows import keep_hemisphere
 from ur_cartesian_driver.planning.moves.plan_report import ignored_remarks
-from ur_cartesian_driver.planning.moves.reference_path import keep_hemisphere
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.planner import plan as plan_goal

@@ -36,6 +36,10 @@ from ur_cartesian_driver.planning.geometry.pose_rows import (
     normalized_rows,
 )
 
+#: So near to half a turn rounding on the wire, and where the arm really stands, decide in which
+#: direction a line turns the tool [rad].
+HALF_TURN = 1e-3
+
 #: Below these two poses are the same, and a motion between them none: the resolution of the wire.
 SAME_POSITION = 1e-6
 SAME_ANGLE = 1e-6

@@ -93,3 +93,10 @@ def normalized_rows(quaternions: Floats) -> Floats:
     """Return quaternions (n, 4) scaled to length 1."""
     lengths: Floats = np.linalg.norm(quaternions, axis=1)
     return quaternions / lengths[:, None]
+
+
+def keep_hemisphere(poses: Floats) -> None:
+    """Turn signs of quaternions (q and -q are one orientation) so that rows do not jump."""
+    dots = np.einsum('ij,ij->i', poses[1:, 3:], poses[:-1, 3:])
+    signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0))
+    poses[1:, 3:] *= signs[:, np.newaxis]

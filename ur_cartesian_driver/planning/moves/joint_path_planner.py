@@ -58,12 +58,12 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
     named_joints,
     TcpKinematics,
 )
-from ur_cartesian_driver.planning.request.validate import (
+from ur_cartesian_driver.planning.request.goal_fields import (
     DEFAULT_SEGMENT,
-    no_motion_error,
     point_field,
     segment_field,
 )
+from ur_cartesian_driver.planning.request.validate import no_motion_error
 
 #: Solutions that differ by less are one [rad].
 SAME_SOLUTION = 1e-6

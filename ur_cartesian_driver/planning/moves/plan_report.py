@@ -12,7 +12,7 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, OptimoveJ, Primitive
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve
 from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
-from ur_cartesian_driver.planning.request.validate import is_optimized, is_timed, segment_of
+from ur_cartesian_driver.planning.request.goal_fields import is_optimized, is_timed, segment_of
 
 #: How many points a remark lists before it counts the rest.
 _MAX_LISTED = 5

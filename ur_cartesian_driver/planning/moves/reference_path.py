@@ -16,7 +16,7 @@ from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning.geometry.blend import Blend, blend_rows, path_rows
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SegmentCurve
-from ur_cartesian_driver.planning.geometry.pose_rows import Floats
+from ur_cartesian_driver.planning.geometry.pose_rows import Floats, keep_hemisphere
 from ur_cartesian_driver.planning.geometry.speed_profile import SpeedProfile, times_at
 from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
 
@@ -143,10 +143,3 @@ def _row_parameters(geometry: SegmentGeometry, timing: SegmentTiming) -> list[fl
     parameters = {begin + span * k / n for k in range(1, n)}
     parameters.update(begin + span * f for f in timing.profile.knots())
     return [*sorted(parameters), end]
-
-
-def keep_hemisphere(poses: Floats) -> None:
-    """Turn signs of quaternions (q and -q are one orientation) so that rows do not jump."""
-    dots = np.einsum('ij,ij->i', poses[1:, 3:], poses[:-1, 3:])
-    signs = np.cumprod(np.where(dots < 0.0, -1.0, 1.0))
-    poses[1:, 3:] *= signs[:, np.newaxis]

@@ -18,21 +18,19 @@ from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.geometry.blend import Blend
-from ur_cartesian_driver.planning.geometry.curves import is_same_pose, LineCurve, SegmentCurve
+from ur_cartesian_driver.planning.geometry.curves import (
+    HALF_TURN,
+    is_same_pose,
+    LineCurve,
+    SegmentCurve,
+)
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.dialect_adaptation import adapt_blend_radius
-from ur_cartesian_driver.planning.request.validate import (
-    arc_through_via,
-    check_blends_fit,
-    point_field,
-    segment_of,
-)
+from ur_cartesian_driver.planning.request.goal_fields import point_field, segment_of
+from ur_cartesian_driver.planning.request.validate import arc_through_via, check_blends_fit
 
 _LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
-#: So near to half a turn rounding on the wire, and where the arm really stands, decide in which
-#: direction a line turns the tool [rad].
-HALF_TURN = 1e-3
 #: Motions on straight lines in joint space.
 JOINT_SPACE_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 #: Motions that can only be blended into from some others; all else stops before them.

@@ -34,7 +34,7 @@ from ur_cartesian_driver.planning.moves.speed_limits import (
     translates,
 )
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.validate import is_optimized, point_field
+from ur_cartesian_driver.planning.request.goal_fields import is_optimized, point_field
 
 #: The lowest speed that the wire carries well enough: it counts in millionths.
 MIN_SPEED = 1e-5

@@ -18,7 +18,7 @@ from ur_cartesian_driver.motion.goal import ArcMode, SegmentType
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve, JointLineCurve, SAME_POSITION
 from ur_cartesian_driver.planning.moves.segment_geometry import JointSpeedBound, SegmentGeometry
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.validate import is_optimized
+from ur_cartesian_driver.planning.request.goal_fields import is_optimized
 
 #: Where the robot stands at the first point already, the way there counts as this.
 _MIN_LENGTH = 1e-9

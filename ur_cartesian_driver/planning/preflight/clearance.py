@@ -26,7 +26,7 @@ from ur_cartesian_driver.motion.errors import CollisionPredicted
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.validate import point_field
+from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.workspace import parse_planes, Plane
 
 Floats: TypeAlias = NDArray[np.float64]

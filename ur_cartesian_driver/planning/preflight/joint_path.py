@@ -33,7 +33,7 @@ from ur_cartesian_driver.planning.geometry.samples import (
     sample_poses,
 )
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
-from ur_cartesian_driver.planning.request.validate import point_field
+from ur_cartesian_driver.planning.request.goal_fields import point_field
 
 #: Places are put in between until no joint turns more than this from one to the next [rad] ...
 _MAX_STEP = 0.1

@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose, rotate, V
 from ur_cartesian_driver.motion.rigid_body import acceleration_at, shift_reference_point, twist_at
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.validate import (
+from ur_cartesian_driver.planning.request.goal_fields import (
     is_spline,
     is_timed,
     point_field,

@@ -23,7 +23,7 @@ from ur_cartesian_driver.motion.primitive import (
     Spline,
 )
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.validate import segment_field
+from ur_cartesian_driver.planning.request.goal_fields import segment_field
 from ur_cartesian_driver.protocol.program.dialects import Dialect
 from ur_cartesian_driver.protocol.program.trajectory_points import motion_type, MotionType
 

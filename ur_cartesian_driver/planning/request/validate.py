@@ -36,11 +36,22 @@ from ur_cartesian_driver.motion.goal import (
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Quaternion
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve, is_same_pose
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.output_placement import check_outputs
 from ur_cartesian_driver.planning.request.default_tolerances import (
     apply_default_tolerances,
     named_tolerances,
 )
+from ur_cartesian_driver.planning.request.goal_fields import (
+    DEFAULT_SEGMENT,
+    is_optimized,
+    is_spline,
+    is_straight,
+    is_timed,
+    point_field,
+    resolve_execution_mode,
+    segment_field,
+    segment_of,
+)
+from ur_cartesian_driver.planning.request.io_commands import check_outputs
 from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT
 
 #: How far a quaternion's length may be off 1.
@@ -59,9 +70,6 @@ MAX_ACCELERATION = 10_000.0
 Rule: TypeAlias = Callable[[Goal, PlanningOptions], None]
 _Enum = TypeVar('_Enum', bound=IntEnum)
 
-#: A goal without segments has these.
-DEFAULT_SEGMENT = Segment()
-
 
 def check(goal: Goal, options: PlanningOptions) -> None:
     """
@@ -71,41 +79,6 @@ def check(goal: Goal, options: PlanningOptions) -> None:
     """
     for rule in RULES:
         rule(goal, options)
-
-
-def point_field(index: int, field: str = '') -> str:
-    """Return the name of a point's field as in the message."""
-    return f'trajectory.points[{index}]' + (f'.{field}' if field else '')
-
-
-def segment_field(index: int, field: str) -> str:
-    """Return the name of a segment's field as in the message."""
-    return f'segments[{index}].{field}'
-
-
-def segment_of(goal: Goal, index: int) -> Segment:
-    """Return the segment that ends at a point, the plain one where the goal has none."""
-    return goal.segments[index] if goal.segments else DEFAULT_SEGMENT
-
-
-def resolve_execution_mode(goal: Goal) -> ExecutionMode:
-    """Return how a goal is carried out: AUTO means SPLINE where only that does what it asks."""
-    if goal.execution != ExecutionMode.AUTO:
-        return ExecutionMode(goal.execution)
-    inner = goal.waypoints if goal.keep_open else goal.waypoints[:-1]
-    if is_timed(goal) and any(any(point.twist) or any(point.acceleration) for point in inner):
-        return ExecutionMode.SPLINE
-    return ExecutionMode.PRIMITIVES
-
-
-def is_spline(goal: Goal) -> bool:
-    """Tell whether the goal's points are joined by a spline, with times."""
-    return resolve_execution_mode(goal) in (ExecutionMode.SPLINE, ExecutionMode.SERVO)
-
-
-def is_timed(goal: Goal) -> bool:
-    """Tell whether the goal gives times; if not, speeds decide."""
-    return any(waypoint.time != 0.0 for waypoint in goal.waypoints)
 
 
 # -- the rules --------------------------------------------------------------------------------
@@ -436,21 +409,6 @@ RULES: tuple[Rule, ...] = (
 
 
 # -- shared with the checks that need the robot -------------------------------------------------
-
-
-def is_straight(kind: SegmentType) -> bool:
-    """Tell whether the tool goes on a straight line."""
-    return kind in (
-        SegmentType.AUTO,
-        SegmentType.LINEAR,
-        SegmentType.PROCESS,
-        SegmentType.OPTIMIZED_LINEAR,
-    )
-
-
-def is_optimized(kind: SegmentType) -> bool:
-    """Tell whether speeds are fractions of the robot's limits."""
-    return kind in (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 
 
 def check_posture(field: str, posture: Posture, tf_prefix: str) -> None:

@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluate, MotionR
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.pose_rows import angle_rows, compose_rows, Floats
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
-from ur_cartesian_driver.planning.request.validate import point_field
+from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
 #: Times of pieces are whole microseconds, as on the wire, so that sums of them do not drift.

@@ -26,7 +26,7 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.goal import Waypoint
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR
+from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR, HALF_TURN
 from ur_cartesian_driver.planning.geometry.pose_rows import angle_rows, Floats
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePiece,
@@ -36,7 +36,6 @@ from ur_cartesian_driver.planning.geometry.samples import (
     STEP_LENGTH,
 )
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolCurve, ToolSpline
-from ur_cartesian_driver.planning.moves.segment_draft import HALF_TURN
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.joint_path import (
     JointPath,
@@ -55,7 +54,7 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
     named_joints,
     TcpKinematics,
 )
-from ur_cartesian_driver.planning.request.validate import point_field
+from ur_cartesian_driver.planning.request.goal_fields import point_field
 
 # Where a piece is looked at for how fast it gets, and what it may be faster in between.
 _COARSE_SAMPLES = 9

@@ -1,0 +1,80 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The output commands of a goal, checked by themselves."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.goal import Goal, IOCommand, OutputKind
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT
+
+#: The longest time after a point [s].
+MAX_OUTPUT_OFFSET = 60.0
+_OUTPUTS = {
+    OutputKind.STANDARD_DIGITAL: ('standard digital output', 8),
+    OutputKind.CONFIGURABLE_DIGITAL: ('configurable digital output', 8),
+    OutputKind.TOOL_DIGITAL: ('tool digital output', 2),
+    OutputKind.STANDARD_ANALOG: ('standard analog output', 2),
+}
+
+
+def check_outputs(goal: Goal, options: PlanningOptions) -> None:
+    """
+    Check the commands by themselves.
+
+    :raises InvalidGoal: names field, value and bound.
+    :raises NotAvailable: the robot program is not ours.
+    """
+    if goal.io_commands and options.dialect is not NEWEST_DIALECT:
+        raise NotAvailable(
+            'io_commands',
+            'is not empty, and robot programs of wire dialect '
+            f'{options.dialect.name} switch no outputs on the way',
+            'leave it empty, or let the driver send its own robot program',
+        )
+    for i, command in enumerate(goal.io_commands):
+        _check_command(command, f'io_commands[{i}]', len(goal.waypoints))
+
+
+def _check_command(command: IOCommand, field: str, points: int) -> None:
+    name, pins = _OUTPUTS[command.output]
+    if not 0 <= command.waypoint < points:
+        raise InvalidGoal(
+            f'{field}.point_index',
+            f'is {command.waypoint}, and the points are 0 to {points - 1}',
+            'name one of these',
+        )
+    if not 0.0 <= command.offset <= MAX_OUTPUT_OFFSET:
+        raise InvalidGoal(
+            f'{field}.offset',
+            f'is {command.offset:g} s; it is 0 to {MAX_OUTPUT_OFFSET:g} s after the point',
+            'name a later point',
+        )
+    if not 0 <= command.pin < pins:
+        raise InvalidGoal(
+            f'{field}.pin',
+            f'is {command.pin}, and there are {name}s 0 to {pins - 1}',
+            'name one of these',
+        )
+    is_analog = command.output is OutputKind.STANDARD_ANALOG
+    if (
+        not isfinite(command.value)
+        or not 0.0 <= command.value <= 1.0
+        or (not is_analog and command.value not in (0.0, 1.0))
+    ):
+        raise InvalidGoal(
+            f'{field}.value',
+            f'is {command.value:g}; a {name} takes '
+            + ('0 to 1, the fraction of its range' if is_analog else '0 (off) or 1 (on)'),
+            'give one of these',
+        )
+
+
+def describe_command(command: IOCommand) -> str:
+    name, _ = _OUTPUTS[command.output]
+    if command.output is OutputKind.STANDARD_ANALOG:
+        return f'{name} {command.pin} to {command.value:g} ({command.domain.name.lower()})'
+    return f'{name} {command.pin} {"on" if command.value else "off"}'
