@@ -3,15 +3,15 @@
 """Every error a goal can end with has its one code, and keeps its sentence on its way."""
 
 import copy
+from pathlib import Path
 import pickle
 
 import pytest
 
 from ur_cartesian_driver.motion.errors import (
-    code_of,
-    CODES,
     DriverError,
     ErrorCode,
+    ERRORS,
     ExecutionEnded,
     GoalRefused,
     InvalidGoal,
@@ -20,7 +20,12 @@ from ur_cartesian_driver.motion.errors import (
     RemoteProtocolError,
     TooFast,
 )
+from ur_cartesian_driver.motion.events import Outcome
 
+CHECKOUT = Path(__file__).resolve().parents[2]
+needs_checkout = pytest.mark.skipif(
+    not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has this file'
+)
 SENTENCE = 'points[2]: the wrist centre lies 1.2 m from the shoulder, and the reach is 0.85 m.'
 
 
@@ -41,22 +46,22 @@ def make(cls):
 
 @pytest.mark.parametrize('cls', ENDS, ids=lambda cls: cls.__name__)
 def test_every_way_in_which_a_goal_ends_has_a_code(cls):
-    assert isinstance(CODES[cls], ErrorCode)
-    assert code_of(make(cls)) is CODES[cls]
+    assert isinstance(make(cls).code, ErrorCode)
+    assert issubclass(cls, ERRORS[cls.code])
 
 
 def test_the_table_holds_nothing_else():
-    assert set(CODES) == set(ENDS)
+    kinds_of_invalid_goal = set(descendants(InvalidGoal))
+    assert set(ERRORS.values()) == set(ENDS) - kinds_of_invalid_goal
 
 
 def test_every_code_but_success_belongs_to_an_error():
-    assert set(CODES.values()) == set(ErrorCode) - {ErrorCode.SUCCESSFUL}
+    assert set(ERRORS) == set(ErrorCode) - {ErrorCode.SUCCESSFUL}
 
 
 def test_codes_are_distinct_but_for_the_kinds_of_invalid_goal():
-    distinct = [code for cls, code in CODES.items() if InvalidGoal not in cls.__bases__]
-    assert len(distinct) == len(set(distinct))
-    assert {CODES[cls] for cls in descendants(InvalidGoal)} == {ErrorCode.INVALID_GOAL}
+    assert [cls.code for cls in ERRORS.values()] == list(ERRORS)
+    assert {cls.code for cls in descendants(InvalidGoal)} == {ErrorCode.INVALID_GOAL}
 
 
 def test_the_numbers_of_the_original_action_are_kept():
@@ -73,7 +78,7 @@ def test_the_numbers_of_the_original_action_are_kept():
 
 @pytest.mark.parametrize('cls', [ProtocolError, LocalProtocolError, RemoteProtocolError])
 def test_a_broken_protocol_counts_as_a_lost_connection(cls):
-    assert code_of(cls('three bytes too many: 00 01 02')) is ErrorCode.CONNECTION_LOST
+    assert cls('three bytes too many: 00 01 02').code is ErrorCode.CONNECTION_LOST
 
 
 @pytest.mark.parametrize('cls', ALL, ids=lambda cls: cls.__name__)
@@ -98,3 +103,37 @@ def test_without_a_remedy_the_sentence_ends_with_the_problem():
 def test_every_error_is_caught_as_a_driver_error():
     assert all(issubclass(cls, DriverError) for cls in ENDS)
     assert not issubclass(GoalRefused, ExecutionEnded)
+
+
+@pytest.mark.parametrize('code', ERRORS, ids=lambda code: code.name)
+@pytest.mark.parametrize('travel', [lambda e: e, lambda e: pickle.loads(pickle.dumps(e))])
+def test_an_outcome_raises_the_error_of_its_code_with_text_and_report(code, travel):
+    outcome = Outcome(code=code, text=SENTENCE, report=('segment 0: LINEAR', 'why: a stop'))
+    with pytest.raises(ERRORS[code]) as raised:
+        outcome.raise_for_error()
+    error = travel(raised.value)
+    assert type(error) is ERRORS[code]
+    assert (error.code, str(error), error.report) == (code, SENTENCE, outcome.report)
+
+
+def test_an_outcome_that_succeeded_is_returned():
+    outcome = Outcome(code=ErrorCode.SUCCESSFUL, text='All 2 points were executed in 4.000 s.')
+    assert outcome.raise_for_error() is outcome
+
+
+def test_an_error_that_was_not_raised_from_an_outcome_has_no_report():
+    assert GoalRefused(SENTENCE).report == ()
+    assert make(InvalidGoal).field == 'points[2]'
+
+
+@needs_checkout
+def test_the_page_of_errors_has_the_table():
+    page = (CHECKOUT / 'doc' / 'errors.md').read_text(encoding='utf-8')
+    start = page.index('| code | name |')
+    rows = page[start : page.index('\n\n', start)].splitlines()[2:]
+    assert rows == [
+        f'| {int(code)} | {code.name} | `{cls.__name__}` | '
+        f'{"before" if issubclass(cls, GoalRefused) else "during"} | '
+        f'{(cls.__doc__ or "").replace("``", "`")} |'
+        for code, cls in ERRORS.items()
+    ]

@@ -11,7 +11,6 @@ import pytest
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.errors import (
-    code_of,
     ErrorCode,
     GoalRefused,
     InvalidGoal,
@@ -288,7 +287,7 @@ def test_malformed_messages_end_with_the_code_and_the_field(spoil, code, sentenc
     spoil(message)
     with pytest.raises(GoalRefused, match=sentence) as refusal:
         check(converted(message), PlanningOptions())
-    assert code_of(refusal.value) is code
+    assert refusal.value.code is code
 
 
 def test_nan_is_not_lost_on_the_way():

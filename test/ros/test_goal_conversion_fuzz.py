@@ -21,7 +21,7 @@ from rosidl_parser.definition import (
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.errors import code_of, DriverError, ErrorCode
+from ur_cartesian_driver.motion.errors import DriverError, ErrorCode
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
@@ -139,7 +139,7 @@ def test_any_goal_is_planned_and_can_be_sent_or_is_refused_with_a_sentence(data)
         made = plan(goal, STATE, ARM, PlanningOptions())
         encode_points(segment.primitive for segment in made.segments)
     if refused:
-        assert code_of(refused[0]) not in (ErrorCode.SUCCESSFUL, ErrorCode.EXECUTION_FAILED)
+        assert refused[0].code not in (ErrorCode.SUCCESSFUL, ErrorCode.EXECUTION_FAILED)
     else:
         end = ARM.forward(made.segments[-1].joints)
         wanted = goal.T_base_frame @ goal.waypoints[-1].pose

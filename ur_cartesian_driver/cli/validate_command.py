@@ -18,7 +18,7 @@ from time import time_ns
 from ur_cartesian_driver.cli.commands import calibration, code_text, read_goal
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.errors import code_of, GoalRefused
+from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.sim import SimulatorConfig
@@ -54,7 +54,7 @@ def validate(arguments: argparse.Namespace) -> int:
         )
         found = plan(goal, state, arm, options)
     except GoalRefused as refusal:
-        print(f'refused, {code_text(code_of(refusal))}: {refusal}', file=sys.stderr)
+        print(f'refused, {code_text(refusal.code)}: {refusal}', file=sys.stderr)
         return 1
     print(
         f'{model.name}{" with its calibration" if arm.calibrated else ""}, joints '

@@ -54,7 +54,6 @@ from ur_cartesian_driver.execution.goal.goal_machine import STOP_TIMEOUT
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
 from ur_cartesian_driver.motion.errors import (
-    code_of,
     ErrorCode,
     GoalRefused,
     RobotNotReady,
@@ -442,7 +441,7 @@ class Driver(RobotServices, InteractiveMotions):
                 planned = self.plan(goal)
             motion = self.start(planned, on_progress)
         except GoalRefused as refusal:
-            return Outcome(code=code_of(refusal), text=str(refusal))
+            return Outcome(code=refusal.code, text=str(refusal))
         try:
             return motion.result(timeout)
         except BaseException:  # also Ctrl-C: nobody waits for this motion any more

@@ -1,33 +1,33 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What can go wrong, one class for each situation in which a caller can act.
+The errors of this package: one class, and one code of the action, for each way a goal can fail.
 
 ::
 
     DriverError
     |-- GoalRefused              nothing has moved
     |   |-- InvalidGoal              the goal contradicts itself or the rules
-    |   |   |-- NotAvailable             asks for something this version does not do
-    |   |   `-- TooFast                  needs more speed than the limits allow
+    |   |   |-- NotAvailable             it needs something that this version does not do
+    |   |   `-- TooFast                  it needs more speed than the limits allow
     |   |-- InvalidJoints            posture names or values do not fit the robot
     |   |-- OldHeaderTimestamp       header.stamp lies too far in the past
-    |   |-- InvalidPosture           the motion cannot arrive in the posture asked for
+    |   |-- InvalidPosture           the motion cannot arrive in the required posture
     |   |-- Unreachable              no joint solution for a pose
     |   |-- NearSingularity          the path comes too close to a singularity
-    |   |-- JointLimitExceeded       the path leaves the joint range
+    |   |-- JointLimitExceeded       the path leaves the range of a joint
     |   |-- CollisionPredicted       the arm would hit itself or a workspace plane
     |   `-- RobotNotReady            not connected, not powered, program not running, busy
-    |-- ExecutionEnded           a running goal ended before its end
+    |-- ExecutionEnded           a goal ended before its last point
     |   |-- PathToleranceViolated, GoalToleranceViolated
     |   |-- ProtectiveStop, EmergencyStop, ProgramStopped, ConnectionLost
     |   |-- Preempted, Cancelled
-    |   `-- ExecutionFailed          the robot program reported a failure
-    `-- ProtocolError
+    |   `-- ExecutionFailed          the robot program failed, or the robot left the plan
+    `-- ProtocolError            counts as a lost connection
         |-- LocalProtocolError       we tried to send something illegal; nothing was sent
         `-- RemoteProtocolError      the robot sent nonsense; its bytes are in the text
 
-Each class of the first two branches has exactly one code of the action, in :data:`CODES`.
+:data:`ERRORS` is the table of codes and classes. ``Outcome.raise_for_error()`` raises from it.
 """
 
 from __future__ import annotations
@@ -35,10 +35,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import IntEnum
 from types import MappingProxyType
+from typing import ClassVar
 
 
 class ErrorCode(IntEnum):
-    """The ``error_code`` of the action's result; FZI's numbers down to -6, ours below."""
+    """The ``error_code`` of the action's result: FZI's numbers down to -6, ours below."""
 
     SUCCESSFUL = 0
     INVALID_GOAL = -1
@@ -62,7 +63,12 @@ class ErrorCode(IntEnum):
 
 
 class DriverError(Exception):
-    """The root of all errors of this package; its text is one sentence for a person."""
+    """The root of all errors of this package; the text is one sentence for the user."""
+
+    #: What the action reports for this error.
+    code: ClassVar[ErrorCode]
+    #: The report of the goal that failed, where the error was raised from its outcome.
+    report: tuple[str, ...] = ()
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle and copy by the finished sentence, because constructors take facts."""
@@ -75,6 +81,10 @@ class GoalRefused(DriverError):
 
 class InvalidGoal(GoalRefused):
     """The goal contradicts itself or the rules; the text names point and field."""
+
+    code = ErrorCode.INVALID_GOAL
+    #: The field that is wrong; empty where the error was raised from an outcome.
+    field = ''
 
     def __init__(self, field: str, problem: str, remedy: str = '') -> None:
         """
@@ -89,7 +99,7 @@ class InvalidGoal(GoalRefused):
 
 
 class NotAvailable(InvalidGoal):
-    """The goal asks for something that this version of the driver does not do."""
+    """The goal needs something that this version of the driver does not do."""
 
 
 class TooFast(InvalidGoal):
@@ -97,79 +107,115 @@ class TooFast(InvalidGoal):
 
 
 class InvalidJoints(GoalRefused):
-    """Posture names are unknown or doubled, or their number differs from the values'."""
+    """Posture joints are unknown or doubled, or names and values differ in number."""
+
+    code = ErrorCode.INVALID_JOINTS
 
 
 class OldHeaderTimestamp(GoalRefused):
-    """``header.stamp`` lies farther in the past than ``stamp_tolerance``."""
+    """``header.stamp`` is older than ``stamp_tolerance``."""
+
+    code = ErrorCode.OLD_HEADER_TIMESTAMP
 
 
 class InvalidPosture(GoalRefused):
-    """The motion cannot arrive in the joint configuration asked for."""
+    """The motion cannot arrive in the required posture."""
+
+    code = ErrorCode.INVALID_POSTURE
 
 
 class Unreachable(GoalRefused):
-    """There is no joint solution for a pose."""
+    """A pose on the path has no joint solution."""
+
+    code = ErrorCode.UNREACHABLE
 
 
 class NearSingularity(GoalRefused):
     """The path comes too close to a singularity."""
 
+    code = ErrorCode.SINGULARITY
+
 
 class JointLimitExceeded(GoalRefused):
     """The path leaves the range of a joint."""
+
+    code = ErrorCode.JOINT_LIMIT
 
 
 class CollisionPredicted(GoalRefused):
     """The arm would hit itself or a workspace plane."""
 
+    code = ErrorCode.COLLISION
+
 
 class RobotNotReady(GoalRefused):
-    """The robot cannot take a goal now; the text says what is needed."""
+    """The robot cannot take a goal now; the text says what it needs."""
+
+    code = ErrorCode.ROBOT_NOT_READY
 
 
 class ExecutionEnded(DriverError):
-    """A running goal ended before its end."""
+    """A goal ended before its last point."""
 
 
 class PathToleranceViolated(ExecutionEnded):
-    """The arm left the path by more than ``path_tolerance``."""
+    """The arm left the path by more than ``path_tolerance``, and was stopped."""
+
+    code = ErrorCode.PATH_TOLERANCE_VIOLATED
 
 
 class GoalToleranceViolated(ExecutionEnded):
-    """The arm stands, or arrived, outside ``goal_tolerance`` or too late."""
+    """The arm ended outside ``goal_tolerance``, or too late."""
+
+    code = ErrorCode.GOAL_TOLERANCE_VIOLATED
 
 
 class ProtectiveStop(ExecutionEnded):
-    """The robot's safety system stopped the arm; unlock it when the cause is gone."""
+    """The safety system stopped the arm; unlock it when the cause is gone."""
+
+    code = ErrorCode.PROTECTIVE_STOP
 
 
 class EmergencyStop(ExecutionEnded):
     """An emergency stop cut the power of the arm."""
 
+    code = ErrorCode.EMERGENCY_STOP
+
 
 class ProgramStopped(ExecutionEnded):
-    """The robot program ended or was paused by somebody else."""
+    """A person, another client or an error ended the robot program."""
+
+    code = ErrorCode.PROGRAM_STOPPED
 
 
 class ConnectionLost(ExecutionEnded):
     """A connection to the robot broke."""
 
+    code = ErrorCode.CONNECTION_LOST
+
 
 class Preempted(ExecutionEnded):
-    """A newer goal took over."""
+    """A newer goal took its place."""
+
+    code = ErrorCode.PREEMPTED
 
 
 class Cancelled(ExecutionEnded):
-    """The client cancelled the goal."""
+    """The goal was cancelled; the arm is at rest."""
+
+    code = ErrorCode.CANCELLED
 
 
 class ExecutionFailed(ExecutionEnded):
-    """The robot program reported a failure, or the robot did something else than planned."""
+    """The robot program failed, or the robot left the plan."""
+
+    code = ErrorCode.EXECUTION_FAILED
 
 
 class ProtocolError(DriverError):
     """One side broke the rules of a wire protocol."""
+
+    code = ErrorCode.CONNECTION_LOST
 
 
 class LocalProtocolError(ProtocolError):
@@ -180,42 +226,44 @@ class RemoteProtocolError(ProtocolError):
     """
     The robot sent bytes that make no sense.
 
-    The stream cannot be trusted after that: close the connection.
+    The stream cannot be trusted any more: close the connection.
     """
 
 
-#: The one table from error classes to the codes of the action.
-CODES: Mapping[type[DriverError], ErrorCode] = MappingProxyType(
+#: The error of every code but SUCCESSFUL. Subclasses of :class:`GoalRefused` come before the
+#: motion, subclasses of :class:`ExecutionEnded` end it.
+ERRORS: Mapping[ErrorCode, type[DriverError]] = MappingProxyType(
     {
-        InvalidGoal: ErrorCode.INVALID_GOAL,
-        NotAvailable: ErrorCode.INVALID_GOAL,
-        TooFast: ErrorCode.INVALID_GOAL,
-        InvalidJoints: ErrorCode.INVALID_JOINTS,
-        OldHeaderTimestamp: ErrorCode.OLD_HEADER_TIMESTAMP,
-        PathToleranceViolated: ErrorCode.PATH_TOLERANCE_VIOLATED,
-        GoalToleranceViolated: ErrorCode.GOAL_TOLERANCE_VIOLATED,
-        InvalidPosture: ErrorCode.INVALID_POSTURE,
-        Unreachable: ErrorCode.UNREACHABLE,
-        NearSingularity: ErrorCode.SINGULARITY,
-        JointLimitExceeded: ErrorCode.JOINT_LIMIT,
-        CollisionPredicted: ErrorCode.COLLISION,
-        ProtectiveStop: ErrorCode.PROTECTIVE_STOP,
-        EmergencyStop: ErrorCode.EMERGENCY_STOP,
-        ProgramStopped: ErrorCode.PROGRAM_STOPPED,
-        ConnectionLost: ErrorCode.CONNECTION_LOST,
-        Preempted: ErrorCode.PREEMPTED,
-        Cancelled: ErrorCode.CANCELLED,
-        ExecutionFailed: ErrorCode.EXECUTION_FAILED,
-        RobotNotReady: ErrorCode.ROBOT_NOT_READY,
+        error.code: error
+        for error in (
+            InvalidGoal,
+            InvalidJoints,
+            OldHeaderTimestamp,
+            PathToleranceViolated,
+            GoalToleranceViolated,
+            InvalidPosture,
+            Unreachable,
+            NearSingularity,
+            JointLimitExceeded,
+            CollisionPredicted,
+            ProtectiveStop,
+            EmergencyStop,
+            ProgramStopped,
+            ConnectionLost,
+            Preempted,
+            Cancelled,
+            ExecutionFailed,
+            RobotNotReady,
+        )
     }
 )
 
 
-def code_of(error: DriverError) -> ErrorCode:
-    """Return the action's code of an error; a broken protocol counts as a lost connection."""
-    if isinstance(error, ProtocolError):
-        return ErrorCode.CONNECTION_LOST
-    return CODES[type(error)]
+def error_of_outcome(code: ErrorCode, text: str, report: tuple[str, ...] = ()) -> DriverError:
+    """Return the error of a goal that ended with a code other than SUCCESSFUL."""
+    error = _restore(ERRORS[code], text)
+    error.report = report
+    return error
 
 
 def _restore(cls: type[DriverError], sentence: str) -> DriverError:

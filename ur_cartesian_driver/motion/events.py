@@ -9,7 +9,7 @@ from enum import IntEnum
 from math import nan
 from typing import TypeAlias
 
-from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.errors import error_of_outcome, ErrorCode
 from ur_cartesian_driver.motion.goal import ZERO6
 from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.motion.servo import ServoFeedback
@@ -132,3 +132,18 @@ class Outcome:
     def succeeded(self) -> bool:
         """Tell whether the goal was reached (or passed all checks, when only these were asked)."""
         return self.code is ErrorCode.SUCCESSFUL
+
+    def raise_for_error(self) -> Outcome:
+        """
+        Return this outcome if it succeeded, else raise the error of its code.
+
+        ``driver.execute(goal).raise_for_error()`` lets Python code handle failures as exceptions;
+        the table of codes and classes is :data:`~ur_cartesian_driver.motion.errors.ERRORS`.
+
+        :raises GoalRefused: nothing has moved.
+        :raises ExecutionEnded: the goal ended before its last point. Both carry the text and the
+            ``report`` of this outcome.
+        """
+        if not self.succeeded:
+            raise error_of_outcome(self.code, self.text, self.report)
+        return self

@@ -32,7 +32,6 @@ from ur_cartesian_driver.driver import Driver, MotionHandle
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import (
     Cancelled,
-    code_of,
     DriverError,
     ErrorCode,
     GoalRefused,
@@ -364,7 +363,7 @@ class GoalRun:
         try:
             outcome = self._process()
         except DriverError as error:
-            outcome = Outcome(code=code_of(error), text=self._refusal_text(error))
+            outcome = Outcome(code=error.code, text=self._refusal_text(error))
         except Exception as error:
             # A goal always ends with a result; the traceback goes the way of all threads.
             self._server.finish_run(
