@@ -5,10 +5,11 @@ from math import inf, nan
 import pytest
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
-from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.pose import IDENTITY
+from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode, STATE_TABLE
+from ur_cartesian_driver.protocol.program import registers
 from ur_cartesian_driver.robot.rtde.state_recipe import (
     in_recipe_order,
-    OPTIONAL_FIELDS,
     REQUIRED_FIELDS,
     robot_state_from_rtde,
 )
@@ -20,7 +21,6 @@ def values(**mode_changes):
     found = {name: (0.0,) * 6 for name in REQUIRED_FIELDS[1:10]}
     found |= dict.fromkeys(('timestamp', 'speed_scaling', 'target_speed_fraction'), 1.0)
     found |= {name: 7 for name in REQUIRED_FIELDS if name not in found}
-    found |= dict.fromkeys(OPTIONAL_FIELDS)
     found |= mode_changes
     return in_recipe_order(tuple(found), tuple(found.values()))
 
@@ -39,3 +39,16 @@ def test_a_number_that_is_not_finite_is_nonsense_and_named(name, number):
     wrong = number if name in ('timestamp', 'speed_scaling') else (0.0, number, *(0.0,) * 4)
     with pytest.raises(RemoteProtocolError, match=f'not finite: {name}.'):
         robot_state_from_rtde(values(**{name: wrong}))
+
+
+def test_the_count_of_points_is_read_from_the_register_that_the_program_writes():
+    """The table of the state stands below the registers, so it has the name as a literal."""
+    (name,) = (row.rtde.name for row in STATE_TABLE if row.name == 'points_begun')
+    assert name == registers.register_name(registers.OutputInteger.POINTS_BEGUN)
+
+
+def test_what_the_robot_lacks_has_its_default():
+    state = robot_state_from_rtde(values())
+    assert state.T_flange_tcp == IDENTITY
+    assert state.actual_tcp_acceleration is None
+    assert state.points_begun == 0

@@ -4,8 +4,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
 from enum import IntEnum, IntFlag
+from types import NoneType
+from typing import Annotated, Any, get_args, get_type_hints
 
 from ur_cartesian_driver.motion.goal import ZERO6
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector6
@@ -89,42 +92,92 @@ class SafetyStatus(IntFlag):
     THREE_POSITION_ENABLING_STOP = 1 << 11
 
 
+@dataclass(frozen=True, slots=True)
+class Rtde:
+    """The RTDE output that a field of :class:`RobotState` holds."""
+
+    name: str
+    #: Older software does not have it: the field has its default then.
+    optional: bool = False
+    #: Goals are monitored with it: a packet in which it is not finite is refused.
+    monitored: bool = True
+
+
 # Never changed, but not frozen: a frozen one takes four times as long to make, and one is made for
 # each packet, between its arrival and what has to be done about it.
-@dataclass(slots=True, kw_only=True)
+@dataclass(slots=True)
 class RobotState:
     """
     One RTDE packet: joints in rad and rad/s, poses of the TCP in the robot's base.
 
     Twists are linear [m/s] and angular [rad/s] of the TCP in base axes.
+
+    This is the only table of these fields: what is read by RTDE, the shared memory and the
+    ``~/status`` message follow from names, types and :class:`Rtde`. Optional outputs come last.
     """
 
     #: The controller's clock [s].
-    timestamp: float
-    actual_q: Vector6
-    actual_qd: Vector6 = ZERO6
-    target_q: Vector6 = ZERO6
-    target_qd: Vector6 = ZERO6
-    actual_tcp_pose: Pose = IDENTITY
-    actual_tcp_twist: Vector6 = ZERO6
-    target_tcp_pose: Pose = IDENTITY
-    target_tcp_twist: Vector6 = ZERO6
-    #: Linear [m/s^2] and angular [rad/s^2], as the twists; None = the robot does not report it.
-    actual_tcp_acceleration: Vector6 | None = None
-    target_tcp_acceleration: Vector6 | None = None
-    #: Torque of each joint [Nm], measured by its current; None = the robot does not report it.
-    joint_torque: Vector6 | None = None
+    timestamp: Annotated[float, Rtde('timestamp')]
+    actual_q: Annotated[Vector6, Rtde('actual_q')]
+    actual_qd: Annotated[Vector6, Rtde('actual_qd')] = ZERO6
+    target_q: Annotated[Vector6, Rtde('target_q')] = ZERO6
+    target_qd: Annotated[Vector6, Rtde('target_qd')] = ZERO6
+    actual_tcp_pose: Annotated[Pose, Rtde('actual_TCP_pose')] = IDENTITY
+    actual_tcp_twist: Annotated[Vector6, Rtde('actual_TCP_speed')] = ZERO6
+    target_tcp_pose: Annotated[Pose, Rtde('target_TCP_pose')] = IDENTITY
+    target_tcp_twist: Annotated[Vector6, Rtde('target_TCP_speed')] = ZERO6
     #: Force [N] and torque [Nm] at the TCP in base axes.
-    actual_tcp_wrench: Vector6 = ZERO6
-    #: The active TCP in the flange frame.
-    T_flange_tcp: Pose = IDENTITY
+    actual_tcp_wrench: Annotated[Vector6, Rtde('actual_TCP_force', monitored=False)] = ZERO6
     #: What the controller really runs at, and the pendant's slider, both 0 to 1.
-    speed_scaling: float = 1.0
-    target_speed_fraction: float = 1.0
-    robot_mode: RobotMode = RobotMode.RUNNING
-    safety_mode: SafetyMode = SafetyMode.NORMAL
-    runtime_state: RuntimeState = RuntimeState.STOPPED
-    robot_status: RobotStatus = RobotStatus.POWER_ON
-    safety_status: SafetyStatus = SafetyStatus.NORMAL_MODE
+    speed_scaling: Annotated[float, Rtde('speed_scaling')] = 1.0
+    target_speed_fraction: Annotated[float, Rtde('target_speed_fraction')] = 1.0
+    robot_mode: Annotated[RobotMode, Rtde('robot_mode')] = RobotMode.RUNNING
+    safety_mode: Annotated[SafetyMode, Rtde('safety_mode')] = SafetyMode.NORMAL
+    runtime_state: Annotated[RuntimeState, Rtde('runtime_state')] = RuntimeState.STOPPED
+    robot_status: Annotated[RobotStatus, Rtde('robot_status_bits')] = RobotStatus.POWER_ON
+    safety_status: Annotated[SafetyStatus, Rtde('safety_status_bits')] = SafetyStatus.NORMAL_MODE
+    #: The active TCP in the flange frame.
+    T_flange_tcp: Annotated[Pose, Rtde('tcp_offset', optional=True)] = IDENTITY
+    #: Linear [m/s^2] and angular [rad/s^2], as the twists; None = the robot does not report it.
+    actual_tcp_acceleration: Annotated[
+        Vector6 | None, Rtde('actual_TCP_acceleration', optional=True, monitored=False)
+    ] = None
+    target_tcp_acceleration: Annotated[
+        Vector6 | None, Rtde('target_TCP_acceleration', optional=True, monitored=False)
+    ] = None
+    #: Torque of each joint [Nm], measured by its current; None = the robot does not report it.
+    joint_torque: Annotated[
+        Vector6 | None, Rtde('actual_current_as_torque', optional=True, monitored=False)
+    ] = None
     #: How many points of the running trajectory the robot program has begun; 0 = none, or unknown.
-    points_begun: int = 0
+    points_begun: Annotated[int, Rtde('output_int_register_26', optional=True)] = 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StateField:
+    """A row of the table: a field of :class:`RobotState`."""
+
+    name: str
+    #: float, int, an enumeration of numbers, Vector6 or Pose; without ``None``.
+    type: Any
+    #: Only vectors may.
+    may_be_none: bool
+    default: Any
+    rtde: Rtde
+
+
+def _state_table() -> Iterator[StateField]:
+    hints = get_type_hints(RobotState, include_extras=True)
+    for field in fields(RobotState):
+        kind, rtde = get_args(hints[field.name])
+        yield StateField(
+            name=field.name,
+            type=get_args(kind)[0] if NoneType in get_args(kind) else kind,
+            may_be_none=NoneType in get_args(kind),
+            default=field.default,
+            rtde=rtde,
+        )
+
+
+#: The table, in the order in which a :class:`RobotState` takes its values.
+STATE_TABLE = tuple(_state_table())

@@ -11,29 +11,65 @@ behind, however the processes end.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from math import isnan, nan
 import mmap
 import os
 import struct
 import tempfile
+from typing import Any
 
-from ur_cartesian_driver.motion.pose import Pose, Vector6
-from ur_cartesian_driver.motion.state import (
-    RobotMode,
-    RobotState,
-    RobotStatus,
-    RuntimeState,
-    SafetyMode,
-    SafetyStatus,
-)
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row, Vector6
+from ur_cartesian_driver.motion.state import RobotState, STATE_TABLE
 
 _COUNTER = struct.Struct('<Q')
-#: valid, timestamp, q qd (actual, target), TCP pose and twist (actual, target), wrench, TCP
-#: offset, two scalings, accelerations (actual, target) and joint torques (NaN: not reported),
-#: modes, bits, points begun.
-_DATA = struct.Struct('<?d6d6d6d6d7d6d7d6d6d7ddd6d6d6d6i')
+#: How many numbers the types of fields hold that hold more than one.
+_SIZES = {Vector6: 6, Pose: 7}
+#: Whether there is a state, then all fields of the table.
+_DATA = struct.Struct(
+    '<?'
+    + ''.join(
+        'd' * _SIZES.get(row.type, 1) if row.type in (float, *_SIZES) else 'q'
+        for row in STATE_TABLE
+    )
+)
 _SIZE = mmap.PAGESIZE
+#: Stands for None.
 _UNKNOWN = (nan,) * 6
+
+
+def _compile_flatten() -> Callable[[RobotState], tuple[float, ...]]:
+    """Return a function of the numbers in a state; as source, because it runs at 500 Hz."""
+    forms = {Vector6: '*state.{0}', Pose: '*state.{0}.position, *state.{0}.quaternion'}
+    parts = (
+        f'*(state.{row.name} or unknown)'
+        if row.may_be_none
+        else forms.get(row.type, 'state.{0}').format(row.name)
+        for row in STATE_TABLE
+    )
+    function: Callable[[RobotState], tuple[float, ...]] = eval(
+        f'lambda state: ({", ".join(parts)})', {'unknown': _UNKNOWN}
+    )
+    return function
+
+
+def _readers() -> Iterator[tuple[int | slice, Callable[[Any], Any]]]:
+    """Yield, for each field, where its numbers are and what makes a value of them."""
+    start = 1
+    for row in STATE_TABLE:
+        size = _SIZES.get(row.type, 1)
+        place = start if size == 1 else slice(start, start + size)
+        if row.may_be_none:
+            yield place, lambda numbers: None if isnan(numbers[0]) else numbers
+        elif row.type is Vector6:
+            yield place, tuple
+        else:
+            yield place, pose_from_row if row.type is Pose else row.type
+        start += size
+
+
+_flatten = _compile_flatten()
+_READERS = tuple(_readers())
 
 
 def create() -> int:
@@ -65,33 +101,7 @@ class StateMemory:
 
     def write(self, state: RobotState) -> None:
         """Publish a state."""
-        self._write(
-            _DATA.pack(
-                True,
-                state.timestamp,
-                *state.actual_q,
-                *state.actual_qd,
-                *state.target_q,
-                *state.target_qd,
-                *state.actual_tcp_pose.row(),
-                *state.actual_tcp_twist,
-                *state.target_tcp_pose.row(),
-                *state.target_tcp_twist,
-                *state.actual_tcp_wrench,
-                *state.T_flange_tcp.row(),
-                state.speed_scaling,
-                state.target_speed_fraction,
-                *(state.actual_tcp_acceleration or _UNKNOWN),
-                *(state.target_tcp_acceleration or _UNKNOWN),
-                *(state.joint_torque or _UNKNOWN),
-                state.robot_mode,
-                state.safety_mode,
-                state.runtime_state,
-                state.robot_status,
-                state.safety_status,
-                state.points_begun,
-            )
-        )
+        self._write(_DATA.pack(True, *_flatten(state)))
 
     def read(self) -> RobotState | None:
         """Return the newest state, None when there is none."""
@@ -114,49 +124,4 @@ class StateMemory:
 def _state(values: tuple[float, ...]) -> RobotState | None:
     if not values[0]:
         return None
-    at = 1
-
-    def take(n: int) -> tuple[float, ...]:
-        nonlocal at
-        at += n
-        return values[at - n : at]
-
-    def vector() -> tuple[float, float, float, float, float, float]:
-        a, b, c, d, e, f = take(6)
-        return (a, b, c, d, e, f)
-
-    def known() -> Vector6 | None:
-        values = vector()
-        return None if isnan(values[0]) else values
-
-    def pose() -> Pose:
-        x, y, z, qx, qy, qz, qw = take(7)
-        return Pose((x, y, z), (qx, qy, qz, qw))
-
-    def number() -> int:
-        return int(take(1)[0])
-
-    return RobotState(
-        timestamp=take(1)[0],
-        actual_q=vector(),
-        actual_qd=vector(),
-        target_q=vector(),
-        target_qd=vector(),
-        actual_tcp_pose=pose(),
-        actual_tcp_twist=vector(),
-        target_tcp_pose=pose(),
-        target_tcp_twist=vector(),
-        actual_tcp_wrench=vector(),
-        T_flange_tcp=pose(),
-        speed_scaling=take(1)[0],
-        target_speed_fraction=take(1)[0],
-        actual_tcp_acceleration=known(),
-        target_tcp_acceleration=known(),
-        joint_torque=known(),
-        robot_mode=RobotMode(number()),
-        safety_mode=SafetyMode(number()),
-        runtime_state=RuntimeState(number()),
-        robot_status=RobotStatus(number()),
-        safety_status=SafetyStatus(number()),
-        points_begun=number(),
-    )
+    return RobotState(*(read(values[place]) for place, read in _READERS))

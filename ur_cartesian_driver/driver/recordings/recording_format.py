@@ -55,7 +55,13 @@ EXECUTED_DTYPE = np.dtype(
     ]
 )
 #: The same for :mod:`struct`, which fills a row faster than numpy does.
-EXECUTED_STRUCT = struct.Struct('<57d6i')
+EXECUTED_STRUCT = struct.Struct(
+    '<'
+    + ''.join(
+        EXECUTED_DTYPE[name].base.char * (EXECUTED_DTYPE[name].shape or (1,))[0]
+        for name in EXECUTED_DTYPE.names or ()
+    )
+)
 #: One sample of the planned path.
 PLANNED_DTYPE = np.dtype([('time', '<f8'), ('pose', '<f8', 7), ('point', '<i4')])
 

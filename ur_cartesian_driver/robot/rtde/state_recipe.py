@@ -1,171 +1,109 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What the driver reads from RTDE, as a :class:`~ur_cartesian_driver.motion.state.RobotState`.
+The RTDE recipe of a :class:`~ur_cartesian_driver.motion.state.RobotState`, and its packets.
 
-Unknown numbers of modes (newer software) become the most careful one that there is.
+Both follow from the table of the state. What does not change from packet to packet is worked out
+once: 500 come in a second, and a CANCEL may wait behind each.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from enum import IntEnum, IntFlag
 from functools import lru_cache
 from math import isfinite
+from operator import itemgetter
 from typing import Any
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector6
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import (
     RobotMode,
     RobotState,
-    RobotStatus,
     RuntimeState,
     SafetyMode,
-    SafetyStatus,
+    STATE_TABLE,
 )
-from ur_cartesian_driver.protocol.program import registers
-from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeValues
+from ur_cartesian_driver.protocol.rtde.rtde_client import OUTPUT_TYPES, RtdeValues
+from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType
 
-POINTS_BEGUN = registers.register_name(registers.OutputInteger.POINTS_BEGUN)
+REQUIRED_FIELDS = tuple(row.rtde.name for row in STATE_TABLE if not row.rtde.optional)
+OPTIONAL_FIELDS = tuple(row.rtde.name for row in STATE_TABLE if row.rtde.optional)
+#: All names, in the order of the table.
+STATE_FIELDS = tuple(row.rtde.name for row in STATE_TABLE)
 
-REQUIRED_FIELDS = (
-    'timestamp',
-    'actual_q',
-    'actual_qd',
-    'target_q',
-    'target_qd',
-    'actual_TCP_pose',
-    'actual_TCP_speed',
-    'target_TCP_pose',
-    'target_TCP_speed',
-    'actual_TCP_force',
-    'speed_scaling',
-    'target_speed_fraction',
-    'robot_mode',
-    'safety_mode',
-    'runtime_state',
-    'robot_status_bits',
-    'safety_status_bits',
+#: What an unknown mode of newer software becomes: the most careful one.
+_UNKNOWN_MODES: Mapping[Any, IntEnum] = {
+    RobotMode: RobotMode.NO_CONTROLLER,
+    SafetyMode: SafetyMode.UNDEFINED_SAFETY_MODE,
+    RuntimeState: RuntimeState.STOPPED,
+}
+
+
+def _converter(kind: Any) -> Callable[[Any], Any] | None:
+    """Return what converts an RTDE value to a field of this type; None = nothing has to."""
+    if kind is Pose:
+        return Pose.from_rotation_vector
+    if kind in _UNKNOWN_MODES:
+        modes, unknown = {mode.value: mode for mode in kind}, _UNKNOWN_MODES[kind]
+        return lru_cache(maxsize=16)(lambda number: modes.get(number, unknown))
+    if isinstance(kind, type) and issubclass(kind, IntFlag):
+        known = sum(kind)
+        return lru_cache(maxsize=16)(lambda bits: kind(bits & known))
+    return None
+
+
+def _monitored(*types: DataType) -> tuple[int, ...]:
+    """Return the columns of these types that have to be finite."""
+    return tuple(
+        i
+        for i, row in enumerate(STATE_TABLE)
+        if row.rtde.monitored and OUTPUT_TYPES[row.rtde.name] in types
+    )
+
+
+_CONVERSIONS = tuple(
+    (i, convert)
+    for i, row in enumerate(STATE_TABLE)
+    if (convert := _converter(row.type)) is not None
 )
-#: Old software does not have these.
-OPTIONAL_FIELDS = (
-    'tcp_offset',
-    'actual_TCP_acceleration',
-    'target_TCP_acceleration',
-    'actual_current_as_torque',
-    POINTS_BEGUN,
-)
-#: The order in which they are asked for.
-STATE_FIELDS = (*REQUIRED_FIELDS, *OPTIONAL_FIELDS)
-
-_ROBOT_MODES = {mode.value: mode for mode in RobotMode}
-_SAFETY_MODES = {mode.value: mode for mode in SafetyMode}
-_RUNTIME_STATES = {state.value: state for state in RuntimeState}
-
-
-#: What has to be finite: vectors, and single numbers.
-_VECTORS = slice(1, 9)
-_NUMBERS = ('timestamp', 'speed_scaling', 'target_speed_fraction')
+#: What stands for an output that the robot does not have.
+_ABSENT = {
+    row.rtde.name: row.default.rotation_vector() if row.type is Pose else row.default
+    for row in STATE_TABLE
+}
+_vectors = itemgetter(*_monitored(DataType.VECTOR6D))
+_numbers = itemgetter(*_monitored(DataType.DOUBLE))
 
 
 def in_recipe_order(names: Sequence[str], values: RtdeValues) -> RtdeValues | tuple[Any, ...]:
-    """Return values as :data:`STATE_FIELDS` has them, None for what the robot does not know."""
+    """Return the values in the order of :data:`STATE_FIELDS`, also where the robot lacks some."""
     if names == STATE_FIELDS:
         return values
     found = dict(zip(names, values, strict=True))
-    return tuple(found.get(name) for name in STATE_FIELDS)
+    return tuple(found.get(name, absent) for name, absent in _ABSENT.items())
 
 
-def robot_state_from_rtde(values: tuple[Any, ...]) -> RobotState:
+def robot_state_from_rtde(values: Sequence[Any]) -> RobotState:
     """
-    Return the snapshot of one data package, whose values are in the order of :data:`STATE_FIELDS`.
+    Return the state in a packet whose values are in the order of :data:`STATE_FIELDS`.
 
-    :raises RemoteProtocolError: a number is not finite: no comparison with it would ever be true,
-        so whoever watches the motion would see nothing.
+    :raises RemoteProtocolError: a number is not finite. No comparison with it is ever true, so
+        the monitor of a goal would find no fault.
     """
-    (
-        timestamp,
-        actual_q,
-        actual_qd,
-        target_q,
-        target_qd,
-        actual_pose,
-        actual_twist,
-        target_pose,
-        target_twist,
-        wrench,
-        speed_scaling,
-        speed_fraction,
-        robot_mode,
-        safety_mode,
-        runtime_state,
-        robot_bits,
-        safety_bits,
-        offset,
-        actual_acceleration,
-        target_acceleration,
-        torque,
-        points_begun,
-    ) = values
-    if not isfinite(
-        sum(map(sum, values[_VECTORS]))
-        + timestamp
-        + speed_scaling
-        + speed_fraction
-        + sum(offset or ())
-    ):
+    if not isfinite(sum(map(sum, _vectors(values))) + sum(_numbers(values))):
         raise RemoteProtocolError(_not_finite(values))
-    modes = _modes(robot_mode, safety_mode, runtime_state, robot_bits, safety_bits)
-    return RobotState(
-        timestamp=timestamp,
-        actual_q=actual_q,
-        actual_qd=actual_qd,
-        target_q=target_q,
-        target_qd=target_qd,
-        actual_tcp_pose=Pose.from_rotation_vector(actual_pose),
-        actual_tcp_twist=actual_twist,
-        target_tcp_pose=Pose.from_rotation_vector(target_pose),
-        target_tcp_twist=target_twist,
-        actual_tcp_acceleration=actual_acceleration,
-        target_tcp_acceleration=target_acceleration,
-        joint_torque=torque,
-        actual_tcp_wrench=wrench,
-        T_flange_tcp=_tcp(offset),
-        speed_scaling=speed_scaling,
-        target_speed_fraction=speed_fraction,
-        robot_mode=modes[0],
-        safety_mode=modes[1],
-        runtime_state=modes[2],
-        robot_status=modes[3],
-        safety_status=modes[4],
-        points_begun=points_begun or 0,
-    )
+    fields = list(values)
+    for i, convert in _CONVERSIONS:
+        fields[i] = convert(fields[i])
+    return RobotState(*fields)
 
 
-@lru_cache(maxsize=16)
-def _tcp(offset: Vector6 | None) -> Pose:
-    return IDENTITY if offset is None else Pose.from_rotation_vector(offset)
-
-
-@lru_cache(maxsize=64)
-def _modes(
-    robot_mode: int, safety_mode: int, runtime_state: int, robot_bits: int, safety_bits: int
-) -> tuple[RobotMode, SafetyMode, RuntimeState, RobotStatus, SafetyStatus]:
-    """Return numbers as what they mean; they are the same ones in most packets."""
-    return (
-        _ROBOT_MODES.get(robot_mode, RobotMode.NO_CONTROLLER),
-        _SAFETY_MODES.get(safety_mode, SafetyMode.UNDEFINED_SAFETY_MODE),
-        _RUNTIME_STATES.get(runtime_state, RuntimeState.STOPPED),
-        RobotStatus(robot_bits & 0xF),
-        SafetyStatus(safety_bits & 0xFFF),
-    )
-
-
-def _not_finite(values: tuple[Any, ...]) -> str:
+def _not_finite(values: Sequence[Any]) -> str:
     names = [
-        name
-        for name, value in zip(STATE_FIELDS, values, strict=True)
-        if name in (*STATE_FIELDS[_VECTORS], *_NUMBERS, 'tcp_offset')
-        and not isfinite(sum(value) if isinstance(value, tuple) else value or 0.0)
+        STATE_FIELDS[i]
+        for i in _monitored(DataType.VECTOR6D, DataType.DOUBLE)
+        if not isfinite(sum(values[i]) if isinstance(values[i], tuple) else values[i])
     ]
     return f'The robot reports numbers that are not finite: {", ".join(names)}.'

@@ -5,10 +5,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import IntEnum
 from math import nan
+from typing import Any
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3, WrenchStamped
+import numpy as np
 
 from ur_cartesian_driver.driver import DriverStatus as Connection
 from ur_cartesian_driver.motion.pose import conjugate, rotate
@@ -49,22 +52,27 @@ def tcp_transform(state: RobotState, base: str, tcp: str, stamp: Time) -> Transf
 
 
 def status_message(connection: Connection, state: RobotState | None, stamp: Time) -> DriverStatus:
-    """Return how far the connection is, with the modes of the robot."""
-    message = DriverStatus(
-        state=int(connection.state),
-        message=connection.message,
-        last_error=connection.last_error,
-        robot_mode=robot_mode_message(state).mode,
-        safety_mode=safety_mode_message(state).mode,
-        program_running=connection.program_running,
-        speed_scaling=nan if state is None else state.speed_scaling,
-        robot_model=connection.robot_model,
-        serial_number=connection.serial_number,
-        polyscope_version=connection.polyscope_version,
-        calibration_known=connection.calibration_known,
-    )
+    """
+    Return how far the connection is, with what the robot reports.
+
+    Each field of the message has the value of the same name of the connection or of the state.
+    """
+    message = DriverStatus()
+    for name in message.get_fields_and_field_types():
+        if name != 'header':
+            value = getattr(connection if hasattr(connection, name) else state, name, None)
+            if value is None:
+                value = _unknown(name, getattr(message, name))
+            setattr(message, name, int(value) if isinstance(value, IntEnum) else value)
     message.header.stamp = stamp
     return message
+
+
+def _unknown(name: str, value: Any) -> Any:
+    """Return what a field of the status says while the robot does not report it."""
+    if isinstance(value, float | np.ndarray):
+        return value + nan
+    return getattr(DriverStatus, f'{name.upper()}_UNKNOWN', value)
 
 
 def robot_mode_message(state: RobotState | None) -> RobotModeMessage:
