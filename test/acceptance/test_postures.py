@@ -12,11 +12,8 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL
-from ur_cartesian_driver.protocol.program.trajectory_points import (
-    decode_point,
-    motion_type,
-    MotionType,
-)
+from ur_cartesian_driver.protocol.program.point_fields import motion_type, MotionType
+from ur_cartesian_driver.protocol.program.trajectory_points import decode_point
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

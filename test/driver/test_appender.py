@@ -19,7 +19,7 @@ from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
-from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT
+from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 
 ARM = Arm(robot_model('ur5e'))
 Q = (0.3, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)

@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
-from ur_cartesian_driver.protocol.program.dialects import DIALECTS
+from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
 ARM = Arm(robot_model('ur5e'))
 Q = (0.3, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)

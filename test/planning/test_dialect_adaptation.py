@@ -14,8 +14,8 @@ from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType,
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, OptimoveJ, OptimoveL
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.protocol.program.dialects import DIALECTS
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
+from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
 OLD = ('2.0', '2.10')
 

@@ -21,11 +21,11 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import SwitchOutput
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.request.io_commands import MAX_OUTPUT_OFFSET
-from ur_cartesian_driver.protocol.program.dialects import DIALECTS
 from ur_cartesian_driver.protocol.program.trajectory_points import (
     encode_points,
     MAX_PENDING_OUTPUTS,
 )
+from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
 OPTIONS = PlanningOptions(max_tool_speed=1.0)
 #: Three sides of a square.

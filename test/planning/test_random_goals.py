@@ -23,8 +23,8 @@ from ur_cartesian_driver.motion.goal import (
 )
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.protocol.program.dialects import DIALECTS
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
+from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
 JOINTS = (
     'shoulder_pan_joint',

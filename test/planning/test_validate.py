@@ -33,7 +33,7 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import check, PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
 from ur_cartesian_driver.planning.request.validate import RULES
-from ur_cartesian_driver.protocol.program.dialects import DIALECTS
+from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
 OPTIONS = PlanningOptions(max_points=10)
 TYPE = SegmentType

@@ -10,6 +10,7 @@ from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.program import ProgramSettings, render, wrap_in_program
 from ur_cartesian_driver.program.render import FEATURES, has_feature
+from ur_cartesian_driver.protocol.program.point_fields import MotionType, SplineKind
 from ur_cartesian_driver.protocol.program.registers import (
     ExternalError,
     InputDouble,
@@ -22,7 +23,6 @@ from ur_cartesian_driver.protocol.program.registers import (
 )
 from ur_cartesian_driver.protocol.program.reverse import ControlMode, TrajectoryAction
 from ur_cartesian_driver.protocol.program.script_command import ScriptCommand, TcpPersistence
-from ur_cartesian_driver.protocol.program.trajectory_points import MotionType, SplineKind
 from ur_cartesian_driver.urscript import parse
 
 SETTINGS = {

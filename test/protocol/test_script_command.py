@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.protocol.framing import encode_result
 from ur_cartesian_driver.protocol.program.script_command import (
     COMMAND_SIZE,
     decode,
     encode,
-    encode_result,
     EndForceModeCommand,
     EndToolContactCommand,
     FtRtdeInputEnableCommand,

@@ -27,20 +27,22 @@ from ur_cartesian_driver.motion.primitive import (
     SwitchOutput,
 )
 from ur_cartesian_driver.motion.signals import AnalogDomain
+from ur_cartesian_driver.protocol.framing import encode_result
+from ur_cartesian_driver.protocol.program.point_fields import (
+    motion_type,
+    MotionType,
+    PointField,
+    SplineKind,
+    to_fields,
+)
 from ur_cartesian_driver.protocol.program.trajectory_points import (
     decode_fields,
     decode_point,
     encode_fields,
     encode_point,
     encode_points,
-    encode_result,
-    motion_type,
-    MotionType,
     POINT_FIELDS,
     POINT_SIZE,
-    PointField,
-    SplineKind,
-    to_fields,
     TrajectoryResultDecoder,
 )
 

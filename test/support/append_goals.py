@@ -12,7 +12,7 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
-from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT
+from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 
 BLEND = Segment(blend_radius=0.01, velocity=0.2, acceleration=1.0)
 

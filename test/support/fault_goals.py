@@ -35,8 +35,8 @@ from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_append, plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
-from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT
 from ur_cartesian_driver.protocol.program.reverse import ControlMode, TrajectoryAction
+from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 from ur_cartesian_driver.sim.builtins.motion_builtins import FreedriveState
 
 #: Side of the way around two corners, and size of the blends there [m].

@@ -25,8 +25,8 @@ from ur_cartesian_driver.motion.events import Progress
 from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import AppendPlan, plan_append
 from ur_cartesian_driver.planning.append.appendable_goal import AppendableGoal, AppendedPoints
-from ur_cartesian_driver.protocol.program.dialects import Dialect
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
+from ur_cartesian_driver.protocol.program.wire_dialects import Dialect
 
 #: How long the robot loop may take to an answer [s]; it stops the arm when it hangs for so long.
 ANSWER_TIMEOUT = 5.0

@@ -31,7 +31,6 @@ from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.workspace import parse_planes
-from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT
 
 #: How far the square of a quaternion's length may be from 1.
 UNIT_TOLERANCE = 1e-3
@@ -154,7 +153,7 @@ class InteractiveMotions(ABC):
 
         :raises RobotNotReady: there is none, or the robot program cannot do this.
         """
-        if self.config.dialect is not NEWEST_DIALECT:
+        if not self.config.dialect.supports_servo:
             raise RobotNotReady(
                 f'Only the robot program of this driver can {what}; wire_dialect '
                 f'says that another one, {self.config.wire_dialect}, runs.'

@@ -9,7 +9,7 @@ from math import isfinite
 from typing import Literal, TypeAlias
 
 from ur_cartesian_driver.planning.workspace import parse_planes
-from ur_cartesian_driver.protocol.program.dialects import Dialect, NEWEST_DIALECT
+from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 #: Finer than this the wire does not carry joint positions [m].
 MIN_SPLINE_TOLERANCE = 1e-6

@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.goal import OutputKind
 from ur_cartesian_driver.protocol.framing import FIXED_POINT
-from ur_cartesian_driver.protocol.program import registers, reverse, script_command
+from ur_cartesian_driver.protocol.program import point_fields, registers, reverse, script_command
 from ur_cartesian_driver.protocol.program import trajectory_points as trajectory
 
 PROGRAM_NAME = 'ur_cartesian_driver'
@@ -72,11 +72,11 @@ OUTPUT_LEAD = 1.5
 #: The words of an output that wait with it, and where in them the program looks.
 OUTPUT_WORDS = 18
 OUTPUT_COLUMNS = {
-    trajectory.PointField.OUTPUT_KIND: 'KIND',
-    trajectory.PointField.OUTPUT_PIN: 'PIN',
-    trajectory.PointField.OUTPUT_VALUE: 'VALUE',
-    trajectory.PointField.OUTPUT_DOMAIN: 'DOMAIN',
-    trajectory.PointField.STARTS_BEYOND: 'STARTS_BEYOND',
+    point_fields.PointField.OUTPUT_KIND: 'KIND',
+    point_fields.PointField.OUTPUT_PIN: 'PIN',
+    point_fields.PointField.OUTPUT_VALUE: 'VALUE',
+    point_fields.PointField.OUTPUT_DOMAIN: 'DOMAIN',
+    point_fields.PointField.STARTS_BEYOND: 'STARTS_BEYOND',
 }
 
 
@@ -177,8 +177,8 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield from _servo_constants(settings)
     yield from _enum('MODE', reverse.ControlMode)
     yield from _enum('TRAJECTORY', reverse.TrajectoryAction)
-    yield from _enum('MOTION', trajectory.MotionType)
-    yield from _enum('SPLINE', trajectory.SplineKind)
+    yield from _enum('MOTION', point_fields.MotionType)
+    yield from _enum('SPLINE', point_fields.SplineKind)
     for name, value in SPLINE_CONSTANTS.items():
         yield f'SPLINE_{name} = {value:.10f}'
     yield from _enum('RESULT', TrajectoryResult)
@@ -195,7 +195,7 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     for field, name in OUTPUT_COLUMNS.items():
         yield f'OUTPUT_{name} = {field.value}'
     # Where a field of a point stands in the list that the robot reads, its length first.
-    yield from _enum('POINT', trajectory.PointField, offset=1)
+    yield from _enum('POINT', point_fields.PointField, offset=1)
 
 
 def _servo_constants(settings: ProgramSettings) -> Iterator[str]:

@@ -14,6 +14,10 @@ grow. A stream that ends inside a unit is an error, because something was lost.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from enum import IntEnum
+from typing import Generic, TypeVar
+
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 
 #: What a value is multiplied by before it is rounded to an integer.
@@ -21,6 +25,9 @@ FIXED_POINT = 1_000_000
 
 INT32_MIN = -(2**31)
 INT32_MAX = 2**31 - 1
+
+T = TypeVar('T')
+E = TypeVar('E', bound=IntEnum)
 
 #: Longest piece of a stream that an error text quotes [bytes].
 _MAX_QUOTED = 48
@@ -119,6 +126,58 @@ class RecordBuffer:
         end = len(data) - len(data) % self._size
         self._rest = data[end:]
         return [data[i : i + self._size] for i in range(0, end, self._size)]
+
+
+class RecordDecoder(Generic[T]):
+    """Decodes a stream of records of one size."""
+
+    def __init__(self, size: int, what: str, decode: Callable[[bytes], T]) -> None:
+        """
+        Start empty.
+
+        :param size: bytes in a record.
+        :param what: what a record is, for error texts.
+        :param decode: turns one record into a message.
+        """
+        self._records = RecordBuffer(size, what)
+        self._decode = decode
+
+    def feed(self, data: bytes) -> list[T]:
+        """
+        Take bytes from the stream (none at all = its end) and return the messages in them.
+
+        :raises RemoteProtocolError: a message is wrong, or the stream ended inside one.
+        """
+        return [self._decode(record) for record in self._records.feed(data)]
+
+
+class ResultDecoder(RecordDecoder[E]):
+    """Decodes a stream of results, each one int32 that is a member of an enum."""
+
+    def __init__(self, enum: type[E], what: str) -> None:
+        """
+        Start empty.
+
+        :param what: what a result is, for error texts.
+        """
+
+        def decode(record: bytes) -> E:
+            number = int.from_bytes(record, 'big', signed=True)
+            try:
+                return enum(number)
+            except ValueError:
+                members = [str(int(member)) for member in enum]
+                raise RemoteProtocolError(
+                    f'{number} is not a {what} ({", ".join(members[:-1])} or {members[-1]}): '
+                    f'{hex_text(record)}.'
+                ) from None
+
+        super().__init__(4, what, decode)
+
+
+def encode_result(result: IntEnum) -> bytes:
+    """Return the 4 bytes of a result."""
+    return result.to_bytes(4, 'big', signed=True)
 
 
 class FrameBuffer:

@@ -33,8 +33,8 @@ from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.program import PROGRAM_NAME, ProgramSettings, render, wrap_in_program
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
-from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
+from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 from ur_cartesian_driver.protocol.rtde.rtde_client import ControllerVersion
 from ur_cartesian_driver.robot.driver_status import (
     DriverStatus,

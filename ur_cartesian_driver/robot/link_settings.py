@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 import ipaddress
 
-from ur_cartesian_driver.protocol.program.dialects import Dialect, DIALECTS, NEWEST_DIALECT
+from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, DIALECTS, NEWEST_DIALECT
 
 #: A robot that reports less often cannot be watched, nor told from one that is lost [Hz].
 MIN_RTDE_FREQUENCY = 10.0

@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.primitive import OptimoveJ, OptimoveL, Spline, SwitchOutput
-from ur_cartesian_driver.protocol.program.dialects import Dialect, NEWEST_DIALECT
+from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -130,7 +130,7 @@ def job_from_plan(
         path_tolerance=goal.path_tolerance,
         goal_tolerance=goal.goal_tolerance,
         goal_time_tolerance=goal.goal_time_tolerance,
-        reports_points_begun=dialect is NEWEST_DIALECT,
+        reports_points_begun=dialect.reports_points_begun,
         keep_open=goal.keep_open,
         ending_records=ending_records,
         has_speed_profile=not (

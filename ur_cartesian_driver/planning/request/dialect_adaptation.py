@@ -24,8 +24,8 @@ from ur_cartesian_driver.motion.primitive import (
 )
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import segment_field
-from ur_cartesian_driver.protocol.program.dialects import Dialect
-from ur_cartesian_driver.protocol.program.trajectory_points import motion_type, MotionType
+from ur_cartesian_driver.protocol.program.point_fields import motion_type, MotionType
+from ur_cartesian_driver.protocol.program.wire_dialects import Dialect
 
 
 def adapt_to_dialect(
@@ -38,7 +38,7 @@ def adapt_to_dialect(
     :raises NotAvailable: the dialect has no words for it.
     """
     dialect, why = options.dialect, ''
-    if dialect.q_near or isinstance(primitive, MoveC | Spline):
+    if dialect.supports_q_near or isinstance(primitive, MoveC | Spline):
         pass
     elif isinstance(primitive, MoveJ | OptimoveJ) and isinstance(primitive.target, Pose):
         _check_calibration(primitive, point, options)

@@ -9,7 +9,6 @@ from math import isfinite
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.goal import Goal, IOCommand, OutputKind
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT
 
 #: The longest time after a point [s].
 MAX_OUTPUT_OFFSET = 60.0
@@ -28,7 +27,7 @@ def check_outputs(goal: Goal, options: PlanningOptions) -> None:
     :raises InvalidGoal: names field, value and bound.
     :raises NotAvailable: the robot program is not ours.
     """
-    if goal.io_commands and options.dialect is not NEWEST_DIALECT:
+    if goal.io_commands and not options.dialect.supports_outputs:
         raise NotAvailable(
             'io_commands',
             'is not empty, and robot programs of wire dialect '

@@ -52,7 +52,6 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     segment_of,
 )
 from ur_cartesian_driver.planning.request.io_commands import check_outputs
-from ur_cartesian_driver.protocol.program.dialects import NEWEST_DIALECT
 
 #: How far a quaternion's length may be off 1.
 QUATERNION_TOLERANCE = 1e-3
@@ -284,7 +283,7 @@ def _spline_can_be_sent(goal: Goal, name: str, options: PlanningOptions) -> None
             remedy,
         )
     if goal.execution == ExecutionMode.SERVO:
-        if options.dialect is not NEWEST_DIALECT:
+        if not options.dialect.supports_servo:
             raise NotAvailable(
                 'execution',
                 f'is {name}, which robot programs of wire dialect '

@@ -53,10 +53,10 @@ from ur_cartesian_driver.protocol.framing import (
     hex_text,
     INT32_MAX,
     INT32_MIN,
-    RecordBuffer,
+    RecordDecoder,
     to_fixed,
 )
-from ur_cartesian_driver.protocol.program.dialects import Dialect, NEWEST_DIALECT
+from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 
 class ControlMode(IntEnum):
@@ -188,20 +188,12 @@ class ReverseMessage:
         return cast(Vector6, tuple(from_fixed(word) for word in self.payload))
 
 
-class ReverseDecoder:
-    """Reads reverse messages: the robot's side."""
+class ReverseDecoder(RecordDecoder[ReverseMessage]):
+    """Decodes reverse messages: the robot's side."""
 
     def __init__(self) -> None:
         """Start empty."""
-        self._records = RecordBuffer(MESSAGE_SIZE, 'reverse message')
-
-    def feed(self, data: bytes) -> list[ReverseMessage]:
-        """
-        Take bytes (none at all = the end) and return the messages in them.
-
-        :raises RemoteProtocolError: a message is wrong, or the stream ended inside one.
-        """
-        return [ReverseMessage.decode(record) for record in self._records.feed(data)]
+        super().__init__(MESSAGE_SIZE, 'reverse message', ReverseMessage.decode)
 
 
 def read_timeout_for(mode: ControlMode, requested: int, step_time: int = DEFAULT_STEP_TIME) -> int:

@@ -49,7 +49,8 @@ from ur_cartesian_driver.protocol.framing import (
     FIXED_POINT,
     from_fixed,
     hex_text,
-    RecordBuffer,
+    RecordDecoder,
+    ResultDecoder,
     to_fixed,
 )
 
@@ -94,7 +95,6 @@ class ToolContactResult(IntEnum):
 COMMAND_WORDS = 28
 COMMAND_SIZE = 4 * COMMAND_WORDS
 _COMMAND = struct.Struct('>28i')
-_RESULT = struct.Struct('>i')
 
 #: Software version: major, minor, bugfix.
 SoftwareVersion: TypeAlias = tuple[int, int, int]
@@ -285,51 +285,20 @@ def decode(data: bytes) -> AnyScriptCommand:
         raise RemoteProtocolError(f'A script command is wrong: {error} {hex_text(data)}') from None
 
 
-class ScriptCommandDecoder:
-    """Reads script commands: the robot's side."""
+class ScriptCommandDecoder(RecordDecoder[AnyScriptCommand]):
+    """Decodes script commands: the robot's side."""
 
     def __init__(self) -> None:
         """Start empty."""
-        self._records = RecordBuffer(COMMAND_SIZE, 'script command')
-
-    def feed(self, data: bytes) -> list[AnyScriptCommand]:
-        """
-        Take bytes (none at all = the end) and return the commands in them.
-
-        :raises RemoteProtocolError: a command is wrong, or the stream ended inside one.
-        """
-        return [decode(record) for record in self._records.feed(data)]
+        super().__init__(COMMAND_SIZE, 'script command', decode)
 
 
-def encode_result(result: ToolContactResult) -> bytes:
-    """Return the 4 bytes with which the robot program answers START_TOOL_CONTACT."""
-    return _RESULT.pack(result)
-
-
-class ToolContactResultDecoder:
-    """Reads the answers to START_TOOL_CONTACT."""
+class ToolContactResultDecoder(ResultDecoder[ToolContactResult]):
+    """Decodes the answers to START_TOOL_CONTACT."""
 
     def __init__(self) -> None:
         """Start empty."""
-        self._records = RecordBuffer(_RESULT.size, 'tool contact result')
-
-    def feed(self, data: bytes) -> list[ToolContactResult]:
-        """
-        Take bytes (none at all = the end) and return the results in them.
-
-        :raises RemoteProtocolError: a number is no result, or the stream ended inside one.
-        """
-        return [_result(record) for record in self._records.feed(data)]
-
-
-def _result(record: bytes) -> ToolContactResult:
-    (number,) = _RESULT.unpack(record)
-    try:
-        return ToolContactResult(number)
-    except ValueError:
-        raise RemoteProtocolError(
-            f'{number} is not a tool contact result (0 or 1): {hex_text(record)}.'
-        ) from None
+        super().__init__(ToolContactResult, 'tool contact result')
 
 
 def _words(command: AnyScriptCommand) -> list[int]:

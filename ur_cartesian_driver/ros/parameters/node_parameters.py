@@ -25,7 +25,7 @@ from rclpy.parameter import Parameter
 from ur_cartesian_driver.driver import DriverConfig
 from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.protocol.program.dialects import DIALECTS
+from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 from ur_cartesian_driver.ros.tf.known_frames import Frames, StaticFrame
 
 ParameterValue: TypeAlias = bool | int | float | str | list[str]

@@ -28,15 +28,15 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveL,
     Spline,
 )
-from ur_cartesian_driver.protocol.program.dialects import DIALECTS, NEWEST_DIALECT
+from ur_cartesian_driver.protocol.program.point_fields import MotionType
 from ur_cartesian_driver.protocol.program.reverse import trajectory, TrajectoryAction
 from ur_cartesian_driver.protocol.program.trajectory_points import (
     decode_point,
     encode_fields,
     encode_point,
     encode_points,
-    MotionType,
 )
+from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS, NEWEST_DIALECT
 
 GOLDEN = json.loads((Path(__file__).parent / 'golden' / 'trajectory_points.json').read_text())
 SENT = [case for case in GOLDEN['cases'] if case['hex'] and case['type'] is not None]

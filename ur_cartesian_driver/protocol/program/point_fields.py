@@ -1,0 +1,398 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The 21 numbers of a trajectory point: motion primitives and outputs to SI numbers and back.
+
+The table is that of URCL since 2.12; the order velocity, acceleration is the wire's, not
+URScript's. What differs in older programs is defined in
+:mod:`~ur_cartesian_driver.protocol.program.wire_dialects`. S = 1,000,000 and T, the dialect's time
+scale, are the factors on the wire
+(:mod:`~ur_cartesian_driver.protocol.program.trajectory_points`).
+
+=======  =====================================================================  =====
+index    meaning                                                                scale
+=======  =====================================================================  =====
+0 - 5    target: joint positions [rad] or x y z rx ry rz [m, rad]               S
+6 - 11   pose targets: q_near [rad], or zeros; MOVEC*: the via point;           S
+         SPLINE: joint velocities [rad/s]; else zeros
+12       velocity [rad/s or m/s; OPTIMOVE*: fraction]                           S
+13       acceleration [rad/s^2 or m/s^2; OPTIMOVE*: fraction]                   S
+14       pose targets: 1 = words 6 - 11 are q_near; MOVEC*: mode of the arc     S
+12 - 17  SPLINE: joint accelerations [rad/s^2], zeros when cubic                S
+6 - 11   before 2.12, all but MOVEC* and SPLINE: the velocity, six times        S
+12 - 17  before 2.12, all but MOVEC* and SPLINE: the acceleration, six times    S
+18       duration [s]; 0 = determined by velocity and acceleration              T
+19       blend radius [m]; SPLINE: its kind, unscaled                           T
+20       motion type                                                            1
+=======  =====================================================================  =====
+
+SWITCH_OUTPUT is not a motion and not part of the library: only our own robot program knows it. The
+program reads it when the previous motion returns, at its stop or where its blend begins. It takes
+no time:
+
+=======  =====================================================================  =====
+0 - 5    trigger pose, x y z rx ry rz [m, rad]; zeros without one               S
+6 - 11   trigger direction, linear and angular, in the axes of that pose        S
+12 - 15  kind of output, pin, value, domain of an analog output                 S
+16, 17   1 = has a trigger pose; 1 = the tool starts beyond its plane           S
+18       delay after the end of the last motion [s]                             T
+20       motion type                                                            1
+=======  =====================================================================  =====
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import IntEnum
+from typing import cast, TypeAlias, TypeVar
+
+from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, ZERO6
+from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.primitive import (
+    Instruction,
+    MoveC,
+    MoveJ,
+    MoveL,
+    MoveP,
+    OptimoveJ,
+    OptimoveL,
+    Primitive,
+    Spline,
+    SwitchOutput,
+    Target,
+)
+from ur_cartesian_driver.motion.signals import AnalogDomain
+from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
+
+
+class MotionType(IntEnum):
+    """Word 20: which URScript function the robot calls, and with which kind of target."""
+
+    #: movej to joint positions
+    MOVEJ = 0
+    #: movel to a pose
+    MOVEL = 1
+    #: movep to a pose
+    MOVEP = 2
+    #: movec through a pose to a pose
+    MOVEC = 3
+    #: optimovej to joint positions
+    OPTIMOVEJ = 4
+    #: optimovel to a pose
+    OPTIMOVEL = 5
+    #: movej to the inverse kinematics of a pose, near q_near if given
+    MOVEJ_POSE = 6
+    #: movel to the pose of joint positions
+    MOVEL_JOINT = 7
+    #: movep to the pose of joint positions
+    MOVEP_JOINT = 8
+    #: movec through joint positions to joint positions
+    MOVEC_JOINT = 9
+    #: movec through a **pose** to **joint** positions: the name gives the target first
+    MOVEC_JOINT_POSE = 10
+    #: movec through **joint** positions to a **pose**
+    MOVEC_POSE_JOINT = 11
+    #: optimovej to the inverse kinematics of a pose
+    OPTIMOVEJ_POSE = 12
+    #: optimovel to the pose of joint positions
+    OPTIMOVEL_JOINT = 13
+    #: cubic or quintic joint spline, interpolated by the robot program
+    SPLINE = 51
+    #: not a motion: switches an output at a trigger pose; our own robot program only
+    SWITCH_OUTPUT = 200
+
+
+class SplineKind(IntEnum):
+    """Word 19 of a SPLINE."""
+
+    CUBIC = 1
+    QUINTIC = 2
+
+
+class PointField(IntEnum):
+    """Index of a field in the 21 words; of a group, its first word."""
+
+    TARGET = 0
+    SECOND = 6
+    VELOCITY = 12
+    ACCELERATION = 13
+    HAS_Q_NEAR = 14
+    ARC_MODE = 14
+    OUTPUT_KIND = 12
+    OUTPUT_PIN = 13
+    OUTPUT_VALUE = 14
+    OUTPUT_DOMAIN = 15
+    HAS_TRIGGER_POSE = 16
+    STARTS_BEYOND = 17
+    DURATION = 18
+    BLEND = 19
+    TYPE = 20
+
+
+#: The 21 numbers of a point in the order of the table, before scaling.
+PointFields: TypeAlias = tuple[float, ...]
+
+_E = TypeVar('_E', bound=IntEnum)
+
+_TARGET_NAMES = tuple(f'target[{i}]' for i in range(6))
+_MOVE_END_NAMES = ('duration', 'blend_radius', 'motion type')
+_ARC_NAMES = (*_TARGET_NAMES, *NEWEST_DIALECT.move_word_names, *_MOVE_END_NAMES)
+_SPLINE_NAMES = (
+    *_TARGET_NAMES,
+    *(f'velocities[{i}]' for i in range(6)),
+    *(f'accelerations[{i}]' for i in range(6)),
+    'duration',
+    'kind',
+    'motion type',
+)
+_OUTPUT_NAMES = (
+    *(f'trigger_pose[{i}]' for i in range(6)),
+    *(f'trigger_direction[{i}]' for i in range(6)),
+    'output',
+    'pin',
+    'value',
+    'domain',
+    'has_trigger_pose',
+    'starts_beyond',
+    'delay',
+    'word 19',
+    'motion type',
+)
+
+#: Class -> motion type with joint positions, with a pose as target.
+_TYPES: dict[type[Primitive], tuple[MotionType, MotionType]] = {
+    MoveJ: (MotionType.MOVEJ, MotionType.MOVEJ_POSE),
+    MoveL: (MotionType.MOVEL_JOINT, MotionType.MOVEL),
+    MoveP: (MotionType.MOVEP_JOINT, MotionType.MOVEP),
+    OptimoveJ: (MotionType.OPTIMOVEJ, MotionType.OPTIMOVEJ_POSE),
+    OptimoveL: (MotionType.OPTIMOVEL_JOINT, MotionType.OPTIMOVEL),
+}
+#: Target is a pose, via is a pose -> motion type.
+_ARC_TYPES = {
+    (False, False): MotionType.MOVEC_JOINT,
+    (False, True): MotionType.MOVEC_JOINT_POSE,
+    (True, False): MotionType.MOVEC_POSE_JOINT,
+    (True, True): MotionType.MOVEC,
+}
+_MOVES = {types[is_pose]: (cls, is_pose) for cls, types in _TYPES.items() for is_pose in (0, 1)}
+_ARCS = {motion: kinds for kinds, motion in _ARC_TYPES.items()}
+_OPTIMOVES = frozenset(
+    motion for motion, (cls, _) in _MOVES.items() if cls in (OptimoveJ, OptimoveL)
+)
+
+
+def motion_type(primitive: Instruction) -> MotionType:
+    """
+    Return the wire's number for a primitive: its class and the kind of its target (and via).
+
+    :raises LocalProtocolError: it is no primitive, nor an output.
+    """
+    if isinstance(primitive, SwitchOutput):
+        return MotionType.SWITCH_OUTPUT
+    if isinstance(primitive, MoveC):
+        return _ARC_TYPES[isinstance(primitive.target, Pose), isinstance(primitive.via, Pose)]
+    if isinstance(primitive, Spline):
+        return MotionType.SPLINE
+    try:
+        return _TYPES[type(primitive)][isinstance(primitive.target, Pose)]
+    except KeyError:
+        raise LocalProtocolError(f'{primitive!r} is not a motion primitive.') from None
+
+
+def to_fields(primitive: Instruction, dialect: Dialect = NEWEST_DIALECT) -> PointFields:
+    """
+    Return the 21 numbers of a primitive in SI units, see the table above.
+
+    :raises LocalProtocolError: joint positions come with a q_near, which belongs to poses; or the
+        dialect has no such motion, or no q_near.
+    """
+    kind = motion_type(primitive)
+    if kind not in dialect.motion_types:
+        raise dialect.unsupported(f'{kind.name} (motion type {kind})')
+    if isinstance(primitive, SwitchOutput):
+        return _output_fields(primitive)
+    if isinstance(primitive, Spline):
+        return _spline_fields(primitive)
+    target, v, a = _numbers(primitive.target), primitive.velocity, primitive.acceleration
+    if isinstance(primitive, MoveC):
+        via, mode, radius = _numbers(primitive.via), primitive.mode, primitive.blend_radius
+        return (*target, *via, v, a, mode, 0, 0, 0, 0, radius, kind)
+    q_near = primitive.q_near
+    if q_near is not None and not isinstance(primitive.target, Pose):
+        raise LocalProtocolError(
+            f'{type(primitive).__name__} has joint positions as its target and a q_near; a q_near '
+            'goes with a pose only.'
+        )
+    words = dialect.encode_move(q_near, v, a)
+    duration = primitive.duration if isinstance(primitive, MoveJ | MoveL) else 0
+    return (*target, *words, duration, primitive.blend_radius, kind)
+
+
+def _output_fields(output: SwitchOutput) -> PointFields:
+    trigger_pose = output.trigger_pose
+    return (
+        *(_numbers(trigger_pose) if trigger_pose else ZERO6),
+        *output.trigger_direction,
+        output.output,
+        output.pin,
+        output.value,
+        output.domain,
+        trigger_pose is not None,
+        output.starts_beyond,
+        output.delay,
+        0,
+        MotionType.SWITCH_OUTPUT,
+    )
+
+
+def _spline_fields(piece: Spline) -> PointFields:
+    kind = SplineKind.CUBIC if piece.accelerations is None else SplineKind.QUINTIC
+    accelerations = piece.accelerations or ZERO6
+    numbers = (*piece.target, *piece.velocities, *accelerations, piece.duration)
+    return (*numbers, kind, MotionType.SPLINE)
+
+
+def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST_DIALECT) -> Instruction:
+    """
+    Return the primitive, or the output, of the 21 numbers.
+
+    :raises RemoteProtocolError: motion type, spline kind, arc mode or output is unknown.
+    """
+    kind = _enum_member(MotionType, fields[20], 'motion type (word 20)')
+    if kind not in dialect.motion_types:
+        raise RemoteProtocolError(
+            f'{kind:d} is an unknown motion type (word 20) in wire dialect {dialect.name}.'
+        )
+    if kind is MotionType.SPLINE:
+        return _spline(fields)
+    if kind is MotionType.SWITCH_OUTPUT:
+        return _output(fields)
+    return _arc(fields, *_ARCS[kind]) if kind in _ARCS else _move(fields, kind, dialect)
+
+
+def _spline(fields: Sequence[float]) -> Spline:
+    kind = _enum_member(SplineKind, fields[19], 'spline kind (word 19)')
+    return Spline(
+        target=_vector(fields[:6]),
+        velocities=_vector(fields[6:12]),
+        accelerations=_vector(fields[12:18]) if kind is SplineKind.QUINTIC else None,
+        duration=fields[18],
+    )
+
+
+def _output(fields: Sequence[float]) -> SwitchOutput:
+    trigger_pose = Pose.from_rotation_vector(_vector(fields[:6])) if fields[16] else None
+    return SwitchOutput(
+        output=_enum_member(OutputKind, fields[12], 'kind of output (word 12)'),
+        pin=int(fields[13]),
+        value=fields[14],
+        domain=_enum_member(AnalogDomain, fields[15], 'domain (word 15)'),
+        trigger_pose=trigger_pose,
+        trigger_direction=_vector(fields[6:12]),
+        starts_beyond=bool(fields[17]),
+        delay=fields[18],
+    )
+
+
+def _arc(fields: Sequence[float], target_is_pose: bool, via_is_pose: bool) -> MoveC:
+    return MoveC(
+        target=_target(fields[:6], target_is_pose),
+        via=_target(fields[6:12], via_is_pose),
+        velocity=fields[12],
+        acceleration=fields[13],
+        blend_radius=fields[19],
+        mode=_enum_member(ArcMode, fields[14], 'arc mode (word 14)'),
+    )
+
+
+def _move(fields: Sequence[float], kind: MotionType, dialect: Dialect) -> Primitive:
+    cls, is_pose = _MOVES[kind]
+    velocity_word, acceleration_word = dialect.speed_words
+    # Optimoves and MoveP have no duration.
+    duration = {'duration': fields[18]} if cls in (MoveJ, MoveL) else {}
+    return cast(type[MoveJ], cls)(
+        target=_target(fields[:6], bool(is_pose)),
+        q_near=_vector(fields[6:12]) if is_pose and dialect.has_q_near(fields) else None,
+        velocity=fields[velocity_word],
+        acceleration=fields[acceleration_word],
+        blend_radius=fields[19],
+        **duration,
+    )
+
+
+def check_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> None:
+    """
+    Refuse what URCL refuses to send: it would mean something else to the robot, or nothing.
+
+    :raises LocalProtocolError: names the field, its value, the bound and the dialect.
+    """
+    duration, blend, kind = fields[18], fields[19], fields[20]
+    if duration and (duration > dialect.max_duration or 0.0 < duration < dialect.min_duration):
+        raise _duration_error(duration, dialect)
+    if kind == MotionType.SWITCH_OUTPUT and not 0.0 <= duration <= dialect.max_duration:
+        raise LocalProtocolError(f'delay is {duration!r} s, but it must not be negative.')
+    if kind in (MotionType.SPLINE, MotionType.SWITCH_OUTPUT):
+        return
+    v_at, a_at = NEWEST_DIALECT.speed_words if kind in _ARCS else dialect.speed_words
+    velocity, acceleration = fields[v_at], fields[a_at]
+    if velocity < 0.0 or acceleration < 0.0 or blend < 0.0:
+        name, value = next(
+            (name, value)
+            for name, value in (
+                ('velocity', velocity),
+                ('acceleration', acceleration),
+                ('blend_radius', blend),
+            )
+            if value < 0.0
+        )
+        raise LocalProtocolError(f'{name} is {value!r}, but it must not be negative.')
+    if kind in _OPTIMOVES and not (0.0 < velocity <= 1.0 and 0.0 < acceleration <= 1.0):
+        raise LocalProtocolError(
+            f'velocity is {velocity!r} and acceleration is {acceleration!r}, but an optimove '
+            'takes fractions in (0, 1].'
+        )
+
+
+def _duration_error(duration: float, dialect: Dialect) -> LocalProtocolError:
+    if duration < dialect.min_duration:
+        return LocalProtocolError(
+            f'duration is {duration!r} s, but wire dialect {dialect.name} counts in '
+            f'{1.0 / dialect.time_scale:g} s, and 0 would mean that the velocity counts.'
+        )
+    return LocalProtocolError(
+        f'duration is {duration!r} s, but at most {dialect.max_duration} s can be sent in one '
+        f'point in wire dialect {dialect.name}.'
+    )
+
+
+def field_names(kind: float, dialect: Dialect) -> Sequence[str]:
+    """Return the names of the 21 numbers of a motion type, for errors."""
+    if kind == MotionType.SPLINE:
+        return _SPLINE_NAMES
+    if kind == MotionType.SWITCH_OUTPUT:
+        return _OUTPUT_NAMES
+    if kind in _ARCS:
+        return _ARC_NAMES
+    return (*_TARGET_NAMES, *dialect.move_word_names, *_MOVE_END_NAMES)
+
+
+def _numbers(target: Target) -> Vector6:
+    return target.rotation_vector() if isinstance(target, Pose) else target
+
+
+def _target(numbers: Sequence[float], is_pose: bool) -> Target:
+    vector = _vector(numbers)
+    return Pose.from_rotation_vector(vector) if is_pose else vector
+
+
+def _vector(numbers: Sequence[float]) -> Vector6:
+    a, b, c, d, e, f = numbers
+    return (a, b, c, d, e, f)
+
+
+def _enum_member(enum: type[_E], number: float, what: str) -> _E:
+    for member in enum:
+        if member == number:
+            return member
+    raise RemoteProtocolError(f'{number:g} is an unknown {what}.')
