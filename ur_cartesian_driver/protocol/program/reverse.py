@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The reverse interface: what the robot program shall do, and for how long it may believe that.
+The reverse interface: what the robot program shall do, and how long it may wait for news.
 
 One message is 8 big-endian int32, 32 bytes; S = 1,000,000. The robot sends nothing back.
 
 =====  ============  ======================================================================
 index  mode          meaning
 =====  ============  ======================================================================
-0      all           how long the robot's *next* read may take [ms]; 0 = for ever
+0      all           timeout of the robot's *next* read [ms]; 0 = none
 1 - 6  SERVOJ        joint positions [rad] x S
 1 - 6  SPEEDJ        joint velocities [rad/s] x S
 1 - 6  SPEEDL        twist of the tool [m/s, rad/s] x S
@@ -16,45 +16,41 @@ index  mode          meaning
 1 - 6  TORQUE        joint torques [Nm] x S
 1, 2   FORWARD       trajectory action, number of points, both unscaled
 1      FREEDRIVE     freedrive action, unscaled
-1 - 6  IDLE,         no meaning; URCL sends whatever is in memory
+1 - 6  IDLE,         no meaning; URCL sends uninitialized memory
        STOPPED
 7      all           control mode
 =====  ============  ======================================================================
 
 The sender must
 
-* send the next message before the time in word 0 is over, also when there is nothing to say
-  (:func:`keepalive`, or ``TrajectoryAction.NOOP`` while a trajectory runs): a read that times out
-  ends the robot program;
-* know that any FORWARD message, NOOP too, *enters* that mode and stops what ran before;
-* give START the number of points, and CANCEL in a stream the number of all points written since
+* send the next message before the timeout in word 0, even if nothing changes (:func:`keepalive`,
+  or ``TrajectoryAction.NOOP`` while a trajectory runs): a read that times out ends the robot
+  program;
+* know that every FORWARD message, also NOOP, *enters* that mode and stops what ran before;
+* give START the number of points, and CANCEL of a stream the number of all points written since
   STREAM_START;
-* end or cancel a stream before the next START, which would else swallow the new points.
+* end or cancel a stream before the next START; otherwise the stream takes the new points.
 
-``BUFFERED_SERVO`` is a mode of our own robot program, whose words 1 to 6 have no meaning either.
-The streams came with URCL 2.14 (see `dialects`). All else here
-has had its place and scale since URCL 2.0.
+``BUFFERED_SERVO`` is a mode of our own robot program; its words 1 to 6 have no meaning either.
+Streams came with URCL 2.14 (see `wire_dialects`). Everything else here has had its place and scale
+since URCL 2.0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 import struct
 from typing import cast, TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.motion.pose import Vector6
 from ur_cartesian_driver.protocol.framing import (
     checked_int32,
     checked_size,
-    from_fixed,
     hex_text,
     INT32_MAX,
     INT32_MIN,
     RecordDecoder,
-    to_fixed,
 )
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
@@ -62,14 +58,14 @@ from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_D
 class ControlMode(IntEnum):
     """Word 7: how the robot is controlled."""
 
-    #: The control loop of the robot program ends, the program around it goes on.
+    #: Ends the control loop of the robot program; the program around it continues.
     STOPPED = -2
     #: Initial value inside the robot program; never sent.
     UNINITIALIZED = -1
     IDLE = 0
     SERVOJ = 1
     SPEEDJ = 2
-    #: Trajectory forwarding: the points come over the trajectory interface.
+    #: Trajectories; the points come over the trajectory interface.
     FORWARD = 3
     SPEEDL = 4
     POSE = 5
@@ -77,8 +73,8 @@ class ControlMode(IntEnum):
     #: Used inside the robot program; never sent.
     TOOL_IN_CONTACT = 7
     TORQUE = 8
-    #: Ours alone: set-points come through RTDE registers (:mod:`~.registers`), are buffered and
-    #: fed to ``servoj``; the messages here are the leash, as in the other modes.
+    #: Our own program only: set-points come through RTDE registers (:mod:`~.registers`), are
+    #: buffered and fed to ``servoj``; the messages here keep it alive, as in the other modes.
     BUFFERED_SERVO = 100
 
 
@@ -103,7 +99,7 @@ class FreedriveAction(IntEnum):
 
 MESSAGE_FIELDS = 8
 MESSAGE_SIZE = 4 * MESSAGE_FIELDS
-#: Longest time between two set-points that the robot is allowed to bridge [ms].
+#: Longest time that the robot may bridge between two set-points [ms].
 MAX_REALTIME_TIMEOUT = 200
 #: Word 0 of a STOPPED message [ms].
 STOPPED_TIMEOUT = 100
@@ -120,13 +116,6 @@ REALTIME_MODES = (
     ControlMode.TORQUE,
 )
 _NEVER_SENT = (ControlMode.UNINITIALIZED, ControlMode.TOOL_IN_CONTACT)
-_VALUE_NAMES = {
-    ControlMode.SERVOJ: 'joint position',
-    ControlMode.SPEEDJ: 'joint velocity',
-    ControlMode.SPEEDL: 'tool speed',
-    ControlMode.POSE: 'pose',
-    ControlMode.TORQUE: 'torque',
-}
 
 MessageWords: TypeAlias = tuple[int, int, int, int, int, int]
 
@@ -136,9 +125,9 @@ _MESSAGE = struct.Struct('>8i')
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReverseMessage:
     """
-    One message as it stands on the wire; the builders below apply the rules.
+    One message as it is on the wire; the functions below apply the rules.
 
-    :param read_timeout: how long the robot's next read may take [ms], 0 = for ever.
+    :param read_timeout: timeout of the robot's next read [ms], 0 = none.
     :param payload: words 1 to 6, unscaled.
     :raises LocalProtocolError: a word does not fit, or the mode is never sent.
     """
@@ -152,8 +141,7 @@ class ReverseMessage:
         _refuse_internal_mode(self.mode)
         if not 0 <= self.read_timeout <= INT32_MAX:
             raise LocalProtocolError(
-                f'read_timeout is {self.read_timeout} ms, but it must lie within 0 and '
-                f'{INT32_MAX}.'
+                f'read_timeout is {self.read_timeout} ms, but must lie within 0 and {INT32_MAX}.'
             )
         if not INT32_MIN <= min(self.payload) <= max(self.payload) <= INT32_MAX:
             for index, word in enumerate(self.payload, 1):
@@ -179,13 +167,8 @@ class ReverseMessage:
             )
         except (ValueError, LocalProtocolError) as error:
             raise RemoteProtocolError(
-                f'A reverse message is wrong: {error} {hex_text(data)}'
+                f'Invalid reverse message: {error} {hex_text(data)}'
             ) from None
-
-    @property
-    def values(self) -> Vector6:
-        """Words 1 to 6 as the numbers that they are in a real-time mode, in SI units."""
-        return cast(Vector6, tuple(from_fixed(word) for word in self.payload))
 
 
 class ReverseDecoder(RecordDecoder[ReverseMessage]):
@@ -198,20 +181,20 @@ class ReverseDecoder(RecordDecoder[ReverseMessage]):
 
 def read_timeout_for(mode: ControlMode, requested: int, step_time: int = DEFAULT_STEP_TIME) -> int:
     """
-    Return word 0 for a wish [ms].
+    Return word 0 for a requested timeout [ms].
 
-    * Real-time modes: at least one step, at most 200 ms. They cannot wait for ever, because the
-      arm would go on moving.
-    * IDLE, FORWARD, FREEDRIVE, BUFFERED_SERVO: 0 = for ever, else at least one step.
+    * Real-time modes: at least one step, at most 200 ms. They cannot wait forever, because the
+      arm would continue to move.
+    * IDLE, FORWARD, FREEDRIVE, BUFFERED_SERVO: 0 = none, otherwise at least one step.
     * STOPPED: always 100 ms.
 
     :param step_time: controller cycle [ms].
-    :raises LocalProtocolError: the mode is never sent, or the wish is negative.
+    :raises LocalProtocolError: the mode is never sent, or the timeout is negative.
     """
     _refuse_internal_mode(mode)
     if requested < 0:
         raise LocalProtocolError(
-            f'read_timeout is {requested} ms, but it must not be negative (0 = for ever).'
+            f'read_timeout is {requested} ms, but must not be negative (0 = no timeout).'
         )
     if mode is ControlMode.STOPPED:
         return STOPPED_TIMEOUT
@@ -234,10 +217,7 @@ def trajectory(
     :raises LocalProtocolError: the dialect has no such action; a program would ignore it.
     """
     if action in _STREAMS and not dialect.supports_append:
-        raise LocalProtocolError(
-            f'{action.name} does not exist in wire dialect {dialect.name}: its trajectories have '
-            'a number of points that is known at their start.'
-        )
+        raise dialect.unsupported(f'{action.name} (a trajectory with an open end)')
     mode = ControlMode.FORWARD
     return ReverseMessage(
         read_timeout=read_timeout_for(mode, read_timeout, step_time),
@@ -246,46 +226,8 @@ def trajectory(
     )
 
 
-def freedrive(
-    action: FreedriveAction, read_timeout: int = 200, step_time: int = DEFAULT_STEP_TIME
-) -> ReverseMessage:
-    """Return the message that starts, ends or keeps alive freedrive."""
-    mode = ControlMode.FREEDRIVE
-    return ReverseMessage(
-        read_timeout=read_timeout_for(mode, read_timeout, step_time),
-        mode=mode,
-        payload=(action, 0, 0, 0, 0, 0),
-    )
-
-
-def setpoint(
-    mode: ControlMode,
-    values: Sequence[float],
-    read_timeout: int = 20,
-    step_time: int = DEFAULT_STEP_TIME,
-) -> ReverseMessage:
-    """
-    Return a set-point of a real-time mode.
-
-    :param values: six numbers, see the table above.
-    :raises LocalProtocolError: the mode takes no set-points, or a value cannot be sent.
-    """
-    if mode not in REALTIME_MODES or len(values) != 6:
-        raise LocalProtocolError(
-            f'{mode.name} with {len(values)} values is not a set-point: the modes are '
-            f'{", ".join(m.name for m in sorted(REALTIME_MODES))}, each with 6 values.'
-        )
-    name = _VALUE_NAMES[mode]
-    words = tuple(to_fixed(value, f'{name}[{i}]') for i, value in enumerate(values))
-    return ReverseMessage(
-        read_timeout=read_timeout_for(mode, read_timeout, step_time),
-        mode=mode,
-        payload=cast(MessageWords, words),
-    )
-
-
 def keepalive(read_timeout: int = 1000, step_time: int = DEFAULT_STEP_TIME) -> ReverseMessage:
-    """Return the message that says: stand still, and wait for the next one."""
+    """Return the message that asks the robot to stand still and wait for the next one."""
     mode = ControlMode.IDLE
     return ReverseMessage(read_timeout=read_timeout_for(mode, read_timeout, step_time), mode=mode)
 
@@ -303,4 +245,4 @@ def stop() -> ReverseMessage:
 
 def _refuse_internal_mode(mode: ControlMode) -> None:
     if mode in _NEVER_SENT:
-        raise LocalProtocolError(f'Control mode {mode.name} exists inside the robot program only.')
+        raise LocalProtocolError(f'Control mode {mode.name} exists only inside the robot program.')

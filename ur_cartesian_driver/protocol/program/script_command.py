@@ -35,11 +35,11 @@ Poses are ``x y z rx ry rz`` [m, rad] here, as the robot writes them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from enum import IntEnum
 import struct
-from typing import ClassVar, TypeAlias
+from typing import Any, ClassVar, get_args, TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.motion.goal import ZERO6
@@ -96,6 +96,9 @@ COMMAND_WORDS = 28
 COMMAND_SIZE = 4 * COMMAND_WORDS
 _COMMAND = struct.Struct('>28i')
 
+Flags6: TypeAlias = tuple[bool, bool, bool, bool, bool, bool]
+#: Six numbers, limited to [0, 1] when they are sent.
+Fractions6: TypeAlias = Vector6
 #: Software version: major, minor, bugfix.
 SoftwareVersion: TypeAlias = tuple[int, int, int]
 
@@ -145,7 +148,7 @@ class StartForceModeCommand:
 
     command: ClassVar = ScriptCommand.START_FORCE_MODE
     task_frame: Vector6
-    selection: tuple[bool, bool, bool, bool, bool, bool]
+    selection: Flags6
     wrench: Vector6
     type: int
     limits: Vector6
@@ -221,8 +224,8 @@ class SetFrictionScalesCommand:
     """Scale the friction compensation of each joint; what lies outside [0, 1] is limited."""
 
     command: ClassVar = ScriptCommand.SET_FRICTION_SCALES
-    viscous: Vector6
-    coulomb: Vector6
+    viscous: Fractions6
+    coulomb: Fractions6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -280,7 +283,7 @@ def decode(data: bytes) -> AnyScriptCommand:
     """
     number, *words = _COMMAND.unpack(checked_size(data, COMMAND_SIZE, 'script command'))
     try:
-        return _READERS[ScriptCommand(number)](words, [from_fixed(word) for word in words])
+        return _command(ScriptCommand(number), words)
     except (ValueError, LocalProtocolError) as error:
         raise RemoteProtocolError(f'A script command is wrong: {error} {hex_text(data)}') from None
 
@@ -303,89 +306,84 @@ class ToolContactResultDecoder(ResultDecoder[ToolContactResult]):
 
 def _words(command: AnyScriptCommand) -> list[int]:
     """Return the words after the number."""
-    match command:
-        case SetPayloadCommand():
-            return [to_fixed(command.mass, 'mass'), *_scaled_all(command.cog, 'cog')]
-        case SetToolVoltageCommand():
-            return [to_fixed(command.voltage, 'voltage')]
-        case StartForceModeCommand():
-            return [
-                *_scaled_all(command.task_frame, 'task_frame'),
-                *(FIXED_POINT * bool(selected) for selected in command.selection),
-                *_scaled_all(command.wrench, 'wrench'),
-                to_fixed(command.type, 'type'),
-                *_scaled_all(command.limits, 'limits'),
-                to_fixed(command.damping, 'damping'),
-                to_fixed(command.gain_scaling, 'gain_scaling'),
-            ]
-        case SetFrictionCompensationCommand():
-            return [int(command.enabled)]
-        case FtRtdeInputEnableCommand():
-            return [
-                int(command.enabled),
-                to_fixed(command.sensor_mass, 'sensor_mass'),
-                *_scaled_all(command.sensor_offset, 'sensor_offset'),
-                *_scaled_all(command.sensor_cog, 'sensor_cog'),
-            ]
-        case SetGravityCommand():
-            return _scaled_all(command.gravity, 'gravity')
-        case SetTcpOffsetCommand():
-            return [*_scaled_all(command.offset, 'offset'), int(command.persistence)]
-        case SetFrictionScalesCommand():
-            # URCL limits these where it refuses other values; the bytes shall be the same.
-            return [
-                *_scaled_all([min(max(v, 0.0), 1.0) for v in command.viscous], 'viscous'),
-                *_scaled_all([min(max(v, 0.0), 1.0) for v in command.coulomb], 'coulomb'),
-            ]
-        case SetTargetPayloadCommand():
-            return [
-                to_fixed(command.mass, 'mass'),
-                *_scaled_all(command.cog, 'cog'),
-                *_scaled_all(command.inertia, 'inertia'),
-                to_fixed(command.transition_time, 'transition_time'),
-            ]
-    return []
+    return [
+        word
+        for field in fields(command)
+        for word in _ARGUMENTS[str(field.type)].encode(getattr(command, field.name), field.name)
+    ]
 
 
-#: The raw and the scaled words after the number -> the command.
-_READERS: Mapping[ScriptCommand, Callable[[list[int], list[float]], AnyScriptCommand]] = {
-    ScriptCommand.ZERO_FTSENSOR: lambda _, v: ZeroFtSensorCommand(),
-    ScriptCommand.SET_PAYLOAD: lambda _, v: SetPayloadCommand(mass=v[0], cog=_three(v[1:4])),
-    ScriptCommand.SET_TOOL_VOLTAGE: lambda _, v: SetToolVoltageCommand(
-        voltage=_as_int(v[0], 'voltage')
+def _command(number: ScriptCommand, words: Sequence[int]) -> AnyScriptCommand:
+    """Return the command of a number and the words after it."""
+    command: type[AnyScriptCommand] = _COMMANDS[number]
+    values: dict[str, Any] = {}
+    start = 0
+    for field in fields(command):
+        argument = _ARGUMENTS[str(field.type)]
+        values[field.name] = argument.decode(words[start : start + argument.count], field.name)
+        start += argument.count
+    return command(**values)
+
+
+@dataclass(frozen=True, slots=True)
+class _Words:
+    """
+    An argument on the wire.
+
+    :param count: number of words.
+    :param encode: value and name to words.
+    :param decode: words and name to the value.
+    """
+
+    count: int
+    encode: Callable[[Any, str], Iterable[int]]
+    decode: Callable[[Sequence[int], str], Any]
+
+
+def _vector(count: int) -> _Words:
+    return _Words(
+        count,
+        lambda values, name: [to_fixed(v, f'{name}[{i}]') for i, v in enumerate(values)],
+        lambda words, _: tuple(map(from_fixed, words)),
+    )
+
+
+def _raw(kind: type[int]) -> _Words:
+    """Return a word that is not scaled, of a kind of integer."""
+    return _Words(1, lambda value, _: [int(value)], lambda words, _: kind(words[0]))
+
+
+def _as_int(value: float, field: str) -> int:
+    if value != int(value):
+        raise LocalProtocolError(f'{field} is {value!r}, but it must be a whole number.')
+    return int(value)
+
+
+_FLOAT = _Words(
+    1, lambda value, name: [to_fixed(value, name)], lambda words, _: from_fixed(words[0])
+)
+_VECTOR6 = _vector(6)
+#: By the annotation of the field; the fields of a command stand in the order of the wire.
+_ARGUMENTS: Mapping[str, _Words] = {
+    'float': _FLOAT,
+    'int': _Words(1, _FLOAT.encode, lambda words, name: _as_int(from_fixed(words[0]), name)),
+    'bool': _raw(bool),
+    'TcpPersistence': _raw(TcpPersistence),
+    'Vector3': _vector(3),
+    'Vector6': _VECTOR6,
+    # URCL limits these where it refuses other values; the bytes have to be the same.
+    'Fractions6': _Words(
+        6,
+        lambda values, name: _VECTOR6.encode([min(max(v, 0.0), 1.0) for v in values], name),
+        _VECTOR6.decode,
     ),
-    ScriptCommand.START_FORCE_MODE: lambda _, v: StartForceModeCommand(
-        task_frame=_six(v[0:6]),
-        selection=_flags(v[6:12]),
-        wrench=_six(v[12:18]),
-        type=_as_int(v[18], 'type'),
-        limits=_six(v[19:25]),
-        damping=v[25],
-        gain_scaling=v[26],
-    ),
-    ScriptCommand.END_FORCE_MODE: lambda _, v: EndForceModeCommand(),
-    ScriptCommand.START_TOOL_CONTACT: lambda _, v: StartToolContactCommand(),
-    ScriptCommand.END_TOOL_CONTACT: lambda _, v: EndToolContactCommand(),
-    ScriptCommand.SET_FRICTION_COMPENSATION: lambda raw, _: SetFrictionCompensationCommand(
-        enabled=raw[0] != 0
-    ),
-    ScriptCommand.FT_RTDE_INPUT_ENABLE: lambda raw, v: FtRtdeInputEnableCommand(
-        enabled=raw[0] != 0,
-        sensor_mass=v[1],
-        sensor_offset=_three(v[2:5]),
-        sensor_cog=_three(v[5:8]),
-    ),
-    ScriptCommand.SET_GRAVITY: lambda _, v: SetGravityCommand(gravity=_three(v[0:3])),
-    ScriptCommand.SET_TCP_OFFSET: lambda raw, v: SetTcpOffsetCommand(
-        offset=_six(v[0:6]), persistence=TcpPersistence(raw[6])
-    ),
-    ScriptCommand.SET_FRICTION_SCALES: lambda _, v: SetFrictionScalesCommand(
-        viscous=_six(v[0:6]), coulomb=_six(v[6:12])
-    ),
-    ScriptCommand.SET_TARGET_PAYLOAD: lambda _, v: SetTargetPayloadCommand(
-        mass=v[0], cog=_three(v[1:4]), inertia=_six(v[4:10]), transition_time=v[10]
+    'Flags6': _Words(
+        6,
+        lambda values, _: [FIXED_POINT * bool(value) for value in values],
+        lambda words, _: tuple(word != 0 for word in words),
     ),
 }
+_COMMANDS: Mapping[ScriptCommand, Any] = {cls.command: cls for cls in get_args(AnyScriptCommand)}
 
 
 def _check_version(command: ScriptCommand, version: SoftwareVersion) -> None:
@@ -407,28 +405,3 @@ def _dotted(version: SoftwareVersion) -> str:
 def _check_range(name: str, value: float, low: float, high: float) -> None:
     if not low <= value <= high:
         raise LocalProtocolError(f'{name} is {value!r}, but it must lie within {low} and {high}.')
-
-
-def _scaled_all(values: Sequence[float], field: str) -> list[int]:
-    return [to_fixed(value, f'{field}[{i}]') for i, value in enumerate(values)]
-
-
-def _as_int(value: float, field: str) -> int:
-    if value != int(value):
-        raise LocalProtocolError(f'{field} is {value!r}, but it must be a whole number.')
-    return int(value)
-
-
-def _three(values: Sequence[float]) -> Vector3:
-    x, y, z = values
-    return (x, y, z)
-
-
-def _six(values: Sequence[float]) -> Vector6:
-    a, b, c, d, e, f = values
-    return (a, b, c, d, e, f)
-
-
-def _flags(values: Sequence[float]) -> tuple[bool, bool, bool, bool, bool, bool]:
-    a, b, c, d, e, f = (value != 0.0 for value in values)
-    return (a, b, c, d, e, f)
