@@ -29,7 +29,7 @@ from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
 from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.sim import SimulatedRobot
-from ur_cartesian_driver.sim.faults.injector import AfterTime
+from ur_cartesian_driver.sim.faults.fault_values import AfterTime
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 pytestmark = pytest.mark.skipif(

@@ -15,7 +15,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.sim.builtins.motion_builtins import FreedriveState
+from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 

@@ -22,9 +22,9 @@ from ur_cartesian_driver.protocol.rtde.rtde_client import (
     RtdeClientCodec,
 )
 from ur_cartesian_driver.sim import SimulatorConfig
-from ur_cartesian_driver.sim.builtins.motion_builtins import FreedriveState
-from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.assembly import assemble
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
+from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState
 from ur_cartesian_driver.sim.programs.script_upload import UploadDecoder
 
 pytestmark = pytest.mark.slow
@@ -55,7 +55,7 @@ class ExternalController:
     """The guide's other side: writes registers, one package in each cycle, and reads packets."""
 
     def __init__(self):
-        self.controller = Controller(SimulatorConfig())
+        self.controller = assemble(SimulatorConfig()).controller
         self._session = RtdeSession(self.controller, set())
         self._client = RtdeClientCodec(
             OUTPUTS, [MODE, SEQUENCE, ERROR, SYNC, *JOINTS, *THRESHOLDS, STATE_TIME]

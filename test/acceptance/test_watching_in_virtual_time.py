@@ -24,7 +24,7 @@ from ur_cartesian_driver.protocol.program.reverse import ReverseDecoder, Traject
 from ur_cartesian_driver.protocol.rtde.rtde_client import OUTPUT_TYPES, Recipe
 from ur_cartesian_driver.protocol.rtde.rtde_packages import RtdeFrameBuffer
 from ur_cartesian_driver.robot.rtde.state_recipe import OPTIONAL_FIELDS, REQUIRED_FIELDS
-from ur_cartesian_driver.sim.faults.injector import (
+from ur_cartesian_driver.sim.faults.fault_values import (
     AfterDistance,
     AfterTime,
     DeviationFault,

@@ -9,7 +9,12 @@ import pytest
 from ur_cartesian_driver.cli import commands, main, parser
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.sim.calibration import random_calibration
-from ur_cartesian_driver.sim.faults.injector import AfterTime, DropFault, EventFault, FaultEvent
+from ur_cartesian_driver.sim.faults.fault_values import (
+    AfterTime,
+    DropFault,
+    EventFault,
+    FaultEvent,
+)
 
 
 def test_a_fault_that_is_not_understood_is_one_sentence_with_the_word(capsys):

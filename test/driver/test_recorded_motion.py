@@ -25,7 +25,7 @@ from ur_cartesian_driver.motion.goal import (
 )
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
-from ur_cartesian_driver.sim.faults.injector import (
+from ur_cartesian_driver.sim.faults.fault_values import (
     AfterDistance,
     EventFault,
     FaultEvent,

@@ -9,7 +9,7 @@ from fault_table import CONTINUED, HEADLESS, LOCAL, PHASES
 import pytest
 from robot_cell import run_cell
 
-import ur_cartesian_driver.sim.faults.injector as faults
+import ur_cartesian_driver.sim.faults.fault_values as faults
 
 pytestmark = pytest.mark.slow
 

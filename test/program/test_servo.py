@@ -25,7 +25,7 @@ from ur_cartesian_driver.protocol.program.reverse import (
     TrajectoryAction,
 )
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
-from ur_cartesian_driver.sim.builtins.motion_builtins import FreedriveState
+from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState
 
 pytestmark = pytest.mark.slow
 

@@ -11,7 +11,7 @@ from robot_ports import FREE
 
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.sim import SimulatedRobot
-from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.assembly import assemble
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 
 
@@ -20,7 +20,7 @@ class Bench:
 
     def __init__(self, **settings: object) -> None:
         # The fields have types of their own; SimulatorConfig checks the values that tests give.
-        self.controller = Controller(SimulatorConfig(**settings))  # type: ignore[arg-type]
+        self.controller, self.faults = assemble(SimulatorConfig(**settings))  # type: ignore[arg-type]
         self.programs = self.controller.programs
 
     @property

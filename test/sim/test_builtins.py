@@ -16,7 +16,8 @@ import pytest
 
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.sim.builtins import controller_builtins, refuse_timed_functions
+from ur_cartesian_driver.sim.builtins import controller_builtins
+from ur_cartesian_driver.sim.programs.secondary_builtins import refuse_timed_functions
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 from ur_cartesian_driver.urscript.script_values import ScriptPose
 
@@ -127,12 +128,10 @@ def value(function, position, item):
     return ScriptPose(*item) if is_vector else item
 
 
-def rotation(function, numbers):
+def rotation(builtins, function, numbers):
     """Return what a result turns by, however it is written."""
     if function == 'rotvec2rpy':
-        from ur_cartesian_driver.sim.builtins.pose_builtins import PoseBuiltins
-
-        numbers = PoseBuiltins().rpy2rotvec(list(numbers))
+        numbers = builtins['rpy2rotvec'](list(numbers))
     return Pose((0.0, 0.0, 0.0), quaternion_from_rotation_vector(tuple(numbers[-3:])))
 
 
@@ -142,11 +141,15 @@ def rotation(function, numbers):
 def test_pose_arithmetic_agrees_with_independent_values(bench, case):
     function, expected = case['function'], case['expected']
     arguments = [value(function, i, item) for i, item in enumerate(case['args'])]
-    result = controller_builtins(bench.controller)[function](*arguments)
+    builtins = controller_builtins(bench.controller)
+    result = builtins[function](*arguments)
     tolerance = case.get('tolerance', 1e-6 if case.get('near_pi') else 1e-8)
     if case.get('near_pi') or case.get('near_gimbal_lock'):
         assert list(result)[:-3] == pytest.approx(expected[:-3], abs=tolerance)
-        assert rotation(function, result).angle_to(rotation(function, expected)) < 1e-6
+        assert (
+            rotation(builtins, function, result).angle_to(rotation(builtins, function, expected))
+            < 1e-6
+        )
     elif isinstance(expected, list):
         assert list(result) == pytest.approx(expected, abs=tolerance)
     else:

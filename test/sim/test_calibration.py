@@ -16,7 +16,7 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     KinematicsInfo,
     PrimaryDecoder,
 )
-from ur_cartesian_driver.sim import Controller, SimulatorConfig
+from ur_cartesian_driver.sim import assemble, SimulatorConfig
 from ur_cartesian_driver.sim.calibration import random_calibration, read_calibration
 from ur_cartesian_driver.sim.interfaces.primary_stream import PrimaryStream
 
@@ -136,7 +136,7 @@ def test_the_robot_moves_and_reports_by_its_calibration(make_bench):
 
 def test_the_primary_interface_reports_the_table():
     geometry = random_calibration(UR5E, 4)
-    stream = PrimaryStream(Controller(SimulatorConfig(geometry=geometry)))
+    stream = PrimaryStream(assemble(SimulatorConfig(geometry=geometry)).controller)
     (state,) = PrimaryDecoder().feed(stream.state())
     (info,) = (package for package in state.packages if isinstance(package, KinematicsInfo))
     assert (info.theta, info.a, info.d, info.alpha) == (

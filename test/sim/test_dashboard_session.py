@@ -9,7 +9,7 @@ import re
 import pytest
 
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.assembly import assemble
 from ur_cartesian_driver.sim.interfaces.dashboard_session import COMMANDS, DashboardSession
 from ur_cartesian_driver.sim.interfaces.tcp_server import HangUp
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
@@ -63,14 +63,14 @@ class Desk:
 
     def __init__(self, major: int, minor: int, **settings: object) -> None:
         # The fields have types of their own; SimulatorConfig checks the values that tests give.
-        self.controller = Controller(
+        self.controller = assemble(
             SimulatorConfig(
                 model='ur5' if major < 5 else 'ur5e',
                 polyscope=f'{major}.{minor}',
                 programs={'a.urp': PROGRAM},
                 **settings,
             )
-        )  # type: ignore[arg-type]
+        ).controller  # type: ignore[arg-type]
         self.session = DashboardSession(self.controller)
         self.ask('load a.urp')
 

@@ -11,14 +11,14 @@ from rtde_requests import setup_outputs, START, VERSION_2
 
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
-from ur_cartesian_driver.sim import Controller, MemorySockets, SimulatorConfig
+from ur_cartesian_driver.sim import assemble, MemorySockets, SimulatorConfig
 from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
-from ur_cartesian_driver.sim.faults.impaired_sockets import ImpairedSockets
-from ur_cartesian_driver.sim.faults.impairment import DelayLine, ImpairedConnection, Impairment
-from ur_cartesian_driver.sim.faults.injector import (
+from ur_cartesian_driver.sim.faults.fault_values import (
     DEVIATION_AXES,
     DeviationFault,
 )
+from ur_cartesian_driver.sim.faults.impaired_sockets import ImpairedSockets
+from ur_cartesian_driver.sim.faults.impairment import DelayLine, ImpairedConnection, Impairment
 from ur_cartesian_driver.sim.interfaces.rtde_output_values import output_getter
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 
@@ -31,7 +31,7 @@ DOWN = UP.replace('0.2', '-0.2')
 
 def add(bench, *texts):
     for text in texts:
-        bench.controller.faults.add(parse_fault(text))
+        bench.faults.add(parse_fault(text))
 
 
 def z(bench):
@@ -75,17 +75,17 @@ def test_a_fault_happens_where_the_tool_crosses_a_plane_from_either_side(bench, 
 
 
 def test_a_robot_without_faults_has_nothing_to_do_for_them(bench):
-    assert not bench.controller.faults.active
+    assert not bench.faults.active
     add(bench, 'slider 0.5', 'offset pose x 0.1 for 0.1 s')
-    assert bench.controller.faults.active
+    assert bench.faults.active
     bench.wait(0.2)
-    assert not bench.controller.faults.active
+    assert not bench.faults.active
 
 
 def test_cleared_faults_do_not_happen_and_no_longer_last(bench):
     add(bench, 'protective_stop at 0.1 s', 'offset pose x 0.1')
     bench.step()
-    bench.controller.faults.clear()
+    bench.faults.clear()
     bench.wait(0.5)
     assert not stopped(bench)
     assert read(bench, 'actual_TCP_pose') == read(bench, 'target_TCP_pose')
@@ -255,10 +255,8 @@ def test_programs_measure_the_same(bench):
 
 def noisy_packages(seed=0, cycles=200):
     """The bytes that an RTDE client gets from a robot with noise."""
-    controller = Controller(SimulatorConfig())
-    controller.faults.add(
-        DeviationFault(quantity='pose', axis='x', shape='noise', amount=1e-3, seed=seed)
-    )
+    controller, faults = assemble(SimulatorConfig())
+    faults.add(DeviationFault(quantity='pose', axis='x', shape='noise', amount=1e-3, seed=seed))
     session = RtdeSession(controller, set())
     for request in (VERSION_2, setup_outputs('actual_TCP_pose', 'actual_q'), START):
         session.feed(request)
@@ -339,9 +337,10 @@ ECHO = """
 def talk(bench):
     """A program that talks to us, in memory: the bench and our end of the connection."""
     memory = MemorySockets()
-    bench.controller = controller = Controller(SimulatorConfig(), ImpairedSockets(memory))
+    controller, bench.faults = assemble(SimulatorConfig(), ImpairedSockets(memory))
+    bench.controller = controller
     bench.programs = controller.programs
-    controller.faults.interfaces['sockets'] = controller.sockets
+    bench.faults.interfaces['sockets'] = controller.sockets
     accepted = memory.listen(50001)
     bench.start(ECHO)
     bench.until(lambda: bool(accepted))

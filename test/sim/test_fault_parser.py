@@ -8,7 +8,7 @@ import pytest
 
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
-from ur_cartesian_driver.sim.faults.injector import (
+from ur_cartesian_driver.sim.faults.fault_values import (
     AfterDistance,
     AfterTime,
     DelayFault,

@@ -13,7 +13,7 @@ from rtde_requests import setup_outputs, START, VERSION_2
 
 from ur_cartesian_driver.motion.state import SafetyMode
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
-from ur_cartesian_driver.sim.faults.injector import (
+from ur_cartesian_driver.sim.faults.fault_values import (
     GarbageFault,
     HalfOpenFault,
     SpeedSliderFault,

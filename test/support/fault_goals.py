@@ -37,7 +37,7 @@ from ur_cartesian_driver.planning.append.append_planner import plan_append, plan
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.protocol.program.reverse import ControlMode, TrajectoryAction
 from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
-from ur_cartesian_driver.sim.builtins.motion_builtins import FreedriveState
+from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState
 
 #: Side of the way around two corners, and size of the blends there [m].
 SIDE, BLEND = 0.05, 0.015

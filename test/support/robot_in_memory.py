@@ -22,7 +22,7 @@ from ur_cartesian_driver.protocol.program.trajectory_points import (
     encode_points,
     TrajectoryResultDecoder,
 )
-from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.assembly import assemble
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets
 from ur_cartesian_driver.sim.state.power_and_safety import OPERATIONAL, SafetyEvent
@@ -69,7 +69,7 @@ class RobotInMemory:
         self._accepted = {
             port: self._sockets.listen(port) for port in (REVERSE, TRAJECTORY, COMMAND)
         }
-        self.controller = Controller(config, self._sockets)
+        self.controller = assemble(config, self._sockets).controller
         program = render(
             ProgramSettings(
                 host='driver',

@@ -20,7 +20,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_client import (
     RtdeClientCodec,
 )
 from ur_cartesian_driver.sim import SimulatorConfig
-from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.assembly import assemble
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 from ur_cartesian_driver.sim.programs.script_upload import UploadDecoder
 
@@ -34,7 +34,7 @@ class GuideCell:
     """A UR5e that runs the sample of the guide, or another program, and one client of RTDE."""
 
     def __init__(self, program=GUIDE):
-        self.controller = Controller(SimulatorConfig())
+        self.controller = assemble(SimulatorConfig()).controller
         self._session = RtdeSession(self.controller, set())
         self._client = RtdeClientCodec(OUTPUTS, registers.SERVO_INPUTS)
         data, ready = self._client.start(), []

@@ -21,7 +21,7 @@ from ur_cartesian_driver.cli import commands, recording_plot, validate_command
 from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
-from ur_cartesian_driver.sim.faults.injector import Fault
+from ur_cartesian_driver.sim.faults.fault_values import Fault
 
 
 def main(argv: Sequence[str] | None = None) -> int:

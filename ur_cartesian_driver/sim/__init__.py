@@ -3,10 +3,11 @@
 """
 A simulated UR controller: it interprets the URScript it is sent and knows nothing of any program.
 
-:class:`SimulatedRobot` is the product, a robot on the ports of a real one. :class:`Controller` is
-the same without network and clock, for tests that count cycles.
+:class:`SimulatedRobot` is the product, a robot on the ports of a real one. :func:`assemble` makes
+its :class:`Controller` without network and clock, for tests that count cycles.
 """
 
+from ur_cartesian_driver.sim.assembly import assemble
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.robot import Ports, RobotSnapshot, SimulatedRobot
 from ur_cartesian_driver.sim.simulator_config import HOME, SimulatorConfig
@@ -20,4 +21,5 @@ __all__ = [
     'RobotSnapshot',
     'SimulatedRobot',
     'SimulatorConfig',
+    'assemble',
 ]

@@ -10,7 +10,8 @@ runs as well under a virtual clock; whoever drives it calls its methods between 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
+from typing import Protocol
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.pose import Pose, Vector3, Vector6
@@ -21,14 +22,13 @@ from ur_cartesian_driver.motion.state import (
     SafetyMode,
     SafetyStatus,
 )
-from ur_cartesian_driver.sim.builtins import controller_builtins
-from ur_cartesian_driver.sim.builtins.motion_builtins import FreedriveState, MotionOwnership
-from ur_cartesian_driver.sim.faults.injector import FaultInjector
 from ur_cartesian_driver.sim.motion import MotionGenerator
 from ur_cartesian_driver.sim.motion.actual_motion import ActualMotion
+from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState, MotionOwnership
 from ur_cartesian_driver.sim.programs.interpreter_mode import InterpreterMode
 from ur_cartesian_driver.sim.programs.program_runner import ProgramRunner
 from ur_cartesian_driver.sim.programs.rtde_watchdog import Watchdogs
+from ur_cartesian_driver.sim.programs.secondary_builtins import Builtins
 from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets, ScriptSockets
 from ur_cartesian_driver.sim.state.controller_io import ControllerIo
@@ -54,14 +54,30 @@ _MAX_HISTORY = 100
 _MAX_POPUPS = 100
 
 
-class Controller:
-    """A robot without its network; see the module."""
+class CycleFaults(Protocol):
+    """The faults of a controller, as its cycle sees them."""
 
-    def __init__(self, config: SimulatorConfig, sockets: ScriptSockets | None = None) -> None:
+    #: Whether there is anything to do in a cycle.
+    active: bool
+
+    def step(self) -> None:
+        """Let happen what is due in this cycle."""
+
+
+class Controller:
+    """A robot without its network; `sim.assembly` puts it together."""
+
+    def __init__(
+        self,
+        config: SimulatorConfig,
+        make_builtins: Callable[[Controller], Builtins],
+        sockets: ScriptSockets | None = None,
+    ) -> None:
         """
         Begin as configured, with the arm at rest.
 
-        :param sockets: what programs connect with; None = in memory, to be listened to by tests.
+        :param make_builtins: returns the functions that programs can call.
+        :param sockets: what programs connect with; None = in memory, for tests.
         """
         self.config = config
         self.cycle = config.cycle
@@ -97,13 +113,11 @@ class Controller:
         self.speed_slider = 1.0
         self.scale = 1.0
         self._joint_history: deque[Vector6] = deque([config.q] * _MAX_HISTORY, maxlen=_MAX_HISTORY)
-        self.programs: ProgramRunner = ProgramRunner(
-            controller_builtins(self), self.messages, self
-        )
+        self.programs: ProgramRunner = ProgramRunner(make_builtins(self), self.messages, self)
         self.interpreter_mode = InterpreterMode(self.programs, self.ownership)
         self.programs.on_end = self.sockets.close_all
         self.messages.on_error = self._pause_if_wanted
-        self.faults = FaultInjector(self)
+        self.faults: CycleFaults | None = None
 
     # What it reports
 
@@ -154,7 +168,7 @@ class Controller:
     def step(self) -> None:
         """Compute one cycle."""
         self.cycles += 1
-        if self.faults.active:
+        if self.faults is not None and self.faults.active:
             self.faults.step()
         self.power.step(self.time)
         self.sockets.poll()

@@ -20,11 +20,12 @@ from typing import Any, TypeVar
 
 from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.sim.assembly import assemble
 from ur_cartesian_driver.sim.clock import Clock, Lateness, RealClock, VirtualClock
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.faults.fault_parser import parse_fault
+from ur_cartesian_driver.sim.faults.fault_values import Fault
 from ur_cartesian_driver.sim.faults.impaired_sockets import ImpairedSockets
-from ur_cartesian_driver.sim.faults.injector import Fault
 from ur_cartesian_driver.sim.interfaces.dashboard_session import DashboardSession
 from ur_cartesian_driver.sim.interfaces.interpreter_session import InterpreterSession
 from ur_cartesian_driver.sim.interfaces.primary_session import PrimarySession, ScriptSession
@@ -106,7 +107,7 @@ class SimulatedRobot:
         #: Called with the port and the bytes that a program's socket received, in our thread.
         self.on_socket_data: Callable[[int, bytes], None] | None = None
         impaired = ImpairedSockets(sockets or TcpScriptSockets(self._on_socket_data))
-        self.controller = Controller(self.config, impaired)
+        self.controller, self._faults = assemble(self.config, impaired)
         taken_inputs: set[str] = set()
         self._rtde = TcpServer('RTDE', lambda: RtdeSession(self.controller, taken_inputs))
         self._primary = TcpServer('primary', lambda: PrimarySession(self.controller))
@@ -122,7 +123,7 @@ class SimulatedRobot:
             self._dashboard,
             self._interpreter,
         )
-        self.controller.faults.interfaces = {'sockets': impaired} | {
+        self._faults.interfaces = {'sockets': impaired} | {
             server.name.lower().replace('-', ''): server for server in self._servers
         }
         self.inject(*self.config.faults)
@@ -302,15 +303,15 @@ class SimulatedRobot:
         """
         parsed = [parse_fault(f) if isinstance(f, str) else f for f in faults]
 
-        def add(controller: Controller) -> None:
+        def add(_: Controller) -> None:
             for fault in parsed:
-                controller.faults.add(fault)
+                self._faults.add(fault)
 
         self.call(add)
 
     def clear_faults(self) -> None:
         """Forget the faults to come and end those that last; what has happened stays."""
-        self.call(lambda controller: controller.faults.clear())
+        self.call(lambda _: self._faults.clear())
 
     def set_speed_slider(self, fraction: float) -> None:
         """Move the speed slider, 0..1."""

@@ -11,7 +11,7 @@ from typing import Literal
 
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model, RobotModel
 from ur_cartesian_driver.motion.pose import Vector6
-from ur_cartesian_driver.sim.faults.injector import Fault
+from ur_cartesian_driver.sim.faults.fault_values import Fault
 
 #: Upright enough to move anywhere, away from every singularity [rad].
 HOME: Vector6 = (0.0, -pi / 2, pi / 2, -pi / 2, -pi / 2, 0.0)
@@ -61,7 +61,7 @@ class SimulatorConfig:
     brake_release_time: float = 0.5
     #: How fast time passes against the wall clock; 0 = as fast as it can.
     rate: float = 1.0
-    #: What goes wrong, as `sim.faults.injector` or in words; times count from
+    #: What goes wrong, as `sim.faults.fault_values` or in words; times count from
     #: the first cycle.
     faults: Sequence[Fault | str] = ()
     #: Programs that the dashboard can load: file name -> URScript.

@@ -8,7 +8,7 @@ import pytest
 
 from ur_cartesian_driver.protocol.rtde.rtde_client import HandshakeDone, RtdeClientCodec
 from ur_cartesian_driver.sim import SimulatorConfig
-from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.assembly import assemble
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 
 OUTPUTS = (
@@ -42,7 +42,7 @@ sliders = st.lists(st.tuples(st.integers(1, 400), st.floats(0.1, 1.0)), max_size
 
 def packets(body, changes, cycles=400):
     """Return the bytes that an RTDE client reads while a program runs."""
-    controller = Controller(SimulatorConfig())
+    controller = assemble(SimulatorConfig()).controller
     session = RtdeSession(controller, set())
     client = RtdeClientCodec(OUTPUTS, ['speed_slider_mask', 'speed_slider_fraction'])
     data, ready = client.start(), []

@@ -5,11 +5,17 @@
 from __future__ import annotations
 
 from math import isfinite
-from typing import Any
 
 from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
-from ur_cartesian_driver.urscript.script_values import is_number, ScriptPose, type_name, Value
+from ur_cartesian_driver.urscript.script_values import (
+    INT_MAX,
+    INT_MIN,
+    is_number,
+    ScriptPose,
+    type_name,
+    Value,
+)
 
 
 def number(value: Value, name: str) -> float:
@@ -43,6 +49,31 @@ def whole(value: Value, name: str) -> int:
     if not result.is_integer():
         raise RuntimeException(f'{name} is {result:g}; it must be a whole number')
     return int(result)
+
+
+def int32(value: Value, name: str) -> int:
+    """Return a whole number that fits into 32 bits."""
+    result = whole(value, name)
+    if not INT_MIN <= result <= INT_MAX:
+        raise RuntimeException(f'{name} is {result}; it must fit into 32 bits')
+    return result
+
+
+def within(value: Value, name: str, low: float, high: float) -> float:
+    """Return a number within bounds, both included."""
+    result = number(value, name)
+    if not low <= result <= high:
+        raise RuntimeException(f'{name} is {result:g}; it must be within {low:g}..{high:g}')
+    return result
+
+
+def one_of(value: Value, name: str, choices: tuple[int, ...]) -> int:
+    """Return a whole number that is one of some."""
+    result = whole(value, name)
+    if result not in choices:
+        *first, last = map(str, choices)
+        raise RuntimeException(f'{name} is {result}; it must be {", ".join(first)} or {last}')
+    return result
 
 
 def index(value: Value, name: str, count: int) -> int:
@@ -91,8 +122,3 @@ def text(value: Value, name: str) -> str:
     if not isinstance(value, str):
         raise RuntimeException(f'Type error: {name} must be a string, not a {type_name(value)}')
     return value
-
-
-def builtins_in(group: object) -> dict[str, Any]:
-    """Return the public methods of an object by name: these are the functions of a program."""
-    return {name: getattr(group, name) for name in dir(group) if not name.startswith('_')}

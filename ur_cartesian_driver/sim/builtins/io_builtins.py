@@ -1,125 +1,123 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Functions of a program on inputs, outputs, flags and registers."""
+"""
+Functions of a program on inputs, outputs, flags, ports and registers.
+
+Most of them read or write one item of a list of :class:`ControllerIo`; the class bodies are the
+table of these.
+"""
 
 from __future__ import annotations
 
-from ur_cartesian_driver.sim.builtins.arguments import index, number, whole
-from ur_cartesian_driver.sim.state.controller_io import (
-    ControllerIo,
-    PORTS,
-    REGISTER_BITS,
-    REGISTER_FLOATS,
-    REGISTER_INTEGERS,
-)
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from ur_cartesian_driver.sim.builtins.arguments import index, int32, number, whole
+from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
+from ur_cartesian_driver.sim.state.controller_io import ControllerIo
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
-from ur_cartesian_driver.urscript.script_values import INT_MAX, INT_MIN, truth, Value
+from ur_cartesian_driver.urscript.script_values import truth, Value
+
+T = TypeVar('T')
+_Items = Callable[[ControllerIo], list[T]]
 
 
-class DigitalBuiltins:
-    """Digital inputs and outputs, and flags."""
+class _IoGroup(BuiltinGroup):
+    @property
+    def _io(self) -> ControllerIo:
+        return self._controller.io
 
-    def __init__(self, io: ControllerIo) -> None:
-        """Work on these signals."""
-        self._io = io
 
-    def set_standard_digital_out(self, n: Value, b: Value) -> None:
-        """Set one of 8."""
-        self._io.digital_out.standard[index(n, 'n', 8)] = truth(b)
+def _get_n(items: _Items[T]) -> Callable[[Any, Value], T]:
+    """Return the function of a program that reads item n."""
 
-    def set_configurable_digital_out(self, n: Value, b: Value) -> None:
-        """Set one of 8."""
-        self._io.digital_out.configurable[index(n, 'n', 8)] = truth(b)
+    def get(group: _IoGroup, n: Value) -> T:
+        values = items(group._io)
+        return values[index(n, 'n', len(values))]
 
-    def set_tool_digital_out(self, n: Value, b: Value) -> None:
-        """Set one of 2."""
-        self._io.digital_out.tool[index(n, 'n', 2)] = truth(b)
+    return get
+
+
+def _set_n(items: _Items[bool]) -> Callable[[Any, Value, Value], None]:
+    """Return the function of a program that sets item n."""
+
+    def set_(group: _IoGroup, n: Value, b: Value) -> None:
+        values = items(group._io)
+        values[index(n, 'n', len(values))] = truth(b)
+
+    return set_
+
+
+def _read(items: _Items[T]) -> Callable[[Any, Value], T]:
+    """Return the function of a program that reads an address."""
+
+    def read(group: _IoGroup, address: Value) -> T:
+        values = items(group._io)
+        return values[index(address, 'address', len(values))]
+
+    return read
+
+
+def _write(
+    items: _Items[T], checked: Callable[[Value, str], T]
+) -> Callable[[Any, Value, Value], None]:
+    """Return the function of a program that writes to an address."""
+
+    def write(group: _IoGroup, address: Value, value: Value) -> None:
+        values, new = items(group._io), checked(value, 'value')
+        values[index(address, 'address', len(values))] = new
+
+    return write
+
+
+def _truth(value: Value, _: str) -> bool:
+    return truth(value)
+
+
+def _uint16(value: Value, name: str) -> int:
+    return index(value, name, 2**16)
+
+
+class DigitalBuiltins(_IoGroup):
+    """Digital inputs and outputs, and flags, which survive the program."""
+
+    set_standard_digital_out = _set_n(lambda io: io.digital_out.standard)
+    set_configurable_digital_out = _set_n(lambda io: io.digital_out.configurable)
+    set_tool_digital_out = _set_n(lambda io: io.digital_out.tool)
+    get_standard_digital_out = _get_n(lambda io: io.digital_out.standard)
+    get_configurable_digital_out = _get_n(lambda io: io.digital_out.configurable)
+    get_tool_digital_out = _get_n(lambda io: io.digital_out.tool)
+    get_standard_digital_in = _get_n(lambda io: io.digital_in.standard)
+    get_configurable_digital_in = _get_n(lambda io: io.digital_in.configurable)
+    get_tool_digital_in = _get_n(lambda io: io.digital_in.tool)
+    # The old numbering: standard 0-7, tool 8-9.
+    get_digital_out = _get_n(lambda io: io.digital_out.standard + io.digital_out.tool)
+    get_digital_in = _get_n(lambda io: io.digital_in.standard + io.digital_in.tool)
+    set_flag = _set_n(lambda io: io.flags)
+    get_flag = _get_n(lambda io: io.flags)
 
     def set_digital_out(self, n: Value, b: Value) -> None:
         """Set standard 0-7, or tool 0-1 as 8-9: the old numbering."""
-        channel = index(n, 'n', 10)
-        if channel < 8:
-            self.set_standard_digital_out(channel, b)
-        else:
-            self.set_tool_digital_out(channel - 8, b)
-
-    def get_standard_digital_out(self, n: Value) -> bool:
-        """Read one of 8."""
-        return self._io.digital_out.standard[index(n, 'n', 8)]
-
-    def get_configurable_digital_out(self, n: Value) -> bool:
-        """Read one of 8."""
-        return self._io.digital_out.configurable[index(n, 'n', 8)]
-
-    def get_tool_digital_out(self, n: Value) -> bool:
-        """Read one of 2."""
-        return self._io.digital_out.tool[index(n, 'n', 2)]
-
-    def get_digital_out(self, n: Value) -> bool:
-        """Read with the old numbering."""
-        outputs = self._io.digital_out
-        return (outputs.standard + outputs.tool)[index(n, 'n', 10)]
-
-    def get_standard_digital_in(self, n: Value) -> bool:
-        """Read one of 8."""
-        return self._io.digital_in.standard[index(n, 'n', 8)]
-
-    def get_configurable_digital_in(self, n: Value) -> bool:
-        """Read one of 8."""
-        return self._io.digital_in.configurable[index(n, 'n', 8)]
-
-    def get_tool_digital_in(self, n: Value) -> bool:
-        """Read one of 2."""
-        return self._io.digital_in.tool[index(n, 'n', 2)]
-
-    def get_digital_in(self, n: Value) -> bool:
-        """Read with the old numbering."""
-        inputs = self._io.digital_in
-        return (inputs.standard + inputs.tool)[index(n, 'n', 10)]
-
-    def set_flag(self, n: Value, b: Value) -> None:
-        """Set one of 32 flags, which survive the program."""
-        self._io.flags[index(n, 'n', 32)] = truth(b)
-
-    def get_flag(self, n: Value) -> bool:
-        """Read a flag."""
-        return self._io.flags[index(n, 'n', 32)]
+        channel, outputs = index(n, 'n', 10), self._io.digital_out
+        side, i = (outputs.standard, channel) if channel < 8 else (outputs.tool, channel - 8)
+        side[i] = truth(b)
 
 
-class AnalogBuiltins:
-    """Analog inputs and outputs and the tool's supply."""
+class AnalogBuiltins(_IoGroup):
+    """Analog inputs and outputs [V or A] and the tool's supply."""
 
-    def __init__(self, io: ControllerIo) -> None:
-        """Work on these signals."""
-        self._io = io
+    get_standard_analog_out = _get_n(lambda io: io.analog_out)
+    get_analog_out = get_standard_analog_out  # the old name
+    get_standard_analog_in = _get_n(lambda io: io.analog_in)
+    get_tool_analog_in = _get_n(lambda io: io.tool_analog_in)
+    # The old numbering: standard 0-1, tool 2-3.
+    get_analog_in = _get_n(lambda io: io.analog_in + io.tool_analog_in)
 
     def set_standard_analog_out(self, n: Value, f: Value) -> None:
         """Set to a fraction 0..1 of the range."""
         self._io.set_analog_out(index(n, 'n', 2), number(f, 'f'))
 
-    def set_analog_out(self, n: Value, f: Value) -> None:
-        """Do as `set_standard_analog_out`: the old name."""
-        self.set_standard_analog_out(n, f)
-
-    def get_standard_analog_out(self, n: Value) -> float:
-        """Read [V or A]."""
-        return self._io.analog_out[index(n, 'n', 2)]
-
-    def get_analog_out(self, n: Value) -> float:
-        """Read [V or A]: the old name."""
-        return self.get_standard_analog_out(n)
-
-    def get_standard_analog_in(self, n: Value) -> float:
-        """Read [V or A]."""
-        return self._io.analog_in[index(n, 'n', 2)]
-
-    def get_tool_analog_in(self, n: Value) -> float:
-        """Read [V or A]."""
-        return self._io.tool_analog_in[index(n, 'n', 2)]
-
-    def get_analog_in(self, n: Value) -> float:
-        """Read standard 0-1, or tool 0-1 as 2-3: the old numbering."""
-        return (self._io.analog_in + self._io.tool_analog_in)[index(n, 'n', 4)]
+    set_analog_out = set_standard_analog_out  # the old name
 
     def set_analog_outputdomain(self, port: Value, domain: Value) -> None:
         """Choose 0 = current, 1 = voltage."""
@@ -145,75 +143,27 @@ class AnalogBuiltins:
         rx_idle_chars: Value,
         tx_idle_chars: Value,
     ) -> None:
-        """Accept settings of the tool's serial line, which ends nowhere."""
+        """Accept settings of the tool's serial line, which has no other end here."""
 
 
-class PortBuiltins:
+class PortBuiltins(_IoGroup):
     """Ports: on a robot Modbus clients see them, here they are memory that survives programs."""
 
-    def __init__(self, io: ControllerIo) -> None:
-        """Work on these signals."""
-        self._io = io
-
-    def read_port_bit(self, address: Value) -> bool:
-        """Read one of 256."""
-        return self._io.port_bits[index(address, 'address', PORTS)]
-
-    def read_port_register(self, address: Value) -> int:
-        """Read one of 256."""
-        return self._io.port_registers[index(address, 'address', PORTS)]
-
-    def write_port_bit(self, address: Value, value: Value) -> None:
-        """Write one of 256."""
-        self._io.port_bits[index(address, 'address', PORTS)] = truth(value)
-
-    def write_port_register(self, address: Value, value: Value) -> None:
-        """Write one of 256, with 16 bits each."""
-        self._io.port_registers[index(address, 'address', PORTS)] = index(value, 'value', 2**16)
+    read_port_bit = _read(lambda io: io.port_bits)
+    read_port_register = _read(lambda io: io.port_registers)
+    write_port_bit = _write(lambda io: io.port_bits, _truth)
+    write_port_register = _write(lambda io: io.port_registers, _uint16)
 
 
-class RegisterBuiltins:
-    """General purpose registers: what RTDE clients write is read-only here."""
+class RegisterBuiltins(_IoGroup):
+    """General purpose registers: programs only read what RTDE clients write."""
 
-    def __init__(self, io: ControllerIo) -> None:
-        """Work on these signals."""
-        self._in, self._out = io.inputs, io.outputs
-
-    def read_input_boolean_register(self, address: Value) -> bool:
-        """Read one of 128."""
-        return self._in.bits[index(address, 'address', REGISTER_BITS)]
-
-    def read_input_integer_register(self, address: Value) -> int:
-        """Read one of 48."""
-        return self._in.integers[index(address, 'address', REGISTER_INTEGERS)]
-
-    def read_input_float_register(self, address: Value) -> float:
-        """Read one of 48."""
-        return self._in.floats[index(address, 'address', REGISTER_FLOATS)]
-
-    def read_output_boolean_register(self, address: Value) -> bool:
-        """Read one of 128."""
-        return self._out.bits[index(address, 'address', REGISTER_BITS)]
-
-    def read_output_integer_register(self, address: Value) -> int:
-        """Read one of 48."""
-        return self._out.integers[index(address, 'address', REGISTER_INTEGERS)]
-
-    def read_output_float_register(self, address: Value) -> float:
-        """Read one of 48."""
-        return self._out.floats[index(address, 'address', REGISTER_FLOATS)]
-
-    def write_output_boolean_register(self, address: Value, value: Value) -> None:
-        """Write one of 128."""
-        self._out.bits[index(address, 'address', REGISTER_BITS)] = truth(value)
-
-    def write_output_integer_register(self, address: Value, value: Value) -> None:
-        """Write one of 48."""
-        number_ = whole(value, 'value')
-        if not INT_MIN <= number_ <= INT_MAX:
-            raise RuntimeException(f'value is {number_}; it must fit into 32 bits')
-        self._out.integers[index(address, 'address', REGISTER_INTEGERS)] = number_
-
-    def write_output_float_register(self, address: Value, value: Value) -> None:
-        """Write one of 48."""
-        self._out.floats[index(address, 'address', REGISTER_FLOATS)] = number(value, 'value')
+    read_input_boolean_register = _read(lambda io: io.inputs.bits)
+    read_input_integer_register = _read(lambda io: io.inputs.integers)
+    read_input_float_register = _read(lambda io: io.inputs.floats)
+    read_output_boolean_register = _read(lambda io: io.outputs.bits)
+    read_output_integer_register = _read(lambda io: io.outputs.integers)
+    read_output_float_register = _read(lambda io: io.outputs.floats)
+    write_output_boolean_register = _write(lambda io: io.outputs.bits, _truth)
+    write_output_integer_register = _write(lambda io: io.outputs.integers, int32)
+    write_output_float_register = _write(lambda io: io.outputs.floats, number)

@@ -4,24 +4,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector6
 from ur_cartesian_driver.sim.builtins.arguments import is_pose, pose, script_pose, six
+from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
+from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
-
-if TYPE_CHECKING:
-    from ur_cartesian_driver.sim.controller import Controller
 
 
 def solve(
     controller: Controller, T_base_tcp: Pose, T_flange_tcp: Pose, near: Vector6
 ) -> Vector6 | None:
     """Return the joints nearest to given ones that bring the TCP to a pose."""
-    found = nearest(controller.arm, T_base_tcp @ T_flange_tcp.inverse(), near)
-    return None if found is None else six(list(found), 'solution')
+    return nearest(controller.arm, T_base_tcp @ T_flange_tcp.inverse(), near)
 
 
 def joints_of(controller: Controller, value: Value, function: str) -> Vector6:
@@ -33,13 +29,18 @@ def joints_of(controller: Controller, value: Value, function: str) -> Vector6:
     if not is_pose(value):
         return six(value, 'q')
     motion = controller.motion
-    found = solve(controller, pose(value, 'pose'), motion.T_flange_tcp, six(list(motion.q), 'q'))
-    if found is None:
+    found = solve(controller, pose(value, 'pose'), motion.T_flange_tcp, motion.q)
+    return _reached(found, function)
+
+
+def _reached(q: Vector6 | None, function: str) -> Vector6:
+    """Return the solution, or raise what the robot says when there is none."""
+    if q is None:
         raise RuntimeException(
             'The robot cannot reach the requested pose. Script function '
             f'{function} is unable to find an inverse kinematics solution.'
         )
-    return found
+    return q
 
 
 def pose_of(controller: Controller, value: Value, name: str) -> Pose:
@@ -49,12 +50,8 @@ def pose_of(controller: Controller, value: Value, name: str) -> Pose:
     return controller.arm.forward(six(value, name)) @ controller.motion.T_flange_tcp
 
 
-class KinematicsBuiltins:
+class KinematicsBuiltins(BuiltinGroup):
     """Forward and inverse kinematics."""
-
-    def __init__(self, controller: Controller) -> None:
-        """Use the arm of this controller."""
-        self._controller = controller
 
     def _tcp(self, tcp: Value) -> Pose:
         return self._controller.motion.T_flange_tcp if tcp == 'active_tcp' else pose(tcp, 'tcp')
@@ -72,13 +69,7 @@ class KinematicsBuiltins:
         tcp: Value = 'active_tcp',
     ) -> list[float]:
         """Return the joints of a pose nearest to `qnear`, by default to the present ones."""
-        found = self._solve(x, qnear, tcp)
-        if found is None:
-            raise RuntimeException(
-                'The robot cannot reach the requested pose. Script function get_inverse_kin is '
-                'unable to find an inverse kinematics solution.'
-            )
-        return list(found)
+        return list(_reached(self._solve(x, qnear, tcp), 'get_inverse_kin'))
 
     def get_inverse_kin_has_solution(
         self,

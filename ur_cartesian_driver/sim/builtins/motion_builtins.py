@@ -1,141 +1,55 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-Functions of a program that move the arm.
-
-One thread owns the motion: from its first motion call until it ends, or until the arm stands and
-it is not inside a motion call, every other thread that calls a motion function, a stop included,
-ends the program. A thread that is killed in the middle of a call leaves the arm moving; if nobody
-takes over in the same cycle the controller brakes. (A stream of servoj, speedj or speedl that is
-not continued in the cycle in which its last call returned ends in the motion generator itself.)
-"""
+"""Functions of a program that move the arm; see `sim/motion/motion_ownership.py` for who may."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Hashable
-from enum import Enum
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.sim.builtins.arguments import (
     not_negative,
     number,
+    one_of,
     pose,
     positive,
     six,
-    whole,
+    within,
 )
+from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.builtins.kinematics_builtins import joints_of, pose_of
-from ur_cartesian_driver.sim.motion import MotionError, MotionGenerator, Move
+from ur_cartesian_driver.sim.motion import MotionGenerator, Move
+from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState, Steps
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import Value
 
-if TYPE_CHECKING:
-    from ur_cartesian_driver.sim.controller import Controller
 
-Steps = Generator[None, None, None]
-
-#: How the controller brakes when a program ends or a stream dries up [rad/s^2]; what a real one
-#: does is not published. Its users call it very sudden.
-HARD_STOP = 15.0
-
-
-class FreedriveState(Enum):
-    """Who moves the arm instead of the program's moves."""
-
-    OFF = ''
-    FREEDRIVE = 'freedrive'
-    TEACH = 'teach mode'
-
-
-class MotionOwnership:
-    """Which thread moves the arm."""
-
-    def __init__(self, motion: MotionGenerator) -> None:
-        """Begin without an owner."""
-        self._motion = motion
-        self._owner: Hashable = None
-        self._calls = 0
-        self._abortable = 0
-        self._aborting = False
-        self._abandoned = False
-
-    def take(self, thread: Hashable) -> None:
-        """
-        Make a thread the owner.
-
-        :raises RuntimeException: another thread is in or between motions.
-        """
-        held = self._owner is not None and (self._calls > 0 or self._motion.moving)
-        if held and self._owner != thread:
-            raise RuntimeException('Another thread is already controlling the robot.')
-        self._owner, self._abandoned = thread, False
-
-    def abort(self) -> None:
-        """Let the move that runs, if it can be aborted, brake and return."""
-        self._aborting = self._abortable > 0
-
-    def run(self, call: Callable[[], Move], abortable: bool = False) -> Steps:
-        """
-        Make a call of the motion generator and wait until it may return.
-
-        :param abortable: `abort` makes the call brake at :data:`HARD_STOP` and return.
-        :raises RuntimeException: the call makes no sense.
-        """
-        try:
-            move = call()
-        except MotionError as error:
-            raise RuntimeException(str(error)) from None
-        self._calls += 1
-        self._abortable += abortable
-        finished = False
-        try:
-            if move.returned and not self._motion.moving:
-                yield  # programs repeat moves to where the arm stands: these take a cycle, too
-            while not move.returned:
-                if self._aborting and abortable:
-                    self._aborting = False
-                    move = self._motion.stopj(HARD_STOP)
-                yield
-            finished = True
-        finally:
-            self._calls -= 1
-            self._abortable -= abortable
-            self._abandoned = self._abandoned or not finished
-
-    def release(self, thread: Hashable) -> None:
-        """Let go when a thread has ended."""
-        if self._owner == thread:
-            self._owner = None
-
-    def end_of_frame(self) -> None:
-        """Brake if nobody continued what has been left moving."""
-        if self._calls == 0 and self._abandoned:
-            self.brake()
-
-    def brake(self) -> None:
-        """Stop as hard as the controller does on its own."""
-        self._owner, self._abandoned = None, False
-        if self._motion.moving:
-            self._motion.stopj(HARD_STOP)
-
-
-class MotionBuiltins:
+class MotionBuiltins(BuiltinGroup):
     """Moves with an end, streams of set-points, stops."""
 
-    def __init__(self, controller: Controller) -> None:
-        """Move the arm of this controller."""
-        self._controller = controller
-        self._motion = controller.motion
-        self._ownership = controller.ownership
+    @property
+    def _motion(self) -> MotionGenerator:
+        return self._controller.motion
 
     def _take(self, waypoint: Pose | None = None) -> None:
         """Own the motion, which leads to a waypoint unless it is a stream."""
         freedrive = self._controller.freedrive
         if freedrive is not FreedriveState.OFF:
             raise RuntimeException(f'The robot cannot move: it is in {freedrive.value}.')
-        self._ownership.take(self._controller.programs.current_thread)
+        self._controller.ownership.take(self._controller.programs.current_thread)
         self._controller.waypoint = waypoint
+
+    def _run(
+        self, call: Callable[[], Move], waypoint: Pose | None = None, abortable: bool = False
+    ) -> Steps:
+        """Own the motion and make a call of the motion generator; wait until it may return."""
+        self._take(waypoint)
+        yield from self._controller.ownership.run(call, abortable)
+
+    def _stop(self, call: Callable[[], Move]) -> Steps:
+        """Own the motion and stop, which freedrive does not prevent."""
+        self._controller.ownership.take(self._controller.programs.current_thread)
+        yield from self._controller.ownership.run(call)
 
     def _joints(self, q: Value, function: str) -> Vector6:
         return joints_of(self._controller, q, function)
@@ -150,9 +64,10 @@ class MotionBuiltins:
         limits = _limits(a, v, t)
         radius = not_negative(r, 'r')
         target = self._joints(q, 'movej')
-        self._take(self._pose(list(target)))
-        yield from self._ownership.run(
-            lambda: self._motion.movej(target, *limits, radius), abortable=True
+        yield from self._run(
+            lambda: self._motion.movej(target, *limits, radius),
+            self._pose(list(target)),
+            abortable=True,
         )
 
     def movel(
@@ -162,9 +77,8 @@ class MotionBuiltins:
         limits = _limits(a, v, t)
         radius = not_negative(r, 'r')
         target = self._pose(pose)
-        self._take(target)
-        yield from self._ownership.run(
-            lambda: self._motion.movel(target, *limits, radius), abortable=True
+        yield from self._run(
+            lambda: self._motion.movel(target, *limits, radius), target, abortable=True
         )
 
     def movep(self, pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Steps:
@@ -172,8 +86,7 @@ class MotionBuiltins:
         a_, v_, _ = _limits(a, v, 0)
         radius = not_negative(r, 'r')
         target = self._pose(pose)
-        self._take(target)
-        yield from self._ownership.run(lambda: self._motion.movep(target, a_, v_, radius))
+        yield from self._run(lambda: self._motion.movep(target, a_, v_, radius), target)
 
     def movec(
         self,
@@ -186,26 +99,23 @@ class MotionBuiltins:
     ) -> Steps:
         """Move on the circle through two more points."""
         a_, v_, _ = _limits(a, v, 0)
-        radius, mode_ = not_negative(r, 'r'), whole(mode, 'mode')
-        if mode_ not in (0, 1):
-            raise RuntimeException(f'mode is {mode_}; it must be 0 or 1')
+        radius, mode_ = not_negative(r, 'r'), one_of(mode, 'mode', (0, 1))
         via, to = self._pose(pose_via, 'pose_via'), self._pose(pose_to, 'pose_to')
-        self._take(to)
-        yield from self._ownership.run(lambda: self._motion.movec(via, to, a_, v_, radius, mode_))
+        yield from self._run(lambda: self._motion.movec(via, to, a_, v_, radius, mode_), to)
 
     def optimovej(self, goal: Value, a: Value = 0.3, v: Value = 0.3, r: Value = 0) -> Steps:
         """Move in joint space with limited jerk, at fractions of what the joints can do."""
         a_, v_, radius = _fraction(a, 'a'), _fraction(v, 'v'), not_negative(r, 'r')
         target = self._joints(goal, 'optimovej')
-        self._take(self._pose(list(target)))
-        yield from self._ownership.run(lambda: self._motion.optimovej(target, a_, v_, radius))
+        yield from self._run(
+            lambda: self._motion.optimovej(target, a_, v_, radius), self._pose(list(target))
+        )
 
     def optimovel(self, goal: Value, a: Value = 0.3, v: Value = 0.3, r: Value = 0) -> Steps:
         """Move straight in space with limited jerk, at fractions of what the joints can do."""
         a_, v_, radius = _fraction(a, 'a'), _fraction(v, 'v'), not_negative(r, 'r')
         target = self._pose(goal, 'goal')
-        self._take(target)
-        yield from self._ownership.run(lambda: self._motion.optimovel(target, a_, v_, radius))
+        yield from self._run(lambda: self._motion.optimovel(target, a_, v_, radius), target)
 
     def servoj(
         self,
@@ -220,11 +130,10 @@ class MotionBuiltins:
         target = six(q, 'q')
         settings = (
             positive(t, 't'),
-            _within(lookahead_time, 'lookahead_time', 0.03, 0.2),
-            _within(gain, 'gain', 100, 2000),
+            within(lookahead_time, 'lookahead_time', 0.03, 0.2),
+            within(gain, 'gain', 100, 2000),
         )
-        self._take()
-        yield from self._ownership.run(lambda: self._motion.servoj(target, *settings))
+        yield from self._run(lambda: self._motion.servoj(target, *settings))
 
     def servoc(self, pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Steps:
         """
@@ -242,32 +151,26 @@ class MotionBuiltins:
     def speedj(self, qd: Value, a: Value, t: Value = None) -> Steps:
         """Go to joint speeds; return after a time, or when they are reached."""
         target, acceleration, time = six(qd, 'qd'), positive(a, 'a'), _duration(t)
-        self._take()
-        yield from self._ownership.run(lambda: self._motion.speedj(target, acceleration, time))
+        yield from self._run(lambda: self._motion.speedj(target, acceleration, time))
 
     def speedl(self, xd: Value, a: Value, t: Value = None, aRot: Value = 'a') -> Steps:
         """Go to a speed of the tool; return after a time, or when it is reached."""
         twist, acceleration, time = six(xd, 'xd'), positive(a, 'a'), _duration(t)
         angular_acceleration = acceleration if aRot == 'a' else positive(aRot, 'aRot')
-        self._take()
-        yield from self._ownership.run(
+        yield from self._run(
             lambda: self._motion.speedl(twist, acceleration, time, angular_acceleration)
         )
 
     def stopj(self, a: Value) -> Steps:
         """Brake in joint space; return at rest."""
         acceleration = positive(a, 'a')
-        self._ownership.take(self._controller.programs.current_thread)
-        yield from self._ownership.run(lambda: self._motion.stopj(acceleration))
+        yield from self._stop(lambda: self._motion.stopj(acceleration))
 
     def stopl(self, a: Value, aRot: Value = 'a') -> Steps:
         """Brake the tool on its tangent; return at rest."""
         acceleration = positive(a, 'a')
         angular_acceleration = acceleration if aRot == 'a' else positive(aRot, 'aRot')
-        self._ownership.take(self._controller.programs.current_thread)
-        yield from self._ownership.run(
-            lambda: self._motion.stopl(acceleration, angular_acceleration)
-        )
+        yield from self._stop(lambda: self._motion.stopl(acceleration, angular_acceleration))
 
     def direct_torque(
         self,
@@ -286,12 +189,8 @@ class MotionBuiltins:
         return self._motion.steady
 
 
-class ModeBuiltins:
+class ModeBuiltins(BuiltinGroup):
     """States in which somebody else moves the arm, or pushes it: states only, no forces."""
-
-    def __init__(self, controller: Controller) -> None:
-        """Change the states of this controller."""
-        self._controller = controller
 
     def freedrive_mode(self, freeAxes: Value = None, feature: Value = None) -> None:
         """Let the arm be moved by hand."""
@@ -326,8 +225,7 @@ class ModeBuiltins:
             (limits, 'limits'),
         ):
             six(value, name)
-        if whole(type, 'type') not in (1, 2, 3):
-            raise RuntimeException(f'type is {type}; it must be 1, 2 or 3')
+        one_of(type, 'type', (1, 2, 3))
         self._controller.force_mode = True
 
     def end_force_mode(self) -> None:
@@ -336,11 +234,11 @@ class ModeBuiltins:
 
     def force_mode_set_damping(self, damping: Value) -> None:
         """Accept 0..1."""
-        _within(damping, 'damping', 0, 1)
+        within(damping, 'damping', 0, 1)
 
     def force_mode_set_gain_scaling(self, scaling: Value) -> None:
         """Accept 0..2."""
-        _within(scaling, 'scaling', 0, 2)
+        within(scaling, 'scaling', 0, 2)
 
     def tool_contact(self, direction: Value = None) -> int:
         """Return 0: nothing is touched, until a test says so."""
@@ -362,13 +260,6 @@ def _fraction(value: Value, name: str) -> float:
     if not 0.0 < fraction <= 1.0:
         raise RuntimeException(f'{name} is {fraction:g}; it must be a fraction within (0, 1]')
     return fraction
-
-
-def _within(value: Value, name: str, low: float, high: float) -> float:
-    result = number(value, name)
-    if not low <= result <= high:
-        raise RuntimeException(f'{name} is {result:g}; it must be within {low:g}..{high:g}')
-    return result
 
 
 def _duration(value: Value) -> float | None:

@@ -23,13 +23,14 @@ from ur_cartesian_driver.sim.builtins.arguments import (
     six,
     three,
 )
+from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.urscript import core_builtins
 from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
 
 _invert_matrix = core_builtins()['inv']
 
 
-class PoseBuiltins:
+class PoseBuiltins(BuiltinGroup):
     """Functions that need nothing but their arguments."""
 
     def pose_trans(self, p_from: Value, p_from_to: Value) -> ScriptPose:

@@ -1,36 +1,36 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Functions around a process: path offsets, screws, limits of forces, what to do about errors.
+Functions around a process: path offset, screws, force limits, reaction to error codes.
 
-All of it is state: an arm without dynamics has no wrench to limit and no torque to hold with, and
-the path is that of the moves alone. Arguments are checked as on the robot. The state ends with
-the program.
+Arguments are checked as on the robot. An arm without dynamics has no wrench to limit and no torque
+to hold with, so those functions have no effect. The path offset is kept and reported but not
+applied; it ends with the program.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ur_cartesian_driver.motion.pose import Vector6
-from ur_cartesian_driver.sim.builtins.arguments import not_negative, number, pose, six, whole
+from ur_cartesian_driver.sim.builtins.arguments import (
+    not_negative,
+    number,
+    one_of,
+    pose,
+    six,
+    whole,
+    within,
+)
+from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.state.controller_state import PathOffset
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
-
-if TYPE_CHECKING:
-    from ur_cartesian_driver.sim.controller import Controller
 
 #: Frames of a path offset: base, TCP, motion, world.
 _FRAMES = (1, 2, 3, 4)
 
 
-class PathOffsetBuiltins:
+class PathOffsetBuiltins(BuiltinGroup):
     """A Cartesian offset on top of the moves: kept and reported, not applied."""
-
-    def __init__(self, controller: Controller) -> None:
-        """Change the state of this controller."""
-        self._controller = controller
 
     @property
     def _state(self) -> PathOffset:
@@ -70,10 +70,7 @@ class PathOffsetBuiltins:
 
     def path_offset_set_alpha_filter(self, alpha: Value) -> None:
         """Set the coefficient of the filter, 0..1."""
-        coefficient = number(alpha, 'alpha')
-        if not 0.0 <= coefficient <= 1.0:
-            raise RuntimeException(f'alpha is {coefficient:g}; it must be within 0..1')
-        self._state.alpha = coefficient
+        self._state.alpha = within(alpha, 'alpha', 0, 1)
 
     def path_offset_set_max_offset(self, transLimit: Value, rotLimit: Value) -> None:
         """Set the limits [m, rad]."""
@@ -82,26 +79,19 @@ class PathOffsetBuiltins:
 
 
 def _frame(type: Value) -> int:
-    frame = whole(type, 'type')
-    if frame not in _FRAMES:
-        raise RuntimeException(f'type is {frame}; it must be 1, 2, 3 or 4')
-    return frame
+    return one_of(type, 'type', _FRAMES)
 
 
-class ProcessBuiltins:
-    """Screws, forces and torques as states; the reaction to error codes is real."""
-
-    def __init__(self, controller: Controller) -> None:
-        """Change the state of this controller."""
-        self._controller = controller
+class ProcessBuiltins(BuiltinGroup):
+    """Screws, forces and torques have no effect; the reaction to error codes is real."""
 
     def screw_driving(self, f: Value, v_limit: Value) -> None:
         """Push along the tool's z axis with a force [N], at most at a speed [m/s]."""
-        self._controller.process.screw_driving = (number(f, 'f'), not_negative(v_limit, 'v_limit'))
+        number(f, 'f')
+        not_negative(v_limit, 'v_limit')
 
     def end_screw_driving(self) -> None:
         """End it; harmless when it has not begun."""
-        self._controller.process.screw_driving = None
 
     def tool_wrench_limit_set(
         self,
@@ -117,28 +107,22 @@ class ProcessBuiltins:
         pose(frame_offset, 'frame_offset')
         names = ('Fx', 'Fy', 'Fz', 'Mx', 'My', 'Mz')
         given = zip(names, (Fx, Fy, Fz, Mx, My, Mz), strict=True)
-        self._controller.process.wrench_limits = {
-            name: not_negative(value, name) for name, value in given if value is not None
-        }
+        for name, value in given:
+            if value is not None:
+                not_negative(value, name)
 
     def tool_wrench_limit_disable(self) -> None:
         """Remove the limits."""
-        self._controller.process.wrench_limits = {}
 
     def high_holding_torque_enable(self) -> None:
         """Hold a standing arm with more torque, as is the default."""
-        self._controller.process.high_holding_torque = True
 
     def high_holding_torque_disable(self) -> None:
         """Hold a standing arm with its normal torque, until the program ends."""
-        self._controller.process.high_holding_torque = False
 
     def position_deviation_warning(self, enabled: Value, threshold: Value = 0.8) -> None:
         """Accept a threshold within 0..1; target and actual position are one here."""
-        limit = number(threshold, 'threshold')
-        if not 0.0 <= limit <= 1.0:
-            raise RuntimeException(f'threshold is {limit:g}; it must be within 0..1')
-        self._controller.process.deviation_threshold = limit if enabled else None
+        within(threshold, 'threshold', 0, 1)
 
     def pause_on_error_code(self, code: Value, argument: Value = None) -> None:
         """Pause the program when an error code occurs; without an argument, with any."""

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from math import isinf, pi
-from typing import TYPE_CHECKING
 
 from ur_cartesian_driver.sim.builtins.arguments import (
     index,
@@ -17,23 +16,17 @@ from ur_cartesian_driver.sim.builtins.arguments import (
     three,
     whole,
 )
+from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.state.controller_state import Payload, Popup
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import Struct, to_text, truth, Value
 
-if TYPE_CHECKING:
-    from ur_cartesian_driver.sim.controller import Controller
-
 Steps = Generator[None, None, None]
 
 
-class TimeBuiltins:
+class TimeBuiltins(BuiltinGroup):
     """Time, and what takes time; neither is scaled by the speed slider."""
-
-    def __init__(self, controller: Controller) -> None:
-        """Use the clock of this controller."""
-        self._controller = controller
 
     def get_steptime(self) -> float:
         """Return the cycle [s]."""
@@ -80,12 +73,8 @@ class TimeBuiltins:
         )
 
 
-class PendantBuiltins:
+class PendantBuiltins(BuiltinGroup):
     """Messages and popups."""
-
-    def __init__(self, controller: Controller) -> None:
-        """Announce through this controller."""
-        self._controller = controller
 
     def textmsg(self, s1: Value, s2: Value = '') -> None:
         """Write to the log: all clients of the primary interface see it."""
@@ -112,21 +101,14 @@ class PendantBuiltins:
             yield
 
 
-class RobotBuiltins:
+class RobotBuiltins(BuiltinGroup):
     """What the robot measures and is told about its tool."""
-
-    def __init__(self, controller: Controller) -> None:
-        """Read and change the state of this controller."""
-        self._controller = controller
-        self._motion = controller.motion
-
-    def get_joint_positions(self) -> list[float]:
-        """Return the target positions [rad]: the old name, kept for old programs."""
-        return list(self._motion.q)
 
     def get_target_joint_positions(self) -> list[float]:
         """Return the target positions [rad]."""
-        return list(self._motion.q)
+        return list(self._controller.motion.q)
+
+    get_joint_positions = get_target_joint_positions  # the old name
 
     def get_actual_joint_positions(self) -> list[float]:
         """Return the actual positions [rad]."""
@@ -146,7 +128,7 @@ class RobotBuiltins:
 
     def get_target_joint_accelerations(self) -> list[float]:
         """Return the target accelerations [rad/s^2]."""
-        return list(self._motion.qdd)
+        return list(self._controller.motion.qdd)
 
     def get_actual_tcp_speed(self) -> list[float]:
         """Return the twist of the TCP in base axes."""
@@ -169,7 +151,7 @@ class RobotBuiltins:
         return [0.0] * 6
 
     def get_joint_temp(self, j: Value) -> float:
-        """Return room temperature."""
+        """Return room temperature [°C]."""
         index(j, 'j', 6)
         return 25.0
 
@@ -190,15 +172,7 @@ class RobotBuiltins:
         """Take the force of an external sensor from RTDE."""
         self._controller.external_ft = truth(enable)
 
-    def enable_external_ft_sensor(
-        self,
-        enable: Value,
-        sensor_mass: Value = 0,
-        sensor_measuring_offset: Value = None,
-        sensor_cog: Value = None,
-    ) -> None:
-        """Take the force of an external sensor from RTDE: the old name."""
-        self._controller.external_ft = truth(enable)
+    enable_external_ft_sensor = ft_rtde_input_enable  # the old name
 
     def set_payload(self, m: Value, cog: Value = None) -> None:
         """Set mass [kg] and centre of gravity [m]; the inertia becomes zero."""
@@ -251,9 +225,9 @@ class RobotBuiltins:
         turn = 2.0 * pi
         counted = [
             q + turn * round((close - q) / turn) if isinf(high - low) else q
-            for q, close, (low, high) in zip(self._motion.q, near, limits, strict=True)
+            for q, close, (low, high) in zip(self._controller.motion.q, near, limits, strict=True)
         ]
-        if counted != list(self._motion.q):
+        if counted != list(self._controller.motion.q):
             self._controller.teleport(six(counted, 'q'))
 
     def set_speed_slider_fraction(self, fraction: Value) -> None:

@@ -13,10 +13,11 @@ from collections.abc import Callable, Generator
 import struct
 from typing import TypeVar
 
-from ur_cartesian_driver.sim.builtins.arguments import number, text, whole
+from ur_cartesian_driver.sim.builtins.arguments import int32, number, text, whole
+from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets, SocketState
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
-from ur_cartesian_driver.urscript.script_values import INT_MAX, INT_MIN, to_text, Value
+from ur_cartesian_driver.urscript.script_values import to_text, Value
 
 CONNECT_TIMEOUT = 2.0
 #: Values in one read of numbers, and characters in one string.
@@ -25,17 +26,16 @@ MAX_NUMBERS, MAX_CHARACTERS = 30, 1023
 T = TypeVar('T')
 
 
-class SocketBuiltins:
+class SocketBuiltins(BuiltinGroup):
     """All of them wait on the controller's clock, so they also work under the virtual one."""
 
-    def __init__(self, sockets: ScriptSockets, now: Callable[[], float]) -> None:
-        """
-        Use these sockets.
+    @property
+    def _sockets(self) -> ScriptSockets:
+        return self._controller.sockets
 
-        :param now: the controller's clock [s].
-        """
-        self._sockets = sockets
-        self._now = now
+    @property
+    def _now(self) -> float:
+        return self._controller.time
 
     def socket_open(
         self, address: Value, port: Value, socket_name: Value = 'socket_0'
@@ -43,9 +43,9 @@ class SocketBuiltins:
         """Connect; give up after 2 s."""
         name = text(socket_name, 'socket_name')
         self._sockets.open(name, text(address, 'address'), whole(port, 'port'))
-        deadline = self._now() + CONNECT_TIMEOUT
+        deadline = self._now + CONNECT_TIMEOUT
         while self._sockets.state(name) is SocketState.CONNECTING:
-            if self._now() >= deadline:
+            if self._now >= deadline:
                 self._sockets.close(name)
                 break
             yield
@@ -60,13 +60,13 @@ class SocketBuiltins:
     ) -> Generator[None, None, T | None]:
         """Return what `take` finds in the received bytes; None for a timeout or a closed peer."""
         limit = number(timeout, 'timeout')
-        deadline = self._now() + limit if limit > 0.0 else float('inf')
+        deadline = self._now + limit if limit > 0.0 else float('inf')
         name_ = text(name, 'socket_name')
         while True:
             found = take(self._sockets.received(name_))
             if found is not None:
                 return found
-            if self._now() >= deadline or self._sockets.state(name_) is not SocketState.OPEN:
+            if self._now >= deadline or self._sockets.state(name_) is not SocketState.OPEN:
                 return None
             yield
 
@@ -140,10 +140,7 @@ class SocketBuiltins:
 
     def socket_send_int(self, value: Value, socket_name: Value = 'socket_0') -> bool:
         """Send a 32 bit integer in network order."""
-        integer = whole(value, 'value')
-        if not INT_MIN <= integer <= INT_MAX:
-            raise RuntimeException(f'value is {integer}; it must fit into 32 bits')
-        return self._send(struct.pack('>i', integer), socket_name)
+        return self._send(struct.pack('>i', int32(value, 'value')), socket_name)
 
     def socket_send_byte(self, value: Value, socket_name: Value = 'socket_0') -> bool:
         """Send the lowest 8 bits."""

@@ -18,7 +18,7 @@ import re
 from types import MappingProxyType
 from typing import Any, get_args
 
-from ur_cartesian_driver.sim.faults.injector import (
+from ur_cartesian_driver.sim.faults.fault_values import (
     AfterDistance,
     AfterTime,
     DelayFault,

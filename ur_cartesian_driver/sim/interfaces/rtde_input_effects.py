@@ -10,17 +10,15 @@ is applied as a whole: masks first, whatever their place in the recipe.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
+from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.state.controller_io import (
     REGISTER_BITS,
     REGISTER_FLOATS,
     REGISTER_INTEGERS,
     Registers,
 )
-
-if TYPE_CHECKING:
-    from ur_cartesian_driver.sim.controller import Controller
 
 _DIGITAL = (
     ('standard', 'standard_digital_output'),

@@ -14,10 +14,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from math import hypot
 from types import MappingProxyType
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from ur_cartesian_driver.motion.pose import IDENTITY, Vector3, Vector6
 from ur_cartesian_driver.motion.state import RobotMode
+from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.motion.point_motion import (
     dot,
     flange_point,
@@ -31,9 +32,6 @@ from ur_cartesian_driver.sim.state.controller_io import (
     REGISTER_INTEGERS,
     Registers,
 )
-
-if TYPE_CHECKING:
-    from ur_cartesian_driver.sim.controller import Controller
 
 Getter = Callable[['Controller'], Any]
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Generator, Mapping
 
-from ur_cartesian_driver.sim.builtins.motion_builtins import MotionOwnership
+from ur_cartesian_driver.sim.motion.motion_ownership import MotionOwnership
 from ur_cartesian_driver.sim.programs.program_runner import ProgramRunner
 from ur_cartesian_driver.urscript import (
     CompiledLine,

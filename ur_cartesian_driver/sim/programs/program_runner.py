@@ -17,13 +17,13 @@ run, and a refused program leaves the running one alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable
 from functools import lru_cache
 import logging
-from typing import Any, Protocol
+from typing import Protocol
 
 from ur_cartesian_driver.motion.state import RuntimeState
-from ur_cartesian_driver.sim.builtins import refuse_timed_functions
+from ur_cartesian_driver.sim.programs.secondary_builtins import Builtins, refuse_timed_functions
 from ur_cartesian_driver.sim.state.controller_messages import ControllerMessages
 from ur_cartesian_driver.urscript import (
     CompileError,
@@ -70,9 +70,7 @@ class ProgramArm(Protocol):
 class ProgramRunner:
     """The primary program, its state, and the secondary programs of this cycle."""
 
-    def __init__(
-        self, builtins: Mapping[str, Any], messages: ControllerMessages, arm: ProgramArm
-    ) -> None:
+    def __init__(self, builtins: Builtins, messages: ControllerMessages, arm: ProgramArm) -> None:
         """Begin with no program."""
         self._builtins = builtins
         self._secondary_builtins = refuse_timed_functions(builtins)

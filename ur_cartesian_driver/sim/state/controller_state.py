@@ -48,12 +48,6 @@ class ProcessState:
     """What a program has set about its process; all of it ends with the program."""
 
     path_offset: PathOffset = field(default_factory=PathOffset)
-    #: Force [N] and speed limit [m/s] while a screw is driven.
-    screw_driving: tuple[float, float] | None = None
-    #: Name of the axis -> limit [N, Nm].
-    wrench_limits: dict[str, float] = field(default_factory=dict)
-    high_holding_torque: bool = True
-    deviation_threshold: float | None = None
     #: Codes and arguments (None: any) of errors that pause the program.
     pause_on: set[tuple[int, int | None]] = field(default_factory=set)
 

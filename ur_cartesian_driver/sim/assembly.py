@@ -1,0 +1,31 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Puts a simulated controller together: its cycle, the functions of programs, its faults."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ur_cartesian_driver.sim.builtins import controller_builtins
+from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.faults.injector import FaultInjector
+from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
+from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets
+
+
+class Assembly(NamedTuple):
+    """A controller that runs programs, and what can go wrong with it."""
+
+    controller: Controller
+    faults: FaultInjector
+
+
+def assemble(config: SimulatorConfig, sockets: ScriptSockets | None = None) -> Assembly:
+    """
+    Return a controller as configured, without network and clock.
+
+    :param sockets: what programs connect with; None = in memory, for tests.
+    """
+    controller = Controller(config, controller_builtins, sockets)
+    controller.faults = faults = FaultInjector(controller)
+    return Assembly(controller, faults)

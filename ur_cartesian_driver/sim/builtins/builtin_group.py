@@ -1,0 +1,25 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What all groups of functions have in common."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ur_cartesian_driver.sim.controller import Controller
+
+
+class BuiltinGroup:
+    """Functions of one subject: the public methods of a subclass; see the package."""
+
+    def __init__(self, controller: Controller) -> None:
+        """Read and change the state of this controller."""
+        self._controller = controller
+
+    def functions(self) -> dict[str, Any]:
+        """Return the functions by name."""
+        return {
+            name: getattr(self, name)
+            for name in dir(self)
+            if not name.startswith('_') and name != 'functions'
+        }
