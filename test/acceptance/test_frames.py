@@ -378,7 +378,7 @@ def test_nothing_moves_on_a_robot_that_does_not_take_the_tcp(
     driver = make_driver(headless_mode=False)
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
     program = served_program(driver)
-    line = 'set_tcp_for(pose_at(command, 2), command[8])'
+    line = 'apply_tcp(pose_at(command, 2), command[8])'
     assert line in program
     ur_sim.run_script(program.replace(line, 'textmsg("no TCP")'))
     driver.wait_ready(5.0)

@@ -136,9 +136,9 @@ def clear_network_log(cell):
 def retained_sizes(cell):
     """Return what the robot loop keeps of the goal that runs: records, rows of path, messages."""
     loop = cell.loop_task.get_coro().cr_frame.f_locals['self']
-    observer = loop._machine._observer
+    monitor = loop._machine._monitor
     return {
-        'records': observer._records.kept,
-        'rows': len(observer._tracker.path.time),
+        'records': monitor._records.kept,
+        'rows': len(monitor._tracker.path.time),
         'unsent': len(loop._points),
     }
