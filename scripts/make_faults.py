@@ -57,7 +57,7 @@ ones begin slowly); after that it has to be played again.
 
 """
 
-CONTINUED_HEAD = """## With `after_robot_stop: continue`
+CONTINUED_HEAD = """## With `on_robot_stop: continue`
 
 Then a protective or safeguard stop holds the goal as a pause does. Everything else is as above.
 
@@ -120,7 +120,7 @@ def _mode(mode: Mode) -> str:
             '\nIn local control:\n\n',
             _faults(mode.local, mode.phases),
             *(
-                ('\nWith `after_robot_stop: continue`:\n\n', _faults(mode.continued, mode.phases))
+                ('\nWith `on_robot_stop: continue`:\n\n', _faults(mode.continued, mode.phases))
                 if mode.continued
                 else ()
             ),

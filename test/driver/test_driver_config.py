@@ -11,7 +11,7 @@ from ur_cartesian_driver.driver import DriverConfig
     ('field', 'value'),
     [
         ('robot_loop', 'fiber'),
-        ('after_robot_stop', 'wait'),
+        ('on_robot_stop', 'wait'),
         ('robot_receive_timeout', 0.0),
         ('keepalive_period', -1.0),
         ('feedback_rate', 0.0),

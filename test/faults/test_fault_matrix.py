@@ -14,7 +14,7 @@ import ur_cartesian_driver.sim.faults.fault_values as faults
 pytestmark = pytest.mark.slow
 
 
-CONTINUE = {'after_robot_stop': 'continue'}
+CONTINUE = {'on_robot_stop': 'continue'}
 CASES = [
     pytest.param(kind, phases, row, settings | more, id=prefix + where + row.fault)
     for kind, prefix, phases, tables, more in [

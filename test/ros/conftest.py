@@ -16,7 +16,7 @@ from ur_cartesian_driver.driver import ConnectionState
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 from ur_cartesian_driver.ros import CartesianDriverNode
-from ur_cartesian_driver.ros.messages.feedback_messages import duration_message, pose_message
+from ur_cartesian_driver.ros.message_fields import duration_message, pose_message
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 EXECUTORS = {'single': SingleThreadedExecutor, 'multi': MultiThreadedExecutor}

@@ -142,7 +142,7 @@ def test_a_goal_for_later_waits_for_its_time(single_cell):
 
 
 def test_goals_beyond_a_number_are_refused_and_the_others_go_on(cell, monkeypatch):
-    monkeypatch.setattr(action_server, 'MOST_GOALS', 2)
+    monkeypatch.setattr(action_server, 'MAX_GOALS', 2)
     cell.wait_ready()
     waiting = [cell.send(later(cell, 30.0)) for _ in range(2)]
     status, result = cell.run(cell.goal((0.4, 0.0, 0.01, 0.0)))

@@ -14,16 +14,17 @@ from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_error
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, SafetyMode
 from ur_cartesian_driver.msg import DriverStatus as DriverStatusMessage
+from ur_cartesian_driver.ros.message_fields import duration_message, seconds
 from ur_cartesian_driver.ros.messages.feedback_messages import (
-    duration_message,
     feedback_message,
     FeedbackFrame,
-    joint_state_message,
     result_message,
+)
+from ur_cartesian_driver.ros.messages.state_messages import (
+    joint_state_message,
+    status_message,
     tcp_pose_message,
 )
-from ur_cartesian_driver.ros.messages.goal_conversion import seconds
-from ur_cartesian_driver.ros.state.state_publisher import status_message
 from ur_cartesian_driver.ros.tf.known_frames import Frames
 
 STAMP = Time(sec=5, nanosec=6)

@@ -25,10 +25,10 @@ from ur_cartesian_driver.msg import (
     MotionSegment,
 )
 from ur_cartesian_driver.planning import check, PlanningOptions
+from ur_cartesian_driver.ros.message_fields import seconds
 from ur_cartesian_driver.ros.messages.goal_conversion import (
     goal_from_message,
     resolve_frames,
-    seconds,
 )
 from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 

@@ -19,11 +19,11 @@ from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.servo import ServoActivity, ServoReport
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import PlanningOptions
-from ur_cartesian_driver.ros.live.live_topics import (
-    servo_state_message,
+from ur_cartesian_driver.ros.live.live_target_subscriber import (
     target_from_message,
     TargetInhibitor,
 )
+from ur_cartesian_driver.ros.messages.state_messages import servo_state_message
 from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames, StaticFrame
 from ur_cartesian_driver.sim.simulator_config import HOME
 

@@ -11,7 +11,7 @@ from rclpy.duration import Duration
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
-from ur_cartesian_driver.ros.messages.feedback_messages import duration_message, pose_message
+from ur_cartesian_driver.ros.message_fields import duration_message, pose_message
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 pytestmark = pytest.mark.slow
@@ -273,7 +273,7 @@ def test_whatever_happens_while_the_arm_stops_each_goal_ends_with_its_code(gentl
     status, result = cell.result(new)
     assert (status, result.error_code) == (ABORTED, ErrorCode.ROBOT_NOT_READY)
     assert 'is in a protective stop' in result.error_string
-    assert f'{name(old)} has made way for it and is over' in result.error_string
+    assert f'so it preempted {name(old)}, which is over' in result.error_string
 
 
 def test_a_node_that_is_destroyed_meanwhile_ends_both(gentle_cell):

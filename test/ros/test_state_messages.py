@@ -19,9 +19,9 @@ from ur_cartesian_driver.robot.rtde.signal_stream import (
     REQUIRED_FIELDS,
     signals_from_rtde,
 )
-from ur_cartesian_driver.ros.messages.feedback_messages import joint_state_message
 from ur_cartesian_driver.ros.messages.state_messages import (
     io_states_message,
+    joint_state_message,
     robot_mode_message,
     safety_mode_message,
     tcp_transform,

@@ -20,7 +20,7 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros.client import add_tf_prefix, load_goal
-from ur_cartesian_driver.ros.messages.feedback_messages import duration_message, pose_message
+from ur_cartesian_driver.ros.message_fields import duration_message, pose_message
 from ur_cartesian_driver.ros.state.state_publisher import STATE_QOS
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
@@ -167,7 +167,7 @@ def check_names(cell):
     cell.spin_until(lambda: len(joints) == 2)
     assert not set(joints['left']) & set(joints['right'])
     frames = [
-        {node.action_server._frames.base, node.action_server._frames.tcp}
+        {node.action_server.frames.base, node.action_server.frames.tcp}
         for node in cell.nodes.values()
     ]
     assert not frames[0] & frames[1]

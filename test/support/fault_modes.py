@@ -77,7 +77,7 @@ ON_THE_PENDANT = (
     'the network cable is cut',
 )
 
-#: With after_robot_stop: continue.
+#: With on_robot_stop: continue.
 CONTINUES = ('protective stop',)
 
 

@@ -407,7 +407,7 @@ HEADLESS = (
 )
 
 
-#: With ``after_robot_stop: continue``, for those who want what the robot does by itself.
+#: With ``on_robot_stop: continue``, for those who want what the robot does by itself.
 CONTINUED = tuple(
     Row(
         fault=fault,

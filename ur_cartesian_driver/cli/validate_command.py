@@ -28,9 +28,9 @@ def validate(arguments: argparse.Namespace) -> int:
     """Plan a goal from where the arm is said to stand, and print the plan."""
     from ur_cartesian_driver.planning import plan
     from ur_cartesian_driver.preview import postures, table
-    from ur_cartesian_driver.ros.messages import goal_conversion as convert
+    from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
     from ur_cartesian_driver.ros.parameters.parameter_files import read_settings
-    from ur_cartesian_driver.ros.tf import known_frames as frames
+    from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot
 
     settings = read_settings(arguments.params_file, arguments.param)
     model = robot_model(arguments.ur_type or settings.driver.ur_type)
@@ -45,11 +45,11 @@ def validate(arguments: argparse.Namespace) -> int:
     )
     message = read_goal(arguments)
     try:
-        goal = convert.goal_from_message(
+        goal = goal_from_message(
             message,
             settings.frames,
             now=time_ns(),
-            snapshot=frames.ArmSnapshot.of(state),
+            snapshot=ArmSnapshot.of(state),
             time_tolerance=settings.node.goal_time_tolerance,
         )
         found = plan(goal, state, arm, options)

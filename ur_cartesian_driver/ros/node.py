@@ -29,11 +29,9 @@ from rclpy.signals import SignalHandlerOptions
 
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.ros.goals.action_server import CartesianActionServer
-from ur_cartesian_driver.ros.live.live_topics import (
-    FreedriveService,
-    LiveTargetSubscriber,
-    ServoStatePublisher,
-)
+from ur_cartesian_driver.ros.live.freedrive_service import FreedriveService
+from ur_cartesian_driver.ros.live.live_target_subscriber import LiveTargetSubscriber
+from ur_cartesian_driver.ros.live.servo_state_publisher import ServoStatePublisher
 from ur_cartesian_driver.ros.parameters.node_parameters import (
     as_overrides,
     declare_parameters,

@@ -23,7 +23,7 @@ class DriverConfig(LinkSettings):
     max_calibration_difference: float = 0.01
     #: What becomes of a goal when the robot makes a protective or safeguard stop: ``abort``, or
     #: ``continue`` when somebody has unlocked the robot and plays its program.
-    after_robot_stop: str = 'abort'
+    on_robot_stop: str = 'abort'
     #: Of goals with keep_open: planned time of the motion that the robot is given ahead [s]; ...
     keep_open_horizon: float = 1.0
     #: ... how long before it runs out the motion is brought to rest if nothing else comes [s]; ...
@@ -56,10 +56,9 @@ class DriverConfig(LinkSettings):
             raise ValueError(
                 f"robot_loop is {self.robot_loop!r}, it has to be 'process' or 'thread'."
             )
-        if self.after_robot_stop not in ('abort', 'continue'):
+        if self.on_robot_stop not in ('abort', 'continue'):
             raise ValueError(
-                f'after_robot_stop is {self.after_robot_stop!r}, it has to be '
-                "'abort' or 'continue'."
+                f"on_robot_stop is {self.on_robot_stop!r}, it has to be 'abort' or 'continue'."
             )
         self._require_positive(
             'feedback_rate', 'node_timeout', 'keep_open_margin', 'record_max_size'

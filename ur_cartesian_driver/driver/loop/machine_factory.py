@@ -28,7 +28,7 @@ def make_machine(request: StartMotion, config: DriverConfig) -> GoalMachine:
     settings: dict[str, Any] = {
         'feedback_period': 1.0 / config.feedback_rate,
         'max_plan_deviation': (config.max_plan_deviation, config.max_plan_deviation_angle),
-        'resume_after_stop': config.after_robot_stop == 'continue',
+        'resume_after_stop': config.on_robot_stop == 'continue',
     }
     if request.job.keep_open:
         return AppendMachine(

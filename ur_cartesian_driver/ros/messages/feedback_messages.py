@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From the driver's reports to messages: feedback, result, robot state.
+Feedback and result of the action.
 
-Feedback goes back in the frame of the goal and about its controlled frame. NaN stands for what
-nobody measures or plans: jerk, and acceleration where the robot's software does not report it.
+Feedback is expressed in the frame of the goal and describes its controlled frame. NaN stands for
+values that are not known: jerk, and acceleration where the robot does not report it.
 """
 
 from __future__ import annotations
@@ -12,24 +12,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import nan
 
-from builtin_interfaces.msg import Duration, Time
-from geometry_msgs.msg import Accel, Point, PoseStamped, Quaternion, Twist, Vector3
-from geometry_msgs.msg import Pose as PoseMessage
-from sensor_msgs.msg import JointState
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Accel, Twist, Vector3
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.pose import Pose, pose_error, rotate, Vector6
-from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
+from ur_cartesian_driver.ros.message_fields import duration_message, pose_message
 
-_MAX_SECONDS = 2**31 - 1
 _NAN6: Vector6 = (nan,) * 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FeedbackFrame:
-    """What all feedback of one goal has in common."""
+    """What all feedback messages of a goal share."""
 
     frame_id: str
     controlled_frame: str
@@ -40,7 +37,7 @@ class FeedbackFrame:
 def feedback_message(
     progress: Progress, frame: FeedbackFrame, stamp: Time
 ) -> FollowCartesianTrajectory.Feedback:
-    """Return the feedback for one report of a running motion."""
+    """Return the feedback message of a progress report."""
     message = FollowCartesianTrajectory.Feedback()
     message.header.stamp = stamp
     message.header.frame_id = frame.frame_id
@@ -74,50 +71,12 @@ def feedback_message(
 
 
 def result_message(outcome: Outcome) -> FollowCartesianTrajectory.Result:
-    """Return the result for the end of a goal."""
+    """Return the result message of an outcome."""
     message = FollowCartesianTrajectory.Result()
     message.error_code = int(outcome.code)
     message.error_string = outcome.text
     message.report = list(outcome.report)
     return message
-
-
-def joint_state_message(state: RobotState, names: tuple[str, ...], stamp: Time) -> JointState:
-    """
-    Return positions [rad], velocities [rad/s] and efforts [Nm].
-
-    Efforts are left out where the software of the robot does not report them.
-    """
-    message = JointState()
-    message.header.stamp = stamp
-    message.name = list(names)
-    message.position = list(state.actual_q)
-    message.velocity = list(state.actual_qd)
-    message.effort = list(state.joint_torque or ())
-    return message
-
-
-def tcp_pose_message(state: RobotState, base: str, stamp: Time) -> PoseStamped:
-    """Return where the active TCP is measured to be in the robot's base."""
-    message = PoseStamped()
-    message.header.stamp = stamp
-    message.header.frame_id = base
-    message.pose = pose_message(state.actual_tcp_pose)
-    return message
-
-
-def pose_message(pose: Pose) -> PoseMessage:
-    """Return a pose as a message."""
-    (x, y, z), (qx, qy, qz, qw) = pose.position, pose.quaternion
-    return PoseMessage(
-        position=Point(x=x, y=y, z=z), orientation=Quaternion(x=qx, y=qy, z=qz, w=qw)
-    )
-
-
-def duration_message(time: float) -> Duration:
-    """Return seconds as a message, to the nearest nanosecond; infinity as the largest it holds."""
-    sec, nanosec = divmod(round(min(time, _MAX_SECONDS) * 1_000_000_000), 1_000_000_000)
-    return Duration(sec=sec, nanosec=nanosec)
 
 
 def _point(

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from enum import IntEnum
-from typing import Any, TypeAlias, TypeVar
+from typing import TypeVar
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.goal import (
@@ -32,10 +32,14 @@ from ur_cartesian_driver.motion.goal import (
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector3, Vector6
 from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
+from ur_cartesian_driver.ros.message_fields import (
+    Message,
+    nanoseconds,
+    pose_from_message,
+    seconds,
+)
 from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 
-#: Generated message classes carry no types.
-Message: TypeAlias = Any
 _Enum = TypeVar('_Enum', bound=IntEnum)
 
 _NO_POSTURE = Posture()
@@ -130,16 +134,6 @@ def resolve_frames(
     )
 
 
-def seconds(duration: Message) -> float:
-    """Return a ``Duration`` or ``Time`` as seconds, rounded only once, so nanoseconds survive."""
-    return nanoseconds(duration) / 1_000_000_000
-
-
-def nanoseconds(time: Message) -> int:
-    """Return a ``Duration`` or ``Time`` in nanoseconds."""
-    return int(time.sec) * 1_000_000_000 + int(time.nanosec)
-
-
 def _age(stamp: Message, now: int) -> float | None:
     """Return how old a stamp is [s]; None for no stamp at all."""
     sent = nanoseconds(stamp)
@@ -150,17 +144,12 @@ def _waypoint(point: Message) -> Waypoint:
     time = point.time_from_start
     return Waypoint(
         time=(time.sec * 1_000_000_000 + time.nanosec) / 1_000_000_000,
-        pose=_pose(point.pose),
+        pose=pose_from_message(point.pose),
         twist=_six(point.twist),
         acceleration=_six(point.acceleration),
         jerk=_six(point.jerk),
         posture=_posture(point.posture),
     )
-
-
-def _pose(pose: Message) -> Pose:
-    p, q = pose.position, pose.orientation
-    return Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))
 
 
 def _three(vector: Message) -> Vector3:
@@ -183,7 +172,7 @@ def _posture(posture: Message) -> Posture:
 
 def _segment(segment: Message, field: str) -> Segment:
     type_ = _member(SegmentType, segment.type, f'{field}.type')
-    via: Pose | None = _pose(segment.via)
+    via: Pose | None = pose_from_message(segment.via)
     if type_ is not SegmentType.CIRCULAR and via == IDENTITY:
         via = None  # left alone; another value is kept, so that it is refused and not ignored
     return Segment(

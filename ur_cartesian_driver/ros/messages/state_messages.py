@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""From the state of the robot to messages for everybody who wants to know it."""
+"""Messages of the state topics."""
 
 from __future__ import annotations
 
@@ -10,16 +10,48 @@ from math import nan
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3, WrenchStamped
+from geometry_msgs.msg import PoseStamped, Transform, TransformStamped, WrenchStamped
 import numpy as np
+from sensor_msgs.msg import JointState
 
-from ur_cartesian_driver.driver import DriverStatus as Connection
+from ur_cartesian_driver.driver import DriverStatus as DriverState
 from ur_cartesian_driver.motion.pose import conjugate, rotate
+from ur_cartesian_driver.motion.servo import ServoReport
 from ur_cartesian_driver.motion.signals import AnalogChannel, Signals
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, SafetyMode
-from ur_cartesian_driver.msg import DriverStatus, IOStates, ToolData
+from ur_cartesian_driver.msg import DriverStatus, IOStates, ServoState, ToolData
 from ur_cartesian_driver.msg import RobotMode as RobotModeMessage
 from ur_cartesian_driver.msg import SafetyMode as SafetyModeMessage
+from ur_cartesian_driver.ros.message_fields import (
+    duration_message,
+    pose_message,
+    quaternion_message,
+    vector_message,
+)
+
+
+def joint_state_message(state: RobotState, names: tuple[str, ...], stamp: Time) -> JointState:
+    """
+    Return positions [rad], velocities [rad/s] and efforts [Nm].
+
+    Efforts are left out where the robot does not report them.
+    """
+    message = JointState()
+    message.header.stamp = stamp
+    message.name = list(names)
+    message.position = list(state.actual_q)
+    message.velocity = list(state.actual_qd)
+    message.effort = list(state.joint_torque or ())
+    return message
+
+
+def tcp_pose_message(state: RobotState, base: str, stamp: Time) -> PoseStamped:
+    """Return the measured pose of the active TCP in the robot's base."""
+    message = PoseStamped()
+    message.header.stamp = stamp
+    message.header.frame_id = base
+    message.pose = pose_message(state.actual_tcp_pose)
+    return message
 
 
 def wrench_message(state: RobotState, tcp: str, stamp: Time) -> WrenchStamped:
@@ -33,34 +65,35 @@ def wrench_message(state: RobotState, tcp: str, stamp: Time) -> WrenchStamped:
     message = WrenchStamped()
     message.header.stamp = stamp
     message.header.frame_id = tcp
-    message.wrench.force = _vector(rotate(to_tcp, (fx, fy, fz)))
-    message.wrench.torque = _vector(rotate(to_tcp, (tx, ty, tz)))
+    message.wrench.force = vector_message(rotate(to_tcp, (fx, fy, fz)))
+    message.wrench.torque = vector_message(rotate(to_tcp, (tx, ty, tz)))
     return message
 
 
 def tcp_transform(state: RobotState, base: str, tcp: str, stamp: Time) -> TransformStamped:
-    """Return where the active TCP is measured to be, as a transform for tf."""
+    """Return the measured pose of the active TCP as a transform for tf."""
     message = TransformStamped(child_frame_id=tcp)
     message.header.stamp = stamp
     message.header.frame_id = base
-    x, y, z, w = state.actual_tcp_pose.quaternion
     message.transform = Transform(
-        translation=_vector(state.actual_tcp_pose.position),
-        rotation=Quaternion(x=x, y=y, z=z, w=w),
+        translation=vector_message(state.actual_tcp_pose.position),
+        rotation=quaternion_message(state.actual_tcp_pose.quaternion),
     )
     return message
 
 
-def status_message(connection: Connection, state: RobotState | None, stamp: Time) -> DriverStatus:
+def status_message(
+    driver_state: DriverState, state: RobotState | None, stamp: Time
+) -> DriverStatus:
     """
-    Return how far the connection is, with what the robot reports.
+    Return the state of the connection and the modes of the robot.
 
-    Each field of the message has the value of the same name of the connection or of the state.
+    Each field has the value of the same name of the driver's or of the robot's state.
     """
     message = DriverStatus()
     for name in message.get_fields_and_field_types():
         if name != 'header':
-            value = getattr(connection if hasattr(connection, name) else state, name, None)
+            value = getattr(driver_state if hasattr(driver_state, name) else state, name, None)
             if value is None:
                 value = _unknown(name, getattr(message, name))
             setattr(message, name, int(value) if isinstance(value, IntEnum) else value)
@@ -108,7 +141,7 @@ def io_states_message(signals: Signals, stamp: Time) -> IOStates:
 
 
 def tool_data_message(signals: Signals, stamp: Time) -> ToolData:
-    """Return the tool connector and the payload."""
+    """Return the state of the tool connector and the payload."""
     message = ToolData(
         analog_inputs=_values(signals.tool_analog_inputs),
         analog_input_domains=_domains(signals.tool_analog_inputs),
@@ -117,7 +150,28 @@ def tool_data_message(signals: Signals, stamp: Time) -> ToolData:
         temperature=signals.tool_temperature,
         mode=signals.tool_mode,
         payload=signals.payload,
-        payload_center_of_gravity=_vector(signals.payload_cog),
+        payload_center_of_gravity=vector_message(signals.payload_cog),
+    )
+    message.header.stamp = stamp
+    return message
+
+
+def servo_state_message(report: ServoReport, stamp: Time) -> ServoState:
+    """Return the state of the set-point stream."""
+    message = ServoState(
+        state=int(report.activity),
+        setpoints_sent=report.setpoints_sent,
+        setpoints_done=report.setpoints_done,
+        buffer_size=report.buffer_size,
+        buffer_capacity=report.buffer_capacity,
+        buffered=duration_message(report.buffered),
+        lag=report.lag,
+        speed_scaling=report.speed_scaling,
+        joint_error=report.joint_error,
+        underruns=report.underruns,
+        overruns=report.overruns,
+        repeats=report.repeats,
+        skipped=report.skipped,
     )
     message.header.stamp = stamp
     return message
@@ -129,8 +183,3 @@ def _values(channels: Sequence[AnalogChannel]) -> list[float]:
 
 def _domains(channels: Sequence[AnalogChannel]) -> list[int]:
     return [int(channel.domain) for channel in channels]
-
-
-def _vector(values: Sequence[float]) -> Vector3:
-    x, y, z = values
-    return Vector3(x=x, y=y, z=z)

@@ -23,7 +23,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from ur_cartesian_driver.driver import DriverConfig
-from ur_cartesian_driver.kinematics.robot_models import MODELS
+from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, MODELS
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 from ur_cartesian_driver.ros.tf.known_frames import Frames, StaticFrame
@@ -69,6 +69,11 @@ class Settings:
     planning: PlanningOptions
     node: NodeSettings
     frames: Frames
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The names of the joints, with ``tf_prefix``."""
+        return tuple(self.planning.tf_prefix + name for name in JOINT_NAMES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +221,7 @@ DECLARATIONS: tuple[ParameterDeclaration, ...] = (
         choices=('refuse', 'slow'),
     ),
     ParameterDeclaration(
-        'after_robot_stop',
+        'on_robot_stop',
         'What becomes of a goal when the robot makes a protective or safeguard stop: '
         'abort it, and the old motion never goes on; or continue it when somebody has '
         'unlocked the robot and plays its program, as the robot itself does.',

@@ -15,14 +15,14 @@ import pickle
 import threading
 from typing import Any
 
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 
 from ur_cartesian_driver.motion.errors import DriverError, InvalidGoal, RobotNotReady
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
-from ur_cartesian_driver.ros.goals.action_server import CartesianActionServer, GoalRun
+from ur_cartesian_driver.ros.goals.action_server import CartesianActionServer
+from ur_cartesian_driver.ros.goals.goal_run import GoalRun
 from ur_cartesian_driver.ros.messages.goal_conversion import appended_points_from_message
-from ur_cartesian_driver.ros.services.command_services import DeferredService
+from ur_cartesian_driver.ros.services.deferred_service import DeferredService
 from ur_cartesian_driver.srv import AppendPoints
 
 #: How long a goal may take from its acceptance to its motion while points wait for it [s].
@@ -45,9 +45,7 @@ class AppendService:
         self._server = server
         self._thread = ThreadPoolExecutor(1, thread_name_prefix='append points')
         self._slots = threading.Semaphore(MAX_WAITING_REQUESTS)
-        self._service = _AppendServiceServer(
-            node, AppendPoints, '~/append_points', self._handle, MutuallyExclusiveCallbackGroup()
-        )
+        self._service = DeferredService(node, AppendPoints, '~/append_points', self._handle)
 
     def close(self) -> None:
         """Take nothing any more; what is being planned comes to its end."""
@@ -119,13 +117,6 @@ class AppendService:
         )
         run.last_append = (request_key, response)
         return response
-
-
-class _AppendServiceServer(DeferredService):
-    """Promises responses."""
-
-    def _response(self, answer: Any) -> Any:
-        return answer
 
 
 def _digest(new_points: AppendedPoints) -> bytes:

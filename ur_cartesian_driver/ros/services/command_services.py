@@ -1,11 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The services of the node: each one a call of the driver, answered when the driver answers.
-
-A service callback of rclpy returns its response, so one that waits holds the executor. Here it
-returns a promise at once, and the response is sent when that is kept, by the thread that keeps
-it. Nothing waits, whatever the executor, and however many services are under way.
+Services that are one call of the driver each; the driver's answer is the response.
 
 Names, types and what they do: ``doc/ros_interface.md``.
 """
@@ -14,19 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
-import contextlib
 from typing import Any
 
-from rclpy.action.server import RCLError
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from ur_cartesian_driver.driver import Driver
 from ur_cartesian_driver.motion.errors import DriverError, LocalProtocolError
 from ur_cartesian_driver.motion.goal import OutputKind
-from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
@@ -41,6 +33,8 @@ from ur_cartesian_driver.robot.services.service_calls import (
     SetTcpCall,
     ZeroFtSensorCall,
 )
+from ur_cartesian_driver.ros.message_fields import pose_from_message
+from ur_cartesian_driver.ros.services.deferred_service import completed_answer, DeferredService
 from ur_cartesian_driver.srv import (
     Load,
     Popup,
@@ -87,8 +81,7 @@ TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
 
 
 def _tcp(request: Any) -> ServiceCall:
-    p, q = request.tcp.position, request.tcp.orientation
-    return SetTcpCall(T_flange_tcp=Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w)))
+    return SetTcpCall(T_flange_tcp=pose_from_message(request.tcp))
 
 
 def _payload(request: Any) -> ServiceCall:
@@ -169,46 +162,3 @@ class _CallHandler:
                 'counts on; wait for its end or cancel it, then try again.'
             )
         return self._driver.call(call)
-
-
-class DeferredService:
-    """A service whose responses are sent when they are there, from whatever thread."""
-
-    def __init__(
-        self,
-        node: Node,
-        kind: Any,
-        name: str,
-        handle: Callable[[Any], Future[ServiceAnswer]],
-        group: MutuallyExclusiveCallbackGroup,
-    ) -> None:
-        self._kind, self._handle = kind, handle
-        service: Any = node.create_service(kind, name, self._begin, callback_group=group)
-        self._send_now = service.send_response
-        # The executor hands what the callback returned, and whom it is for, to this method.
-        service.send_response = self._send_when_done
-
-    def _begin(self, request: Any, _: Any) -> Any:
-        return self._handle(request)
-
-    def _send_when_done(self, future: Future[ServiceAnswer], header: Any) -> None:
-        future.add_done_callback(
-            lambda completed_answer: self._send(completed_answer.result(), header)
-        )
-
-    def _send(self, answer: ServiceAnswer, header: Any) -> None:
-        response = self._response(answer)
-        # The node, or all of ROS, may have ended meanwhile.
-        with contextlib.suppress(InvalidHandle, RCLError):
-            self._send_now(response, header)
-
-    def _response(self, answer: Any) -> Any:
-        """Return the response of what was promised."""
-        return self._kind.Response(success=answer.ok, message=answer.text)
-
-
-def completed_answer(text: str, *, ok: bool = False) -> Future[ServiceAnswer]:
-    """Return a promise that is kept already: mostly by a refusal."""
-    future: Future[ServiceAnswer] = Future()
-    future.set_result(ServiceAnswer(ok=ok, text=text))
-    return future

@@ -28,19 +28,16 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64
 
 from ur_cartesian_driver.driver import Driver
-from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.msg import DriverStatus, IOStates, RobotMode, SafetyMode, ToolData
-from ur_cartesian_driver.ros.messages.feedback_messages import (
-    joint_state_message,
-    tcp_pose_message,
-)
 from ur_cartesian_driver.ros.messages.state_messages import (
     io_states_message,
+    joint_state_message,
     robot_mode_message,
     safety_mode_message,
     status_message,
+    tcp_pose_message,
     tcp_transform,
     tool_data_message,
     wrench_message,
@@ -126,7 +123,7 @@ class _StateTopics:
     """What is published with each new state of the robot."""
 
     def __init__(self, node: Node, settings: Settings) -> None:
-        self._joint_names = tuple(settings.planning.tf_prefix + name for name in JOINT_NAMES)
+        self._joint_names = settings.joint_names
         self._base, self._tcp = settings.frames.base, settings.frames.tcp
         self._joint_states = node.create_publisher(JointState, 'joint_states', STATE_QOS)
         self._tcp_pose = node.create_publisher(PoseStamped, '~/tcp_pose', STATE_QOS)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 import importlib
-from typing import Any, Protocol, TypeAlias
+from typing import Protocol
 
 from rclpy.duration import Duration
 from rclpy.node import Node
@@ -19,9 +19,7 @@ from rclpy.time import Time
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.pose import normalize, Pose
-
-#: Generated message classes carry no types.
-Message: TypeAlias = Any
+from ur_cartesian_driver.ros.message_fields import Message, nanoseconds
 
 #: How long a transform is waited for [s]: one for this moment is published in the next.
 LOOKUP_TIMEOUT = 0.5
@@ -71,7 +69,7 @@ class TransformLookup:
         :raises InvalidGoal: there is no such transform, or only an old one.
         """
         message = self._lookup(field, target, source, at)
-        stamp = _nanoseconds(message.header.stamp)
+        stamp = nanoseconds(message.header.stamp)
         if at == 0 and stamp != 0:
             self._check_age(field, target, source, stamp)
         return _pose(message.transform)
@@ -93,7 +91,7 @@ class TransformLookup:
         :raises InvalidGoal: there is no such transform, or the frames move against each other.
         """
         message = self._lookup(field, target, source, 0)
-        if _nanoseconds(message.header.stamp) != 0:
+        if nanoseconds(message.header.stamp) != 0:
             raise InvalidGoal(
                 field,
                 f'is "{source}", which is not fixed to "{target}": tf2 has only a '
@@ -137,10 +135,6 @@ def listen_to_tf(node: Node, max_age: float) -> TransformLookup | None:
         close=listener.unregister,
         now=lambda: int(node.get_clock().now().nanoseconds),
     )
-
-
-def _nanoseconds(stamp: Message) -> int:
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
 
 def _pose(transform: Message) -> Pose:

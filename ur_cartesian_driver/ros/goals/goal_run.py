@@ -1,0 +1,328 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+One accepted goal, from its acceptance to its outcome, in a thread of its own.
+
+A run converts the goal, plans it, waits for its start time and for the arm, and follows the
+motion. Its executor sees it twice: when the goal is accepted, and when the outcome is there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import contextlib
+from dataclasses import dataclass, replace
+import threading
+from typing import Any, TypeAlias
+
+from rclpy.action.server import RCLError
+from rclpy.clock import Clock
+from rclpy.exceptions import InvalidHandle
+
+from ur_cartesian_driver.driver import Driver, MotionHandle
+from ur_cartesian_driver.motion.errors import (
+    Cancelled,
+    DriverError,
+    ErrorCode,
+    GoalRefused,
+    Preempted,
+    RobotNotReady,
+)
+from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.plan import Plan
+from ur_cartesian_driver.planning.request.validate import check
+from ur_cartesian_driver.ros.goals.arm_arbiter import ArmArbiter, ArmRequest
+from ur_cartesian_driver.ros.message_fields import nanoseconds
+from ur_cartesian_driver.ros.messages.feedback_messages import feedback_message, FeedbackFrame
+from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message, resolve_frames
+from ur_cartesian_driver.ros.parameters.node_parameters import Settings
+from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
+
+GoalHandle: TypeAlias = Any
+
+#: How often a waiting goal reads the node's clock, which may be a simulated one [s].
+CLOCK_PERIOD = 0.05
+#: How long rclpy may take from its cancel callback to the state CANCELING [s].
+CANCELING_TIMEOUT = 1.0
+
+SHUTDOWN = 'The driver node is shutting down'
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GoalContext:
+    """What all goals of a node share."""
+
+    driver: Driver
+    arbiter: ArmArbiter
+    frames: Frames
+    clock: Clock
+    settings: Settings
+
+    def now(self) -> int:
+        """Return the time of the node's clock [ns]."""
+        return int(self.clock.now().nanoseconds)
+
+    def snapshot(self) -> ArmSnapshot | None:
+        """Return where the arm is, or would come to rest; None while that is unknown."""
+        state = self.driver.rest_state
+        return None if state is None else ArmSnapshot.of(state)
+
+
+class GoalRun:
+    """One goal, from its acceptance to its outcome."""
+
+    def __init__(
+        self,
+        handle: GoalHandle,
+        context: GoalContext,
+        on_end: Callable[[GoalRun, Outcome], None],
+    ) -> None:
+        """
+        Make a run; its thread is still to be started.
+
+        :param on_end: takes the outcome, in the thread of the run.
+        """
+        self.handle = handle
+        self.key = goal_key(handle)
+        self._context = context
+        self._on_end = on_end
+        self._received = context.now()
+        #: When the motion starts [ns]; 0: at once.
+        self._start_time = nanoseconds(handle.request.trajectory.header.stamp)
+        self.arm_request = ArmRequest(f'goal {self.key.hex()[:8]}', self._preempt_motion)
+        self.thread = threading.Thread(target=self._run, name=self.arm_request.name, daemon=True)
+        #: Whether the goal waits for its start time.
+        self.is_waiting = self.is_scheduled
+        #: The last append request that was granted, and its response.
+        self.last_append: tuple[object, Any] | None = None
+        self._lock = threading.Lock()
+        self._motion: MotionHandle | None = None
+        #: Set when the motion has begun, or never will.
+        self._begun = threading.Event()
+        self._abort_requested = threading.Event()
+        self._cancel_requested = False
+
+    @property
+    def is_scheduled(self) -> bool:
+        """Tell whether the start time was in the future when the goal was received."""
+        return self._start_time > self._received
+
+    @property
+    def points(self) -> int:
+        """The number of points of a goal with keep_open; 0 for all others."""
+        motion = self._motion
+        return motion.appender.points if motion is not None and motion.appender else 0
+
+    def motion(self, timeout: float) -> MotionHandle | None:
+        """Return the motion, waiting until it has begun [s]; None if there is none."""
+        self._begun.wait(timeout)
+        return self._motion
+
+    def cancel(self) -> None:
+        """End the goal because its client cancels it."""
+        self._cancel_requested = True
+        self.abort()
+
+    def abort(self) -> None:
+        """End the goal, before its motion or with a stop of the arm."""
+        with self._lock:
+            self._abort_requested.set()
+            motion = self._motion
+        self._context.arbiter.withdraw(self.arm_request)
+        if motion is not None:
+            motion.cancel()
+
+    def _preempt_motion(self) -> None:
+        with self._lock:
+            motion = self._motion
+        if motion is not None:
+            motion.preempt(self.arm_request.preempted_by)
+
+    # ---- in the thread of the run -------------------------------------------------------------
+
+    def _run(self) -> None:
+        try:
+            outcome = self._process()
+        except DriverError as error:
+            outcome = Outcome(code=error.code, text=self._refusal_text(error))
+        except Exception as error:
+            # A goal always ends with a result; the thread prints the traceback.
+            text = f'The driver has a defect, {type(error).__name__}: {error}; its log says more.'
+            self._on_end(self, Outcome(code=ErrorCode.EXECUTION_FAILED, text=text))
+            raise
+        finally:
+            self._begun.set()
+        if outcome.code is ErrorCode.CANCELLED and self._cancel_requested:
+            self._wait_for_canceling_state()
+        self._on_end(self, outcome)
+
+    def _process(self) -> Outcome:
+        context, request = self._context, self.handle.request
+        goal = goal_from_message(
+            request,
+            context.frames,
+            now=self._received,
+            snapshot=context.snapshot(),
+            time_tolerance=context.settings.node.goal_time_tolerance,
+        )
+        if request.validate_only:
+            plan = self._plan(goal)
+            return Outcome(
+                code=ErrorCode.SUCCESSFUL, text='The goal passed all checks.', report=plan.report
+            )
+        if self.is_scheduled:
+            self._plan(goal)
+            self._wait_for_start_time()
+            context.arbiter.enqueue(self.arm_request)
+            goal = replace(goal, age=0.0)
+        if context.settings.node.on_new_goal == 'preempt':
+            return self._execute(self._plan_and_preempt(goal))
+        return self._execute(self._plan_if_free(goal))
+
+    def _wait_for_start_time(self) -> None:
+        while (remaining := self._start_time - self._context.now()) > 0:
+            if self._abort_requested.wait(min(remaining / 1_000_000_000, CLOCK_PERIOD)):
+                break
+        self.is_waiting = False
+        self._check_wanted()
+
+    def _plan_if_free(self, goal: Goal) -> Plan:
+        """
+        Acquire the arm and plan the goal.
+
+        :raises GoalRefused: the arm is not free; a malformed goal is refused for that instead.
+        """
+        arbiter = self._context.arbiter
+        if not arbiter.acquire(self.arm_request):
+            check(goal, self._context.settings.planning)
+            holder = arbiter.holder
+            other = (
+                'Another goal is'
+                if not holder or holder.startswith('goal ')
+                else f'{holder.capitalize()} is'
+            )
+            raise RobotNotReady(
+                f'{other} running and on_new_goal is reject; wait for its end or '
+                'cancel it, then send this goal again.'
+            )
+        return self._plan_from_here(goal)
+
+    def _plan_and_preempt(self, goal: Goal) -> Plan:
+        """
+        Plan the goal, have older goals give up the arm, and return the plan.
+
+        The goal is first planned from where the arm would come to rest: a refusal then disturbs
+        no other goal. It is planned again if another goal has moved the arm meanwhile.
+
+        :raises GoalRefused: the goal, or the robot cannot take a goal after the running one.
+        """
+        arbiter = self._context.arbiter
+        release_count = arbiter.release_count
+        plan = self._plan_from_here(goal)
+        if arbiter.is_held():
+            self._context.driver.check_can_preempt()
+        arbiter.preempt(self.arm_request)
+        self._check_wanted()
+        return plan if arbiter.release_count == release_count else self._plan_from_here(goal)
+
+    def _plan_from_here(self, goal: Goal) -> Plan:
+        """Plan a goal whose frames are where they are now: the arm may have moved since."""
+        context = self._context
+        return self._plan(
+            resolve_frames(
+                goal,
+                self.handle.request.trajectory,
+                context.frames,
+                now=context.now(),
+                snapshot=context.snapshot(),
+            )
+        )
+
+    def _plan(self, goal: Goal) -> Plan:
+        plan = self._context.driver.plan(goal)
+        self._check_wanted()
+        return plan
+
+    def _check_wanted(self) -> None:
+        """
+        Check that the goal was neither aborted nor preempted meanwhile.
+
+        :raises ExecutionEnded: it was.
+        """
+        if self._abort_requested.is_set():
+            raise self._cancellation('before anything moved')
+        if preempted_by := self.arm_request.preempted_by:
+            raise Preempted(
+                f'{preempted_by.capitalize()} took the place of this one before anything moved.'
+            )
+
+    def _execute(self, plan: Plan) -> Outcome:
+        motion = self._context.driver.start(plan, self._feedback_publisher(plan))
+        with self._lock:
+            self._motion = motion
+            abort_requested = self._abort_requested.is_set()
+        self._begun.set()
+        if abort_requested:
+            motion.cancel()
+        elif self.arm_request.preempted_by:
+            motion.preempt(self.arm_request.preempted_by)
+        outcome = motion.result()
+        if (
+            outcome.code is ErrorCode.CANCELLED
+            and not self._cancel_requested
+            and self._abort_requested.is_set()
+        ):
+            return replace(outcome, text=str(self._cancellation('and the arm was stopped')))
+        return outcome
+
+    def _feedback_publisher(self, plan: Plan) -> Callable[[Progress], None]:
+        """Return what publishes feedback; publishing is safe from any thread."""
+        context, trajectory = self._context, self.handle.request.trajectory
+        frame = FeedbackFrame(
+            frame_id=trajectory.header.frame_id or context.frames.base,
+            controlled_frame=trajectory.controlled_frame or context.frames.tcp,
+            T_frame_base=plan.goal.T_base_frame.inverse(),
+            joint_names=context.settings.joint_names,
+        )
+
+        def publish(progress: Progress) -> None:
+            message = feedback_message(progress, frame, context.clock.now().to_msg())
+            # The node, or all of ROS, may be shutting down; the motion is then cancelled anyway.
+            with contextlib.suppress(InvalidHandle, RCLError):
+                self.handle.publish_feedback(message)
+
+        return publish
+
+    def _refusal_text(self, error: DriverError) -> str:
+        """Return the text of a refusal; it mentions a goal that was preempted in vain."""
+        preempted = self.arm_request.preempted
+        if not (isinstance(error, GoalRefused) and preempted):
+            return str(error)
+        return (
+            f'{error} The goal had passed all checks from where the arm was expected to come '
+            f'to rest, so it preempted {preempted}, which is over.'
+        )
+
+    def _cancellation(self, when: str) -> Cancelled:
+        if self._cancel_requested:
+            return Cancelled(f'The goal was cancelled {when}.')
+        return Cancelled(f'{SHUTDOWN}: the goal ended {when}.')
+
+    def _wait_for_canceling_state(self) -> None:
+        """
+        Wait until rclpy has put the goal into the state CANCELING.
+
+        rclpy calls back first and changes the state afterwards, possibly in another thread. Until
+        then the goal cannot become CANCELED.
+        """
+        tick = threading.Event()
+        for _ in range(int(CANCELING_TIMEOUT / 0.001)):
+            if self.handle.is_cancel_requested:
+                return
+            tick.wait(0.001)
+
+
+def goal_key(handle: GoalHandle) -> bytes:
+    """Return the bytes of a goal's id."""
+    return bytes(handle.goal_id.uuid)

@@ -1,0 +1,69 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+A service that responds when its answer is there.
+
+A service callback of rclpy returns the response, so a callback that waits holds up the executor.
+Here the callback returns a future at once, and the thread that completes it sends the response.
+Nothing waits, whatever the executor, and however many calls are pending.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Future
+import contextlib
+from typing import Any
+
+from rclpy.action.server import RCLError
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.exceptions import InvalidHandle
+from rclpy.node import Node
+
+from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer
+
+
+class DeferredService:
+    """A service whose handler returns the future of its response."""
+
+    def __init__(
+        self,
+        node: Node,
+        kind: Any,
+        name: str,
+        handle: Callable[[Any], Future[Any]],
+        group: MutuallyExclusiveCallbackGroup | None = None,
+    ) -> None:
+        """
+        Start to serve.
+
+        :param handle: takes the request and returns at once; the future may be completed by any
+            thread, with a response of this kind or a :class:`ServiceAnswer`.
+        """
+        self._kind = kind
+        service: Any = node.create_service(
+            kind,
+            name,
+            lambda request, _: handle(request),
+            callback_group=group or MutuallyExclusiveCallbackGroup(),
+        )
+        self._send_now = service.send_response
+        # The executor passes what the callback returned, and the request's header, to this method.
+        service.send_response = self._send_when_done
+
+    def _send_when_done(self, future: Future[Any], header: Any) -> None:
+        future.add_done_callback(lambda done: self._send(done.result(), header))
+
+    def _send(self, answer: Any, header: Any) -> None:
+        if isinstance(answer, ServiceAnswer):
+            answer = self._kind.Response(success=answer.ok, message=answer.text)
+        # The node, or all of ROS, may have been shut down meanwhile.
+        with contextlib.suppress(InvalidHandle, RCLError):
+            self._send_now(answer, header)
+
+
+def completed_answer(text: str, *, ok: bool = False) -> Future[ServiceAnswer]:
+    """Return an answer that is known at once, mostly a refusal."""
+    future: Future[ServiceAnswer] = Future()
+    future.set_result(ServiceAnswer(ok=ok, text=text))
+    return future
