@@ -259,7 +259,7 @@ def test_there_are_interface_files():
 
 @pytest.mark.parametrize('path', interface_files(), ids=lambda p: p.name)
 def test_every_quantity_has_its_unit_in_a_comment(path):
-    unit = re.compile(r'\[[^\]]+\]|fraction|[Pp]art of|0 to 1|from \w+ to')
+    unit = re.compile(r'\[[^\]]+\]|[Ff]raction|0 to 1|from \w+ to')
     quantities = ('float64', 'geometry_msgs/', 'builtin_interfaces/Duration')
     bare = [
         field

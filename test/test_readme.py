@@ -284,7 +284,7 @@ def test_commands_exist(document):
 
 
 def check_parameters(words):
-    from ur_cartesian_driver.ros.parameters.node_parameters import DECLARATIONS
+    from ur_cartesian_driver.ros.parameters.parameter_table import DECLARATIONS
 
     known = {declaration.name for declaration in DECLARATIONS}
     given = {word.split(':=')[0] for word in words if ':=' in word}

@@ -6,16 +6,16 @@ Fixtures for tests of programs that use the driver; installed as a pytest plugin
 ``ur_sim``
     a simulated robot on free ports; ``@pytest.mark.ur_sim(model='ur10e')`` sets fields of its
     :class:`~ur_cartesian_driver.sim.SimulatorConfig`, such as
-    ``faults=['protective_stop at 0.35 m']``; ``ur_sim.inject('drop rtde')`` lets something go
-    wrong in the course of a test.
+    ``faults=['protective_stop at 0.35 m']``; ``ur_sim.inject('drop rtde')`` injects a fault
+    during a test.
 ``cartesian_driver``
-    the driver's node, connected to ``ur_sim`` and ready for goals; it is not spinning, add it to
-    an executor of your own. ``@pytest.mark.cartesian_driver(max_tool_speed=1.0)`` sets parameters.
+    the driver's node, connected to ``ur_sim`` and ready for goals; add it to an executor of your
+    own, nothing spins it. ``@pytest.mark.cartesian_driver(max_tool_speed=1.0)`` sets parameters.
 ``private_ros_graph``
-    keeps all nodes of a test run to themselves; ``cartesian_driver`` uses it.
+    isolates the nodes of a test run from all others; ``cartesian_driver`` uses it.
 
-Importing this module costs next to nothing: pytest does it in every project of the environment,
-so what is heavy is imported where a fixture is used.
+pytest imports this module in every project of the environment. So it costs next to nothing: heavy
+imports stand in the fixtures.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     from ur_cartesian_driver.ros import CartesianDriverNode
     from ur_cartesian_driver.sim import SimulatedRobot
 
-#: ROS domains that users seldom are on; 0 to 101 are allowed everywhere.
+#: ROS domains that users rarely choose; 0 to 101 are allowed on all systems.
 DOMAINS = range(60, 101)
-#: How long driver and simulator may need to find each other [s].
+#: How long the driver may take to connect to the simulator [s].
 READY_TIMEOUT = 10.0
 
 
@@ -63,10 +63,10 @@ def ur_sim(request: pytest.FixtureRequest) -> Iterator[SimulatedRobot]:
 @pytest.fixture(scope='session')
 def private_ros_graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]:
     """
-    Keep the nodes of this test run to themselves, and yield their ROS domain.
+    Isolate the nodes of this test run, and yield their ROS domain.
 
-    The graph stays on this computer, in a domain that no other run with this plugin has, and logs
-    go to a temporary folder. Variables that are set already are left alone.
+    The graph stays on this computer, in a domain that no other run with this plugin uses, and logs
+    go to a temporary folder. Discovery range and log folder are kept if they are set already.
     """
     with contextlib.ExitStack() as stack, pytest.MonkeyPatch.context() as environment:
         domain = next(d for d in DOMAINS if _lock_domain(d, stack))
@@ -81,7 +81,7 @@ def private_ros_graph(tmp_path_factory: pytest.TempPathFactory) -> Iterator[int]
 
 
 def _lock_domain(domain: int, stack: contextlib.ExitStack) -> bool:
-    """Take a domain for as long as the stack lives, unless another run has it."""
+    """Lock a domain until the stack closes; return False if another run has locked it."""
     path = Path(tempfile.gettempdir(), f'ur_cartesian_driver_test_domain_{domain}')
     lock = stack.enter_context(path.open('w'))
     try:

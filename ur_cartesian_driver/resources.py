@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the files are that belong to the package and are not Python: config/, launch/, msg/."""
+"""The location of the data files of the package: config/, launch/, msg/ and others."""
 
 import os
 from pathlib import Path
@@ -13,14 +13,16 @@ def share_path() -> Path:
     """
     Return the directory that holds config/, launch/, msg/, srv/, action/ and package.xml.
 
-    That is the checkout, where the modules are used from one (an editable install, colcon's
-    --symlink-install), so that an edited file counts at once; else share/ of the ROS
-    installation or of the pip environment.
+    If the modules are used from a checkout (an editable install, colcon's --symlink-install), that
+    is the checkout, so that an edited file counts at once; else share/ of the ROS installation or
+    of the pip environment.
+
+    :raises FileNotFoundError: the data files are not installed.
     """
     checkout = Path(__file__).resolve().parents[1]
     if (checkout / 'package.xml').is_file():
         return checkout
-    # The wheels of ROS 2 do not set AMENT_PREFIX_PATH; without it there is no index to ask.
+    # The wheels of ROS 2 do not set AMENT_PREFIX_PATH, so there may be no ament index.
     for prefix in [
         *filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)),
         sys.prefix,

@@ -52,7 +52,7 @@ def test_a_goal_is_continued_once_for_each_request_and_ends_with_the_last(single
     request.points[1].pose.position.z += 0.01
     others = append.ask(request)
     assert (others.accepted, others.points_received) == (False, 3), 'others in the same place'
-    assert 'go on with point 3' in others.message
+    assert 'continue with point 3' in others.message
     for index, step, text in (
         (5, (4.0, 0.0, 0.0, 0.0), 'first_index is 5, but the goal has 3 points; append'),
         (2, (4.0, 0.0, 0.0, 0.0), 'first_index is 2, but the goal has 3 points; go on with'),
@@ -62,7 +62,7 @@ def test_a_goal_is_continued_once_for_each_request_and_ends_with_the_last(single
         assert (refused.accepted, refused.points_received) == (False, 3), refused.message
         assert text in refused.message
     stranger = append(handle, 0, (0.5, 0.0, 0.0, 0.0), goal_id=UUID(uuid=[1] * 16))
-    assert 'There is no goal with this goal_id' in stranger.message
+    assert 'No goal with this goal_id' in stranger.message
     assert append(handle, 3, (4.0, 0.0, 0.0, 0.0), last=True).accepted
     _, result = cell.result(handle)
     assert result.error_code == ErrorCode.SUCCESSFUL, result.error_string

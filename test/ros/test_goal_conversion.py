@@ -150,7 +150,7 @@ def test_a_time_tolerance_of_zero_is_the_default():
 @pytest.mark.parametrize(
     ('fields', 'sentence'),
     [
-        ({'execution': 4}, r'^execution is 4; it is one of AUTO \(0\), PRIMITIVES \(1\)'),
+        ({'execution': 4}, r'^execution is 4; it must be one of AUTO \(0\), PRIMITIVES \(1\)'),
         (
             {'segments': [MotionSegment(), MotionSegment(type=9)]},
             r'^segments\[1\]\.type is 9; .*AUTO',

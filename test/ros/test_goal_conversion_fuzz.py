@@ -27,12 +27,8 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
-from ur_cartesian_driver.ros.parameters.node_parameters import (
-    DECLARATIONS,
-    defaults,
-    ParameterError,
-    settings_from,
-)
+from ur_cartesian_driver.ros.parameters.node_parameters import defaults, settings_from
+from ur_cartesian_driver.ros.parameters.parameter_table import DECLARATIONS, ParameterError
 from ur_cartesian_driver.ros.services.command_services import REQUEST_SERVICES
 from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.sim.simulator_config import HOME

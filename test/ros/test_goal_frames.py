@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Goals by the names of their frames, from the message to the arm and back to the feedback."""
 
+from dataclasses import replace
+
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 import pytest
@@ -49,8 +51,11 @@ class Cell:
         driver = cell.node.driver
         wait_for(lambda: driver.state.T_flange_tcp.distance_to(TCP) < 1e-9)
         server = cell.node.action_server
-        server._frames = server._frames.with_transforms(
-            TransformLookup(StandInBuffer(), LookupError, now=lambda: 0, max_age=1.0)
+        server._context = replace(
+            server._context,
+            frames=server.frames.with_transforms(
+                TransformLookup(StandInBuffer(), LookupError, now=lambda: 0, max_age=1.0)
+            ),
         )
 
     def snapshot(self, T_flange_frame):

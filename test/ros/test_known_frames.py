@@ -78,8 +78,8 @@ def test_a_frame_without_the_prefix_is_unknown():
         (['table base 1 2 3 0 0 0 2'], r'has length 2 instead of 1'),
         (['table world 1 2 3 0 0 0 1'], 'the parent "world" of "table" does not lead to base'),
         (['a b 0 0 0 0 0 0 1', 'b a 0 0 0 0 0 0 1'], 'does not lead to base'),
-        (['base base_link 0 0 0 0 0 0 1'], '"base" is there twice'),
-        (['a base 0 0 0 0 0 0 1', 'a base 0 0 1 0 0 0 1'], '"a" is there twice'),
+        (['base base_link 0 0 0 0 0 0 1'], 'the name "base" is taken'),
+        (['a base 0 0 0 0 0 0 1', 'a base 0 0 1 0 0 0 1'], 'the name "a" is taken'),
     ],
 )
 def test_malformed_static_frames_say_what_is_wrong(texts, sentence):

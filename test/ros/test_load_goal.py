@@ -39,35 +39,38 @@ def test_an_empty_text_is_an_empty_goal(text):
     [
         (
             'trajectory: {points: [{}, {pose: {positon: {}}}]}',
-            'trajectory.points[1].pose.positon: there is no such field; trajectory.points[1].pose '
+            'trajectory.points[1].pose.positon is not a field; trajectory.points[1].pose '
             'has position, orientation.',
         ),
         (
             'trajectry: {}',
-            'trajectry: there is no such field; a goal has trajectory, path_tolerance,',
+            'trajectry is not a field; a goal has trajectory, path_tolerance,',
         ),
-        ('trajectory: {points: {}}', 'trajectory.points is {}, but it is a list.'),
-        ('trajectory: {points: [1]}', 'trajectory.points[0] is 1, but it is a mapping of fields.'),
+        ('trajectory: {points: {}}', 'trajectory.points is {}, but must be a list.'),
+        (
+            'trajectory: {points: [1]}',
+            'trajectory.points[0] is 1, but must be a mapping of fields.',
+        ),
         (
             'trajectory: {header: {frame_id: 1}}',
-            'trajectory.header.frame_id is 1, but it is a text; put it in quotes.',
+            'trajectory.header.frame_id is 1, but must be a text; put it in quotes.',
         ),
         (
             'trajectory: {points: [{pose: {position: {x: left}}}]}',
-            "trajectory.points[0].pose.position.x is 'left', but it is a number.",
+            "trajectory.points[0].pose.position.x is 'left', but must be a number.",
         ),
         (
             'trajectory: {points: [{pose: {position: {x: true}}}]}',
-            'trajectory.points[0].pose.position.x is True, but it is a number.',
+            'trajectory.points[0].pose.position.x is True, but must be a number.',
         ),
-        ('execution: 300', 'execution is 300, but it is a whole number from 0 to 255.'),
+        ('execution: 300', 'execution is 300, but must be a whole number from 0 to 255.'),
         (
             'goal_time_tolerance: {sec: 0.5}',
-            'goal_time_tolerance.sec is 0.5, but it is a whole number from -2147483648 to '
+            'goal_time_tolerance.sec is 0.5, but must be a whole number from -2147483648 to '
             '2147483647.',
         ),
-        ('validate_only: 1', 'validate_only is 1, but it is true or false.'),
-        ('[1, 2]', 'the goal is [1, 2], but it is a mapping of fields.'),
+        ('validate_only: 1', 'validate_only is 1, but must be true or false.'),
+        ('[1, 2]', 'the goal is [1, 2], but must be a mapping of fields.'),
         ('{trajectory: ', 'this is not YAML: '),
     ],
 )
@@ -79,5 +82,5 @@ def test_what_does_not_fit_is_named_by_its_key(text, sentence):
 def test_the_name_of_the_file_is_said(tmp_path):
     path = tmp_path / 'goal.yaml'
     path.write_text('points: []')
-    with pytest.raises(GoalFileError, match=re.escape(f'{path}: points: there is no such field')):
+    with pytest.raises(GoalFileError, match=re.escape(f'{path}: points is not a field')):
         load_goal(path)

@@ -28,7 +28,7 @@ from ur_cartesian_driver.msg import (
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros import CartesianDriverNode
 from ur_cartesian_driver.ros.client import GoalClient, load_goal
-from ur_cartesian_driver.ros.parameters.node_parameters import ParameterError
+from ur_cartesian_driver.ros.parameters.parameter_table import ParameterError
 from ur_cartesian_driver.ros.state.state_publisher import LATCHED_QOS, STATE_QOS
 
 pytestmark = pytest.mark.slow
@@ -181,7 +181,7 @@ def test_ctrl_c_at_the_client_cancels_the_goal(single_cell):
 def test_a_client_without_a_driver_says_so(no_thread_left):
     with (
         GoalClient('nobody') as client,
-        pytest.raises(TimeoutError, match='Nobody serves /nobody/follow_cartesian_trajectory'),
+        pytest.raises(TimeoutError, match='No driver serves /nobody/follow_cartesian_trajectory'),
     ):
         client.send(None, timeout=0.1)
 
@@ -228,10 +228,10 @@ def run_when_ready(client, goal, on_feedback):
 @pytest.mark.parametrize(
     ('arguments', 'sentence'),
     [
-        (['-p', 'ur_type:=ur4'], "Parameter ur_type is 'ur4'; it is one of ur3,"),
+        (['-p', 'ur_type:=ur4'], "Parameter ur_type is 'ur4', but must be one of ur3,"),
         (
             ['-p', 'max_tool_speed:=fast'],
-            "Parameter max_tool_speed is 'fast', but it is a number.",
+            "Parameter max_tool_speed is 'fast', but must be a number.",
         ),
         (['-p', 'max_tool_sped:=0.5'], 'There is no parameter max_tool_sped; did you mean'),
         (['-p', 'ur_type'], "failed to initialize rcl: Couldn't parse parameter override rule"),

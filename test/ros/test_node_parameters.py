@@ -15,12 +15,11 @@ from ur_cartesian_driver.planning import PlanningOptions
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.parameters.node_parameters import (
     as_overrides,
-    DECLARATIONS,
     declare_parameters,
     defaults,
     NodeSettings,
-    ParameterError,
 )
+from ur_cartesian_driver.ros.parameters.parameter_table import DECLARATIONS, ParameterError
 
 FILE = share_path() / 'config' / 'driver.yaml'
 
@@ -153,25 +152,31 @@ def test_every_number_has_a_range(declared):
     ('values', 'sentence'),
     [
         ({'ur_typo': 'ur5e'}, 'There is no parameter ur_typo; did you mean ur_type?'),
-        ({'zzz': 1}, 'There is no parameter zzz; config/driver.yaml lists all there are.'),
-        ({'ur_type': 'ur4'}, "Parameter ur_type is 'ur4'; it is one of ur3, ur5,"),
-        ({'ur_type': 5}, 'Parameter ur_type is 5, but it is a text; put it in quotes'),
-        ({'max_tool_speed': 1}, 'Parameter max_tool_speed is 1, but it is a number; write 1.0.'),
+        ({'zzz': 1}, 'There is no parameter zzz; config/driver.yaml lists all.'),
+        ({'ur_type': 'ur4'}, "Parameter ur_type is 'ur4', but must be one of ur3, ur5,"),
+        ({'ur_type': 5}, 'Parameter ur_type is 5, but must be a text; put it in quotes'),
+        ({'max_tool_speed': 1}, 'Parameter max_tool_speed is 1, but must be a number; write 1.0.'),
         (
             {'max_tool_speed': -0.1},
-            'Parameter max_tool_speed is -0.1; it must lie between 0 and 10.',
+            'Parameter max_tool_speed is -0.1, but must lie between 0 and 10.',
         ),
-        ({'max_tool_speed': float('nan')}, 'Parameter max_tool_speed is nan; it must lie between'),
-        ({'max_points': 2.0}, 'Parameter max_points is 2.0, but it is a whole number.'),
-        ({'headless_mode': 1}, 'Parameter headless_mode is 1, but it is true or false.'),
+        (
+            {'max_tool_speed': float('nan')},
+            'Parameter max_tool_speed is nan, but must lie between',
+        ),
+        ({'max_points': 2.0}, 'Parameter max_points is 2.0, but must be a whole number.'),
+        ({'headless_mode': 1}, 'Parameter headless_mode is 1, but must be true or false.'),
         (
             {'reverse_port': 65536},
-            'Parameter reverse_port is 65536; it must lie between 0 and 65535.',
+            'Parameter reverse_port is 65536, but must lie between 0 and 65535.',
         ),
-        ({'robot_loop': 'fork'}, "Parameter robot_loop is 'fork'; it is one of process, thread."),
+        (
+            {'robot_loop': 'fork'},
+            "Parameter robot_loop is 'fork', but must be one of process, thread.",
+        ),
         (
             {'on_new_goal': 'queue'},
-            "Parameter on_new_goal is 'queue'; it is one of preempt, reject",
+            "Parameter on_new_goal is 'queue', but must be one of preempt, reject",
         ),
         (
             {'static_frames': ['table']},

@@ -193,7 +193,7 @@ def test_a_second_driver_of_the_same_name_is_told(no_thread_left, capfd):
         executor.add_node(nodes[1])
         deadline = monotonic() + 10.0
         said = ''
-        while 'Another node is called /ur_cartesian_driver: ' not in said:
+        while 'Another node has the name /ur_cartesian_driver: ' not in said:
             assert monotonic() < deadline
             executor.spin_once(timeout_sec=0.1)
             said += capfd.readouterr().err

@@ -3,8 +3,8 @@
 """
 The command ``ur-cartesian``.
 
-Each command is a function of the parsed arguments that returns the exit status. What needs ROS is
-imported inside the commands that need it, so ``sim`` and ``where`` run without.
+Each command is a function from parsed arguments to the exit status. Only the commands that need
+ROS import it, so ``sim`` and ``where`` run without.
 """
 
 from __future__ import annotations
@@ -25,11 +25,10 @@ from ur_cartesian_driver.sim.faults.fault_values import Fault
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line and return the exit status: 0 only if what was asked for happened."""
+    """Run the command line and return the exit status; 0 means that the command succeeded."""
     arguments = parser().parse_args(sys.argv[1:] if argv is None else argv)
     logging.basicConfig(level=logging.WARNING, format='%(levelname)s: %(message)s')
-    # A command that is told to end has to tidy up as after Ctrl-C; a shell that starts it in the
-    # background has SIGINT ignored.
+    # SIGTERM cleans up like Ctrl-C. SIGINT is ignored by default in a background process.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.default_int_handler)
     run: Callable[[argparse.Namespace], int] = arguments.run
@@ -75,7 +74,7 @@ def _add(
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     command.set_defaults(run=run)
-    # What begins with a minus is a value also where it is six numbers; argparse has no public way.
+    # Six numbers that begin with a minus are a value too; argparse has no public option for that.
     command._negative_number_matcher = _NUMBERS
     return command
 
@@ -85,32 +84,32 @@ def _add_demo(sub: Commands[argparse.ArgumentParser]) -> None:
         sub,
         'demo',
         commands.demo,
-        'simulator, driver and a client, each a process, and one goal through them all',
+        'run simulator, driver and client, a process each, with one goal',
     )
     demo.add_argument(
         'goal',
         nargs='?',
         default='seam',
-        help='a goal file, or the name of one of config/examples',
+        help='goal file, or the name of an example in config/examples',
     )
     demo.add_argument(
-        '--picture', default='demo.png', help='where to draw planned and executed path'
+        '--picture', default='demo.png', help='picture of the planned and executed path'
     )
     demo.add_argument(
         '--arms',
         type=int,
         choices=(1, 2),
         default=1,
-        help='2 = another robot, driver and client beside them',
+        help='2 = a second robot, driver and client beside the first',
     )
     demo.add_argument(
-        '--second-goal', default='square', metavar='GOAL', help='what the second arm does'
+        '--second-goal', default='square', metavar='GOAL', help='goal of the second arm'
     )
     demo.add_argument('--model', default='ur5e', choices=sorted(MODELS), help='model of the robot')
 
 
 def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
-    sim = _add(sub, 'sim', commands.sim, 'a simulated controller on the ports of a real one')
+    sim = _add(sub, 'sim', commands.sim, 'run a simulated controller on the ports of a real one')
     sim.add_argument('--model', default='ur5e', choices=sorted(MODELS), help='model of the robot')
     sim.add_argument('--host', default='127.0.0.1', help='address to listen on')
     sim.add_argument(
@@ -126,20 +125,20 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
             f'--{name}-port',
             type=int,
             default=None,
-            help=f'0 = any free port; left out: {port} if the primary port is 30001, else any',
+            help=f'0 = any free port; by default {port} if the primary port is 30001, else any',
         )
     sim.add_argument(
         '--joints',
         type=_six_numbers,
         metavar='Q1,...,Q6',
-        help='joint positions at the start [rad]',
+        help='initial joint positions [rad]',
     )
     _add_calibration(sim)
     sim.add_argument(
         '--rate',
         type=float,
         default=1.0,
-        help='how fast time passes; 2 = twice as fast, 0 = as fast as it can',
+        help='speed of time; 2 = twice as fast, 0 = as fast as possible',
     )
     sim.add_argument(
         '--fault',
@@ -148,23 +147,23 @@ def _add_sim(sub: Commands[argparse.ArgumentParser]) -> None:
         default=[],
         metavar='TEXT',
         dest='faults',
-        help="what goes wrong, and when: 'protective_stop at 2 s', 'drop rtde at 0.35 m'; may be "
+        help="fault, and when it happens: 'protective_stop at 2 s', 'drop rtde at 0.35 m'; may be "
         'given several times, see doc/simulation.md',
     )
-    sim.add_argument('--power-off', action='store_true', help='start with the arm switched off')
+    sim.add_argument('--power-off', action='store_true', help='start with the arm powered off')
     sim.add_argument(
-        '--local', action='store_true', help='local control: no scripts over the network'
+        '--local', action='store_true', help='local control: refuse scripts from the network'
     )
 
 
 def _add_goal(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         'file',
-        help='goal in the YAML of `ros2 action send_goal`, or the name '
-        'of an example; - = standard input',
+        help='goal in the YAML of `ros2 action send_goal`, or the name of an example; '
+        '- = standard input',
     )
     command.add_argument(
-        '--tf-prefix', default='', help='put before the names of frames and joints in the file'
+        '--tf-prefix', default='', help='prefix for the names of frames and joints in the file'
     )
 
 
@@ -179,12 +178,14 @@ def _add_calibration(command: argparse.ArgumentParser) -> None:
         '--calibration-seed',
         type=int,
         metavar='N',
-        help='a made-up calibration, for each number another',
+        help='seed of a random calibration',
     )
 
 
 def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
-    send = _add(sub, 'send', commands.send, 'send a goal to a running driver and wait for its end')
+    send = _add(
+        sub, 'send', commands.send, 'send a goal to a running driver and wait for its result'
+    )
     _add_goal(send)
     send.add_argument(
         '--driver',
@@ -196,11 +197,11 @@ def _add_send(sub: Commands[argparse.ArgumentParser]) -> None:
         type=float,
         default=10.0,
         metavar='SECONDS',
-        help='how long the driver may need until it is ready; 0 = do not look',
+        help='time until the driver must be ready; 0 = do not check',
     )
     send.add_argument('--validate-only', action='store_true', help='plan, but do not move')
     send.add_argument(
-        '--report', action='store_true', help='print what is done and why, as --validate-only does'
+        '--report', action='store_true', help='print the report: what was done, and why'
     )
     send.add_argument('--record', metavar='FILE', help='write the feedback as JSON lines')
 
@@ -210,24 +211,26 @@ def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
         sub,
         'validate',
         validate_command.validate,
-        'check and plan a goal with neither motion nor robot, and print the plan',
+        'check and plan a goal without a robot, and print the plan',
     )
     _add_goal(validate)
     validate.add_argument(
-        '--ur-type', choices=sorted(MODELS), help='model; left out: the parameter ur_type'
+        '--ur-type',
+        choices=sorted(MODELS),
+        help='model of the robot; by default the parameter ur_type',
     )
     validate.add_argument(
         '--joints',
         type=_six_numbers,
         metavar='Q1,...,Q6',
-        help='where the arm stands [rad]; home when left out',
+        help='initial joint positions [rad]; by default home',
     )
     validate.add_argument(
         '--tcp',
         type=_six_numbers,
         metavar='X,Y,Z,RX,RY,RZ',
-        help='active TCP in the flange, as the pendant shows it [m, rad]; '
-        'the flange when left out',
+        help='active TCP in the flange frame, as the pendant shows it [m, rad]; by default the '
+        'flange',
     )
     validate.add_argument(
         '--params-file',
@@ -235,7 +238,7 @@ def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
         action='append',
         default=[],
         metavar='FILE',
-        help='parameters of the driver, as driver.yaml',
+        help='parameter file of the driver, like driver.yaml',
     )
     validate.add_argument(
         '-p',
@@ -248,7 +251,7 @@ def _add_validate(sub: Commands[argparse.ArgumentParser]) -> None:
     validate.add_argument(
         '--postures',
         action='store_true',
-        help='print the joint positions in which the arm arrives',
+        help='print the joint positions at each point',
     )
     _add_calibration(validate)
 
@@ -258,7 +261,7 @@ def _add_where(sub: Commands[argparse.ArgumentParser]) -> None:
         sub,
         'where',
         commands.where,
-        'print where the robot stands, as a point to paste into a goal',
+        'print the pose of the robot, as a point to paste into a goal',
     )
     where.add_argument('--robot-ip', default='127.0.0.1', help='address of the robot')
     where.add_argument('--rtde-port', type=int, default=30004, help='its RTDE port')
@@ -271,17 +274,19 @@ def _add_plot(sub: Commands[argparse.ArgumentParser]) -> None:
         recording_plot.plot,
         'draw a recorded motion: path, deviation, speed, lag, outputs and events',
     )
-    draw.add_argument('file', help='a recording, or a directory of recordings: its newest one')
+    draw.add_argument(
+        'file', help='recording, or a directory, of which the newest recording is drawn'
+    )
     draw.add_argument(
         '-o',
         '--output',
         metavar='PICTURE',
-        help='left out: beside the recording, as .png; the suffix is the format',
+        help='picture file, its suffix is the format; by default beside the recording, as .png',
     )
     draw.add_argument(
         '--csv',
         metavar='TABLE',
-        help='write all packets as comma-separated values; without -o no picture',
+        help='write all packets as comma-separated values; without -o, draw no picture',
     )
 
 
@@ -293,8 +298,8 @@ def _fault(text: str) -> Fault:
 
 
 def _six_numbers(text: str) -> tuple[float, ...]:
-    """Return six numbers that stand with commas between them."""
+    """Return six numbers separated by commas."""
     numbers = tuple(float(part) for part in text.split(','))
     if len(numbers) != 6:
-        raise argparse.ArgumentTypeError(f'{len(numbers)} numbers; give six, with commas')
+        raise argparse.ArgumentTypeError(f'{len(numbers)} numbers; give six, separated by commas')
     return numbers

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the commands do."""
+"""The commands ``demo``, ``sim``, ``send`` and ``where``."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from ur_cartesian_driver.sim.calibration import random_calibration, read_calibra
 
 
 def demo(arguments: argparse.Namespace) -> int:
-    """Run all the processes, a goal for each arm, and draw the pictures."""
+    """Run the processes of each arm with its goal, and draw the pictures."""
     from ur_cartesian_driver.cli.demo import DemoArm, run
 
     picture = Path(arguments.picture)
@@ -50,7 +50,7 @@ def demo(arguments: argparse.Namespace) -> int:
 
 
 def sim(arguments: argparse.Namespace) -> int:
-    """Run a simulated controller until it is told to end."""
+    """Run a simulated controller until it is interrupted."""
     robot = SimulatedRobot(simulator_config(arguments))
     asyncio.run(_simulate(robot))
     return 0
@@ -58,9 +58,9 @@ def sim(arguments: argparse.Namespace) -> int:
 
 def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
     """
-    Return the robot that is asked for.
+    Return the configuration of the simulated robot.
 
-    :raises ValueError: there is no such robot, or its calibration is not understood.
+    :raises ValueError: there is no such robot, or its calibration is not readable.
     """
     return SimulatorConfig(
         model=arguments.model,
@@ -82,7 +82,7 @@ def simulator_config(arguments: argparse.Namespace) -> SimulatorConfig:
 
 
 def calibration(arguments: argparse.Namespace, model: RobotModel) -> DhTable | None:
-    """Return the table of the arm that is asked for; None = that of the model."""
+    """Return the calibrated DH table from the arguments; None = the nominal one."""
     if arguments.calibration is not None:
         return read_calibration(Path(arguments.calibration), model)
     if arguments.calibration_seed is not None:
@@ -91,7 +91,7 @@ def calibration(arguments: argparse.Namespace, model: RobotModel) -> DhTable | N
 
 
 async def _simulate(robot: SimulatedRobot) -> None:
-    """Say where the simulator listens, then show its state as long as somebody looks."""
+    """Print the ports of the simulator, then its state if the output is a terminal."""
     showing = asyncio.create_task(_show_status(robot))
     try:
         await robot.run(on_listening=lambda: _show_ports(robot))
@@ -117,7 +117,7 @@ async def _show_status(robot: SimulatedRobot) -> None:
 
 
 def send(arguments: argparse.Namespace) -> int:
-    """Send a goal, show its progress, and wait for its end."""
+    """Send a goal, show its progress, and wait for its result."""
     from ur_cartesian_driver.ros import client
 
     goal = read_goal(arguments)
@@ -140,7 +140,7 @@ def send(arguments: argparse.Namespace) -> int:
 
 
 def read_goal(arguments: argparse.Namespace) -> Any:
-    """Return the goal of a file, an example or standard input, as a message."""
+    """Return the goal message of a file, an example or standard input."""
     from ur_cartesian_driver.ros import client
 
     return client.add_tf_prefix(
@@ -150,13 +150,13 @@ def read_goal(arguments: argparse.Namespace) -> Any:
 
 
 def code_text(number: int) -> str:
-    """Return an error code by its name and number, ``INVALID_GOAL (-1)``."""
+    """Return name and number of an error code, ``INVALID_GOAL (-1)``."""
     code = ErrorCode(number)
     return f'{code.name} ({code.value})'
 
 
 def clear_line() -> None:
-    """Take back the line of progress on a terminal."""
+    """Clear the line of progress on a terminal."""
     if sys.stdout.isatty():
         print('\r\033[K', end='')
 
@@ -165,7 +165,7 @@ class FeedbackLog:
     """Shows feedback on the terminal and writes it to a file, one JSON object a line."""
 
     def __init__(self, path: str | None) -> None:
-        """Take the file's name, None = no file."""
+        """Store the name of the file; None = no file."""
         self._path = path
         self._file: Any = None
         self._next_line = 0.0
@@ -182,7 +182,7 @@ class FeedbackLog:
             self._file.close()
 
     def take(self, feedback: Any) -> None:
-        """Take one feedback message."""
+        """Show and write one feedback message."""
         position = feedback.actual.pose.position
         line = (
             f'{100.0 * feedback.progress:5.1f} %  to point {feedback.point_index}  '
@@ -206,7 +206,7 @@ class FeedbackLog:
             )
 
     def _show(self, line: str) -> None:
-        """Rewrite one line on a terminal; elsewhere a line a second is enough to follow."""
+        """Rewrite one line on a terminal; elsewhere print a line a second."""
         if sys.stdout.isatty():
             print(f'\r{line}\033[K', end='', flush=True)
         elif monotonic() >= self._next_line:
@@ -222,7 +222,7 @@ def where(arguments: argparse.Namespace) -> int:
 
 
 def point_as_yaml(state: RobotState) -> str:
-    """Return where the robot stands as a point of a goal, in flow style."""
+    """Return the pose of the robot as a point of a goal, in YAML flow style."""
     x, y, z, qx, qy, qz, qw = state.actual_tcp_pose.row()
     joints = ', '.join(f'{v:.6f}' for v in state.actual_q)
     return (
@@ -237,7 +237,7 @@ def point_as_yaml(state: RobotState) -> str:
 
 def goal_file(name: str) -> Path:
     """
-    Return the path of a goal: a file, or the name of an example.
+    Return the path of a goal file or of an example.
 
     :raises OSError: neither exists.
     """

@@ -1,11 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The whole way in one command: simulated controller, driver node and client, a process each.
+``ur-cartesian demo``: simulated controller, driver node and client, a process each.
 
-Nothing here is special to the demo: the three processes are the commands that a user starts by
-hand, only their ports are free ones, so that the demo disturbs nothing that runs. Two arms are
-twice the same, each driver in a namespace and with a ``tf_prefix`` of its own.
+The processes are the commands that a user starts by hand, but with free ports, so that the demo
+disturbs nothing that runs. With two arms each driver has a namespace and a ``tf_prefix``.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ import threading
 
 from ur_cartesian_driver.cli import feedback_plot
 
-#: How long a process may take to say that it is there, and to end [s].
+#: How long a process may take to start, and to end [s].
 START_TIMEOUT = 30.0
 END_TIMEOUT = 10.0
 _PORTS = re.compile(r'RTDE (\d+), primary (\d+), dashboard (\d+)')
@@ -33,9 +32,9 @@ _PORTS = re.compile(r'RTDE (\d+), primary (\d+), dashboard (\d+)')
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DemoArm:
     """
-    One of the arms.
+    One arm of the demo.
 
-    :param name: its namespace; empty = none, it is the only arm.
+    :param name: its namespace; empty for a single arm.
     """
 
     name: str = ''
@@ -45,17 +44,17 @@ class DemoArm:
 
     @property
     def driver(self) -> str:
-        """Return the name of its node."""
+        """The name of its driver node."""
         return f'{self.name}/ur_cartesian_driver'.lstrip('/')
 
     @property
     def tf_prefix(self) -> str:
-        """Return what its frames and joints begin with."""
+        """The prefix of its frames and joints."""
         return f'{self.name}_' if self.name else ''
 
     @property
     def label(self) -> str:
-        """Return what its lines of output begin with."""
+        """The prefix of its lines of output."""
         return f'{self.name}: ' if self.name else ''
 
 
@@ -120,7 +119,7 @@ def _start(arm: DemoArm, environment: dict[str, str], stack: ExitStack) -> None:
         parameters['tf_prefix'] = arm.tf_prefix
     names = ['-r', f'__ns:=/{arm.name}'] if arm.name else []
     settings = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
-    # The client says what happens; what the driver has to add then is a warning.
+    # The client prints what happens; the driver adds warnings only.
     stack.enter_context(
         process(
             '--ros-args',
@@ -162,7 +161,7 @@ def _clients(options: Mapping[DemoArm, Sequence[str]], environment: dict[str, st
 
 
 def _forward_output(client: subprocess.Popen[str], label: str) -> None:
-    """Print what a client says, each line behind the name of its arm."""
+    """Print the output of a client, each line with the name of its arm."""
     assert client.stdout is not None
     for line in client.stdout:
         print(f'{label}{line}', end='', flush=True)
@@ -181,14 +180,14 @@ def process(
     module: str = 'ur_cartesian_driver.cli',
     stdout: int | None = None,
 ) -> Iterator[subprocess.Popen[str]]:
-    """Run one of our commands; it is gone when the block is left, whatever happens."""
+    """Run one of our commands for the duration of the block."""
     command = [sys.executable, '-m', module, *arguments]
     running = subprocess.Popen(
         command,
         env=environment,
         stdout=stdout,
         text=True,
-        # Ctrl-C is for us: we end the processes in order.
+        # Ctrl-C reaches only us: we end the processes in order.
         start_new_session=True,
     )
     try:
@@ -198,7 +197,7 @@ def process(
 
 
 def _end(running: subprocess.Popen[str]) -> None:
-    """End a process in the kind way, then in the other one, together with its children."""
+    """Interrupt a process; kill it and its children if it does not end."""
     if running.poll() is None:
         running.send_signal(signal.SIGINT)
     try:
@@ -211,7 +210,7 @@ def _end(running: subprocess.Popen[str]) -> None:
 
 
 def _ports(simulator: subprocess.Popen[str]) -> tuple[int, int, int]:
-    """Read the simulator's first line, which says where it listens."""
+    """Read the ports from the simulator's first line."""
     assert simulator.stdout is not None
     line = simulator.stdout.readline()
     match = _PORTS.search(line)
@@ -226,7 +225,7 @@ def _free_port_options(*names: str) -> Sequence[str]:
 
 
 def _environment() -> dict[str, str]:
-    """Return an environment in which the three see each other and nobody else."""
+    """Return an environment in which the processes discover only each other."""
     return {
         'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
         'ROS_DOMAIN_ID': str(1 + os.getpid() % 100),

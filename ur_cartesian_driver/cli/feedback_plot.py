@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The picture of planned and executed tool path; matplotlib is needed for nothing else."""
+"""The picture of planned and executed path that the demo draws; needs matplotlib."""
 
 from __future__ import annotations
 

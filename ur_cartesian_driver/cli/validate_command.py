@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-``ur-cartesian validate``: what the driver would say of a goal, without driver and robot.
+``ur-cartesian validate``: check and plan a goal without driver and robot.
 
-What the driver reads from the robot is said on the command line: model, calibration, where the
-arm stands and its TCP. Frames that only tf2 knows are not known here.
+The command line gives what the driver reads from the robot: model, calibration, joint positions
+and TCP. tf2 frames are not available.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ur_cartesian_driver.sim import SimulatorConfig
 
 
 def validate(arguments: argparse.Namespace) -> int:
-    """Plan a goal from where the arm is said to stand, and print the plan."""
+    """Plan a goal from the given joint positions, and print the plan or the refusal."""
     from ur_cartesian_driver.planning import plan
     from ur_cartesian_driver.preview import postures, table
     from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
@@ -68,7 +68,7 @@ def validate(arguments: argparse.Namespace) -> int:
 
 
 def stationary_state(arm: Arm, q: tuple[float, ...], T_flange_tcp: Pose = IDENTITY) -> RobotState:
-    """Return the state of an arm that stands still."""
+    """Return the state of an arm at rest."""
     a, b, c, d, e, f = q
     joints = (a, b, c, d, e, f)
     pose = arm.forward(joints) @ T_flange_tcp

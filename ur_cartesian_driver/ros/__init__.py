@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The ROS border: the node, its action, and the way between messages and our own types.
+The ROS interface: the node, its action, topics, services and parameters, and their messages.
 
-Nothing below this package knows ROS::
+No package below this one knows ROS::
 
     rclpy.init()
     node = CartesianDriverNode(parameter_overrides={'robot_ip': '192.168.56.101'})
@@ -19,7 +19,7 @@ __all__ = ['CartesianDriverNode']
 
 
 def __getattr__(name: str) -> Any:
-    """Load the node when it is asked for: `python -m` of a module here must not load it first."""
+    """Import the node on first use: `python -m` of a module here must not import it before."""
     if name in __all__:
         from ur_cartesian_driver.ros import node
 

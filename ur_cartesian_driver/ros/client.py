@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The other side of the action: read a goal from YAML, send it, wait for its end.
+An action client: read a goal from YAML, send it, wait for its result.
 
-``ur-cartesian send`` and the demo use it. The YAML is the one of ``ros2 action send_goal``, whose
-own reader (rosidl_runtime_py) does not come with the wheels of ROS 2.
+``ur-cartesian send`` and the demo use it. The YAML is that of ``ros2 action send_goal``, whose
+reader (rosidl_runtime_py) is not among the wheels of ROS 2.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ from ur_cartesian_driver.msg import DriverStatus
 
 Message: TypeAlias = Any
 
-#: What a goal's status is called.
+#: Names of the final states of a goal.
 STATUS_NAMES = {
     GoalStatus.STATUS_SUCCEEDED: 'SUCCEEDED',
     GoalStatus.STATUS_CANCELED: 'CANCELED',
     GoalStatus.STATUS_ABORTED: 'ABORTED',
 }
-#: Without a server for that long, the driver counts as gone [s].
+#: Time without a server after which the driver counts as gone [s].
 SERVER_TIMEOUT = 3.0
 _INTEGERS = {
     f'{sign}int{bits}': (0 if sign else -(2 ** (bits - 1)), 2 ** (bits - (not sign)) - 1)
@@ -57,7 +57,7 @@ _FLOATS = ('float', 'double', 'long double')
 
 
 class GoalFileError(ValueError):
-    """A text is no goal; the sentence names the key."""
+    """A text is not a goal; the sentence names the key."""
 
 
 # ---- reading ----------------------------------------------------------------------------------
@@ -68,7 +68,7 @@ def load_goal(source: str | os.PathLike[str]) -> FollowCartesianTrajectory.Goal:
     Return the goal that a YAML text describes, as in ``ros2 action send_goal``.
 
     :param source: a path object for a file, or the text itself.
-    :raises GoalFileError: the text is no YAML, or a key or value does not fit the action.
+    :raises GoalFileError: the text is not YAML, or a key or value does not fit the action.
     :raises OSError: the file cannot be read.
     """
     text = source if isinstance(source, str) else Path(source).read_text(encoding='utf-8')
@@ -87,7 +87,7 @@ def load_goal(source: str | os.PathLike[str]) -> FollowCartesianTrajectory.Goal:
 def add_tf_prefix(
     goal: FollowCartesianTrajectory.Goal, tf_prefix: str
 ) -> FollowCartesianTrajectory.Goal:
-    """Change a goal to the frames and joints of an arm with a ``tf_prefix``; return it."""
+    """Add a ``tf_prefix`` to the frames and joints of a goal; return the goal."""
     trajectory = goal.trajectory
     trajectory.header.frame_id = _prefixed(tf_prefix, trajectory.header.frame_id)
     trajectory.controlled_frame = _prefixed(tf_prefix, trajectory.controlled_frame)
@@ -105,32 +105,32 @@ def _prefixed(tf_prefix: str, name: str) -> str:
 
 
 def _fill(message: Message, values: object, key: str) -> None:
-    """Set the fields of a message that are named; the others keep their defaults."""
+    """Set the named fields of a message; the others keep their defaults."""
     if not isinstance(values, dict):
-        raise GoalFileError(f'{key or "the goal"} is {values!r}, but it is a mapping of fields.')
+        raise GoalFileError(f'{key or "the goal"} is {values!r}, but must be a mapping of fields.')
     types = dict(zip(message.get_fields_and_field_types(), message.SLOT_TYPES, strict=True))
     for name, value in values.items():
         path = f'{key}.{name}' if key else str(name)
         if name not in types:
             raise GoalFileError(
-                f'{path}: there is no such field; {key or "a goal"} has {", ".join(types)}.'
+                f'{path} is not a field; {key or "a goal"} has {", ".join(types)}.'
             )
         setattr(message, name, _value(types[name], value, path))
 
 
 def _value(kind: Any, value: object, key: str) -> Any:
-    """Return a value of a field as its message wants it."""
+    """Return a value as the type of its field."""
     if isinstance(kind, NamespacedType):
         message = getattr(import_module('.'.join(kind.namespaces)), kind.name)()
         _fill(message, value, key)
         return message
     if isinstance(kind, (AbstractSequence, Array)):
         if not isinstance(value, list):
-            raise GoalFileError(f'{key} is {value!r}, but it is a list.')
+            raise GoalFileError(f'{key} is {value!r}, but must be a list.')
         return [_value(kind.value_type, item, f'{key}[{i}]') for i, item in enumerate(value)]
     if isinstance(kind, AbstractString):
         if not isinstance(value, str):
-            raise GoalFileError(f'{key} is {value!r}, but it is a text; put it in quotes.')
+            raise GoalFileError(f'{key} is {value!r}, but must be a text; put it in quotes.')
         return value
     assert isinstance(kind, BasicType), kind
     return _number(kind.typename, value, key)
@@ -139,17 +139,19 @@ def _value(kind: Any, value: object, key: str) -> Any:
 def _number(typename: str, value: object, key: str) -> bool | int | float:
     if typename == 'boolean':
         if not isinstance(value, bool):
-            raise GoalFileError(f'{key} is {value!r}, but it is true or false.')
+            raise GoalFileError(f'{key} is {value!r}, but must be true or false.')
         return value
     if typename in _FLOATS:
-        # YAML takes 1e-3 for a text: it wants 1.0e-3.
+        # YAML reads 1e-3 as a text; its own form is 1.0e-3.
         with contextlib.suppress(ValueError):
             if isinstance(value, (int, float, str)) and not isinstance(value, bool):
                 return float(value)
-        raise GoalFileError(f'{key} is {value!r}, but it is a number.')
+        raise GoalFileError(f'{key} is {value!r}, but must be a number.')
     low, high = _INTEGERS[typename]
     if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
-        raise GoalFileError(f'{key} is {value!r}, but it is a whole number from {low} to {high}.')
+        raise GoalFileError(
+            f'{key} is {value!r}, but must be a whole number from {low} to {high}.'
+        )
     return value
 
 
@@ -158,7 +160,7 @@ def _number(typename: str, value: object, key: str) -> bool | int | float:
 
 class GoalClient:
     """
-    A context manager with a node of its own, beside whatever else uses ROS in this process.
+    A client with a node and a ROS context of its own; a context manager.
 
     ::
 
@@ -170,13 +172,13 @@ class GoalClient:
         self, driver: str = 'ur_cartesian_driver', node_name: str = 'ur_cartesian_client'
     ) -> None:
         """
-        Prepare a client.
+        Create the node.
 
         :param driver: name of the driver's node, with its namespace if it has one.
         """
         self._driver = f'/{driver.strip("/")}'
         self.action = f'{self._driver}/follow_cartesian_trajectory'
-        # A context of its own leaves signals alone: after Ctrl-C a goal can still be cancelled.
+        # A context of its own installs no signal handlers: a goal can be cancelled after Ctrl-C.
         self._context = Context()
         rclpy.init(args=[], context=self._context)
         self._node = rclpy.create_node(node_name, context=self._context)
@@ -185,7 +187,7 @@ class GoalClient:
         self._executor.add_node(self._node)
 
     def __enter__(self) -> GoalClient:
-        """Do nothing; the client is ready."""
+        """Return the client."""
         return self
 
     def __exit__(
@@ -194,11 +196,11 @@ class GoalClient:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Close."""
+        """Close the client."""
         self.close()
 
     def close(self) -> None:
-        """Leave the graph."""
+        """Destroy the node and shut down the context."""
         if self._context.ok():
             self._executor.shutdown()
             self._client.destroy()
@@ -214,11 +216,11 @@ class GoalClient:
         """
         Send a goal and return its status (:data:`STATUS_NAMES`) and result.
 
-        The first Ctrl-C cancels the goal and goes on waiting, the second one gives up.
+        The first Ctrl-C cancels the goal and waits for its result; the second one gives up.
 
         :param timeout: how long to look for the driver [s].
         :raises TimeoutError: no driver answers.
-        :raises ConnectionError: the driver is gone, and nobody knows how the goal ended.
+        :raises ConnectionError: the driver is gone; how the goal ended is not known.
         """
         self._find_server(timeout)
         with _interrupts() as interrupted:
@@ -228,8 +230,8 @@ class GoalClient:
             handle = self._spin_until(request, lambda: None)
             if not handle.accepted:
                 raise ConnectionError(
-                    f'{self.action} did not accept the goal; this driver '
-                    'accepts all, so it is another one, or it is ending.'
+                    f'{self.action} did not accept the goal; this driver accepts all goals, so '
+                    'another node serves the action, or the driver is shutting down.'
                 )
             cancelled = False
 
@@ -244,7 +246,7 @@ class GoalClient:
 
     def wait_ready(self, timeout: float) -> None:
         """
-        Wait until the driver says on its status topic that a goal can run.
+        Wait until the status of the driver is READY.
 
         :raises TimeoutError: it takes longer than ``timeout`` [s]; the text says what is needed.
         """
@@ -257,7 +259,7 @@ class GoalClient:
             deadline = monotonic() + timeout
             while not latest or latest[-1].state < DriverStatus.READY:
                 if monotonic() > deadline:
-                    needed = latest[-1].message if latest else 'Its status does not come.'
+                    needed = latest[-1].message if latest else 'It publishes no status.'
                     raise TimeoutError(
                         f'The driver {self._driver} is not ready after {timeout:g} s: {needed}'
                     )
@@ -269,12 +271,12 @@ class GoalClient:
         if not self._client.wait_for_server(timeout_sec=timeout):
             domain = os.environ.get('ROS_DOMAIN_ID', '0')
             raise TimeoutError(
-                f'Nobody serves {self.action} (looked for {timeout:g} s): start the driver, with '
+                f'No driver serves {self.action} (searched for {timeout:g} s): start it, with '
                 f'the same ROS_DOMAIN_ID as here, which is {domain}.'
             )
 
     def _spin_until(self, future: Any, between: Callable[[], None]) -> Any:
-        """Serve callbacks until a future is done."""
+        """Spin until a future is done."""
         last_seen = monotonic()
         while not future.done():
             self._executor.spin_once(timeout_sec=0.1)
@@ -283,15 +285,14 @@ class GoalClient:
                 last_seen = monotonic()
             elif monotonic() - last_seen > SERVER_TIMEOUT:
                 raise ConnectionError(
-                    f'The driver that served {self.action} is gone; how the goal ended is not '
-                    'known.'
+                    f'The driver of {self.action} is gone; how the goal ended is not known.'
                 )
         return future.result()
 
 
 @contextlib.contextmanager
 def _interrupts() -> Iterator[threading.Event]:
-    """Note the first Ctrl-C instead of raising KeyboardInterrupt; the second one raises it."""
+    """Set an event at the first Ctrl-C; the second one raises KeyboardInterrupt."""
     interrupted = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield interrupted

@@ -1,10 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""
-The node: it makes the parts and connects them, and does nothing itself.
-
-:func:`main` is the command ``ur-cartesian-driver``.
-"""
+"""The node, which creates and connects its components; its :func:`main` is a command."""
 
 from __future__ import annotations
 
@@ -32,19 +28,15 @@ from ur_cartesian_driver.ros.goals.action_server import CartesianActionServer
 from ur_cartesian_driver.ros.live.freedrive_service import FreedriveService
 from ur_cartesian_driver.ros.live.live_target_subscriber import LiveTargetSubscriber
 from ur_cartesian_driver.ros.live.servo_state_publisher import ServoStatePublisher
-from ur_cartesian_driver.ros.parameters.node_parameters import (
-    as_overrides,
-    declare_parameters,
-    ParameterError,
-    ParameterValue,
-)
+from ur_cartesian_driver.ros.parameters.node_parameters import as_overrides, declare_parameters
+from ur_cartesian_driver.ros.parameters.parameter_table import ParameterError, ParameterValue
 from ur_cartesian_driver.ros.services.append_service import AppendService
 from ur_cartesian_driver.ros.services.command_services import CommandServices
 from ur_cartesian_driver.ros.state.state_publisher import StatePublisher
 
-#: How often the driver hears that the executor of the node is alive, at least [s].
+#: Longest period of the heartbeat that says that the executor of the node is alive [s].
 HEARTBEAT_PERIOD = 0.5
-#: How long the other nodes have to make themselves known [s].
+#: Time for the discovery of other nodes [s].
 DISCOVERY_TIME = 2.0
 #: How long :func:`main` waits for the arm to stop and the results to be sent [s].
 SHUTDOWN_TIMEOUT = 5.0
@@ -54,9 +46,8 @@ class CartesianDriverNode(Node):
     """
     The driver of one arm as a ROS node.
 
-    It connects to the robot by itself from its construction on and until :meth:`destroy_node`,
-    and may be added to any executor, except that its executor must not hang for ``node_timeout``:
-    then the arm is stopped.
+    It connects to the robot by itself, from its construction until :meth:`destroy_node`. Add it to
+    any executor that does not hang for ``node_timeout``: then the arm is stopped.
     """
 
     def __init__(
@@ -70,9 +61,9 @@ class CartesianDriverNode(Node):
         """
         Declare the parameters and start to connect.
 
-        :param parameter_overrides: values by name, or as rclpy wants them.
+        :param parameter_overrides: values by name, or rclpy parameters.
         :param node_kwargs: for ``rclpy.node.Node``.
-        :raises ParameterError: a parameter cannot have its value; the text says why.
+        :raises ParameterError: a parameter is unknown or invalid; the text says why.
         """
         try:
             super().__init__(
@@ -86,10 +77,9 @@ class CartesianDriverNode(Node):
             if 'PARAMETER_NOT_SET' not in str(error):
                 raise
             raise ParameterError(
-                "A parameter is given without a value; write '' for an empty "
-                "text and [''] for an empty list."
+                "A parameter has no value; write '' for an empty text and [''] for an empty list."
             ) from None
-        self._components: list[Any] = []  # with close(), the last one first
+        self._components: list[Any] = []  # destroy_node() closes them, the last one first
         try:
             self._start()
         except BaseException:
@@ -126,7 +116,7 @@ class CartesianDriverNode(Node):
         self.create_timer(
             min(HEARTBEAT_PERIOD, settings.driver.node_timeout / 4.0),
             self.driver.heartbeat,
-            # Of its own, and on a clock that no simulation stops.
+            # Served beside other callbacks, by a clock that no simulation stops.
             callback_group=MutuallyExclusiveCallbackGroup(),
             clock=Clock(clock_type=ClockType.STEADY_TIME),
         )
@@ -137,22 +127,22 @@ class CartesianDriverNode(Node):
         )
 
     def _is_idle(self) -> bool:
-        """Tell whether nobody counts on the TCP and the payload that are set."""
+        """Tell whether no goal or session depends on the present TCP and payload."""
         return self.action_server.idle and not self.action_server.arbiter.is_held()
 
     def _warn_if_name_is_taken(self) -> None:
-        """Say once that there is another driver of the same name: each would answer for both."""
+        """Log once that another node has the same name: each would answer for both."""
         self._name_check_timer.cancel()
         own_name = self.get_name(), self.get_namespace()
         if self.get_node_names_and_namespaces().count(own_name) > 1:
             self.get_logger().error(  # type: ignore[no-untyped-call]  # rclpy's
-                f'Another node is called {self.get_fully_qualified_name()}: goals and calls may '
-                'reach the wrong robot. Give each driver a namespace, a tf_prefix and ports of '
-                'its own.'
+                f'Another node has the name {self.get_fully_qualified_name()}: goals and calls '
+                'may reach the wrong robot. Give each driver a namespace, a tf_prefix and ports '
+                'of its own.'
             )
 
     def destroy_node(self) -> None:
-        """Stop the arm if it moves, end all goals, threads and connections, then the node."""
+        """Stop the arm, end all goals, threads and connections, and destroy the node."""
         components, self._components = self._components, []
         for component in reversed(components):
             component.close()
@@ -160,7 +150,7 @@ class CartesianDriverNode(Node):
 
 
 class _LogBridge(logging.Handler):
-    """Passes what our own modules log on to the logger of the node."""
+    """Passes the log records of the package to the logger of the node."""
 
     _SEVERITIES = ((logging.ERROR, 'error'), (logging.WARNING, 'warning'), (logging.INFO, 'info'))
 
@@ -176,7 +166,7 @@ class _LogBridge(logging.Handler):
         text = record.getMessage()
         for level, severity in self._SEVERITIES:
             if record.levelno >= level:
-                # One call site for each severity, as rclpy insists on.
+                # rclpy insists on one call site for each severity.
                 getattr(self, f'_{severity}')(text)
                 return
         self._ros_logger.debug(text)
@@ -210,7 +200,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             signal_handler_options=SignalHandlerOptions.NO,
         )
     except RuntimeError as error:
-        # Behind the sentence stands where in the source of rcl it was written.
+        # rcl appends the source line to its sentence.
         sys.exit(f'ur_cartesian_driver: {re.split(r", at /", str(error))[0]}')
     signals = _SignalCounter()
     try:
@@ -236,7 +226,7 @@ def _end_goals(
     deadline = monotonic() + SHUTDOWN_TIMEOUT
     while not node.action_server.idle and monotonic() < deadline and signals.count < 2:
         executor.spin_once(timeout_sec=0.05)
-    for _ in range(3):  # the results are on their way through the executor
+    for _ in range(3):  # the executor still sends the results
         executor.spin_once(timeout_sec=0.02)
 
 

@@ -1,14 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Who may move the arm: one goal at a time, and of several that want to, the newest.
+Decides which goal or session may move the arm: one at a time, and the newest preempts the others.
 
-A goal lines up when it comes, or when its time has come, and that numbers it. One that has passed
-its checks claims the arm: all older goals in line, the one that moves and those that are still
-being planned or wait, have to make way, and the claim is granted when the arm is free. An older
-goal that gets through its checks after a newer one has claimed is too late. So the last word is
-always that of the newest goal that passed, however long the planning of each takes, and a goal
-that is refused has never disturbed another one.
+A goal enters the queue when it arrives, or at its start time, and gets a number. When it has
+passed its checks, it preempts all older goals in the queue, the running one and those that are
+still planned or wait, and acquires the arm as soon as it is free. An older goal that passes its
+checks after that is too late. So the newest goal that passes always wins, however long the
+planning of each takes, and a refused goal never disturbs another one.
 """
 
 from __future__ import annotations
@@ -19,29 +18,30 @@ import threading
 
 
 class ArmRequest:
-    """One goal's turn at the arm."""
+    """One goal's or session's place with the arbiter."""
 
     def __init__(self, name: str, on_preempt: Callable[[], None]) -> None:
         """
-        Take part, without a place in line yet.
+        Make a request that is not in the queue yet.
 
-        :param on_preempt: called, once or never, when ``preempted_by`` is set; from any thread.
+        :param name: for messages, for example ``goal 5f0c91ab``.
+        :param on_preempt: called at most once, when ``preempted_by`` is set, from any thread.
         """
         self.name = name
         self.on_preempt = on_preempt
-        #: The newer goal that takes the place of this one; empty: none does.
+        #: Name of the newer request that preempted this one; empty: none did.
         self.preempted_by = ''
-        #: The goal that had to make way when this one claimed the arm; empty: none had to.
+        #: Name of the request that this one preempted; empty: none.
         self.preempted = ''
         self._number = 0
         self._withdrawn = False
 
 
 class ArmArbiter:
-    """The line in front of one arm; thread-safe."""
+    """The queue for one arm; thread-safe."""
 
     def __init__(self) -> None:
-        """Begin with a free arm."""
+        """Start with a free arm."""
         self._condition = threading.Condition()
         self._numbers = count(1)
         self._queue: list[ArmRequest] = []
@@ -50,27 +50,27 @@ class ArmArbiter:
 
     @property
     def release_count(self) -> int:
-        """How often the arm was given back: after each it may stand somewhere else."""
+        """How often the arm was released: it may have moved each time."""
         return self._release_count
 
     @property
     def holder(self) -> str:
-        """Who has the arm; empty: nobody."""
+        """The name of the request that has the arm; empty: none."""
         holder = self._holder
         return '' if holder is None else holder.name
 
     def is_held(self) -> bool:
-        """Tell whether a goal has the arm."""
+        """Tell whether a request has the arm."""
         return self._holder is not None
 
     def enqueue(self, arm_request: ArmRequest) -> None:
-        """Be the newest."""
+        """Append a request to the queue as the newest."""
         with self._condition:
             arm_request._number = next(self._numbers)
             self._queue.append(arm_request)
 
     def acquire(self, arm_request: ArmRequest) -> bool:
-        """Take the arm if it is free; tell whether it was."""
+        """Acquire the arm if it is free; tell whether it was."""
         with self._condition:
             if self._holder is not None:
                 return False
@@ -79,9 +79,9 @@ class ArmArbiter:
 
     def acquire_preemptible(self, arm_request: ArmRequest) -> bool:
         """
-        Take the arm if it is free, and make way for whatever goal claims it; tell whether it was.
+        Acquire the arm if it is free, as the oldest request; tell whether it was.
 
-        In line it stands before all others: each of them is newer.
+        Any other request can preempt it.
         """
         with self._condition:
             if self._holder is not None:
@@ -92,9 +92,9 @@ class ArmArbiter:
 
     def preempt(self, arm_request: ArmRequest) -> None:
         """
-        Have all older goals make way, and wait for the arm.
+        Preempt all older requests, and wait for the arm.
 
-        On return the arm is that of this turn, unless it has a ``preempted_by`` or was withdrawn.
+        On return the request has the arm, unless it was preempted or withdrawn itself.
         """
         with self._condition:
             older = (
@@ -111,7 +111,7 @@ class ArmArbiter:
             if self._holder is not None:
                 arm_request.preempted = self._holder.name
             self._condition.notify_all()
-        for other in older:  # not under our lock: it does more than we can know
+        for other in older:  # without our lock, because callbacks may take other locks
             other.on_preempt()
         with self._condition:
             self._condition.wait_for(
@@ -121,13 +121,13 @@ class ArmArbiter:
                 self._holder = arm_request
 
     def withdraw(self, arm_request: ArmRequest) -> None:
-        """Wait no longer."""
+        """End the wait of a request for the arm."""
         with self._condition:
             arm_request._withdrawn = True
             self._condition.notify_all()
 
     def release(self, arm_request: ArmRequest) -> None:
-        """Leave the line, and give back the arm."""
+        """Remove a request from the queue, and release the arm if the request has it."""
         with self._condition:
             if arm_request in self._queue:
                 self._queue.remove(arm_request)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The action server of rclpy, but for when the executor hears of a goal."""
+"""The action server of rclpy, with goals that finish from any thread."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ GoalHandle: TypeAlias = Any
 
 class DeferredActionServer(ActionServer):
     """
-    An action server whose goals come to the executor when their outcome is there.
+    An action server that gives the executor a task only when the outcome of a goal is there.
 
-    rclpy hands every accepted goal to :meth:`notify_execute`, which gives the executor a task that
-    waits for the callback. Here the callback begins the goal at once, and the task comes with
-    :meth:`finish`, from whatever thread.
+    rclpy passes every accepted goal to :meth:`notify_execute`, which creates a task that runs the
+    callback to its end. Here the callback only starts the goal, and :meth:`finish` creates the
+    task, from any thread.
     """
 
     _destroyed = False
 
     def take_data(self) -> Any:
         """
-        Take a request without a garbage collection in between.
+        Take a request without garbage collection.
 
-        A large goal makes hundreds of thousands of objects, none of which is garbage, and the
-        collector would walk through them again and again: 40 % of the time, in which no other
-        thread runs.
+        A large goal creates hundreds of thousands of objects, none of which is garbage. The
+        collector would visit them again and again: 40 % of the time, in which no other thread
+        runs.
         """
         enabled = gc.isenabled()
         gc.disable()
@@ -41,14 +41,14 @@ class DeferredActionServer(ActionServer):
                 gc.enable()
 
     def notify_execute(self, goal_handle: GoalHandle, execute_callback: Any) -> None:
-        """Begin a goal; it is in the state EXECUTING."""
+        """Start a goal; it is in the state EXECUTING."""
         (execute_callback or self._execute_callback)(goal_handle)
 
     def finish(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:
-        """Let the executor call back for the result and send it; from any thread."""
+        """Have the executor call back for the result and send it; from any thread."""
         executor = self._node.executor
-        if executor is not None:  # None: nobody is left to send it
-            # A plain function first: a coroutine that no executor runs any more would complain.
+        if executor is not None:  # None: the node is being destroyed
+            # A plain function, because a coroutine that no executor runs any more would warn.
             executor.create_task(self._hand_over, goal_handle, callback)
 
     def _hand_over(self, goal_handle: GoalHandle, callback: Callable[[GoalHandle], Any]) -> None:

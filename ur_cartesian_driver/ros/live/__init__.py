@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Live targets, set-point state and freedrive."""
+"""Live targets, the state of the set-point stream, and freedrive."""

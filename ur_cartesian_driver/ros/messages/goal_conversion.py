@@ -1,12 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From a goal message to :class:`~ur_cartesian_driver.motion.goal.Goal`: the way into the driver.
+From a goal message to :class:`~ur_cartesian_driver.motion.goal.Goal`.
 
-Only what the message alone can get wrong is refused here: numbers that stand for nothing and
-names of frames. Whether the goal makes sense is decided by the planning, which knows no messages.
-A goal of 20,000 points comes through here in one plain loop; every attribute that is looked up
-there counts.
+Only errors of the message itself are refused here: invalid enumerations and unknown frames. The
+planning, which knows no messages, checks the rest. A goal of 20,000 points passes through one
+plain loop, in which every attribute lookup counts.
 """
 
 from __future__ import annotations
@@ -57,11 +56,11 @@ def goal_from_message(
     Return the goal of a ``FollowCartesianTrajectory.Goal``.
 
     :param now: time of the node's clock when the goal was received [ns].
-    :param snapshot: where the arm stands, None while it is unknown.
-    :param time_tolerance: what a ``goal_time_tolerance`` of zero means [s].
+    :param snapshot: pose of the arm; None if it is not known.
+    :param time_tolerance: the value for a ``goal_time_tolerance`` of zero [s].
     :raises InvalidGoal: a frame is unknown or an enumeration has no such value; the text names
         the field.
-    :raises RobotNotReady: a frame moves with the arm, and nobody knows where that stands.
+    :raises RobotNotReady: a frame moves with the arm, whose pose is not known.
     """
     trajectory = message.trajectory
     return resolve_frames(
@@ -91,7 +90,7 @@ def goal_from_message(
 
 def appended_points_from_message(message: Message) -> AppendedPoints:
     """
-    Return what an ``AppendPoints.Request`` appends.
+    Return the points of an ``AppendPoints.Request``.
 
     :raises InvalidGoal: an enumeration has no such value; the text names the field.
     """
@@ -112,14 +111,14 @@ def resolve_frames(
     goal: Goal, trajectory: Message, frames: Frames, *, now: int, snapshot: ArmSnapshot | None
 ) -> Goal:
     """
-    Return a goal whose frames are where they are at this moment.
+    Return a goal with its frames resolved to their present poses.
 
-    A stamp in the future is looked at when it has come; until then the newest transforms do.
+    A stamp in the future is used when its time has come; until then the newest transforms are.
 
     :param trajectory: the ``CartesianTrajectory`` from which the goal was made.
     :param now: time of the node's clock [ns].
     :raises InvalidGoal: a frame is unknown.
-    :raises RobotNotReady: it moves with the arm, and nobody knows where that stands.
+    :raises RobotNotReady: a frame moves with the arm, whose pose is not known.
     """
     stamp = nanoseconds(trajectory.header.stamp)
     T_flange_controlled = frames.T_flange_frame(trajectory.controlled_frame, snapshot)
@@ -129,13 +128,13 @@ def resolve_frames(
             trajectory.header.frame_id, snapshot, at=stamp if stamp <= now else 0
         ),
         T_flange_controlled=T_flange_controlled,
-        # Empty: the active TCP, by whatever name it was given.
+        # Empty for the active TCP, also if it was given by name.
         controlled_frame='' if T_flange_controlled is None else trajectory.controlled_frame,
     )
 
 
 def _age(stamp: Message, now: int) -> float | None:
-    """Return how old a stamp is [s]; None for no stamp at all."""
+    """Return the age of a stamp [s]; None if it is zero."""
     sent = nanoseconds(stamp)
     return None if sent == 0 else (now - sent) / 1_000_000_000
 
@@ -157,7 +156,7 @@ def _three(vector: Message) -> Vector3:
 
 
 def _six(twist: Message) -> Vector6:
-    """Return a ``Twist`` or ``Accel``; the zero of nearly all points is one shared tuple."""
+    """Return a ``Twist`` or ``Accel``; almost all points share one tuple of zeros."""
     u, v = twist.linear, twist.angular
     values = (u.x, u.y, u.z, v.x, v.y, v.z)
     return values if any(values) else ZERO6
@@ -174,7 +173,7 @@ def _segment(segment: Message, field: str) -> Segment:
     type_ = _member(SegmentType, segment.type, f'{field}.type')
     via: Pose | None = pose_from_message(segment.via)
     if type_ is not SegmentType.CIRCULAR and via == IDENTITY:
-        via = None  # left alone; another value is kept, so that it is refused and not ignored
+        via = None  # the default; another value is kept, so that it is refused and not ignored
     return Segment(
         type=type_,
         blend_radius=segment.blend_radius,
@@ -207,9 +206,9 @@ def _tolerance(tolerance: Message) -> Tolerance:
 
 
 def _member(enum: type[_Enum], value: int, field: str) -> _Enum:
-    """Return the member with a value, or say which there are."""
+    """Return the member of a value, or refuse the value and list the members."""
     try:
         return enum(value)
     except ValueError:
         names = ', '.join(f'{member.name} ({member.value})' for member in enum)
-        raise InvalidGoal(field, f'is {value}', f'it is one of {names}') from None
+        raise InvalidGoal(field, f'is {value}', f'it must be one of {names}') from None

@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters of the node, and files of them."""
+"""The parameters of the node, and parameter files."""

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Parameters without a node: from the same files and words that the node takes.
+Parameters without a node, from the same files and arguments that the node takes.
 
-So that ``ur-cartesian validate`` plans with what the driver is going to plan with.
+``ur-cartesian validate`` plans with them as the driver does.
 """
 
 from __future__ import annotations
@@ -13,23 +13,19 @@ from pathlib import Path
 
 import yaml
 
-from ur_cartesian_driver.ros.parameters.node_parameters import (
-    ParameterError,
-    ParameterValue,
-    Settings,
-    settings_from,
-)
+from ur_cartesian_driver.ros.parameters.node_parameters import Settings, settings_from
+from ur_cartesian_driver.ros.parameters.parameter_table import ParameterError, ParameterValue
 
 _NODE = 'ur_cartesian_driver'
 
 
 def read_settings(files: Iterable[Path] = (), words: Iterable[str] = ()) -> Settings:
     """
-    Return all parameters: the defaults, then those of files, then single ones.
+    Return all parameters; files override the defaults, and single parameters override both.
 
     :param files: as for ``--params-file`` of ROS 2.
     :param words: ``NAME:=VALUE`` as for its ``-p``.
-    :raises ParameterError: a name is unknown or a value cannot be.
+    :raises ParameterError: a name is unknown or a value invalid.
     :raises OSError: a file cannot be read.
     """
     given: dict[str, ParameterValue] = {}
@@ -44,7 +40,7 @@ def read_settings(files: Iterable[Path] = (), words: Iterable[str] = ()) -> Sett
 
 
 def _of_file(file: Path) -> dict[str, ParameterValue]:
-    """Return the parameters that a file has for the node, whatever its namespace."""
+    """Return the parameters of a file for the node, in any namespace."""
     content: object = _yaml(file.read_text(encoding='utf-8'), str(file))
     found: dict[str, ParameterValue] = {}
     for node, values in content.items() if isinstance(content, dict) else ():
@@ -52,8 +48,8 @@ def _of_file(file: Path) -> dict[str, ParameterValue]:
             found |= values.get('ros__parameters') or {}
     if not found:
         raise ParameterError(
-            f'{file} has no parameters for a node {_NODE}; they stand below '
-            '"/**:" and "ros__parameters:", as in config/driver.yaml.'
+            f'{file} has no parameters for a node {_NODE}; put them below "/**:" and '
+            '"ros__parameters:", as in config/driver.yaml.'
         )
     return found
 

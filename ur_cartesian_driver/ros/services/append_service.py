@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The service that appends points to a goal that is being carried out (keep_open).
+The service that appends points to a running goal with keep_open.
 
-Points are planned in a thread of their own, one request after the other, so neither the executor
-nor the feedback waits for them; the response is sent when they are taken, or refused.
+A thread of its own plans the points, one request after the other, so neither the executor nor the
+feedback waits for them. The response is sent when the points are appended or refused.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from ur_cartesian_driver.ros.messages.goal_conversion import appended_points_fro
 from ur_cartesian_driver.ros.services.deferred_service import DeferredService
 from ur_cartesian_driver.srv import AppendPoints
 
-#: How long a goal may take from its acceptance to its motion while points wait for it [s].
+#: How long points wait for the motion of a goal to begin [s].
 BEGIN_TIMEOUT = 10.0
 
-#: How many requests may wait for their turn, with their points in memory.
+#: How many requests may wait, with their points in memory.
 MAX_WAITING_REQUESTS = 32
 
 SHUTDOWN_REFUSAL = 'The driver node is shutting down.'
@@ -41,14 +41,14 @@ class AppendService:
     """Serves ``~/append_points``."""
 
     def __init__(self, node: Node, server: CartesianActionServer) -> None:
-        """Begin to serve."""
+        """Start to serve."""
         self._server = server
         self._thread = ThreadPoolExecutor(1, thread_name_prefix='append points')
         self._slots = threading.Semaphore(MAX_WAITING_REQUESTS)
         self._service = DeferredService(node, AppendPoints, '~/append_points', self._handle)
 
     def close(self) -> None:
-        """Take nothing any more; what is being planned comes to its end."""
+        """Refuse new requests; the one that is being planned is completed."""
         self._thread.shutdown(cancel_futures=True)
 
     def _handle(self, request: Any) -> Future[Any]:
@@ -72,8 +72,7 @@ class AppendService:
         run = self._server.find_run(bytes(request.goal_id.uuid))
         if run is None:
             return _refusal(
-                'There is no goal with this goal_id that is being carried out: it '
-                'has ended, or was never sent.'
+                'No goal with this goal_id is running: it has ended, or was never sent.'
             )
         try:
             return self._append_to_run(run, request)
@@ -86,11 +85,11 @@ class AppendService:
 
     def _append_to_run(self, run: GoalRun, request: Any) -> Any:
         """
-        Return the response to a request to a goal.
+        Append the points of a request to a goal, and return the response.
 
-        :raises GoalRefused: nothing was taken.
+        :raises GoalRefused: nothing was appended.
         """
-        # Others may append to the goal that has the arm until then; nobody keeps them waiting.
+        # A goal that waits for its start time must not hold up appends to the running one.
         motion = run.motion(0.0 if run.is_waiting else BEGIN_TIMEOUT)
         if motion is None or motion.appender is None:
             raise RobotNotReady(
@@ -101,7 +100,7 @@ class AppendService:
         new_points = appended_points_from_message(request)
         request_key = request.first_index, _digest(new_points)
         if run.last_append is not None and run.last_append[0] == request_key:
-            return run.last_append[1]  # it came twice
+            return run.last_append[1]  # the same request again
         points = motion.appender.points
         if request.first_index != points:
             raise InvalidGoal(
@@ -109,7 +108,7 @@ class AppendService:
                 f'is {request.first_index}, but the goal has {points} points',
                 f'append point {points} first'
                 if request.first_index > points
-                else f'go on with point {points}',
+                else f'continue with point {points}',
             )
         appended = motion.appender.append(new_points)
         response = AppendPoints.Response(
@@ -120,7 +119,7 @@ class AppendService:
 
 
 def _digest(new_points: AppendedPoints) -> bytes:
-    """Return what tells additions apart; also where they contain NaN, which equals nothing."""
+    """Return a key of the points that equals itself even if they contain NaN."""
     return sha256(pickle.dumps(new_points)).digest()
 
 

@@ -47,7 +47,7 @@ from ur_cartesian_driver.srv import (
     SetPayload as SetPayloadService,
 )
 
-#: Services that take and tell nothing but success and a sentence, or the value asked for.
+#: Services without a request; the response is success and a sentence, or the value.
 TRIGGER_SERVICES: Mapping[str, ServiceCall] = {
     'recover': RecoverCall(),
     'resend_robot_program': SendProgramCall(),
@@ -97,7 +97,7 @@ def _output(request: Any) -> ServiceCall:
     return SetOutputCall(kind=kind, pin=request.pin, value=request.value, domain=domain)
 
 
-#: Services with a request of their own, and how it becomes a call.
+#: Services with a request of their own, and the call that it becomes.
 REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
     'set_tcp': (SetTCP, _tcp),
     'set_payload': (SetPayloadService, _payload),
@@ -123,13 +123,13 @@ REQUEST_SERVICES: Mapping[str, tuple[Any, Callable[[Any], ServiceCall]]] = {
 
 
 class CommandServices:
-    """All services of a driver; they go with the node."""
+    """All command services; the node destroys them."""
 
     def __init__(self, node: Node, driver: Driver, is_idle: Callable[[], bool]) -> None:
         """
-        Begin to serve.
+        Start to serve.
 
-        :param is_idle: tells whether no goal is being planned, waited for or carried out.
+        :param is_idle: tells whether no goal is planned, waits or runs.
         """
         group = MutuallyExclusiveCallbackGroup()
         kinds = {
@@ -150,15 +150,15 @@ class _CallHandler:
         self._driver, self._is_idle, self._call_of = driver, is_idle, call_of
 
     def __call__(self, request: Any) -> Future[ServiceAnswer]:
-        """Make the call, or refuse it; it is answered in any case."""
+        """Make the call, or refuse it."""
         try:
             call = self._call_of(request)
         except DriverError as error:
             return completed_answer(str(error))
-        # A goal that is only planned so far counts on what it found.
+        # A goal that is being planned depends on the TCP and payload that it found.
         if isinstance(call, SetTcpCall | SetPayloadCall) and not self._is_idle():
             return completed_answer(
-                'A goal is being planned or carried out, and this would change what it '
-                'counts on; wait for its end or cancel it, then try again.'
+                'A goal that is being planned or executed depends on the present value; wait for '
+                'its end or cancel it, then try again.'
             )
         return self._driver.call(call)

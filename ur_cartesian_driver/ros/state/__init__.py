@@ -1,3 +1,3 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Topics that publish the state of robot and driver."""
+"""Topics with the state of robot and driver."""

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""``/diagnostics``: how the driver is, for rqt_robot_monitor and for whoever keeps the logs."""
+"""``/diagnostics``: the state of the driver, for rqt_robot_monitor and for logs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from ur_cartesian_driver.driver import ConnectionState, Driver
 
-#: How bad a state of the connection is.
+#: Level of each state of the connection.
 LEVELS = {
     ConnectionState.DISCONNECTED: DiagnosticStatus.ERROR,
     ConnectionState.CONNECTING: DiagnosticStatus.WARN,
@@ -22,7 +22,7 @@ LEVELS = {
 
 
 def diagnostics_message(driver: Driver, node_name: str, stamp: Time) -> DiagnosticArray:
-    """Return the state of the connection, what is needed, and how steady it is."""
+    """Return the state of the connection, what is needed, and its longest gaps."""
     status, state, gaps = driver.status, driver.state, driver.gaps
     values = {
         'connection': status.state.name,
@@ -38,7 +38,7 @@ def diagnostics_message(driver: Driver, node_name: str, stamp: Time) -> Diagnost
         'software': status.polyscope_version,
         'calibration known': str(status.calibration_known),
         'timeout sent to the robot program [s]': f'{driver.config.robot_receive_timeout:g}',
-        'longest gap between signs of life sent [s]': f'{gaps.keepalives:.4f}',
+        'longest gap between keepalives sent [s]': f'{gaps.keepalives:.4f}',
         'longest gap between robot reports [s]': f'{gaps.reports:.4f}',
     }
     message = DiagnosticArray(

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The topics that tell the state of the robot, published from a thread of their own.
+The topics with the state of the robot, published by a thread of their own.
 
 A timer of the executor would cost twice as much and wait behind every other callback. The thread
-also notices changes, so there is one place that publishes and nothing to lock.
+also detects changes: one place publishes, and nothing needs a lock.
 
 Names, types, units and rates: ``doc/ros_interface.md``.
 """
@@ -45,17 +45,17 @@ from ur_cartesian_driver.ros.messages.state_messages import (
 from ur_cartesian_driver.ros.parameters.node_parameters import Settings
 from ur_cartesian_driver.ros.state.diagnostics import diagnostics_message
 
-#: The newest value is enough, but a reliable subscriber shall be served too.
+#: The newest value is enough, but reliable subscribers are served too.
 STATE_QOS = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
-#: Who comes late gets the last value at once.
+#: Late subscribers get the last value at once.
 LATCHED_QOS = QoSProfile(
     depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
-#: As tf2 wants it.
+#: As tf2 requires it.
 TF_QOS = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
-#: How often an unchanged status is confirmed [s].
+#: Period in which an unchanged status is published again [s].
 STATUS_PERIOD = 1.0
-#: How often a defect is told, at most [s].
+#: How often the same defect is logged at most [s].
 WARNING_PERIOD = 10.0
 
 
@@ -71,7 +71,7 @@ class StatePublisher:
     """Publishes the state of a driver from its start to :meth:`close`."""
 
     def __init__(self, node: Node, driver: Driver, settings: Settings) -> None:
-        """Make the publishers; :meth:`start` begins to use them."""
+        """Create the publishers."""
         self._clock = node.get_clock()
         self._logger = node.get_logger()
         self._driver = driver
@@ -84,17 +84,17 @@ class StatePublisher:
         self._diagnostics_topic = _DiagnosticsTopic(node, settings.node.diagnostics_rate)
 
     def start(self) -> None:
-        """Start the thread."""
+        """Start to publish."""
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread; the publishers go with the node."""
+        """Stop to publish; the node destroys the publishers."""
         self._closed.set()
         if self._thread.is_alive():
             self._thread.join()
 
     def _run(self) -> None:
-        """Publish at absolute deadlines; those that were missed are left out."""
+        """Publish at absolute deadlines; missed ones are skipped."""
         due = monotonic()
         while not self._closed.wait(max(0.0, due - monotonic())):
             try:
@@ -104,7 +104,7 @@ class StatePublisher:
             except Exception as error:
                 # One bad value must not silence all topics for good.
                 self._logger.error(
-                    f'The state of the robot is not published, because of a defect of the driver, '
+                    'The state of the robot is not published, because of a defect of the driver, '
                     f'{type(error).__name__}: {error}.',
                     throttle_duration_sec=WARNING_PERIOD,
                 )
@@ -120,7 +120,7 @@ class StatePublisher:
 
 
 class _StateTopics:
-    """What is published with each new state of the robot."""
+    """Topics that are published with each new state of the robot."""
 
     def __init__(self, node: Node, settings: Settings) -> None:
         self._joint_names = settings.joint_names
@@ -151,7 +151,7 @@ class _StateTopics:
 
 
 class _StatusTopics:
-    """What is published when it changes: latched."""
+    """Latched topics that are published on change."""
 
     def __init__(self, node: Node) -> None:
         self._status = node.create_publisher(DriverStatus, '~/status', LATCHED_QOS)
@@ -177,7 +177,7 @@ class _StatusTopics:
             self._program.publish(Bool(data=connection.program_running))
 
     def _is_new(self, topic: Any, value: object) -> bool:
-        """Tell whether a topic has another value than before, or none yet."""
+        """Tell whether the value of a topic has changed, or is its first."""
         if topic in self._last and self._last[topic] == value:
             return False
         self._last[topic] = value
@@ -185,7 +185,7 @@ class _StatusTopics:
 
 
 class _IoTopics:
-    """Inputs, outputs and tool: when something of them changes, latched."""
+    """Inputs, outputs and tool: latched, published on change."""
 
     def __init__(self, node: Node) -> None:
         self._io_states = node.create_publisher(IOStates, '~/io_states', LATCHED_QOS)
@@ -201,7 +201,7 @@ class _IoTopics:
 
 
 class _DiagnosticsTopic:
-    """``/diagnostics``, at a rate of its own."""
+    """``/diagnostics``, at its own rate."""
 
     def __init__(self, node: Node, rate: float) -> None:
         self._name = node.get_fully_qualified_name().strip('/')

@@ -1,18 +1,18 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The frames that a goal may name: in which it is given, and which one it moves.
+The frames that a goal may name: the frame of its poses, and the controlled frame.
 
-Poses go to the robot in ``base``, the frame that its own controller counts in. ``base_link`` of
-the robot description is the same point turned by pi about z.
+The robot receives poses in ``base``, the frame of its own controller. ``base_link`` of the robot
+description has the same origin, rotated by pi about z.
 
 ``tool0`` is the controller's flange. ``flange`` of the robot description has the same origin and
-the axes of REP-103 (x forward), that is tool0 turned back by rpy (pi/2, 0, pi/2).
-``tool0_controller`` is the robot's active TCP. A goal that is given in one of these three is given
-from where the robot stands when it is planned: a relative motion.
+the axes of REP-103 (x forward), that is tool0 rotated back by rpy (pi/2, 0, pi/2).
+``tool0_controller`` is the robot's active TCP. A goal in one of these three frames is a relative
+motion, from where the robot stands when the goal is planned.
 
-The parameter ``static_frames`` adds frames behind all of these. Frames that nobody has named so
-are looked up in tf2 where it is installed.
+The parameter ``static_frames`` adds frames fixed to any of these. All other frames are looked up
+in tf2, where it is installed.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _FRAME_ID, _CONTROLLED = 'trajectory.header.frame_id', 'trajectory.controlled_fr
 
 @dataclass(frozen=True, slots=True)
 class StaticFrame:
-    """A frame that does not move with respect to its parent."""
+    """A frame that is fixed to its parent."""
 
     name: str
     parent: str
@@ -78,19 +78,19 @@ class StaticFrame:
 
 @dataclass(frozen=True, slots=True)
 class ArmSnapshot:
-    """Where the arm stands, and the TCP that it has."""
+    """Flange pose and active TCP at one moment."""
 
     T_base_flange: Pose
     T_flange_tcp: Pose
 
     @classmethod
     def of(cls, state: RobotState) -> ArmSnapshot:
-        """Return it by the robot's own report, which knows the arm's calibration."""
+        """Return it from the robot's own report, which includes the calibration of the arm."""
         return cls(state.actual_tcp_pose @ state.T_flange_tcp.inverse(), state.T_flange_tcp)
 
 
 class Frames:
-    """The frames that are known to this driver, with the robot's ``tf_prefix`` in their names."""
+    """The frames of this driver, with ``tf_prefix`` in the names of the robot's own."""
 
     def __init__(self, tf_prefix: str = '', static_frames: Iterable[StaticFrame] = ()) -> None:
         """
@@ -119,19 +119,19 @@ class Frames:
         )
 
     def with_transforms(self, transforms: TransformLookup | None) -> Frames:
-        """Return the same frames, and those of tf2."""
+        """Return these frames with those of tf2."""
         frames = copy.copy(self)
         frames._transforms = transforms
         return frames
 
     def T_base_frame(self, name: str, snapshot: ArmSnapshot | None = None, at: int = 0) -> Pose:
         """
-        Return where a frame is in the robot's base; the empty name is the base itself.
+        Return the pose of a frame in the robot's base; the empty name is the base itself.
 
-        :param snapshot: for frames that move with the arm; None while nobody knows.
-        :param at: when, for frames of tf2 [ns]; 0 = as new as there is.
-        :raises InvalidGoal: the frame is unknown, or tf2 does not know where it is (any more).
-        :raises RobotNotReady: it moves with the arm, and nobody knows where that stands.
+        :param snapshot: for frames that move with the arm; None if the arm's pose is not known.
+        :param at: time of a tf2 transform [ns]; 0 = the newest.
+        :raises InvalidGoal: the frame is unknown, or tf2 has no transform, or only an old one.
+        :raises RobotNotReady: the frame moves with the arm, whose pose is not known.
         """
         name = name or self.base
         if name in self._T_base:
@@ -154,11 +154,11 @@ class Frames:
 
     def T_flange_frame(self, name: str, snapshot: ArmSnapshot | None = None) -> Pose | None:
         """
-        Return where a controlled frame is behind the flange; None for the robot's active TCP.
+        Return the pose of a controlled frame in the flange; None for the robot's active TCP.
 
-        :param snapshot: for frames behind the active TCP; None while nobody knows.
-        :raises InvalidGoal: there is no such frame, or it is not behind the flange.
-        :raises RobotNotReady: it is behind the TCP, and nobody knows where that is.
+        :param snapshot: for frames fixed to the active TCP; None if the TCP is not known.
+        :raises InvalidGoal: the frame is unknown, or not fixed to the flange.
+        :raises RobotNotReady: the frame is fixed to the TCP, which is not known.
         """
         if name in ('', self.tcp):
             return None
@@ -186,8 +186,8 @@ class Frames:
 def _require_snapshot(snapshot: ArmSnapshot | None, field: str, name: str) -> ArmSnapshot:
     if snapshot is None:
         raise RobotNotReady(
-            f'{field} is "{name}", which moves with the arm, and the robot has '
-            'not said yet where it stands; wait for the connection to the robot.'
+            f'{field} is "{name}", which moves with the arm, and the robot has not reported its '
+            'pose yet; wait for the connection to the robot.'
         )
     return snapshot
 
@@ -195,12 +195,12 @@ def _require_snapshot(snapshot: ArmSnapshot | None, field: str, name: str) -> Ar
 def _resolve_static_frames(
     known: Mapping[str, tuple[str, Pose]], static_frames: Iterable[StaticFrame]
 ) -> dict[str, tuple[str, Pose]]:
-    """Return each frame's root and where it is there, whatever the order of the static ones."""
+    """Return the root of each frame and its pose there; static frames may have any order."""
     frames = dict(known)
     waiting: dict[str, StaticFrame] = {}
     for frame in static_frames:
         if frame.name in frames or frame.name in waiting:
-            raise ValueError(f'static_frames: "{frame.name}" is there twice.')
+            raise ValueError(f'static_frames: the name "{frame.name}" is taken.')
         waiting[frame.name] = frame
     while waiting:
         ready = [frame for frame in waiting.values() if frame.parent in frames]

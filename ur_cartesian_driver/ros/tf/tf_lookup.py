@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Frames that others publish, by tf2 where it is installed; it does not come from PyPI.
+Frames of other nodes from tf2, where it is installed; it is not on PyPI.
 
-A transform that is missing or old refuses the goal: an arm that goes to where a part was some time
-ago is worse than one that stands.
+A goal is refused if a transform is missing or old: an arm that moves to where a part was some time
+ago is worse than one that does not move.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.pose import normalize, Pose
 from ur_cartesian_driver.ros.message_fields import Message, nanoseconds
 
-#: How long a transform is waited for [s]: one for this moment is published in the next.
+#: Time to wait for a transform [s]: that of this moment is published in the next.
 LOOKUP_TIMEOUT = 0.5
 
 
 class TransformBuffer(Protocol):
-    """What is used of ``tf2_ros.Buffer``."""
+    """The part of ``tf2_ros.Buffer`` that is used."""
 
     def lookup_transform(
         self, target_frame: str, source_frame: str, time: Time, timeout: Duration
@@ -35,7 +35,7 @@ class TransformBuffer(Protocol):
 
 
 class TransformLookup:
-    """A buffer of transforms, asked on behalf of goals."""
+    """Looks up the transforms that goals need."""
 
     def __init__(
         self,
@@ -49,9 +49,9 @@ class TransformLookup:
         """
         Use a buffer.
 
-        :param errors: what the buffer raises when it does not know a transform.
+        :param errors: what the buffer raises when it has no transform.
         :param now: the node's clock [ns].
-        :param max_age: how old the newest transform of a frame may be [s].
+        :param max_age: largest age of the newest transform of a frame [s].
         """
         self._buffer = buffer
         self._errors = errors
@@ -61,11 +61,11 @@ class TransformLookup:
 
     def T_target_source(self, field: str, target: str, source: str, at: int = 0) -> Pose:
         """
-        Return where a frame is in another one.
+        Return the pose of the source frame in the target frame.
 
         :param field: of the goal, for the text of the refusal.
-        :param at: when [ns]; 0 = as new as there is, if that is not too old. What never changes
-            has the stamp 0 and is never old.
+        :param at: time [ns]; 0 = the newest transform, unless it is too old. Static transforms
+            have the stamp 0 and no age.
         :raises InvalidGoal: there is no such transform, or only an old one.
         """
         message = self._lookup(field, target, source, at)
@@ -81,12 +81,12 @@ class TransformLookup:
                 field,
                 f'is "{source}", and its newest transform to "{target}" is {age:.3f} s '
                 f'old, tf_max_age is {self._max_age:g} s',
-                'see why it is not published any more, or raise the parameter',
+                'check why it is not published any more, or raise the parameter',
             )
 
     def T_static(self, field: str, target: str, source: str) -> Pose:
         """
-        Return where a frame is that is fixed to another one.
+        Return the pose of the source frame in the target frame, to which it must be fixed.
 
         :raises InvalidGoal: there is no such transform, or the frames move against each other.
         """
@@ -112,15 +112,15 @@ class TransformLookup:
                 field,
                 f'is "{source}", and tf2 has no transform from it to "{target}"{when} '
                 f'({str(error).rstrip(".")})',
-                'see that it is published, or name the frame in the parameter static_frames',
+                'check that it is published, or name the frame in the parameter static_frames',
             ) from None
 
 
 def listen_to_tf(node: Node, max_age: float) -> TransformLookup | None:
     """
-    Return the transforms that a node hears of; None where tf2 is not installed.
+    Return the transforms that a node receives; None where tf2 is not installed.
 
-    :param max_age: how old the newest transform of a frame may be [s].
+    :param max_age: largest age of the newest transform of a frame [s].
     """
     try:
         tf2_ros = importlib.import_module('tf2_ros')
