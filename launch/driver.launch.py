@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Start the driver for one robot: the node, with its parameters from a file and the command line.
+Start the driver node of one robot, with parameters from a file and the command line.
 
-Names of the arguments are those of the UR ROS 2 driver. Two robots take two namespaces, two
-tf_prefixes and, on one address, other ports (0: any free one).
+The arguments have the names of the UR ROS 2 driver. Two robots need two namespaces, two
+tf_prefixes and, on one address, different ports (0: any free port).
 """
 
 from launch import LaunchDescription
@@ -36,7 +36,7 @@ ARGUMENTS = [
     DeclareLaunchArgument(
         'ur_type',
         choices=MODELS,
-        description='Model of the robot; a robot that reports another one is refused.',
+        description='Model of the robot; a robot that reports another model is refused.',
     ),
     DeclareLaunchArgument('robot_ip', description='Address of the robot.'),
     DeclareLaunchArgument(
@@ -81,7 +81,7 @@ ARGUMENTS = [
     DeclareLaunchArgument(
         'config_file',
         default_value=PathJoinSubstitution([FindPackageShare(PACKAGE), 'config', 'driver.yaml']),
-        description='YAML file with parameters; the arguments above go before it.',
+        description='YAML file with parameters; the arguments above override it.',
     ),
 ]
 STRINGS = ['ur_type', 'robot_ip', 'reverse_ip', 'tf_prefix']

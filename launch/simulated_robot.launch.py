@@ -35,7 +35,7 @@ ARGUMENTS = [
 
 
 def generate_launch_description():
-    """Return the simulator and the driver; when the simulator ends, all ends."""
+    """Return the simulator and the driver; the end of the simulator ends both."""
     simulator = ExecuteProcess(
         cmd=[
             ExecutableInPackage(package=PACKAGE, executable='sim'),
@@ -60,7 +60,7 @@ def generate_launch_description():
                 for name in ('ur_type', 'robot_ip', 'tf_prefix', 'namespace')
             },
             'headless_mode': 'true',
-            **dict.fromkeys(ports, '0'),  # any free ones: nothing has to be known beforehand
+            **dict.fromkeys(ports, '0'),  # any free ports: no client needs to know them
         }.items(),
     )
     return LaunchDescription([*ARGUMENTS, simulator, driver])

@@ -3,9 +3,8 @@
 """
 Start the drivers of two robots, `left` and `right`.
 
-Each has a namespace, so that topics, services and the action have names of their own, a tf_prefix,
-so that joints and frames have, and ports of its own on this computer. For more arms, or other
-names, take this file as a pattern.
+Each has its own namespace for topics, services and the action, its own tf_prefix for joints and
+frames, and its own ports on this computer. Copy this file for more arms or other names.
 """
 
 from launch import LaunchDescription
@@ -32,11 +31,11 @@ ARGUMENTS = [
     DeclareLaunchArgument(
         'config_file',
         default_value=PathJoinSubstitution([FindPackageShare(PACKAGE), 'config', 'driver.yaml']),
-        description='YAML file with parameters for both; what is said here goes before it.',
+        description='YAML file with parameters for both; the arguments above override it.',
     ),
 ]
 PORTS = ['reverse_port', 'script_sender_port', 'trajectory_port', 'script_command_port']
-#: The pendant has to know the script sender: 50002 of the left robot, 50012 of the right one.
+#: The External Control URCap needs the script sender port: 50002 (left), 50012 (right).
 FIRST_PORT = {'left': 50001, 'right': 50011}
 
 

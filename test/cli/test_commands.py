@@ -12,8 +12,7 @@ import sys
 import pytest
 import yaml
 
-from ur_cartesian_driver.cli import feedback_plot as picture
-from ur_cartesian_driver.cli import main
+from ur_cartesian_driver.cli import feedback_plot, main
 from ur_cartesian_driver.cli.commands import goal_file
 from ur_cartesian_driver.cli.validate_command import stationary_state
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -223,5 +222,5 @@ def test_the_picture_shows_what_was_recorded(tmp_path):
         )
     )
     drawing = tmp_path / 'picture.png'
-    picture.draw(record, drawing, 'a line')
+    feedback_plot.draw(record, drawing, 'a line')
     assert drawing.read_bytes().startswith(b'\x89PNG')

@@ -55,7 +55,7 @@ def test_a_goal_is_continued_once_for_each_request_and_ends_with_the_last(single
     assert 'continue with point 3' in others.message
     for index, step, text in (
         (5, (4.0, 0.0, 0.0, 0.0), 'first_index is 5, but the goal has 3 points; append'),
-        (2, (4.0, 0.0, 0.0, 0.0), 'first_index is 2, but the goal has 3 points; go on with'),
+        (2, (4.0, 0.0, 0.0, 0.0), 'first_index is 2, but the goal has 3 points; continue with'),
         (3, (4.0, 3.0, 0.0, 0.0), 'points[3]'),
     ):
         refused = append(handle, index, step)

@@ -11,7 +11,7 @@ from rclpy.duration import Duration
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.ros.tf import tf_lookup as transforms
+from ur_cartesian_driver.ros.tf import tf_lookup
 from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 from ur_cartesian_driver.ros.tf.tf_lookup import TransformLookup
 
@@ -60,7 +60,7 @@ def test_an_unknown_frame_is_looked_up_from_the_base(prefix, base):
     assert sum(x * x for x in T.quaternion) == pytest.approx(1.0, abs=1e-12)
     ((target, source, at, timeout),) = buffer.asked
     assert (target, source, at) == (base, 'camera', 0)
-    assert timeout == Duration(seconds=transforms.LOOKUP_TIMEOUT)
+    assert timeout == Duration(seconds=tf_lookup.LOOKUP_TIMEOUT)
 
 
 def test_a_stamp_is_passed_on():
@@ -136,7 +136,7 @@ def test_a_frame_that_moves_against_the_flange_cannot_be_controlled():
 
 def test_without_tf2_nothing_is_listened_to(monkeypatch):
     monkeypatch.setitem(sys.modules, 'tf2_ros', None)  # as if it were not there
-    assert transforms.listen_to_tf(None, 1.0) is None
+    assert tf_lookup.listen_to_tf(None, 1.0) is None
 
 
 def test_where_tf2_is_installed_it_is_listened_to(monkeypatch):
@@ -154,7 +154,7 @@ def test_where_tf2_is_installed_it_is_listened_to(monkeypatch):
                 type(self).unregistered = True
 
     monkeypatch.setitem(sys.modules, 'tf2_ros', Tf2Ros)
-    made = transforms.listen_to_tf(None, 1.0)
+    made = tf_lookup.listen_to_tf(None, 1.0)
     made.T_target_source('trajectory.header.frame_id', 'base', 'camera', at=NOW)
     with pytest.raises(InvalidGoal):
         made.T_target_source('trajectory.header.frame_id', 'base', 'moon')

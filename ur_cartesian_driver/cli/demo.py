@@ -23,8 +23,7 @@ import threading
 
 from ur_cartesian_driver.cli import feedback_plot
 
-#: How long a process may take to start, and to end [s].
-START_TIMEOUT = 30.0
+#: How long a process may take to end [s].
 END_TIMEOUT = 10.0
 _PORTS = re.compile(r'RTDE (\d+), primary (\d+), dashboard (\d+)')
 

@@ -230,30 +230,14 @@ class RemoteProtocolError(ProtocolError):
     """
 
 
-#: The error of every code but SUCCESSFUL. Subclasses of :class:`GoalRefused` come before the
-#: motion, subclasses of :class:`ExecutionEnded` end it.
+#: The error of every code but SUCCESSFUL: the direct subclasses of :class:`GoalRefused`, raised
+#: before the motion, and of :class:`ExecutionEnded`, which end it.
 ERRORS: Mapping[ErrorCode, type[DriverError]] = MappingProxyType(
     {
         error.code: error
-        for error in (
-            InvalidGoal,
-            InvalidJoints,
-            OldHeaderTimestamp,
-            PathToleranceViolated,
-            GoalToleranceViolated,
-            InvalidPosture,
-            Unreachable,
-            NearSingularity,
-            JointLimitExceeded,
-            CollisionPredicted,
-            ProtectiveStop,
-            EmergencyStop,
-            ProgramStopped,
-            ConnectionLost,
-            Preempted,
-            Cancelled,
-            ExecutionFailed,
-            RobotNotReady,
+        for error in sorted(
+            [*GoalRefused.__subclasses__(), *ExecutionEnded.__subclasses__()],
+            key=lambda error: -error.code,
         )
     }
 )

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
+from functools import partial
 from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -131,30 +132,23 @@ class CommandServices:
 
         :param is_idle: tells whether no goal is planned, waits or runs.
         """
+        self._driver, self._is_idle = driver, is_idle
         group = MutuallyExclusiveCallbackGroup()
-        kinds = {
-            name: (Trigger, lambda _, call=call: call) for name, call in TRIGGER_SERVICES.items()
-        }
-        self._services = [
-            DeferredService(node, kind, f'~/{name}', _CallHandler(driver, is_idle, call_of), group)
-            for name, (kind, call_of) in {**kinds, **REQUEST_SERVICES}.items()
-        ]
+        for name, call in TRIGGER_SERVICES.items():
+            DeferredService(node, Trigger, f'~/{name}', partial(self._call, call), group)
+        for name, (kind, call_of) in REQUEST_SERVICES.items():
+            DeferredService(node, kind, f'~/{name}', partial(self._convert, call_of), group)
 
-
-class _CallHandler:
-    """Turns a request into a call of the driver."""
-
-    def __init__(
-        self, driver: Driver, is_idle: Callable[[], bool], call_of: Callable[[Any], ServiceCall]
-    ) -> None:
-        self._driver, self._is_idle, self._call_of = driver, is_idle, call_of
-
-    def __call__(self, request: Any) -> Future[ServiceAnswer]:
-        """Make the call, or refuse it."""
+    def _convert(
+        self, call_of: Callable[[Any], ServiceCall], request: Any
+    ) -> Future[ServiceAnswer]:
+        """Make the call of a request, or refuse the request."""
         try:
-            call = self._call_of(request)
+            return self._call(call_of(request))
         except DriverError as error:
             return completed_answer(str(error))
+
+    def _call(self, call: ServiceCall, _: Any = None) -> Future[ServiceAnswer]:
         # A goal that is being planned depends on the TCP and payload that it found.
         if isinstance(call, SetTcpCall | SetPayloadCall) and not self._is_idle():
             return completed_answer(
