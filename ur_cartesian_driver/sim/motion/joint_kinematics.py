@@ -30,6 +30,8 @@ LIMIT_DECELERATION = 10.0
 #: Joint travel per tool travel [rad/m, rad/rad] beyond which the arm counts as singular.
 SINGULAR_RATE = 1000.0
 
+#: The speed of an arm at rest.
+STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 #: Joint changes below this are rounding [rad].
 NO_CHANGE = 1e-9
 # As near to its limit a joint is the reason why there is no solution [rad].

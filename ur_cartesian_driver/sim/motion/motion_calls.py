@@ -6,23 +6,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import inf
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.sim.motion.move_paths import MovePath
 from ur_cartesian_driver.sim.motion.moves import MotionError, Move
 from ur_cartesian_driver.sim.motion.path_motion import ProfileParameters
-
-#: Arguments of C171: of waypoints that were skipped, and of blends that are none, by the move.
-BLEND_SKIPPED_ARGUMENTS = {
-    'movej': 4,
-    'optimovej': 4,
-    'movel': 11,
-    'optimovel': 11,
-    'movec': 0,
-    'movep': 9,
-}
-BLEND_TOO_SMALL_ARGUMENTS = {'movec': 1, 'movep': 10}
 
 
 class PathStart(NamedTuple):
@@ -32,14 +21,22 @@ class PathStart(NamedTuple):
     pose: Pose
 
 
+ParameterFunction: TypeAlias = Callable[[MovePath, PathStart], ProfileParameters]
+
+
 class MotionCall(NamedTuple):
     """A call of a path motion, to be resolved where the leg begins."""
 
     name: str
     move_path: Callable[[PathStart], MovePath]
-    parameters: Callable[[MovePath, PathStart], ProfileParameters]
+    parameters: ProfileParameters | ParameterFunction
     radius: float
     move: Move
+
+    def parameters_of(self, move_path: MovePath, start: PathStart) -> ProfileParameters:
+        """Return the profile parameters of the path that the call has been resolved to."""
+        given = self.parameters
+        return given if isinstance(given, ProfileParameters) else given(move_path, start)
 
 
 def constant_speed_parameters(a: float, v: float, r: float) -> ProfileParameters:

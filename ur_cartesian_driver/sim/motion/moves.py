@@ -17,12 +17,11 @@ class Move:
     One motion call under way.
 
     ``returned`` becomes true when the script call may return: the waypoint is reached, the next
-    cycle enters its blend, the stop has ended, the time is over. The arm may go on moving.
-    ``aborted`` says that it returned because something else took over.
+    cycle enters its blend, the stop has ended, the time is over, or another motion took over. The
+    arm may go on moving.
     """
 
     returned: bool = False
-    aborted: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

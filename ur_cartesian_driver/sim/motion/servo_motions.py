@@ -10,7 +10,7 @@ the others run in scaled time.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import hypot
 from typing import Any, TypeAlias
 
@@ -21,98 +21,100 @@ from ur_cartesian_driver.motion.pose import (
     Vector3,
     Vector6,
 )
+from ur_cartesian_driver.sim.motion.joint_kinematics import difference_rate, STILL
 from ur_cartesian_driver.sim.motion.move_paths import Setpoint
 
 _JointState: TypeAlias = tuple[Vector6, Vector6, float]
 _ToolState: TypeAlias = tuple[Pose, Vector6, float]
 _MIN_SPEED = 1e-12
 _ROUNDING = 1e-9
-_STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(slots=True)
-class JointSpeedMotion:
+class _JointMotion:
+    """Joint positions [rad], their speeds [rad/s] and the time since the call [s]."""
+
+    q: Vector6
+    qd: Vector6
+    elapsed: float = field(default=0.0, kw_only=True)
+    real_time = False
+
+    def accept(self, state: Any) -> None:
+        """Go to a state that ``preview`` returned."""
+        self.q, self.qd, self.elapsed = state
+
+
+@dataclass(slots=True)
+class _ToolMotion:
+    """Pose and twist of the TCP (base axes, [m/s, rad/s]) and the time since the call [s]."""
+
+    pose: Pose
+    twist: Vector6
+    elapsed: float = field(default=0.0, kw_only=True)
+    real_time = False
+
+    def accept(self, state: Any) -> None:
+        """Go to a state that ``preview`` returned."""
+        self.pose, self.twist, self.elapsed = state
+
+
+@dataclass(slots=True)
+class JointSpeedMotion(_JointMotion):
     """
     speedj: the leading axis changes its speed at ``acceleration``, all reach theirs together.
 
     :param duration: [s] after which the call returns; None = when the speed is reached.
     """
 
-    q: Vector6
-    qd: Vector6
     target: Vector6
     acceleration: float
     duration: float | None
-    elapsed: float = 0.0
-    real_time = False
 
     def preview(self, h: float) -> tuple[Setpoint, _JointState]:
-        """Return the place and state after ``h`` seconds; the mean speed carries."""
-        change = _minus(self.target, self.qd)
-        max_joint_difference = max(map(abs, change))
-        full = (
-            h
-            if max_joint_difference <= _MIN_SPEED
-            else min(h, max_joint_difference / self.acceleration)
-        )
-        part = (
-            1.0
-            if max_joint_difference <= self.acceleration * h
-            else self.acceleration * h / max_joint_difference
-        )
+        """Return set-point and state after ``h`` seconds; the mean speed carries."""
+        change = difference_rate(self.target, self.qd, 1.0)
+        size = max(map(abs, change))
+        full = h if size <= _MIN_SPEED else min(h, size / self.acceleration)
+        step = self.acceleration * h
+        part = step / size if size > step else 1.0
         qd = self.target if part >= 1.0 else _add(self.qd, change, part)
         # The change takes ``full`` seconds at the mean of both speeds, the rest is even.
         q = _add(_add(_add(self.q, self.qd, 0.5 * full), qd, 0.5 * full), qd, h - full)
         return q, (q, qd, self.elapsed + h)
 
-    def accept(self, state: Any) -> None:
-        """Go to a state that ``preview`` returned."""
-        self.q, self.qd, self.elapsed = state
-
     @property
     def is_over(self) -> bool:
         """Whether the call may return."""
-        if self.duration is None:  # at the speed already: hold it for a cycle, as any call does
-            return self.elapsed > 0.0 and self.qd == self.target
-        return self.elapsed >= self.duration - _ROUNDING
+        return _speed_call_is_over(self.duration, self.elapsed, self.qd == self.target)
 
 
 @dataclass(slots=True)
-class ServoMotion:
+class ServoMotion(_JointMotion):
     """
     servoj: qdd = gain (q_target - (q + lookahead qd)), limited.
 
-    The law is not published. This one is what the manual's words say: ``gain`` is a proportional
+    The law is not published. This one follows the manual's words: ``gain`` is a proportional
     term, ``lookahead`` projects the present position along the present speed. It follows a ramp
     with a lag of exactly ``lookahead``; natural frequency sqrt(gain), damping
     lookahead sqrt(gain) / 2.
     """
 
-    q: Vector6
-    qd: Vector6
     target: Vector6
     duration: float
     lookahead: float
     gain: float
     max_acceleration: float
-    elapsed: float = 0.0
-    real_time = False
 
     def preview(self, h: float) -> tuple[Setpoint, _JointState]:
-        """Return the place and state after ``h`` seconds (semi-implicit Euler)."""
+        """Return set-point and state after ``h`` seconds (semi-implicit Euler)."""
         bound = self.max_acceleration
-        qd = _six(
-            [
-                v + h * min(max(self.gain * (wanted - (q + self.lookahead * v)), -bound), bound)
-                for q, v, wanted in zip(self.q, self.qd, self.target, strict=True)
-            ]
-        )
+        a, b, c, d, e, f = [
+            v + h * min(max(self.gain * (wanted - (q + self.lookahead * v)), -bound), bound)
+            for q, v, wanted in zip(self.q, self.qd, self.target, strict=True)
+        ]
+        qd = a, b, c, d, e, f
         q = _add(self.q, qd, h)
         return q, (q, qd, self.elapsed + h)
-
-    def accept(self, state: Any) -> None:
-        """Go to a state that ``preview`` returned."""
-        self.q, self.qd, self.elapsed = state
 
     @property
     def is_over(self) -> bool:
@@ -121,97 +123,87 @@ class ServoMotion:
 
 
 @dataclass(slots=True)
-class JointStopMotion:
+class JointStopMotion(_JointMotion):
     """stopj: the leading axis brakes at ``acceleration`` [rad/s^2], all stand at the same time."""
 
-    q: Vector6
-    qd: Vector6
     acceleration: float
     real_time = True
 
     def preview(self, h: float) -> tuple[Setpoint, _JointState]:
-        """Return the place and state after ``h`` seconds."""
+        """Return set-point and state after ``h`` seconds."""
         time = max(map(abs, self.qd)) / self.acceleration
         if time <= h:
             q = _add(self.q, self.qd, 0.5 * time)
-            return q, (q, _STILL, 0.0)
+            return q, (q, STILL, 0.0)
         part = 1.0 - h / time
         q = _add(self.q, self.qd, 0.5 * h * (1.0 + part))
-        return q, (q, _add(_STILL, self.qd, part), 0.0)
-
-    def accept(self, state: Any) -> None:
-        """Go to a state that ``preview`` returned."""
-        self.q, self.qd, _ = state
+        return q, (q, _add(STILL, self.qd, part), 0.0)
 
     @property
     def is_over(self) -> bool:
         """Whether the arm stands."""
-        return self.qd == _STILL
+        return self.qd == STILL
 
 
 @dataclass(slots=True)
-class ToolSpeedMotion:
+class ToolSpeedMotion(_ToolMotion):
     """
     speedl: the tool's speed changes at ``acceleration``, its rotation at ``acceleration_rot``.
 
-    :param twist: now and ``target``, base axes [m/s, rad/s].
+    :param duration: [s] after which the call returns; None = when the speed is reached.
     """
 
-    pose: Pose
-    twist: Vector6
     target: Vector6
     acceleration: float
     acceleration_rot: float
     duration: float | None
-    elapsed: float = 0.0
-    real_time = False
 
     def preview(self, h: float) -> tuple[Setpoint, _ToolState]:
-        """Return the place and state after ``h`` seconds."""
+        """Return set-point and state after ``h`` seconds."""
         twist = _approach_twist(
             self.twist, self.target, self.acceleration * h, self.acceleration_rot * h
         )
         pose = _integrated_pose(self.pose, self.twist, twist, h)
         return pose, (pose, twist, self.elapsed + h)
 
-    def accept(self, state: Any) -> None:
-        """Go to a state that ``preview`` returned."""
-        self.pose, self.twist, self.elapsed = state
-
     @property
     def is_over(self) -> bool:
         """Whether the call may return."""
-        if self.duration is None:  # at the speed already: hold it for a cycle, as any call does
-            return self.elapsed > 0.0 and self.twist == self.target
-        return self.elapsed >= self.duration - _ROUNDING
+        return _speed_call_is_over(self.duration, self.elapsed, self.twist == self.target)
 
 
 @dataclass(slots=True)
-class ToolStopMotion:
+class ToolStopMotion(_ToolMotion):
     """stopl: the tool brakes along its tangent, its rotation at ``acceleration_rot``."""
 
-    pose: Pose
-    twist: Vector6
     acceleration: float
     acceleration_rot: float
     real_time = True
 
     def preview(self, h: float) -> tuple[Setpoint, _ToolState]:
-        """Return the place and state after ``h`` seconds."""
+        """Return set-point and state after ``h`` seconds."""
         twist = _approach_twist(
-            self.twist, _STILL, self.acceleration * h, self.acceleration_rot * h
+            self.twist, STILL, self.acceleration * h, self.acceleration_rot * h
         )
         pose = _integrated_pose(self.pose, self.twist, twist, h)
         return pose, (pose, twist, 0.0)
 
-    def accept(self, state: Any) -> None:
-        """Go to a state that ``preview`` returned."""
-        self.pose, self.twist, _ = state
-
     @property
     def is_over(self) -> bool:
         """Whether the arm stands."""
-        return self.twist == _STILL
+        return self.twist == STILL
+
+
+SetpointMotion: TypeAlias = JointSpeedMotion | ServoMotion | ToolSpeedMotion
+StopMotion: TypeAlias = JointStopMotion | ToolStopMotion
+ServoLikeMotion: TypeAlias = SetpointMotion | StopMotion
+
+
+def _speed_call_is_over(duration: float | None, elapsed: float, reached: bool) -> bool:
+    """Tell whether a speed call may return; at its speed already, it holds it for a cycle."""
+    if duration is None:
+        return elapsed > 0.0 and reached
+    return elapsed >= duration - _ROUNDING
 
 
 def _approach_twist(twist: Vector6, target: Vector6, step: float, step_rot: float) -> Vector6:
@@ -248,12 +240,3 @@ def _add(a: Vector6, b: Vector6, f: float) -> Vector6:
         a[4] + f * b[4],
         a[5] + f * b[5],
     )
-
-
-def _minus(a: Vector6, b: Vector6) -> Vector6:
-    return _add(a, b, -1.0)
-
-
-def _six(values: list[float]) -> Vector6:
-    a, b, c, d, e, f = values
-    return (a, b, c, d, e, f)

@@ -1,0 +1,121 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The motion that the arm makes, and how a servo-like motion or a stop takes its place."""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.motion.pose import Vector6
+from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
+from ur_cartesian_driver.sim.motion.cycle_stepper import Motion
+from ur_cartesian_driver.sim.motion.joint_kinematics import difference_rate, STILL
+from ur_cartesian_driver.sim.motion.moves import Move
+from ur_cartesian_driver.sim.motion.servo_motions import (
+    JointSpeedMotion,
+    JointStopMotion,
+    ServoLikeMotion,
+    ServoMotion,
+    SetpointMotion,
+    ToolSpeedMotion,
+    ToolStopMotion,
+)
+
+#: How hard the arm brakes when servoj set-points stay away, or before a path [rad/s^2].
+UNATTENDED_DECELERATION = 15.0
+
+
+class ActiveMotion:
+    """
+    The running motion, its call, and the speeds at which another one takes over.
+
+    :param target: of the arm.
+    """
+
+    def __init__(self, target: ArmTarget) -> None:
+        """Begin at rest."""
+        self._target = target
+        self.motion: Motion | None = None
+        self.move: Move | None = None
+        #: The speed scaling of the last cycle: what was asked for, and what the arm could follow.
+        self.scale = self.rate = 1.0
+
+    @property
+    def moving(self) -> bool:
+        """Whether the target moved in the last cycle or is about to."""
+        return self.motion is not None or self._target.qd != STILL
+
+    @property
+    def setpoints_are_late(self) -> bool:
+        """Whether a stream of set-points has not been continued in time."""
+        return isinstance(self.motion, SetpointMotion) and self.motion.is_over
+
+    def replace(self, motion: ServoLikeMotion) -> Move:
+        """Run a motion without a path from now on."""
+        self.abort()
+        self._target.activate_tcp()
+        self.motion, self.move = motion, Move()
+        if isinstance(motion, SetpointMotion) and motion.duration is not None:
+            self.move.returned = motion.is_over
+        return self.move
+
+    def abort(self) -> None:
+        """Let the running call return."""
+        if self.move is not None:
+            self.move.returned = True
+
+    def hold(self) -> None:
+        """Stay for this cycle; no limit of the arm slows that down."""
+        self._target.hold()
+        self.rate = self.scale
+
+    def brake_unattended(self) -> None:
+        """Brake, because no further set-point has come in time."""
+        motion = self.motion
+        if isinstance(motion, ToolSpeedMotion):
+            self.motion = self.tool_stop(motion.acceleration, motion.acceleration_rot)
+        elif isinstance(motion, JointSpeedMotion):
+            self.motion = self.joint_stop(motion.acceleration)
+        else:
+            self.motion = self.joint_stop(UNATTENDED_DECELERATION)
+
+    def joint_stop(self, a: float) -> JointStopMotion:
+        """Return the stop in joint space from the present speed; in real time."""
+        return JointStopMotion(self._target.q, self._joint_speed(), a)
+
+    def tool_stop(self, a: float, a_rot: float) -> ToolStopMotion:
+        """Return the stop along the tool's tangent from the present speed; in real time."""
+        return ToolStopMotion(self._target.T_base_tcp, self._twist(), a, a_rot)
+
+    def nominal_joint_speed(self) -> Vector6:
+        """Return the joint speed as it would be without speed scaling."""
+        if isinstance(self.motion, JointSpeedMotion | ServoMotion):
+            return self.motion.qd
+        return self._unscaled(self._joint_speed())
+
+    def nominal_twist(self) -> Vector6:
+        """Return the twist of the TCP as it would be without speed scaling."""
+        if isinstance(self.motion, ToolSpeedMotion):
+            return self.motion.twist
+        return self._unscaled(self._twist())
+
+    def _joint_speed(self) -> Vector6:
+        """Return the joint speed at the end of the last cycle (``qd`` is the mean of it)."""
+        motion = self.motion
+        if motion is None or isinstance(motion, JointStopMotion):
+            return STILL if motion is None else motion.qd
+        if isinstance(motion, JointSpeedMotion | ServoMotion):
+            return difference_rate(motion.qd, STILL, self.rate)
+        return self._target.qd
+
+    def _twist(self) -> Vector6:
+        """Return the twist of the TCP at the end of the last cycle."""
+        motion = self.motion
+        if motion is None or isinstance(motion, ToolStopMotion):
+            return STILL if motion is None else motion.twist
+        if isinstance(motion, ToolSpeedMotion):
+            return difference_rate(motion.twist, STILL, self.rate)
+        return self._target.tcp_twist
+
+    def _unscaled(self, speed: Vector6) -> Vector6:
+        if self.motion is None or self.scale <= 0.0:
+            return STILL
+        return difference_rate(speed, STILL, 1.0 / self.scale)

@@ -1,0 +1,102 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The target of the arm: where it is to be in a cycle, how fast it moves, and for which TCP."""
+
+from __future__ import annotations
+
+from math import inf
+
+from ur_cartesian_driver.kinematics.chain import Arm
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector6
+from ur_cartesian_driver.sim.motion.ik_branch import IkBranchTracker
+from ur_cartesian_driver.sim.motion.joint_kinematics import (
+    difference_rate,
+    JointKinematics,
+    max_joint_difference,
+    NO_CHANGE,
+    STILL,
+    twist_between,
+)
+
+#: Still this long [s]: steady.
+STEADY_AFTER = 0.5
+
+
+class ArmTarget:
+    """
+    The target of the last cycle.
+
+    ``q``, ``qd``, ``qdd`` [rad, rad/s, rad/s^2], ``T_base_tcp`` and ``tcp_twist`` (base axes,
+    [m/s, rad/s]). Speeds are differences of positions over the cycle, so they always fit these.
+
+    :param cycle: [s].
+    :param q: where the arm stands [rad].
+    """
+
+    def __init__(self, arm: Arm, cycle: float, q: Vector6) -> None:
+        """Stand still at ``q`` with the flange as TCP."""
+        self.arm = arm
+        self.cycle = cycle
+        self.kinematics = JointKinematics(arm, cycle)
+        self._T_flange_tcp = self._active_tcp = self.T_tcp_flange = IDENTITY
+        self.q: Vector6 = q
+        self.qd: Vector6 = STILL
+        self._still_for: float = inf
+        self.teleport(q)
+
+    @property
+    def T_flange_tcp(self) -> Pose:
+        """The tool centre point; motions that began before it was set keep the one before."""
+        return self._T_flange_tcp
+
+    @T_flange_tcp.setter
+    def T_flange_tcp(self, pose: Pose) -> None:
+        self._T_flange_tcp = pose
+        self.T_base_tcp = self.forward(self.q)
+
+    def activate_tcp(self) -> None:
+        """Let the motion that begins now use the TCP that was set last."""
+        self.T_tcp_flange = self._T_flange_tcp.inverse()
+        self._active_tcp = self._T_flange_tcp
+
+    @property
+    def tcp_is_active(self) -> bool:
+        """Whether the TCP is that of the running motion."""
+        return self._active_tcp is self._T_flange_tcp
+
+    @property
+    def steady(self) -> bool:
+        """Whether the target has stood still for half a second."""
+        return self._still_for >= STEADY_AFTER - 0.5 * self.cycle
+
+    def forward(self, q: Vector6) -> Pose:
+        """Return T_base_tcp at joint positions."""
+        return self.arm.forward(q) @ self._T_flange_tcp
+
+    def ik_branch(self) -> IkBranchTracker:
+        """Return the IK branch on which the arm is."""
+        return IkBranchTracker(self.kinematics, self.q, self.T_base_tcp, self.T_tcp_flange)
+
+    def move_to(self, q: Vector6, pose: Pose) -> None:
+        """Be at joint positions and their pose in this cycle."""
+        rate = 1.0 / self.cycle
+        self.tcp_twist = twist_between(self.T_base_tcp, pose, rate)
+        qd = difference_rate(q, self.q, rate)
+        self.qdd = difference_rate(qd, self.qd, rate)
+        self.q, self.qd, self.T_base_tcp = q, qd, pose
+        self._still_for = (
+            0.0 if max_joint_difference(qd, STILL) > NO_CHANGE else self._still_for + self.cycle
+        )
+
+    def hold(self) -> None:
+        """Stay for this cycle."""
+        self.qdd = difference_rate(STILL, self.qd, 1.0 / self.cycle)
+        self.qd = self.tcp_twist = STILL
+        self._still_for += self.cycle
+
+    def teleport(self, q: Vector6) -> None:
+        """Stand at joint positions [rad] without having moved there."""
+        self.q, self.qd, self.qdd = q, STILL, STILL
+        self.tcp_twist = STILL
+        self.T_base_tcp = self.forward(q)
+        self._still_for = inf

@@ -1,0 +1,130 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+One cycle of a motion, as far as the arm can follow.
+
+Limits stretch the time and keep the path: the step of a cycle is shortened where a joint would
+exceed its speed, could no longer brake before the end of its range, and where the tool would be
+too fast.
+"""
+
+from __future__ import annotations
+
+from math import inf, log
+from typing import NamedTuple, TypeAlias
+
+from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
+from ur_cartesian_driver.sim.motion.joint_kinematics import is_singular
+from ur_cartesian_driver.sim.motion.move_paths import Setpoint
+from ur_cartesian_driver.sim.motion.moves import MotionFault
+from ur_cartesian_driver.sim.motion.path_motion import PathMotion
+from ur_cartesian_driver.sim.motion.servo_motions import JointStopMotion, ServoLikeMotion
+
+Motion: TypeAlias = PathMotion | ServoLikeMotion
+
+#: A step that is too long by less than this factor is rounding.
+ROUNDING = 1.0 + 1e-6
+# A step is shortened this often before its end counts as out of reach.
+_ATTEMPTS = 12
+# Beside a singularity half a step turns the joints hardly less than the whole one. So the step is
+# divided by a power, at most this one, of the factor by which it is too long, and by at most so
+# many times that factor.
+_MAX_POWER, _MAX_OVERCUT = 4.0, 2.0
+# A tool motion at less than this part of its speed for so long [s] has met a wall, unless a joint
+# turns at more than this part of its limit: then it passes a singularity.
+_STALLED = 0.01
+_STALLED_AFTER = 1.0
+_TURNING = 0.2
+# A joint line does not begin where the tool's path before it ends if it is so much too fast.
+_JUMP_RATIO = 50.0
+
+
+class CycleStep(NamedTuple):
+    """Where a motion has got to, and the time of its own that it took [s]."""
+
+    q: Vector6
+    pose: Pose
+    duration: float
+
+
+class CycleStepper:
+    """Advances motions by one cycle."""
+
+    def __init__(self, target: ArmTarget) -> None:
+        """Begin with an arm that has not stalled."""
+        self._target = target
+        #: Whether the last set-point was a pose, solved by inverse kinematics.
+        self._on_tool_path = False
+        self._stalled_for = 0.0
+
+    def forget_stall(self) -> None:
+        """Give a motion that had stalled its time again."""
+        self._stalled_for = 0.0
+
+    def advance(
+        self, motion: Motion, duration: float, max_tool_speed: float
+    ) -> CycleStep | MotionFault:
+        """
+        Advance by ``duration`` [s] or as far as the arm can follow.
+
+        :param max_tool_speed: [m/s]; stops in joint space need not keep it.
+        :returns: a fault when the arm cannot follow at all.
+        """
+        target = self._target
+        setpoint: Setpoint = target.q
+        h, before = duration, (duration, 0.0)
+        arm = target.ik_branch()
+        for _ in range(_ATTEMPTS):
+            setpoint, state = motion.preview(h)
+            q = arm.after(setpoint, h, lambda time: motion.preview(time)[0])
+            if q is None:
+                h *= 0.5
+                continue
+            is_pose = isinstance(setpoint, Pose)
+            pose = self._pose(setpoint, q)
+            joints = target.kinematics.overspeed_factor(q, target.q)
+            tool = target.T_base_tcp.distance_to(pose) / (max_tool_speed * target.cycle)
+            factor = max(joints, tool)
+            if factor <= ROUNDING or (factor < inf and isinstance(motion, JointStopMotion)):
+                if joints < _TURNING and self._stalls(is_pose and h < _STALLED * duration):
+                    break
+                motion.accept(state)
+                self._on_tool_path = is_pose
+                return CycleStep(q, pose, h)
+            if factor == inf:
+                break
+            jumps = self._jumps(q, setpoint, joints)
+            divisor = 2.0 if jumps else _step_divisor((h, factor), before)
+            before, h = (h, factor), h / divisor
+        return target.kinematics.motion_fault(target.q, arm.joints(setpoint))
+
+    def _pose(self, setpoint: Setpoint, q: Vector6) -> Pose:
+        """Return T_base_tcp of a set-point that the joints reach."""
+        if isinstance(setpoint, Pose) and self._target.tcp_is_active:
+            return setpoint
+        return self._target.forward(q)
+
+    def _jumps(self, q: Vector6, setpoint: Setpoint, joints: float) -> bool:
+        """Tell whether a step does not shrink with its time: a jump to another branch."""
+        if isinstance(setpoint, Pose):
+            return is_singular(self._target.q, q, self._target.T_base_tcp, setpoint)
+        return self._on_tool_path and joints > _JUMP_RATIO
+
+    def _stalls(self, slow: bool) -> bool:
+        """Tell whether a tool motion has hardly advanced for a while: it never will."""
+        self._stalled_for = self._stalled_for + self._target.cycle if slow else 0.0
+        return self._stalled_for > _STALLED_AFTER
+
+
+def _step_divisor(step: tuple[float, float], before: tuple[float, float]) -> float:
+    """
+    Return by what to divide a step so that it is not too long: a secant in logarithms.
+
+    :param step: its time and by which factor it is too long; ``before``: the last one.
+    """
+    (h, ratio), (h_before, ratio_before) = step, before
+    if ratio_before <= ratio:
+        return ratio
+    power = log(h_before / h) / log(ratio_before / ratio)
+    return min(float(ratio ** min(max(power, 1.0), _MAX_POWER)), _MAX_OVERCUT * ratio)

@@ -1,0 +1,64 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""What the motion generator reports: error codes as the controller writes them."""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.sim.motion.moves import MotionFault, MotionWarning, Move
+
+#: Arguments of C171 by move: a waypoint was skipped; a blend is too small.
+_BLEND_SKIPPED_ARGUMENTS = {
+    'movej': 4,
+    'optimovej': 4,
+    'movel': 11,
+    'optimovel': 11,
+    'movec': 0,
+    'movep': 9,
+}
+_BLEND_TOO_SMALL_ARGUMENTS = {'movec': 1, 'movep': 10}
+
+
+class MotionReports:
+    """Warnings to be taken out, and the fault at which the arm stands."""
+
+    def __init__(self) -> None:
+        """Begin with nothing to report."""
+        self.fault: MotionFault | None = None
+        self.warnings: list[MotionWarning] = []
+        #: The movep that has been reported to be too fast.
+        self._too_fast: Move | None = None
+
+    def blend_skipped(self, name: str) -> None:
+        """Report a waypoint whose blend overlaps the one before."""
+        self._warn(
+            171,
+            _BLEND_SKIPPED_ARGUMENTS[name],
+            f'Overlapping blends in a {name}, a waypoint was skipped.',
+        )
+
+    def blend_too_small(self, name: str, radius: float) -> None:
+        """Report a blend radius that the tool passes within one cycle."""
+        self._warn(
+            171,
+            _BLEND_TOO_SMALL_ARGUMENTS[name],
+            f'Blend radius too small in a {name}: {radius:g} m is less than the path of one '
+            'cycle, so the arm stops at the waypoint.',
+        )
+
+    def waypoint_within_blend(self, name: str) -> None:
+        """Report a waypoint that lies within the blend before it."""
+        self._warn(
+            197,
+            0,
+            f'Blend overlap: the waypoint of this {name} lies within the blend before it, so '
+            'the arm stops at the waypoint before.',
+        )
+
+    def movep_too_fast(self, call: Move, reason: str) -> None:
+        """Report once of a movep that the arm cannot keep its speed."""
+        if call is not self._too_fast:
+            self._too_fast = call
+            self._warn(196, 0, f'MoveP speed too high: {reason}')
+
+    def _warn(self, code: int, argument: int, text: str) -> None:
+        self.warnings.append(MotionWarning(code=code, argument=argument, text=text))

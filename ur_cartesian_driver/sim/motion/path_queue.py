@@ -1,0 +1,191 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Path moves: begun from rest or in the blend of the one before, or after the arm has braked.
+
+A move that a program calls while the blend of the one before is about to begin is blended into it.
+A move that cannot begin yet waits until the arm stands.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.sim.motion.active_motion import ActiveMotion, UNATTENDED_DECELERATION
+from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
+from ur_cartesian_driver.sim.motion.cycle_stepper import ROUNDING
+from ur_cartesian_driver.sim.motion.joint_kinematics import (
+    MAX_JOINT_ACCELERATION,
+    max_joint_difference,
+    STILL,
+)
+from ur_cartesian_driver.sim.motion.motion_calls import MotionCall, PathStart
+from ur_cartesian_driver.sim.motion.motion_reports import MotionReports
+from ur_cartesian_driver.sim.motion.move_paths import FilletBlendPath, MovePath
+from ur_cartesian_driver.sim.motion.moves import MotionError, MotionFault
+from ur_cartesian_driver.sim.motion.path_motion import (
+    append_move_path,
+    PathMotion,
+    start_from_rest,
+)
+
+# Blends that touch do not overlap [m].
+_TOUCHING = 1e-9
+
+
+class _Overlap(NamedTuple):
+    """What was before a waypoint that is skipped if another move follows at once."""
+
+    before: PathMotion | None
+    after_movep: bool
+    name: str
+
+
+class PathQueue:
+    """The path moves of one arm: the running one and the one that waits for rest."""
+
+    def __init__(self, target: ArmTarget, active: ActiveMotion, reports: MotionReports) -> None:
+        """Begin with none."""
+        self._target, self._active, self._reports = target, active, reports
+        #: What waits until the arm stands.
+        self._waiting: MotionCall | None = None
+        #: Whether the last path move is a movep.
+        self._after_movep = False
+        self._overlap: _Overlap | None = None
+
+    def clear(self) -> None:
+        """Forget the move that waits."""
+        self._waiting = self._overlap = None
+
+    def end_of_frame(self) -> None:
+        """Keep an overlapping waypoint, because no other move has followed at once."""
+        self._overlap = None
+
+    def begin(self, call: MotionCall) -> None:
+        """
+        Begin a move, or let it wait until the arm stands.
+
+        :raises MotionError: there is no such path from where it begins.
+        """
+        self._skip_overlapping()
+        active = self._active
+        motion = active.motion
+        if isinstance(motion, PathMotion) and motion.last_move.call.returned:
+            if self._target.tcp_is_active:
+                self._begin_in_blend(motion, call)
+            else:
+                # A blend joins two moves of the same TCP: first to the waypoint.
+                self._wait(call)
+        elif motion is None:
+            self._begin_from_rest(call)
+        else:
+            # A path begins at rest or in a blend, nowhere else: brake first.
+            stop = active.joint_stop(UNATTENDED_DECELERATION)
+            active.replace(stop)
+            self._wait(call)
+            if stop.is_over:
+                self.finish_at_rest()
+
+    def finish_at_rest(self) -> None:
+        """End the motion that has come to rest, and begin the move that waited for it."""
+        self._active.motion = None
+        if self._waiting is None:
+            if self._active.move is not None:
+                self._active.move.returned = True
+            return
+        call, self._waiting = self._waiting, None
+        try:
+            self.begin(call)
+        except MotionError as error:
+            self._reports.fault = MotionFault(code=171, argument=0, text=str(error))
+
+    def after_step(self, motion: PathMotion) -> None:
+        """Let the call return when it may; warn of a movep that is too fast."""
+        if self._after_movep:
+            self._check_movep_speed(motion)
+        if motion.may_return(self._target.cycle):
+            motion.last_move.call.returned = True
+        if motion.finished:
+            self.finish_at_rest()
+
+    def _wait(self, call: MotionCall) -> None:
+        self._active.move, self._waiting = call.move, call
+
+    def _begin_from_rest(self, call: MotionCall) -> None:
+        target = self._target
+        target.activate_tcp()
+        start = PathStart(target.q, target.T_base_tcp)
+        move_path = call.move_path(start)
+        path_motion = start_from_rest(
+            move_path, call.parameters_of(move_path, start), call.radius, call.move
+        )
+        margin = _distance_to_waypoint(start.pose, move_path) - call.radius
+        self._follow(None, path_motion, call, margin)
+
+    def _begin_in_blend(self, path_motion: PathMotion, call: MotionCall) -> None:
+        """Go on from a move whose blend is about to begin or has begun."""
+        last = path_motion.last_move
+        pose = last.move_path.pose(last.move_path.length)
+        q = self._target.ik_branch().joints_at_end_of(last.move_path)
+        if q is None and call.name.endswith('j'):
+            # No joint line begins where the arm cannot get to: let it fail on its path there.
+            self._wait(call)
+            return
+        start = PathStart(q or self._target.q, pose)
+        move_path = call.move_path(start)
+        blended, is_blended = append_move_path(
+            path_motion,
+            move_path,
+            call.parameters_of(move_path, start),
+            call.radius,
+            call.move,
+            circular=call.name == 'movep' and self._after_movep,
+        )
+        travel = _distance_to_waypoint(pose, move_path)
+        if not is_blended and call.radius <= 0.0 and travel <= last.radius:
+            self._reports.waypoint_within_blend(call.name)
+        margin = travel - call.radius - (last.radius if call.radius > 0.0 else 0.0)
+        self._follow(path_motion, blended, call, margin)
+
+    def _follow(
+        self, before: PathMotion | None, path_motion: PathMotion, call: MotionCall, margin: float
+    ) -> None:
+        """
+        Follow a path.
+
+        A waypoint whose blend reaches into the one before (``margin`` [m] is negative) is skipped
+        if the program goes on at once; if no move follows, the arm goes there.
+        """
+        overlaps = call.radius > 0.0 and margin < -_TOUCHING
+        self._overlap = _Overlap(before, self._after_movep, call.name) if overlaps else None
+        self._after_movep = call.name == 'movep'
+        self._active.motion, self._active.move = path_motion, call.move
+        call.move.returned = overlaps or path_motion.may_return(self._target.cycle)
+        if before is None and path_motion.sections[0].profile.duration <= 0.0:
+            self._active.motion, call.move.returned = None, True
+
+    def _skip_overlapping(self) -> None:
+        """Forget a waypoint that overlaps, now that another move follows at once."""
+        if self._overlap is not None:
+            self._active.motion, self._after_movep, name = self._overlap
+            self._overlap = None
+            self._reports.blend_skipped(name)
+
+    def _check_movep_speed(self, motion: PathMotion) -> None:
+        """Warn of a movep that is too fast: slowed down, or too hard on a joint in a blend."""
+        call = motion.last_move.call
+        if self._active.rate < self._active.scale / ROUNDING:
+            self._reports.movep_too_fast(call, 'the arm cannot keep it here.')
+        elif isinstance(motion.sections[motion.index].path, FilletBlendPath) and (
+            max_joint_difference(self._target.qdd, STILL) > MAX_JOINT_ACCELERATION
+        ):
+            self._reports.movep_too_fast(
+                call,
+                'a joint would need too much acceleration in a blend; enlarge its radius.',
+            )
+
+
+def _distance_to_waypoint(start: Pose, move_path: MovePath) -> float:
+    """Return how far the waypoint is from the start [m]."""
+    return start.distance_to(move_path.pose(move_path.length))
