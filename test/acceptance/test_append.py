@@ -86,8 +86,8 @@ class Speeds:
         while True:
             if self._controller.time != self._time:
                 self._time = self._controller.time
-                if self.rows or any(self._controller.qd):
-                    self.rows.append(self._controller.qd)
+                if self.rows or any(self._controller.motion.qd):
+                    self.rows.append(self._controller.motion.qd)
             await asyncio.sleep(0.5 * CYCLE)
 
     def stop(self):
@@ -259,7 +259,7 @@ async def outputs_at(cell, kind, chunk):
 
     async def look():
         while True:
-            if not begin and any(cell.robot.controller.qd):
+            if not begin and any(cell.robot.controller.motion.qd):
                 begin.append(cell.robot.controller.time)
             for k in range(len(SWITCHES)):
                 if cell.robot.state().digital_outputs >> k & 1:

@@ -102,7 +102,7 @@ class Servo:
 
     @property
     def speed(self):
-        return max(map(abs, self.controller.qd))
+        return max(map(abs, self.controller.motion.qd))
 
     @property
     def log(self):
@@ -301,7 +301,7 @@ def test_the_servo_waits_for_an_arm_that_another_thread_brakes():
     for _ in range(500):
         sockets[0].feed(trajectory(TrajectoryAction.NOOP, 0, timeout).encode())
         controller.step()
-    assert max(map(abs, controller.qd)) > 0.1
+    assert max(map(abs, controller.motion.qd)) > 0.1
     inputs = controller.io.inputs
     inputs.integers[InputInteger.DESIRED_MODE] = int(ServoMode.SERVO)
     inputs.integers[InputInteger.EXTERNAL_SYNC_STATE] = int(SyncState.EXTERNAL_TO_ROBOT)
@@ -315,5 +315,5 @@ def test_the_servo_waits_for_an_arm_that_another_thread_brakes():
         controller.step()
     out = controller.io.outputs
     assert controller.programs.running, controller.messages.log
-    assert max(map(abs, controller.qd)) == 0.0
+    assert max(map(abs, controller.motion.qd)) == 0.0
     assert out.integers[OutputInteger.ACTUAL_MODE] == ServoMode.SERVO

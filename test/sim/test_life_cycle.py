@@ -63,10 +63,10 @@ def test_a_program_that_ends_while_the_arm_moves_makes_it_brake(bench):
     q = bench.controller.config.q
     bench.start('movej([1.5, -1.57, 1.57, -1.57, -1.57, 0], a=2, v=1, r=0.05)\nhalt')
     bench.until(lambda: bench.programs.state is RuntimeState.STOPPING)
-    speed = max(abs(v) for v in bench.controller.qd)
+    speed = max(abs(v) for v in bench.controller.motion.qd)
     assert speed > 0.1
     bench.until(lambda: bench.programs.state is RuntimeState.STOPPED, within=0.5)
-    assert bench.controller.qd == (0.0,) * 6
+    assert bench.controller.motion.qd == (0.0,) * 6
     assert dist(bench.controller.motion.q, q) > 0.5
 
 
@@ -249,9 +249,9 @@ sleep(0.5)
 kill t
 sleep(10)""")
     bench.wait(0.48)
-    assert max(bench.controller.qd) > 0.5
+    assert max(bench.controller.motion.qd) > 0.5
     bench.wait(0.2)
-    assert bench.controller.qd == (0.0,) * 6
+    assert bench.controller.motion.qd == (0.0,) * 6
 
 
 def test_an_unreachable_movej_raises_and_an_unreachable_movel_stops_protectively(bench):
@@ -313,9 +313,9 @@ while i < 250:
 end
 sleep(1)""")
     bench.wait(0.45)
-    assert max(bench.controller.qd) == pytest.approx(0.5, rel=0.05)
+    assert max(bench.controller.motion.qd) == pytest.approx(0.5, rel=0.05)
     bench.wait(0.5)
-    assert bench.controller.qd == (0.0,) * 6
+    assert bench.controller.motion.qd == (0.0,) * 6
 
 
 def test_the_same_inputs_give_the_same_states(make_bench):

@@ -237,7 +237,7 @@ class RobotCell:
 
     def at_rest(self):
         """Tell whether no joint moves."""
-        return max(map(abs, self.robot.controller.qd)) < 1e-6
+        return max(map(abs, self.robot.controller.motion.qd)) < 1e-6
 
     async def until(self, condition, bound=2.0, purpose=''):
         """

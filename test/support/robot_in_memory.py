@@ -92,7 +92,7 @@ class RobotInMemory:
         self._ready()
         motion = self.controller.motion
         motion.T_flange_tcp = T_flange_tcp
-        self.controller.teleport(q)
+        self.controller.motion.teleport(q)
         return RobotState(
             timestamp=0.0,
             actual_q=q,

@@ -127,16 +127,6 @@ class Controller:
         return START_TIME + self.cycles * self.cycle
 
     @property
-    def qd(self) -> Vector6:
-        """Joint speeds [rad/s]."""
-        return self.motion.qd
-
-    @property
-    def tcp_twist(self) -> Vector6:
-        """Twist of the TCP in base axes [m/s, rad/s]."""
-        return self.motion.tcp_twist
-
-    @property
     def at_rest(self) -> bool:
         """Whether nothing moves, at the end of a motion or paused on its path."""
         return self.scale == 0.0 or not self.motion.moving
@@ -302,10 +292,6 @@ class Controller:
         elif self.safety.mode not in OPERATIONAL:
             self.programs.pause()
         return ''
-
-    def teleport(self, q: Vector6) -> None:
-        """Put the arm somewhere at rest."""
-        self.motion.teleport(q)
 
     def watch_input(self, variable: str, frequency: float, action: str) -> None:
         """

@@ -401,7 +401,7 @@ def _snapshot(controller: Controller) -> RobotSnapshot:
     return RobotSnapshot(
         timestamp=controller.time,
         q=motion.q,
-        qd=controller.qd,
+        qd=motion.qd,
         T_base_tcp=motion.T_base_tcp,
         T_flange_tcp=motion.T_flange_tcp,
         robot_mode=controller.power.mode,

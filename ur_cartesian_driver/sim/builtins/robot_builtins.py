@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from math import isinf, pi
 
 from ur_cartesian_driver.sim.builtins.arguments import (
@@ -17,6 +17,7 @@ from ur_cartesian_driver.sim.builtins.arguments import (
     whole,
 )
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
+from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.state.controller_state import Payload, Popup
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
@@ -101,54 +102,38 @@ class PendantBuiltins(BuiltinGroup):
             yield
 
 
+def _list_of(
+    values: Callable[[Controller], tuple[float, ...]],
+) -> Callable[[BuiltinGroup], list[float]]:
+    """Return the function of a program that returns numbers of the controller as a list."""
+
+    def get(group: BuiltinGroup) -> list[float]:
+        return list(values(group._controller))
+
+    return get
+
+
 class RobotBuiltins(BuiltinGroup):
-    """What the robot measures and is told about its tool."""
+    """What the robot measures [rad, m, s and their derivatives], and its payload."""
 
-    def get_target_joint_positions(self) -> list[float]:
-        """Return the target positions [rad]."""
-        return list(self._controller.motion.q)
-
+    get_target_joint_positions = _list_of(lambda c: c.motion.q)
     get_joint_positions = get_target_joint_positions  # the old name
-
-    def get_actual_joint_positions(self) -> list[float]:
-        """Return the actual positions [rad]."""
-        return list(self._controller.actual.q)
+    get_actual_joint_positions = _list_of(lambda c: c.actual.q)
+    get_target_joint_speeds = _list_of(lambda c: c.motion.qd)
+    get_actual_joint_speeds = _list_of(lambda c: c.actual.qd)
+    get_target_joint_accelerations = _list_of(lambda c: c.motion.qdd)
+    get_target_tcp_speed = _list_of(lambda c: c.motion.tcp_twist)
+    get_actual_tcp_speed = _list_of(lambda c: c.actual.tcp_twist)
+    # The arm touches nothing and has no dynamics.
+    get_tcp_force = get_joint_torques = _list_of(lambda _: (0.0,) * 6)
 
     def get_actual_joint_positions_history(self, steps: Value = 0) -> list[float]:
         """Return the actual positions some cycles ago [rad]."""
         return list(self._controller.joint_history(whole(steps, 'steps')))
 
-    def get_target_joint_speeds(self) -> list[float]:
-        """Return the target speeds [rad/s]."""
-        return list(self._controller.qd)
-
-    def get_actual_joint_speeds(self) -> list[float]:
-        """Return the actual speeds [rad/s]."""
-        return list(self._controller.actual.qd)
-
-    def get_target_joint_accelerations(self) -> list[float]:
-        """Return the target accelerations [rad/s^2]."""
-        return list(self._controller.motion.qdd)
-
-    def get_actual_tcp_speed(self) -> list[float]:
-        """Return the twist of the TCP in base axes."""
-        return list(self._controller.actual.tcp_twist)
-
-    def get_target_tcp_speed(self) -> list[float]:
-        """Return the twist of the TCP in base axes."""
-        return list(self._controller.tcp_twist)
-
-    def get_tcp_force(self) -> list[float]:
-        """Return zeros: nothing is touched."""
-        return [0.0] * 6
-
     def force(self) -> float:
         """Return zero: nothing is touched."""
         return 0.0
-
-    def get_joint_torques(self) -> list[float]:
-        """Return zeros: an arm without dynamics."""
-        return [0.0] * 6
 
     def get_joint_temp(self, j: Value) -> float:
         """Return room temperature [°C]."""
@@ -197,13 +182,8 @@ class RobotBuiltins(BuiltinGroup):
         """Return the mass [kg]."""
         return self._controller.payload.mass
 
-    def get_target_payload_cog(self) -> list[float]:
-        """Return the centre of gravity [m]."""
-        return list(self._controller.payload.cog)
-
-    def get_target_payload_inertia(self) -> list[float]:
-        """Return the inertia [kg m^2]: Ixx, Iyy, Izz, Ixy, Ixz, Iyz."""
-        return list(self._controller.payload.inertia)
+    get_target_payload_cog = _list_of(lambda c: c.payload.cog)
+    get_target_payload_inertia = _list_of(lambda c: c.payload.inertia)
 
     def set_gravity(self, d: Value) -> None:
         """Set the direction away from the earth [m/s^2]."""
@@ -211,7 +191,7 @@ class RobotBuiltins(BuiltinGroup):
 
     def set_pos(self, q: Value) -> None:
         """Put the arm somewhere, which only a simulated one can do."""
-        self._controller.teleport(six(q, 'q'))
+        self._controller.motion.teleport(six(q, 'q'))
 
     def reset_revolution_counter(self, qNear: Value = None) -> None:
         """
@@ -228,7 +208,7 @@ class RobotBuiltins(BuiltinGroup):
             for q, close, (low, high) in zip(self._controller.motion.q, near, limits, strict=True)
         ]
         if counted != list(self._controller.motion.q):
-            self._controller.teleport(six(counted, 'q'))
+            self._controller.motion.teleport(six(counted, 'q'))
 
     def set_speed_slider_fraction(self, fraction: Value) -> None:
         """Set the speed slider."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 import re
 from types import MappingProxyType
-from typing import Any, get_args
+from typing import Any, TypeAlias
 
 from ur_cartesian_driver.sim.faults.fault_values import (
     AfterDistance,
@@ -24,16 +24,18 @@ from ur_cartesian_driver.sim.faults.fault_values import (
     DelayFault,
     DEVIATION_AXES,
     DEVIATION_QUANTITIES,
+    DEVIATION_SHAPES,
     DeviationFault,
-    DeviationShape,
     DropFault,
     EventFault,
     Fault,
     FaultEvent,
     FaultTrigger,
     ForeignMotionFault,
+    GARBAGE_SIZE,
     GarbageFault,
     HalfOpenFault,
+    LastingInterfaceFault,
     PlaneCrossing,
     SilenceFault,
     SpeedSliderFault,
@@ -93,69 +95,65 @@ class _WordReader:
         return value
 
 
-def _event_reader(action: FaultEvent) -> Callable[[_WordReader], dict[str, Any]]:
-    return lambda _words: {'action': action}
+Reader: TypeAlias = Callable[[_WordReader], Any]
 
 
-def _read_deviation(shape: DeviationShape) -> Callable[[_WordReader], dict[str, Any]]:
-    def read(words: _WordReader) -> dict[str, Any]:
-        return {
-            'shape': shape,
-            'quantity': words.one_of(DEVIATION_QUANTITIES),
-            'axis': words.one_of(DEVIATION_AXES),
-            'amount': words.number('an amount'),
-        }
-
-    return read
+def _constant(value: object) -> Reader:
+    return lambda _words: value
 
 
-def _read_interface(words: _WordReader) -> dict[str, Any]:
-    return {'interface': words.name()}
+def _choice(choices: tuple[str, ...]) -> Reader:
+    return lambda words: words.one_of(choices)
 
 
-def _read_delay(words: _WordReader) -> dict[str, Any]:
-    found = {'interface': words.name(), 'seconds': words.number('a time in seconds')}
+def _number(meaning: str) -> Reader:
+    return lambda words: words.number(meaning)
+
+
+def _read_seconds(words: _WordReader) -> float:
+    seconds = words.number('a time in seconds')
     words.skip('s')
-    return found
+    return seconds
 
 
-def _read_throttle(words: _WordReader) -> dict[str, Any]:
-    return {'interface': words.name(), 'rate': words.number('a rate in bytes per second')}
+def _read_size(words: _WordReader) -> int:
+    if words.peek() in ('at', _END):
+        return GARBAGE_SIZE
+    return int(words.number('a number of bytes'))
 
 
-def _read_garbage(words: _WordReader) -> dict[str, Any]:
-    found: dict[str, Any] = {'interface': words.name()}
-    if words.peek() not in ('at', _END):
-        found['size'] = int(words.number('a number of bytes'))
-    return found
+_INTERFACE: dict[str, Reader] = {'interface': _WordReader.name}
+_DEVIATION: dict[str, Reader] = {
+    'quantity': _choice(DEVIATION_QUANTITIES),
+    'axis': _choice(DEVIATION_AXES),
+    'amount': _number('an amount'),
+}
 
-
-def _read_slider(words: _WordReader) -> dict[str, Any]:
-    return {'fraction': words.number('where the slider stands, 0 to 1')}
-
-
-def _read_motion(words: _WordReader) -> dict[str, Any]:
-    return {'axis': words.one_of(DEVIATION_AXES), 'distance': words.number('a distance')}
-
-
-_Kind = tuple[Callable[..., Fault], Callable[[_WordReader], dict[str, Any]], bool]
-
-#: What begins a fault: what it makes, how its arguments are read, whether it can last.
-_KINDS: Mapping[str, _Kind] = MappingProxyType(
+#: The first word of a fault: what it makes, and how the following words are read into its fields.
+_KINDS: Mapping[str, tuple[type[Fault], Mapping[str, Reader]]] = MappingProxyType(
     {
-        **{action.value: (EventFault, _event_reader(action), False) for action in FaultEvent},
-        'slider': (SpeedSliderFault, _read_slider, False),
-        'foreign_motion': (ForeignMotionFault, _read_motion, False),
+        **{event.value: (EventFault, {'action': _constant(event)}) for event in FaultEvent},
+        'slider': (
+            SpeedSliderFault,
+            {'fraction': _number('where the slider stands, 0 to 1')},
+        ),
+        'foreign_motion': (
+            ForeignMotionFault,
+            {'axis': _choice(DEVIATION_AXES), 'distance': _number('a distance')},
+        ),
         **{
-            shape: (DeviationFault, _read_deviation(shape), True)
-            for shape in get_args(DeviationShape)
+            shape: (DeviationFault, {'shape': _constant(shape), **_DEVIATION})
+            for shape in DEVIATION_SHAPES
         },
-        'drop': (DropFault, _read_interface, True),
-        'half_open': (HalfOpenFault, _read_interface, False),
-        'silence': (SilenceFault, _read_interface, True),
-        'delay': (DelayFault, _read_delay, True),
-        'throttle': (ThrottleFault, _read_throttle, True),
-        'garbage': (GarbageFault, _read_garbage, False),
+        'drop': (DropFault, _INTERFACE),
+        'half_open': (HalfOpenFault, _INTERFACE),
+        'silence': (SilenceFault, _INTERFACE),
+        'delay': (DelayFault, {**_INTERFACE, 'seconds': _read_seconds}),
+        'throttle': (
+            ThrottleFault,
+            {**_INTERFACE, 'rate': _number('a rate in bytes per second')},
+        ),
+        'garbage': (GarbageFault, {**_INTERFACE, 'size': _read_size}),
     }
 )
 
@@ -169,8 +167,9 @@ def parse_fault(text: str) -> Fault:
     words = _WordReader(text)
     if words.peek() not in _KINDS:
         raise words.wrong(f'one of {", ".join(_KINDS)}')
-    make, read, has_duration = _KINDS[words.take()]
-    fields = read(words)
+    make, readers = _KINDS[words.take()]
+    fields = {name: read(words) for name, read in readers.items()}
+    has_duration = issubclass(make, DeviationFault | LastingInterfaceFault)
     if words.skip('at'):
         fields['trigger'] = _read_trigger(words)
     if has_duration and words.skip('for'):

@@ -21,6 +21,9 @@ DeviationShape: TypeAlias = Literal['offset', 'ramp', 'noise']
 DEVIATION_AXES: tuple[DeviationAxis, ...] = get_args(DeviationAxis)
 DEVIATION_QUANTITIES: tuple[DeviationQuantity, ...] = get_args(DeviationQuantity)
 DEVIATION_SHAPES: tuple[DeviationShape, ...] = get_args(DeviationShape)
+#: Random bytes that a robot sends if nothing else is asked for.
+GARBAGE_SIZE = 64
+
 
 # --- When ------------------------------------------------------------------------------------
 
@@ -54,8 +57,30 @@ IMMEDIATELY = AfterTime()
 # --- What ------------------------------------------------------------------------------------
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fault:
+    """Something that goes wrong at a moment."""
+
+    trigger: FaultTrigger = IMMEDIATELY
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InterfaceFault(Fault):
+    """Something that goes wrong with the connections of an interface."""
+
+    interface: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LastingInterfaceFault(InterfaceFault):
+    """Something that stays wrong with the connections of an interface."""
+
+    #: [s]
+    duration: float = inf
+
+
 class FaultEvent(Enum):
-    """What somebody else does to the robot: another client, or a person at it."""
+    """What another client, or a person at the robot, does to it."""
 
     PROTECTIVE_STOP = 'protective_stop'
     EMERGENCY_STOP = 'emergency_stop'
@@ -72,19 +97,17 @@ class FaultEvent(Enum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class EventFault:
-    """Something happens to safety, power or program, without being asked for by the client."""
+class EventFault(Fault):
+    """Something happens to safety, power or program that the client did not ask for."""
 
     action: FaultEvent
-    trigger: FaultTrigger = IMMEDIATELY
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SpeedSliderFault:
+class SpeedSliderFault(Fault):
     """Somebody moves the speed slider, 0..1."""
 
     fraction: float
-    trigger: FaultTrigger = IMMEDIATELY
 
     def __post_init__(self) -> None:
         """Reject what no slider shows."""
@@ -93,13 +116,12 @@ class SpeedSliderFault:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ForeignMotionFault:
-    """Another client's program takes the place of the running one and moves the arm away."""
+class ForeignMotionFault(Fault):
+    """Another client's program replaces the running one and moves the arm away."""
 
     axis: DeviationAxis
     #: In base axes, from where the tool is [m or rad].
     distance: float
-    trigger: FaultTrigger = IMMEDIATELY
 
     def script(self) -> str:
         """Return that program."""
@@ -110,62 +132,47 @@ class ForeignMotionFault:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DeviationFault:
-    """An actual value is not what the target asks for, on one axis of the base."""
+class DeviationFault(Fault):
+    """An actual value deviates from its target on one axis of the base."""
 
     quantity: DeviationQuantity
     axis: DeviationAxis
     shape: DeviationShape
-    #: [m, rad and their derivatives]: of the offset, of the ramp per second, the standard
-    #: deviation of the noise.
+    #: The offset, the ramp per second, or the standard deviation of the noise [m, rad and their
+    #: derivatives].
     amount: float
-    trigger: FaultTrigger = IMMEDIATELY
     #: [s]
     duration: float = inf
     seed: int = 0
 
     def value(self, elapsed: float, random: Random) -> float:
-        """Return by how much the value is off, so long after it began [s]."""
+        """Return the deviation so long after it began [s]."""
         if self.shape == 'noise':
             return random.gauss(0.0, self.amount)
         return self.amount * elapsed if self.shape == 'ramp' else self.amount
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DropFault:
+class DropFault(LastingInterfaceFault):
     """All connections of an interface are cut, and none is accepted for the duration."""
 
-    interface: str
-    trigger: FaultTrigger = IMMEDIATELY
     #: [s]
     duration: float = 0.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class HalfOpenFault:
-    """The connections that there are stay open and dead, new ones work: as if a cable was cut."""
-
-    interface: str
-    trigger: FaultTrigger = IMMEDIATELY
+class HalfOpenFault(InterfaceFault):
+    """The present connections stay open and dead, new ones work: as if a cable was cut."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SilenceFault:
-    """The robot hears, but what it has to say on an interface is lost, message by message."""
-
-    interface: str
-    trigger: FaultTrigger = IMMEDIATELY
-    duration: float = inf
+class SilenceFault(LastingInterfaceFault):
+    """The robot hears, but every message that it sends on an interface is lost."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DelayFault:
+class DelayFault(LastingInterfaceFault):
     """Everything on an interface takes longer [s], in each direction."""
 
-    interface: str
     seconds: float
-    trigger: FaultTrigger = IMMEDIATELY
-    duration: float = inf
 
     def __post_init__(self) -> None:
         """Reject what would answer before it is asked."""
@@ -174,13 +181,10 @@ class DelayFault:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ThrottleFault:
+class ThrottleFault(LastingInterfaceFault):
     """An interface carries no more than a rate [bytes/s], in each direction."""
 
-    interface: str
     rate: float
-    trigger: FaultTrigger = IMMEDIATELY
-    duration: float = inf
 
     def __post_init__(self) -> None:
         """Reject what carries nothing: that is another fault."""
@@ -191,12 +195,10 @@ class ThrottleFault:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GarbageFault:
-    """The robot says random bytes to all clients of an interface."""
+class GarbageFault(InterfaceFault):
+    """The robot sends random bytes to all clients of an interface."""
 
-    interface: str
-    size: int = 64
-    trigger: FaultTrigger = IMMEDIATELY
+    size: int = GARBAGE_SIZE
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -205,19 +207,4 @@ class GarbageFault:
             raise ValueError(f'Garbage of {self.size} bytes cannot be; use 1 to 1000000.')
 
 
-Fault: TypeAlias = (
-    EventFault
-    | SpeedSliderFault
-    | ForeignMotionFault
-    | DeviationFault
-    | DropFault
-    | HalfOpenFault
-    | SilenceFault
-    | DelayFault
-    | ThrottleFault
-    | GarbageFault
-)
-TimedFault: TypeAlias = DeviationFault | DropFault | SilenceFault | DelayFault | ThrottleFault
-InterfaceFault: TypeAlias = (
-    DropFault | HalfOpenFault | SilenceFault | DelayFault | ThrottleFault | GarbageFault
-)
+TimedFault: TypeAlias = DeviationFault | LastingInterfaceFault

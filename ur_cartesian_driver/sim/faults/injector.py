@@ -165,7 +165,7 @@ class FaultInjector:
 
     def _measure_path(self) -> None:
         """Add what the tool has moved; the tool's change of another TCP is none."""
-        vx, vy, vz, _, _, _ = self._controller.tcp_twist
+        vx, vy, vz, _, _, _ = self._controller.motion.tcp_twist
         self._travelled += hypot(vx, vy, vz) * self._controller.cycle
 
     def _is_beyond(self, plane: PlaneCrossing) -> bool:

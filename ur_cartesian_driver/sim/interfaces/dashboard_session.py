@@ -3,7 +3,7 @@
 """
 One client of the dashboard: a line in, a line out.
 
-:data:`COMMANDS` has them all, longest first where one is the beginning of another, with the
+:data:`COMMANDS` has them all, the longer one first where one is the beginning of another, with the
 software in which each appeared. A command that this software does not have yet is answered like
 one that does not exist.
 """
@@ -17,7 +17,7 @@ from pathlib import PurePosixPath
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.protocol.framing import LineBuffer
 from ur_cartesian_driver.sim.controller import Controller
-from ur_cartesian_driver.sim.interfaces.tcp_server import HangUp
+from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession, HangUp
 from ur_cartesian_driver.sim.state.controller_state import Popup
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 
@@ -43,9 +43,38 @@ class DashboardHandlers:
     def __init__(self, controller: Controller) -> None:
         """Begin as after the start of the pendant."""
         self.controller = controller
+        self.programs = controller.programs
         self.role = 'PROGRAMMER'
         self.operational_mode = 'NONE'
         self.closing = False
+        config = controller.config
+        self.version = '.'.join(map(str, config.version))
+        #: Without the mark of its generation, as the robot writes it.
+        self.robot_model = config.model.upper().removesuffix('E')
+
+    # What replies name
+
+    @property
+    def loaded(self) -> str:
+        """The name of the loaded program."""
+        return self.programs.loaded or '<unnamed>'
+
+    @property
+    def program_state(self) -> str:
+        """The state of the program."""
+        return _RUNTIME_WORDS[self.programs.state]
+
+    @property
+    def running(self) -> str:
+        """Whether a program runs."""
+        return str(self.programs.running).lower()
+
+    @property
+    def remote_control(self) -> str:
+        """Whether clients may control the robot."""
+        return str(self.controller.remote_control).lower()
+
+    # What commands do
 
     def load(self, name: str) -> str:
         """Load a program by its file name; directories do not matter here."""
@@ -53,21 +82,36 @@ class DashboardHandlers:
         text = self.controller.config.programs.get(file)
         if text is None:
             return f'File not found: {name}'
-        reason = self.controller.programs.load(file, text)
-        return f'Error while loading program: {name}' if reason else f'Loading program: {name}'
+        if self.programs.load(file, text):
+            return f'Error while loading program: {name}'
+        return f'Loading program: {name}'
+
+    def load_installation(self, name: str) -> str:
+        """Load an installation: only the default one exists."""
+        if PurePosixPath(name).name != 'default.installation':
+            return f'File not found: {name}'
+        return f'Loading installation: {name}'
 
     def play(self, _: str) -> str:
         """Start or resume."""
-        return 'Failed to execute: play' if self.controller.programs.play() else 'Starting program'
+        return 'Failed to execute: play' if self.programs.play() else 'Starting program'
 
     def pause(self, _: str) -> str:
         """Pause."""
-        refusal = self.controller.programs.pause()
-        return 'Failed to execute: pause' if refusal else 'Pausing program'
+        return 'Failed to execute: pause' if self.programs.pause() else 'Pausing program'
+
+    def power_on(self, _: str) -> str:
+        """Power up."""
+        return 'Failed to execute: power on' if self.controller.power_on() else 'Powering on'
+
+    def brake_release(self, _: str) -> str:
+        """Power up to running."""
+        refusal = self.controller.release_brakes()
+        return 'Failed to execute: brake release' if refusal else 'Brake releasing'
 
     def stop(self, _: str) -> str:
-        """Stop; nothing running is fine."""
-        self.controller.programs.stop()
+        """Stop; it is no error if no program runs."""
+        self.programs.stop()
         return 'Stopped'
 
     def quit(self, _: str) -> str:
@@ -76,23 +120,14 @@ class DashboardHandlers:
         return 'Disconnected'
 
     def shutdown(self, _: str) -> str:
-        """Cut the power; the controller itself stays, or nothing could be tested afterwards."""
+        """Cut the power; the controller stays, or nothing could be tested afterwards."""
         self.controller.power_off()
         return 'Shutting down'
-
-    def power_on(self, _: str) -> str:
-        """Power up."""
-        return 'Failed to execute: power on' if self.controller.power_on() else 'Powering on'
 
     def power_off(self, _: str) -> str:
         """Cut the power."""
         self.controller.power_off()
         return 'Powering off'
-
-    def brake_release(self, _: str) -> str:
-        """Power up to running."""
-        refusal = self.controller.release_brakes()
-        return 'Failed to execute: brake release' if refusal else 'Brake releasing'
 
     def unlock(self, _: str) -> str:
         """Unlock a protective stop, if it has lasted long enough."""
@@ -115,10 +150,6 @@ class DashboardHandlers:
         self.controller.close_popups()
         return 'closing popup'
 
-    def close_safety_popup(self, _: str) -> str:
-        """Close a window that is not shown here."""
-        return 'closing safety popup'
-
     def popup(self, text: str) -> str:
         """Show a window."""
         self.controller.show_popup(Popup(text=text))
@@ -129,46 +160,10 @@ class DashboardHandlers:
         self.controller.messages.note(text)
         return 'Added log message'
 
-    def running(self, _: str) -> str:
-        """Tell whether a program runs."""
-        return f'Program running: {str(self.controller.programs.running).lower()}'
-
-    def robot_mode(self, _: str) -> str:
-        """Tell the robot mode."""
-        return f'Robotmode: {self.controller.power.mode.name}'
-
-    def safety_mode(self, _: str) -> str:
-        """Tell the safety mode."""
-        return f'Safetymode: {self.controller.safety.mode.name}'
-
-    def safety_status(self, _: str) -> str:
-        """Tell the safety status."""
-        return f'Safetystatus: {self.controller.safety.mode.name}'
-
-    def program_state(self, _: str) -> str:
-        """Tell the state and the name of the loaded program."""
-        programs = self.controller.programs
-        return f'{_RUNTIME_WORDS[programs.state]} {programs.loaded or "<unnamed>"}'
-
     def loaded_program(self, _: str) -> str:
-        """Tell the name of the loaded program."""
-        loaded = self.controller.programs.loaded
+        """Return the path of the loaded program."""
+        loaded = self.programs.loaded
         return f'Loaded program: /programs/{loaded}' if loaded else 'No program loaded'
-
-    def is_saved(self, _: str) -> str:
-        """Tell that the program is saved: nobody can edit it."""
-        return f'true {self.controller.programs.loaded or "<unnamed>"}'
-
-    def polyscope_version(self, _: str) -> str:
-        """Tell the version of the software."""
-        return f'URSoftware {self._version(4)} (Jan 01 2026)'
-
-    def version(self, _: str) -> str:
-        """Tell the version of the software, numbers only."""
-        return self._version(4)
-
-    def _version(self, count: int) -> str:
-        return '.'.join(str(part) for part in self.controller.config.version[:count])
 
     def set_role(self, role: str) -> str:
         """Change the user role."""
@@ -178,10 +173,6 @@ class DashboardHandlers:
         self.role = word
         return f'Setting user role: {role}'
 
-    def get_role(self, _: str) -> str:
-        """Tell the user role."""
-        return self.role
-
     def set_operational_mode(self, mode: str) -> str:
         """Take control of the operational mode."""
         word = mode.upper()
@@ -190,44 +181,10 @@ class DashboardHandlers:
         self.operational_mode = word
         return f'Operational mode "{mode}" is set'
 
-    def get_operational_mode(self, _: str) -> str:
-        """Tell the operational mode."""
-        return self.operational_mode
-
     def clear_operational_mode(self, _: str) -> str:
         """Give the operational mode back."""
         self.operational_mode = 'NONE'
         return 'No longer controlling the operational mode. Current operational mode: NONE'
-
-    def load_installation(self, name: str) -> str:
-        """Load an installation: only the default one exists."""
-        if PurePosixPath(name).name != 'default.installation':
-            return f'File not found: {name}'
-        return f'Loading installation: {name}'
-
-    def remote(self, _: str) -> str:
-        """Tell whether clients may control the robot."""
-        return str(self.controller.remote_control).lower()
-
-    def serial_number(self, _: str) -> str:
-        """Tell a number that belongs to no arm."""
-        return '20000000000'
-
-    def robot_model(self, _: str) -> str:
-        """Tell the model without the mark of its generation, as the robot does."""
-        return self.controller.config.model.upper().removesuffix('E')
-
-    def flight_report(self, _: str) -> str:
-        """Say that a report was written; there is nothing to write."""
-        return 'Flight Report generated with id: 0'
-
-    def support_file(self, directory: str) -> str:
-        """Say that a file was written; there is nothing to write."""
-        return f'Completed successfully: {directory}/ursupport.zip'
-
-    def save_log(self, _: str) -> str:
-        """Say that the log was written; there is nothing to write."""
-        return 'Log saved to disk'
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,10 +192,17 @@ class DashboardCommand:
     """A command with the software versions of CB3 and e-Series from which on it exists."""
 
     words: str
-    action: CommandHandler
     cb3: tuple[int, int] | None
     e: tuple[int, int] | None
+    #: What carries it out, or the reply: {0} = the handlers, {1} = the argument.
+    action: CommandHandler | str
     argument: bool = False
+
+    def reply(self, handlers: DashboardHandlers, argument: str) -> str:
+        """Carry out the command, return the reply."""
+        if isinstance(self.action, str):
+            return self.action.format(handlers, argument)
+        return self.action(handlers, argument)
 
     def argument_in(self, line: str) -> str | None:
         """Return the argument if the line is this command, None if it is another one."""
@@ -247,58 +211,53 @@ class DashboardCommand:
         return line[len(self.words) + 1 :].strip() if line.startswith(self.words + ' ') else None
 
 
+_SUPPORT_FILE_WRITTEN = 'Completed successfully: {1}/ursupport.zip'
+_Handlers, _Row = DashboardHandlers, DashboardCommand
 COMMANDS = (
-    DashboardCommand(
-        'load installation', DashboardHandlers.load_installation, (3, 2), (5, 0), argument=True
+    _Row('load installation', (3, 2), (5, 0), _Handlers.load_installation, argument=True),
+    _Row('load', (1, 4), (5, 0), _Handlers.load, argument=True),
+    _Row('play', (1, 4), (5, 0), _Handlers.play),
+    _Row('pause', (1, 4), (5, 0), _Handlers.pause),
+    _Row('stop', (1, 4), (5, 0), _Handlers.stop),
+    _Row('quit', (1, 4), (5, 0), _Handlers.quit),
+    _Row('shutdown', (1, 4), (5, 0), _Handlers.shutdown),
+    _Row('power on', (3, 0), (5, 0), _Handlers.power_on),
+    _Row('power off', (3, 0), (5, 0), _Handlers.power_off),
+    _Row('brake release', (3, 0), (5, 0), _Handlers.brake_release),
+    _Row('unlock protective stop', (3, 1), (5, 0), _Handlers.unlock),
+    _Row('close popup', (1, 6), (5, 0), _Handlers.close_popup),
+    _Row('close safety popup', (3, 1), (5, 0), 'closing safety popup'),
+    _Row('restart safety', (3, 7), (5, 1), _Handlers.restart_safety),
+    _Row('running', (1, 6), (5, 0), 'Program running: {0.running}'),
+    _Row('robotmode', (1, 6), (5, 0), 'Robotmode: {0.controller.power.mode.name}'),
+    _Row('safetymode', (3, 0), (5, 0), 'Safetymode: {0.controller.safety.mode.name}'),
+    _Row('safetystatus', None, (5, 4), 'Safetystatus: {0.controller.safety.mode.name}'),
+    _Row('get loaded program', (1, 6), (5, 0), _Handlers.loaded_program),
+    _Row('programState', (1, 8), (5, 0), '{0.program_state} {0.loaded}'),
+    _Row('isProgramSaved', (1, 8), (5, 0), 'true {0.loaded}'),
+    _Row('popup', (1, 6), (5, 0), _Handlers.popup, argument=True),
+    _Row('addToLog', (1, 8), (5, 0), _Handlers.add_to_log, argument=True),
+    _Row('PolyscopeVersion', (1, 8), (5, 0), 'URSoftware {0.version} (Jan 01 2026)'),
+    _Row('version', None, (5, 0), '{0.version}'),
+    _Row('setUserRole', (3, 1), None, _Handlers.set_role, argument=True),
+    _Row('getUserRole', (3, 1), None, '{0.role}'),
+    _Row('set operational mode', None, (5, 0), _Handlers.set_operational_mode, argument=True),
+    _Row('get operational mode', None, (5, 6), '{0.operational_mode}'),
+    _Row('clear operational mode', None, (5, 0), _Handlers.clear_operational_mode),
+    _Row('is in remote control', None, (5, 6), '{0.remote_control}'),
+    _Row('get serial number', (3, 12), (5, 6), '20000000000'),
+    _Row('get robot model', (3, 12), (5, 6), '{0.robot_model}'),
+    # Nothing is written.
+    _Row('generate flight report', (3, 13), (5, 8), 'Flight Report generated with id: 0', True),
+    _Row(
+        'generate support file', (3, 13), (5, 8), 'Completed successfully: {1}/ursupport.zip', True
     ),
-    DashboardCommand('load', DashboardHandlers.load, (1, 4), (5, 0), argument=True),
-    DashboardCommand('play', DashboardHandlers.play, (1, 4), (5, 0)),
-    DashboardCommand('pause', DashboardHandlers.pause, (1, 4), (5, 0)),
-    DashboardCommand('stop', DashboardHandlers.stop, (1, 4), (5, 0)),
-    DashboardCommand('quit', DashboardHandlers.quit, (1, 4), (5, 0)),
-    DashboardCommand('shutdown', DashboardHandlers.shutdown, (1, 4), (5, 0)),
-    DashboardCommand('power on', DashboardHandlers.power_on, (3, 0), (5, 0)),
-    DashboardCommand('power off', DashboardHandlers.power_off, (3, 0), (5, 0)),
-    DashboardCommand('brake release', DashboardHandlers.brake_release, (3, 0), (5, 0)),
-    DashboardCommand('unlock protective stop', DashboardHandlers.unlock, (3, 1), (5, 0)),
-    DashboardCommand('close popup', DashboardHandlers.close_popup, (1, 6), (5, 0)),
-    DashboardCommand('close safety popup', DashboardHandlers.close_safety_popup, (3, 1), (5, 0)),
-    DashboardCommand('restart safety', DashboardHandlers.restart_safety, (3, 7), (5, 1)),
-    DashboardCommand('running', DashboardHandlers.running, (1, 6), (5, 0)),
-    DashboardCommand('robotmode', DashboardHandlers.robot_mode, (1, 6), (5, 0)),
-    DashboardCommand('safetymode', DashboardHandlers.safety_mode, (3, 0), (5, 0)),
-    DashboardCommand('safetystatus', DashboardHandlers.safety_status, None, (5, 4)),
-    DashboardCommand('get loaded program', DashboardHandlers.loaded_program, (1, 6), (5, 0)),
-    DashboardCommand('programState', DashboardHandlers.program_state, (1, 8), (5, 0)),
-    DashboardCommand('isProgramSaved', DashboardHandlers.is_saved, (1, 8), (5, 0)),
-    DashboardCommand('popup', DashboardHandlers.popup, (1, 6), (5, 0), argument=True),
-    DashboardCommand('addToLog', DashboardHandlers.add_to_log, (1, 8), (5, 0), argument=True),
-    DashboardCommand('PolyscopeVersion', DashboardHandlers.polyscope_version, (1, 8), (5, 0)),
-    DashboardCommand('version', DashboardHandlers.version, None, (5, 0)),
-    DashboardCommand('setUserRole', DashboardHandlers.set_role, (3, 1), None, argument=True),
-    DashboardCommand('getUserRole', DashboardHandlers.get_role, (3, 1), None),
-    DashboardCommand(
-        'set operational mode', DashboardHandlers.set_operational_mode, None, (5, 0), argument=True
-    ),
-    DashboardCommand('get operational mode', DashboardHandlers.get_operational_mode, None, (5, 6)),
-    DashboardCommand(
-        'clear operational mode', DashboardHandlers.clear_operational_mode, None, (5, 0)
-    ),
-    DashboardCommand('is in remote control', DashboardHandlers.remote, None, (5, 6)),
-    DashboardCommand('get serial number', DashboardHandlers.serial_number, (3, 12), (5, 6)),
-    DashboardCommand('get robot model', DashboardHandlers.robot_model, (3, 12), (5, 6)),
-    DashboardCommand(
-        'generate flight report', DashboardHandlers.flight_report, (3, 13), (5, 8), argument=True
-    ),
-    DashboardCommand(
-        'generate support file', DashboardHandlers.support_file, (3, 13), (5, 8), argument=True
-    ),
-    DashboardCommand('saveLog', DashboardHandlers.save_log, (3, 13), (5, 8)),
+    _Row('saveLog', (3, 13), (5, 8), 'Log saved to disk'),
 )
 
 
-class DashboardSession:
-    """A :class:`~.server.Session`."""
+class DashboardSession(ClientSession):
+    """Answers the commands that the software of this robot has."""
 
     def __init__(self, controller: Controller) -> None:
         """Wait for commands."""
@@ -317,9 +276,6 @@ class DashboardSession:
         """Greet."""
         return f'{BANNER}\n'.encode()
 
-    def close(self) -> None:
-        """Hold nothing."""
-
     def feed(self, data: bytes) -> bytes:
         """Answer each line by one line."""
         answers = ''
@@ -333,5 +289,5 @@ class DashboardSession:
         for command in self._commands:
             argument = command.argument_in(line)
             if argument is not None:
-                return command.action(self._handlers, argument)
+                return command.reply(self._handlers, argument)
         return f'could not understand: "{line}"'

@@ -6,26 +6,20 @@ from __future__ import annotations
 
 from ur_cartesian_driver.protocol.framing import LineBuffer
 from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession
 
 #: A whole function may stand on one line [bytes].
 _MAX_LINE_LENGTH = 1024 * 1024
 
 
-class InterpreterSession:
-    """A :class:`~.server.Session` whose answers can come later than what they answer."""
+class InterpreterSession(ClientSession):
+    """Hands statements over; their answers can come later."""
 
     def __init__(self, controller: Controller) -> None:
         """Wait for statements."""
         self._interpreter_mode = controller.interpreter_mode
         self._lines = LineBuffer(_MAX_LINE_LENGTH)
         self._answers: list[str] = []
-
-    def open(self) -> bytes:
-        """Say nothing."""
-        return b''
-
-    def close(self) -> None:
-        """Hold nothing: statements that were sent are executed all the same."""
 
     def feed(self, data: bytes) -> bytes:
         """Hand over each line, return what can be answered at once."""

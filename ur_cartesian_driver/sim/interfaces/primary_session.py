@@ -12,24 +12,17 @@ from __future__ import annotations
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.interfaces.primary_commands import execute_command
 from ur_cartesian_driver.sim.interfaces.primary_stream import version_frame
-from ur_cartesian_driver.sim.interfaces.tcp_server import HangUp
+from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession, HangUp
 from ur_cartesian_driver.sim.programs.script_upload import UploadDecoder, UploadTooLong
 
 
-class ScriptSession:
-    """A :class:`~.server.Session`."""
+class ScriptSession(ClientSession):
+    """Executes programs and commands; the first state comes in the cycle of the connection."""
 
     def __init__(self, controller: Controller) -> None:
         """Wait for programs."""
         self._controller = controller
         self._uploads = UploadDecoder()
-
-    def open(self) -> bytes:
-        """Say nothing: the first state comes in this cycle."""
-        return b''
-
-    def close(self) -> None:
-        """Forget what came of an unfinished program."""
 
     def feed(self, data: bytes) -> bytes:
         """Do what is complete; what there is to say goes to all clients."""

@@ -127,7 +127,7 @@ def _tcp(controller: Controller) -> Vector6:
 
 
 def _scaled_momentum(controller: Controller) -> float:
-    return controller.payload.mass * hypot(*controller.tcp_twist[:3])
+    return controller.payload.mass * hypot(*controller.motion.tcp_twist[:3])
 
 
 #: Outputs that are computed.
@@ -137,12 +137,12 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType(
         'control_step': lambda c: c.cycles,
         'target_q': lambda c: c.motion.q,
         'actual_q': lambda c: c.actual.q,
-        'target_qd': lambda c: c.qd,
+        'target_qd': lambda c: c.motion.qd,
         'actual_qd': lambda c: c.actual.qd,
         'target_qdd': lambda c: c.motion.qdd,
         'target_TCP_pose': _tcp,
         'actual_TCP_pose': lambda c: c.actual.T_base_tcp.rotation_vector(),
-        'target_TCP_speed': lambda c: c.tcp_twist,
+        'target_TCP_speed': lambda c: c.motion.tcp_twist,
         'actual_TCP_speed': lambda c: c.actual.tcp_twist,
         'tcp_offset': lambda c: (
             _ZERO6

@@ -17,6 +17,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_server import (
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.interfaces.rtde_input_effects import apply_inputs
 from ur_cartesian_driver.sim.interfaces.rtde_output_values import output_getter
+from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession
 
 
 class _OutputSchedule:
@@ -39,8 +40,8 @@ class _OutputSchedule:
         return self._recipe.pack([get(controller) for get in self._getters])
 
 
-class RtdeSession:
-    """A :class:`~.server.Session`."""
+class RtdeSession(ClientSession):
+    """Answers requests, applies inputs, and packs the data packages that are due."""
 
     def __init__(self, controller: Controller, taken_inputs: set[str]) -> None:
         """
@@ -58,10 +59,6 @@ class RtdeSession:
         )
         self._outputs: list[OutputStream] = []
         self._streams: list[_OutputSchedule] = []
-
-    def open(self) -> bytes:
-        """Say nothing: the client begins."""
-        return b''
 
     def feed(self, data: bytes) -> bytes:
         """Answer requests and apply inputs."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterator
 import logging
-from typing import cast, Generic, Protocol, TypeVar
+from typing import cast, Generic, TypeVar
 
 from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.sim.faults.impairment import ImpairedConnection, Impairment
@@ -34,11 +34,12 @@ class HangUp(Exception):
         self.farewell = farewell
 
 
-class ClientSession(Protocol):
+class ClientSession:
     """One client's conversation."""
 
     def open(self) -> bytes:
-        """Return what is sent unasked at the start."""
+        """Return what is sent unasked at the start: by default nothing, the client begins."""
+        return b''
 
     def feed(self, data: bytes) -> bytes:
         """
@@ -47,9 +48,10 @@ class ClientSession(Protocol):
         :raises ProtocolError: the client talks nonsense; it is disconnected.
         :raises HangUp: the conversation is over.
         """
+        raise NotImplementedError
 
     def close(self) -> None:
-        """Give back what the client held."""
+        """Give back what the client held: by default nothing."""
 
 
 S = TypeVar('S', bound=ClientSession)
