@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Arms that are not as their model says: from a calibration file, or made up.
+Kinematic calibrations: read from a file, or random.
 
-Both are axes in space, which a DH table is computed from by their common normals. Where two axes
-are nearly parallel (shoulder lift, elbow, wrist 1) the normal may lie far away: so real robots
-come to report lengths of many metres that cancel.
+Both are axes in space, whose common normals give the DH table. Where two axes are nearly parallel
+(shoulder lift, elbow, wrist 1) the normal may lie far away. That is why real robots report lengths
+of many metres, which cancel.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from ur_cartesian_driver.kinematics.robot_models import DhTable, RobotModel
 
 Array = NDArray[np.float64]
 
-#: How far the axes of a made-up arm are off, standard deviations [rad, m]. Flanges then are some
-#: 1 to 2 mm off, as real ones are found to be.
+#: Standard deviations of the axes of a random calibration [rad, m]; they put the flange 1 to 2 mm
+#: off, as on real arms.
 AXIS_TURN, AXIS_SHIFT = 1e-3, 3e-4
 
 _LINKS = ('shoulder', 'upper_arm', 'forearm', 'wrist_1', 'wrist_2', 'wrist_3')
 _FIELDS = ('x', 'y', 'z', 'roll', 'pitch', 'yaw')
-# Axes this parallel are taken as parallel [rad]: files are rounded to ten digits.
+# Axes with a smaller angle count as parallel [rad]: files are rounded to ten digits.
 _PARALLEL = 1e-8
-# How far the first joint may be from the axis of the base [m, rad].
+# Tolerance of the first joint from the axis of the base [m, rad].
 _OFF_AXIS = 1e-9
 
 
@@ -72,7 +72,7 @@ def read_calibration(path: Path, model: RobotModel) -> DhTable:
 
 def random_calibration(model: RobotModel, seed: int) -> DhTable:
     """
-    Return the table of an arm whose axes are off as those of real arms are; see above.
+    Return the table of an arm whose axes deviate like those of real arms; see above.
 
     :raises ValueError: the seed is negative.
     """
@@ -83,7 +83,7 @@ def random_calibration(model: RobotModel, seed: int) -> DhTable:
     for i in range(1, 6):
         axes.directions[i] = _turned(axes.directions[i], random.normal(0.0, AXIS_TURN, 3))
         axes.points[i] += random.normal(0.0, AXIS_SHIFT, 3)
-    # The table ends on the last axis: there the flange is put again.
+    # The table ends on the last axis, so the flange has to lie on it.
     axes.flange = _flange_on(axes)
     return _table(axes, model)
 
@@ -141,7 +141,7 @@ def _table(axes: _Axes, model: RobotModel) -> DhTable:
         following = axes.directions[i]
         normal, d, a = _common_normal(origin, z, axes.points[i], following)
         alpha = _angle(normal, z, following)
-        # Of the two directions of the normal the one that the model has.
+        # Of the two directions of the normal, that of the model.
         nominal_a, nominal_alpha = model.geometry.a[i - 1], model.geometry.alpha[i - 1]
         if (a * nominal_a if nominal_a else alpha * nominal_alpha) < 0.0:
             normal, a, alpha = -normal, -a, -alpha
@@ -158,14 +158,14 @@ def _table(axes: _Axes, model: RobotModel) -> DhTable:
 def _common_normal(
     origin: Array, z: Array, point: Array, following: Array
 ) -> tuple[Array, float, float]:
-    """Return the direction between two axes, how far along the first it begins, its length."""
+    """Return the direction of the common normal, where on the first axis it begins, its length."""
     normal = np.cross(z, following)
     size = float(np.linalg.norm(normal))
     if size > _PARALLEL:
         normal /= size
         d, a, _ = np.linalg.solve(np.column_stack([z, normal, -following]), point - origin)
         return normal, float(d), float(a)
-    # Any normal will do; this one goes through where the row begins.
+    # Any normal will do; this one goes through the origin of the row.
     across = point - origin
     across = across - z * (z @ across)
     a = float(np.linalg.norm(across))

@@ -15,12 +15,12 @@ from dataclasses import dataclass
 import time
 from typing import Protocol
 
-#: The event loop wakes up to this much late [s] (epoll counts in milliseconds), so it is asked to
-#: wake this much early, and the rest is slept.
+#: The event loop wakes up to this much late [s] (epoll counts in milliseconds). So it has to wake
+#: this much early, and the clock sleeps for the rest.
 _LOOP_GRAIN = 0.001
-#: Behind by more than this [s] (a suspended process, a starved machine), the clock starts anew
-#: instead of racing: programs count their timeouts in cycles, commonly 0.2 s, and in a race of
-#: cycles nobody could answer them in time.
+#: A clock that is late by more than this [s] (suspended process, overloaded machine) starts anew
+#: instead of catching up: programs count timeouts in cycles, commonly 0.2 s, and while cycles race
+#: no client could answer in time.
 _MAX_LAG = 0.1
 _MAX_SAMPLES = 20_000
 
@@ -36,17 +36,17 @@ class Lateness:
 
 
 class Clock(Protocol):
-    """Waits until the next cycle is due, while others on the event loop run."""
+    """Waits until the next cycle is due, while the event loop runs."""
 
     async def next_cycle(self) -> None:
         """Return when the next cycle is due."""
 
 
 class VirtualClock:
-    """Time that passes as fast as the cycles can be computed; everybody else runs in between."""
+    """Time that passes as fast as cycles can be computed; the servers run in between."""
 
     async def next_cycle(self) -> None:
-        """Let the servers run once, wait for nothing."""
+        """Let the servers run once, without waiting."""
         await asyncio.sleep(0)
 
 
@@ -64,7 +64,7 @@ class RealClock:
         self._start: float | None = None
         self._count = 0
         self._late: deque[float] = deque(maxlen=_MAX_SAMPLES)
-        #: How often the clock gave up catching up.
+        #: How often the clock has started anew.
         self.slips = 0
 
     async def next_cycle(self) -> None:

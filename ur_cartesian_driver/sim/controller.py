@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The simulated controller: one step is one cycle, and nothing in it waits.
+The simulated controller: programs, motion, power, safety and I/O, one cycle per step.
 
-It joins the parts: programs, motion, power, safety, signals. It owns no socket and no clock, so it
-runs as well under a virtual clock; whoever drives it calls its methods between two steps.
+It never waits, and owns neither clock nor network, so it runs on a virtual clock as well. Its
+methods are called between two steps.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ from ur_cartesian_driver.sim.state.power_and_safety import (
 )
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 
-#: The controller's clock at the start [s]: clients of RTDE take a controller that has been up for
-#: less than 40 s for one that is still booting.
+#: The controller's clock at the start [s]: RTDE clients believe that a controller that has been
+#: up for less than 40 s is still booting.
 START_TIME = 60.0
-#: Time in which the speed goes from full to zero [s]: by the slider and by a pause, and by a
-#: protective stop. A real robot's are not published.
+#: Time from full speed to zero [s]: by the slider or a pause, and by a protective stop. Those of
+#: a real robot are not published.
 SLIDER_TIME, PROTECTIVE_STOP_TIME = 0.25, 0.1
 _MAX_HISTORY = 100
 _MAX_POPUPS = 100
@@ -77,14 +77,14 @@ class Controller:
         Begin as configured, with the arm at rest.
 
         :param make_builtins: returns the functions that programs can call.
-        :param sockets: what programs connect with; None = in memory, for tests.
+        :param sockets: the sockets of programs; None = in memory, for tests.
         """
         self.config = config
         self.cycle = config.cycle
         self.cycles = 0
         self.arm = Arm(config.robot_model, config.geometry)
         self.motion = MotionGenerator(self.arm, self.cycle, config.q)
-        #: What is measured of the motion: the targets, unless a fault interferes.
+        #: The measured motion: equal to the targets, unless a fault interferes.
         self.actual = ActualMotion(self.motion)
         self.sockets = MemorySockets() if sockets is None else sockets
         self.io = ControllerIo()
@@ -102,14 +102,14 @@ class Controller:
         self.gravity: Vector3 = (0.0, 0.0, 9.82)
         self.freedrive = FreedriveState.OFF
         self.process = ProcessState()
-        #: Where the last move leads to; None after a stream.
+        #: Target of the last move; None after a stream of set-points.
         self.waypoint: Pose | None = None
         self.force_mode = False
         self.external_ft = False
         #: What `tool_contact` returns: steps back to the contact, 0 = none.
         self.contact_steps = 0
         self.remote_control = config.remote_control
-        #: The speed slider, 0..1, and what motion really runs at.
+        #: The speed slider, 0..1, and the scaling at which motion runs.
         self.speed_slider = 1.0
         self.scale = 1.0
         self._joint_history: deque[Vector6] = deque([config.q] * _MAX_HISTORY, maxlen=_MAX_HISTORY)
@@ -119,7 +119,7 @@ class Controller:
         self.messages.on_error = self._pause_if_wanted
         self.faults: CycleFaults | None = None
 
-    # What it reports
+    # State
 
     @property
     def time(self) -> float:
@@ -147,7 +147,7 @@ class Controller:
         """
         Return the joint positions some cycles ago.
 
-        :raises RuntimeException: farther back than is remembered.
+        :raises RuntimeException: farther back than the history goes.
         """
         if not 0 <= steps < _MAX_HISTORY:
             raise RuntimeException(f'steps is {steps}; the history holds 0..{_MAX_HISTORY - 1}')
@@ -174,9 +174,9 @@ class Controller:
 
     def _change_scale(self, was_at_rest: bool) -> None:
         """
-        Move the scale towards what it should be, slowly enough for an arm.
+        Move the scale towards its target, slowly enough for an arm.
 
-        :param rested: the arm stood before this cycle, so it can begin with any scale.
+        :param was_at_rest: the arm stood before this cycle, so any scale is possible at once.
         """
         paused = self.programs.state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
         target = 0.0 if paused else self.speed_slider
@@ -206,7 +206,7 @@ class Controller:
             self.programs.pause()
 
     def _watch_inputs(self) -> None:
-        """Act on inputs that an RTDE client has stopped to write."""
+        """Act on inputs that an RTDE client has stopped writing."""
         for variable, action in self.watchdogs.expired(self.time):
             self.messages.text(f'RTDE watchdog: {variable} was not written in time.')
             if action == 'stop':
@@ -214,16 +214,16 @@ class Controller:
             elif action == 'pause':
                 self.programs.pause()
 
-    # What the life of programs asks for
+    # Called by the program runner
 
     def brake(self) -> None:
-        """Stop hard; an arm that stands on its path, paused or at a fault, only forgets it."""
+        """Stop hard; an arm that stands on its path, paused or at a fault, drops the path."""
         if self.scale == 0.0 or self.motion.fault is not None:
             self.motion.stop_at_once()
         self.ownership.brake()
 
     def end_modes(self) -> None:
-        """End what lives only as long as a program."""
+        """End the modes and settings that end with a program."""
         self.freedrive = FreedriveState.OFF
         self.force_mode = False
         self.process = ProcessState()
@@ -231,15 +231,15 @@ class Controller:
         self.watchdogs.clear()
 
     def end_of_frame(self) -> None:
-        """Brake if nobody goes on with what moves."""
+        """Brake if no thread continues the motion."""
         self.ownership.end_of_frame()
 
     def release(self, thread: Hashable) -> None:
-        """Forget a thread that has ended."""
+        """Take the motion from a thread that has ended."""
         self.ownership.release(thread)
 
     def start_refusal(self) -> str:
-        """Return why no program can run now."""
+        """Return why no program can run now, or an empty string."""
         if self.safety.mode not in OPERATIONAL:
             return f'the safety mode is {self.safety.mode.name}'
         if self.power.mode is not RobotMode.RUNNING:
@@ -274,9 +274,9 @@ class Controller:
 
     def safety_event(self, event: SafetyEvent, reported: bool = False) -> str:
         """
-        Let something happen to the safety system; return why it is refused, or an empty string.
+        Pass an event to the safety system; return why it is refused, or an empty string.
 
-        :param reported: the error code of a protective stop has been announced already.
+        :param reported: the error code of the protective stop has been sent already.
         """
         before = self.safety.mode
         refusal = self.safety.step(event, self.time)
@@ -295,7 +295,7 @@ class Controller:
 
     def watch_input(self, variable: str, frequency: float, action: str) -> None:
         """
-        Expect that an RTDE input is written at a rate [1/s].
+        Watch that an RTDE input is written at least at a rate [1/s].
 
         :raises RuntimeException: the action does not exist.
         """
@@ -304,13 +304,13 @@ class Controller:
         self.watchdogs.watch(variable, frequency, action, self.time)
 
     def show_popup(self, popup: Popup) -> None:
-        """Show a window; one that nobody waits for is not kept when there are many already."""
+        """Show a window; one that no program waits for is not kept when there are many."""
         if popup.blocking or len(self.popups) < _MAX_POPUPS:
             self.popups.append(popup)
         self.messages.popup(popup)
 
     def close_popups(self) -> None:
-        """Close all windows; programs that wait for them go on."""
+        """Close all windows; programs that wait for one continue."""
         for popup in self.popups:
             popup.open = False
         self.popups.clear()

@@ -3,8 +3,8 @@
 """
 A simulated robot that listens on the ports of a real one.
 
-One thread runs one event loop with everything in it: the controller's cycle, the servers, nothing
-to lock. Calls from other threads are carried out between two cycles.
+One thread runs one event loop with the controller's cycle and the servers, so there is nothing to
+lock. Calls from other threads are carried out between two cycles.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ POLYSCOPE_X = 10
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ports:
-    """Where the servers listen."""
+    """The ports that the servers listen on."""
 
     rtde: int
     primary: int
@@ -74,7 +74,7 @@ class RobotSnapshot:
     speed_slider: float
     speed_scaling: float
     digital_outputs: int
-    #: What programs wrote with `textmsg`, and the errors, newest last.
+    #: Texts of programs (`textmsg`) and errors, newest last.
     messages: tuple[str, ...]
     popups: tuple[str, ...]
 
@@ -99,8 +99,8 @@ class SimulatedRobot:
         """
         Make a robot; it lives from `start` to `close`, or as long as `run` runs.
 
-        :param sockets: what programs connect with; None = TCP.
-        :param clock: when cycles are due; None = as the configuration's rate says.
+        :param sockets: the sockets of programs; None = TCP.
+        :param clock: when cycles are due; None = by the rate of the configuration.
         """
         self.config = config or SimulatorConfig()
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -157,7 +157,7 @@ class SimulatedRobot:
         return self
 
     def close(self) -> None:
-        """Disconnect everybody and end the thread; may be called twice."""
+        """Disconnect all clients and end the thread; may be called twice."""
         thread, self._thread = self._thread, None
         if thread is None:
             return
@@ -212,7 +212,7 @@ class SimulatedRobot:
             self.controller.sockets.close_all()
             for server in self._servers:
                 await server.close()
-            # Clients that called at the last moment are taken, and hung up on.
+            # Clients that connected at the last moment are accepted and disconnected.
             await asyncio.sleep(0.01)
 
     async def _listen(self) -> None:
@@ -262,9 +262,9 @@ class SimulatedRobot:
 
     def call(self, function: Callable[[Controller], T]) -> T:
         """
-        Let a function work on the controller between two cycles, and return its result.
+        Call a function with the controller between two cycles, and return its result.
 
-        :raises TimeoutError: the robot's thread did not get to it within 10 s.
+        :raises TimeoutError: the robot's thread did not call it within 10 s.
         """
         loop = self._loop
         if loop is None or _is_running_in(loop):
@@ -288,16 +288,16 @@ class SimulatedRobot:
         :raises RuntimeError: the robot has not been started.
         """
         if self._ports is None:
-            raise RuntimeError('The simulated robot listens nowhere yet; start it first.')
+            raise RuntimeError('The simulated robot is not listening yet: start it first.')
         return self._ports
 
     def state(self) -> RobotSnapshot:
-        """Return the robot as it is now."""
+        """Return a snapshot of the robot."""
         return self.call(_snapshot)
 
     def inject(self, *faults: Fault | str) -> None:
         """
-        Let something go wrong, now or at its moment: a fault, or the text of one.
+        Set faults, as values or as text; each happens when it is triggered.
 
         :raises ValueError: a text is not understood, or the robot has no such interface.
         """
@@ -310,7 +310,7 @@ class SimulatedRobot:
         self.call(add)
 
     def clear_faults(self) -> None:
-        """Forget the faults to come and end those that last; what has happened stays."""
+        """Forget faults that have not happened and end those that last."""
         self.call(lambda _: self._faults.clear())
 
     def set_speed_slider(self, fraction: float) -> None:
@@ -318,31 +318,31 @@ class SimulatedRobot:
         self.call(lambda controller: controller.set_slider(fraction))
 
     def protective_stop(self) -> None:
-        """Stop the arm as if it had hit something."""
+        """Trigger a protective stop, as if the arm had hit something."""
         self._safety(SafetyEvent.PROTECTIVE_STOP)
 
     def unlock_protective_stop(self) -> None:
         """
-        Unlock as a person at the pendant does.
+        Unlock the protective stop, as at the pendant.
 
         :raises RuntimeError: not stopped, or stopped less than the unlock delay ago.
         """
         self._safety(SafetyEvent.UNLOCK)
 
     def emergency_stop(self) -> None:
-        """Press the button."""
+        """Press the emergency stop button."""
         self._safety(SafetyEvent.EMERGENCY_STOP)
 
     def release_emergency_stop(self) -> None:
         """
-        Turn the button back; the arm stays without power.
+        Release the emergency stop button; the arm stays without power.
 
-        :raises RuntimeError: it is not pressed.
+        :raises RuntimeError: the button is not pressed.
         """
         self._safety(SafetyEvent.RELEASE)
 
     def stop_program(self) -> None:
-        """Stop the program as a person at the pendant does."""
+        """Stop the program, as at the pendant."""
         self.call(lambda controller: controller.programs.stop())
 
     def pause_program(self) -> None:
@@ -353,7 +353,7 @@ class SimulatedRobot:
         """
         Resume the paused program, or start the loaded one.
 
-        :raises RuntimeError: there is none, or the robot cannot run.
+        :raises RuntimeError: there is no program, or the robot cannot run one.
         """
         self._checked(lambda controller: controller.programs.play())
 
@@ -366,7 +366,7 @@ class SimulatedRobot:
         self.call(lambda controller: controller.close_popups())
 
     def lateness(self) -> Lateness | None:
-        """Return how late cycles begin; None without real time."""
+        """Return how late cycles begin; None on the virtual clock."""
         clock = self._clock
         return self.call(lambda _: clock.lateness() if isinstance(clock, RealClock) else None)
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What can be chosen about a simulated robot; frozen, and checked when it is made."""
+"""The configuration of a simulated robot; frozen, and checked when it is made."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _DEFAULT_VERSIONS = {'CB3': '3.15.8', 'e': '5.21.0'}
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatorConfig:
     """
-    One simulated robot; every default is what a test or a first try wants.
+    One simulated robot; the defaults suit tests and first tries.
 
     :raises ValueError: a model, version, frequency or power state does not exist.
     """
 
     #: One of :data:`ur_cartesian_driver.kinematics.robot_models.MODELS`.
     model: str = 'ur5e'
-    #: Where the servers listen. Nothing is reachable from other machines unless asked for.
+    #: Address that the servers listen on; by default other machines cannot reach it.
     host: str = '127.0.0.1'
     #: Version of the robot's software; empty = 5.21.0, or 3.15.8 for a CB3 model.
     polyscope: str = ''
@@ -38,11 +38,11 @@ class SimulatorConfig:
     rtde_port: int = 30004
     primary_port: int = _PRIMARY_PORT
     dashboard_port: int = 29999
-    #: None = 30002 and 30003 beside a primary interface on 30001, any free ones beside another:
-    #: who gives the robot a port of his own is not alone on this computer.
+    #: None = 30002 and 30003 if the primary interface is on 30001, otherwise any free ones: a
+    #: robot on other ports is probably not the only one on this computer.
     secondary_port: int | None = None
     realtime_port: int | None = None
-    #: Statements for programs in interpreter mode; None = 30020 or any free one, as above.
+    #: Port of interpreter mode; None = 30020 or any free one, as above.
     interpreter_port: int | None = None
     #: Joint positions at start [rad].
     q: Vector6 = HOME
@@ -53,13 +53,13 @@ class SimulatorConfig:
     geometry: DhTable | None = None
     #: Cycles per second; None = 500, or 125 for a CB3 model.
     frequency: float | None = None
-    #: Unlocking is refused this long after a protective stop [s]. A real robot insists on 5 s.
+    #: Time after a protective stop during which unlocking is refused [s]; 5 s on a real robot.
     unlock_delay: float = 5.0
     #: From `power on` to IDLE, and from IDLE to RUNNING [s]; a real arm takes about ten times as
-    #: long, which teaches a test nothing.
+    #: long.
     power_on_time: float = 0.5
     brake_release_time: float = 0.5
-    #: How fast time passes against the wall clock; 0 = as fast as it can.
+    #: Simulated seconds per second of real time; 0 = as many as possible.
     rate: float = 1.0
     #: What goes wrong, as `sim.faults.fault_values` or in words; times count from
     #: the first cycle.
@@ -68,7 +68,7 @@ class SimulatorConfig:
     programs: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Reject what cannot be simulated, naming the field."""
+        """Refuse what cannot be simulated, naming the field."""
         model = self.robot_model  # raises for an unknown name
         if self.power not in ('running', 'off'):
             raise ValueError(f"power is {self.power!r}; use 'running' or 'off'.")

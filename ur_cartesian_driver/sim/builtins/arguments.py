@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The border between the values of a program and the values of this package."""
+"""Checks and converts the arguments that programs pass to functions."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ur_cartesian_driver.urscript.script_values import (
 
 
 def number(value: Value, name: str) -> float:
-    """Return a finite number; a program that passes anything else ends."""
+    """Return a finite number; any other value ends the program."""
     if not is_number(value):
         raise RuntimeException(f'Type error: {name} must be a number, not a {type_name(value)}')
     if not isfinite(value):
@@ -44,7 +44,7 @@ def not_negative(value: Value, name: str) -> float:
 
 
 def whole(value: Value, name: str) -> int:
-    """Return a whole number; a float without fraction will do, as programs divide to get them."""
+    """Return a whole number; a float without a fraction will do, as divisions give floats."""
     result = number(value, name)
     if not result.is_integer():
         raise RuntimeException(f'{name} is {result:g}; it must be a whole number')
@@ -108,7 +108,7 @@ def pose(value: Value, name: str) -> Pose:
 
 
 def is_pose(value: Value) -> bool:
-    """Tell a pose from a list of joint positions."""
+    """Tell whether a value is a pose, and not a list of joint positions."""
     return isinstance(value, ScriptPose)
 
 

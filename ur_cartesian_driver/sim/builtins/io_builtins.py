@@ -3,8 +3,8 @@
 """
 Functions of a program on inputs, outputs, flags, ports and registers.
 
-Most of them read or write one item of a list of :class:`ControllerIo`; the class bodies are the
-table of these.
+Most of them read or write one item of a list in :class:`ControllerIo`; the class bodies are their
+table.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ class AnalogBuiltins(_IoGroup):
 
 
 class PortBuiltins(_IoGroup):
-    """Ports: on a robot Modbus clients see them, here they are memory that survives programs."""
+    """Ports, which Modbus clients of a real robot share; here memory that survives programs."""
 
     read_port_bit = _read(lambda io: io.port_bits)
     read_port_register = _read(lambda io: io.port_registers)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Functions of a program between joints and poses, with the active TCP and this arm's geometry."""
+"""Functions of a program that convert between joints and poses, and set the TCP."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from ur_cartesian_driver.urscript.script_values import ScriptPose, Value
 def solve(
     controller: Controller, T_base_tcp: Pose, T_flange_tcp: Pose, near: Vector6
 ) -> Vector6 | None:
-    """Return the joints nearest to given ones that bring the TCP to a pose."""
+    """Return the joints nearest to given ones at which the TCP has a pose."""
     return nearest(controller.arm, T_base_tcp @ T_flange_tcp.inverse(), near)
 
 
 def joints_of(controller: Controller, value: Value, function: str) -> Vector6:
     """
-    Return joints as they are, and the solution of a pose that is nearest to where the arm is.
+    Return joints as they are, and for a pose the solution nearest to the present joints.
 
     :raises RuntimeException: the pose cannot be reached.
     """
@@ -44,7 +44,7 @@ def _reached(q: Vector6 | None, function: str) -> Vector6:
 
 
 def pose_of(controller: Controller, value: Value, name: str) -> Pose:
-    """Return a pose as it is, and the pose of the TCP that joints reach."""
+    """Return a pose as it is, and for joints the pose of the TCP there."""
     if is_pose(value):
         return pose(value, name)
     return controller.arm.forward(six(value, name)) @ controller.motion.T_flange_tcp
@@ -100,22 +100,22 @@ class KinematicsBuiltins(BuiltinGroup):
         )
 
     def get_actual_tcp_pose(self) -> ScriptPose:
-        """Return where the TCP is."""
+        """Return the actual pose of the TCP."""
         return script_pose(self._controller.actual.T_base_tcp)
 
     def get_target_tcp_pose(self) -> ScriptPose:
-        """Return where the TCP should be."""
+        """Return the target pose of the TCP."""
         return script_pose(self._controller.motion.T_base_tcp)
 
     def get_target_waypoint(self) -> ScriptPose:
-        """Return where the running move leads to; without one, where the TCP should be."""
+        """Return the waypoint of the running move; without one, the target pose of the TCP."""
         motion, waypoint = self._controller.motion, self._controller.waypoint
         return script_pose(
             waypoint if waypoint is not None and motion.moving else motion.T_base_tcp
         )
 
     def get_actual_tool_flange_pose(self) -> ScriptPose:
-        """Return where the flange is."""
+        """Return the actual pose of the flange."""
         return script_pose(self._controller.arm.forward(self._controller.actual.q))
 
     def get_tcp_offset(self) -> ScriptPose:

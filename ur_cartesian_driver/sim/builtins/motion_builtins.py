@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Functions of a program that move the arm; see `sim/motion/motion_ownership.py` for who may."""
+"""Functions of a program that move the arm; `motion_ownership` says which thread may."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class MotionBuiltins(BuiltinGroup):
         return self._controller.motion
 
     def _take(self, waypoint: Pose | None = None) -> None:
-        """Own the motion, which leads to a waypoint unless it is a stream."""
+        """Take the motion, which leads to a waypoint unless it is a stream of set-points."""
         freedrive = self._controller.freedrive
         if freedrive is not FreedriveState.OFF:
             raise RuntimeException(f'The robot cannot move: it is in {freedrive.value}.')
@@ -42,12 +42,12 @@ class MotionBuiltins(BuiltinGroup):
     def _run(
         self, call: Callable[[], Move], waypoint: Pose | None = None, abortable: bool = False
     ) -> Steps:
-        """Own the motion and make a call of the motion generator; wait until it may return."""
+        """Take the motion, call the motion generator, and wait until the call may return."""
         self._take(waypoint)
         yield from self._controller.ownership.run(call, abortable)
 
     def _stop(self, call: Callable[[], Move]) -> Steps:
-        """Own the motion and stop, which freedrive does not prevent."""
+        """Take the motion and stop, which is possible in freedrive, too."""
         self._controller.ownership.take(self._controller.programs.current_thread)
         yield from self._controller.ownership.run(call)
 
@@ -60,7 +60,7 @@ class MotionBuiltins(BuiltinGroup):
     def movej(
         self, q: Value, a: Value = 1.4, v: Value = 1.05, t: Value = 0, r: Value = 0
     ) -> Steps:
-        """Move straight in joint space; a pose means its solution nearest to the present one."""
+        """Move straight in joint space; for a pose, to the solution nearest to the present one."""
         limits = _limits(a, v, t)
         radius = not_negative(r, 'r')
         target = self._joints(q, 'movej')
@@ -73,7 +73,7 @@ class MotionBuiltins(BuiltinGroup):
     def movel(
         self, pose: Value, a: Value = 1.2, v: Value = 0.25, t: Value = 0, r: Value = 0
     ) -> Steps:
-        """Move straight in space; joints mean the pose that they reach."""
+        """Move straight in space; for joints, to the pose that they reach."""
         limits = _limits(a, v, t)
         radius = not_negative(r, 'r')
         target = self._pose(pose)
@@ -137,9 +137,9 @@ class MotionBuiltins(BuiltinGroup):
 
     def servoc(self, pose: Value, a: Value = 1.2, v: Value = 0.25, r: Value = 0) -> Steps:
         """
-        Move as by `movep`: what else the manual's "servo circular" does is not published.
+        Move as by `movep`: what else "servo circular" of the manual does is not published.
 
-        It takes a cycle also at its target: programs call it in a loop with nothing else.
+        It takes a cycle even at its target, because programs call it in a loop with nothing else.
         """
         passed = False
         for _ in self.movep(pose, a, v, r):
@@ -190,7 +190,7 @@ class MotionBuiltins(BuiltinGroup):
 
 
 class ModeBuiltins(BuiltinGroup):
-    """States in which somebody else moves the arm, or pushes it: states only, no forces."""
+    """Freedrive, force mode and tool contact: states only, no forces."""
 
     def freedrive_mode(self, freeAxes: Value = None, feature: Value = None) -> None:
         """Let the arm be moved by hand."""
@@ -203,7 +203,7 @@ class ModeBuiltins(BuiltinGroup):
         self._controller.freedrive = FreedriveState.OFF
 
     def get_freedrive_status(self) -> int:
-        """Return 0, which is normal operation: no hand ever pushes the arm near a singularity."""
+        """Return 0, normal operation: no one pushes the arm near a singularity."""
         return 0
 
     def teach_mode(self) -> None:
@@ -217,7 +217,7 @@ class ModeBuiltins(BuiltinGroup):
     def force_mode(
         self, task_frame: Value, selection_vector: Value, wrench: Value, type: Value, limits: Value
     ) -> None:
-        """Enter force mode, which changes nothing in an arm that touches nothing."""
+        """Enter force mode, which has no effect on an arm that touches nothing."""
         pose(task_frame, 'task_frame')
         for value, name in (
             (selection_vector, 'selection_vector'),
@@ -241,14 +241,14 @@ class ModeBuiltins(BuiltinGroup):
         within(scaling, 'scaling', 0, 2)
 
     def tool_contact(self, direction: Value = None) -> int:
-        """Return 0: nothing is touched, until a test says so."""
+        """Return 0, as the arm touches nothing, unless a test sets the steps back to a contact."""
         if direction is not None:
             six(direction, 'direction')
         return self._controller.contact_steps
 
 
 def _limits(a: Value, v: Value, t: Value) -> tuple[float, float, float]:
-    """Return acceleration, speed and time; the first two are ignored when there is a time."""
+    """Return acceleration, speed and time; a time makes the first two irrelevant."""
     time = not_negative(t, 't')
     if time > 0.0:
         return number(a, 'a'), number(v, 'v'), time
@@ -263,5 +263,5 @@ def _fraction(value: Value, name: str) -> float:
 
 
 def _duration(value: Value) -> float | None:
-    """Return the time of a speed command; left out means until the speed is reached."""
+    """Return the time of a speed command; None = until the speed is reached."""
     return None if value is None else not_negative(value, 't')

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Arithmetic on poses, as programs know it: rotation vectors at the border, quaternions inside."""
+"""Arithmetic on poses: rotation vectors for programs, quaternions inside."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class PoseBuiltins(BuiltinGroup):
         return pose(p_from, 'p_from').distance_to(pose(p_to, 'p_to'))
 
     def interpolate_pose(self, p_from: Value, p_to: Value, alpha: Value) -> ScriptPose:
-        """Return the pose at a fraction of the way; fractions outside 0..1 extrapolate."""
+        """Return the pose at a fraction of the path; fractions outside 0..1 extrapolate."""
         start, to = pose(p_from, 'p_from'), pose(p_to, 'p_to')
         return script_pose(start.interpolate(to, number(alpha, 'alpha')))
 
@@ -85,7 +85,7 @@ class PoseBuiltins(BuiltinGroup):
         return list(rotation_vector_from_quaternion(rotation))
 
     def wrench_trans(self, T_from_to: Value, w_from: Value) -> list[float]:
-        """Return a wrench given in one frame in the axes and about the origin of another."""
+        """Return a wrench, given in one frame, in the axes and about the origin of another."""
         to_from = pose(T_from_to, 'T_from_to').inverse()
         fx, fy, fz, tx, ty, tz = six(w_from, 'w_from')
         turn = Pose((0.0, 0.0, 0.0), to_from.quaternion)

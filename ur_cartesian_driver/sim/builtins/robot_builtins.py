@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Functions of a program about time, the robot's state, and people."""
+"""Functions of a program on time, the robot's state, and the pendant."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Steps = Generator[None, None, None]
 
 
 class TimeBuiltins(BuiltinGroup):
-    """Time, and what takes time; neither is scaled by the speed slider."""
+    """Time and functions that take time; the speed slider scales neither."""
 
     def get_steptime(self) -> float:
         """Return the cycle [s]."""
@@ -50,7 +50,7 @@ class TimeBuiltins(BuiltinGroup):
         return Struct({'sec': nanoseconds // 10**9, 'nanosec': nanoseconds % 10**9})
 
     def interpreter_mode(self, clearQueueOnEnter: Value = True, clearOnEnd: Value = True) -> Steps:
-        """Execute what the clients of the interpreter port send, until it is ended."""
+        """Execute what clients of the interpreter port send, until the mode is ended."""
         yield from self._controller.interpreter_mode.run(
             clear_queue=truth(clearQueueOnEnter), clear_on_end=truth(clearOnEnd)
         )
@@ -60,13 +60,13 @@ class TimeBuiltins(BuiltinGroup):
         self._controller.interpreter_mode.end()
 
     def clear_interpreter(self) -> None:
-        """Forget what statements have made after the one that is being executed."""
+        """Delete what statements have defined, after the one that is being executed."""
         self._controller.interpreter_mode.clear()
 
     def rtde_set_watchdog(
         self, variable_name: Value, min_frequency: Value, action: Value = 'pause'
     ) -> None:
-        """Watch how often an input is written; the watch ends with the program."""
+        """Watch that an input is written often enough; the watch ends with the program."""
         self._controller.watch_input(
             text(variable_name, 'variable_name'),
             not_negative(min_frequency, 'min_frequency'),
@@ -78,7 +78,7 @@ class PendantBuiltins(BuiltinGroup):
     """Messages and popups."""
 
     def textmsg(self, s1: Value, s2: Value = '') -> None:
-        """Write to the log: all clients of the primary interface see it."""
+        """Write to the log and send to all clients of the primary interface."""
         self._controller.messages.text(to_text(s1) + to_text(s2))
 
     def popup(
@@ -190,14 +190,14 @@ class RobotBuiltins(BuiltinGroup):
         self._controller.gravity = three(d, 'd')
 
     def set_pos(self, q: Value) -> None:
-        """Put the arm somewhere, which only a simulated one can do."""
+        """Put the arm at joint positions, which only a simulated arm can do."""
         self._controller.motion.teleport(six(q, 'q'))
 
     def reset_revolution_counter(self, qNear: Value = None) -> None:
         """
-        Count the turns of joints without limits anew.
+        Reset the turns of joints without limits.
 
-        :param qNear: the count becomes the one nearest to these joints; left out, nothing changes.
+        :param qNear: the position becomes the one nearest to these joints; None = no change.
         """
         if qNear is None:
             return
@@ -215,7 +215,7 @@ class RobotBuiltins(BuiltinGroup):
         self._controller.set_slider(number(fraction, 'fraction'))
 
     def protective_stop(self) -> Steps:
-        """Stop as if something had been hit; what follows runs when somebody lets it go on."""
+        """Trigger a protective stop; the program continues after unlock and play."""
         self._controller.safety_event(SafetyEvent.PROTECTIVE_STOP)
         yield
 

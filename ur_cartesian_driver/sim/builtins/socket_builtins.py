@@ -3,8 +3,8 @@
 """
 Functions of a program on sockets.
 
-A timeout of zero or less waits for ever, so a connection that its peer has closed must end a read
-at once: the result is then that of a timeout. What has arrived of an incomplete value stays.
+A timeout of zero or less waits for ever, so a connection closed by its peer ends a read at once,
+with the result of a timeout. An incomplete value stays in the buffer.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ T = TypeVar('T')
 
 
 class SocketBuiltins(BuiltinGroup):
-    """All of them wait on the controller's clock, so they also work under the virtual one."""
+    """They wait on the controller's clock, so they also work on the virtual clock."""
 
     @property
     def _sockets(self) -> ScriptSockets:
@@ -58,7 +58,7 @@ class SocketBuiltins(BuiltinGroup):
     def _wait(
         self, name: Value, timeout: Value, take: Callable[[bytearray], T | None]
     ) -> Generator[None, None, T | None]:
-        """Return what `take` finds in the received bytes; None for a timeout or a closed peer."""
+        """Return what `take` finds in the received bytes; None after a timeout or a close."""
         limit = number(timeout, 'timeout')
         deadline = self._now + limit if limit > 0.0 else float('inf')
         name_ = text(name, 'socket_name')

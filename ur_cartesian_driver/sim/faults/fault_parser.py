@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Faults in words, for the command line and the markers of tests.
+Read faults from text, for the command line and the markers of tests.
 
 ::
 
@@ -42,7 +42,7 @@ from ur_cartesian_driver.sim.faults.fault_values import (
     ThrottleFault,
 )
 
-# A number with its unit written close to it, such as 2s, are two words.
+# A number and the unit right behind it, such as 2s, are two words.
 _WORD = re.compile(r'[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|[A-Za-z_]\w*|=|\S+?(?=\s|$)')
 _END = 'the end'
 
@@ -70,7 +70,7 @@ class _WordReader:
         return True
 
     def wrong(self, expected: str, word: str | None = None) -> ValueError:
-        """Return the error of the next word, or of one that was taken."""
+        """Return the error for the next word, or for one that was taken."""
         word = self.peek() if word is None else word
         return ValueError(
             f'The fault {self._text!r} is not understood at {word!r}; expected {expected}.'
@@ -135,7 +135,7 @@ _KINDS: Mapping[str, tuple[type[Fault], Mapping[str, Reader]]] = MappingProxyTyp
         **{event.value: (EventFault, {'action': _constant(event)}) for event in FaultEvent},
         'slider': (
             SpeedSliderFault,
-            {'fraction': _number('where the slider stands, 0 to 1')},
+            {'fraction': _number('a fraction of the speed, 0 to 1')},
         ),
         'foreign_motion': (
             ForeignMotionFault,
@@ -189,7 +189,9 @@ def _read_trigger(words: _WordReader) -> FaultTrigger:
         plane = PlaneCrossing(axis, words.number('a coordinate in metres'))
         words.skip('m')
         return plane
-    value = words.number('a time such as 2 s, a way such as 0.35 m, or a plane such as z = 0.3 m')
+    value = words.number(
+        'a time such as 2 s, a distance such as 0.35 m, or a plane such as z = 0.3 m'
+    )
     if value < 0.0:
-        raise words.wrong('no negative number', f'{value:g}')
+        raise words.wrong('a number of at least 0', f'{value:g}')
     return AfterTime(value) if words.one_of(('s', 'm')) == 's' else AfterDistance(value)

@@ -30,21 +30,21 @@ GARBAGE_SIZE = 64
 
 @dataclass(frozen=True, slots=True)
 class AfterTime:
-    """So long after the fault was set [s] of the controller's time."""
+    """A time after the fault was set, on the controller's clock [s]."""
 
     seconds: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class AfterDistance:
-    """When the tool centre point has moved so far since the fault was set [m]."""
+    """The TCP has moved this far since the fault was set [m]."""
 
     metres: float
 
 
 @dataclass(frozen=True, slots=True)
 class PlaneCrossing:
-    """When the tool centre point crosses the plane where a coordinate in the base is this [m]."""
+    """The TCP crosses a plane of the base, given by one coordinate [m]."""
 
     axis: Literal['x', 'y', 'z']
     position: float
@@ -98,7 +98,7 @@ class FaultEvent(Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EventFault(Fault):
-    """Something happens to safety, power or program that the client did not ask for."""
+    """An event of safety, power or program that the client did not ask for."""
 
     action: FaultEvent
 
@@ -110,9 +110,9 @@ class SpeedSliderFault(Fault):
     fraction: float
 
     def __post_init__(self) -> None:
-        """Reject what no slider shows."""
+        """Reject a fraction that the slider does not have."""
         if not 0.0 <= self.fraction <= 1.0:
-            raise ValueError(f'The slider cannot stand at {self.fraction:g}; use 0 to 1.')
+            raise ValueError(f'The speed slider is set to {self.fraction:g}; use 0 to 1.')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,9 +175,9 @@ class DelayFault(LastingInterfaceFault):
     seconds: float
 
     def __post_init__(self) -> None:
-        """Reject what would answer before it is asked."""
+        """Reject a delay that is none."""
         if self.seconds <= 0.0:
-            raise ValueError(f'A delay of {self.seconds:g} s cannot be; use more than 0.')
+            raise ValueError(f'The delay is {self.seconds:g} s; use more than 0.')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,10 +187,10 @@ class ThrottleFault(LastingInterfaceFault):
     rate: float
 
     def __post_init__(self) -> None:
-        """Reject what carries nothing: that is another fault."""
+        """Reject a rate that carries nothing: that is another fault."""
         if self.rate <= 0.0:
             raise ValueError(
-                f'A rate of {self.rate:g} bytes/s cannot be; use more than 0, or silence.'
+                f'The rate is {self.rate:g} bytes/s; use more than 0, or the fault silence.'
             )
 
 
@@ -202,9 +202,9 @@ class GarbageFault(InterfaceFault):
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Reject what is nothing, or would not fit a connection."""
+        """Reject a size that is nothing or too much for a connection."""
         if not 1 <= self.size <= 1_000_000:
-            raise ValueError(f'Garbage of {self.size} bytes cannot be; use 1 to 1000000.')
+            raise ValueError(f'The size of the garbage is {self.size} bytes; use 1 to 1000000.')
 
 
 TimedFault: TypeAlias = DeviationFault | LastingInterfaceFault

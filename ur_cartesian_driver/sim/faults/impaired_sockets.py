@@ -1,25 +1,25 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The sockets that programs open, with the faults of connections between them and the program."""
+"""The sockets that programs open, with connection faults between socket and program."""
 
 from __future__ import annotations
 
 from ur_cartesian_driver.sim.faults.impairment import ImpairedConnection, Impairment
 from ur_cartesian_driver.sim.sockets.script_sockets import ScriptSockets, SocketState
 
-#: Bytes that are held back before the rest is left to the kernel, and so to the peer.
+#: Bytes that are held back; the rest stays in the kernel, and so with the peer.
 _MAX_INCOMING = 65_536
 
 
 class ImpairedSockets:
     """
-    Other script sockets, which may be impaired; see :class:`~.script_sockets.ScriptSockets`.
+    Script sockets that faults can impair; see :class:`~.script_sockets.ScriptSockets`.
 
-    As long as nothing is wrong every call goes straight through.
+    Without a fault every call goes straight through.
     """
 
     def __init__(self, sockets: ScriptSockets) -> None:
-        """Take the sockets that really connect."""
+        """Wrap the sockets that connect."""
         self._sockets = sockets
         self._impairment: Impairment | None = None
         self._now = 0.0
@@ -28,7 +28,7 @@ class ImpairedSockets:
         self._arrived: dict[str, bytearray] = {}
 
     def open(self, name: str, address: str, port: int) -> None:
-        """Begin to connect, unless a fault keeps the program from it."""
+        """Begin to connect, unless a fault prevents it."""
         self.close(name)
         if self._impairment is not None and self._impairment.refuses_connections:
             return
@@ -42,13 +42,13 @@ class ImpairedSockets:
         return self._sockets.state(name)
 
     def received(self, name: str) -> bytearray:
-        """Return what has arrived; what was delayed comes before what was not."""
+        """Return what has arrived; delayed bytes come before newer ones."""
         if name in self._impaired:
             return self._arrived[name]
         return self._sockets.received(name)
 
     def send(self, name: str, data: bytes) -> bool:
-        """Send; what a fault swallows counts as sent."""
+        """Send; bytes that a fault drops count as sent."""
         if name not in self._impaired:
             return self._sockets.send(name, data)
         if self._sockets.state(name) is not SocketState.OPEN:
@@ -77,13 +77,13 @@ class ImpairedSockets:
     # As faults see it: an Impairable
 
     def impair(self, impairment: Impairment | None, now: float) -> None:
-        """Let this be wrong with all sockets."""
+        """Impair all sockets from now on; None = no longer."""
         self._impairment, self._now = impairment, now
         for name in self._names:
             self._impair_socket(name)
 
     def pump(self, now: float) -> bool:
-        """Let go what is due; tell whether this has to be called again in the next cycle."""
+        """Pass on the bytes that are due; tell whether to call again in the next cycle."""
         self._now = now
         for name, impaired in tuple(self._impaired.items()):
             self._pump(name, impaired)
@@ -94,12 +94,12 @@ class ImpairedSockets:
         self.close_all()
 
     def freeze(self) -> None:
-        """Neither hear nor say anything on the sockets that there are."""
+        """Keep the present sockets open, but send and receive nothing on them."""
         for name in self._names:
             self._impair_socket(name).frozen = True
 
     def inject(self, data: bytes) -> None:
-        """Say something that no program has said."""
+        """Send bytes that no program has sent."""
         for name in self._names:
             self.send(name, data)
 

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Bad connections, without sockets or a clock: what is held back, and when it is let go.
+Impaired connections, without sockets or a clock: which bytes are held back, and until when.
 
-A connection that nothing is wrong with has none of this. One that is hampered hands its bytes over
-in both directions and asks once per cycle for those that are due; times are the controller's, so
-that the virtual clock stays deterministic.
+An impaired connection hands its bytes over in both directions, and asks once per cycle for those
+that are due; a sound one does without. Times are the controller's, so results are deterministic on
+the virtual clock.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from typing import Protocol
 class Impairment:
     """What is wrong with all connections of an interface."""
 
-    #: What the robot says is lost.
+    #: Messages of the robot are lost.
     drops_outgoing: bool = False
-    #: Who calls is hung up on.
+    #: New connections are closed at once.
     refuses_connections: bool = False
     #: In each direction [s].
     delay: float = 0.0
@@ -34,42 +34,42 @@ class Impairable(Protocol):
     """An interface with its connections, as faults see it."""
 
     def impair(self, impairment: Impairment | None, now: float) -> None:
-        """Let this be wrong from now on; None = nothing any more."""
+        """Impair all connections from now on; None = no longer."""
 
     def pump(self, now: float) -> bool:
-        """Let go what is due; tell whether this has to be called again in the next cycle."""
+        """Pass on the bytes that are due; tell whether to call again in the next cycle."""
 
     def drop(self) -> None:
         """Cut all connections."""
 
     def freeze(self) -> None:
-        """Neither hear nor say anything on the connections that there are, and keep them open."""
+        """Keep the present connections open, but send and receive nothing on them."""
 
     def inject(self, data: bytes) -> None:
-        """Say something on all connections."""
+        """Send bytes on all connections."""
 
 
 class DelayLine:
-    """Bytes on their way in one direction."""
+    """Bytes that are delayed in one direction."""
 
     def __init__(self, now: float) -> None:
         """Begin empty."""
         self._pieces: deque[tuple[float, bytes]] = deque()
         self._budget = 0.0
         self._last = now
-        #: Bytes on their way.
+        #: Bytes that are held back.
         self.size = 0
 
     def put(self, data: bytes, due: float) -> None:
-        """Send a piece on its way; it arrives after all before it."""
+        """Hold a piece back until it is due; it arrives after all before it."""
         self._pieces.append((due, data))
         self.size += len(data)
 
     def take(self, now: float, rate: float = inf) -> bytes:
         """
-        Return what has arrived since the last time.
+        Return the bytes that have arrived since the last call.
 
-        :param rate: most bytes per second; a piece may arrive in parts.
+        :param rate: bound on bytes per second; a piece may arrive in parts.
         """
         self._budget = inf if rate == inf else self._budget + rate * (now - self._last)
         self._last = now if now < inf else self._last
@@ -88,27 +88,27 @@ class DelayLine:
 
 
 class ImpairedConnection:
-    """One connection that something is wrong with, or that still holds what came before."""
+    """One connection that is impaired, or still holds bytes back."""
 
     def __init__(self, impairment: Impairment | None, now: float) -> None:
-        """Begin with nothing on its way."""
+        """Begin with nothing held back."""
         self.impairment = impairment
         self.frozen = False
         self._incoming, self._outgoing = DelayLine(now), DelayLine(now)
 
     @property
     def outgoing_size(self) -> int:
-        """Bytes that have been said and have not left."""
+        """Bytes of the robot that have not left."""
         return self._outgoing.size
 
     @property
     def incoming_size(self) -> int:
-        """Bytes that have come and have not reached the robot."""
+        """Bytes of the client that have not reached the robot."""
         return self._incoming.size
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing is wrong any more and nothing held back."""
+        """Whether the connection is sound again and holds nothing back."""
         return (
             self.impairment is None
             and not self.frozen
@@ -117,22 +117,22 @@ class ImpairedConnection:
         )
 
     def queue_outgoing(self, data: bytes, now: float) -> None:
-        """Take what the robot says."""
+        """Take bytes from the robot."""
         drops_outgoing = self.impairment is not None and self.impairment.drops_outgoing
         if not self.frozen and not drops_outgoing:
             self._outgoing.put(data, now + self._delay)
 
     def queue_incoming(self, data: bytes, now: float) -> None:
-        """Take what the client says."""
+        """Take bytes from the client."""
         if not self.frozen:
             self._incoming.put(data, now + self._delay)
 
     def due_incoming(self, now: float) -> bytes:
-        """Return what reaches the robot now."""
+        """Return the bytes that reach the robot now."""
         return self._incoming.take(*self._release_terms(now))
 
     def due_outgoing(self, now: float) -> bytes:
-        """Return what leaves the robot now."""
+        """Return the bytes that leave the robot now."""
         return self._outgoing.take(*self._release_terms(now))
 
     @property
@@ -140,5 +140,5 @@ class ImpairedConnection:
         return 0.0 if self.impairment is None else self.impairment.delay
 
     def _release_terms(self, now: float) -> tuple[float, float]:
-        """Return until when pieces are due, and how fast they may come; at once when cured."""
+        """Return until when pieces are due, and at which rate; at once when sound again."""
         return (inf, inf) if self.impairment is None else (now, self.impairment.rate)

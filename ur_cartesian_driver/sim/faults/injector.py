@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Lets faults happen to the simulated robot at their moment.
+Lets faults happen to the simulated robot when they are triggered.
 
 :class:`FaultInjector` counts in the controller's cycles, so it is as deterministic as they are; it
 costs nothing while no fault is set.
@@ -82,18 +82,18 @@ _ACTIONS: Mapping[FaultEvent, Callable[[Controller], str]] = MappingProxyType(
 
 @dataclass(slots=True)
 class _PendingFault:
-    """A fault that has not happened, with what its moment is reckoned from."""
+    """A fault that has not happened yet, and what its trigger counts from."""
 
     fault: Fault
     set_at: float
     travelled: float
-    #: On which side of the plane the tool was.
+    #: Whether the TCP was beyond the plane.
     side: bool
 
 
 @dataclass(slots=True)
 class _ActiveFault:
-    """A fault that lasts."""
+    """A fault that lasts, since when, and its noise."""
 
     fault: TimedFault
     since: float
@@ -105,12 +105,12 @@ class _ActiveFault:
 
 
 class FaultInjector:
-    """The faults of one robot: those that wait for their moment and those that last."""
+    """The faults of one robot: those that wait for their trigger and those that last."""
 
     def __init__(self, controller: Controller) -> None:
         """Begin with none."""
         self._controller = controller
-        #: What connections can be impaired, by the name that faults call it.
+        #: The interfaces that can be impaired, by their names in faults.
         self.interfaces: dict[str, Impairable] = {}
         #: Whether there is anything to do in a cycle.
         self.active = False
@@ -122,15 +122,13 @@ class FaultInjector:
 
     def add(self, fault: Fault) -> None:
         """
-        Set a fault; it happens at its moment, at the earliest in the next cycle.
+        Set a fault; it happens when it is triggered, in the next cycle at the earliest.
 
         :raises ValueError: the robot has no such interface.
         """
         if isinstance(fault, InterfaceFault) and fault.interface not in self.interfaces:
             known = ', '.join(self.interfaces) or 'none'
-            raise ValueError(
-                f'The robot has no interface {fault.interface!r}; faults know {known}.'
-            )
+            raise ValueError(f'The robot has no interface {fault.interface!r}; it has {known}.')
         trigger = fault.trigger
         side = isinstance(trigger, PlaneCrossing) and self._is_beyond(trigger)
         self._pending.append(_PendingFault(fault, self._controller.time, self._travelled, side))
@@ -138,7 +136,7 @@ class FaultInjector:
 
     def clear(self) -> None:
         """
-        Forget faults that wait and end those that last.
+        Forget faults that have not happened, and end those that last.
 
         What has happened stays: a stop, a dropped or half-open connection.
         """
@@ -164,7 +162,7 @@ class FaultInjector:
     # When
 
     def _measure_path(self) -> None:
-        """Add what the tool has moved; the tool's change of another TCP is none."""
+        """Add what the TCP has moved; a change of the active TCP is no motion."""
         vx, vy, vz, _, _, _ = self._controller.motion.tcp_twist
         self._travelled += hypot(vx, vy, vz) * self._controller.cycle
 
@@ -206,7 +204,7 @@ class FaultInjector:
             interface.inject(Random(fault.seed).randbytes(fault.size))
 
     def _apply_running(self, now: float) -> None:
-        """Make of all faults that last what is wrong in this cycle."""
+        """Apply all faults that last to this cycle."""
         self._active = [running for running in self._active if not running.is_over(now)]
         self._apply_deviations(now)
         impaired = self._impairments()
@@ -232,7 +230,7 @@ class FaultInjector:
         )
 
     def _impairments(self) -> dict[str, Impairment]:
-        """Return what is wrong with each interface: the sum of its faults."""
+        """Return the impairment of each interface: the sum of its faults."""
         found: dict[str, Impairment] = {}
         for running in self._active:
             fault = running.fault

@@ -3,9 +3,9 @@
 """
 One client of the dashboard: a line in, a line out.
 
-:data:`COMMANDS` has them all, the longer one first where one is the beginning of another, with the
-software in which each appeared. A command that this software does not have yet is answered like
-one that does not exist.
+:data:`COMMANDS` lists all commands with the software in which each appeared; where one is the
+beginning of another, the longer one comes first. A command that this software does not have yet is
+answered like one that does not exist.
 """
 
 from __future__ import annotations
@@ -38,10 +38,10 @@ CommandHandler = Callable[['DashboardHandlers', str], str]
 
 
 class DashboardHandlers:
-    """What the commands work on: a controller, and what only the pendant knows."""
+    """What the commands read and change: a controller, and the state of the pendant."""
 
     def __init__(self, controller: Controller) -> None:
-        """Begin as after the start of the pendant."""
+        """Begin like a pendant after its start."""
         self.controller = controller
         self.programs = controller.programs
         self.role = 'PROGRAMMER'
@@ -189,7 +189,7 @@ class DashboardHandlers:
 
 @dataclass(frozen=True, slots=True)
 class DashboardCommand:
-    """A command with the software versions of CB3 and e-Series from which on it exists."""
+    """A command, and the first CB3 and e-Series software that has it."""
 
     words: str
     cb3: tuple[int, int] | None

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One client of the interpreter port: statements in, a line for each out, in time."""
+"""One client of the interpreter port: it sends statements and gets a line for each."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class InterpreterSession(ClientSession):
         return self.answers()
 
     def answers(self) -> bytes:
-        """Return the answers that have come up since the last time."""
+        """Return the answers since the last call."""
         text = ''.join(f'{answer}\n' for answer in self._answers)
         self._answers.clear()
         return text.encode()

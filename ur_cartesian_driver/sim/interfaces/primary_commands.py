@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What clients may send to a script port besides programs: one line each.
+The commands that clients may send to a script port besides programs, one line each.
 
-A line that is none of the control commands is a statement: it is compiled as a program of its own,
-which replaces the running one, as on the robot. In local control all of it is refused.
+Any other line is a statement: it is compiled as a program of its own, which replaces the running
+one, as on the robot. In local control everything is refused.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _CONTROL: Mapping[str, Callable[[Controller], object]] = MappingProxyType(
 
 
 def execute_command(controller: Controller, item: UploadedProgram | UploadedLine) -> None:
-    """Do what a client has sent; answers are announcements to everybody."""
+    """Execute what a client has sent; answers go to all clients."""
     if not controller.remote_control:
         controller.messages.error(
             READ_ONLY, 0, 'Socket is read-only when the robot is in local (Teach pendant) control'
@@ -56,4 +56,4 @@ def _set_speed(controller: Controller, argument: str) -> None:
     try:
         controller.set_slider(float(argument))
     except ValueError:
-        controller.messages.text(f'set speed: {argument!r} is no number.')
+        controller.messages.text(f'set speed: {argument!r} is not a number.')

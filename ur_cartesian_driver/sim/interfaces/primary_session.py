@@ -3,8 +3,8 @@
 """
 One client of an interface that takes scripts: primary, secondary, real-time.
 
-What it sends is the same on all three, programs and commands; what it gets differs, comes unasked,
-and is not its session's business, apart from a greeting.
+All three take programs and commands. What they send differs; apart from the greeting, it goes to
+all clients.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class ScriptSession(ClientSession):
         self._uploads = UploadDecoder()
 
     def feed(self, data: bytes) -> bytes:
-        """Do what is complete; what there is to say goes to all clients."""
+        """Execute what is complete; answers go to all clients."""
         try:
             for item in self._uploads.feed(data):
                 execute_command(self._controller, item)

@@ -30,10 +30,10 @@ from ur_cartesian_driver.sim.controller import Controller
 
 #: States per second.
 STATE_RATE = 10.0
-#: Greatest joint acceleration that is reported [rad/s^2], as a recorded UR5e does.
+#: Joint acceleration limit that is reported [rad/s^2], as by a recorded UR5e.
 _JOINT_ACCELERATION = 40.0
 _EMERGENCY = frozenset({SafetyMode.ROBOT_EMERGENCY_STOP, SafetyMode.SYSTEM_EMERGENCY_STOP})
-#: What stands for an endless joint on the wire, which has no infinity [rad].
+#: Limit of an endless joint on the wire, which has no infinity [rad].
 _UNLIMITED = 1e6
 
 
@@ -53,16 +53,16 @@ def version_frame(controller: Controller) -> bytes:
 
 
 class PrimaryStream:
-    """What clients get unasked: messages at once, states at their rate."""
+    """What all clients get: messages at once, states at their rate."""
 
     def __init__(self, controller: Controller) -> None:
-        """Compute once what never changes."""
+        """Compute the sub-packages that never change."""
         self._controller = controller
         self._constant = (_kinematics(controller), _configuration(controller))
         self._cycles_per_state = max(1, round(1.0 / (STATE_RATE * controller.cycle)))
 
     def messages(self) -> Iterator[bytes]:
-        """Yield what has been announced since the last cycle."""
+        """Yield the messages since the last cycle."""
         for message in self._controller.messages.take():
             yield encode_message(message)
 

@@ -56,10 +56,10 @@ OUTPUTS: Mapping[str, str] = MappingProxyType(
 
 
 class RealtimeStream:
-    """What all clients of the real-time interface get."""
+    """The packets that all clients of the real-time interface get."""
 
     def __init__(self, controller: Controller) -> None:
-        """Look up once how each field is computed."""
+        """Look up how each field is computed."""
         self._controller = controller
         self._size = packet_size(controller.config.version)
         self._getters = [

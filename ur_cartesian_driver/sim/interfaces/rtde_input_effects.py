@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What RTDE clients may write, and what writing it does.
+The RTDE inputs, and what writing them does.
 
-Outputs come with a mask that says which channels the value means; the slider as well. A package
-is applied as a whole: masks first, whatever their place in the recipe.
+Outputs and slider come with a mask of the channels to set. A package is applied as a whole: masks
+first, wherever they stand in the recipe.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def _write_item(values: Callable[[Registers], list[Any]], i: int) -> Write:
 
 
 def _writers() -> dict[str, Write]:
-    """Return what writes each input register; values have the types of their recipe already."""
+    """Return the function that writes each input register; values have the types of the recipe."""
     return {
         'input_bit_registers0_to_31': _write_packed(0),
         'input_bit_registers32_to_63': _write_packed(32),

@@ -1,12 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What each RTDE output means in the simulated controller.
+How each RTDE output is computed in the simulated controller.
 
-Target and actual are one, unless a fault makes them differ: the arm follows without error. Its
-links weigh nothing; only the payload does. Outputs that would need more (currents, temperatures,
-encoders) have fixed, plausible values; those that are not zero stand in :data:`FIXED`, apart from
-those that are computed.
+Actual values equal the targets, unless a fault makes them differ: the arm follows without error.
+Its links weigh nothing; only the payload does. Outputs that would need more (currents,
+temperatures, encoders) are zero or have the plausible values of :data:`FIXED`.
 """
 
 from __future__ import annotations
@@ -37,19 +36,19 @@ Getter = Callable[['Controller'], Any]
 
 _ZERO6: Vector6 = (0.0,) * 6
 _NO_FORCE: Vector6 = (0.0,) * 6
-#: ``joint_mode`` and ``tool_mode``; numbers of the controller.
+#: Values of ``joint_mode`` and ``tool_mode``.
 _RUNNING, _IDLE, _POWER_OFF = 253, 255, 239
-#: Of the supply of the arm [V], and what an arm at rest takes [A].
+#: Supply voltage of the arm [V], and its current at rest [A].
 _VOLTAGE, _CURRENT = 48.0, 0.5
 
 
 def _elbow(controller: Controller) -> Vector3:
-    """Return where the elbow is: the third joint [m]."""
+    """Return the position of the elbow: the third joint [m]."""
     return controller.arm.frames(controller.motion.q).origins[2]
 
 
 def _elbow_velocity(controller: Controller) -> Vector3:
-    """Return how fast the elbow is [m/s]; the first two joints move it."""
+    """Return the velocity of the elbow [m/s]; the first two joints move it."""
     motion = controller.motion
     frames = controller.arm.frames(motion.q)
     return point_motion(frames, motion.qd, motion.qdd, frames.origins[2], 2).velocity
@@ -68,7 +67,7 @@ def _tcp_acceleration(controller: Controller) -> Vector6:
 
 
 def _accelerometer(controller: Controller) -> Vector3:
-    """Return what a sensor in the flange feels, weight included, in its axes [m/s^2]."""
+    """Return what a sensor in the flange measures, gravity included, in its axes [m/s^2]."""
     motion = controller.motion
     frames = controller.arm.frames(motion.q)
     acceleration = point_motion(frames, motion.qd, motion.qdd, frames.position).acceleration
@@ -196,7 +195,7 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType(
     }
 )
 
-#: Outputs that never change, because nothing behind them is simulated.
+#: Outputs that never change, because their cause is not simulated.
 FIXED: Mapping[str, Any] = MappingProxyType(
     {
         'joint_temperatures': (25.0,) * 6,
@@ -207,7 +206,7 @@ FIXED: Mapping[str, Any] = MappingProxyType(
 
 
 def _register_getters(prefix: str, of: Callable[[Controller], Registers]) -> dict[str, Getter]:
-    """Return what reads each register of one direction."""
+    """Return the function that reads each register of one direction."""
 
     def item(values: Callable[[Controller], list[Any]], i: int) -> Getter:
         return lambda controller: values(controller)[i]
@@ -240,9 +239,9 @@ REGISTERS: Mapping[str, Getter] = MappingProxyType(
 
 def output_getter(name: str, zero: Any) -> Getter:
     """
-    Return what computes an output.
+    Return the function that computes an output.
 
-    :param zero: its value if nothing of it is simulated.
+    :param zero: its value if it is not simulated.
     """
     found = COMPUTED.get(name) or REGISTERS.get(name)
     if found is not None:

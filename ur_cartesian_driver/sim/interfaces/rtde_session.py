@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One RTDE client: its share of the data of each cycle, and what its inputs do."""
+"""One RTDE client: the data packages that it gets and the inputs that it writes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ur_cartesian_driver.sim.interfaces.tcp_server import ClientSession
 
 
 class _OutputSchedule:
-    """A recipe with the functions that compute its values, and how often it is due."""
+    """A recipe, the functions that compute its values, and how often it is due."""
 
     def __init__(self, output: OutputStream, maximum: float) -> None:
         self._recipe: Recipe = output.recipe
@@ -32,7 +32,7 @@ class _OutputSchedule:
         self._ratio = output.frequency / maximum
 
     def is_due(self, cycle: int) -> bool:
-        """Tell whether this is one of the cycles; they are spread evenly."""
+        """Tell whether a package is due in this cycle; they are spread evenly."""
         return self._ratio >= 1.0 or floor(cycle * self._ratio) > floor((cycle - 1) * self._ratio)
 
     def package(self, controller: Controller) -> bytes:
@@ -47,7 +47,7 @@ class RtdeSession(ClientSession):
         """
         Wait for requests.
 
-        :param taken_inputs: inputs that some client writes; shared by all sessions.
+        :param taken_inputs: inputs that a client writes; shared by all sessions.
         """
         major, minor, bugfix, build = controller.config.version
         self._controller = controller
@@ -71,7 +71,7 @@ class RtdeSession(ClientSession):
         return self._server.data_to_send()
 
     def close(self) -> None:
-        """Let others write what this client wrote."""
+        """Let others write the inputs of this client."""
         self._server.close()
 
     def packages(self) -> Iterator[bytes]:

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Listening on a TCP port for any number of clients of one kind.
+A TCP port that serves any number of clients of one kind.
 
-What is said is decided by a session, which knows no sockets: bytes in, bytes out. A client that
-does not read what it gets is dropped, so that it can stall neither the cycle nor the others.
+A session decides what to answer; it knows no sockets, only bytes in and bytes out. A client that
+does not read is dropped, so that it can stall neither the cycle nor the other clients.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from ur_cartesian_driver.sim.faults.impairment import ImpairedConnection, Impair
 
 _log = logging.getLogger(__name__)
 
-#: Bytes that a client may leave unread beside what the kernel holds.
+#: Bytes that a client may leave unread, besides those in the kernel.
 MAX_UNREAD_BYTES = 1_000_000
-#: From here on a client is spared states: many send their scripts and never read.
+#: A client with more unread bytes gets no states: many send scripts and never read.
 MAX_UNREAD_BYTES_FOR_STATE = 16_384
 
 
 class HangUp(Exception):
-    """Raised by a session to end its connection; what it carries is sent before."""
+    """Raised by a session to end its connection after its last bytes."""
 
     def __init__(self, farewell: bytes = b'') -> None:
         """Take the last bytes to send."""
@@ -43,9 +43,9 @@ class ClientSession:
 
     def feed(self, data: bytes) -> bytes:
         """
-        Take what came from the client, return the answer.
+        Take bytes from the client, return the answer.
 
-        :raises ProtocolError: the client talks nonsense; it is disconnected.
+        :raises ProtocolError: the client violates the protocol; it is disconnected.
         :raises HangUp: the conversation is over.
         """
         raise NotImplementedError
@@ -64,7 +64,7 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
         self._server = server
         self.session = server.make_session()
         self._transport: asyncio.Transport | None = None
-        #: What is wrong with this connection; None, as always without faults: nothing.
+        #: None unless a fault impairs this connection.
         self._impaired: ImpairedConnection | None = None
         self._closing_after_send = False
 
@@ -86,7 +86,7 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
             self._transport_reading(self._impaired.incoming_size < MAX_UNREAD_BYTES)
 
     def _transport_reading(self, wanted: bool) -> None:
-        """Leave to the kernel, and so to the client, what is too much to hold back."""
+        """Pause reading when too much is held back, so that the client has to wait."""
         if self._transport is None or self._transport.is_closing():
             return
         if wanted:
@@ -132,21 +132,21 @@ class _ClientConnection(asyncio.Protocol, Generic[S]):
         self.abort()
 
     def write_state(self, data: bytes) -> None:
-        """Send a piece that the next of its kind replaces, if the client has read the others."""
+        """Send a state, unless the client has not read the last ones."""
         if self._transport is not None and (
             self._transport.get_write_buffer_size() < MAX_UNREAD_BYTES_FOR_STATE
         ):
             self.write(data)
 
     def impair_connection(self, impairment: Impairment | None) -> ImpairedConnection:
-        """Let something be wrong with this connection."""
+        """Impair this connection; None = no longer."""
         if self._impaired is None:
             self._impaired = ImpairedConnection(impairment, self._server.now)
         self._impaired.impairment = impairment
         return self._impaired
 
     def pump(self, now: float) -> bool:
-        """Let go what is due; tell whether anything is still wrong."""
+        """Pass on the bytes that are due; tell whether the connection is still impaired."""
         impaired = self._impaired
         if impaired is None:
             return False
@@ -187,7 +187,7 @@ class TcpServer(Generic[S]):
         self.connections: set[_ClientConnection[S]] = set()
         self._server: asyncio.Server | None = None
         self.closing = False
-        #: What a fault makes of all connections, and the controller's clock while one does [s].
+        #: The impairment of all connections, and the controller's clock while there is one [s].
         self.impairment: Impairment | None = None
         self.now = 0.0
 
@@ -199,14 +199,14 @@ class TcpServer(Generic[S]):
 
     @property
     def refuses_connections(self) -> bool:
-        """Whether who calls is hung up on: at the last moment, or by a fault."""
+        """Whether new connections are closed at once: the server closes, or a fault."""
         return self.closing or (
             self.impairment is not None and self.impairment.refuses_connections
         )
 
     @property
     def session_connections(self) -> Iterator[tuple[S, _ClientConnection[S]]]:
-        """The conversations with what they are written to."""
+        """The sessions with their connections."""
         return ((connection.session, connection) for connection in tuple(self.connections))
 
     async def listen(self, host: str, port: int) -> None:
@@ -221,30 +221,30 @@ class TcpServer(Generic[S]):
             self._server = await loop.create_server(lambda: _ClientConnection(self), host, port)
         except OSError as error:
             raise OSError(
-                f'The {self.name} port {port} on {host} cannot be listened on: '
+                f'Cannot open the {self.name} port {port} on {host}: '
                 f'{error.strerror or error}. Choose another port, or 0 for any free one.'
             ) from error
 
     def broadcast(self, data: bytes) -> None:
-        """Send the same piece to all clients."""
+        """Send the same bytes to all clients."""
         for connection in tuple(self.connections):
             connection.write(data)
 
     def broadcast_state(self, data: bytes) -> None:
-        """Send the same piece to all clients that read what they are sent."""
+        """Send a state to all clients that read."""
         for connection in tuple(self.connections):
             connection.write_state(data)
 
     # As faults see it: an Impairable
 
     def impair(self, impairment: Impairment | None, now: float) -> None:
-        """Let this be wrong with all connections."""
+        """Impair all connections from now on; None = no longer."""
         self.impairment, self.now = impairment, now
         for connection in self.connections:
             connection.impair_connection(impairment)
 
     def pump(self, now: float) -> bool:
-        """Let go what is due; tell whether this has to be called again in the next cycle."""
+        """Pass on the bytes that are due; tell whether to call again in the next cycle."""
         self.now = now
         held = [connection.pump(now) for connection in tuple(self.connections)]
         return self.impairment is not None or any(held)
@@ -255,12 +255,12 @@ class TcpServer(Generic[S]):
             connection.abort()
 
     def freeze(self) -> None:
-        """Make all connections half-open ones: neither hear nor say anything, do not hang up."""
+        """Make all connections half-open: send and receive nothing, do not hang up."""
         for connection in self.connections:
             connection.impair_connection(self.impairment).frozen = True
 
     def inject(self, data: bytes) -> None:
-        """Say something that no session has said."""
+        """Send bytes that no session has sent."""
         self.broadcast(data)
 
     async def close(self) -> None:

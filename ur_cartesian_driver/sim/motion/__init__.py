@@ -3,7 +3,7 @@
 """
 The motion generator of the simulated controller: from motion calls to one target per cycle.
 
-Pure and deterministic: no clock, no sockets. :class:`MotionGenerator` is the door; profiles are
+Deterministic, without clock and sockets. :class:`MotionGenerator` takes the calls; profiles are
 functions of time, geometry is a function of a path parameter, and servo laws integrate speeds.
 """
 

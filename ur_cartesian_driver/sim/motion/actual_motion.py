@@ -1,13 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What the robot measures of its motion.
+The motion that the robot measures.
 
-The simulated arm follows its targets exactly, so the actual values are the targets, unless a fault
+The simulated arm follows its targets exactly, so actual values equal the targets, unless a fault
 makes them deviate. A deviation of the pose shows in pose and joint positions, one of the twist in
-twist and joint speeds, each as a faulty measurement would and neither in the other. One of the
-acceleration shows in acceleration and accelerometer and, summed up over the cycles, in twist and
-joint speeds, for there many clients look for it.
+twist and joint speeds; like a faulty measurement, neither shows in the other. A deviation of the
+acceleration shows in acceleration and accelerometer and, integrated, in twist and joint speeds,
+because many clients check it there.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ _BRANCH_JUMP = 0.5
 
 
 class ActualMotion:
-    """The measured side of one arm's motion."""
+    """The measured motion of one arm."""
 
     def __init__(self, motion: MotionGenerator) -> None:
         """Follow the targets of this motion exactly."""
         self._motion = motion
         self._pose: Vector6 | None = None
         self._twist: Vector6 | None = None
-        #: By how much the measured acceleration of the tool is off [m/s^2, rad/s^2].
+        #: Deviation of the measured acceleration of the TCP [m/s^2, rad/s^2].
         self.acceleration_error: Vector6 = _ZERO
-        #: The sum of the deviation of the acceleration.
+        #: The integral of the deviation of the acceleration.
         self._drift: Vector6 = _ZERO
         self._solved: tuple[object, object, Vector6] | None = None
 
     def deviate(
         self, pose: Vector6 | None, twist: Vector6 | None, acceleration: Vector6 | None
     ) -> None:
-        """Be off by this in this cycle, in base axes; None = not at all."""
+        """Set the deviations of this cycle, in base axes; None = none."""
         self._pose = pose
         self.acceleration_error = acceleration or _ZERO
         if acceleration is None:
@@ -58,7 +58,7 @@ class ActualMotion:
 
     @property
     def T_base_tcp(self) -> Pose:
-        """Where the tool centre point is."""
+        """Pose of the TCP."""
         target = self._motion.T_base_tcp
         if self._pose is None:
             return target
@@ -71,7 +71,7 @@ class ActualMotion:
 
     @property
     def q(self) -> Vector6:
-        """Joint positions [rad]: those that lead to the pose."""
+        """Joint positions at the deviated pose [rad]."""
         if self._pose is None:
             return self._motion.q
         if self._solved is None or self._solved[:2] != (self._motion.q, self._pose):
@@ -86,7 +86,7 @@ class ActualMotion:
 
     @property
     def qd(self) -> Vector6:
-        """Joint speeds [rad/s]: those that lead to the twist."""
+        """Joint speeds for the deviated twist [rad/s]."""
         if self._twist is None:
             return self._motion.qd
         return _sum(self._motion.qd, self._joint_change(self._twist))
@@ -100,7 +100,7 @@ class ActualMotion:
         return q
 
     def _joint_change(self, change: Vector6) -> Vector6:
-        """Return the joints' share in a small change of the tool; the least one if singular."""
+        """Return the joint change for a small change of the TCP; the smallest one if singular."""
         jacobian = self._motion.arm.jacobian(self._motion.q, self._motion.T_flange_tcp)
         a, b, c, d, e, f = (float(v) for v in np.linalg.pinv(jacobian, rcond=1e-6) @ change)
         return a, b, c, d, e, f

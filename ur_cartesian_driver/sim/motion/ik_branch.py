@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Which of its solutions the arm has: the one that it comes to on its way from where it is.
+Select the IK branch that is reached continuously from the current joints.
 
-Beside a singularity the solution on the other side is the nearer one after a long step, while an
-arm that passes there swings round and stays on its side. So where a step changes sides it is
-looked at in shorter ones.
+Beside a singularity the solution on the other branch is the nearer one after a long step, while an
+arm that passes there swings round and stays on its branch. So a step that changes the branch is
+solved in shorter ones.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from ur_cartesian_driver.motion.pose import Pose, Vector6
 from ur_cartesian_driver.sim.motion.joint_kinematics import JointKinematics, max_joint_difference
 from ur_cartesian_driver.sim.motion.move_paths import JointMovePath, MovePath, Setpoint
 
-# The rest of a leg is walked in so many steps, or in shorter ones, down to this part of it, so
-# that none turns a joint by more [rad].
+# The rest of a path is solved in so many steps, or in shorter ones down to this part of it, so
+# that no step turns a joint by more [rad].
 _WALK_STEPS = 8
 _MIN_WALK_STEP = 1e-4
 _MAX_JOINT_STEP = 0.3
-# Steps in which the arm changes sides are cut to this length [m, rad].
+# Steps that change the branch are cut to this length [m, rad].
 _FINE = 1e-5
 
 
 @dataclass(frozen=True, slots=True)
 class IkBranchTracker:
-    """An arm that stands somewhere, and where it comes to from there."""
+    """The joints of an arm, and the joints that it reaches from there."""
 
     kinematics: JointKinematics
     q: Vector6
@@ -37,16 +37,16 @@ class IkBranchTracker:
     T_tcp_flange: Pose
 
     def joints(self, setpoint: Setpoint) -> Vector6 | None:
-        """Return the nearest joints at a place; None: there are none."""
+        """Return the nearest joints at a set-point; None = no solution."""
         return self._nearest(setpoint, self.q)
 
     def after(
         self, setpoint: Setpoint, h: float, step: Callable[[float], Setpoint]
     ) -> Vector6 | None:
         """
-        Return the joints at a place that a step of ``h`` seconds leads to.
+        Return the joints at the set-point after a step of ``h`` seconds; None = no solution.
 
-        :param step: where a shorter one leads to [s].
+        :param step: returns the set-point after a shorter step [s].
         """
         q = self.joints(setpoint)
         if (
@@ -59,7 +59,7 @@ class IkBranchTracker:
         return self._joints_after_steps(step, self.q, 0.0, h, ceil(log2(max(travel / _FINE, 1.0))))
 
     def joints_at_end_of(self, move_path: MovePath) -> Vector6 | None:
-        """Return the joints that the arm will have at the end of a leg, or None: a jump."""
+        """Return the joints that the arm will have at the end of a path; None = a jump."""
         if isinstance(move_path, JointMovePath):
             return move_path.end
         here, there = self.T_base_tcp, move_path.pose(move_path.length)
@@ -83,9 +83,9 @@ class IkBranchTracker:
         halvings: int,
     ) -> Vector6 | None:
         """
-        Return the joints at the end of a step, come to in small steps where the arm changes sides.
+        Return the joints at the end of a step; small steps where the branch changes.
 
-        :param q: the joints at ``begin``, which like ``end`` counts from now [s].
+        :param q: the joints at ``begin``; ``begin`` and ``end`` count from now [s].
         """
         setpoint = step(end)
         after = self._nearest(setpoint, q)

@@ -19,13 +19,13 @@ from ur_cartesian_driver.sim.motion.move_paths import MovePath
 from ur_cartesian_driver.sim.motion.moves import MotionFault
 from ur_cartesian_driver.sim.motion.path_motion import ProfileParameters
 
-# Assumptions, the robot's numbers are not published:
-#: What optimove's fractions are of [rad/s^2] and [rad/s^3]; also bounds servoj.
+# Assumptions; the robot's numbers are not published:
+#: Full acceleration [rad/s^2] and jerk [rad/s^3] of optimove; the first also bounds servoj.
 MAX_JOINT_ACCELERATION = 40.0
 MAX_JOINT_JERK = 400.0
-#: The greatest limit of the tool's speed that the safety settings allow [m/s].
+#: The highest limit of the tool speed that safety settings allow [m/s].
 MAX_TOOL_SPEED = 5.0
-#: How hard a joint can brake before the end of its range [rad/s^2].
+#: Deceleration of a joint before the end of its range [rad/s^2].
 LIMIT_DECELERATION = 10.0
 #: Joint travel per tool travel [rad/m, rad/rad] beyond which the arm counts as singular.
 SINGULAR_RATE = 1000.0
@@ -34,11 +34,11 @@ SINGULAR_RATE = 1000.0
 STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 #: Joint changes below this are rounding [rad].
 NO_CHANGE = 1e-9
-# As near to its limit a joint is the reason why there is no solution [rad].
+# A joint this near to its limit is the reason why there is no solution [rad].
 _AT_LIMIT = 0.02
 _SAMPLES = 8
 
-#: No arm reaches so far [m].
+#: Farther than any arm reaches [m].
 _MAX_DISTANCE = 1e3
 
 
@@ -63,7 +63,7 @@ class JointKinematics:
         return nearest(self._arm, T_base_flange, q_near)
 
     def changes_branch(self, q: Vector6, q_next: Vector6) -> bool:
-        """Return whether shoulder, elbow or wrist 2 go over to their other solution."""
+        """Return whether shoulder, elbow or wrist 2 change to their other solution."""
         return any(
             a * b < 0.0
             for a, b in zip(self._branch_signs(q), self._branch_signs(q_next), strict=True)
@@ -71,10 +71,10 @@ class JointKinematics:
 
     def _branch_signs(self, q: Vector6) -> tuple[float, float, float]:
         """
-        Return three numbers whose signs are the branch.
+        Return three numbers whose signs name the branch.
 
-        How far the wrist centre is in front of the shoulder [m], of the nominal arm (near enough
-        for a sign); the sines of elbow and wrist 2.
+        The distance of the wrist centre in front of the shoulder [m], for the nominal arm (its
+        sign is the same); the sines of elbow and wrist 2.
         """
         upper_arm, forearm, wrist = self._lengths
         angle = q[1] + q[2]
@@ -86,21 +86,21 @@ class JointKinematics:
 
     def overspeed_factor(self, q: Vector6, q_before: Vector6) -> float:
         """
-        Return by which factor the way to ``q`` is too long for one cycle; inf: no way.
+        Return by which factor the step to ``q`` is too long for one cycle; inf = impossible.
 
-        A joint may be as fast as its limit says, and no faster than it can still brake before
-        the end of its range: v^2 = 2 a x.
+        A joint may not exceed its speed limit, nor the speed from which it can brake before the
+        end of its range: v^2 = 2 a x.
         """
         worst = 0.0
-        for new, old, fastest_parameters, (low, high) in zip(
+        for new, old, max_speed, (low, high) in zip(
             q, q_before, self._speeds, self._limits, strict=True
         ):
             travel = abs(new - old)
             if travel < NO_CHANGE:
                 continue
             margin = high - old if new > old else old - low
-            allowed = fastest_parameters * self._cycle
-            if 2.0 * LIMIT_DECELERATION * margin < fastest_parameters * fastest_parameters:
+            allowed = max_speed * self._cycle
+            if 2.0 * LIMIT_DECELERATION * margin < max_speed * max_speed:
                 if margin <= NO_CHANGE:
                     return inf
                 allowed = min(
@@ -110,7 +110,7 @@ class JointKinematics:
         return worst
 
     def motion_fault(self, q: Vector6, q_next: Vector6 | None) -> MotionFault:
-        """Return why the way from ``q`` to ``q_next`` (None: no solution) cannot be gone."""
+        """Return why the step from ``q`` to ``q_next`` (None = no solution) is impossible."""
         for i, (position, (low, high)) in enumerate(zip(q, self._limits, strict=True)):
             if position - low < _AT_LIMIT or high - position < _AT_LIMIT:
                 return MotionFault(
@@ -144,9 +144,9 @@ class JointKinematics:
         self, move_path: MovePath, q: Vector6, T_tcp_flange: Pose, a: float, v: float
     ) -> ProfileParameters:
         """
-        Return the fastest law of a leg that no joint minds, times fractions of it.
+        Return the fastest parameters of a path within the joint limits, times fractions of them.
 
-        Joint travel per path is taken from a few samples, from ``q`` on.
+        Joint travel per path length comes from a few samples, from ``q`` on.
         """
         step = move_path.length / _SAMPLES or 1.0
         speed = acceleration = inf
@@ -163,13 +163,13 @@ class JointKinematics:
                 acceleration = min(acceleration, MAX_JOINT_ACCELERATION / rate)
             q = after
         if speed == inf:
-            speed = acceleration = 1.0  # The leg will fail where it begins.
+            speed = acceleration = 1.0  # The move will fail where it begins.
         jerk = acceleration * MAX_JOINT_JERK / MAX_JOINT_ACCELERATION
         return ProfileParameters(acceleration=a * acceleration, speed=v * speed, jerk=jerk)
 
 
 def is_singular(q_before: Vector6, q: Vector6, before: Pose, pose: Pose) -> bool:
-    """Return whether joints turn too much for the way of the tool."""
+    """Return whether joints turn too much for the travel of the tool."""
     travel = before.distance_to(pose) + before.angle_to(pose)
     return max_joint_difference(q, q_before) > SINGULAR_RATE * travel
 

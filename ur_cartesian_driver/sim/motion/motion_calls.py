@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Calls of path motions before they are resolved, and what they may ask for."""
+"""Calls of path moves before their path is known, and checks of their arguments."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ur_cartesian_driver.sim.motion.path_motion import ProfileParameters
 
 
 class PathStart(NamedTuple):
-    """Where a leg begins: joint positions [rad], and T_base_tcp."""
+    """Where a path begins: joint positions [rad], and T_base_tcp."""
 
     q: Vector6
     pose: Pose
@@ -25,7 +25,7 @@ ParameterFunction: TypeAlias = Callable[[MovePath, PathStart], ProfileParameters
 
 
 class MotionCall(NamedTuple):
-    """A call of a path motion, to be resolved where the leg begins."""
+    """A call of a path move; its path is resolved where it begins."""
 
     name: str
     move_path: Callable[[PathStart], MovePath]
@@ -40,13 +40,13 @@ class MotionCall(NamedTuple):
 
 
 def constant_speed_parameters(a: float, v: float, r: float) -> ProfileParameters:
-    """Return the law of movep: to stand in the waypoint from full speed, v^2 = 2 b r."""
+    """Return the parameters of movep: from full speed to rest at the waypoint, v^2 = 2 b r."""
     braking = max(a, v * v / (2.0 * r)) if r > 0.0 else None
     return ProfileParameters(acceleration=a, speed=v, braking=braking)
 
 
 def check_profile_parameters(name: str, parameters: ProfileParameters) -> None:
-    """Refuse what no arm can be driven by."""
+    """Refuse a time, acceleration or speed that is impossible."""
     if not 0.0 <= parameters.time < inf:
         raise MotionError(f'{name}: the time is {parameters.time:g} s, it must be 0 or more.')
     if parameters.time > 0.0:

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Where on a path at which time: trapezoids, timed moves, ramps and S-curves.
+Path parameter over time: trapezoids, timed moves, ramps and S-curves.
 
 A profile is a chain of phases of constant jerk (zero for all but the S-curve). Its parameter has
 whatever unit the path has: metres, radians of the leading axis, or none. All profiles end at
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from math import sqrt
 
 _BISECTIONS = 80
-#: A timed move spends these shares of its time on speeding up and on braking.
+#: A timed move accelerates and brakes for this part of its time each.
 TIMED_RAMP = 1.0 / 3.0
 
 
@@ -115,8 +115,8 @@ def trapezoid(
     Accelerate, cruise, brake to rest.
 
     From rest, T = d/v + v/a when d > v^2/a, else the triangle T = 2 sqrt(d/a). In general the
-    peak u follows from (u^2 - v0^2)/2a + u^2/2b = d. Who comes too fast to stop in time brakes
-    as hard as it takes.
+    peak u follows from (u^2 - v0^2)/2a + u^2/2b = d. A start that is too fast to stop in time
+    brakes as hard as it takes.
 
     :param braking: b, when it differs from the acceleration.
     """
@@ -146,7 +146,7 @@ def timed_cruise(length: float, duration: float, start_speed: float = 0.0) -> fl
     Return the cruising speed c of :func:`timed`.
 
     With ramps of x and y seconds, d = v0 x/2 + c (T - x/2 - y/2). y = T/3; x = T/3 too, or less
-    where a fast start would otherwise leave no way for the rest.
+    where a fast start would otherwise use up the length.
     """
     x, y = _timed_ramps(length, duration, start_speed)
     return (length - 0.5 * start_speed * x) / (duration - 0.5 * (x + y))
@@ -156,8 +156,8 @@ def timed(length: float, duration: float, start_speed: float = 0.0) -> MotionPro
     """
     Arrive at rest after exactly ``duration`` [s]: a third each to speed up, cruise and brake.
 
-    The robot documents only that a time counts more than speed and acceleration; thirds are our
-    choice. From rest: c = 1.5 d/T, a = 4.5 d/T^2.
+    The manual says only that a time overrides speed and acceleration; thirds are our choice.
+    From rest: c = 1.5 d/T, a = 4.5 d/T^2.
     """
     if length <= 0.0:
         return MotionProfile(0.0, duration, (_Phase(0.0, 0.0, 0.0, 0.0, 0.0),))

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The geometry of motion: where the arm is at a path parameter, with no notion of time.
+The geometry of motion: the set-point at a path parameter, without time.
 
-A leg runs from 0 to its ``length``: joint lines in radians of the leading axis, lines and arcs of
-the tool in metres (in radians where the rotation is the larger number). A corner runs from 0 to 1
-and replaces the end of one leg and the beginning of the next. A place is six joint positions or a
-pose of the TCP in the base.
+A move path runs from 0 to its ``length``: joint lines in radians of the leading axis, lines and
+arcs of the tool in metres (in radians where the rotation is the larger number). A blend path runs
+from 0 to 1 and replaces the end of one move path and the beginning of the next. A set-point is six
+joint positions or a pose of the TCP in the base.
 """
 
 from __future__ import annotations
@@ -28,29 +28,29 @@ from ur_cartesian_driver.sim.motion.moves import MotionError
 
 Setpoint: TypeAlias = Vector6 | Pose
 
-# Legs shorter than this are none, their ends differ by rounding [m, rad].
+# Paths shorter than this count as empty: their ends differ by rounding [m, rad].
 _MIN_LENGTH = 1e-9
 # Three points of an arc nearer than this [m], or in line within this sine, make no circle.
 _COINCIDENT = 1e-6
 _COLLINEAR = 1e-6
-# Where a leg leaves a sphere: samples until it is outside, then steps to find the border.
+# To find where a path leaves a sphere: samples until it is outside, then steps to the border.
 _SAMPLES = 24
 _REFINEMENTS = 50
 _ON_BORDER = 1e-12
-# Legs that go straight on, or straight back, have no circular fillet [rad].
+# Paths that go straight on, or straight back, have no circular fillet [rad].
 _STRAIGHT = 1e-6
 
 
 class MotionPath(Protocol):
-    """What both legs and corners can do."""
+    """A move path or a blend path."""
 
     def at(self, s: float) -> Setpoint:
-        """Return the place at the path parameter."""
+        """Return the set-point at the path parameter."""
         ...
 
 
 class MovePath(Protocol):
-    """The way to one waypoint."""
+    """The path to one waypoint."""
 
     @property
     def length(self) -> float:
@@ -58,7 +58,7 @@ class MovePath(Protocol):
         ...
 
     def at(self, s: float) -> Setpoint:
-        """Return the place, the exact waypoint from ``length`` on."""
+        """Return the set-point, the exact waypoint from ``length`` on."""
         ...
 
     def pose(self, s: float) -> Pose:
@@ -74,7 +74,7 @@ class JointMovePath:
     """
 
     def __init__(self, start: Vector6, end: Vector6, forward: Callable[[Vector6], Pose]) -> None:
-        """Take the leading axis: the one with the longest way."""
+        """Find the leading axis: the one with the longest travel."""
         self.start, self.end, self._forward = start, end, forward
         self._travel = tuple(b - a for a, b in zip(start, end, strict=True))
         length = max(abs(travel) for travel in self._travel)
@@ -109,7 +109,7 @@ class LinearMovePath:
     """
 
     def __init__(self, start: Pose, end: Pose) -> None:
-        """Measure the way."""
+        """Measure distance and length."""
         self.start, self.end = start, end
         self.distance = start.distance_to(end)
         length = max(self.distance, start.angle_to(end))
@@ -126,8 +126,8 @@ class CircularMovePath:
     """
     A circle through three points.
 
-    Unconstrained, the orientation turns the shortest way from start to end, whatever it is at
-    ``via``, and counts in the length as on a line. Fixed, it stays as it is relative to the
+    Unconstrained, the orientation takes the shortest rotation from start to end, whatever it is
+    at ``via``, and counts in the length as on a line. Fixed, it stays as it is relative to the
     tangent, and the end's orientation is ignored; the length is that of the arc.
 
     :raises MotionError: the three points do not lie on a circle.
@@ -181,16 +181,16 @@ class CircularMovePath:
 
 class JointBlendPath:
     """
-    Two joint legs at once: one brakes to the waypoint while the next one sets out.
+    Two joint lines at once: one brakes to the waypoint while the next one sets out.
 
-    q(u) = q1(s1(u)) + q2(s2(u)) - q_waypoint with s1 = L1 - r1 (1 - u)^2 and s2 = r2 u^2: both
-    legs are left and met on their tangent, a parabola between straight lines.
+    q(u) = q1(s1(u)) + q2(s2(u)) - q_waypoint with s1 = L1 - r1 (1 - u)^2 and s2 = r2 u^2: a
+    parabola that is tangent to both lines.
     """
 
     def __init__(
         self, before: JointMovePath, tail: float, after: JointMovePath, head: float
     ) -> None:
-        """Blend the last ``tail`` of one leg with the first ``head`` of the next."""
+        """Blend the last ``tail`` of one path with the first ``head`` of the next."""
         self._before, self._after, self._tail, self._head = before, after, tail, head
         self.entry_rate, self.exit_rate = 2.0 * tail, 2.0 * head
 
@@ -213,14 +213,14 @@ class JointBlendPath:
 
 class ToolBlendPath:
     """
-    The same of two poses: positions add, rotations follow each other.
+    The same for poses: positions add, rotations are composed.
 
     p = p1 + p2 - p_waypoint, R = R1 R_waypoint^-1 R2. Between straight lines the position runs on
     the parabola with the waypoint as its control point, inside the corner.
     """
 
     def __init__(self, before: MovePath, tail: float, after: MovePath, head: float) -> None:
-        """Blend the last ``tail`` of one leg with the first ``head`` of the next."""
+        """Blend the last ``tail`` of one path with the first ``head`` of the next."""
         self._before, self._after, self._tail, self._head = before, after, tail, head
         self._waypoint = before.pose(before.length)
         self.entry_rate, self.exit_rate = 2.0 * tail, 2.0 * head
@@ -240,10 +240,10 @@ class ToolBlendPath:
 
 class FilletBlendPath:
     """
-    A circular arc tangent to two straight legs at equal distances d from the waypoint.
+    A circular arc tangent to two lines at equal distances d from the waypoint.
 
     Where the direction turns by phi its radius is d / tan(phi/2): d itself in a right angle.
-    The orientation is that of :class:`ToolBlendPath`, the position runs evenly.
+    The orientation is that of :class:`ToolBlendPath`, the position has a constant speed.
     """
 
     def __init__(
@@ -286,7 +286,7 @@ BlendPath: TypeAlias = JointBlendPath | ToolBlendPath | FilletBlendPath
 
 
 def fillet_angle(before: LinearMovePath, after: LinearMovePath) -> float:
-    """Return by how much the direction turns [rad]."""
+    """Return the angle between the directions of two lines [rad]."""
     a = _unit(_minus(before.end.position, before.start.position))
     b = _unit(_minus(after.end.position, after.start.position))
     return 2.0 * atan2(_norm(_minus(a, b)), _norm(_plus(a, b)))
@@ -296,9 +296,9 @@ def make_blend(
     before: MovePath, tail: float, after: MovePath, head: float, circular: bool
 ) -> BlendPath:
     """
-    Join two legs: joint lines in joint space, all others in the tool's space.
+    Blend two paths: joint lines in joint space, all others in the tool's space.
 
-    :param circular: by a circle, where both are lines that meet at an angle.
+    :param circular: by an arc, where both are lines that meet at an angle.
     """
     if isinstance(before, JointMovePath) and isinstance(after, JointMovePath):
         return JointBlendPath(before, tail, after, head)
@@ -313,7 +313,7 @@ def make_blend(
 
 
 def start_within_radius(move_path: MovePath, radius: float) -> float | None:
-    """Return the parameter at which the tool is ``radius`` [m] from the leg's beginning."""
+    """Return the parameter at which the tool is ``radius`` [m] from the start of the path."""
     if isinstance(move_path, LinearMovePath):
         return (
             move_path.length * radius / move_path.distance if move_path.distance > radius else None

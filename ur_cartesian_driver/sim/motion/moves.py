@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What callers and generator tell each other: calls under way, faults, warnings, errors."""
+"""Values between callers and motion generator: running calls, faults, warnings, errors."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 
 class MotionError(Exception):
-    """A motion call makes no sense; nothing has moved. The text is for the program's user."""
+    """A motion call is refused; nothing has moved. The text is for the author of the program."""
 
 
 @dataclass(slots=True)
 class Move:
     """
-    One motion call under way.
+    One running motion call.
 
     ``returned`` becomes true when the script call may return: the waypoint is reached, the next
     cycle enters its blend, the stop has ended, the time is over, or another motion took over. The
@@ -26,7 +26,7 @@ class Move:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionFault:
-    """Why the arm stopped by itself: a robot error code ``C<code>A<argument>`` and its text."""
+    """Why the arm stopped by itself: error code ``C<code>A<argument>`` and its text."""
 
     code: int
     argument: int

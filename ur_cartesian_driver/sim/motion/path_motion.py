@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Legs and corners strung together, each with its profile: what the arm follows.
+The sequence of move paths and blends that the arm follows, each with its profile.
 
 The robot knows one move ahead at most: the next call comes when the arm enters the blend. So each
-leg is planned to end at rest in its waypoint; a call that comes in time cuts the leg at the border
-of the blend and puts corner and next leg in the place of the rest.
+move is planned to end at rest at its waypoint; a call that comes in time cuts the path at the
+border of the blend, and blend and next path replace its rest.
 """
 
 from __future__ import annotations
@@ -33,21 +33,21 @@ from ur_cartesian_driver.sim.motion.move_paths import (
 )
 from ur_cartesian_driver.sim.motion.moves import Move
 
-# Ends of pieces nearer than this are reached [s]: sums of cycles miss them by rounding.
+# A section is over when less than this is left [s]: sums of cycles are rounded.
 _ROUNDING = 1e-9
-# Speeds and ways below this are none, in the units of any leg.
+# Speeds and lengths below this count as zero, in the units of any path.
 _MIN_SPEED = 1e-9
-# What is left after a corner is driven at most this much faster than the mean, to be in time.
+# To be in time, the rest behind a blend is driven at most this much faster than the mean.
 _MAX_CATCH_UP = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProfileParameters:
     """
-    How a move wants its leg to be driven, in the leg's unit (rad or m) per second.
+    Speed and acceleration along a path, in its unit (rad or m) per second.
 
-    :param time: [s], counts instead of speed and acceleration unless 0.
-    :param jerk: bounded, for an S-curve; None = trapezoid.
+    :param time: [s], replaces speed and acceleration unless 0.
+    :param jerk: bound, for an S-curve; None = trapezoid.
     :param braking: at the end, where it differs from the acceleration.
     """
 
@@ -58,7 +58,7 @@ class ProfileParameters:
     braking: float | None = None
 
     def profile(self, length: float, start_speed: float = 0.0) -> MotionProfile:
-        """Return the profile of a way, to rest."""
+        """Return the profile over a length, to rest."""
         if self.time > 0.0:
             return timed(length, self.time, start_speed)
         if self.jerk is not None:
@@ -72,7 +72,7 @@ class PathSection:
     One path under one profile.
 
     :param offset: path parameter at which the profile begins.
-    :param stop: time of the profile at which the next piece takes over.
+    :param stop: time of the profile at which the next section takes over.
     :param halt: whether a cycle has to end exactly there.
     """
 
@@ -83,7 +83,7 @@ class PathSection:
     halt: bool = False
 
     def at(self, time: float) -> Setpoint:
-        """Return the place; the exact end of the path at the end of the profile."""
+        """Return the set-point; the exact end of the path at the end of the profile."""
         if time >= self.profile.duration:
             return self.path.at(inf)
         return self.path.at(self.offset + self.profile.at(time))
@@ -92,7 +92,7 @@ class PathSection:
 @dataclass(frozen=True, slots=True)
 class LastMove:
     """
-    The last leg of a track and what a follower must know of it.
+    The last move, and what the next one needs to be blended into it.
 
     :param entry: time of its profile at which its blend begins; its end without a blend.
     """
@@ -107,9 +107,9 @@ class LastMove:
 @dataclass(slots=True)
 class PathMotion:
     """
-    Pieces to follow and how far the arm is: time [s] in the profile of piece ``index``.
+    Sections to follow and the progress of the arm: time [s] in the profile of section ``index``.
 
-    The last piece is always the leg of ``last_move``.
+    The last section always belongs to ``last_move``.
     """
 
     sections: tuple[PathSection, ...]
@@ -119,7 +119,7 @@ class PathMotion:
     real_time = False
 
     def preview(self, h: float) -> tuple[Setpoint, tuple[int, float]]:
-        """Return the place after ``h`` more seconds [s of the profile]."""
+        """Return the set-point after ``h`` more seconds of the profile."""
         i, t = self.index, self.time
         while True:
             section = self.sections[i]
@@ -155,7 +155,7 @@ class PathMotion:
 def start_from_rest(
     move_path: MovePath, parameters: ProfileParameters, radius: float, call: Move
 ) -> PathMotion:
-    """Return the track of one leg, begun and ended at rest."""
+    """Return the motion along one path, from rest to rest."""
     profile = parameters.profile(move_path.length)
     section = PathSection(move_path, profile, 0.0, profile.duration)
     return PathMotion(
@@ -175,12 +175,12 @@ def append_move_path(
     circular: bool,
 ) -> tuple[PathMotion, bool]:
     """
-    Return the track with one more leg, blended where that is possible, and whether it is.
+    Return the motion with one more path, and whether it is blended.
 
-    The corner begins at the blend radius, or where the arm is if the call comes late, and ends as
-    far behind the waypoint. It is not blended when the arm already stands, or when the new leg
-    does not leave the blend: then the arm stops at the waypoint. (Both legs share the speed
-    through the corner, and a short one would be driven by the other's.)
+    The blend begins at the blend radius, or where the arm is if the call comes late, and ends as
+    far behind the waypoint. There is no blend if the arm already stands, or if the new path does
+    not leave the blend radius: then the arm stops at the waypoint. (Both moves share the speed
+    through the blend, and a short one would be driven at that of the other.)
     """
     last, last_move, ahead = (
         path_motion.sections[-1],
@@ -226,7 +226,7 @@ def append_move_path(
 
 
 def _blend_entry_time(section: PathSection, move_path: MovePath, radius: float) -> float:
-    """Return the time at which the leg comes within the radius [m] of its end."""
+    """Return the time at which the path comes within the radius [m] of its end."""
     if radius <= 0.0:
         return section.stop
     tail = end_within_radius(move_path, radius)
@@ -245,19 +245,19 @@ def _blend_profiles(
     rest: float,
 ) -> tuple[MotionProfile, MotionProfile]:
     """
-    Return the profiles of the corner (0 to 1) and of the rest of the leg behind it.
+    Return the profiles of the blend (0 to 1) and of the rest of the path behind it.
 
-    The corner's rate changes evenly from that of the entry to that of the next leg's cruising
-    speed, where three bounds allow: it does not grow beyond what keeps both legs' parts within
-    their accelerations (r1'' = 2 r1 u'^2 <= a, so u'^2 <= a / 2r), and the rest of the leg must
+    The rate of the blend changes evenly from that of the entry to that of the next cruising
+    speed, within three bounds: it does not grow beyond what keeps both parts within their
+    accelerations (r1'' = 2 r1 u'^2 <= a, so u'^2 <= a / 2r), and the rest of the path must
     suffice to brake. A trapezoid enters with v <= sqrt(2 a r), which fulfils the first anyway.
 
-    Times are kept in sum: what the move before had left until it would have stood in its
-    waypoint is added to the time of the next one.
+    The sum of times is kept: the time that the move before had left until its waypoint is added
+    to the time of the next one.
 
-    :param rates: path units of the legs per unit of the corner's parameter, at entry and exit.
-    :param speed: at the entry; ``remaining`` [s]: until the rest in the waypoint.
-    :param head: the new leg's way within the corner; ``rest``: behind it.
+    :param rates: path units per unit of the blend's parameter, at entry and exit.
+    :param speed: at the entry; ``remaining`` [s]: until rest at the waypoint.
+    :param head: length of the new path within the blend; ``rest``: behind it.
     """
     entry_rate, exit_rate = rates
     u0 = speed / entry_rate

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How points of the arm move, from the joints' speeds and accelerations.
+The motion of points of the arm, from joint speeds and accelerations.
 
-The controller reports such things (elbow, tool accelerometer, moments) beside the joints, and they
-have to fit the joints. All vectors are in base axes, [m], [rad] and [s].
+The controller reports some (elbow, tool accelerometer, moments) besides the joints, and they have
+to agree with the joints. All vectors are in base axes, [m], [rad] and [s].
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _ZERO: Vector3 = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PointMotion:
-    """A point that is fixed to a link, and the turning of that link."""
+    """The motion of a point on a link, and the rotation of that link."""
 
     velocity: Vector3
     acceleration: Vector3
@@ -31,13 +31,13 @@ def point_motion(
     frames: ChainFrames, qd: Vector6, qdd: Vector6, point: Vector3, joints: int = 6
 ) -> PointMotion:
     """
-    Return how a point moves that is fixed behind the first joints.
+    Return the motion of a point on the link behind the first joints.
 
-    From link to link, as in the outward half of the Newton-Euler recursion (Craig, Introduction
-    to Robotics, section 6.5).
+    Computed from link to link, as in the outward half of the Newton-Euler recursion (Craig,
+    Introduction to Robotics, section 6.5).
 
-    :param point: where it is [m].
-    :param joints: how many joints lie between the base and the point's link.
+    :param point: its position [m].
+    :param joints: number of joints between the base and the link.
     """
     omega = alpha = velocity = acceleration = _ZERO
     here = frames.origins[0]
@@ -75,7 +75,7 @@ def moments_for(frames: ChainFrames, point: Vector3, force: Vector3) -> Vector6:
 
 
 def flange_point(frames: ChainFrames, offset: Vector3) -> Vector3:
-    """Return where a point is that is given in flange coordinates [m]."""
+    """Return the position of a point given in flange coordinates [m]."""
     x, y, z = offset
     return _plus(frames.position, _times(x, frames.x), _times(y, frames.y), _times(z, frames.z))
 
@@ -83,7 +83,7 @@ def flange_point(frames: ChainFrames, offset: Vector3) -> Vector3:
 def _shifted_motion(
     velocity: Vector3, acceleration: Vector3, omega: Vector3, alpha: Vector3, lever_arm: Vector3
 ) -> tuple[Vector3, Vector3]:
-    """Return velocity and acceleration of a point of the same link, an arm farther out."""
+    """Return velocity and acceleration of another point of the link, a lever arm farther out."""
     round_ = cross(omega, lever_arm)
     return (
         _plus(velocity, round_),

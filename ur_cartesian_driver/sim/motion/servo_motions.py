@@ -3,9 +3,8 @@
 """
 Motions without a path: servoj, speedj, speedl and the two stops.
 
-Each law can look ahead without going there (``preview``), because the generator may have to
-shorten the step. Stops run in real time, whatever the speed scaling is, so that they always end;
-the others run in scaled time.
+``preview`` looks ahead without going there, because the step may have to be shortened. Stops run
+in real time, whatever the speed scaling is, so that they always end; the others in scaled time.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Interpreter mode: a program that waits for statements and executes what clients send, in order.
+Interpreter mode: a program executes the statements that clients send, in order.
 
 A statement is compiled and numbered as it arrives and answered by `ack: <number>: <statement>`, or
-by `discard: <reason>: <statement>`, and is executed when those before it have been. While no
-program is in interpreter mode statements wait, without an answer; they also wait behind one that
-clears or ends it, because they could name what is about to be forgotten. Commands are executed at
-once, also in front of statements that wait.
+by `discard: <reason>: <statement>`, and is executed after those before it. While no program is in
+interpreter mode statements wait, without an answer; they also wait behind one that clears or ends
+it, because they could name a variable that is about to be deleted. Commands are executed at once,
+before statements that wait.
 
 Decided where nothing is documented: statements while no program runs are discarded, and `abort`
 and `skipbuffer` are acknowledged with the number of the last statement.
@@ -27,9 +27,9 @@ from ur_cartesian_driver.urscript import (
     ScriptInterpreter,
 )
 
-#: Statements that wait to be compiled or executed; a robot takes about as many.
+#: Bound on statements that wait to be compiled or executed; a robot takes about as many.
 MAX_QUEUED_STATEMENTS = 500
-#: What statements must not be compiled behind before it has been executed.
+#: A statement that calls one of these is executed before the next one is compiled.
 _CLOSING = frozenset({'clear_interpreter', 'end_interpreter'})
 
 AnswerCallback = Callable[[str], None]
@@ -37,13 +37,13 @@ ModeSteps = Generator[None, None, None]
 
 
 class InterpreterMode:
-    """The statements of all clients, and how far they have got."""
+    """The statements of all clients, and which of them are compiled and executed."""
 
     def __init__(self, programs: ProgramRunner, ownership: MotionOwnership) -> None:
         """
         Begin with no statements.
 
-        :param programs: whose machine compiles and runs the statements.
+        :param programs: its interpreter compiles and runs the statements.
         :param ownership: of the motion, which `abort` stops.
         """
         self._programs = programs
@@ -61,7 +61,7 @@ class InterpreterMode:
         self.end_of_program()
 
     def end_of_program(self) -> None:
-        """Forget everything and count from 1 again."""
+        """Drop all statements and count from 1 again."""
         self._interpreter: ScriptInterpreter | None = None
         self._interpreted = self._executed = self._cleared = 0
         self._closing = self._clear_wanted = self._end_wanted = False
@@ -95,12 +95,12 @@ class InterpreterMode:
 
     def _skip(self) -> str:
         self._queue.clear()
-        self._closing = False  # what would have cleared or ended the mode may be gone
+        self._closing = False  # a statement that clears or ends the mode may be gone
         self._compile_queued()
         return f'ack: {self._interpreted}'
 
     def _compile_queued(self) -> None:
-        """Compile and answer what waits, up to a statement that clears or ends the mode."""
+        """Compile and answer waiting statements, up to one that clears or ends the mode."""
         while self._interpreter is not None and self._uncompiled and not self._closing:
             statement, answer = self._uncompiled.popleft()
             try:
@@ -125,7 +125,7 @@ class InterpreterMode:
         Execute statements until one, or another thread, ends the mode.
 
         :param clear_queue: discard the statements that have been waiting.
-        :param clear_on_end: forget what the statements have made when the mode ends.
+        :param clear_on_end: delete what the statements have defined when the mode ends.
         :raises RuntimeException: not in the main thread, or inside a statement.
         """
         interpreter = self._programs.interpreter
@@ -155,11 +155,11 @@ class InterpreterMode:
         self._end_wanted = True
 
     def clear(self) -> None:
-        """Let everything be forgotten after the statement that is being executed."""
+        """Clear the mode after the statement that is being executed."""
         self._clear_wanted = True
 
     def _forget(self, interpreter: ScriptInterpreter, first_thread: int) -> None:
-        """Forget what statements have made, the threads that they have started included."""
+        """Delete what statements have defined, and end the threads that they have started."""
         interpreter.kill_since(first_thread)
         interpreter.lines.forget()
         self._queue.clear()

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The life of programs: one primary one, and secondary ones beside it.
+Programs from start to end: one primary program, and secondary ones beside it.
 
 ::
 
@@ -10,9 +10,9 @@ The life of programs: one primary one, and secondary ones beside it.
                        +------------- RESUMING <-------play---------+
     any of these --end, halt, exception, stop, new program--> STOPPING --arm stands--> STOPPED
 
-A program that is stopped while the arm moves makes the controller brake hard; the next program
-starts when the arm stands. Programs are refused with line and column before anything of them has
-run, and a refused program leaves the running one alone.
+When a program is stopped while the arm moves, the controller brakes hard; the next program starts
+when the arm stands. A program that does not compile is refused with line and column; the running
+one goes on.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ _log = logging.getLogger(__name__)
 #: Clients send the same program again and again; its tree is immutable.
 _parse_cached = lru_cache(maxsize=8)(parse)
 
-#: What happens to the arm and to the modes around a program.
+#: States of a program that has not ended.
 RUNNING = frozenset(
     {RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.PAUSED, RuntimeState.RESUMING}
 )
 
 
 class ProgramArm(Protocol):
-    """What the life of programs needs to know of the arm, and to make it do."""
+    """The arm, as the program runner sees it."""
 
     @property
     def at_rest(self) -> bool:
@@ -55,16 +55,16 @@ class ProgramArm(Protocol):
         """Stop as hard as the controller does on its own."""
 
     def end_modes(self) -> None:
-        """End what a program had switched on: force mode, hand guiding, watchdogs."""
+        """End what a program has switched on: force mode, freedrive, watchdogs."""
 
     def end_of_frame(self) -> None:
-        """Brake if the program left a motion alone."""
+        """Brake if no thread continues the motion."""
 
     def release(self, thread: Hashable) -> None:
-        """Let a thread that has ended own the motion no longer."""
+        """Take the motion from a thread that has ended."""
 
     def start_refusal(self) -> str:
-        """Return why no program can run now; empty if one can."""
+        """Return why no program can run now, or an empty string."""
 
 
 class ProgramRunner:
@@ -97,7 +97,7 @@ class ProgramRunner:
 
     @property
     def interpreter(self) -> ScriptInterpreter | None:
-        """The machine of the primary program, if its functions are being executed."""
+        """The interpreter of the primary program, while it is executed."""
         return self._interpreter if self._stepping is self._interpreter else None
 
     @property
@@ -109,7 +109,7 @@ class ProgramRunner:
         """
         Compile a program and start it, or run it beside the primary one if it is a `sec`.
 
-        :param line_offset: lines that were put before the text that was sent.
+        :param line_offset: number of lines put before the text of the client.
         """
         try:
             program = _parse_cached(text)
@@ -133,7 +133,8 @@ class ProgramRunner:
         """
         Make a program the one that `play` starts; return why not, or an empty string.
 
-        A script that a client has sent is not loaded: once stopped it is gone, as on the robot.
+        A script that a client has sent is not loaded: once stopped it cannot be played, as on the
+        robot.
         """
         if self.running:
             return 'a program is running'
@@ -197,7 +198,7 @@ class ProgramRunner:
             self._finish()
 
     def _finish(self) -> None:
-        """Close the machine and clean up behind it."""
+        """Stop the interpreter and end what belongs to the program."""
         interpreter, self._interpreter = self._interpreter, None
         if interpreter is not None:
             interpreter.stop()
@@ -233,7 +234,7 @@ class ProgramRunner:
         self._stepping = interpreter
         try:
             interpreter.step()
-        except Exception as error:  # a defect of a function must not end the robot
+        except Exception as error:  # a defect of a function must not end the simulator
             _log.exception('A function of program %s failed', self.name)
             interpreter.error = RuntimeException(f'Internal error of the simulator: {error!r}')
             self._stepping = None
@@ -242,7 +243,7 @@ class ProgramRunner:
             self._stepping = None
 
     def _handle_end_of_frame(self, interpreter: ScriptInterpreter) -> None:
-        """See what the frame did to the program."""
+        """Report an error of the frame; end or pause the program."""
         if interpreter.error is not None:
             error = interpreter.error
             self._messages.exception(error.line, error.column, str(error))
@@ -252,7 +253,7 @@ class ProgramRunner:
             self.pause()
 
     def _run_secondary(self, interpreter: ScriptInterpreter) -> None:
-        """Run a whole secondary program; what has not ended after one frame never does."""
+        """Run a whole secondary program; stop one that does not end within a frame."""
         self._run(interpreter)
         error = interpreter.error
         if interpreter.running:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Which RTDE inputs a program wants to be written regularly, and which were not."""
+"""Watches that RTDE inputs are written as often as a program demands."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Watchdogs:
         self._watches: dict[str, _InputWatch] = {}
 
     def watch(self, variable: str, frequency: float, action: str, now: float) -> None:
-        """Watch an input from now on; a frequency of 0 ends it."""
+        """Watch an input from now on; a frequency of 0 ends the watch."""
         if frequency > 0.0:
             self._watches[variable] = _InputWatch(1.0 / frequency, action, now)
         else:
@@ -36,7 +36,7 @@ class Watchdogs:
                 watch.last, watch.expired = now, False
 
     def expired(self, now: float) -> list[tuple[str, str]]:
-        """Return the inputs that have just become late, with what to do."""
+        """Return the inputs that have just become late, with their actions."""
         late = []
         for variable, watch in self._watches.items():
             if not watch.expired and now - watch.last > watch.period:

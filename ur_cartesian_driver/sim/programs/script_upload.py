@@ -1,13 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What clients write to the script ports, cut into programs and single lines.
+Cuts the stream of a script port into programs and single lines.
 
-A program begins with `def` or `sec` in column 1 and may come in any number of pieces. It ends with
-`end` in column 1, as the robot's manual wants it, where everything between is indented. Programs
-whose indentation has been lost exist too; those end where as many blocks have ended as begun. (To
-count in indented programs as well would leave one that lacks an `end` without any answer.)
-Everything else is one line each: a command, or a statement.
+A program begins with `def` or `sec` in column 1 and may come in any number of pieces. If all of it
+is indented, it ends with `end` in column 1, as the robot's manual demands. A program without
+indentation ends where all its blocks have ended. (Counting blocks in indented programs, too, would
+leave one that lacks an `end` without an answer.) Any other line is a command or a statement.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from functools import lru_cache
 from ur_cartesian_driver.urscript.parsing.scanner import scan, TokenKind
 from ur_cartesian_driver.urscript.script_errors import CompileError
 
-#: A program longer than this is no program [bytes].
+#: Bound on the length of a program [bytes].
 MAX_UPLOAD_SIZE = 16 * 1024 * 1024
 
 _BLOCKS = frozenset({'def', 'sec', 'thread', 'if', 'while', 'switch'})
@@ -39,11 +38,11 @@ class UploadedLine:
 
 
 class UploadTooLong(Exception):
-    """Somebody sends without end."""
+    """A line or program exceeds the bound."""
 
 
 class UploadDecoder:
-    """Cuts one connection's stream; feed it whatever arrives."""
+    """Decodes the stream of one connection."""
 
     def __init__(self) -> None:
         """Begin outside of any program."""

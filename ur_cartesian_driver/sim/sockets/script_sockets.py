@@ -3,8 +3,8 @@
 """
 The sockets that programs open, as the builtins see them.
 
-Nothing here waits: a builtin asks once per cycle and yields in between. Real TCP is in
-`tcp_script_sockets`; the one in memory is for programs under the virtual clock.
+No method waits: a builtin asks once per cycle and yields in between. `tcp_script_sockets` has real
+TCP; the sockets in memory are for programs on the virtual clock.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Protocol
 
 
 class SocketState(Enum):
-    """What a script's socket is doing."""
+    """State of a program's socket."""
 
     CLOSED = 'closed'
     CONNECTING = 'connecting'
@@ -23,16 +23,16 @@ class SocketState(Enum):
 
 
 class ScriptSockets(Protocol):
-    """Named connections to the outside, none of whose methods blocks."""
+    """Named connections of a program; no method blocks."""
 
     def open(self, name: str, address: str, port: int) -> None:
         """Begin to connect; an older socket of that name is closed."""
 
     def state(self, name: str) -> SocketState:
-        """Return the state; an unknown name is CLOSED, one that its peer has closed as well."""
+        """Return the state; CLOSED if the name is unknown or the peer has closed."""
 
     def received(self, name: str) -> bytearray:
-        """Return what has arrived and was not read yet; the reader deletes what it takes."""
+        """Return what has arrived and is unread; the reader deletes what it takes."""
 
     def send(self, name: str, data: bytes) -> bool:
         """Send without waiting; tell whether the socket took it."""
@@ -48,7 +48,7 @@ class ScriptSockets(Protocol):
 
 
 class MemorySocket:
-    """One end of a connection in memory; the test, or whoever holds it, is the peer."""
+    """One end of a connection in memory; the test that holds it is the peer."""
 
     def __init__(self) -> None:
         """Begin open, with nothing in either direction."""
@@ -67,7 +67,7 @@ class MemorySocket:
         return data
 
     def hang_up(self) -> None:
-        """Close the peer's side; what is under way can still be read."""
+        """Close the peer's side; what was sent can still be read."""
         self.state = SocketState.CLOSED
 
 
@@ -75,7 +75,7 @@ class MemorySockets:
     """Connections to peers in this process: port -> what is called with each new connection."""
 
     def __init__(self) -> None:
-        """Begin with nobody listening."""
+        """Begin without listeners."""
         self.listeners: dict[int, Callable[[MemorySocket], None]] = {}
         self._sockets: dict[str, MemorySocket] = {}
 

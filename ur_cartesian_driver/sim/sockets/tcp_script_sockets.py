@@ -3,9 +3,8 @@
 """
 The sockets of programs over real TCP, polled by the controller's cycle.
 
-They are not served by the event loop, because a program may read only in its own cycle: what it
-has not asked for stays in the kernel, and a program that stands still stops its peer (TCP's flow
-control), as on the real robot.
+The event loop does not serve them, because a program reads only in its own cycle: unread bytes
+stay in the kernel, and a paused program stops its peer by TCP's flow control, as on the robot.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ import socket
 
 from ur_cartesian_driver.sim.sockets.script_sockets import SocketState
 
-#: Bytes taken from the kernel ahead of the program, and bytes that a slow peer may owe us.
+#: Bound on bytes read ahead of the program, and on bytes that a slow peer has not taken.
 _MAX_BUFFERED = 65_536
 _IN_PROGRESS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK, errno.EINTR)
 _CONNECTED = (0, errno.EISCONN)
@@ -28,7 +27,7 @@ _Resolved = list[tuple[int, int, int, str, _Address]]
 
 
 class _ScriptConnection:
-    """One socket: connecting, open, or closed by its peer with data left to read."""
+    """One socket: connecting, open, or closed with data left to read."""
 
     def __init__(self, port: int, on_data: Callable[[int, bytes], None] | None) -> None:
         self.state = SocketState.CONNECTING
@@ -49,7 +48,7 @@ class _ScriptConnection:
         self._continue_connecting()
 
     def poll(self) -> None:
-        """Go on with what has not been finished."""
+        """Go on with resolving, connecting or sending."""
         if self.resolving is not None and self.resolving.done():
             resolving, self.resolving = self.resolving, None
             try:
@@ -71,7 +70,7 @@ class _ScriptConnection:
             self.close()
 
     def receive(self) -> None:
-        """Take what the kernel has, up to the limit."""
+        """Read from the kernel, up to the limit."""
         while self.state is SocketState.OPEN and len(self.incoming) < _MAX_BUFFERED:
             assert self._socket is not None
             try:
@@ -88,7 +87,7 @@ class _ScriptConnection:
                 self._on_data(self._port, data)
 
     def send(self, data: bytes) -> bool:
-        """Send now, keep what the kernel does not take; False when too much is kept already."""
+        """Send; keep what the kernel does not take. False if too much is kept already."""
         if self.state is not SocketState.OPEN or len(self._outgoing) + len(data) > _MAX_BUFFERED:
             return False
         self._outgoing += data
@@ -125,14 +124,14 @@ class TcpScriptSockets:
         """
         Begin with none.
 
-        :param on_data: called with the peer's port and what came from it, as it is received.
+        :param on_data: called with the peer's port and the bytes that are received from it.
         """
         self.on_data = on_data
         self._connections: dict[str, _ScriptConnection] = {}
         self._resolver: ThreadPoolExecutor | None = None
 
     def open(self, name: str, address: str, port: int) -> None:
-        """Begin to connect; host names are looked up in a thread, for that may take seconds."""
+        """Begin to connect; host names are looked up in a thread, as that may take seconds."""
         self.close(name)
         connection = _ScriptConnection(port, self.on_data)
         self._connections[name] = connection

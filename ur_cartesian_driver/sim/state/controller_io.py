@@ -3,8 +3,8 @@
 """
 Inputs, outputs and registers of the simulated controller.
 
-Values that RTDE clients write, that programs write, and that both read. Registers are plain lists,
-indexed as in the robot's manual: bit 0-127, integer and float 0-47.
+RTDE clients and programs write them, and both read them. Registers are plain lists, indexed as in
+the robot's manual: bit 0-127, integer and float 0-47.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from ur_cartesian_driver.motion.pose import Vector6
 
 REGISTER_BITS, REGISTER_INTEGERS, REGISTER_FLOATS = 128, 48, 48
 STANDARD, CONFIGURABLE, TOOL = 8, 8, 2
-#: Addresses of ports, which Modbus clients of a real robot share with its programs.
+#: Port addresses, which Modbus clients of a real robot share with its programs.
 PORTS = 256
 
 
@@ -48,18 +48,18 @@ class DigitalPort:
 
 @dataclass(slots=True)
 class ControllerIo:
-    """All of them."""
+    """All inputs, outputs, registers, flags and ports."""
 
     digital_in: DigitalPort = field(default_factory=DigitalPort)
     digital_out: DigitalPort = field(default_factory=DigitalPort)
-    #: [V] or [A] as the domain says; True = voltage.
+    #: [V] or [A] by the domain; True = voltage.
     analog_in: list[float] = field(default_factory=lambda: [0.0, 0.0])
     analog_in_voltage: list[bool] = field(default_factory=lambda: [True, True])
     analog_out: list[float] = field(default_factory=lambda: [0.0, 0.0])
     analog_out_voltage: list[bool] = field(default_factory=lambda: [True, True])
     tool_analog_in: list[float] = field(default_factory=lambda: [0.0, 0.0])
     tool_voltage: int = 0
-    #: Force [N] and torque [Nm] that an RTDE client measures for us.
+    #: Force [N] and torque [Nm] that an RTDE client has measured.
     external_force: Vector6 = (0.0,) * 6
     inputs: Registers = field(default_factory=Registers)
     outputs: Registers = field(default_factory=Registers)

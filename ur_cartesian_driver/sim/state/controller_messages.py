@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the controller tells all clients of the primary interface, and its log for people."""
+"""Messages of the controller to all clients of the primary interface, and its log."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
 )
 from ur_cartesian_driver.sim.state.controller_state import Popup
 
-#: Messages that wait to be sent, and lines that are remembered.
+#: Bound on messages to be sent and on log lines.
 _MAX_LOG_LINES = 10_000
 #: Longest text in a message [bytes]: a frame must stay below 4092.
 _MAX_TEXT_LENGTH = 4000
@@ -29,11 +29,11 @@ _POPUP = 2
 
 
 class ControllerMessages:
-    """Collects messages; whoever has clients takes them once per cycle."""
+    """Collects messages; the primary stream takes them once per cycle."""
 
     def __init__(self, now: Callable[[], float]) -> None:
         """
-        Begin with nothing to say.
+        Begin with no messages.
 
         :param now: the controller's clock [s].
         """
@@ -41,11 +41,11 @@ class ControllerMessages:
         self.pending: deque[PrimaryMessage] = deque(maxlen=_MAX_LOG_LINES)
         #: Called with code and argument of each error.
         self.on_error: Callable[[int, int], None] | None = None
-        #: What programs wrote and what went wrong, as lines for people.
+        #: Texts of programs and errors, as lines.
         self.log: deque[str] = deque(maxlen=_MAX_LOG_LINES)
 
     def take(self) -> list[PrimaryMessage]:
-        """Return what has been announced since the last time."""
+        """Return the messages since the last call."""
         messages = list(self.pending)
         self.pending.clear()
         return messages
@@ -55,16 +55,16 @@ class ControllerMessages:
         self.log.append(text)
 
     def text(self, text: str) -> None:
-        """Announce a text of a program, or of the controller."""
+        """Send a text of a program, or of the controller."""
         self.log.append(text)
         self.pending.append(TextMessage(timestamp=self._stamp(), text=_cut(text)))
 
     def key(self, title: str, text: str) -> None:
-        """Announce an event of a program's life."""
+        """Send that a program has started, stopped or failed."""
         self.pending.append(KeyMessage(timestamp=self._stamp(), title=title, text=_cut(text)))
 
     def exception(self, line: int, column: int, text: str) -> None:
-        """Announce why a program does not start, or ended; line and column from 1."""
+        """Send why a program does not start, or has ended; line and column from 1."""
         self.log.append(f'{line}:{column}: {text}')
         self.pending.append(
             RuntimeExceptionMessage(
@@ -73,7 +73,7 @@ class ControllerMessages:
         )
 
     def error(self, code: int, argument: int, text: str) -> None:
-        """Announce an error code; a protective stop, too, is a warning to the controller."""
+        """Send an error code; to the controller even a protective stop is a warning."""
         message = ErrorCodeMessage(
             timestamp=self._stamp(),
             code=code,
@@ -87,12 +87,12 @@ class ControllerMessages:
             self.on_error(code, argument)
 
     def safety_mode(self, mode: SafetyMode) -> None:
-        """Announce that the safety mode has changed."""
+        """Send the new safety mode."""
         self.pending.append(SafetyModeMessage(timestamp=self._stamp(), safety_mode=mode))
 
     def popup(self, popup: Popup) -> None:
         """
-        Announce a window.
+        Send that a window is shown.
 
         Body: u32 request, u8 type of the request, flags warning, error, blocking, u8 length of
         the title, title, text.
@@ -116,7 +116,7 @@ class ControllerMessages:
 
 
 def _cut(text: str) -> str:
-    """Return as much of a text as a message can hold."""
+    """Return the text, cut to what fits into a message."""
     return (
         text
         if len(text) < _MAX_TEXT_LENGTH // 4

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Small values of the controller that functions of programs make."""
+"""State of the controller that programs set."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ur_cartesian_driver.motion.pose import Vector3, Vector6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Payload:
-    """What the flange carries: mass [kg], centre of gravity [m], inertia [kg m^2]."""
+    """The payload: mass [kg], centre of gravity [m], inertia [kg m^2]."""
 
     mass: float = 0.0
     cog: Vector3 = (0.0, 0.0, 0.0)
@@ -33,7 +33,7 @@ class Popup:
 
 @dataclass(slots=True, kw_only=True)
 class PathOffset:
-    """A Cartesian offset on top of the moves, with the limits that a robot begins with."""
+    """A Cartesian offset on top of the moves; the limits are a robot's defaults."""
 
     enabled: bool = False
     #: Frame -> offset [m, rad].
@@ -45,12 +45,12 @@ class PathOffset:
 
 @dataclass(slots=True, kw_only=True)
 class ProcessState:
-    """What a program has set about its process; all of it ends with the program."""
+    """Process settings of a program; they end with it."""
 
     path_offset: PathOffset = field(default_factory=PathOffset)
     #: Codes and arguments (None: any) of errors that pause the program.
     pause_on: set[tuple[int, int | None]] = field(default_factory=set)
 
     def has_pause_on(self, code: int, argument: int) -> bool:
-        """Tell whether an error is to pause the program."""
+        """Tell whether an error shall pause the program."""
         return bool(self.pause_on & {(code, argument), (code, None)})

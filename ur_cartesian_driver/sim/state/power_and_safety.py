@@ -3,12 +3,12 @@
 """
 Power and safety of the simulated arm, as two tables.
 
-Power goes up in a chain, POWER_OFF -> POWER_ON -> IDLE -> RUNNING, and each link takes its time;
-a command only says how far. It falls at once.
+Power goes up step by step, POWER_OFF -> POWER_ON -> IDLE -> RUNNING, and each step takes time; a
+command only sets the goal. Power goes off at once.
 
-The safety system is a second machine. What it does to the arm is decided by the controller: a
+The safety system is a second state machine. The controller carries out what it demands: a
 protective stop brakes the arm on its path and pauses the program, an emergency stop does the same
-and then cuts the power (a category 1 stop), a violation or fault cuts it where the arm stands.
+and then cuts the power (a category 1 stop), a violation or fault cuts the power at once.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.state import RobotMode, SafetyMode, SafetyStatus
 
 
 class SafetyEvent(Enum):
-    """What can happen to the safety system."""
+    """An event that the safety system reacts to."""
 
     PROTECTIVE_STOP = 'protective stop'
     UNLOCK = 'unlock protective stop'
@@ -46,7 +46,7 @@ _POWER_CUT_TRANSITIONS = {
     for event in (SafetyEvent.EMERGENCY_STOP, SafetyEvent.VIOLATION, SafetyEvent.FAULT)
 }
 
-#: What is not in the table is refused.
+#: An event that is not in the table is refused.
 SAFETY_TRANSITIONS: Mapping[SafetyMode, Mapping[SafetyEvent, SafetyMode]] = MappingProxyType(
     {
         SafetyMode.NORMAL: _STOP_TRANSITIONS,
@@ -131,10 +131,10 @@ class SafetySystem:
 
 
 class ArmPower:
-    """The arm's power: where it is, and where it was told to go."""
+    """The arm's power: its robot mode, and the mode that was commanded."""
 
     def __init__(self, mode: RobotMode, power_on_time: float, brake_release_time: float) -> None:
-        """Begin in a mode of the chain; times in [s]."""
+        """Begin in a mode of the sequence; times in [s]."""
         self.mode = mode
         self._goal = mode
         self._times = {
@@ -145,7 +145,7 @@ class ArmPower:
         self._since = 0.0
 
     def on(self, now: float) -> None:
-        """Go to IDLE; an arm that is farther stays where it is."""
+        """Go to IDLE; an arm in RUNNING stays there."""
         self._raise_goal(RobotMode.IDLE, now)
 
     def release_brakes(self, now: float) -> None:
@@ -162,6 +162,6 @@ class ArmPower:
         self._goal = max(self._goal, goal)
 
     def step(self, now: float) -> None:
-        """Climb one link of the chain when its time is over."""
+        """Go to the next mode when the time of this one is over."""
         if self.mode < self._goal and now - self._since >= self._times[self.mode]:
             self.mode, self._since = _POWER_SEQUENCE[_POWER_SEQUENCE.index(self.mode) + 1], now
