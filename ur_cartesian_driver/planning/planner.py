@@ -319,15 +319,15 @@ class _Planner:
         return PlannedSegment(
             primitive=primitive,
             waypoint=geometry.index,
-            length=geometry.path.length,
-            angle=geometry.path.angle,
+            length=geometry.curve.length,
+            angle=geometry.curve.angle,
             duration=timing.duration,
             joints=geometry.joints,
             note=segment_note(geometry, timing, primitive, self.why.get(geometry.index, ())),
         )
 
     def _primitive(self, geometry: SegmentGeometry, timing: SegmentTiming) -> Primitive:
-        blend = geometry.after.radius if geometry.after else 0.0
+        blend = geometry.blend_after.radius if geometry.blend_after else 0.0
         v, a, target = timing.velocity, timing.acceleration, self.targets[geometry.index]
         match geometry.kind:
             case SegmentType.JOINT:
@@ -397,7 +397,7 @@ class _Planner:
         """Return the arc, with joint fields where target or via carry a posture."""
         segment = geometry.segment
         assert segment.via is not None
-        assert isinstance(geometry.path, ArcCurve)
+        assert isinstance(geometry.curve, ArcCurve)
         T_base_via = self.goal.T_base_frame @ segment.via
         via: Target = T_base_via
         target: Target = self.targets[geometry.index]
@@ -435,9 +435,9 @@ class _Planner:
 
         :raises InvalidPosture: the arm goes along the arc in another configuration.
         """
-        assert isinstance(geometry.path, ArcCurve)
+        assert isinstance(geometry.curve, ArcCurve)
         location = segment_field(geometry.index, 'via')
-        passing = self.samples.joints_at(geometry.index, geometry.path.u_via)
+        passing = self.samples.joints_at(geometry.index, geometry.curve.u_via)
         # The orientation of the via does not shape the arc, so go on from there to its pose.
         q = self.kinematics.nearest(via, passing, location)
         named = named_joints(segment.via_posture, self.options.tf_prefix)

@@ -14,13 +14,16 @@ Goals of ten thousand blended points are usual, so corners are made and sampled 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.planning.geometry.curves import (
     ARC_CHORD_ERROR,
+    Curve,
     CURVE_CHORD_ERROR,
     JointLineCurve,
     LineCurve,
@@ -37,7 +40,6 @@ from ur_cartesian_driver.planning.geometry.pose_rows import (
     multiply_rows,
     normalized_rows,
 )
-from ur_cartesian_driver.planning.geometry.tool_spline import ToolCurve
 
 # Chords that measure the length of a corner without a formula.
 _CHORDS = 16
@@ -80,6 +82,29 @@ class Blend:
     #: to the waypoint as it likes, or cut the corner straight: this one is half-way between. The
     #: turn of the tool may run ahead of its way, or behind it.
     blend_tolerance: tuple[float, float]
+    can_start_at_rest: ClassVar[bool] = False
+
+    @property
+    def joint_travel(self) -> float:
+        """Travel of the leading joint on the parts of joint lines [rad]."""
+        return max(
+            (1.0 - self.leave) * self.first.joint_travel, self.join * self.second.joint_travel
+        )
+
+    @property
+    def end(self) -> Pose:
+        """The pose at which it joins the second curve."""
+        return self.pose(1.0)
+
+    def pose(self, s: float) -> Pose:
+        """Return the pose at ``s``."""
+        return pose_from_row(self.rows(np.array([s]))[0])
+
+    def locate(self, s: float) -> tuple[int, float]:
+        """Return the curve whose segment ``s`` counts to, 0 or 1, and the ``u`` there."""
+        if s <= 0.5:
+            return 0, self.leave + (1.0 - self.leave) * s * (2.0 - s)
+        return 1, self.join * s * s
 
     @property
     def in_joint_space(self) -> bool:
@@ -152,18 +177,7 @@ def _with_measured_length(blend: Blend) -> Blend:
     """Return a corner that is no parabola with its length measured along chords."""
     positions = blend.rows(np.linspace(0.0, 1.0, _CHORDS + 1))[:, :3]
     length = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
-    return Blend(
-        blend.first,
-        blend.second,
-        blend.radius,
-        blend.fillet,
-        blend.leave,
-        blend.join,
-        length,
-        blend.angle,
-        blend.samples,
-        blend.blend_tolerance,
-    )
+    return replace(blend, length=length)
 
 
 def _poses_at(paths: Iterable[SegmentCurve], u: Sequence[float]) -> Floats:
@@ -286,13 +300,11 @@ def _crossfade_rows(all_blends: Sequence[Blend], which: NDArray[np.intp], s: Flo
     return rows
 
 
-def path_rows(
-    paths: Sequence[SegmentCurve | ToolCurve], which: NDArray[np.intp], u: Floats
-) -> Floats:
+def path_rows(paths: Sequence[Curve], which: NDArray[np.intp], u: Floats) -> Floats:
     """
-    Return poses (n, 7) of many paths.
+    Return poses (n, 7) of many curves.
 
-    :param which: (n,) the number of the path of each row, not decreasing.
+    :param which: (n,) the number of the curve of each row, not decreasing.
     :param u: (n,) where on it.
     """
     rows = np.empty((len(u), 7))

@@ -1,18 +1,18 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The curves that the robot's motions trace: lines, arcs and joint lines.
+The curves of the robot's motions: lines, arcs and joint lines.
 
-A path maps ``u`` in [0, 1] to poses of the TCP in the robot's base, with ``u`` proportional to
-the quantity that leads the motion (length of a line or an arc, travel of the joints). Corner to
-corner: what a blend makes of the corner is the business of :mod:`~.blend`.
+A curve maps ``u`` in [0, 1] to poses of the TCP in the robot's base, with ``u`` proportional to
+the leading quantity of the motion (length of a line or an arc, travel of the joints). It runs from
+waypoint to waypoint; :mod:`~.blend` rounds the transitions.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from math import asin, atan2, ceil, hypot, pi, sqrt
-from typing import TypeAlias
+from typing import ClassVar, Protocol, TypeAlias
 
 import numpy as np
 
@@ -36,22 +36,52 @@ from ur_cartesian_driver.planning.geometry.pose_rows import (
     normalized_rows,
 )
 
-#: So near to half a turn rounding on the wire, and where the arm really stands, decide in which
+#: This close to half a turn, rounding on the wire and the arm's actual pose decide in which
 #: direction a line turns the tool [rad].
 HALF_TURN = 1e-3
 
-#: Below these two poses are the same, and a motion between them none: the resolution of the wire.
+#: Two poses that differ by less are the same: the resolution of the wire [m], [rad].
 SAME_POSITION = 1e-6
 SAME_ANGLE = 1e-6
-#: Least height of the via above the chord [m] at which three points still make a circle.
+#: Minimum height of the via above the chord [m] at which three points make a circle.
 MIN_ARC_HEIGHT = 1e-5
-#: Arcs through points that are farther apart are refused [m]: no arm comes there.
+#: Arcs through points that are farther apart are refused [m]: no arm reaches that far.
 MAX_ARC_SIZE = 1000.0
 #: Chord error of sampled arcs and of sampled joint lines [m].
 ARC_CHORD_ERROR = 5e-6
 CURVE_CHORD_ERROR = 20e-6
 #: Largest turn between two samples [rad].
 MAX_TURN_PER_SAMPLE = pi / 18.0
+
+
+class Curve(Protocol):
+    """A path of the TCP over one parameter in [0, 1], as the checks along a path need it."""
+
+    @property
+    def length(self) -> float:
+        """Path length [m]."""
+
+    @property
+    def angle(self) -> float:
+        """Turn of the tool [rad]."""
+
+    @property
+    def joint_travel(self) -> float:
+        """Travel of the leading joint [rad]; 0 where the tool's path defines the curve."""
+
+    @property
+    def can_start_at_rest(self) -> bool:
+        """Whether the arm may be at rest where the curve starts."""
+
+    @property
+    def end(self) -> Pose:
+        """The pose at 1."""
+
+    def pose(self, u: float) -> Pose:
+        """Return the pose at ``u``."""
+
+    def rows(self, u: Floats) -> Floats:
+        """Return the poses (n, 7) at many ``u`` (n,)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +92,10 @@ class LineCurve:
     end: Pose
     length: float
     angle: float
-    #: (2, 7) both ends, so that thousands of lines are soon one array.
+    #: (2, 7) both ends, ready to be stacked into one array with those of thousands of lines.
     ends: Floats = field(compare=False, repr=False)
+    joint_travel: ClassVar[float] = 0.0
+    can_start_at_rest: ClassVar[bool] = True
 
     @classmethod
     def between(cls, start: Pose, end: Pose) -> LineCurve:
@@ -113,6 +145,8 @@ class ArcCurve:
     mode: ArcMode
     #: Where the via lies, (0, 1).
     u_via: float
+    joint_travel: ClassVar[float] = 0.0
+    can_start_at_rest: ClassVar[bool] = True
 
     @classmethod
     def through(cls, start: Pose, via: Vector3, end: Pose, mode: ArcMode) -> ArcCurve:
@@ -178,7 +212,7 @@ class ArcCurve:
 
 @dataclass(frozen=True, slots=True)
 class JointLineCurve:
-    """All joints in step on a straight line in joint space; the tool goes where that leads."""
+    """A straight line in joint space; the tool follows from the forward kinematics."""
 
     arm: Arm
     T_flange_tcp: Pose
@@ -189,8 +223,9 @@ class JointLineCurve:
     length: float
     #: Into how many pieces to cut it so that chords follow it.
     samples: int
-    #: The largest ratio of the tool's speed to its mean speed along the way.
+    #: Peak speed of the tool over its mean speed.
     unevenness: float
+    can_start_at_rest: ClassVar[bool] = True
 
     @classmethod
     def between(
@@ -228,6 +263,11 @@ class JointLineCurve:
         """How far each joint turns [rad], all >= 0."""
         a, b, c, d, e, f = (abs(y - x) for x, y in zip(self.q_start, self.q_end, strict=True))
         return (a, b, c, d, e, f)
+
+    @property
+    def joint_travel(self) -> float:
+        """Travel of the leading joint [rad]."""
+        return max(self.travel)
 
     def joints(self, u: float) -> Joints:
         """Return the joint positions at ``u``."""

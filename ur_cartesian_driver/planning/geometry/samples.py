@@ -17,12 +17,11 @@ from math import ceil, pi
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.geometry.blend import Blend, blend_rows, crossfade, path_rows
-from ur_cartesian_driver.planning.geometry.curves import JointLineCurve, SegmentCurve
+from ur_cartesian_driver.planning.geometry.curves import Curve, JointLineCurve, SegmentCurve
 from ur_cartesian_driver.planning.geometry.pose_rows import Floats
-from ur_cartesian_driver.planning.geometry.tool_spline import ToolCurve
 
 Ints = NDArray[np.int32]
 
@@ -58,47 +57,55 @@ class PathSamples:
 
 @dataclass(frozen=True, slots=True)
 class CurvePiece:
-    """A part of one path, or a whole corner."""
+    """A part of the curve of one segment, or a whole blend."""
 
-    #: Index of the waypoint at the end of the path; of a corner the one that it rounds.
+    #: Index of the waypoint at the end of the curve; of a blend the one that it rounds.
     index: int
-    curve: SegmentCurve | Blend | ToolCurve
-    #: From where to where: the path's ``u``, the corner's ``s``.
+    curve: Curve
+    #: Its range: the curve's ``u``, the blend's ``s``.
     begin: float
     end: float
     sample_count: int
 
     @classmethod
     def part(cls, index: int, path: SegmentCurve, begin: float, end: float) -> CurvePiece:
-        """Return a part of a path."""
-        share = end - begin
-        turn = max(path.travel) if isinstance(path, JointLineCurve) else path.angle
-        return cls(index, path, begin, end, _sample_count(path.length * share, turn * share))
+        """Return a part of a segment's curve."""
+        part, turn = end - begin, path.joint_travel or path.angle
+        return cls(index, path, begin, end, _sample_count(path.length * part, turn * part))
 
     @classmethod
     def blend(cls, index: int, blend: Blend) -> CurvePiece:
-        """Return a corner; it has places on both sides of its waypoint."""
-        turn = blend.angle
-        if isinstance(blend.first, JointLineCurve):
-            turn = max(turn, (1.0 - blend.leave) * max(blend.first.travel))
-        if isinstance(blend.second, JointLineCurve):
-            turn = max(turn, blend.join * max(blend.second.travel))
+        """Return a blend; it has samples on both sides of its waypoint."""
+        turn = max(blend.angle, blend.joint_travel)
         return cls(index, blend, 0.0, 1.0, max(2, _sample_count(blend.length, turn)))
 
+    @property
+    def is_blend(self) -> bool:
+        """Whether it is a blend."""
+        return isinstance(self.curve, Blend)
+
+    @property
+    def is_in_joint_space(self) -> bool:
+        """Whether joint positions, and not poses, define it."""
+        return isinstance(self.curve, JointLineCurve) or (
+            isinstance(self.curve, Blend) and self.curve.in_joint_space
+        )
+
     def pose(self, t: float) -> Pose:
-        """Return the pose at a place."""
-        if isinstance(self.curve, Blend):
-            return pose_from_row(self.curve.rows(np.array([t]))[0])
+        """Return the pose at a parameter."""
         return self.curve.end if t == 1.0 else self.curve.pose(t)
 
+    def joint_rows(self, t: Floats) -> Floats:
+        """Return the joint positions (n, 6) [rad] at parameters (n,) of a piece in joint space."""
+        assert isinstance(self.curve, JointLineCurve | Blend)
+        return self.curve.joint_rows(t)
+
     def on_segment(self, t: float) -> tuple[int, float]:
-        """Return the segment and the fraction of it at a place."""
+        """Return the segment and the fraction of it at a parameter."""
         if not isinstance(self.curve, Blend):
             return self.index, t
-        leave, join = self.curve.leave, self.curve.join
-        if t <= 0.5:
-            return self.index, leave + (1.0 - leave) * t * (2.0 - t)
-        return self.index + 1, join * t * t
+        after, fraction = self.curve.locate(t)
+        return self.index + after, fraction
 
     @property
     def size(self) -> tuple[float, float]:

@@ -11,7 +11,7 @@ quintic where accelerations are given too. Both are met exactly at the points.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,13 +136,15 @@ class ToolSpline:
 
 @dataclass(frozen=True, slots=True)
 class ToolCurve:
-    """One piece as a path over ``u``, its share of time, for the look ahead."""
+    """One piece as a :class:`~.curves.Curve` over the fraction of its time."""
 
     spline: ToolSpline
     piece: int
     #: Length [m] and turn [rad].
     length: float
     angle: float
+    joint_travel: ClassVar[float] = 0.0
+    can_start_at_rest: ClassVar[bool] = False
 
     def rows(self, u: Floats) -> Floats:
         """Return the poses (n, 7) at many ``u`` (n,)."""

@@ -28,7 +28,7 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.goal import Goal, SegmentType
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.geometry.blend import Blend, BlendInput, blends
+from ur_cartesian_driver.planning.geometry.blend import BlendInput, blends
 from ur_cartesian_driver.planning.geometry.curves import (
     is_same_pose,
     JointLineCurve,
@@ -188,18 +188,18 @@ class JointPathPlanner:
         inputs: list[BlendInput] = []
         indices: list[int] = []
         for n in range(k, stop):
-            drafts[n].before = None
+            drafts[n].blend_before = None
             if n > 0:
-                drafts[n - 1].after = None
+                drafts[n - 1].blend_after = None
                 if self._is_blended(n - 1):
                     first, second = drafts[n - 1], drafts[n]
                     fillet = first.kind == second.kind == SegmentType.PROCESS
                     inputs.append(
-                        BlendInput(first.known_path, second.known_path, first.radius, fillet)
+                        BlendInput(first.known_curve, second.known_curve, first.radius, fillet)
                     )
                     indices.append(n)
         for n, blend in zip(indices, blends(inputs), strict=True):
-            drafts[n - 1].after = drafts[n].before = blend
+            drafts[n - 1].blend_after = drafts[n].blend_before = blend
         for n in range(max(k - 1, 0), stop):
             self._check_overlap(n)
 
@@ -209,12 +209,12 @@ class JointPathPlanner:
         for n in range(k, stop):
             draft = self._drafts[n]
             pieces += self._entry(n)
-            begin, end = draft.begin, self._end(n)
-            max_step = self._max_path_length / max(draft.known_path.length, 1e-300)
-            if end > begin or not (draft.before or draft.after):
+            begin, end = draft.u_join, self._end(n)
+            max_step = self._max_path_length / max(draft.known_curve.length, 1e-300)
+            if end > begin or not (draft.blend_before or draft.blend_after):
                 pieces.append(
                     CurvePiece.part(
-                        draft.index, draft.known_path, begin, min(end, begin + max_step)
+                        draft.index, draft.known_curve, begin, min(end, begin + max_step)
                     )
                 )
         return pieces
@@ -224,18 +224,18 @@ class JointPathPlanner:
         if n == 0:
             return []
         before = self._drafts[n - 1]
-        if before.after is not None:
-            return [CurvePiece.blend(before.index, before.after)]
+        if before.blend_after is not None:
+            return [CurvePiece.blend(before.index, before.blend_after)]
         if before.checked_until < 1.0:
-            return [CurvePiece.part(before.index, before.known_path, before.checked_until, 1.0)]
+            return [CurvePiece.part(before.index, before.known_curve, before.checked_until, 1.0)]
         return []
 
     def _end(self, n: int) -> float:
         """Return the ``u`` where a leg is left, also where its corner is not known yet."""
         draft = self._drafts[n]
-        if draft.after is not None:
-            return draft.after.leave
-        return trim_end(draft.known_path, draft.radius) if self._is_blended(n) else 1.0
+        if draft.blend_after is not None:
+            return draft.blend_after.leave
+        return trim_end(draft.known_curve, draft.radius) if self._is_blended(n) else 1.0
 
     def _arrivals(
         self, drafts: list[SegmentDraft], joint_path: JointPath, segments: np.ndarray
@@ -252,7 +252,7 @@ class JointPathPlanner:
         ]
         if rounded:
             # The arm does not come there; the report and joint moves from there want to know.
-            ends = pose_rows(drafts[n].known_path.end for n in rounded)
+            ends = pose_rows(drafts[n].known_curve.end for n in rounded)
             there = nearest_rows(
                 self.kinematics.arm, compose_rows(ends, self.kinematics.T_tcp_flange), q[rounded]
             )
@@ -272,7 +272,7 @@ class JointPathPlanner:
             return None
         named = named_joints(posture, self.options.tf_prefix)
         chosen = self.kinematics.solve_posture(
-            draft.known_path.end, named, q, point_field(draft.index, 'pose')
+            draft.known_curve.end, named, q, point_field(draft.index, 'pose')
         )
         clause = describe_miss(q, chosen, named)
         if not clause:
@@ -298,10 +298,10 @@ class JointPathPlanner:
             if isinstance(refusal, InvalidPosture)
             else 'there is no straight way'
         )
-        draft.kind, draft.path, draft.before = _JOINT, None, None
-        if n + 1 < len(self._drafts) and self._drafts[n + 1].path is not None:
+        draft.kind, draft.curve, draft.blend_before = _JOINT, None, None
+        if n + 1 < len(self._drafts) and self._drafts[n + 1].curve is not None:
             after = self._drafts[n + 1]
-            after.path = self._draft_builder.line_or_arc(after, self.targets[draft.index])
+            after.curve = self._draft_builder.line_or_arc(after, self.targets[draft.index])
 
     # -- joint moves -----------------------------------------------------------------------------
 
@@ -318,10 +318,10 @@ class JointPathPlanner:
         line = JointLineCurve.between(self.kinematics.arm, self.kinematics.T_flange_tcp, q, chosen)
         if i == 0 and max(line.travel) <= SAME_SOLUTION:
             draft.radius = 0.0
-        draft.path, draft.joints = line, chosen
+        draft.curve, draft.joints = line, chosen
         self._make_blends(k, k + 1)
         self._solve_entry(k)
-        self._add_joint_move([CurvePiece.part(i, line, draft.begin, self._end(k))])
+        self._add_joint_move([CurvePiece.part(i, line, draft.u_join, self._end(k))])
         draft.checked_until = self._end(k)
 
     def _start_joints(self, k: int) -> Joints:
@@ -331,13 +331,13 @@ class JointPathPlanner:
         before = self._drafts[k - 1]
         if before.checked_until == 1.0:
             return before.known_joints
-        if isinstance(before.known_path, JointLineCurve):
+        if isinstance(before.known_curve, JointLineCurve):
             return before.known_joints
         # A blended waypoint may lie out of reach, but not one at which a joint line begins: there
         # the robot has to know the joints to which the rest of the leg would bring it.
         rest = solve_joint_path(
             self.kinematics,
-            [CurvePiece.part(before.index, before.known_path, before.checked_until, 1.0)],
+            [CurvePiece.part(before.index, before.known_curve, before.checked_until, 1.0)],
             self._q,
         )
         if rest.refusal is not None:
@@ -350,10 +350,7 @@ class JointPathPlanner:
         pieces = self._entry(k)
         if not pieces:
             return
-        curve = pieces[0].curve
-        if isinstance(curve, JointLineCurve) or (
-            isinstance(curve, Blend) and curve.in_joint_space
-        ):
+        if pieces[0].is_in_joint_space:
             self._add_joint_move(pieces)
             return
         q_start = self._q
@@ -373,12 +370,12 @@ class JointPathPlanner:
             raise near[0]
         a, b, c, d, e, f = joint_path.q[-1].tolist()
         self._q = (a, b, c, d, e, f)
-        line = self._drafts[k].known_path
+        line = self._drafts[k].known_curve
         assert isinstance(line, JointLineCurve)
-        joins = line.joints(self._drafts[k].begin)
+        joins = line.joints(self._drafts[k].u_join)
         if max(abs(x - y) for x, y in zip(self._q, joins, strict=True)) > _MAX_LINE_OFFSET:
             raise self.kinematics.discontinuity_error(
-                line.pose(self._drafts[k].begin),
+                line.pose(self._drafts[k].u_join),
                 self._q,
                 joins,
                 f'{segment_field(self._drafts[k - 1].index, "blend_radius")}',
@@ -407,7 +404,7 @@ class JointPathPlanner:
 
     def _check_overlap(self, n: int) -> None:
         draft = self._drafts[n]
-        if draft.path is not None and draft.begin > self._end(n) + 1e-9:
+        if draft.curve is not None and draft.u_join > self._end(n) + 1e-9:
             raise InvalidGoal(
                 segment_field(draft.index, 'blend_radius'),
                 f'is too large: the blends at both ends of the segment to '
@@ -438,25 +435,25 @@ class JointPathPlanner:
                 kind=draft.kind,
                 waypoint=self.goal.waypoints[i],
                 segment=draft.segment,
-                path=draft.known_path,
+                curve=draft.known_curve,
                 joints=draft.known_joints,
                 time=time,
                 speed_bound=speed_bounds[i],
                 tightest_margin=margins[i],
-                before=draft.before,
-                after=draft.after,
-                u_before=draft.begin,
-                u_after=draft.u_leave,
-                share=max(draft.u_leave - draft.begin, 1e-9),
+                blend_before=draft.blend_before,
+                blend_after=draft.blend_after,
+                u_join=draft.u_join,
+                u_leave=draft.u_leave,
+                unblended_fraction=max(draft.u_leave - draft.u_join, 1e-9),
             )
             yield self._at_first_point(geometry) if self._has_no_motion(geometry) else geometry
 
     def _has_no_motion(self, geometry: SegmentGeometry) -> bool:
-        if geometry.path.length > SAME_POSITION:
+        if geometry.curve.length > SAME_POSITION:
             return False
-        if isinstance(geometry.path, JointLineCurve):
-            return max(geometry.path.travel) <= SAME_SOLUTION
-        return is_same_pose(geometry.path.start, geometry.path.end)
+        if isinstance(geometry.curve, JointLineCurve):
+            return max(geometry.curve.travel) <= SAME_SOLUTION
+        return is_same_pose(geometry.curve.start, geometry.curve.end)
 
     def _at_first_point(self, geometry: SegmentGeometry) -> SegmentGeometry:
         """Return the leg to a first point at which the robot stands; others are refused."""

@@ -31,15 +31,15 @@ def segment_note(
         f'point {geometry.index}: {asked} -> {_name(primitive)} '
         f'{_extent(geometry)} in {_duration(geometry, timing)}'
     ]
-    if geometry.after is not None:
-        parts.append(f'blend {1e3 * geometry.after.radius:g} mm')
+    if geometry.blend_after is not None:
+        parts.append(f'blend {1e3 * geometry.blend_after.radius:g} mm')
     parts.append('because ' + ' and '.join([*why, timing.reason]))
     return f'{", ".join(parts)}; nearest: {geometry.tightest_margin}'
 
 
 def tightest_remark(geometries: Sequence[SegmentGeometry]) -> str:
     """Return the remark about what comes nearest to its bound in the whole goal."""
-    geometry = min(geometries, key=lambda geometry: geometry.tightest_margin.share)
+    geometry = min(geometries, key=lambda geometry: geometry.tightest_margin.normalized)
     return f'nearest of all: {geometry.tightest_margin} of the way to point {geometry.index}'
 
 
@@ -119,19 +119,19 @@ def _name(primitive: Primitive) -> str:
 
 
 def _extent(geometry: SegmentGeometry) -> str:
-    turn = degrees(geometry.path.angle)
-    return f'{geometry.path.length:.3f} m' + (f' and {turn:.1f} degrees' if turn >= 0.05 else '')
+    turn = degrees(geometry.curve.angle)
+    return f'{geometry.curve.length:.3f} m' + (f' and {turn:.1f} degrees' if turn >= 0.05 else '')
 
 
 def _duration(geometry: SegmentGeometry, timing: SegmentTiming) -> str:
     about = 'about ' if is_optimized(geometry.kind) else ''
-    if geometry.path.length > 1e-6:
-        speed = f'{geometry.path.length / max(timing.duration, 1e-9):.3f} m/s on average'
-    elif isinstance(geometry.path, JointLineCurve):  # another posture of the same pose
+    if geometry.curve.length > 1e-6:
+        speed = f'{geometry.curve.length / max(timing.duration, 1e-9):.3f} m/s on average'
+    elif isinstance(geometry.curve, JointLineCurve):  # another posture of the same pose
         speed = (
-            f'{max(geometry.path.travel) / max(timing.duration, 1e-9):.3f} rad/s of the leading '
+            f'{max(geometry.curve.travel) / max(timing.duration, 1e-9):.3f} rad/s of the leading '
             'joint on average'
         )
     else:
-        speed = f'{geometry.path.angle / max(timing.duration, 1e-9):.3f} rad/s on average'
+        speed = f'{geometry.curve.angle / max(timing.duration, 1e-9):.3f} rad/s on average'
     return f'{about}{timing.duration:.3f} s ({speed})'

@@ -80,21 +80,21 @@ def _sections(
 ) -> Iterator[_PathSection]:
     now = 0.0
     for geometry, timing in zip(geometries, timings, strict=True):
-        profile, span = timing.profile, geometry.u_after - geometry.u_before
+        profile, span = timing.profile, geometry.u_leave - geometry.u_join
         yield _PathSection(
-            geometry.path,
+            geometry.curve,
             geometry.index,
             _row_parameters(geometry, timing),
-            geometry.u_before,
+            geometry.u_join,
             now,
             profile,
             profile.length / span if span > 0.0 else 0.0,
         )
         now += profile.duration
-        if geometry.after is not None:
-            n = geometry.after.samples
+        if geometry.blend_after is not None:
+            n = geometry.blend_after.samples
             yield _PathSection(
-                geometry.after,
+                geometry.blend_after,
                 geometry.index,
                 [k / n for k in range(1, n + 1)],
                 0.0,
@@ -132,14 +132,14 @@ def _poses(
 
 def _row_parameters(geometry: SegmentGeometry, timing: SegmentTiming) -> list[float]:
     """Return the ``u`` of the rows of a leg, the first one left out (it is there already)."""
-    begin, end = geometry.u_before, geometry.u_after
+    begin, end = geometry.u_join, geometry.u_leave
     span = max(end - begin, 0.0)
     if isinstance(
-        geometry.path, JointLineCurve
+        geometry.curve, JointLineCurve
     ):  # evenly: preview finds the joint positions by counting
-        n = max(_MIN_JOINT_SAMPLES, ceil(geometry.path.samples * span))
+        n = max(_MIN_JOINT_SAMPLES, ceil(geometry.curve.samples * span))
         return [*(begin + span * k / n for k in range(1, n)), end]
-    n = max(1, ceil(geometry.path.samples * span))
+    n = max(1, ceil(geometry.curve.samples * span))
     parameters = {begin + span * k / n for k in range(1, n)}
     parameters.update(begin + span * f for f in timing.profile.knots())
     return [*sorted(parameters), end]

@@ -50,28 +50,28 @@ class SegmentDraft:
     segment: Segment
     radius: float
     #: None = a joint move whose start is not known yet.
-    path: SegmentCurve | None = None
+    curve: SegmentCurve | None = None
     joints: Joints | None = None
-    before: Blend | None = None
-    after: Blend | None = None
+    blend_before: Blend | None = None
+    blend_after: Blend | None = None
     #: How far its path has been looked at, where that ends before the leg does.
     checked_until: float = 1.0
 
     @property
-    def begin(self) -> float:
+    def u_join(self) -> float:
         """The ``u`` where its path is joined."""
-        return self.before.join if self.before else 0.0
+        return self.blend_before.join if self.blend_before else 0.0
 
     @property
     def u_leave(self) -> float:
         """The ``u`` where its path is left, once its corner is known."""
-        return self.after.leave if self.after else 1.0
+        return self.blend_after.leave if self.blend_after else 1.0
 
     @property
-    def known_path(self) -> SegmentCurve:
+    def known_curve(self) -> SegmentCurve:
         """Its path, which is known by now."""
-        assert self.path is not None
-        return self.path
+        assert self.curve is not None
+        return self.curve
 
     @property
     def known_joints(self) -> Joints:
@@ -115,9 +115,9 @@ class SegmentDraftBuilder:
             )
             draft = SegmentDraft(i, kind, segment, radius)
             if kind not in JOINT_SPACE_TYPES:
-                draft.path = self.line_or_arc(draft, before)
+                draft.curve = self.line_or_arc(draft, before)
             drafts.append(draft)
-            before = draft.path.end if draft.path else self._targets[i]
+            before = draft.curve.end if draft.curve else self._targets[i]
         self._check_first_blend(drafts[0], start)
         return drafts
 

@@ -37,7 +37,7 @@ class SegmentGeometry:
     kind: SegmentType
     waypoint: Waypoint
     segment: Segment
-    path: SegmentCurve
+    curve: SegmentCurve
     #: Configuration at the end [rad].
     joints: Joints
     #: What the joints and the singularities say about it.
@@ -46,13 +46,13 @@ class SegmentGeometry:
     #: Time that the goal gives it [s]; None = speeds decide.
     time: float | None
     #: The corners at its ends; None = it stands there.
-    before: Blend | None = None
-    after: Blend | None = None
+    blend_before: Blend | None = None
+    blend_after: Blend | None = None
     #: Where the path is joined after the corner before, and left for the corner after.
-    u_before: float = 0.0
-    u_after: float = 1.0
+    u_join: float = 0.0
+    u_leave: float = 1.0
     #: The part of it between its corners; blends that touch leave nearly nothing.
-    share: float = 1.0
+    unblended_fraction: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

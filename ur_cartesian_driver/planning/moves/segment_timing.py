@@ -81,11 +81,11 @@ def schedule(
     for geometry, timing in zip(geometries, timings, strict=True):
         _check_wire(geometry, timing, options)
     for k in range(1, len(geometries)):
-        if geometries[k].before is not None and geometries[k].time is None:
+        if geometries[k].blend_before is not None and geometries[k].time is None:
             timings[k] = _after_blend(geometries, timings, k)
     blend_times = [
         blend_duration(geometries[k], timings[k], geometries[k + 1], timings[k + 1])
-        if geometries[k].after is not None
+        if geometries[k].blend_after is not None
         else 0.0
         for k in range(len(geometries))
     ]
@@ -131,8 +131,8 @@ def _after_blend(
     r2 s^2, so s' may grow to sqrt(a / 2r) of either.
     """
     before, old = timings[k - 1].profile, timings[k].profile
-    r1 = (1.0 - geometries[k - 1].u_after) * before.length / geometries[k - 1].share
-    r2 = geometries[k].u_before * old.length / geometries[k].share
+    r1 = (1.0 - geometries[k - 1].u_leave) * before.length / geometries[k - 1].unblended_fraction
+    r2 = geometries[k].u_join * old.length / geometries[k].unblended_fraction
     blend_rate = max(
         before.leave / (2.0 * r1), sqrt(min(before.acceleration / r1, old.acceleration / r2) / 2.0)
     )
@@ -200,14 +200,14 @@ def _own_acceleration(geometry: SegmentGeometry) -> float:
 
 
 def _rests_at_ends(geometry: SegmentGeometry) -> tuple[bool, bool]:
-    return geometry.before is None, geometry.after is None
+    return geometry.blend_before is None, geometry.blend_after is None
 
 
 def _stop_distance(geometry: SegmentGeometry, length: float) -> float:
     """Return how far behind its end between corners the robot plans to stop, see trapezoid."""
-    if geometry.after is not None and geometry.kind == SegmentType.PROCESS:
+    if geometry.blend_after is not None and geometry.kind == SegmentType.PROCESS:
         return inf
-    return length * (1.0 - geometry.u_after)
+    return length * (1.0 - geometry.u_leave)
 
 
 def _first_guess(
@@ -254,10 +254,10 @@ def _by_speed(
     if is_optimized(geometry.kind):
         rate *= _OPTIMIZED_JOINT_ACCELERATION / min(model.max_joint_speed)
     profile = trapezoid(
-        length * geometry.share,
+        length * geometry.unblended_fraction,
         velocity,
         rate,
-        inf if geometry.before else 0.0,
+        inf if geometry.blend_before else 0.0,
         _stop_distance(geometry, length),
     )
     return SegmentTiming(
@@ -328,11 +328,13 @@ def _turning_line(
         )
         velocity = options.max_tool_speed
     time = max(
-        min_duration(geometry.path.length, velocity, acceleration),
+        min_duration(geometry.curve.length, velocity, acceleration),
         min_duration(angle, options.angular_velocity, options.angular_acceleration),
     )
     profile = profile_for_time(
-        angle * geometry.share, time * geometry.share, *_rests_at_ends(geometry)
+        angle * geometry.unblended_fraction,
+        time * geometry.unblended_fraction,
+        *_rests_at_ends(geometry),
     )
     wire_time = time
     if not _takes_time(geometry.kind, options):
@@ -368,7 +370,9 @@ def _by_time(
     if time < min_time * (1.0 - 1e-9):
         time, remark = _slow_or_refuse(geometry, length, unit, min_time, limits, options)
     profile = profile_for_time(
-        length * geometry.share, time * geometry.share, *_rests_at_ends(geometry)
+        length * geometry.unblended_fraction,
+        time * geometry.unblended_fraction,
+        *_rests_at_ends(geometry),
     )
     # The robot ignores speed and acceleration when it has a time; they say what it will need.
     velocity, acceleration = peak_speed_and_acceleration(length, time)
@@ -401,7 +405,10 @@ def _by_speed_for_time(
     assert geometry.time is not None
     length, unit = measured
     limits = speed_limits(geometry, length, options, model)
-    distance, stop_distance = length * geometry.share, _stop_distance(geometry, length)
+    distance, stop_distance = (
+        length * geometry.unblended_fraction,
+        _stop_distance(geometry, length),
+    )
     bound = _max_acceleration(geometry, limits)
     time, remark = geometry.time, ''
     min_time = time_in_blends + _min_time_by_speed(geometry, distance, limits.speed, bound)
@@ -420,7 +427,7 @@ def _by_speed_for_time(
     if velocity is None:  # only before the corners are known, or within rounding
         velocity = 2.0 * distance / between
     profile = trapezoid(
-        distance, velocity, acceleration, inf if geometry.before else 0.0, stop_distance
+        distance, velocity, acceleration, inf if geometry.blend_before else 0.0, stop_distance
     )
     return SegmentTiming(
         velocity=velocity,
@@ -491,9 +498,9 @@ def _blend_time(
 ) -> float:
     """Return the time that a leg spends in its halves of the corners at its ends [s]."""
     time = 0.0
-    if geometries[k].before is not None:
+    if geometries[k].blend_before is not None:
         time += blend_duration(geometries[k - 1], timings[k - 1], geometries[k], timings[k]) / 2.0
-    if geometries[k].after is not None:
+    if geometries[k].blend_after is not None:
         time += blend_duration(geometries[k], timings[k], geometries[k + 1], timings[k + 1]) / 2.0
     return time
 
@@ -505,12 +512,15 @@ def blend_duration(
     next_timing: SegmentTiming,
 ) -> float:
     """Return the time in the corner between two legs [s]; the tool's speed changes evenly."""
-    assert first.after is not None
+    assert first.blend_after is not None
     speeds = (
-        timing.profile.leave * first.path.length / timing.profile.length * first.share
+        timing.profile.leave
+        * first.curve.length
+        / timing.profile.length
+        * first.unblended_fraction
         + next_timing.profile.enter
-        * second.path.length
+        * second.curve.length
         / next_timing.profile.length
-        * second.share
+        * second.unblended_fraction
     )
-    return 2.0 * first.after.length / max(speeds, 1e-9)
+    return 2.0 * first.blend_after.length / max(speeds, 1e-9)

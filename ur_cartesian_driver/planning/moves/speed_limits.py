@@ -40,7 +40,7 @@ def leading_quantity(geometry: SegmentGeometry) -> tuple[float, str]:
     OPTIMIZED moves are measured by the time that they would take with some joint at its limit
     everywhere.
     """
-    path = geometry.path
+    path = geometry.curve
     if is_optimized(geometry.kind):
         length, unit = geometry.speed_bound.time_at_limits, 's'
     elif isinstance(path, JointLineCurve):
@@ -60,8 +60,8 @@ def speed_limits(
     if options.max_tool_speed > 0.0 and translates(geometry):
         tool = options.max_tool_speed / _tool_travel_per_unit(geometry, length)
     speed, name = tool, f'max_tool_speed = {options.max_tool_speed:g} m/s'
-    if geometry.kind == SegmentType.JOINT and isinstance(geometry.path, JointLineCurve):
-        for k, travel_of_joint in enumerate(geometry.path.travel):
+    if geometry.kind == SegmentType.JOINT and isinstance(geometry.curve, JointLineCurve):
+        for k, travel_of_joint in enumerate(geometry.curve.travel):
             if (
                 travel_of_joint > 0.0
                 and model.max_joint_speed[k] * length / travel_of_joint < speed
@@ -75,12 +75,12 @@ def speed_limits(
         if min_time > 0.0 and length / min_time < speed:
             speed, name = length / min_time, _joint_limit(geometry.speed_bound)
     bound = (
-        options.max_linear_acceleration * length / geometry.path.length
+        options.max_linear_acceleration * length / geometry.curve.length
         if translates(geometry)
         else inf
     )
-    if geometry.path.angle > 0.0:
-        bound = min(bound, options.max_angular_acceleration * length / geometry.path.angle)
+    if geometry.curve.angle > 0.0:
+        bound = min(bound, options.max_angular_acceleration * length / geometry.curve.angle)
     return SpeedLimits(speed=speed, name=name, acceleration=bound)
 
 
@@ -103,7 +103,7 @@ def _joint_limit(speed_bound: JointSpeedBound) -> str:
 
 def _tool_travel_per_unit(geometry: SegmentGeometry, length: float) -> float:
     """Return the most metres that the tool goes per unit of the leading quantity."""
-    path = geometry.path
+    path = geometry.curve
     if is_optimized(geometry.kind):  # the tool is fastest where the joints have the least to do
         length = max(geometry.speed_bound.shortest_time, _MIN_LENGTH)
     uneven = path.unevenness if isinstance(path, JointLineCurve) else 1.0
@@ -112,12 +112,12 @@ def _tool_travel_per_unit(geometry: SegmentGeometry, length: float) -> float:
 
 def is_blended(geometry: SegmentGeometry) -> bool:
     """Tell whether a leg has a corner at one of its ends."""
-    return geometry.before is not None or geometry.after is not None
+    return geometry.blend_before is not None or geometry.blend_after is not None
 
 
 def translates(geometry: SegmentGeometry) -> bool:
     """Tell whether the tool's position changes; if not the leg only turns it."""
-    return geometry.path.length > SAME_POSITION
+    return geometry.curve.length > SAME_POSITION
 
 
 def speed_unit(unit: str) -> str:

@@ -23,7 +23,6 @@ from ur_cartesian_driver.kinematics.inverse_rows import branch_measures, solve_p
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.planning.geometry.blend import Blend
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.planning.geometry.samples import (
@@ -103,14 +102,9 @@ class _Refinement:
 
 
 def sample_joint_moves(kinematics: TcpKinematics, pieces: Sequence[CurvePiece]) -> JointPath:
-    """Return the places on pieces in joint space."""
+    """Return the samples on pieces in joint space."""
     piece, t = sample_parameters(pieces)
-    q = np.concatenate(
-        [
-            p.curve.joint_rows(t[piece == k])  # type: ignore[union-attr]  # no other comes here
-            for k, p in enumerate(pieces)
-        ]
-    )
+    q = np.concatenate([p.joint_rows(t[piece == k]) for k, p in enumerate(pieces)])
     return JointPath(piece, t, tcp_rows(kinematics.arm, kinematics.T_flange_tcp, q), q)
 
 
@@ -226,7 +220,7 @@ def _refusal_at(
         )
         return kinematics.discontinuity_error(pose, q, refinement.jump, where, poses_beyond), index
     refusal = kinematics.no_solution_error(pose, where)
-    if not isinstance(piece.curve, Blend) and fraction < 1.0:
+    if not piece.is_blend and fraction < 1.0:
         # There the value is just beyond its bound; at the point it says how far beyond.
         at_end = kinematics.no_solution_error(piece.curve.end, where, 'at the point ')
         if type(at_end) is type(refusal) and kinematics.solution(piece.curve.end, q) is None:

@@ -24,7 +24,6 @@ from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import NearSingularity
 from ur_cartesian_driver.planning.geometry.pose_rows import Floats
 from ur_cartesian_driver.planning.geometry.samples import CurvePiece
-from ur_cartesian_driver.planning.geometry.tool_spline import ToolCurve
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.joint_path import describe_location, JointPath
 
@@ -83,7 +82,7 @@ class TightestMargin:
     unit: str
     fraction: float
     #: The value as a part of the scale of its quantity.
-    share: float
+    normalized: float
 
     def __str__(self) -> str:
         """Return it as a report says it."""
@@ -168,14 +167,12 @@ def _is_leaving(
     """
     piece = pieces[int(joint_path.piece[rows[0]])]
     excused = np.zeros((len(rows), len(SINGULARITY_MEASURES)), dtype=np.bool_)
-    if isinstance(piece.curve, ToolCurve):
-        return excused  # splines have one start, see leaving_rows
     if (
-        piece.begin > 0.0
-        or _is_blend(piece)
-        or (int(joint_path.piece[rows[0]]) != _first_of(pieces, piece.index))
+        not piece.curve.can_start_at_rest
+        or piece.begin > 0.0
+        or int(joint_path.piece[rows[0]]) != _first_of(pieces, piece.index)
     ):
-        return excused  # it comes out of a corner
+        return excused  # it comes out of a blend, or is a spline, see is_leaving_rows
     length, angle = piece.size
     on_it = joint_path.piece[rows] == joint_path.piece[rows[0]]
     t = joint_path.t[rows]
@@ -203,13 +200,9 @@ def is_leaving_rows(
 def _first_of(pieces: Sequence[CurvePiece], index: int) -> int:
     """Return the number of the first piece on which the tool is on the way to a waypoint."""
     for number, piece in enumerate(pieces):
-        if piece.index == index or (piece.index == index - 1 and _is_blend(piece)):
+        if piece.index == index or (piece.index == index - 1 and piece.is_blend):
             return number
     return -1
-
-
-def _is_blend(piece: CurvePiece) -> bool:
-    return hasattr(piece.curve, 'leave')
 
 
 def margins_by_segment(

@@ -358,7 +358,7 @@ def _precision(polynomials: JointPolynomials) -> str:
 
 
 def _tightest_remark(path: SplinePath) -> str:
-    point, tightest_margin = min(path.tightest_margin.items(), key=lambda item: item[1].share)
+    point, tightest_margin = min(path.tightest_margin.items(), key=lambda item: item[1].normalized)
     return f'nearest of all: {tightest_margin} of the way to point {point}'
 
 
