@@ -101,7 +101,7 @@ def test_a_flip_is_named_fails_as_a_line_and_passes_as_a_joint_move(robot_of, mo
     assert flip in str(refusal.value)
     assert 'points[0]' in str(refusal.value)
     if flip != 'elbow':  # it never comes to the stretch
-        share = re.search(r'([\d.]+) % of the way', str(refusal.value))
+        share = re.search(r'at ([\d.]+) % of its segment', str(refusal.value))
         assert float(share[1]) == pytest.approx(50.0, abs=10.0)
     with pytest.raises(InvalidPosture, match=flip):
         plan(goal, state, arm, OPTIONS)

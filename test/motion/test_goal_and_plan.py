@@ -46,7 +46,7 @@ def planned(waypoint, duration):
         angle=0.0,
         duration=duration,
         joints=ZEROS,
-        note=f'segment {waypoint}: MOVEL, 0.1 m',
+        report_line=f'segment {waypoint}: MOVEL, 0.1 m',
     )
 
 

@@ -55,8 +55,8 @@ def test_capsules_warn_unless_they_are_told_to_refuse(choice):
     found = clear.violation or clear.warning
     assert found.text.startswith('upper arm and wrist 1 come within 0.00')
     assert 'measured between capsules' in found.text
-    assert found.text.endswith('0.0050 m is asked for')
-    assert 'self_collision' in found.help
+    assert 'less than min_clearance = 0.0050 m' in found.text
+    assert 'self_collision' in found.remedy
 
 
 @pytest.mark.parametrize('choice', ['warn', 'auto', 'refuse', 'off'])
@@ -168,9 +168,9 @@ def test_the_margin_of_a_plane_is_kept():
     wider = (f'table 0 0 {z - 0.03} 0 0 1 0.04',)
     found = check(q, start=(0, -H, 0, -H, 0, 0), tcp=TOOL, workspace_planes=wider).violation
     assert found.text == (
-        'the TCP comes within 0.0300 m of the workspace plane "table", 0.0400 m is asked for'
+        'the TCP comes within 0.0300 m of the workspace plane "table", its margin is 0.0400 m'
     )
-    assert 'workspace_planes' in found.help
+    assert 'workspace_planes' in found.remedy
 
 
 def test_a_tool_may_work_on_a_plane_and_go_no_deeper():
@@ -281,8 +281,8 @@ def test_a_refusal_names_segment_and_fraction():
     percent = 100 * FRACTION[clear.violation.row]
     assert clear.violation.row >= 30
     assert str(refusal.value) == (
-        f'trajectory.points[3].pose, {percent:.1f} % of the way to it: {clear.violation.text}; '
-        f'{clear.violation.help}.'
+        f'trajectory.points[3].pose, at {percent:.1f} % of its segment: {clear.violation.text}; '
+        f'{clear.violation.remedy}.'
     )
 
 
@@ -322,8 +322,8 @@ def test_a_goal_that_folds_the_arm_into_itself_is_a_collision(make_cell):
         plan(folding(cell), cell.state, cell.arm, FREE)
     assert refusal.value.code == ErrorCode.COLLISION == -10
     assert re.match(
-        r'trajectory\.points\[1\]\.pose, 9\d\.\d % of the way to it: upper arm and '
-        r'wrist 1 come within 0\.00\d\d m of each other, 0\.0050 m is asked for; ',
+        r'trajectory\.points\[1\]\.pose, at 9\d\.\d % of its segment: upper arm and '
+        r'wrist 1 come within 0\.00\d\d m of each other, less than min_clearance = 0\.0050 m; ',
         str(refusal.value),
     )
 
@@ -335,7 +335,7 @@ def test_where_only_capsules_tell_the_report_warns(make_cell):
         remark
         for remark in made.remarks
         if re.match(
-            r'point 1: 9\d\.\d % of the way to it, upper arm and wrist 1 come within', remark
+            r'point 1: at 9\d\.\d % of its segment upper arm and wrist 1 come within', remark
         )
     ]
     assert 'clearance: none between upper arm and wrist 1' in made.remarks
@@ -352,7 +352,7 @@ def test_a_goal_that_crosses_a_plane_is_a_collision(cell):
         with pytest.raises(CollisionPredicted) as refusal:
             plan(goal, cell.state, cell.arm, options)
         said = re.match(
-            r'trajectory\.points\[1\]\.pose, (.*) % of the way to it: the TCP goes '
+            r'trajectory\.points\[1\]\.pose, at (.*) % of its segment: the TCP is '
             r'0\.00.. m beyond the workspace plane "table"; ',
             str(refusal.value),
         )

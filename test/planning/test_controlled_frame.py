@@ -70,7 +70,7 @@ def test_the_tcp_is_set_where_it_may_and_the_goal_stays_as_it_is(cell):
     assert first.angle_to(start) < 1e-9
     reached = cell.arm.forward(made.segments[-1].joints) @ T_FLANGE_NOZZLE
     assert reached.distance_to(goal.waypoints[0].pose) < 1e-6
-    assert any('is set to nozzle' in line and 'put back' in line for line in made.report)
+    assert any('temporary TCP: nozzle' in line and 'restored' in line for line in made.report)
 
 
 @pytest.mark.parametrize('change', [{}, {'T_flange_controlled': None, 'controlled_frame': ''}])
@@ -94,7 +94,7 @@ def test_a_goal_that_does_not_turn_is_carried_over_to_the_tcp(cell):
     )
     made = plan(goal, cell.state, cell.arm, KEEP)
     assert made.T_flange_tcp is None
-    assert any('carried over from nozzle' in line for line in made.report)
+    assert any('converted from nozzle to the active TCP' in line for line in made.report)
     path = nozzle_of(made)
     assert np.linalg.norm(path - np.array(via.position), axis=1).min() < 2e-3
     arc = path[made.reference.point == 0]

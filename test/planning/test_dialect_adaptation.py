@@ -50,12 +50,12 @@ def test_a_joint_move_arrives_in_the_same_solution(cell, name):
     if name in OLD:
         assert segment.primitive.target == segment.joints
         assert segment.primitive.q_near is None
-        assert '-> MOVEJ ' in segment.note
-        assert f'wire dialect {name} has no q_near' in segment.note
+        assert '-> MOVEJ because ' in segment.report_line
+        assert f'wire dialect {name} has no q_near' in segment.report_line
     else:
         assert segment.primitive.target == cell.pose(y=0.05)
         assert segment.primitive.q_near == pytest.approx(segment.joints)
-        assert '-> MOVEJ_POSE ' in segment.note
+        assert '-> MOVEJ_POSE, ' in segment.report_line
 
 
 @pytest.mark.parametrize('name', OLD)
@@ -116,7 +116,7 @@ def test_times_are_kept_by_speeds_where_programs_count_in_milliseconds(cell):
     times = [0.0, *(p[2] for p in points)]
     for segment, (before, after) in zip(made.segments, pairwise(times), strict=True):
         assert segment.duration == pytest.approx(after - before, rel=1e-6)
-    assert any('times are kept by speeds' in remark for remark in made.remarks)
+    assert any('sent with speeds instead of times' in remark for remark in made.remarks)
     for name in ('2.10', '2.12', '2.14'):
         newer = planned(cell, name, *points)
         assert newer.segments[0].primitive.duration == pytest.approx(0.7504)

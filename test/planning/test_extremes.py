@@ -99,8 +99,8 @@ def test_a_time_that_the_wire_cannot_carry_is_refused_and_not_proposed(make_cell
     with pytest.raises(
         TooFast,
         match=(
-            r'points\[0\]\.time_from_start .* because of .*wrist_1_joint at 50 % of the way it '
-            r'takes \d{5} s, more than max_segment_time = 2147 s; go around'
+            r'points\[0\]\.time_from_start .* because of .*wrist_1_joint at 50 % of the segment\) '
+            r'it takes \d{5} s, more than max_segment_time = 2147 s; move the path away'
         ),
     ):
         sent(cell, goal, singularity_margin_wrist=0.0, on_too_fast=choice)
@@ -150,7 +150,7 @@ def test_the_time_of_an_optimized_line_is_that_of_its_way_not_of_its_worst_place
 def test_a_line_is_no_faster_than_the_joints(cell):
     """Next to the axis of the base a slow tool needs a fast shoulder."""
     turn = Goal(waypoints=(cell.point(turn=(0.0, 0.0, 3.0), time=0.5),))
-    with pytest.raises(InvalidGoal, match='limits of the joints'):
+    with pytest.raises(InvalidGoal, match='joint speed limits'):
         sent(cell, turn)
     assert sent(cell, turn, on_too_fast='slow').duration > 0.9
 
@@ -189,7 +189,7 @@ def test_absurd_numbers_in_a_spline_are_refused_at_once_or_can_be_sent(cell, fie
 def test_a_spline_that_turns_the_tool_more_than_once_around_names_its_point(cell):
     spin = (0.0, 0.0, 0.0, 0.0, 0.0, 50.0)
     goal = Goal(waypoints=(cell.point(time=1.0, twist=spin), cell.point(time=2.0)))
-    with pytest.raises(InvalidGoal, match=r'points\[0\] .* a turn by up to 7\.\d+ rad in betw'):
+    with pytest.raises(InvalidGoal, match=r'points\[0\] .* imply a turn of 7\.\d+ rad'):
         sent(cell, goal)
 
 
@@ -199,6 +199,6 @@ def test_a_spline_of_kilometres_is_refused_before_it_is_looked_at(cell):
     )
     goal = Goal(waypoints=(*wide, cell.point(time=2001.0)))
     begin = process_time()
-    with pytest.raises(InvalidGoal, match=r'a detour of|would have to be looked at in'):
+    with pytest.raises(InvalidGoal, match=r'a detour of|its check needs'):
         sent(cell, goal)
     assert process_time() - begin < 3.0

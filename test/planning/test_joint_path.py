@@ -62,7 +62,7 @@ def refusal(error, cell, goal, options=FREE):
 
 def fraction_in(text):
     """Return the place that a refusal names, as a fraction."""
-    return float(re.search(r'pose, ([\d.]+) % of the way', text)[1]) / 100.0
+    return float(re.search(r'pose, at ([\d.]+) % of its segment', text)[1]) / 100.0
 
 
 def to(pose, **fields):
@@ -110,7 +110,7 @@ def test_a_line_past_a_straight_wrist_is_refused_by_name_where_it_is_nearest(mak
     u, angle = least_on_line(cell, end, straightness(cell), 0.3, 0.7)
     text = refusal(NearSingularity, cell, to(end))
     assert 'of the wrist singularity' in text
-    assert 'singularity_margin_wrist asks for 0.05 rad' in text
+    assert 'less than singularity_margin_wrist = 0.05 rad' in text
     assert fraction_in(text) == pytest.approx(u, abs=0.001)
     assert float(re.search(r'within ([\d.e-]+) rad', text)[1]) == pytest.approx(angle, abs=2e-4)
 
@@ -212,7 +212,7 @@ def test_joint_moves_pass_singularities_and_may_replace_the_line(make_cell, name
     assert cell.tool(made.segments[0].joints).distance_to(end) < 1e-7
     assert made.remarks[0].startswith('point 0: JOINT instead of LINEAR (on_posture_change')
     assert f'of the {name} singularity' in made.remarks[0]
-    assert 'there is no straight way' in made.segments[0].note
+    assert 'there is no straight path' in made.segments[0].report_line
 
 
 def test_a_line_in_a_run_that_becomes_a_joint_move_leaves_the_others_as_they_were(make_cell):
@@ -344,7 +344,7 @@ def test_two_thousand_points_in_a_wrong_frame_are_refused_at_once(cell):
 def test_a_peak_of_the_joints_between_coarse_places_counts(make_cell):
     cell, end = across(make_cell, (0.0, -1.2, 1.6, 1.5 * pi - 0.4, 0.004, 0.4), (0.0, 1.0, 0.0))
     text = refusal(TooFast, cell, to(end, time=3.0), NO_MARGINS)
-    assert re.search(r'speed limits of the joints, wrist_\d_joint at \d+ % of the way', text)
+    assert re.search(r'joint speed limits \(wrist_\d_joint at \d+ % of the segment\)', text)
     slow = plan(to(end, time=3.0), cell.state, cell.arm, replace(NO_MARGINS, on_too_fast='slow'))
     assert slow.duration > 3.0
 
@@ -427,10 +427,10 @@ def test_every_line_says_what_came_nearest_and_the_last_remark_the_least_of_all(
     )
     made = plan(goal, cell.state, cell.arm, FREE)
     for segment in made.segments:
-        assert re.search(r'; nearest: .* [\d.]+ (rad|m) at \d+ %$', segment.note)
-    assert 'the end of the range of' in made.segments[1].note
-    assert 'blend 10 mm' in made.segments[0].note
-    assert made.remarks[-1].startswith('nearest of all: ')
+        assert re.search(r'; margin [\d.]+ (rad|m) to the .* at \d+ %$', segment.report_line)
+    assert 'to the limit of' in made.segments[1].report_line
+    assert 'blend 10 mm' in made.segments[0].report_line
+    assert made.remarks[-1].startswith('tightest margin: ')
 
 
 def test_whatever_is_refused_is_a_sentence_about_a_place(make_cell):
@@ -444,6 +444,6 @@ def test_whatever_is_refused_is_a_sentence_about_a_place(make_cell):
             plan(goal, cell.state, cell.arm, replace(FREE, on_too_fast='slow'))
         except GoalRefused as error:
             texts.append(str(error))
-    place = re.compile(r'trajectory\.points\[0\]\.pose(, [\d.]+ % of the way to it,)? ')
+    place = re.compile(r'trajectory\.points\[0\]\.pose(, at [\d.]+ % of its segment,)? ')
     assert len(texts) > 10
     assert [text for text in texts if not place.match(text)] == []

@@ -154,7 +154,7 @@ def test_the_report_tells_them_with_their_points(cell):
         ),
     )
     first, second, third, *_ = made.report
-    assert first.endswith('; switches standard digital output 0 on in the middle of its corner')
+    assert first.endswith('; switches standard digital output 0 on in the middle of its blend')
     assert second.endswith('; switches standard digital output 0 off 0.100 s after it')
     assert third.endswith(
         '; switches standard analog output 0 to 0.25 (current) 0.200 s after the end'
@@ -232,17 +232,17 @@ def test_where_a_spline_stops_it_is_switched_at_once(cell):
 
 
 REFUSED = [
-    (command(3), r'^io_commands\[0\]\.point_index is 3, and the points are 0 to 2; '),
+    (command(3), r'^io_commands\[0\]\.point_index is 3, but the points are 0 to 2; '),
     (command(-1), r'\.point_index is -1'),
-    (command(pin=8), r'\.pin is 8, and there are standard digital outputs 0 to 7; '),
+    (command(pin=8), r'\.pin is 8, but there are standard digital outputs 0 to 7; '),
     (command(pin=-1), r'\.pin is -1'),
-    (command(output=OutputKind.TOOL_DIGITAL, pin=2), r'\.pin is 2, and there are tool digital'),
+    (command(output=OutputKind.TOOL_DIGITAL, pin=2), r'\.pin is 2, but there are tool digital'),
     (command(output=OutputKind.STANDARD_ANALOG, pin=2), r'\.pin is 2'),
     (command(value=0.5), r'\.value is 0\.5; a standard digital output takes 0 \(off\) or 1'),
     (command(value=nan), r'\.value is nan'),
     (command(output=OutputKind.STANDARD_ANALOG, value=1.01), r'\.value is 1\.01; .*fraction'),
     (command(output=OutputKind.STANDARD_ANALOG, value=-inf), r'\.value is -inf'),
-    (command(offset=-0.001), r'\.offset is -0\.001 s; it is 0 to 60 s after the point; '),
+    (command(offset=-0.001), r'\.offset is -0\.001 s, outside 0 to 60 s; '),
     (command(offset=nan), r'\.offset is nan'),
     (command(offset=MAX_OUTPUT_OFFSET + 0.1), r'\.offset is 60\.1 s'),
 ]
@@ -256,7 +256,7 @@ def test_what_makes_no_sense_is_refused_with_its_field(cell, wrong, text):
 
 def test_older_robot_programs_switch_nothing(cell):
     options = replace(OPTIONS, dialect=DIALECTS['2.12'])
-    with pytest.raises(NotAvailable, match='io_commands is not empty, and robot programs'):
+    with pytest.raises(NotAvailable, match='io_commands is not empty, but robot programs'):
         planned(cell, square(cell, command()), options)
 
 
@@ -264,12 +264,12 @@ def test_too_many_between_two_motions_are_refused(cell):
     many = [command(0, value=float(k % 2)) for k in range(MAX_PENDING_OUTPUTS)]
     assert len(records(planned(cell, square(cell, *many)))) == MAX_PENDING_OUTPUTS
     with pytest.raises(
-        InvalidGoal, match='more than 64 outputs between two motions, behind point 0'
+        InvalidGoal, match='more than 64 outputs between two motions, after point 0'
     ):
         planned(cell, square(cell, *many, command(0)))
 
 
 def test_a_point_where_the_robot_stands_switches_nothing(cell):
     goal = Goal(waypoints=(cell.point(), cell.point(x=0.02, time=1.0)), io_commands=(command(0),))
-    with pytest.raises(InvalidGoal, match=r'io_commands\[0\]\.point_index is 0, and no motion'):
+    with pytest.raises(InvalidGoal, match=r'io_commands\[0\]\.point_index is 0, but no motion'):
         planned(cell, goal)

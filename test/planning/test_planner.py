@@ -67,11 +67,13 @@ def test_a_plain_square_becomes_timed_straight_lines_to_its_poses(cell):
     assert [segment.length for segment in made.segments] == pytest.approx(
         [0.1, 0.2, 0.2, 0.2, 0.2]
     )
-    assert made.segments[1].note == (
-        'point 1: AUTO -> MOVEL 0.200 m in 2.000 s (0.100 m/s on average), because its '
-        'time_from_start says so; nearest: shoulder 0.369 m at 67 %'
+    assert made.segments[1].report_line == (
+        'point 1: AUTO -> MOVEL, 0.200 m in 2.000 s (0.100 m/s mean), time from '
+        'points[1].time_from_start; margin 0.369 m to the shoulder singularity at 67 %'
     )
-    assert made.remarks[-1] == 'nearest of all: shoulder 0.369 m at 67 % of the way to point 1'
+    assert made.remarks[-1] == (
+        'tightest margin: 0.369 m to the shoulder singularity at 67 % of the segment to point 1'
+    )
     assert len(made.remarks) == 2  # the other is about clearance
 
 
@@ -138,12 +140,12 @@ def test_arcs_carry_joints_exactly_where_a_posture_is_and_the_pose_always_wins(
         assert pose.distance_to(wanted) < 1e-9
         assert pose.angle_to(wanted) < 1e-8
     name = {
-        (False, False): 'MOVEC ',
+        (False, False): 'MOVEC, ',
         (True, True): 'MOVEC_JOINT ',
         (True, False): 'MOVEC_JOINT_POSE ',
         (False, True): 'MOVEC_POSE_JOINT ',
     }
-    assert f'-> {name[of_target, of_via]}' in made.segments[1].note
+    assert f'-> {name[of_target, of_via]}' in made.segments[1].report_line
 
 
 def test_arcs_are_sent_as_poses_while_the_calibration_is_unknown(cell):
@@ -154,7 +156,7 @@ def test_arcs_are_sent_as_poses_while_the_calibration_is_unknown(cell):
     )
     made = plan(goal, cell.state, cell.arm, PlanningOptions(calibration_known=False))
     assert isinstance(made.segments[0].primitive.target, Pose)
-    assert 'calibration of the robot is not known' in made.remarks[0]
+    assert 'calibration of this robot is unknown' in made.remarks[0]
 
 
 def test_an_arc_that_keeps_to_its_tangent_ends_in_the_turned_orientation_and_says_so(cell):
@@ -170,7 +172,7 @@ def test_an_arc_that_keeps_to_its_tangent_ends_in_the_turned_orientation_and_say
         ),
     )
     made = plan(goal, cell.state, cell.arm, OPTIONS)
-    assert 'the orientation of the point is ignored' in made.remarks[0]
+    assert 'the orientation is ignored' in made.remarks[0]
     # The next line turns the tool back to the orientation of its point.
     assert made.segments[1].angle == pytest.approx(made.segments[0].angle, abs=1e-6)
 
@@ -302,7 +304,7 @@ def test_a_line_that_leaves_the_reach_half_way_names_the_place(make_cell):
     x, y, _ = cell.home.position
     goal = Goal(waypoints=(cell.point(-2.0 * x, -2.0 * y),))
     text = refusal(Unreachable, cell, goal, PlanningOptions(max_approach_distance=0.0))
-    assert '% of the way to it' in text
+    assert '% of its segment' in text
 
 
 def test_a_point_beyond_the_joint_range_is_a_joint_limit(make_cell):
@@ -310,8 +312,8 @@ def test_a_point_beyond_the_joint_range_is_a_joint_limit(make_cell):
     end = cell.tool((2 * pi + 0.2, -1.6, 1.6, -1.6, -1.57, 0.0))
     text = refusal(JointLimitExceeded, cell, Goal(waypoints=(Waypoint(pose=end),)))
     assert (
-        'takes shoulder_pan_joint out of its range of -6.2832 to 6.2832 rad, as far as 6.4832 '
-        'rad; start with this joint turned back, or go there with a JOINT segment.'
+        'moves shoulder_pan_joint to 6.4832 rad, outside its range of -6.2832 to 6.2832 rad; '
+        'start with this joint turned back, or use a JOINT segment.'
     ) in text
 
 
@@ -329,9 +331,9 @@ def test_a_line_that_passes_a_wrist_singularity_is_refused_with_the_joint_and_th
     # Wrist 2 passes 0 by a ten-thousandth, so wrist 1 and 3 would have to swing round.
     cell, point = wrist_crossing(make_cell, (0.0, -1.2, 1.6, -0.4 - pi / 2, 1e-4, 0.4))
     text = refusal(NearSingularity, cell, Goal(waypoints=(point,)))
-    assert text.startswith('trajectory.points[0].pose, 50.0 % of the way to it, comes within ')
+    assert text.startswith('trajectory.points[0].pose, at 50.0 % of its segment, comes within ')
     assert 'of the wrist singularity' in text
-    assert 'singularity_margin_wrist asks for 0.05 rad' in text
+    assert 'less than singularity_margin_wrist = 0.05 rad' in text
 
 
 def test_a_wrist_cannot_flip_on_a_line_and_can_with_a_joint_move(make_cell):
@@ -374,7 +376,7 @@ def test_a_first_point_at_time_0_in_another_posture_is_refused(cell):
 def test_the_same_goal_can_be_sent_again_where_it_ended(cell):
     goal = Goal(waypoints=(cell.point(time=1.0), cell.point(0.1, time=3.0)))
     made = plan(goal, cell.state, cell.arm, OPTIONS)
-    assert 'the robot stands there already; its 1 s are not waited' in made.remarks[0]
+    assert 'the robot is already there; it does not wait 1 s' in made.remarks[0]
     assert made.segments[0].duration < 0.01
     one = plan(Goal(waypoints=(cell.point(),)), cell.state, cell.arm, OPTIONS)
     assert len(one.segments) == 1
@@ -385,7 +387,7 @@ def test_a_joint_move_to_where_the_arm_is_is_refused(cell):
         waypoints=(cell.point(0.1), cell.point(0.1)),
         segments=(Segment(), Segment(type=TYPE.JOINT)),
     )
-    assert 'is the same as points[0]' in refusal(InvalidGoal, cell, goal)
+    assert 'duplicates points[0]' in refusal(InvalidGoal, cell, goal)
 
 
 def test_a_robot_that_is_not_where_its_kinematics_puts_it_gets_no_plan(cell):
@@ -417,7 +419,7 @@ def test_everything_that_is_ignored_is_said(cell):
         'point 4: acceleration is ignored',
         'points 0, 1, 2, 3: jerk is ignored',
         'points 0, 1, 2, 3: the acceleration of',
-        'point 4: the blend is ignored: the last',
+        'point 4: blend_radius is ignored: the last',
     ):
         assert any(remark.startswith(text) for remark in remarks), text
 

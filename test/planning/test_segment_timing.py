@@ -93,7 +93,7 @@ def test_speed_comes_from_the_segment_else_the_twist_else_the_default(cell):
 def test_a_line_that_turns_more_than_it_moves_is_sent_with_a_time(cell):
     segment, _ = one(cell, x=0.1, turn=(0.0, 0.0, pi / 2))
     assert segment.primitive.duration == pytest.approx(1.5 * (pi / 2) / 0.5)
-    assert 'it turns on the way' in segment.note
+    assert 'turn within angular_velocity' in segment.report_line
 
 
 @pytest.mark.parametrize('kind', [TYPE.LINEAR, TYPE.PROCESS])

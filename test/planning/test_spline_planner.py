@@ -180,9 +180,7 @@ def test_points_with_accelerations_make_quintic_pieces_others_cubic_ones(cell):
             for segment in made.segments
         )
         kind = 'quintic' if accelerations else 'cubic'
-        assert any(
-            f' {kind} pieces, along which the tool stays within' in line for line in made.report
-        )
+        assert any(f' {kind} pieces, which keep the tool within' in line for line in made.report)
 
 
 def test_times_of_pieces_are_whole_microseconds_and_do_not_drift(cell):
@@ -206,7 +204,7 @@ def test_each_piece_leads_to_its_point_and_the_last_one_of_a_point_says_so(cell)
     points = [segment.waypoint for segment in made.segments]
     assert points == sorted(points)
     assert set(points) == {0, 1, 2, 3}
-    notes = [segment.note for segment in made.segments if segment.note]
+    notes = [segment.report_line for segment in made.segments if segment.report_line]
     assert [note.split(':')[0] for note in notes] == [f'point {k}' for k in range(4)]
     assert sum(segment.length for segment in made.segments) == pytest.approx(
         np.linalg.norm(np.diff(made.reference.poses[:, :3], axis=0), axis=1).sum()
@@ -282,7 +280,7 @@ def test_a_point_without_twist_is_a_stop_and_the_report_says_so(cell):
         in made.report
     )
     assert 'stops there' in made.report[1]
-    assert 'passes it' in made.report[0]
+    assert 'passes through' in made.report[0]
 
 
 def test_nan_is_chosen_and_the_report_says_so(cell):
@@ -297,8 +295,8 @@ def test_nan_is_chosen_and_the_report_says_so(cell):
     assert all(any(segment.primitive.velocities) for segment in made.segments[:-1])
     for field in ('twist', 'acceleration'):
         assert (
-            f'points 0, 1, 2: {field} is NaN, so it is chosen, to fit the points around'
-            in made.report
+            f'points 0, 1, 2: {field} is NaN, so the driver chooses it to fit the neighbouring '
+            'points' in made.report
         )
 
 
@@ -358,7 +356,7 @@ def test_a_point_out_of_reach_is_refused_with_the_place(cell):
         replace(OPTIONS, max_approach_distance=0.0, singularity_margin_elbow=0.0),
     )
     assert text.startswith('trajectory.points[0].pose, ')
-    assert '% of the way to it, cannot be reached' in text
+    assert '% of its segment, cannot be reached' in text
 
 
 def test_a_curve_that_leaves_the_reach_between_its_points_is_refused(cell):
@@ -388,7 +386,7 @@ def test_a_singularity_on_the_curve_is_refused_with_value_and_bound(cell):
     )
     text = refused(NearSingularity, cell, goal)
     assert 'wrist singularity' in text
-    assert 'singularity_margin_wrist asks for 0.05 rad' in text
+    assert 'less than singularity_margin_wrist = 0.05 rad' in text
     assert 'PRIMITIVES with a JOINT segment' in text
 
 
@@ -451,7 +449,8 @@ def test_a_joint_at_the_end_of_its_range_is_refused(make_cell):
         except JointLimitExceeded as error:
             texts.append(str(error))
     assert len(texts) == 1
-    assert 'wrist_3_joint out of its range' in texts[0]
+    assert 'moves wrist_3_joint to ' in texts[0]
+    assert 'outside its range' in texts[0]
     assert 'use PRIMITIVES with a JOINT segment.' in texts[0]
     assert texts[0].startswith('trajectory.points[0].pose, ')
 
@@ -470,23 +469,22 @@ def test_a_posture_that_the_curve_does_not_arrive_in_is_refused(cell):
         (
             {'x': 0.4, 'time': 1.5},
             {},
-            r'the tool needs 0\.\d+ m/s, and allowed are 0.250 m/s '
-            r'\(max_tool_speed\)',
+            r'the tool needs 0\.\d+ m/s, more than max_tool_speed = 0.250 m/s',
         ),
         (
             {'x': 0.1, 'time': 0.3},
             {'max_tool_speed': 0.0, 'max_linear_acceleration': 2.0},
-            r'the tool needs \d+\.\d+ m/s\^2, and allowed are 2.000 m/s\^2 \(max_linear_accel',
+            r'the tool needs \d+\.\d+ m/s\^2, more than max_linear_acceleration = 2.000 m/s\^2',
         ),
         (
             {'turn': (0.0, 0.0, 2.0), 'time': 0.5},
             {'max_angular_acceleration': 1000.0, 'max_joint_acceleration': 1000.0},
-            r'wrist_3_joint needs \d+\.\d+ rad/s, and allowed are 3.142 rad/s \(the limit',
+            r'wrist_3_joint needs \d+\.\d+ rad/s, more than the joint speed limit = 3.142 rad/s',
         ),
         (
             {'turn': (0.0, 0.0, 0.5), 'time': 0.3},
             {'max_joint_acceleration': 10.0},
-            r'_joint needs \d+\.\d+ rad/s\^2, and allowed are 10.000 rad/s\^2 \(max_joint',
+            r'_joint needs \d+\.\d+ rad/s\^2, more than max_joint_acceleration = 10.000',
         ),
     ],
 )
@@ -508,7 +506,7 @@ def test_slow_stretches_all_times_and_keeps_the_way(cell):
             for point in goal.waypoints
         ),
     )
-    assert '(max_tool_speed)' in refused(TooFast, cell, fast)
+    assert 'more than max_tool_speed = ' in refused(TooFast, cell, fast)
     made = plan(fast, cell.state, cell.arm, replace(OPTIONS, on_too_fast='slow'))
     factor = made.duration / fast.waypoints[-1].time
     assert factor > 1.0
@@ -625,7 +623,7 @@ def test_a_motion_in_two_parts_is_the_motion_in_one(cell, accelerations):
         assert a.primitive.target == pytest.approx(b.primitive.target, abs=1e-7)
         assert a.primitive.velocities == pytest.approx(b.primitive.velocities, abs=1e-7)
         assert a.duration == pytest.approx(b.duration, abs=1e-9)
-    assert rest.segments[-1].note.startswith('point 5: ')
+    assert rest.segments[-1].report_line.startswith('point 5: ')
 
 
 def test_an_open_goal_may_be_planned_to_end_moving(cell):
@@ -637,7 +635,7 @@ def test_an_open_goal_may_be_planned_to_end_moving(cell):
     assert tool_rates(cell.arm, cell.T_flange_tcp, q, qd, qdd)[0][0] == pytest.approx(
         goal.waypoints[-1].twist, abs=1e-6
     )
-    assert 'passes it' in part.segments[-1].note
+    assert 'passes through' in part.segments[-1].report_line
 
 
 def test_what_is_planned_in_parts_is_not_slowed(cell):
@@ -645,7 +643,7 @@ def test_what_is_planned_in_parts_is_not_slowed(cell):
     slow = replace(OPTIONS, on_too_fast='slow')
     start = SplineState(q=cell.state.actual_q, qd=(0.1,) * 6)
     fast = replace(goal, waypoints=(replace(goal.waypoints[0], time=0.1),))
-    text = r'give all points \d+\.\d+ times the time \(and twists and accelerations to match\)\.$'
+    text = r'multiply all times by \d+\.\d+ \(and adapt twists and accelerations\)\.$'
     with pytest.raises(TooFast, match=text):
         plan_spline(start, fast, cell.arm, cell.T_flange_tcp, slow)
     with pytest.raises(TooFast, match=text):
@@ -673,7 +671,9 @@ def test_a_closing_piece_keeps_to_the_range_of_a_joint_or_is_refused(cell):
     piece = plan_stop(state, cell.arm, 4.0)
     assert piece.target[5] <= 2.0 * pi
     assert piece.duration < 1.5 / 4.0
-    with pytest.raises(JointLimitExceeded, match='wrist_3_joint is so near to the end'):
+    with pytest.raises(
+        JointLimitExceeded, match='wrist_3_joint is too fast to stop before the end of its range'
+    ):
         plan_stop(replace(state, q=(*q[:5], 2.0 * pi - 1e-4)), cell.arm, 4.0)
 
 
@@ -728,4 +728,7 @@ def test_the_state_at_the_end_of_a_plan_is_where_it_can_be_continued():
     assert (end.time, end.is_moving) == (pytest.approx(2.0), False)
     assert isinstance(made.segments[-1].primitive, Spline)
     assert end.q == made.segments[-1].joints
-    assert 'point 0: the acceleration of the segment is ignored: its time counts' in made.report
+    assert (
+        'point 0: the acceleration of the segment is ignored: its time sets the speed'
+        in made.report
+    )

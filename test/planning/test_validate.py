@@ -93,7 +93,7 @@ REFUSALS = [
         'segments has 2 entries for 3 points',
     ),
     # unknown numbers
-    (replace(PLAIN, execution=7), InvalidGoal, 'execution is 7, which is none of AUTO = 0'),
+    (replace(PLAIN, execution=7), InvalidGoal, 'execution is 7; allowed are AUTO = 0'),
     (with_segment(PLAIN, 1, type=9), InvalidGoal, 'segments[1].type is 9'),
     (with_segment(PLAIN, 1, **ARC, arc_mode=2), InvalidGoal, 'segments[1].arc_mode is 2'),
     # not finite
@@ -168,13 +168,13 @@ REFUSALS = [
     (with_segment(PLAIN, 1, acceleration=-1.0), InvalidGoal, 'segments[1].acceleration is -1'),
     (with_segment(PLAIN, 1, blend_radius=-0.01), InvalidGoal, 'segments[1].blend_radius is -0.01'),
     # stamps
-    (replace(PLAIN, age=1.5), OldHeaderTimestamp, 'header.stamp lies 1.500 s in the past'),
-    (replace(PLAIN, age=-61.0), InvalidGoal, 'trajectory.header.stamp lies 61.0 s in the future'),
+    (replace(PLAIN, age=1.5), OldHeaderTimestamp, 'header.stamp is 1.500 s old'),
+    (replace(PLAIN, age=-61.0), InvalidGoal, 'trajectory.header.stamp is 61.0 s in the future'),
     # not there yet
     (
         replace(TIMED, keep_open=True, execution=ExecutionMode.SERVO),
         NotAvailable,
-        'keep_open is set, but the points of a SERVO goal have to be known',
+        'keep_open is set, but a SERVO goal needs all its points at the start',
     ),
     (
         replace(
@@ -187,7 +187,7 @@ REFUSALS = [
             ),
         ),
         NotAvailable,
-        'io_commands is not empty, and SERVO switches no outputs',
+        'io_commands is not empty, but SERVO switches no outputs',
     ),
     (
         replace(PLAIN, controlled_frame='nozzle'),
@@ -198,40 +198,44 @@ REFUSALS = [
     (
         replace(PLAIN, execution=ExecutionMode.SPLINE),
         InvalidGoal,
-        'execution is SPLINE, and the goal has no times',
+        'execution is SPLINE, which needs times',
     ),
     (
         replace(PLAIN, execution=ExecutionMode.SERVO),
         InvalidGoal,
-        'execution is SERVO, and the goal has no times',
+        'execution is SERVO, which needs times',
     ),
     (
         with_point(with_point(TIMED, 0, twist=ONE), 2, twist=ONE),
         InvalidGoal,
-        'trajectory.points[2].twist is not zero, but the motion ends there',
+        'trajectory.points[2].twist is not zero, but the motion ends at rest there',
     ),
     (
         with_point(SPLINE, 2, acceleration=ONE),
         InvalidGoal,
-        'trajectory.points[2].acceleration is not zero, but the motion ends there',
+        'trajectory.points[2].acceleration is not zero, but the motion ends at rest there',
     ),
     (
         with_point(SPLINE, 0, time=0.0, twist=ONE),
         InvalidGoal,
-        'trajectory.points[0].twist is not zero, but the robot stands there',
+        'trajectory.points[0].twist is not zero, but the motion starts at rest there',
     ),
     (
         with_segment(SPLINE, 1, type=TYPE.JOINT),
         InvalidGoal,
-        'segments[1].type is JOINT, but the execution is SPLINE',
+        'segments[1].type is JOINT, but with execution SPLINE',
     ),
     (with_segment(SPLINE, 1, **ARC), InvalidGoal, 'segments[1].type is CIRCULAR, but'),
     (
         with_segment(SPLINE, 1, blend_radius=0.01),
         InvalidGoal,
-        'segments[1].blend_radius is 0.01, but the execution is SPLINE',
+        'segments[1].blend_radius is 0.01, but with execution SPLINE',
     ),
-    (with_segment(SPLINE, 1, velocity=0.1), InvalidGoal, 'segments[1].velocity is 0.1 in a goal'),
+    (
+        with_segment(SPLINE, 1, velocity=0.1),
+        InvalidGoal,
+        'segments[1].velocity is 0.1, but the times',
+    ),
     (
         with_point(SPLINE, 1, time=1.0005),
         InvalidGoal,
@@ -254,7 +258,7 @@ REFUSALS = [
     (
         replace(with_point(TIMED, 2, time=2.0), execution=ExecutionMode.SPLINE),
         InvalidGoal,
-        'must increase from point to point; correct it',
+        'not later than the 2 s of points[1]; increase it.',
     ),
     (with_point(TIMED, 1, time=0.5), InvalidGoal, 'trajectory.points[1].time_from_start is 0.5 s'),
     (with_point(TIMED, 2, time=0.0), InvalidGoal, 'trajectory.points[2].time_from_start is 0 s'),
@@ -269,17 +273,17 @@ REFUSALS = [
     (
         with_segment(TIMED, 1, velocity=0.1),
         InvalidGoal,
-        'segments[1].velocity is 0.1 in a goal with times',
+        'segments[1].velocity is 0.1, but the times of the goal',
     ),
     (
         with_segment(TIMED, 1, type=TYPE.OPTIMIZED_LINEAR),
         InvalidGoal,
-        'segments[1].type is OPTIMIZED_LINEAR, which cannot keep the time',
+        'segments[1].type is OPTIMIZED_LINEAR, which cannot meet the time',
     ),
     (
         with_segment(TIMED, 1, type=TYPE.OPTIMIZED_JOINT),
         InvalidGoal,
-        'segments[1].type is OPTIMIZED_JOINT, which cannot keep the time',
+        'segments[1].type is OPTIMIZED_JOINT, which cannot meet the time',
     ),
     (
         with_segment(PLAIN, 1, type=TYPE.OPTIMIZED_JOINT, velocity=1.1),
@@ -307,7 +311,7 @@ REFUSALS = [
     (
         with_segment(PLAIN, 1, type=TYPE.CIRCULAR, via=Pose((0.15, 0.0, 0.0))),
         InvalidGoal,
-        'segments[1].via gives no arc to point 1: the start, the via and the end of the arc lie '
+        'segments[1].via defines no arc to point 1: the start, the via and the end of the arc lie '
         'on',
     ),
     (
@@ -329,22 +333,23 @@ REFUSALS = [
     (
         with_point(PLAIN, 1, posture=Posture(names=('elbow',), values=(0.0,))),
         InvalidJoints,
-        "trajectory.points[1].posture.posture_joint_names[0] is 'elbow', which is no joint",
+        "trajectory.points[1].posture.posture_joint_names[0] is 'elbow', not a joint of this "
+        'robot',
     ),
     (
         with_point(PLAIN, 1, posture=Posture(names=('elbow_joint',) * 2, values=(0.0, 0.0))),
         InvalidJoints,
-        "posture_joint_names[1] names 'elbow_joint' for the second time",
+        "posture_joint_names[1] repeats 'elbow_joint'",
     ),
     (
         with_point(PLAIN, 1, posture=Posture(names=('elbow_joint',), values=())),
         InvalidJoints,
-        'trajectory.points[1].posture has 1 joint names and 0 values',
+        'trajectory.points[1].posture has 1 joint names but 0 values',
     ),
     (
         with_point(PLAIN, 1, posture=Posture(values=(0.0,))),
         InvalidJoints,
-        'trajectory.points[1].posture has 0 joint names and 1 values',
+        'trajectory.points[1].posture has 0 joint names but 1 values',
     ),
     (
         with_point(PLAIN, 1, posture=Posture(names=('elbow_joint',), values=(inf,))),
@@ -360,25 +365,26 @@ REFUSALS = [
     (
         with_segment(PLAIN, 1, blend_radius=0.11),
         InvalidGoal,
-        'segments[1].blend_radius is too large: the blends around points 0 and 1 reach 0 mm and '
-        '110',
+        'segments[1].blend_radius is too large: the blends at points[0] and points[1] '
+        'take 0 mm and 110',
     ),
     (
         replace(
             PLAIN, segments=(Segment(blend_radius=0.06), Segment(blend_radius=0.05), Segment())
         ),
         InvalidGoal,
-        'reach 60 mm and 50 mm into a segment of 100.000 mm',
+        'take 60 mm and 50 mm of a segment of 100.000 mm',
     ),
     (
         with_point(TIMED, 1, pose=Pose((0.1, 0.0, 0.0))),
         InvalidGoal,
-        'trajectory.points[1] is the same as points[0] for 1 s',
+        'trajectory.points[1] duplicates points[0]: a UR move needs a distance to go, and the '
+        'robot cannot wait there for 1 s',
     ),
     (
         with_point(PLAIN, 1, pose=Pose((0.1, 0.0, 0.0))),
         InvalidGoal,
-        'trajectory.points[1] is the same as points[0]: there is no way to go',
+        'trajectory.points[1] duplicates points[0]: a UR move needs a distance to go; remove',
     ),
 ]
 

@@ -38,5 +38,5 @@ def test_what_is_no_plane_is_refused_in_one_sentence(text, words):
 
 
 def test_a_name_is_taken_once():
-    with pytest.raises(ValueError, match='"a" is there twice'):
+    with pytest.raises(ValueError, match='"a" appears twice'):
         parse_planes(('a 0 0 0 0 0 1', 'b 0 0 0 0 0 1', 'a 1 0 0 0 0 1'))

@@ -68,7 +68,7 @@ class PlannedSegment:
     joints: Joints
     #: One line for people: what and why; empty where the line of another piece of the same
     #: segment says it (a SPLINE takes several pieces from point to point).
-    note: str
+    report_line: str
     #: What is switched after it was begun, in this order.
     outputs: tuple[SwitchOutput, ...] = ()
 
@@ -102,7 +102,10 @@ class Plan:
     @property
     def report(self) -> tuple[str, ...]:
         """One line for each segment, then the remarks."""
-        return tuple(segment.note for segment in self.segments if segment.note) + self.remarks
+        return (
+            tuple(segment.report_line for segment in self.segments if segment.report_line)
+            + self.remarks
+        )
 
     @property
     def instructions(self) -> Iterator[Instruction]:

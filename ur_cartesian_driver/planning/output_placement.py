@@ -64,7 +64,7 @@ def place_outputs(
         key=lambda found: found.time,
     )
     outputs: list[list[SwitchOutput]] = [[] for _ in segments]
-    notes = [segment.note for segment in segments]
+    notes = [segment.report_line for segment in segments]
     for found in switches:
         outputs[found.after_index].append(found.record)
         notes[found.report_index] += f'; {found.text}'
@@ -73,11 +73,13 @@ def place_outputs(
             raise InvalidGoal(
                 'io_commands',
                 f'switches more than {MAX_PENDING_OUTPUTS} outputs between two motions, '
-                f'behind point {segment.waypoint}',
+                f'after point {segment.waypoint}',
                 'add a point in between',
             )
     return tuple(
-        replace(segment, outputs=tuple(own), note=note) if own or note != segment.note else segment
+        replace(segment, outputs=tuple(own), report_line=note)
+        if own or note != segment.report_line
+        else segment
         for segment, own, note in zip(segments, outputs, notes, strict=True)
     )
 
@@ -116,8 +118,8 @@ class _TimedPath:
         if report_index is None:
             raise InvalidGoal(
                 f'{field}.point_index',
-                f'is {command.waypoint}, and no motion leads there: the robot stands there',
-                'set the output before',
+                f'is {command.waypoint}, but no motion leads there: the robot is already there',
+                'switch the output before the goal',
             )
         time, last = float(self.ends[report_index]) + command.offset, len(self.segments) - 1
         late = time - float(self.ends[last])
@@ -164,8 +166,8 @@ class _TimedPath:
 
     def _where(self, k: int) -> str:
         if self.blend_times[k] > 0.0:
-            return 'in the middle of its corner'
-        return 'on passing it' if self._passes(k) else 'when it has stopped there'
+            return 'in the middle of its blend'
+        return 'while passing it' if self._passes(k) else 'after stopping there'
 
     def _at_point(self, k: int) -> float | None:
         """Return when the tool is nearest to the end of a motion [s], None where it stops."""

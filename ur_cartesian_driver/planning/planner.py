@@ -39,11 +39,7 @@ from ur_cartesian_driver.motion.primitive import (
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
-from ur_cartesian_driver.planning.moves.plan_report import (
-    ignored_remarks,
-    segment_note,
-    tightest_remark,
-)
+from ur_cartesian_driver.planning.moves.plan_report import segment_line, tightest_remark
 from ur_cartesian_driver.planning.moves.reference_path import reference_path
 from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
 from ur_cartesian_driver.planning.moves.segment_timing import schedule
@@ -73,6 +69,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     resolve_execution_mode,
     segment_field,
 )
+from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
 from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.planning.spline.spline_planner import (
     plan_spline,
@@ -206,17 +203,17 @@ class _Planner:
         self.goal, self.state, self.options = goal, state, options
         self.kinematics = TcpKinematics(arm, state.T_flange_tcp)
         self.remarks: list[str] = []
-        #: By point: why its primitive is not the plain one.
-        self.why: dict[int, list[str]] = {}
+        #: By point: reasons for a primitive other than the plain one.
+        self.reasons: dict[int, list[str]] = {}
         self.targets = [goal.T_base_frame @ point.pose for point in goal.waypoints]
         self.timed = is_timed(goal)
         if self.timed and options.dialect.is_coarse and not is_spline(goal):
             self.remarks.append(
-                f'all points: times are kept by speeds, because robot programs '
-                f'of wire dialect {options.dialect.name} count in milliseconds'
+                'all points: sent with speeds instead of times, because robot programs of wire '
+                f'dialect {options.dialect.name} count in milliseconds'
             )
         self.joint_path_planner = JointPathPlanner(
-            goal, self.targets, self.kinematics, options, self.remarks, self.why
+            goal, self.targets, self.kinematics, options, self.remarks, self.reasons
         )
         self._check_robot()
 
@@ -231,10 +228,9 @@ class _Planner:
         if distance > MAX_MISMATCH_POSITION or angle > MAX_MISMATCH_ANGLE:
             raise RobotNotReady(
                 f'The robot reports its TCP {1e3 * distance:.1f} mm and {angle:.3f} rad away from '
-                f'where the kinematics of a {self.kinematics.arm.model.name} puts it; '
-                'check ur_type '
-                'and the TCP. Where the software of a robot does not report its TCP (RTDE field '
-                'tcp_offset), it has to be the flange.'
+                f'where the kinematics of a {self.kinematics.arm.model.name} puts it; check '
+                'ur_type and the TCP. If the software of the robot does not report its TCP (RTDE '
+                'field tcp_offset), the TCP has to be the flange.'
             )
         self._check_approach()
 
@@ -246,8 +242,7 @@ class _Planner:
                 point_field(0, 'pose.position'),
                 f'is {distance:.3f} m away from the tool, more '
                 f'than max_approach_distance = {bound:g} m',
-                'move nearer first, or begin the '
-                'goal with points in between, or raise the parameter',
+                'move closer first, add points in between, or raise the parameter',
             )
 
     def _is_at_first_point(self) -> bool:
@@ -268,12 +263,10 @@ class _Planner:
                 f'{angle:.4f} rad away from the point (allowed are '
                 f'{options.start_tolerance_position:g} m and {options.start_tolerance_angle:g} '
                 'rad)',
-                'give the way to the first point a time',
+                'give the first point a time greater than 0',
             )
         self._check_start_posture()
-        self.remarks.append(
-            'point 0: at time 0 and where the robot stands, so nothing is sent for it'
-        )
+        self.remarks.append('point 0: the robot is there at time 0, so nothing is sent for it')
         return True
 
     def _check_start_posture(self) -> None:
@@ -288,8 +281,8 @@ class _Planner:
             near = self.kinematics.nearest(self.targets[0], q, point_field(0, 'pose'))
             if clause := describe_miss(near, chosen, named):
                 raise InvalidPosture(
-                    f'{point_field(0, "posture")} is not the one in which the '
-                    f'robot stands: {clause}; give the first point a time.'
+                    f'{point_field(0, "posture")} is not the one in which the robot stands: '
+                    f'{clause}; give the first point a time greater than 0.'
                 )
 
     def begin(self) -> int:
@@ -311,11 +304,11 @@ class _Planner:
 
     def segment(self, geometry: SegmentGeometry, timing: SegmentTiming) -> PlannedSegment:
         """Return the primitive of a leg and what is expected of it."""
-        primitive, why = adapt_to_dialect(
+        primitive, reason = adapt_to_dialect(
             self._primitive(geometry, timing), geometry.index, geometry.joints, self.options
         )
-        if why:
-            self.why.setdefault(geometry.index, []).append(why)
+        if reason:
+            self.reasons.setdefault(geometry.index, []).append(reason)
         return PlannedSegment(
             primitive=primitive,
             waypoint=geometry.index,
@@ -323,7 +316,9 @@ class _Planner:
             angle=geometry.curve.angle,
             duration=timing.duration,
             joints=geometry.joints,
-            note=segment_note(geometry, timing, primitive, self.why.get(geometry.index, ())),
+            report_line=segment_line(
+                geometry, timing, primitive, self.reasons.get(geometry.index, ())
+            ),
         )
 
     def _primitive(self, geometry: SegmentGeometry, timing: SegmentTiming) -> Primitive:
@@ -411,11 +406,11 @@ class _Planner:
         ]
         if wanted and (reason := explain_poses_only(self.options)):
             self.remarks.append(
-                f'point {geometry.index}: sent as poses in spite of the posture of '
+                f'point {geometry.index}: sent as poses despite the posture of '
                 f'{" and ".join(wanted)}, because {reason}'
             )
         elif wanted:
-            self.why.setdefault(geometry.index, []).append(
+            self.reasons.setdefault(geometry.index, []).append(
                 f'{" and ".join(wanted)} {"has" if len(wanted) == 1 else "have"} a posture'
             )
             target = geometry.joints if geometry.waypoint.posture else target
@@ -444,9 +439,8 @@ class _Planner:
         chosen = self.kinematics.solve_posture(via, named, q, location)
         if clause := describe_miss(q, chosen, named):
             raise InvalidPosture(
-                f'{segment_field(geometry.index, "via_posture")} is not the configuration in '
-                'which '
-                f'the arm goes along the arc: {clause}; leave it empty, or go to the start of '
-                'the arc in that configuration.'
+                f'{segment_field(geometry.index, "via_posture")} is not the configuration of the '
+                f'arm on the arc: {clause}; leave it empty, or start the arc in that '
+                'configuration.'
             )
         return chosen

@@ -66,5 +66,7 @@ def parse_planes(texts: tuple[str, ...]) -> tuple[Plane, ...]:
     names = [plane.name for plane in planes]
     for name in names:
         if names.count(name) > 1:
-            raise ValueError(f'workspace_planes: "{name}" is there twice.')
+            raise ValueError(
+                f'workspace_planes: "{name}" appears twice; give each plane a name of its own.'
+            )
     return planes

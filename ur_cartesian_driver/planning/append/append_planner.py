@@ -38,11 +38,11 @@ from ur_cartesian_driver.planning.append.appendable_goal import (
 )
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.pose_rows import keep_hemisphere
-from ur_cartesian_driver.planning.moves.plan_report import ignored_remarks
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.output_placement import place_outputs
 from ur_cartesian_driver.planning.planner import plan as plan_goal
 from ur_cartesian_driver.planning.request.controlled_frame import retarget_to_tcp, tool_tips
+from ur_cartesian_driver.planning.request.ignored_fields import ignored_remarks
 from ur_cartesian_driver.planning.request.validate import check
 from ur_cartesian_driver.planning.spline.spline_planner import (
     end_state,
@@ -217,7 +217,9 @@ def _renumber_plan(new_plan: Plan, first: int, waypoint: int, start_time: float)
     return replace(
         new_plan,
         segments=tuple(
-            replace(s, waypoint=s.waypoint + first, note=_renumber_text(s.note, first))
+            replace(
+                s, waypoint=s.waypoint + first, report_line=_renumber_text(s.report_line, first)
+            )
             for s in new_plan.segments[len(left_out) :]
         ),
         reference=ReferencePath(
@@ -512,7 +514,7 @@ def _place_outputs(
     ends, now = {}, start_time
     # A piece to rest leads to no point: what is due on it is due behind the last one.
     last = new_plan.segments[-1]
-    closes = not last.note and last.length == 0.0
+    closes = not last.report_line and last.length == 0.0
     segments = [replace(segment, outputs=()) for segment in new_plan.segments]
     if closes:
         segments[-1] = replace(segments[-1], waypoint=last.waypoint + 1)
@@ -540,7 +542,7 @@ def _place_outputs(
     return replace(
         new_plan,
         segments=tuple(
-            replace(segment, waypoint=old.waypoint, note=old.note)
+            replace(segment, waypoint=old.waypoint, report_line=old.report_line)
             for segment, old in zip(found, new_plan.segments, strict=True)
         ),
     ), end_time
@@ -597,7 +599,7 @@ def _with_stop(
                 angle=0.0,
                 duration=piece.duration,
                 joints=piece.target if isinstance(piece.target, tuple) else end.q,
-                note='',
+                report_line='',
             ),
         ),
         reference=ReferencePath(

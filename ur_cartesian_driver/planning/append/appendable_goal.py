@@ -14,6 +14,7 @@ from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.request.io_commands import check_outputs
+from ur_cartesian_driver.planning.request.validate import check_list_lengths
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
 
@@ -78,25 +79,19 @@ def check_appended_points(
     :raises GoalRefused: with the reason; points are numbered from the start of the goal.
     """
     count, first = len(appended.waypoints), appendable.points
-    if not count:
-        raise InvalidGoal('points', 'is empty', 'give at least one point, or set last')
-    if count > options.max_points:
-        raise InvalidGoal(
-            'points',
-            f'has {count} points, more than max_points = {options.max_points}',
-            'append them in several requests',
-        )
-    if appended.segments and len(appended.segments) != count:
-        raise InvalidGoal(
-            'segments',
-            f'has {len(appended.segments)} entries for {count} points',
-            'give none, or exactly one for each point',
-        )
+    check_list_lengths(
+        'points',
+        count,
+        len(appended.segments),
+        options,
+        if_empty='give at least one point, or set last',
+        if_too_many='append them in several requests',
+    )
     for i, command in enumerate(appended.io_commands):
         if not first <= command.waypoint < first + count:
             raise InvalidGoal(
                 f'io_commands[{i}].point_index',
-                f'is {command.waypoint}, and the points of this '
+                f'is {command.waypoint}, but the points of this '
                 f'request are {first} to {first + count - 1}',
                 'name one of these',
             )
@@ -126,16 +121,13 @@ def _check_times(appendable: AppendableGoal, appended: AppendedPoints) -> None:
         if appendable.last_client_time == 0.0 and appendable.points > 1:
             raise InvalidGoal(
                 point_field(i, 'time_from_start'),
-                f'is {point.time:g} s, and the points before '
-                'have no times: speeds count in this goal',
-                'leave it 0 in all points',
+                f'is {point.time:g} s, but the points before have no times',
+                'set it to 0 in all points',
             )
         if point.time <= before:
             raise InvalidGoal(
                 point_field(i, 'time_from_start'),
-                f'is {point.time:g} s, and the point before it '
-                f'has {before:g} s; times must increase from point to point, also in what is '
-                'appended',
-                'count them from the start of the goal',
+                f'is {point.time:g} s, not later than the {before:g} s of the point before',
+                'count times from the start of the goal',
             )
         before = point.time

@@ -19,7 +19,6 @@ import numpy as np
 from ur_cartesian_driver.kinematics.inverse_rows import nearest_rows
 from ur_cartesian_driver.motion.errors import (
     GoalRefused,
-    InvalidGoal,
     InvalidPosture,
     JointLimitExceeded,
     NearSingularity,
@@ -58,12 +57,13 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
     named_joints,
     TcpKinematics,
 )
+from ur_cartesian_driver.planning.request.blend_limits import check_blend_parameters
 from ur_cartesian_driver.planning.request.goal_fields import (
     DEFAULT_SEGMENT,
     point_field,
     segment_field,
 )
-from ur_cartesian_driver.planning.request.validate import no_motion_error
+from ur_cartesian_driver.planning.request.validate import duplicate_point_error
 
 #: Solutions that differ by less are one [rad].
 SAME_SOLUTION = 1e-6
@@ -84,7 +84,7 @@ class JointPathPlanner:
     :param targets: the poses of all waypoints in base.
     :param begin: the first waypoint to go to.
     :param remarks: what is changed or ignored is added to these,
-    :param why: and to these, by waypoint, why a primitive is not the plain one.
+    :param reasons: by waypoint, for a primitive other than the plain one; added to.
     """
 
     def __init__(
@@ -94,11 +94,11 @@ class JointPathPlanner:
         kinematics: TcpKinematics,
         options: PlanningOptions,
         remarks: list[str],
-        why: dict[int, list[str]],
+        reasons: dict[int, list[str]],
     ) -> None:
         """Take what the legs are made of."""
         self.goal, self.targets, self.kinematics, self.options = goal, targets, kinematics, options
-        self.remarks, self.why = remarks, why
+        self.remarks, self.reasons = remarks, reasons
         self.path_margins = PathMargins(kinematics.arm)
         self._draft_builder = SegmentDraftBuilder(goal, targets, options, remarks)
         self._max_path_length = max_path_length(kinematics)
@@ -280,7 +280,7 @@ class JointPathPlanner:
         flips = self.kinematics.describe_flips(q, chosen)
         return InvalidPosture(
             f'{point_field(draft.index, "posture")} cannot be reached by a straight or circular '
-            f'move: {clause}{f", which takes {flips}" if flips else ""}; use a JOINT segment, or '
+            f'move: {clause}{f", which needs {flips}" if flips else ""}; use a JOINT segment, or '
             'set on_posture_change to movej.'
         )
 
@@ -291,12 +291,12 @@ class JointPathPlanner:
             raise refusal
         self.remarks.append(
             f'point {draft.index}: JOINT instead of {draft.kind.name} '
-            f'(on_posture_change = movej), because otherwise: {refusal}'
+            f'(on_posture_change = movej), which would be refused: {refusal}'
         )
-        self.why.setdefault(draft.index, []).append(
+        self.reasons.setdefault(draft.index, []).append(
             'the posture needs a joint move'
             if isinstance(refusal, InvalidPosture)
-            else 'there is no straight way'
+            else 'there is no straight path'
         )
         draft.kind, draft.curve, draft.blend_before = _JOINT, None, None
         if n + 1 < len(self._drafts) and self._drafts[n + 1].curve is not None:
@@ -404,13 +404,8 @@ class JointPathPlanner:
 
     def _check_overlap(self, n: int) -> None:
         draft = self._drafts[n]
-        if draft.curve is not None and draft.u_join > self._end(n) + 1e-9:
-            raise InvalidGoal(
-                segment_field(draft.index, 'blend_radius'),
-                f'is too large: the blends at both ends of the segment to '
-                f'point {draft.index} overlap',
-                'make them smaller',
-            )
+        if draft.curve is not None:
+            check_blend_parameters(draft.index, draft.u_join, self._end(n))
 
     def _remark_stops(self) -> None:
         for n, draft in enumerate(self._drafts[:-1]):
@@ -459,10 +454,10 @@ class JointPathPlanner:
         """Return the leg to a first point at which the robot stands; others are refused."""
         i = geometry.index
         if i > 0:
-            raise no_motion_error(self.goal, i)
-        wait_clause = f'; its {geometry.time:g} s are not waited' if geometry.time else ''
-        self.remarks.append(f'point 0: the robot stands there already{wait_clause}')
-        self.why[0] = ['the robot stands there already']
+            raise duplicate_point_error(self.goal, i)
+        wait_clause = f'; it does not wait {geometry.time:g} s' if geometry.time else ''
+        self.remarks.append(f'point 0: the robot is already there{wait_clause}')
+        self.reasons[0] = ['the robot is already there']
         kind = geometry.kind if geometry.kind == _JOINT else SegmentType.LINEAR
         return replace(
             geometry,

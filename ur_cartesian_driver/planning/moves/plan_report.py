@@ -1,112 +1,48 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a plan says to people: a line for each segment, and what was ignored or changed."""
+"""The report of a plan: a line for each segment, and the tightest margin of the goal."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from math import degrees
 
-from ur_cartesian_driver.motion.goal import Goal, SegmentType
+from ur_cartesian_driver.motion.goal import SegmentType
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, OptimoveJ, Primitive
 from ur_cartesian_driver.planning.geometry.curves import JointLineCurve
 from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
-from ur_cartesian_driver.planning.request.goal_fields import is_optimized, is_timed, segment_of
-
-#: How many points a remark lists before it counts the rest.
-_MAX_LISTED = 5
+from ur_cartesian_driver.planning.request.goal_fields import is_optimized
 
 
-def segment_note(
-    geometry: SegmentGeometry, timing: SegmentTiming, primitive: Primitive, why: Sequence[str]
+def segment_line(
+    geometry: SegmentGeometry, timing: SegmentTiming, primitive: Primitive, reasons: Sequence[str]
 ) -> str:
     """
     Return the line of one segment.
 
-    :param why: reasons for the choice of the primitive, before the reason for its speed.
+    :param reasons: for the choice of the primitive.
     """
     asked = SegmentType(geometry.segment.type).name
+    because = f' because {" and ".join(reasons)}' if reasons else ''
     parts = [
-        f'point {geometry.index}: {asked} -> {_name(primitive)} '
-        f'{_extent(geometry)} in {_duration(geometry, timing)}'
+        f'point {geometry.index}: {asked} -> {_name(primitive)}{because}',
+        f'{_extent(geometry)} in {_duration(geometry, timing)}',
     ]
     if geometry.blend_after is not None:
         parts.append(f'blend {1e3 * geometry.blend_after.radius:g} mm')
-    parts.append('because ' + ' and '.join([*why, timing.reason]))
-    return f'{", ".join(parts)}; nearest: {geometry.tightest_margin}'
+    parts.append(timing.source)
+    return f'{", ".join(parts)}; margin {geometry.tightest_margin}'
 
 
 def tightest_remark(geometries: Sequence[SegmentGeometry]) -> str:
-    """Return the remark about what comes nearest to its bound in the whole goal."""
+    """Return the remark about the tightest margin of the goal."""
     geometry = min(geometries, key=lambda geometry: geometry.tightest_margin.normalized)
-    return f'nearest of all: {geometry.tightest_margin} of the way to point {geometry.index}'
-
-
-def ignored_remarks(goal: Goal, first: int = 0) -> list[str]:
-    """Return a remark for all that has no effect in a checked goal; points count from first."""
-    remarks: list[str] = []
-    timed = is_timed(goal)
-    points = list(enumerate(goal.waypoints, first))
-    if timed:
-        add_remark(
-            remarks,
-            [i for i, p in points if any(p.twist)],
-            'twist is ignored: UR motion commands stop or blend at a point',
-        )
-    else:
-        add_remark(
-            remarks,
-            [i for i, p in points if any(p.twist) and not _takes_twist(goal, i - first)],
-            'twist is ignored: the segment has a velocity of its own, or no speed of the tool',
-        )
-    add_remark(
-        remarks,
-        [i for i, p in points if any(p.acceleration)],
-        'acceleration is ignored: UR motion commands cannot meet it',
-    )
-    add_remark(
-        remarks, [i for i, p in points if any(p.jerk)], 'jerk is ignored: no robot motion takes it'
-    )
-    if timed:
-        add_remark(
-            remarks,
-            [
-                i
-                for i, s in enumerate(goal.segments, first)
-                if s.acceleration > 0.0
-                and s.type in (SegmentType.AUTO, SegmentType.LINEAR, SegmentType.JOINT)
-            ],
-            'the acceleration of the segment is ignored: its time counts',
-        )
-    if goal.segments and goal.segments[-1].blend_radius > 0.0 and not goal.keep_open:
-        remarks.append(
-            f'point {points[-1][0]}: the blend is ignored: the last point is never blended'
-        )
-    return remarks
-
-
-def _takes_twist(goal: Goal, index: int) -> bool:
-    segment = segment_of(goal, index)
-    return (
-        segment.velocity == 0.0
-        and segment.type != SegmentType.JOINT
-        and not is_optimized(segment.type)
-    )
-
-
-def add_remark(remarks: list[str], points: list[int], what: str) -> None:
-    """Add the remark about some points, none if there are no such points."""
-    if not points:
-        return
-    listed = ', '.join(str(i) for i in points[:_MAX_LISTED])
-    more = f' and {len(points) - _MAX_LISTED} more' if len(points) > _MAX_LISTED else ''
-    word = 'point' if len(points) == 1 else 'points'
-    remarks.append(f'{word} {listed}{more}: {what}')
+    return f'tightest margin: {geometry.tightest_margin} of the segment to point {geometry.index}'
 
 
 def _name(primitive: Primitive) -> str:
-    """Return the robot's name of the motion, with the kinds of its targets."""
+    """Return the motion type of the primitive, with the kinds of its targets."""
     name = type(primitive).__name__.upper()
     if isinstance(primitive, MoveC):
         kinds = [
@@ -126,12 +62,12 @@ def _extent(geometry: SegmentGeometry) -> str:
 def _duration(geometry: SegmentGeometry, timing: SegmentTiming) -> str:
     about = 'about ' if is_optimized(geometry.kind) else ''
     if geometry.curve.length > 1e-6:
-        speed = f'{geometry.curve.length / max(timing.duration, 1e-9):.3f} m/s on average'
+        speed = f'{geometry.curve.length / max(timing.duration, 1e-9):.3f} m/s mean'
     elif isinstance(geometry.curve, JointLineCurve):  # another posture of the same pose
         speed = (
-            f'{max(geometry.curve.travel) / max(timing.duration, 1e-9):.3f} rad/s of the leading '
-            'joint on average'
+            f'{geometry.curve.joint_travel / max(timing.duration, 1e-9):.3f} rad/s mean of the '
+            'leading joint'
         )
     else:
-        speed = f'{geometry.curve.angle / max(timing.duration, 1e-9):.3f} rad/s on average'
+        speed = f'{geometry.curve.angle / max(timing.duration, 1e-9):.3f} rad/s mean'
     return f'{about}{timing.duration:.3f} s ({speed})'

@@ -25,9 +25,9 @@ from ur_cartesian_driver.planning.geometry.curves import (
     SegmentCurve,
 )
 from ur_cartesian_driver.planning.options import PlanningOptions
-from ur_cartesian_driver.planning.request.dialect_adaptation import adapt_blend_radius
+from ur_cartesian_driver.planning.request.blend_limits import check_blends_fit, round_blend_radius
 from ur_cartesian_driver.planning.request.goal_fields import point_field, segment_of
-from ur_cartesian_driver.planning.request.validate import arc_through_via, check_blends_fit
+from ur_cartesian_driver.planning.request.validate import arc_through_via
 
 _LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
@@ -109,7 +109,7 @@ class SegmentDraftBuilder:
             radius = (
                 0.0
                 if i == last
-                else adapt_blend_radius(
+                else round_blend_radius(
                     segment.blend_radius, i, self._options.dialect, self._remarks
                 )
             )
@@ -129,9 +129,8 @@ class SegmentDraftBuilder:
         if turn > pi - HALF_TURN and not follows_arc:
             raise InvalidGoal(
                 point_field(i, 'pose.orientation'),
-                f'turns the tool by {degrees(turn):.2f} '
-                'degrees on the way, and either way round is as short: nobody can tell which the '
-                'robot takes',
+                f'turns the tool by {degrees(turn):.2f} degrees, so that the direction of the '
+                'rotation is ambiguous',
                 'add a point in between, or use a JOINT segment',
             )
         if draft.kind != SegmentType.CIRCULAR:
@@ -143,8 +142,8 @@ class SegmentDraftBuilder:
         off = arc.end.angle_to(self._targets[i])
         if off > self._options.start_tolerance_angle:
             self._remarks.append(
-                f'point {i}: the orientation of the point is ignored, because arc_mode FIXED '
-                f'keeps it to the tangent; it arrives {degrees(off):.1f} degrees off'
+                f'point {i}: the orientation is ignored, because arc_mode FIXED turns the tool '
+                f'with the arc; it arrives {degrees(off):.1f} degrees off'
             )
         return arc
 
@@ -155,7 +154,7 @@ class SegmentDraftBuilder:
         if is_same_pose(start, target) and not self._goal.waypoints[first.index].posture:
             first.radius = 0.0  # the robot stands there already, and the report says so
             return
-        check_blends_fit(self._goal, first.index, start.distance_to(target), 0.0, first.radius)
+        check_blends_fit(first.index, start.distance_to(target), 0.0, first.radius)
 
 
 def can_blend(first: SegmentDraft, second: SegmentDraft) -> bool:

@@ -70,7 +70,7 @@ class SegmentTiming:
     duration: float
     #: Time in the corner after it [s], 0 without one.
     blend_time: float = 0.0
-    #: Why, as the end of "because ...".
-    reason: str = ''
+    #: Where speed or time come from, for the report.
+    source: str = ''
     #: What was changed, empty if nothing.
     remark: str = ''

@@ -41,7 +41,6 @@ MIN_SPEED = 1e-5
 #: What an OPTIMIZED move is taken to accelerate with at fraction 1 [rad/s^2]; the robot's own
 #: limits are not published. It only serves to say about how long such a move takes.
 _OPTIMIZED_JOINT_ACCELERATION = 40.0
-_FROM_TIME = 'its time_from_start says so'
 #: Motions whose messages have a time.
 _TIMED_ON_WIRE = (SegmentType.LINEAR, SegmentType.JOINT)
 #: Rounds in which speeds and the times in corners are made to agree.
@@ -116,7 +115,7 @@ def _check_wire(
             raise InvalidGoal(
                 point_field(geometry.index),
                 f'would be approached with {value:.2g} {name}, less than '
-                f'the {MIN_SPEED:g} that the robot can be told',
+                f'the {MIN_SPEED:g} that can be sent',
                 'give it less time' if geometry.time else 'raise velocity or acceleration',
             )
 
@@ -179,7 +178,7 @@ def _with_profile(
         profile=profile,
         duration=duration,
         blend_time=blend_time,
-        reason=timing.reason,
+        source=timing.source,
         remark=timing.remark,
     )
 
@@ -235,14 +234,14 @@ def _by_speed(
     model: RobotModel,
 ) -> SegmentTiming:
     """Return the timing of a leg without a time."""
-    wanted, reason = _wanted_speed(geometry, unit, options)
+    wanted, source = _wanted_speed(geometry, unit, options)
     acceleration = geometry.segment.acceleration or _default_acceleration(geometry, unit, options)
     limits = speed_limits(geometry, length, options, model)
     if not is_optimized(geometry.kind):
         acceleration = min(acceleration, limits.acceleration)
     turn_leads = geometry.kind == SegmentType.LINEAR and unit == 'rad' and translates(geometry)
     if turn_leads:
-        return _turning_line(geometry, length, wanted, acceleration, reason, options)
+        return _turning_line(geometry, length, wanted, acceleration, source, options)
     velocity = min(wanted, limits.speed)
     remark = ''
     if velocity < wanted:
@@ -267,7 +266,7 @@ def _by_speed(
         unit=unit,
         profile=profile,
         duration=profile.duration,
-        reason=reason,
+        source=source,
         remark=remark,
     )
 
@@ -275,27 +274,31 @@ def _by_speed(
 def _wanted_speed(
     geometry: SegmentGeometry, unit: str, options: PlanningOptions
 ) -> tuple[float, str]:
-    """Return the speed that the goal asks for, and the words for where it comes from."""
+    """Return the speed that the goal asks for, and where it comes from."""
     if geometry.segment.velocity > 0.0:
-        return geometry.segment.velocity, 'its velocity says so'
+        return geometry.segment.velocity, f'speed from segments[{geometry.index}].velocity'
     if is_optimized(geometry.kind):
-        return options.optimized_velocity, 'that is the default speed'
+        return options.optimized_velocity, 'speed from optimized_velocity'
     if geometry.kind == SegmentType.JOINT:
-        return options.joint_velocity, 'that is the default speed'
+        return options.joint_velocity, 'speed from joint_velocity'
     twist = geometry.waypoint.twist
     speed = hypot(*twist[:3]) if translates(geometry) else hypot(*twist[3:])
     if speed > 0.0:
-        return speed, 'its twist says so'
+        return speed, f'speed from points[{geometry.index}].twist'
     if not translates(geometry):
-        return options.angular_velocity, 'that is the default speed'
+        return options.angular_velocity, 'speed from angular_velocity'
     if unit == 'rad' and geometry.kind != SegmentType.LINEAR:
         # One number for both: as rad/s the turn may have more, but never more than the tool may.
         fastest = options.max_tool_speed or options.angular_velocity
         return (
             max(options.linear_velocity, min(options.angular_velocity, fastest)),
-            'it turns more than it moves',
+            'speed from linear_velocity and angular_velocity, as the turn leads',
         )
-    return options.linear_velocity, 'that is the default speed'
+    return options.linear_velocity, 'speed from linear_velocity'
+
+
+def _time_source(geometry: SegmentGeometry) -> str:
+    return f'time from points[{geometry.index}].time_from_start'
 
 
 def _default_acceleration(geometry: SegmentGeometry, unit: str, options: PlanningOptions) -> float:
@@ -311,7 +314,7 @@ def _turning_line(
     angle: float,
     velocity: float,
     acceleration: float,
-    reason: str,
+    source: str,
     options: PlanningOptions,
 ) -> SegmentTiming:
     """
@@ -347,7 +350,7 @@ def _turning_line(
         unit='rad',
         profile=profile,
         duration=time,
-        reason=f'{reason} and it turns on the way',
+        source=f'{source}, turn within angular_velocity',
         remark=remark,
     )
 
@@ -383,7 +386,7 @@ def _by_time(
         unit=unit,
         profile=profile,
         duration=time,
-        reason=_FROM_TIME,
+        source=_time_source(geometry),
         remark=remark,
     )
 
@@ -436,7 +439,7 @@ def _by_speed_for_time(
         unit=unit,
         profile=profile,
         duration=time,
-        reason=_FROM_TIME,
+        source=_time_source(geometry),
         remark=remark,
     )
 
@@ -456,7 +459,7 @@ def _slow_or_refuse(
             point_field(geometry.index, 'time_from_start'),
             f'gives the segment {geometry.time:.3f} s, but because of {limits.name} it takes '
             f'{min_time:.0f} s, more than max_segment_time = {options.max_segment_time:.0f} s',
-            'go around the place where it has to be slow, or use a JOINT segment',
+            'move the path away from there, or use a JOINT segment',
         )
     if options.on_too_fast == 'slow':
         return min_time, (

@@ -67,7 +67,7 @@ def speed_limits(
                 and model.max_joint_speed[k] * length / travel_of_joint < speed
             ):
                 speed = model.max_joint_speed[k] * length / travel_of_joint
-                name = f'the limit of {JOINT_NAMES[k]}, {model.max_joint_speed[k]:.3f} rad/s'
+                name = f'the speed limit of {JOINT_NAMES[k]}, {model.max_joint_speed[k]:.3f} rad/s'
         speed, name = _limit_in_blends(geometry, length, speed, name)
         return SpeedLimits(speed=speed, name=name, acceleration=options.max_joint_acceleration)
     if not is_optimized(geometry.kind):
@@ -96,8 +96,8 @@ def _limit_in_blends(
 
 def _joint_limit(speed_bound: JointSpeedBound) -> str:
     return (
-        f'the speed limits of the joints, {JOINT_NAMES[speed_bound.joint]} at '
-        f'{100.0 * speed_bound.fraction:.0f} % of the way'
+        f'the joint speed limits ({JOINT_NAMES[speed_bound.joint]} at '
+        f'{100.0 * speed_bound.fraction:.0f} % of the segment)'
     )
 
 

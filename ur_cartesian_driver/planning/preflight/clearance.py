@@ -49,7 +49,7 @@ class Violation:
     #: A clause: what is too near to what, how near, and what is asked for.
     text: str
     #: What would help.
-    help: str
+    remedy: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -131,14 +131,14 @@ def clearance_remarks(
     if clear.violation is not None:
         row = clear.violation.row
         raise CollisionPredicted(
-            f'{point_field(int(segment[row]), "pose")}, {100.0 * fraction[row]:.1f} % of the way '
-            f'to it: {clear.violation.text}; {clear.violation.help}.'
+            f'{point_field(int(segment[row]), "pose")}, at {100.0 * fraction[row]:.1f} % of its '
+            f'segment: {clear.violation.text}; {clear.violation.remedy}.'
         )
     lines = []
     if clear.warning is not None:
         row = clear.warning.row
         lines.append(
-            f'point {segment[row]}: {100.0 * fraction[row]:.1f} % of the way to it, '
+            f'point {segment[row]}: at {100.0 * fraction[row]:.1f} % of its segment '
             f'{clear.warning.text}'
         )
     if clear.description:
@@ -230,12 +230,13 @@ class _SelfCollisionChecker:
             distance = float(self._meshes.distances((a, b), q)[0])
         else:
             between = ' (measured between capsules, which are thicker than the arm)'
-            advice = '; self_collision says what happens where capsules meet'
+            advice = '; self_collision decides whether capsules refuse'
         near = f'come within {distance:.4f} m of each other' if distance > 0.0 else 'touch'
+        near += f', less than min_clearance = {self._bound:.4f} m'
         return Violation(
             row=row,
-            text=f'{a} and {b} {near}{between}, {self._bound:.4f} m is asked for',
-            help=f'take another way or posture, or lower min_clearance{advice}',
+            text=f'{a} and {b} {near}{between}',
+            remedy=f'take another path or posture, or lower min_clearance{advice}',
         )
 
 
@@ -280,18 +281,15 @@ class _PlaneChecker:
         plane, name = self._planes[number], self._names[which]
         name = 'the TCP' if name == 'TCP' else name
         if distance < -_ON_PLANE:
-            text = f'{name} goes {-distance:.4f} m beyond the workspace plane "{plane.name}"'
+            text = f'{name} is {-distance:.4f} m beyond the workspace plane "{plane.name}"'
         else:
             text = f'{name} comes within {distance:.4f} m of the workspace plane "{plane.name}"'
         if plane.margin > 0.0:
-            text += f', {plane.margin:.4f} m is asked for'
+            text += f', its margin is {plane.margin:.4f} m'
         return Violation(
             row=row,
             text=text,
-            help=(
-                'stay on the side of the plane to which its normal points, or change '
-                'workspace_planes'
-            ),
+            remedy='stay on the side to which its normal points, or change workspace_planes',
         )
 
 

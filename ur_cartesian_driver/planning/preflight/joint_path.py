@@ -234,7 +234,7 @@ def describe_location(index: int, fraction: float) -> str:
     return (
         field_name
         if fraction >= 1.0
-        else (f'{field_name}, {100.0 * fraction:.1f} % of the way to it,')
+        else f'{field_name}, at {100.0 * fraction:.1f} % of its segment,'
     )
 
 

@@ -52,21 +52,21 @@ SINGULARITY_MEASURES = (
         'wrist',
         'rad',
         'singularity_margin_wrist',
-        'wrist_2_joint from where the axes 4 and 6 are parallel',
+        'axes 4 and 6 parallel',
         1.0,
     ),
     SingularityMeasure(
         'elbow',
         'rad',
         'singularity_margin_elbow',
-        'elbow_joint from the stretched or folded arm',
+        'arm stretched or folded',
         1.0,
     ),
     SingularityMeasure(
         'shoulder',
         'm',
         'singularity_margin_shoulder',
-        'the centre of the wrist from above or below the shoulder',
+        'wrist centre above or below the shoulder',
         0.3,
     ),
 )
@@ -86,7 +86,7 @@ class TightestMargin:
 
     def __str__(self) -> str:
         """Return it as a report says it."""
-        return f'{self.name} {self.value:.3g} {self.unit} at {100.0 * self.fraction:.0f} %'
+        return f'{self.value:.3g} {self.unit} to {self.name} at {100.0 * self.fraction:.0f} %'
 
 
 def singularity_distance_rows(arm: Arm, q: Floats) -> Floats:
@@ -144,7 +144,7 @@ def near_singularity_refusal(
         where = describe_location(int(segment), float(fractions[rows[row]]))
         return NearSingularity(
             f'{where} comes within {value} {measure.unit} of the {measure.name} singularity '
-            f'({measure.meaning}), and {measure.option} asks for {bound:g} {measure.unit}; keep '
+            f'({measure.meaning}), less than {measure.option} = {bound:g} {measure.unit}; keep '
             'away from it, use a JOINT segment, or lower the parameter.'
         ), int(segment)
     return None
@@ -238,8 +238,8 @@ def margins_by_segment(
 
 def _name(kind: int, joint: int) -> str:
     if kind == len(SINGULARITY_MEASURES):
-        return f'the end of the range of {JOINT_NAMES[joint]}'
-    return SINGULARITY_MEASURES[kind].name
+        return f'the limit of {JOINT_NAMES[joint]}'
+    return f'the {SINGULARITY_MEASURES[kind].name} singularity'
 
 
 def _unit(kind: int) -> str:

@@ -108,13 +108,13 @@ class TcpKinematics:
         :param there: where the pose is, if not at the place.
         """
         T_base_flange = self.flange(T_base_tcp)
-        why = there + explain_unreachable(self.arm, T_base_flange)
+        reason = there + explain_unreachable(self.arm, T_base_flange)
         if solutions(self.arm, T_base_flange):
             return JointLimitExceeded(
-                f'{where} cannot be reached: {why}; turn the tool in another way.'
+                f'{where} cannot be reached: {reason}; turn the tool differently.'
             )
         return Unreachable(
-            f'{where} cannot be reached: {why}; check the frame and the TCP, or '
+            f'{where} cannot be reached: {reason}; check the frame and the TCP, or '
             'move the point or the robot.'
         )
 
@@ -140,16 +140,16 @@ class TcpKinematics:
                 )
                 value, _ = format_distinct(far, high if side > 0.0 else low)
                 return JointLimitExceeded(
-                    f'{where} takes {JOINT_NAMES[k]} out of its range of {low:.4f} to {high:.4f} '
-                    f'rad, as far as {value} rad; start with this joint turned back, or go there '
-                    'with a JOINT segment.'
+                    f'{where} moves {JOINT_NAMES[k]} to {value} rad, outside its range of '
+                    f'{low:.4f} to {high:.4f} rad; start with this joint turned back, or use a '
+                    'JOINT segment.'
                 )
         joint = max(range(6), key=lambda k: abs(q_next[k] - q[k]))
         return NearSingularity(
             f'{where} lies behind the {self.nearest_singularity(q)} singularity: '
-            f'{JOINT_NAMES[joint]} would have to turn '
-            f'by {degrees(abs(q_next[joint] - q[joint])):.0f} degrees at once; keep away from '
-            'it, or use a JOINT segment.'
+            f'{JOINT_NAMES[joint]} would have to jump by '
+            f'{degrees(abs(q_next[joint] - q[joint])):.0f} degrees; keep away from it, or use a '
+            'JOINT segment.'
         )
 
     def nearest_singularity(self, q: Joints) -> str:
@@ -169,7 +169,7 @@ class TcpKinematics:
         names = [
             name
             for name, x, y in zip(
-                ('a crossing of the shoulder', 'a flip of the elbow', 'a flip of the wrist'),
+                ('a flip of the shoulder', 'a flip of the elbow', 'a flip of the wrist'),
                 a,
                 b,
                 strict=True,
@@ -233,8 +233,5 @@ def describe_miss(q: Joints, chosen: Joints, named: dict[int, float]) -> str:
     """
     for k in sorted(named):
         if abs(q[k] - chosen[k]) > ARRIVAL_TOLERANCE:
-            return (
-                f'{JOINT_NAMES[k]} arrives at {q[k]:.3f} rad, and the solution for the '
-                f'posture has it at {chosen[k]:.3f} rad'
-            )
+            return f'{JOINT_NAMES[k]} arrives at {q[k]:.3f} rad instead of {chosen[k]:.3f} rad'
     return ''

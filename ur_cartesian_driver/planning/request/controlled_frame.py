@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Goals about another frame than the robot's active TCP.
+Goals that control another frame than the robot's active TCP.
 
-A straight line of one point of the tool is no straight line of another one when the tool turns.
-So the robot's TCP is set to the controlled frame for the time of the goal, and all that follows is
-planned as if it were there already. Where that is not allowed, the goal is carried over to the
-active TCP, which is exact as long as the tool does not turn.
+When the tool turns, a straight line of one of its points is a curve of another one. So the robot's
+TCP is set to the controlled frame for the goal (temporary TCP), and planning assumes it from here
+on. Where that is not allowed, the goal is converted to the active TCP, which is exact as long as
+the tool does not turn.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     segment_of,
 )
 
-#: How far the tool may turn on a straight or circular segment that counts as one without a turn
-#: [rad]: a frame r away from the TCP leaves its line by r angle^2 / 8, 5 um at 0.4 m.
+#: The tool counts as not turning up to this angle on a straight or circular segment [rad]: a
+#: frame r away from the TCP leaves its line by r angle^2 / 8, 5 um at 0.4 m.
 MAX_FIXED_ANGLE = 0.01
 
-#: How near the controlled frame is to the TCP for being it [m], [rad]: some steps of the wire, so
-#: that a TCP that is set and the one before it can be told apart.
+#: The controlled frame is the TCP within this distance [m], [rad]: some steps of the wire, so that
+#: the reported TCP shows which of the two is set.
 SAME_TCP = 5e-6
 
 _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
@@ -41,7 +41,7 @@ _JOINT_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RetargetedGoal:
-    """A goal and the state of its robot, both about the TCP that the motion will have."""
+    """A goal and the state of its robot, both for the TCP of the motion."""
 
     goal: Goal
     state: RobotState
@@ -53,9 +53,9 @@ class RetargetedGoal:
 
 def retarget_to_tcp(goal: Goal, state: RobotState, options: PlanningOptions) -> RetargetedGoal:
     """
-    Return a checked goal about the TCP with which it is going to be executed.
+    Return a checked goal for the TCP with which it will be executed.
 
-    :raises InvalidGoal: the TCP must not change, and the tool turns on the way.
+    :raises InvalidGoal: the TCP must not change, but the tool turns.
     """
     T_flange_controlled = goal.T_flange_controlled
     if T_flange_controlled is None or _is_same_tcp(T_flange_controlled, state.T_flange_tcp):
@@ -68,8 +68,8 @@ def retarget_to_tcp(goal: Goal, state: RobotState, options: PlanningOptions) -> 
             state=shift_reference_point(state, T_tcp_controlled),
             T_flange_tcp=T_flange_controlled,
             remarks=(
-                f'the TCP of the robot is set to {_name(goal)}, p[{x:.6f}, {y:.6f}, {z:.6f}, '
-                f'{rx:.6f}, {ry:.6f}, {rz:.6f}], for this goal, and put back at its end',
+                f'temporary TCP: {_name(goal)}, p[{x:.6f}, {y:.6f}, {z:.6f}, {rx:.6f}, {ry:.6f}, '
+                f'{rz:.6f}], set for this goal and restored at its end',
             ),
         )
     _check_no_rotation(goal, state.actual_tcp_pose @ T_tcp_controlled)
@@ -78,17 +78,17 @@ def retarget_to_tcp(goal: Goal, state: RobotState, options: PlanningOptions) -> 
         state=state,
         T_tcp_controlled=T_tcp_controlled,
         remarks=(
-            f'the motion is carried over from {_name(goal)} to the TCP of the robot, which '
-            'must not change (allow_tcp_change is false)',
+            f'the goal is converted from {_name(goal)} to the active TCP, because '
+            'allow_tcp_change is false',
         ),
     )
 
 
 def tool_tips(goal: Goal, T_flange_active: Pose) -> tuple[Pose, ...]:
     """
-    Return to where tools reach behind the flange: the active TCP, and the controlled frame.
+    Return the tool tips to check for collisions: the active TCP and the controlled frame.
 
-    What is mounted there stays mounted when a goal is about the bare flange.
+    A mounted tool stays mounted when a goal controls the bare flange.
     """
     T_flange_controlled = goal.T_flange_controlled
     if T_flange_controlled is None or _is_same_tcp(T_flange_controlled, T_flange_active):
@@ -123,9 +123,8 @@ def _check_no_rotation(goal: Goal, T_base_start: Pose) -> None:
         if angle > MAX_FIXED_ANGLE:
             raise InvalidGoal(
                 point_field(i, 'pose.orientation'),
-                f'turns {_name(goal)} by {degrees(angle):.2f} '
-                'degrees on the way; a frame that is not the TCP of the robot keeps to a line or '
-                'an arc only if it does not turn, and the TCP must not change',
+                f'turns {_name(goal)} by {degrees(angle):.2f} degrees, but a frame other than the '
+                'active TCP follows a line or an arc only without turning',
                 remedy,
             )
         if is_spline(goal):
@@ -133,22 +132,21 @@ def _check_no_rotation(goal: Goal, T_base_start: Pose) -> None:
         if segment.type == SegmentType.CIRCULAR and segment.arc_mode == ArcMode.FIXED:
             raise InvalidGoal(
                 segment_field(i, 'arc_mode'),
-                f'is FIXED, which turns {_name(goal)} along with '
-                'the arc; that needs the TCP of the robot to be there, and it must not change',
+                f'is FIXED, which turns {_name(goal)} with the arc, but a frame other than the '
+                'active TCP follows an arc only without turning',
                 'use UNCONSTRAINED, or set allow_tcp_change to true',
             )
 
 
 def _check_no_angular_rates(goal: Goal, index: int, remedy: str) -> None:
-    """Refuse a point of a spline at which the tool turns; NaN chooses that it does not."""
+    """Refuse a point of a spline at which the tool turns; NaN stands for no turn."""
     point = goal.waypoints[index]
     for field, values in (('twist', point.twist), ('acceleration', point.acceleration)):
         if any(value != 0.0 and not isnan(value) for value in values[3:]):
             raise InvalidGoal(
                 f'{point_field(index, field)}.angular',
-                f'turns {_name(goal)}; a frame that is '
-                'not the TCP of the robot keeps to a spline only if it does not turn, and the TCP '
-                'must not change',
+                f'turns {_name(goal)}, but a frame other than the active TCP follows a spline '
+                'only without turning',
                 remedy,
             )
 
@@ -182,7 +180,7 @@ def _retarget_waypoint(point: Waypoint, T_controlled_tcp: Pose) -> Waypoint:
 
 
 def _without_angular_nan(rates: Vector6) -> Vector6:
-    """Return rates whose angular part is 0 where it may be chosen."""
+    """Return rates whose angular NaN are replaced by 0."""
     x, y, z, *angular = rates
     a, b, c = (0.0 if isnan(value) else value for value in angular)
     return (x, y, z, a, b, c)

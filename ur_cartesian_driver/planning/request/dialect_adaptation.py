@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What a robot program of an older wire dialect can be told: the same motion in other words, or no.
+Adapt a primitive to an older wire dialect, or refuse it.
 
-A program skips motion types that it does not know, in silence, and goes on with the next point
-from where it is. So nothing is sent that the dialect does not have.
+A robot program silently skips motion types that it does not know and goes on to the next point
+from where it is. So only what the dialect has is sent.
 """
 
 from __future__ import annotations
@@ -25,66 +25,53 @@ from ur_cartesian_driver.motion.primitive import (
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import segment_field
 from ur_cartesian_driver.protocol.program.point_fields import motion_type, MotionType
-from ur_cartesian_driver.protocol.program.wire_dialects import Dialect
 
 
 def adapt_to_dialect(
     primitive: Primitive, point: int, joints: Joints, options: PlanningOptions
 ) -> tuple[Primitive, str]:
     """
-    Return a primitive in the words of the dialect, and why they are others; '' where they are not.
+    Return a primitive as the dialect has it, and the reason for a change; '' if there is none.
 
-    :param joints: the solution that it arrives in [rad].
-    :raises NotAvailable: the dialect has no words for it.
+    :param joints: the joint solution at its end [rad].
+    :raises NotAvailable: the dialect cannot express it.
     """
-    dialect, why = options.dialect, ''
+    dialect, reason = options.dialect, ''
     if dialect.supports_q_near or isinstance(primitive, MoveC | Spline):
         pass
     elif isinstance(primitive, MoveJ | OptimoveJ) and isinstance(primitive.target, Pose):
         _check_calibration(primitive, point, options)
         primitive = replace(primitive, target=joints, q_near=None)
-        why = f'wire dialect {dialect.name} has no q_near, so the joint solution itself is sent'
+        reason = f'wire dialect {dialect.name} has no q_near and takes the joint solution'
     else:
-        primitive = replace(primitive, q_near=None)  # the robot would not look at it
+        primitive = replace(primitive, q_near=None)  # the robot ignores it
     if motion_type(primitive) not in dialect.motion_types:
         raise NotAvailable(
             segment_field(point, 'type'),
             f'needs {motion_type(primitive).name}, which robot '
-            f'programs of wire dialect {dialect.name} do not know',
+            f'programs of wire dialect {dialect.name} do not support',
             'use LINEAR or JOINT'
             if isinstance(primitive, OptimoveJ | OptimoveL)
             else 'use a newer program and wire_dialect',
         )
-    return primitive, why
+    return primitive, reason
 
 
 def _check_calibration(primitive: Primitive, point: int, options: PlanningOptions) -> None:
     if not options.calibration_known:
         raise NotAvailable(
             segment_field(point, 'type'),
-            f'is a joint motion ({type(primitive).__name__}), for '
-            f'which wire dialect {options.dialect.name} takes joint positions only, and the '
-            'calibration of the robot, from which they follow, is not known',
+            f'is a joint motion ({type(primitive).__name__}), which wire dialect '
+            f'{options.dialect.name} takes as joint positions only, but the calibration of this '
+            'robot is unknown',
             'use LINEAR',
         )
 
 
 def explain_poses_only(options: PlanningOptions) -> str:
-    """Return why arcs cannot be sent as joint positions, as the end of "because ..."; '' = can."""
+    """Return why arcs cannot be sent as joint positions ("because ..."); '' if they can."""
     if not options.calibration_known:
-        return 'the calibration of the robot is not known'
+        return 'the calibration of this robot is unknown'
     if MotionType.MOVEC_JOINT not in options.dialect.motion_types:
         return f'wire dialect {options.dialect.name} has no arcs with joint positions'
     return ''
-
-
-def adapt_blend_radius(radius: float, point: int, dialect: Dialect, remarks: list[str]) -> float:
-    """Return a blend radius that the wire carries [m]."""
-    whole = dialect.round_down_radius(radius)
-    if whole < radius - 1e-6:
-        remarks.append(
-            f'point {point}: blend of {1e3 * whole:g} mm instead of '
-            f'{1e3 * radius:g} mm, because wire dialect {dialect.name} counts in '
-            f'{1e3 / dialect.time_scale:g} mm'
-        )
-    return whole

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The output commands of a goal, checked by themselves."""
+"""The output commands of a goal: their checks and their words in a report."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
 from ur_cartesian_driver.motion.goal import Goal, IOCommand, OutputKind
 from ur_cartesian_driver.planning.options import PlanningOptions
 
-#: The longest time after a point [s].
+#: Maximum time after a point [s].
 MAX_OUTPUT_OFFSET = 60.0
 _OUTPUTS = {
     OutputKind.STANDARD_DIGITAL: ('standard digital output', 8),
@@ -22,7 +22,7 @@ _OUTPUTS = {
 
 def check_outputs(goal: Goal, options: PlanningOptions) -> None:
     """
-    Check the commands by themselves.
+    Check the commands of a goal.
 
     :raises InvalidGoal: names field, value and bound.
     :raises NotAvailable: the robot program is not ours.
@@ -30,8 +30,8 @@ def check_outputs(goal: Goal, options: PlanningOptions) -> None:
     if goal.io_commands and not options.dialect.supports_outputs:
         raise NotAvailable(
             'io_commands',
-            'is not empty, and robot programs of wire dialect '
-            f'{options.dialect.name} switch no outputs on the way',
+            'is not empty, but robot programs of wire dialect '
+            f'{options.dialect.name} cannot switch outputs during a motion',
             'leave it empty, or let the driver send its own robot program',
         )
     for i, command in enumerate(goal.io_commands):
@@ -43,19 +43,19 @@ def _check_command(command: IOCommand, field: str, points: int) -> None:
     if not 0 <= command.waypoint < points:
         raise InvalidGoal(
             f'{field}.point_index',
-            f'is {command.waypoint}, and the points are 0 to {points - 1}',
+            f'is {command.waypoint}, but the points are 0 to {points - 1}',
             'name one of these',
         )
     if not 0.0 <= command.offset <= MAX_OUTPUT_OFFSET:
         raise InvalidGoal(
             f'{field}.offset',
-            f'is {command.offset:g} s; it is 0 to {MAX_OUTPUT_OFFSET:g} s after the point',
-            'name a later point',
+            f'is {command.offset:g} s, outside 0 to {MAX_OUTPUT_OFFSET:g} s',
+            'name another point',
         )
     if not 0 <= command.pin < pins:
         raise InvalidGoal(
             f'{field}.pin',
-            f'is {command.pin}, and there are {name}s 0 to {pins - 1}',
+            f'is {command.pin}, but there are {name}s 0 to {pins - 1}',
             'name one of these',
         )
     is_analog = command.output is OutputKind.STANDARD_ANALOG
@@ -68,11 +68,11 @@ def _check_command(command: IOCommand, field: str, points: int) -> None:
             f'{field}.value',
             f'is {command.value:g}; a {name} takes '
             + ('0 to 1, the fraction of its range' if is_analog else '0 (off) or 1 (on)'),
-            'give one of these',
         )
 
 
 def describe_command(command: IOCommand) -> str:
+    """Return a command in words."""
     name, _ = _OUTPUTS[command.output]
     if command.output is OutputKind.STANDARD_ANALOG:
         return f'{name} {command.pin} to {command.value:g} ({command.domain.name.lower()})'

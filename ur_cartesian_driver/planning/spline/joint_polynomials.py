@@ -174,9 +174,9 @@ class _PieceRefinement:
         distance, angle = self.deviation[row].tolist()
         raise TooFast(
             point_field(self.path.first + int(self.piece[row])),
-            f'cannot be approached along the spline: {self.times[row]:.3f} s from the start the '
-            f'joints change so fast that the tool would be {1e3 * distance:.3f} mm and '
-            f'{angle:.4f} rad off it in one step of the controller',
+            f'cannot be reached along the spline: {self.times[row]:.3f} s after the start the '
+            f'joints turn so fast that the tool would leave it by {1e3 * distance:.3f} mm and '
+            f'{angle:.4f} rad within a controller cycle',
             'give it more time, or keep away from the singularity there',
         )
 

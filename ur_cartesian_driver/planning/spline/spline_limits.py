@@ -52,11 +52,11 @@ class LimitExcess:
         """
         return TooFast(
             point_field(self.point, 'time_from_start'),
-            f'gives too little time: after {100.0 * self.fraction:.0f} % of it {self.what} needs '
-            f'{self.needed:.3f} {self.unit}, and allowed are {self.allowed:.3f} {self.unit} '
-            f'({self.name})',
-            f'give all points {ceil(1e3 * self.factor) / 1e3:.3f} times the time (and twists and '
-            f'accelerations to match){", or set on_too_fast to slow" if may_slow else ""}',
+            f'gives too little time: at {100.0 * self.fraction:.0f} % of it {self.what} needs '
+            f'{self.needed:.3f} {self.unit}, more than {self.name} = {self.allowed:.3f} '
+            f'{self.unit}',
+            f'multiply all times by {ceil(1e3 * self.factor) / 1e3:.3f} (and adapt twists and '
+            f'accelerations){", or set on_too_fast to slow" if may_slow else ""}',
         )
 
 
@@ -130,7 +130,7 @@ def _quantities(
     for k, (name, limit) in enumerate(
         zip(JOINT_NAMES, kinematics.arm.model.max_joint_speed, strict=True)
     ):
-        yield _Quantity(name, np.abs(qd[:, k]), limit, 1, 'rad/s', 'the limit of the joint')
+        yield _Quantity(name, np.abs(qd[:, k]), limit, 1, 'rad/s', 'the joint speed limit')
         yield _Quantity(
             name,
             np.abs(qdd[:, k]),

@@ -187,9 +187,9 @@ def _with_spline_advice(refusal: GoalRefused) -> GoalRefused:
     """Return a refusal whose advice is good for splines, which have no JOINT segments."""
     if isinstance(refusal, NearSingularity | JointLimitExceeded):
         text = str(refusal)
-        for advice in ('use a JOINT segment', 'go there with a JOINT segment'):
-            text = text.replace(advice, 'use PRIMITIVES with a JOINT segment')
-        return type(refusal)(text)
+        return type(refusal)(
+            text.replace('use a JOINT segment', 'use PRIMITIVES with a JOINT segment')
+        )
     return refusal
 
 
@@ -210,7 +210,7 @@ def _check_posture(
         flips = kinematics.describe_flips(arrives, chosen)
         raise InvalidPosture(
             f'{point_field(piece.index, "posture")} cannot be reached along the spline: {clause}'
-            f'{f", which takes {flips}" if flips else ""}; start in that configuration, or use '
+            f'{f", which needs {flips}" if flips else ""}; start in that configuration, or use '
             'PRIMITIVES with a JOINT segment.'
         )
 
@@ -240,22 +240,21 @@ def _check_sizes(
     if angles[k, -1] > pi - HALF_TURN:
         raise InvalidGoal(
             point_field(first + k, 'pose.orientation'),
-            f'turns the tool by '
-            f'{degrees(angles[k, -1]):.2f} degrees on the way, and either way round is as short',
+            f'turns the tool by {degrees(angles[k, -1]):.2f} degrees, so that the direction of '
+            'the rotation is ambiguous',
             'add a point in between',
         )
     for sizes, bound, what, unit in (
-        (detour, max_path_length(kinematics), 'a detour of', 'm'),
-        (angles.max(axis=1), _MAX_TURN, 'a turn by up to', 'rad'),
+        (detour, max_path_length(kinematics), 'a detour', 'm'),
+        (angles.max(axis=1), _MAX_TURN, 'a turn', 'rad'),
     ):
         k = int(np.argmax(sizes > bound))
         if sizes[k] > bound:
             raise InvalidGoal(
                 point_field(first + k),
-                f'and the point before it ask for {what} {sizes[k]:.3g} '
-                f'{unit} in between, by their twists and accelerations; more than {bound:.3g} '
-                f'{unit} make no sense',
-                'check units, directions, and the time in between',
+                f'and the point before it imply {what} of {sizes[k]:.3g} {unit} by their twists '
+                f'and accelerations, more than {bound:.3g} {unit}',
+                'check their units and directions, and the time in between',
             )
 
 
@@ -282,9 +281,8 @@ def _pose_samples(
         k = int(np.argmax(count))
         raise InvalidGoal(
             'trajectory.points',
-            f'ask for a way so long, or so fast (most of all to points'
-            f'[{first + k}]), that it would have to be looked at in {count.sum():.3g} places, '
-            f'more than {MAX_SAMPLES:,}',
+            f'ask for a path so long, or so fast (most of all to points[{first + k}]), that its '
+            f'check needs {count.sum():.3g} samples, more than {MAX_SAMPLES:,}',
             'check twists and accelerations, or split the goal',
         )
     count = count.astype(np.intp)

@@ -94,7 +94,7 @@ class SplineState:
 class SplinePieces:
     """A part of a motion that passed all checks."""
 
-    #: One for each piece; the note stands at the last piece to a point.
+    #: One for each piece; the last piece to a point carries its report line.
     segments: tuple[PlannedSegment, ...]
     #: Row 0 is the start; times are from the start of the motion.
     reference: ReferencePath
@@ -198,8 +198,8 @@ def plan_stop(state: SplineState, arm: Arm, deceleration: float) -> Spline:
             return piece
         T *= _SHORTENING
     raise JointLimitExceeded(
-        f'{JOINT_NAMES[joint or 0]} is so near to the end of its range, and so fast, that it '
-        'cannot be stopped before it; end the motion earlier.'
+        f'{JOINT_NAMES[joint or 0]} is too fast to stop before the end of its range; end the '
+        'motion earlier.'
     )
 
 
@@ -237,15 +237,15 @@ def _fit_to_limits(
             point_field(path.first + longest, 'time_from_start'),
             f'would take {time:.0f} s because of {found.name}, more than max_segment_time = '
             f'{options.max_segment_time:.0f} s',
-            'go around the place where it has to be slow',
+            'move the path away from there',
         )
     return (
         path,
         found.factor,
         [
             f'all times are stretched by {found.factor:.4g}, because of {found.name} = '
-            f'{found.allowed:.3f} {found.unit} of {found.what} on the way to point {found.point}: '
-            f'{path.spline.times[-1]:.3f} s in all'
+            f'{found.allowed:.3f} {found.unit} ({found.what}, on the segment to point '
+            f'{found.point}): {path.spline.times[-1]:.3f} s in total'
         ],
     )
 
@@ -275,9 +275,9 @@ def _segments(
             angle_done + radians,
             count + 1,
         )
-        note = ''
+        line = ''
         if is_last:
-            note = _segment_note(path, goal, k, count, (length_done, angle_done, time_done))
+            line = _segment_line(path, goal, k, count, (length_done, angle_done, time_done))
             time_done, length_done, angle_done, count = 0.0, 0.0, 0.0, 0
         yield PlannedSegment(
             primitive=Spline(
@@ -291,11 +291,11 @@ def _segments(
             angle=radians,
             duration=duration,
             joints=tuple(q),
-            note=note,
+            report_line=line,
         )
 
 
-def _segment_note(
+def _segment_line(
     path: SplinePath, goal: Goal, k: int, count: int, done: tuple[float, float, float]
 ) -> str:
     """Return the line of the segment to a point: ``done`` are its length, turn and time."""
@@ -303,18 +303,18 @@ def _segment_note(
     turn = f' and {degrees(angle):.1f} degrees' if degrees(angle) >= 0.05 else ''
     speed = (
         f'{length / time:.3f} m/s' if length > 1e-6 else f'{angle / time:.3f} rad/s'
-    ) + ' on average'
+    ) + ' mean'
     point = path.first + k
     passes = (
         'stops there'
         if not any(goal.waypoints[k].twist)
         or (k + 1 == len(goal.waypoints) and not goal.keep_open)
-        else 'passes it'
+        else 'passes through'
     )
     pieces = '1 piece' if count == 1 else f'{count} pieces'
     return (
         f'point {point}: SPLINE in {pieces}, {length:.3f} m{turn} in {time:.3f} s ({speed}), '
-        f'{passes}; nearest: {path.tightest_margin[point]}'
+        f'{passes}; margin {path.tightest_margin[point]}'
     )
 
 
@@ -352,14 +352,14 @@ def _reference(path: SplinePath) -> ReferencePath:
 def _precision(polynomials: JointPolynomials) -> str:
     kind = 'quintic' if polynomials.quintic else 'cubic'
     return (
-        f'joints: {len(polynomials.piece)} {kind} pieces, along which the tool stays within '
+        f'joints: {len(polynomials.piece)} {kind} pieces, which keep the tool within '
         f'{1e3 * polynomials.distance:.3f} mm and {polynomials.angle:.5f} rad of its spline'
     )
 
 
 def _tightest_remark(path: SplinePath) -> str:
     point, tightest_margin = min(path.tightest_margin.items(), key=lambda item: item[1].normalized)
-    return f'nearest of all: {tightest_margin} of the way to point {point}'
+    return f'tightest margin: {tightest_margin} of the segment to point {point}'
 
 
 def _six(values: Floats) -> Vector6:

@@ -25,7 +25,7 @@ from ur_cartesian_driver.planning.geometry.pose_rows import (
 )
 from ur_cartesian_driver.planning.geometry.rotation_rows import log_rows, rotation_rates
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints
-from ur_cartesian_driver.planning.moves.plan_report import add_remark
+from ur_cartesian_driver.planning.request.ignored_fields import add_remark
 
 # Shorter ways are none, and a point beside one is not passed through [m], [rad].
 _MIN_DISTANCE = 1e-9
@@ -64,7 +64,7 @@ def point_remarks(goal: Goal, first: int) -> list[str]:
         add_remark(
             lines,
             [i for i, point in inner if isnan(sum(getattr(point, field)))],
-            f'{field} is NaN, so it is chosen, to fit the points around',
+            f'{field} is NaN, so the driver chooses it to fit the neighbouring points',
         )
     add_remark(
         lines,
@@ -74,7 +74,7 @@ def point_remarks(goal: Goal, first: int) -> list[str]:
     add_remark(
         lines,
         [i for i, segment in enumerate(goal.segments, first) if segment.acceleration > 0.0],
-        'the acceleration of the segment is ignored: its time counts',
+        'the acceleration of the segment is ignored: its time sets the speed',
     )
     return lines
 

@@ -1,0 +1,73 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The bounds of a blend radius: both blends of a segment fit into it, and the wire carries it.
+
+A negative radius is refused by :mod:`~.number_rules`, one in a spline by :mod:`~.spline_rules`.
+"""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.goal_fields import is_spline, segment_field
+from ur_cartesian_driver.protocol.program.wire_dialects import Dialect
+
+
+def check_blends(goal: Goal, options: PlanningOptions) -> None:
+    """Refuse blends that overlap between two points of the goal."""
+    if is_spline(goal):
+        return
+    last = len(goal.waypoints) - 1
+    for i in range(1, len(goal.segments)):
+        check_blends_fit(
+            i,
+            goal.waypoints[i - 1].pose.distance_to(goal.waypoints[i].pose),
+            goal.segments[i - 1].blend_radius,
+            0.0 if i == last else goal.segments[i].blend_radius,
+        )
+
+
+def check_blends_fit(index: int, length: float, before: float, after: float) -> None:
+    """
+    Refuse blends that overlap within a segment: the controller skips such a waypoint (C171).
+
+    :param length: distance of its two points [m].
+    :param before: blend radius at its start [m], and ``after`` at its end.
+    """
+    # Rounding must not refuse blends that touch.
+    if before + after > length * (1.0 + 1e-9) + 1e-9:
+        raise InvalidGoal(
+            segment_field(index if after > 0.0 else index - 1, 'blend_radius'),
+            f'is too large: the blends at points[{index - 1}] and points[{index}] take '
+            f'{1e3 * before:g} mm and {1e3 * after:g} mm of a segment of {1e3 * length:.3f} mm',
+            'reduce one of them',
+        )
+
+
+def check_blend_parameters(index: int, u_join: float, u_leave: float) -> None:
+    """
+    Refuse blends that overlap on the curve of a segment.
+
+    :param u_join: where the curve is joined after the blend before, and ``u_leave`` where it is
+        left for the blend after, in [0, 1].
+    """
+    if u_join > u_leave + 1e-9:
+        raise InvalidGoal(
+            segment_field(index, 'blend_radius'),
+            f'is too large: the blends at both ends of the segment to point {index} overlap',
+            'reduce one of them',
+        )
+
+
+def round_blend_radius(radius: float, index: int, dialect: Dialect, remarks: list[str]) -> float:
+    """Return the blend radius [m] that the wire carries, with a remark where it is smaller."""
+    rounded = dialect.round_down_radius(radius)
+    if rounded < radius - 1e-6:
+        remarks.append(
+            f'point {index}: blend of {1e3 * rounded:g} mm instead of {1e3 * radius:g} mm, '
+            f'because wire dialect {dialect.name} counts in steps of '
+            f'{1e3 / dialect.time_scale:g} mm'
+        )
+    return rounded

@@ -1,0 +1,134 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Rules about goals whose points a spline joins: SPLINE and SERVO."""
+
+from __future__ import annotations
+
+from math import isnan
+
+from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Segment, SegmentType
+from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.goal_fields import (
+    DEFAULT_SEGMENT,
+    is_spline,
+    is_timed,
+    point_field,
+    resolve_execution_mode,
+    segment_field,
+)
+
+#: Shortest time from point to point [s].
+MIN_SPLINE_TIME = 0.001
+#: Larger values at points are mistakes [m], [m/s, rad/s], [m/s^2, rad/s^2].
+MAX_POINT_COORDINATE = 1000.0
+MAX_TWIST = 100.0
+MAX_ACCELERATION = 10_000.0
+
+_USE_PRIMITIVES = 'set execution to PRIMITIVES (which ignores twists and accelerations at points)'
+
+
+def check_spline(goal: Goal, options: PlanningOptions) -> None:
+    """Refuse a spline that the robot program cannot run, or that makes no sense."""
+    if not is_spline(goal):
+        return
+    name = resolve_execution_mode(goal).name
+    if not is_timed(goal):
+        raise InvalidGoal(
+            'execution',
+            f'is {name}, which needs times',
+            'give every point a time_from_start, or set execution to PRIMITIVES',
+        )
+    _check_support(goal, name, options)
+    _check_points(goal)
+    for i, segment in enumerate(goal.segments):
+        if segment is not DEFAULT_SEGMENT:
+            _check_segment(i, segment, name)
+    if goal.waypoints[0].time == 0.0:
+        _check_at_rest(goal, 0, 'starts')
+    if not goal.keep_open:
+        _check_at_rest(goal, len(goal.waypoints) - 1, 'ends')
+
+
+def _check_points(goal: Goal) -> None:
+    before = 0.0
+    for i, point in enumerate(goal.waypoints):
+        if 0.0 < point.time < before + MIN_SPLINE_TIME:
+            raise InvalidGoal(
+                point_field(i, 'time_from_start'),
+                f'gives the segment {point.time - before:g} s, less than the '
+                f'{MIN_SPLINE_TIME:g} s that a piece of a spline needs',
+                'leave points out',
+            )
+        before = point.time
+        for field, values, bound in (
+            ('pose.position', point.pose.position, MAX_POINT_COORDINATE),
+            ('twist', point.twist, MAX_TWIST),
+            ('acceleration', point.acceleration, MAX_ACCELERATION),
+        ):
+            if any(abs(value) > bound for value in values):
+                raise InvalidGoal(
+                    point_field(i, field),
+                    f'contains a number beyond {bound:g}, more than any of these robots can do',
+                    'check the units (m, rad, s)',
+                )
+
+
+def _check_support(goal: Goal, name: str, options: PlanningOptions) -> None:
+    remedy = 'set execution to PRIMITIVES'
+    if not options.calibration_known:
+        raise NotAvailable(
+            'execution',
+            f'is {name}, which sends joint positions, but the calibration of this robot is '
+            'unknown',
+            remedy,
+        )
+    if goal.execution == ExecutionMode.SERVO:
+        if not options.dialect.supports_servo:
+            raise NotAvailable(
+                'execution',
+                f'is {name}, which robot programs of wire dialect '
+                f'{options.dialect.name} do not support',
+                remedy,
+            )
+        if goal.io_commands:
+            raise NotAvailable(
+                'io_commands',
+                f'is not empty, but {name} switches no outputs',
+                'set execution to SPLINE or PRIMITIVES',
+            )
+    elif options.dialect.is_coarse:
+        raise NotAvailable(
+            'execution',
+            f'is {name}, but robot programs of wire dialect {options.dialect.name} '
+            'count in milliseconds, too coarse for splines',
+            remedy,
+        )
+
+
+def _check_segment(index: int, segment: Segment, name: str) -> None:
+    kind = SegmentType(segment.type)
+    if kind not in (SegmentType.AUTO, SegmentType.LINEAR):
+        raise InvalidGoal(
+            segment_field(index, 'type'),
+            f'is {kind.name}, but with execution {name} a spline joins the points',
+            f'set it to AUTO, or {_USE_PRIMITIVES}',
+        )
+    if segment.blend_radius > 0.0:
+        raise InvalidGoal(
+            segment_field(index, 'blend_radius'),
+            f'is {segment.blend_radius:g}, but with execution {name} a spline passes through '
+            'the points',
+            f'set it to 0, or {_USE_PRIMITIVES}',
+        )
+
+
+def _check_at_rest(goal: Goal, index: int, verb: str) -> None:
+    point = goal.waypoints[index]
+    for field, values in (('twist', point.twist), ('acceleration', point.acceleration)):
+        if any(value != 0.0 and not isnan(value) for value in values):
+            raise InvalidGoal(
+                point_field(index, field),
+                f'is not zero, but the motion {verb} at rest there',
+                'set it to 0',
+            )
