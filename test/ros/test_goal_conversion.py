@@ -274,10 +274,10 @@ def _via_without_arc(message):
         (
             _unequal_posture,
             ErrorCode.INVALID_JOINTS,
-            r'points\[1\]\.posture has 2 joint names and 1',
+            r'points\[1\]\.posture has 2 joint names but 1',
         ),
         (_unknown_joint, ErrorCode.INVALID_JOINTS, 'knee_joint'),
-        (_old_stamp, ErrorCode.OLD_HEADER_TIMESTAMP, 'header.stamp lies 10.123 s in the past'),
+        (_old_stamp, ErrorCode.OLD_HEADER_TIMESTAMP, 'header.stamp is 10.123 s old'),
         (_via_without_arc, ErrorCode.INVALID_GOAL, r'segments\[1\]\.via'),
     ],
 )

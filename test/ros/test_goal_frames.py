@@ -114,7 +114,7 @@ def test_goals_go_to_where_their_frames_say(named):
         target = Pose((x, y + 0.02, z), start.quaternion)
         result = named.run(frame_id, controlled, T_base_frame.inverse() @ target)
         assert same(named.snapshot(T_flange_frame), target)
-        assert any('put back' in line for line in result.report) == bool(controlled)
+        assert any('restored at its end' in line for line in result.report) == bool(controlled)
         last = named.cell.feedback[-1]
         assert last.header.frame_id == frame_id
         assert last.controlled_frame == (controlled or 'tool0_controller')
