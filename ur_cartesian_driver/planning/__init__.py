@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From what was asked to what is done: check a goal, choose primitives, times and configurations.
+Check a goal and plan it: primitives, times, joint configurations, report.
 
-:func:`check` finds everything that needs no robot, :func:`plan` the rest; both refuse by raising a
-:class:`~ur_cartesian_driver.motion.errors.GoalRefused`. What passes is a
-:class:`~ur_cartesian_driver.motion.plan.Plan`. Nothing here moves anything.
+:func:`check` makes the checks that need no robot, :func:`plan` all others; both refuse a goal by
+raising a :class:`~ur_cartesian_driver.motion.errors.GoalRefused`. A goal that passes becomes a
+:class:`~ur_cartesian_driver.motion.plan.Plan`. Nothing here moves a robot.
 """
 
 from ur_cartesian_driver.planning.options import PlanningOptions

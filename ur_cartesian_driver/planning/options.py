@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the planner may decide by itself, and the bounds within which it does."""
+"""The parameters of planning: bounds, defaults and what to do where a goal exceeds a bound."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Literal, TypeAlias
 from ur_cartesian_driver.planning.workspace import parse_planes
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
-#: Finer than this the wire does not carry joint positions [m].
+#: The wire carries joint positions no finer than this [m].
 MIN_SPLINE_TOLERANCE = 1e-6
 
 Choice: TypeAlias = Literal['refuse', 'slow']
@@ -27,58 +27,58 @@ class PlanningOptions:
     :raises ValueError: an option is not in its range.
     """
 
-    #: Longest list of points that is accepted.
+    #: Maximum number of points.
     max_points: int = 20_000
-    #: How old ``header.stamp`` may be at the receipt [s].
+    #: Maximum age of ``header.stamp`` on receipt [s].
     stamp_tolerance: float = 1.0
-    #: How far the robot may stand from a first point at time 0 [m], [rad].
+    #: How far the robot may be from a first point at time 0 [m], [rad].
     start_tolerance_position: float = 0.001
     start_tolerance_angle: float = 0.01
-    #: Longest way of the tool to the first point [m]; 0 = without bound.
+    #: Maximum distance of the tool to the first point [m]; 0 = no bound.
     max_approach_distance: float = 0.5
-    #: Largest speed of the TCP [m/s]; 0 = without bound.
+    #: Maximum speed of the TCP [m/s]; 0 = no bound.
     max_tool_speed: float = 0.25
-    #: What happens to a goal whose times need more speed than the limits allow.
+    #: What to do with a goal whose times need more speed than the limits allow.
     on_too_fast: Choice = 'refuse'
-    #: What happens to a straight move or an arc that cannot arrive in the posture asked for, or
-    #: cannot be gone although its end can be reached.
+    #: What to do with a line or an arc that cannot arrive in the requested posture, or that the
+    #: arm cannot follow although it can reach the end.
     on_posture_change: PostureChoice = 'refuse'
-    #: What happens to a goal on whose way the arm comes too near to itself; auto: meshes refuse,
-    #: capsules, which are thicker than the arm, warn.
+    #: What to do where the arm comes too close to itself; auto: meshes refuse, capsules, which
+    #: are thicker than the arm, warn.
     self_collision: CollisionChoice = 'auto'
-    #: How near that is [m].
+    #: Minimum distance of the arm to itself [m].
     min_clearance: float = 0.005
     #: Radius of a tool between the flange and the TCP, for these checks [m]; 0 = none.
     tool_radius: float = 0.0
-    #: Planes that the arm must not cross, each 'name x y z nx ny nz [margin]' in base.
+    #: Planes that the arm must not cross, each 'name x y z nx ny nz [margin]' in base [m].
     workspace_planes: tuple[str, ...] = ()
-    #: How near a straight line or an arc may come to a singularity: angle of wrist 2 [rad], angle
-    #: of the elbow [rad], wrist centre in front of the plane of the axes 1 and 2 [m]; 0 = off.
+    #: How close a line or an arc may come to a singularity: angle of wrist 2 [rad], angle of the
+    #: elbow [rad], distance of the wrist centre from the plane of axes 1 and 2 [m]; 0 = off.
     singularity_margin_wrist: float = 0.05
     singularity_margin_elbow: float = 0.05
     singularity_margin_shoulder: float = 0.02
-    #: Whether the TCP of the robot may be set to the controlled frame for the time of a goal.
+    #: Whether a goal may set a temporary TCP.
     allow_tcp_change: bool = True
-    #: Whether the kinematics is the robot's own; if not, arcs are never sent as joint positions.
+    #: Whether the kinematics is the robot's calibrated one; if not, arcs are sent as poses.
     calibration_known: bool = True
-    #: Whether the robot's software knows OPTIMIZED moves (PolyScope 5.21, PolyScope X 10.8).
+    #: Whether the robot's software has OPTIMIZED moves (PolyScope 5.21, PolyScope X 10.8).
     optimove_known: bool = True
-    #: Whether the robot reports the accelerations of the TCP; else nobody can watch them.
+    #: Whether the robot reports TCP accelerations; if not, tolerances on them are refused.
     acceleration_known: bool = True
-    #: What the robot program understands.
+    #: The wire dialect of the robot program.
     dialect: Dialect = NEWEST_DIALECT
     #: Prefix of the joint names in postures.
     tf_prefix: str = ''
 
-    #: Largest deviations on the way, on every axis of which the goal says nothing; 0 = without
-    #: limit: [m], [rad], [m/s], [rad/s], [m/s^2], [rad/s^2] ...
+    #: Path tolerances on axes for which the goal gives none; 0 = no limit: [m], [rad], [m/s],
+    #: [rad/s], [m/s^2], [rad/s^2].
     path_tolerance_position: float = 0.0
     path_tolerance_orientation: float = 0.0
     path_tolerance_linear_velocity: float = 0.0
     path_tolerance_angular_velocity: float = 0.0
     path_tolerance_linear_acceleration: float = 0.0
     path_tolerance_angular_acceleration: float = 0.0
-    #: ... and at the end.
+    #: The same of the goal tolerances.
     goal_tolerance_position: float = 0.0
     goal_tolerance_orientation: float = 0.0
     goal_tolerance_linear_velocity: float = 0.0
@@ -86,40 +86,40 @@ class PlanningOptions:
     goal_tolerance_linear_acceleration: float = 0.0
     goal_tolerance_angular_acceleration: float = 0.0
 
-    #: Speeds and accelerations where the goal says nothing: tool [m/s], [m/s^2] ...
+    #: Defaults of speed and acceleration: tool [m/s], [m/s^2],
     linear_velocity: float = 0.1
     linear_acceleration: float = 0.5
-    #: ... its rotation [rad/s], [rad/s^2] ...
+    #: rotation of the tool [rad/s], [rad/s^2],
     angular_velocity: float = 0.5
     angular_acceleration: float = 1.0
-    #: ... leading axis of joint moves [rad/s], [rad/s^2] ...
+    #: leading joint of joint moves [rad/s], [rad/s^2],
     joint_velocity: float = 0.5
     joint_acceleration: float = 1.0
-    #: ... and parts of the robot's limits in OPTIMIZED moves, (0, 1].
+    #: fractions of the robot's limits in OPTIMIZED moves, (0, 1].
     optimized_velocity: float = 0.3
     optimized_acceleration: float = 0.3
 
-    #: Live targets: how fast the tool follows [m/s], [m/s^2], [rad/s], [rad/s^2], the fastest
-    #: joint meanwhile [rad/s] ...
+    #: Live targets: limits of the tool [m/s], [m/s^2], [rad/s], [rad/s^2] and of every joint
+    #: [rad/s],
     live_target_linear_velocity: float = 0.25
     live_target_linear_acceleration: float = 1.0
     live_target_angular_velocity: float = 1.0
     live_target_angular_acceleration: float = 4.0
     live_target_joint_velocity: float = 1.5
-    #: ... how old a target may be, and how long after the last one the session ends [s].
+    #: maximum age of a target, and time after the last one at which the session ends [s].
     live_target_max_age: float = 0.2
     live_target_timeout: float = 2.0
 
-    #: Largest accelerations that a time may lead to [m/s^2], [rad/s^2], [rad/s^2].
+    #: Maximum accelerations that follow from times [m/s^2], [rad/s^2], [rad/s^2].
     max_linear_acceleration: float = 10.0
     max_angular_acceleration: float = 40.0
     max_joint_acceleration: float = 40.0
-    #: SPLINE and SERVO: how far the tool may be beside the curve through the points [m]; how far
-    #: turned is as much at 0.1 m.
+    #: SPLINE and SERVO: how far the tool may deviate from the curve through the points [m]; a turn
+    #: counts as its arc at 0.1 m.
     spline_tolerance: float = 0.00005
-    #: How hard the fastest joint brakes where an open goal ends without a last point [rad/s^2].
+    #: Deceleration of the fastest joint where no more points are appended [rad/s^2].
     keep_open_deceleration: float = 4.0
-    #: The longest time that the wire carries, (2^31 - 1) us.
+    #: Maximum time of a segment [s]; the wire carries (2^31 - 1) us.
     max_segment_time: float = 2147.483647
 
     def __post_init__(self) -> None:

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Outputs on the way: from a command of the goal to a record behind the right motion.
+Outputs during a motion: place the commands of a goal as records behind the right primitives.
 
 The robot program reads a record when the motion before it returns, at its stop or where its blend
-begins, and switches the output when the tool gets to a place. So the time of a command (that of
-its point, and its offset) is turned into a place on the planned path, and the record stands behind
-the last motion that has returned by then. A robot that is slowed down switches at the same places.
+begins, and switches the output when the tool reaches the trigger pose. So the time of a command
+(that of its point plus its offset) becomes a trigger pose on the planned path, and the record
+stands behind the last motion that has returned by then. A slower robot switches at the same poses.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from ur_cartesian_driver.planning.request.io_commands import (
 )
 from ur_cartesian_driver.protocol.program.trajectory_points import MAX_PENDING_OUTPUTS
 
-# Two times nearer than this are one [s].
+# Times that differ by less are the same [s].
 _SAME_TIME = 1e-6
-# Half of the time over which a heading is looked for [s], and how long it may get.
+# Half of the time over which the trigger direction is measured [s], at first and at most.
 _DIRECTION_TIME, _MAX_DIRECTION_TIME = 0.002, 0.6
-# Where the tool moves by less than this the heading means nothing [m], [rad]; where it moves by
-# less than so much for a turn, it is that of the turn [m/rad].
+# A shorter motion has no direction [m], [rad]; one with less distance per turn has that of its
+# turn [m/rad].
 _MIN_MOTION = 1e-7
 _TURNING = 0.01
-# A tool that is less beyond a place when its record is read does not come round to it [m], [rad].
+# From this distance beyond the trigger pose on, the tool counts as coming round to it [m], [rad].
 _BEYOND = 1e-4
 
 
@@ -48,13 +48,13 @@ def place_outputs(
     start_time: float = 0.0,
 ) -> tuple[PlannedSegment, ...]:
     """
-    Return the segments with the outputs that are switched on the way, in their order in time.
+    Return the segments with the outputs that are switched during the motion, in order of time.
 
     :param reference: the path of the TCP; its times are those of the segments.
     :param commands: their waypoints are numbered as those of the segments.
-    :param corners: the time in the corner after each segment [s]; empty = there are none.
-    :param since: when the first segment begins [s].
-    :raises InvalidGoal: no motion leads to a point, or too many outputs wait at one time.
+    :param blend_times: the time in the blend after each segment [s]; empty = no blends.
+    :param start_time: when the first segment begins [s].
+    :raises InvalidGoal: no motion leads to a point, or too many outputs are pending at a time.
     """
     if not commands:
         return tuple(segments)
@@ -86,7 +86,7 @@ def place_outputs(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _PlacedOutput:
-    """One output: when, behind which segment, and in which segment's line it is told."""
+    """One output: its time, the segment that it follows, and the segment that reports it."""
 
     time: float
     after_index: int
@@ -96,7 +96,7 @@ class _PlacedOutput:
 
 
 class _TimedPath:
-    """The motions in time, and the path."""
+    """The segments over time, with their path."""
 
     def __init__(
         self,
@@ -105,7 +105,7 @@ class _TimedPath:
         blend_times: Sequence[float],
         start_time: float,
     ) -> None:
-        """Note when each motion ends, and when it returns."""
+        """Compute when each motion ends, and when it returns."""
         self.segments, self.reference = segments, reference
         self.ends: Floats = start_time + np.cumsum([segment.duration for segment in segments])
         self.blend_times = np.array(blend_times or [0.0] * len(segments))
@@ -113,7 +113,7 @@ class _TimedPath:
         self.index = {segment.waypoint: k for k, segment in enumerate(segments)}
 
     def switch(self, command: IOCommand, field: str) -> _PlacedOutput:
-        """Return when and where a command is carried out."""
+        """Return when and where a command switches its output."""
         report_index = self.index.get(command.waypoint)
         if report_index is None:
             raise InvalidGoal(
@@ -156,7 +156,7 @@ class _TimedPath:
         )
 
     def _last_returned(self, time: float) -> int:
-        """Return the number of the last motion that has returned at a time [s]."""
+        """Return the index of the last motion that has returned at a time [s]."""
         return int(np.searchsorted(self.returns, time + _SAME_TIME, side='right')) - 1
 
     def _passes(self, k: int) -> bool:
@@ -170,7 +170,7 @@ class _TimedPath:
         return 'while passing it' if self._passes(k) else 'after stopping there'
 
     def _at_point(self, k: int) -> float | None:
-        """Return when the tool is nearest to the end of a motion [s], None where it stops."""
+        """Return when the tool is closest to the end of a motion [s], None where it stops."""
         if not self._passes(k):
             return None
         end, half = float(self.ends[k]), 0.5 * float(self.blend_times[k])
@@ -180,7 +180,7 @@ class _TimedPath:
         return self._nearest(np.array(target.position), end - half, end + half, end)
 
     def _nearest(self, position: Floats, begin: float, end: float, middle: float) -> float:
-        """Return when the path is nearest to a position within a time, the middle if always."""
+        """Return when the path is closest to a position; the middle where the tool rests."""
         times, rows = self.reference.time, self.reference.poses
         own = slice(
             max(int(np.searchsorted(times, begin, side='right')) - 1, 0),
@@ -197,7 +197,7 @@ class _TimedPath:
         return float(np.clip(t[k] + u[k] * (t[k + 1] - t[k]), begin, end))
 
     def _at(self, record: SwitchOutput, time: float, read: float) -> SwitchOutput:
-        """Return a record with its place: where the tool is at a time, read at another [s]."""
+        """Return a record with the tool pose at a time as trigger; ``read`` is when it is read."""
         trigger_pose, trigger_direction = self._pose(time), self._trigger_direction(time)
         if trigger_direction is None:
             return record
@@ -218,7 +218,7 @@ class _TimedPath:
         return pose_from_row(rows[k - 1]).interpolate(pose_from_row(rows[k]), part)
 
     def _trigger_direction(self, time: float) -> Vector6 | None:
-        """Return the direction of the path at a time, None where it stands."""
+        """Return the direction of the path at a time, None where the tool rests."""
         pose, half = self._pose(time), _DIRECTION_TIME
         while half <= _MAX_DIRECTION_TIME:
             a, b = self._pose(time - half), self._pose(time + half)

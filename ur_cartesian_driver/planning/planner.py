@@ -3,9 +3,9 @@
 """
 From a goal to a plan: choose the primitives, and refuse what the arm cannot do.
 
-The stages: :func:`~.request.validate.check` (no robot needed), the way of every segment with the
+The stages: :func:`~.request.validate.check` (no robot needed), the curve of every segment with the
 configuration in which it arrives, blends, speeds, and then the primitives, the reference path and
-the report. The first reason to refuse that is met is raised; nothing has been sent by then.
+the report. The first reason for a refusal is raised.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ from ur_cartesian_driver.planning.geometry.curves import ArcCurve
 from ur_cartesian_driver.planning.moves.joint_path_planner import JointPathPlanner, SAME_SOLUTION
 from ur_cartesian_driver.planning.moves.plan_report import segment_line, tightest_remark
 from ur_cartesian_driver.planning.moves.reference_path import reference_path
+from ur_cartesian_driver.planning.moves.segment_draft import JOINT_SPACE_TYPES
 from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
 from ur_cartesian_driver.planning.moves.segment_timing import schedule
 from ur_cartesian_driver.planning.options import PlanningOptions
@@ -77,10 +78,16 @@ from ur_cartesian_driver.planning.spline.spline_planner import (
     stretch_times,
 )
 
-#: How far the reported TCP may be from where the kinematics puts it [m], [rad]. Calibration moves
-#: it by some millimetres; another model or another TCP moves it by much more.
+#: How far the reported TCP may be from where the kinematics puts it [m], [rad]. Calibration shifts
+#: it by some millimetres; another model or another TCP shifts it much more.
 MAX_MISMATCH_POSITION = 0.015
 MAX_MISMATCH_ANGLE = 0.05
+
+_UNTIMED_MOVES: dict[SegmentType, type[MoveP] | type[OptimoveJ] | type[OptimoveL]] = {
+    SegmentType.PROCESS: MoveP,
+    SegmentType.OPTIMIZED_JOINT: OptimoveJ,
+    SegmentType.OPTIMIZED_LINEAR: OptimoveL,
+}
 
 
 def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
@@ -89,7 +96,7 @@ def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> P
 
     :param state: joints, TCP pose and TCP offset are read from it.
     :param arm: the kinematics, the robot's own calibrated one where it is known.
-    :raises GoalRefused: the subclass that fits; its text names place, quantity, value and bound.
+    :raises GoalRefused: a subclass; its text names point, quantity, value and bound.
     """
     with _no_collections():
         return _plan(goal, state, arm, options)
@@ -98,10 +105,10 @@ def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> P
 @contextmanager
 def _no_collections() -> Iterator[None]:
     """
-    Keep the garbage collector away.
+    Switch the garbage collector off.
 
     A plan of ten thousand points is hundreds of thousands of objects, none of which is garbage
-    before it is done, and the collector would walk through them again and again.
+    before the plan is made, and the collector would scan them again and again.
     """
     enabled = gc.isenabled()
     gc.disable()
@@ -166,7 +173,7 @@ def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> 
 
 
 def _spline_plan(planner: _Planner, retargeted: RetargetedGoal, T_flange_active: Pose) -> Plan:
-    """Return the plan of a goal whose points are joined by a spline."""
+    """Return the plan of a SPLINE or SERVO goal."""
     goal, state, options = planner.goal, planner.state, planner.options
     begin = planner.begin()
     part = (
@@ -197,7 +204,7 @@ def _spline_plan(planner: _Planner, retargeted: RetargetedGoal, T_flange_active:
 
 
 class _Planner:
-    """The data that the stages share; made for one goal and thrown away."""
+    """The data that the stages of one goal share."""
 
     def __init__(self, goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> None:
         self.goal, self.state, self.options = goal, state, options
@@ -220,7 +227,7 @@ class _Planner:
     # -- before the first segment ----------------------------------------------------------------
 
     def _check_robot(self) -> None:
-        """Refuse where the robot is not what the kinematics thinks, or is somewhere else."""
+        """Refuse a robot whose TCP is not where the kinematics puts it, or a far first point."""
         state = self.state
         predicted = self.kinematics.arm.forward(state.actual_q) @ state.T_flange_tcp
         distance = predicted.distance_to(state.actual_tcp_pose)
@@ -247,9 +254,9 @@ class _Planner:
 
     def _is_at_first_point(self) -> bool:
         """
-        Tell whether the first point is at time 0 and so needs no motion.
+        Tell whether the first point is at time 0, which needs no motion.
 
-        :raises InvalidGoal: it is at time 0, and the robot is not there.
+        :raises InvalidGoal: it is at time 0, but the robot is not there.
         """
         if not self.timed or self.goal.waypoints[0].time != 0.0:
             return False
@@ -277,7 +284,7 @@ class _Planner:
             chosen = self.kinematics.solve_posture(
                 self.targets[0], named, q, point_field(0, 'pose')
             )
-            # The robot stands within the start's tolerance, not exactly there.
+            # The robot is within the tolerance of the start, not exactly there.
             near = self.kinematics.nearest(self.targets[0], q, point_field(0, 'pose'))
             if clause := describe_miss(near, chosen, named):
                 raise InvalidPosture(
@@ -290,7 +297,7 @@ class _Planner:
         return 1 if self._is_at_first_point() else 0
 
     def geometries(self) -> list[SegmentGeometry]:
-        """Return the way of every segment and the configuration it arrives in."""
+        """Return the curve of every segment and the configuration in which it arrives."""
         begin = self.begin()
         stops = [0.0, *(point.time for point in self.goal.waypoints)][begin:]
         times = [after - before if self.timed else None for before, after in pairwise(stops)]
@@ -303,7 +310,7 @@ class _Planner:
     # -- primitives ------------------------------------------------------------------------------
 
     def segment(self, geometry: SegmentGeometry, timing: SegmentTiming) -> PlannedSegment:
-        """Return the primitive of a leg and what is expected of it."""
+        """Return the primitive of a segment and what is expected of it."""
         primitive, reason = adapt_to_dialect(
             self._primitive(geometry, timing), geometry.index, geometry.joints, self.options
         )
@@ -324,57 +331,30 @@ class _Planner:
     def _primitive(self, geometry: SegmentGeometry, timing: SegmentTiming) -> Primitive:
         blend = geometry.blend_after.radius if geometry.blend_after else 0.0
         v, a, target = timing.velocity, timing.acceleration, self.targets[geometry.index]
-        match geometry.kind:
-            case SegmentType.JOINT:
-                return MoveJ(
-                    target=target,
-                    q_near=self._q_near(geometry),
-                    velocity=v,
-                    acceleration=a,
-                    duration=timing.wire_time,
-                    blend_radius=blend,
-                )
-            case SegmentType.PROCESS:
-                return MoveP(
-                    target=target,
-                    q_near=self._posture_near(geometry),
-                    velocity=v,
-                    acceleration=a,
-                    blend_radius=blend,
-                )
-            case SegmentType.CIRCULAR:
-                return self._arc(geometry, v, a, blend)
-            case SegmentType.OPTIMIZED_JOINT:
-                return OptimoveJ(
-                    target=target,
-                    q_near=self._q_near(geometry),
-                    velocity=v,
-                    acceleration=a,
-                    blend_radius=blend,
-                )
-            case SegmentType.OPTIMIZED_LINEAR:
-                return OptimoveL(
-                    target=target,
-                    q_near=self._posture_near(geometry),
-                    velocity=v,
-                    acceleration=a,
-                    blend_radius=blend,
-                )
-            case _:
-                return MoveL(
-                    target=target,
-                    q_near=self._posture_near(geometry),
-                    velocity=v,
-                    acceleration=a,
-                    duration=timing.wire_time,
-                    blend_radius=blend,
-                )
-
-    def _posture_near(self, geometry: SegmentGeometry) -> Joints | None:
-        return self._q_near(geometry) if geometry.waypoint.posture else None
+        if geometry.kind == SegmentType.CIRCULAR:
+            return self._arc(geometry, v, a, blend)
+        q_near = (
+            self._q_near(geometry)
+            if geometry.kind in JOINT_SPACE_TYPES or geometry.waypoint.posture
+            else None
+        )
+        untimed = _UNTIMED_MOVES.get(geometry.kind)
+        if untimed is not None:
+            return untimed(
+                target=target, q_near=q_near, velocity=v, acceleration=a, blend_radius=blend
+            )
+        timed = MoveJ if geometry.kind == SegmentType.JOINT else MoveL
+        return timed(
+            target=target,
+            q_near=q_near,
+            velocity=v,
+            acceleration=a,
+            duration=timing.wire_time,
+            blend_radius=blend,
+        )
 
     def _q_near(self, geometry: SegmentGeometry) -> Joints:
-        """Return the chosen solution; a full posture itself where it leads to the same one."""
+        """Return the chosen solution; a full posture itself where it selects the same one."""
         wanted = full_posture(named_joints(geometry.waypoint.posture, self.options.tf_prefix))
         if wanted is not None:
             location = point_field(geometry.index, 'pose')
@@ -426,14 +406,14 @@ class _Planner:
 
     def _via_joints(self, geometry: SegmentGeometry, segment: Segment, via: Pose) -> Joints:
         """
-        Return the solution of the via's pose that its posture means.
+        Return the solution of the via's pose that its posture selects.
 
-        :raises InvalidPosture: the arm goes along the arc in another configuration.
+        :raises InvalidPosture: the arm follows the arc in another configuration.
         """
         assert isinstance(geometry.curve, ArcCurve)
         location = segment_field(geometry.index, 'via')
         passing = self.samples.joints_at(geometry.index, geometry.curve.u_via)
-        # The orientation of the via does not shape the arc, so go on from there to its pose.
+        # The orientation of the via does not shape the arc: continue from the arc to its pose.
         q = self.kinematics.nearest(via, passing, location)
         named = named_joints(segment.via_posture, self.options.tf_prefix)
         chosen = self.kinematics.solve_posture(via, named, q, location)

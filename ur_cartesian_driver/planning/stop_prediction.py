@@ -1,13 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Where a moving arm would come to rest: what a goal is checked from that is to follow another one.
+Predict where a moving arm comes to rest: a goal that preempts another one is checked from there.
 
-The robot program stops an arm along its joints (``stopj``): the leading joint brakes evenly and
-the others in proportion, so each goes on by half of what it would have gone in the time of the
-stop. That is where the next goal begins, in that configuration. It is looked at as if the stop
-began now. Checking takes a while in which the arm goes on, but nobody knows how long before it is
-done; so what passes is planned again when the arm stands.
+The robot program stops the arm along its joints (``stopj``): the leading joint brakes evenly and
+the others in proportion, so each travels half of what it would have travelled in the time of
+the stop. The prediction assumes that the stop begins now. The arm moves on while the goal is
+checked, for an unknown time; so a goal that passes is planned again when the arm is at rest.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from ur_cartesian_driver.motion.state import RobotState
 
 def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState:
     """
-    Return the state in which the arm would be if it were stopped now; itself where it stands.
+    Return the state of the arm after a stop that begins now; the state itself if it is at rest.
 
     :param deceleration: of the leading joint [rad/s^2].
     """

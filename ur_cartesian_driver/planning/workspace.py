@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The planes that the arm must not cross, as a parameter gives them."""
+"""Workspace planes, which the arm must not cross, read from their parameter."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class Plane:
     name: str
     #: A point on it, in ``base`` (the frame of the controller, not ``base_link``) [m].
     point: tuple[float, float, float]
-    #: Unit vector in ``base`` into the side that is allowed.
+    #: Unit vector in ``base`` into the allowed side.
     normal: tuple[float, float, float]
-    #: How far the arm keeps away from it [m].
+    #: Distance that the arm keeps from it [m].
     margin: float = 0.0
 
     @classmethod
@@ -25,7 +25,7 @@ class Plane:
         """
         Read ``name x y z nx ny nz [margin]`` in ``base`` [m]; the normal may have any length.
 
-        :raises ValueError: the text has another form; the sentence says what is wrong.
+        :raises ValueError: the text has another form.
         """
         words = text.split()
         if len(words) not in (7, 8):
@@ -60,7 +60,7 @@ def parse_planes(texts: tuple[str, ...]) -> tuple[Plane, ...]:
     """
     Read all planes.
 
-    :raises ValueError: one cannot be read, or two have one name.
+    :raises ValueError: one cannot be read, or two have the same name.
     """
     planes = tuple(Plane.parse(text) for text in texts)
     names = [plane.name for plane in planes]

@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Blended corners: the way from one path into the next that leaves out the waypoint between them.
+Blends: the transition from one curve into the next that rounds the waypoint between them.
 
-The robot's maker publishes the radius within which a corner is rounded, and the shape only for
-``movep`` (a circular fillet). The others are taken as the two motions crossing over: the first
-slows down evenly while the second speeds up evenly, which between straight lines is a parabola.
-Between two joint moves this happens in joint space, else in Cartesian space.
+UR publishes the radius within which a blend stays, and its shape only for ``movep`` (a circular
+fillet). The other blends are modelled as a crossfade of the two motions: the first slows down
+evenly while the second speeds up evenly, which between straight lines is a parabola. Between two
+joint moves this happens in joint space, else in Cartesian space.
 
-Goals of ten thousand blended points are usual, so corners are made and sampled many at a time.
+Goals of ten thousand blended points are usual, so blends are made and sampled many at a time.
 """
 
 from __future__ import annotations
@@ -41,30 +41,30 @@ from ur_cartesian_driver.planning.geometry.pose_rows import (
     normalized_rows,
 )
 
-# Chords that measure the length of a corner without a formula.
+# Chords that measure the length of a blend without a formula.
 _CHORDS = 16
-# Legs that go straight on, or straight back, have no circle between them [rad].
+# Segments that continue straight on, or straight back, have no circle between them [rad].
 _STRAIGHT = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class BlendInput:
-    """Where two paths meet, and how: what a corner is made of."""
+    """Two curves that meet, and the blend to make there."""
 
     first: SegmentCurve
     second: SegmentCurve
-    #: Distance from the waypoint at which both paths are left [m].
+    #: Distance from the waypoint at which both curves are left [m].
     radius: float
-    #: A circular arc (``movep``); both paths must be lines.
+    #: A circular arc (``movep``); both curves must be lines.
     fillet: bool
 
 
 @dataclass(frozen=True, slots=True)
 class Blend:
     """
-    The blend between two paths.
+    The blend between two curves, over ``s`` in [0, 1].
 
-    ``leave`` is where it leaves the first path, ``join`` where it joins the second (their ``u``).
+    ``leave`` is where it leaves the first curve, ``join`` where it joins the second (their ``u``).
     """
 
     first: SegmentCurve
@@ -73,14 +73,14 @@ class Blend:
     fillet: bool
     leave: float
     join: float
-    #: Length of the rounded corner [m], and the turn of the tool in it [rad].
+    #: Length [m], and turn of the tool [rad].
     length: float
     angle: float
-    #: Into how many pieces to cut it so that chords follow it.
+    #: Number of chords that follow it closely enough.
     samples: int
-    #: How far the robot's own corner may lie beside this one, [m] and [rad]. It may come as near
-    #: to the waypoint as it likes, or cut the corner straight: this one is half-way between. The
-    #: turn of the tool may run ahead of its way, or behind it.
+    #: How far the robot's own blend may lie beside this one [m], [rad]. It may come as close to
+    #: the waypoint as it likes, or cut across straight: this one is half-way between. The turn
+    #: of the tool may run ahead of its position, or behind it.
     blend_tolerance: tuple[float, float]
     can_start_at_rest: ClassVar[bool] = False
 
@@ -108,11 +108,11 @@ class Blend:
 
     @property
     def in_joint_space(self) -> bool:
-        """Whether the joints cross over, and not the poses of the tool."""
+        """Whether it crossfades joint positions instead of tool poses."""
         return isinstance(self.first, JointLineCurve) and isinstance(self.second, JointLineCurve)
 
     def joint_rows(self, s: Floats) -> Floats:
-        """Return the joint positions (n, 6) [rad] at ``s`` (n,) of a corner in joint space."""
+        """Return the joint positions (n, 6) [rad] at ``s`` (n,) of a blend in joint space."""
         assert isinstance(self.first, JointLineCurve)
         assert isinstance(self.second, JointLineCurve)
         a, b = crossfade(self.leave, self.join, s)
@@ -129,12 +129,12 @@ class Blend:
 
 
 def crossfade(leave: float | Floats, join: float | Floats, s: Floats) -> tuple[Floats, Floats]:
-    """Return the ``u`` of the first path and that of the second at ``s`` of corners."""
+    """Return the ``u`` of the first curve and that of the second at ``s`` of blends."""
     return leave + (1.0 - leave) * s * (2.0 - s), join * s * s
 
 
 def blends(inputs: Sequence[BlendInput]) -> list[Blend]:
-    """Return the corners of many pairs of paths."""
+    """Return the blends of many pairs of curves."""
     if not inputs:
         return []
     ends = [(trim_end(m.first, m.radius), m.second.trim(m.radius)) for m in inputs]
@@ -174,14 +174,14 @@ def blends(inputs: Sequence[BlendInput]) -> list[Blend]:
 
 
 def _with_measured_length(blend: Blend) -> Blend:
-    """Return a corner that is no parabola with its length measured along chords."""
+    """Return a blend that is no parabola with its length measured along chords."""
     positions = blend.rows(np.linspace(0.0, 1.0, _CHORDS + 1))[:, :3]
     length = float(np.linalg.norm(np.diff(positions, axis=0), axis=1).sum())
     return replace(blend, length=length)
 
 
 def _poses_at(paths: Iterable[SegmentCurve], u: Sequence[float]) -> Floats:
-    """Return one pose (n, 7) of each path."""
+    """Return one pose (n, 7) of each curve."""
     every = list(paths)
     rows = np.empty((len(every), 7))
     lines = [k for k, path in enumerate(every) if isinstance(path, LineCurve)]
@@ -195,7 +195,7 @@ def _poses_at(paths: Iterable[SegmentCurve], u: Sequence[float]) -> Floats:
 
 
 def _starts(paths: Sequence[SegmentCurve]) -> Floats:
-    """Return the poses (n, 7) at which paths begin."""
+    """Return the poses (n, 7) at which curves begin."""
     return np.array(
         [path.ends[0] if isinstance(path, LineCurve) else path.start.row() for path in paths]
     )
@@ -208,16 +208,16 @@ def _ends(lines: Sequence[LineCurve]) -> Floats:
 
 class _BlendShapes:
     """
-    The measures of many corners.
+    Lengths, turns and tolerances of many blends.
 
-    :param start: the poses (n, 7) where they begin; ``middle`` of their waypoints, ``end`` where
-        they end.
+    :param start: poses (n, 7) where they begin; ``middle`` of their waypoints, ``end`` where they
+        end.
     """
 
     def __init__(
         self, start: Floats, middle: Floats, end: Floats, radius: Floats, fillet: Floats
     ) -> None:
-        """Keep the positions, and measure turns and openings."""
+        """Measure turns and openings."""
         self.start, self.middle, self.end = start[:, :3], middle[:, :3], end[:, :3]
         self.radius, self.fillet = radius, fillet
         self.before = angle_rows(start[:, 3:], middle[:, 3:])
@@ -240,7 +240,7 @@ class _BlendShapes:
         return lengths
 
     def samples(self) -> Floats:
-        """Return into how many pieces to cut them."""
+        """Return the numbers of chords that follow them closely enough."""
         # At its ends the blend turns at twice its mean rate.
         turns = np.ceil(2.0 * self.turns / MAX_TURN_PER_SAMPLE)
         radius = np.maximum(fillet_radius(self.radius, self.opening), 1e-3)
@@ -252,17 +252,17 @@ class _BlendShapes:
         return np.maximum(2.0, np.maximum(turns, curve)).astype(np.intp)
 
     def blend_tolerances(self) -> Floats:
-        """Return the room (n, 2) beside them [m], [rad]."""
+        """Return their blend tolerances (n, 2) [m], [rad]."""
         height = np.linalg.norm(self.middle - 0.5 * (self.start + self.end), axis=1)
         return 0.5 * np.stack((height, np.maximum(self.before, self.after)), axis=1)
 
 
 def blend_rows(all_blends: Sequence[Blend], which: NDArray[np.intp], s: Floats) -> Floats:
     """
-    Return poses (n, 7) in many corners.
+    Return poses (n, 7) in many blends.
 
-    :param which: (n,) the number of the corner of each row, not decreasing.
-    :param s: (n,) where in it, [0, 1].
+    :param which: (n,) the number of the blend of each row, not decreasing.
+    :param s: (n,) in [0, 1].
     """
     in_joint_space = np.array([blend.in_joint_space for blend in all_blends], dtype=np.bool_)
     if not in_joint_space.any():
@@ -277,7 +277,7 @@ def blend_rows(all_blends: Sequence[Blend], which: NDArray[np.intp], s: Floats) 
 
 
 def _crossfade_rows(all_blends: Sequence[Blend], which: NDArray[np.intp], s: Floats) -> Floats:
-    """Return poses in corners whose poses cross over."""
+    """Return poses in blends that crossfade poses."""
     leave = np.array([c.leave for c in all_blends])[which]
     join = np.array([c.join for c in all_blends])[which]
     a, b = crossfade(leave, join, s)
@@ -305,7 +305,7 @@ def path_rows(paths: Sequence[Curve], which: NDArray[np.intp], u: Floats) -> Flo
     Return poses (n, 7) of many curves.
 
     :param which: (n,) the number of the curve of each row, not decreasing.
-    :param u: (n,) where on it.
+    :param u: (n,) in [0, 1].
     """
     rows = np.empty((len(u), 7))
     is_line = np.array([isinstance(path, LineCurve) for path in paths], dtype=np.bool_)
@@ -322,9 +322,9 @@ def path_rows(paths: Sequence[Curve], which: NDArray[np.intp], u: Floats) -> Flo
 
 
 def opening_rows(start: Floats, waypoint: Floats, end: Floats) -> Floats:
-    """Return the angles between the two legs at the waypoints [rad], pi = straight on."""
+    """Return the angles between the two segments at the waypoints [rad], pi = straight on."""
     a, b = _units(start - waypoint), _units(end - waypoint)
-    # Better than the arc cosine where the legs are in line.
+    # More accurate than the arc cosine where the segments are in line.
     opening: Floats = 2.0 * np.arctan2(
         np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1)
     )
@@ -332,13 +332,13 @@ def opening_rows(start: Floats, waypoint: Floats, end: Floats) -> Floats:
 
 
 def fillet_radius(radius: Floats, opening: Floats) -> Floats:
-    """Return the radii of the circles that touch both legs at the blends' distances [m]."""
+    """Return the radii of the circles that touch both segments at the blend radius [m]."""
     result: Floats = radius * np.tan(np.minimum(0.5 * opening, 0.5 * np.pi - 1e-9))
     return result
 
 
 def _on_fillets(start: Floats, waypoint: Floats, end: Floats, radius: Floats, s: Floats) -> Floats:
-    """Return positions (n, 3) on circles that touch both legs, evenly along them."""
+    """Return positions (n, 3) on circles that touch both segments, evenly along them."""
     opening = opening_rows(start, waypoint, end)
     rho = fillet_radius(radius, opening)
     inwards = _units(_units(start - waypoint) + _units(end - waypoint))
@@ -359,9 +359,8 @@ def _parabola_lengths(start: Floats, waypoint: Floats, end: Floats) -> Floats:
     Return the lengths of parabolas with these control points [m].
 
     The speed is 2 |u + s w| with u = p - a, w = a - 2 p + b; its square A s^2 + B s + C has a
-    root whose integral is elementary. It is taken by Gauss-Legendre instead, whose eight points
-    are exact to a millionth but for corners that go back nearly straight, where it is a
-    thousandth, and which knows no special cases.
+    root whose integral is elementary, but has special cases. Gauss-Legendre has none: its eight
+    points are exact to a millionth, and to a thousandth for blends that go back nearly straight.
     """
     u, w = waypoint - start, start - 2.0 * waypoint + end
     nodes, weights = np.polynomial.legendre.leggauss(8)

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Poses by the ten thousand: the formulas of :mod:`~ur_cartesian_driver.motion.pose` for rows.
+The formulas of :mod:`~ur_cartesian_driver.motion.pose` for rows of poses.
 
-A row is x y z [m] and the unit quaternion x y z w; arrays are (n, 7). Looking ahead along a goal
-needs so many poses that one object for each would take longer than the inverse kinematics.
+A row is x y z [m] and the unit quaternion x y z w; arrays are (n, 7). The checks along a goal need
+so many poses that an object for each would take longer than the inverse kinematics.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def multiply_rows(a: Floats, b: Floats) -> Floats:
 
 
 def cross_rows(a: Floats, b: Floats) -> Floats:
-    """Return the products of vectors (n, 3); numpy's own takes many times as long for few."""
+    """Return the cross products of vectors (n, 3); numpy's own is many times slower for few."""
     ax, ay, az = a.T
     bx, by, bz = b.T
     return np.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), axis=1)
@@ -70,7 +70,7 @@ def compose_rows(T_a_b: Floats, T_b_c: Pose) -> Floats:
 
 def interpolate_rows(a: Floats, b: Floats, fraction: Floats) -> Floats:
     """
-    Return the poses at fractions (n,) of the ways from ``a`` to ``b`` (n, 7).
+    Return the poses at fractions (n,) between ``a`` and ``b`` (n, 7).
 
     Straight line, shortest rotation.
     """

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Turns as rotation vectors, with their exact velocities, in rows.
+Rotation vectors with their exact angular rates, in rows.
 
 An orientation near to R0 is exp(r) R0 with the rotation vector r (n, 3) [rad] in base axes. While
 r changes the body turns with w = J r', where J is the left Jacobian of the rotation group,
@@ -9,8 +9,8 @@ r changes the body turns with w = J r', where J is the left Jacobian of the rota
     J = I + b [r]x + c [r]x^2,    b = (1 - cos |r|) / |r|^2,    c = (|r| - sin |r|) / |r|^3
 
 (J. Sola, J. Deray, D. Atchuthan, A micro Lie theory for state estimation in robotics, 2018). So a
-twist that is asked for at a point is met exactly. b and c are power series of |r|^2, which have no
-singular place and need no cases.
+twist that is requested at a point is met exactly. b and c are power series of |r|^2, which are
+regular everywhere and need no cases.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def angular_rates(turn: MotionRows) -> tuple[Floats, Floats]:
 
 
 def rotation_rates(r: Floats, w: Floats, e: Floats) -> MotionRows:
-    """Return the turn with a rotation vector r, |r| < 2 pi, and these :func:`angular` rates."""
+    """Return r, |r| < 2 pi, and its derivatives with these :func:`angular_rates`."""
     b, _, c, _ = _series(r)
     K = _cross_matrices(r)
     J = np.eye(3) + b[:, :, None] * K + c[:, :, None] * (K @ K)

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Places along the way of a goal, as the robot will go it: parts of paths, and the corners between.
+Samples along the path of a goal: on parts of curves, and on the blends between them.
 
-A place every 2 mm and every degree, and at least eight on each piece. Pieces shorter than 13 mm
-and 6 degrees have fewer, one every 1.6 mm and 0.8 degrees: a path of 5 mm steps has four places on
-each of them. Where the joints turn fast :mod:`~.joint_path` adds places.
+One sample every 2 mm and every degree, and at least eight on each piece. Pieces shorter than 13 mm
+and 6 degrees have fewer, one every 1.6 mm and 0.8 degrees: a path of 5 mm steps has four samples
+on each of them. Where the joints turn fast :mod:`~.joint_path` adds samples.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from ur_cartesian_driver.planning.geometry.pose_rows import Floats
 
 Ints = NDArray[np.int32]
 
-#: Largest distance of two places [m], [rad].
+#: Maximum distance of two samples [m], [rad].
 STEP_LENGTH = 0.002
 STEP_ANGLE = pi / 180.0
-#: The least number of places on a piece, and how much finer than the largest distance they then
-#: are at most.
+#: Minimum number of samples on a piece, as long as they are no closer than the maximum distance
+#: divided by this.
 MIN_SAMPLES = 8
 _MIN_REFINEMENT = 1.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathSamples:
-    """All places of a goal at which the arm was looked at, in order of time."""
+    """All samples of a goal, in order of time."""
 
     #: (n,) the index of the waypoint to which the motion leads.
     segment: Ints
-    #: (n,) how much of that segment lies behind, (0, 1].
+    #: (n,) the fraction of that segment, (0, 1].
     fraction: Floats
     #: (n, 6) joint positions [rad].
     q: Floats
@@ -48,7 +48,7 @@ class PathSamples:
     poses: Floats
 
     def joints_at(self, segment: int, fraction: float) -> Joints:
-        """Return the joint positions at the place of a segment that is nearest to a fraction."""
+        """Return the joint positions at the sample of a segment closest to a fraction."""
         first, last = np.searchsorted(self.segment, (segment, segment + 1))
         row = int(first) + int(np.argmin(np.abs(self.fraction[first:last] - fraction)))
         a, b, c, d, e, f = self.q[row].tolist()
@@ -120,7 +120,7 @@ def _sample_count(length: float, angle: float) -> int:
 
 @dataclass(frozen=True, slots=True)
 class PoseSamples:
-    """Rows of places on pieces: the number of the piece, where on it, and the pose there."""
+    """Rows of samples on pieces: the number of the piece, the parameter, and the pose."""
 
     #: (n,) not decreasing.
     piece: NDArray[np.intp]
@@ -131,7 +131,7 @@ class PoseSamples:
 
 
 def sample_poses(pieces: Sequence[CurvePiece]) -> PoseSamples:
-    """Return the places on pieces of the tool's space; where a piece begins is none of its."""
+    """Return the samples on Cartesian pieces; the start of a piece belongs to the one before."""
     piece, t = sample_parameters(pieces)
     poses = np.empty((len(t), 7))
     is_blend = np.array([isinstance(p.curve, Blend) for p in pieces], dtype=np.bool_)
@@ -147,20 +147,20 @@ def sample_poses(pieces: Sequence[CurvePiece]) -> PoseSamples:
 
 
 def sample_parameters(pieces: Sequence[CurvePiece]) -> tuple[NDArray[np.intp], Floats]:
-    """Return the piece (n,) and the parameter (n,) of each of its places."""
+    """Return the piece (n,) and the parameter (n,) of each sample."""
     n = np.array([p.sample_count for p in pieces], dtype=np.intp)
     begin, end = np.array([(p.begin, p.end) for p in pieces]).reshape(-1, 2).T
     piece = np.repeat(np.arange(len(pieces)), n)
     k = np.arange(1, len(piece) + 1) - np.repeat(np.cumsum(n) - n, n)
-    share = k / n[piece]
-    t = np.where(share == 1.0, end[piece], begin[piece] + (end - begin)[piece] * share)
+    part = k / n[piece]
+    t = np.where(part == 1.0, end[piece], begin[piece] + (end - begin)[piece] * part)
     return piece, t
 
 
 def segments_of(
     pieces: Sequence[CurvePiece], piece: NDArray[np.intp], t: Floats
 ) -> tuple[Ints, Floats]:
-    """Return the segment (n,) and the fraction (n,) of it of each place: many ``on_segment``."""
+    """Return the segment (n,) of each sample and the fraction (n,) of it; see ``on_segment``."""
     index = np.array([p.index for p in pieces], dtype=np.int32)[piece]
     ends = np.array(
         [

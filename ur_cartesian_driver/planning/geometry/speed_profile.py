@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Speed over the way: accelerate, cruise, brake, and what follows from it."""
+"""Speed profiles: accelerate, cruise, brake."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-#: With a time the robot keeps its profile to itself; taken is a third each for accelerating,
-#: cruising and braking.
+#: The profile of a move with a time is not published; assumed is a third of the time each for
+#: accelerating, cruising and braking.
 RAMP_SHARE = 1.0 / 3.0
 
 
@@ -41,7 +41,7 @@ class SpeedProfile:
         ) / self.acceleration
 
     def time_at(self, distance: float) -> float:
-        """Return the time after which that much of the length is done [s]."""
+        """Return the time at which a distance is done [s]."""
         if distance <= 0.0 or self.length <= 0.0:
             return 0.0
         if distance >= self.length:
@@ -54,18 +54,18 @@ class SpeedProfile:
         return (self.cruise - self.enter) / self.acceleration + (distance - ramp_in) / self.cruise
 
     def knots(self) -> tuple[float, ...]:
-        """Return the ways at which the time curve bends, ends left out, as fractions in (0, 1)."""
+        """Return the fractions of the length in (0, 1) at which to sample the time."""
         if self.length <= 0.0:
             return ()
         a, b = (
             self._ramp_distance(self.enter) / self.length,
             self._ramp_distance(self.leave) / self.length,
         )
-        # The halves of the ramps keep straight lines between the knots near the parabola.
+        # The halves of the ramps keep the chords between the knots close to the parabola.
         return tuple(f for f in (0.25 * a, a, 1.0 - b, 1.0 - 0.25 * b) if 0.0 < f < 1.0)
 
     def _ramp_distance(self, speed: float) -> float:
-        """Return the way between a speed and the cruise: (v^2 - u^2) / 2a."""
+        """Return the distance between a speed and the cruise: (v^2 - u^2) / 2a."""
         return (self.cruise + speed) * (self.cruise - speed) / (2.0 * self.acceleration)
 
     def _ramp_time(self, speed: float, distance: float) -> float:
@@ -78,7 +78,7 @@ def times_at(
     profiles: Sequence[SpeedProfile], which: NDArray[np.intp], distance: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """
-    Return :meth:`Profile.time_at` of many ways (n,).
+    Return :meth:`SpeedProfile.time_at` of many distances (n,).
 
     :param which: (n,) the number of the profile of each.
     """
@@ -90,7 +90,7 @@ def times_at(
     left = length - distance
     speeding = (np.sqrt(enter * enter + 2.0 * a * np.minimum(distance, ramp_in)) - enter) / a
     even = np.clip(distance - ramp_in, 0.0, length - ramp_in - ramp_out) / cruise
-    # What braking takes from its beginning: all of it less what is still to come.
+    # The time of braking so far: all of it less the rest.
     to_come = (np.sqrt(leave * leave + 2.0 * a * np.minimum(left, ramp_out)) - leave) / a
     braking = np.where(left < ramp_out, (cruise - leave) / a - to_come, 0.0)
     times: NDArray[np.float64] = speeding + even + braking
@@ -109,8 +109,8 @@ def trapezoid(
 
     From rest to rest T = d/v + v/a if d > v^2/a, else the triangle T = 2 sqrt(d/a).
 
-    :param enter: the speed to begin with, where that is not more than the velocity.
-    :param tail: how far behind the end it would come to rest; inf = it goes on at its speed. A
+    :param enter: the speed at the start, as far as it does not exceed the velocity.
+    :param stop_distance: how far behind the end it would come to rest; inf = it keeps its speed. A
         robot that does not know yet what follows its blend brakes for the waypoint.
     """
     leave = min(velocity, sqrt(2.0 * acceleration * stop_distance))
@@ -122,7 +122,7 @@ def trapezoid(
 def profile_for_time(
     length: float, duration: float, stands_before: bool, stands_after: bool
 ) -> SpeedProfile:
-    """Return the profile of a motion for which the robot is told the time."""
+    """Return the profile of a motion that is sent with a time."""
     cruise = length / duration / (1.0 - 0.5 * RAMP_SHARE * (stands_before + stands_after))
     acceleration = max(cruise, 1e-12) / (RAMP_SHARE * duration)
     return SpeedProfile(
@@ -136,7 +136,7 @@ def profile_for_time(
 
 def peak_speed_and_acceleration(length: float, duration: float) -> tuple[float, float]:
     """
-    Return the largest speed and acceleration of a motion for which the robot is told the time.
+    Return the peak speed and acceleration of a motion that is sent with a time.
 
     They are those from rest to rest, 1.5 d/T and 4.5 d/T^2: the robot plans to stop at the
     waypoint, also where a blend then takes over.
@@ -146,7 +146,7 @@ def peak_speed_and_acceleration(length: float, duration: float) -> tuple[float, 
 
 
 def min_duration(length: float, speed: float, acceleration: float) -> float:
-    """Return the shortest time that keeps :func:`peak_of` within both bounds."""
+    """Return the shortest time that keeps both peaks (above) within their bounds."""
     return max(
         length / speed / (1.0 - RAMP_SHARE),
         sqrt(length / acceleration / (RAMP_SHARE * (1.0 - RAMP_SHARE))),
@@ -159,8 +159,8 @@ def cruise_speed_for(
     """
     Return the cruise speed that takes exactly a duration, None if the acceleration is too low.
 
-    Each of the ramps (0 to 2) costs the way v^2 / 2a, so v T = d + n v^2 / 2a, of which the
-    smaller root counts.
+    Each of the ramps (0 to 2) costs the distance v^2 / 2a, so v T = d + n v^2 / 2a; the smaller
+    root counts.
     """
     root = duration * duration - 2.0 * ramps * length / acceleration
     if root < 0.0:

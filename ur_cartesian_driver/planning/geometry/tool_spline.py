@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The tool over time: the curve that a SPLINE or SERVO goal means.
+The tool spline: the pose of the tool over time in a SPLINE or SERVO goal.
 
 From point to point the position is a polynomial, and so is the rotation vector from the
-orientation at the begin of the piece (:mod:`~.rotation_rows`): cubic where twists are given,
+orientation at the start of the piece (:mod:`~.rotation_rows`): cubic where twists are given,
 quintic where accelerations are given too. Both are met exactly at the points.
 """
 
@@ -36,7 +36,7 @@ Ints = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ToolPoints:
-    """What the tool is to do at n + 1 times, the first of them the start; in one frame."""
+    """Pose, twist and acceleration of the tool at n + 1 times, of which the first is the start."""
 
     #: (n + 1,) [s], increasing.
     times: Floats
@@ -89,7 +89,7 @@ class ToolSpline:
                 MotionRows(x[begin], v[begin, :3], a[begin, :3]),
                 MotionRows(x[end], v[end, :3], a[end, :3]),
             ),
-            # At the begin the vector is 0, and there its derivatives are the angular ones.
+            # At the start the vector is 0, so its derivatives are the angular rates.
             turns=between(
                 durations,
                 MotionRows(zero, v[begin, 3:], a[begin, 3:]),
@@ -117,14 +117,14 @@ class ToolSpline:
         return (evaluate(self.positions[piece], t).x, evaluate(self.turns[piece], t).x)
 
     def at(self, times: Floats) -> ToolRows:
-        """Return the tool at times (m,) [s]; where two pieces meet on the second one."""
+        """Return the tool at times (m,) [s]; where two pieces meet, on the second one."""
         piece = np.clip(
             np.searchsorted(self.times, times, side='right') - 1, 0, len(self.positions) - 1
         )
         return self.rows(piece, times - self.times[piece])
 
     def stretch_times(self, factor: float) -> ToolSpline:
-        """Return the same way in so many times the time."""
+        """Return the same path with all times multiplied by a factor."""
         powers = factor ** -np.arange(6.0)[:, None]
         return ToolSpline(
             times=self.times[0] + factor * (self.times - self.times[0]),

@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Which way each segment goes, and in which configurations: the look ahead along a whole goal.
+Plan the joint path of a whole goal: the curve of each segment and its joint configurations.
 
-Straight lines and arcs that follow each other, with the corners between them, are a *run*: its
-poses are known beforehand, so all of it is solved at once. A joint move ends a run, because it
-begins in the configuration in which the run arrives. So does a line that has to become a joint
-move (``on_posture_change: movej``): it is put in its place, and the rest is looked at again.
+Lines and arcs that follow each other, with the blends between them, are a *run*: its poses are
+known beforehand, so the joints are solved at once. A joint move ends a run, because it begins in
+the configuration in which the run arrives. So does a line that has to become a joint move
+(``on_posture_change: movej``): the joint move replaces it, and the rest is solved again.
 """
 
 from __future__ import annotations
@@ -65,25 +65,24 @@ from ur_cartesian_driver.planning.request.goal_fields import (
 )
 from ur_cartesian_driver.planning.request.validate import duplicate_point_error
 
-#: Solutions that differ by less are one [rad].
+#: Solutions that differ by less are the same [rad].
 SAME_SOLUTION = 1e-6
-#: Where a blend leads into a joint line, the arm comes out of it this near to the line [rad].
+#: How far from a joint line the arm may leave a blend into it [rad].
 _MAX_LINE_OFFSET = 0.05
-#: Legs of the first run where lines may turn into joint moves; of later ones ever more.
+#: Segments of the first run where lines may become joint moves; each later one doubles.
 _FIRST_RUN = 8
 
 _JOINT = SegmentType.JOINT
-#: Why a line or an arc may become a joint move.
+#: The refusals of a line or an arc for which a joint move may replace it.
 _NO_STRAIGHT_PATH = (InvalidPosture, NearSingularity, JointLimitExceeded, Unreachable)
 
 
 class JointPathPlanner:
     """
-    The legs of one goal, one after the other, from where the robot stands.
+    Plans the segments of one goal, one after the other, from the pose of the robot.
 
     :param targets: the poses of all waypoints in base.
-    :param begin: the first waypoint to go to.
-    :param remarks: what is changed or ignored is added to these,
+    :param remarks: on what is changed or ignored; added to.
     :param reasons: by waypoint, for a primitive other than the plain one; added to.
     """
 
@@ -96,7 +95,7 @@ class JointPathPlanner:
         remarks: list[str],
         reasons: dict[int, list[str]],
     ) -> None:
-        """Take what the legs are made of."""
+        """Begin with no segment."""
         self.goal, self.targets, self.kinematics, self.options = goal, targets, kinematics, options
         self.remarks, self.reasons = remarks, reasons
         self.path_margins = PathMargins(kinematics.arm)
@@ -108,10 +107,11 @@ class JointPathPlanner:
         self, begin: int, T_base_tcp: Pose, q: Joints, times: Sequence[float | None]
     ) -> list[SegmentGeometry]:
         """
-        Return the way of every segment, its corners and the configuration it arrives in.
+        Return every segment with its curve, its blends and the configuration at its end.
 
-        :param T_base_tcp: where the tool is, and ``q`` where the joints are [rad].
-        :param times: of each leg [s]; None = speeds decide.
+        :param begin: index of the first waypoint with a motion.
+        :param T_base_tcp: pose of the tool at the start, ``q`` the joint positions [rad].
+        :param times: of each segment [s]; None = by speed.
         :raises GoalRefused: the arm cannot go there.
         """
         self._q_start = self._q = q
@@ -143,9 +143,9 @@ class JointPathPlanner:
 
     def _run(self, k: int, stop: int) -> int:
         """
-        Look along the legs from k to stop; return where to go on.
+        Solve the segments from k to stop; return the index to continue with.
 
-        That is k again where one of them has become a joint move.
+        That is k again if one of them has become a joint move.
         """
         self._make_blends(k, stop)
         pieces, q_start = self._pieces(k, stop), self._q
@@ -156,7 +156,7 @@ class JointPathPlanner:
             pieces, joint_path, measures, segments, fractions, self.options
         )
         refusal, index = joint_path.refusal, joint_path.refused_segment
-        # The end of a range behind a singularity is where the joints swing to beside it.
+        # Beside a singularity joints swing to a limit: the singularity is the cause.
         if near is not None and (
             refusal is None
             or near[1] < index
@@ -183,7 +183,7 @@ class JointPathPlanner:
         return stop
 
     def _make_blends(self, k: int, stop: int) -> None:
-        """Round the corners of a run, the one into it included."""
+        """Make the blends of a run, including the one into it."""
         drafts = self._drafts
         inputs: list[BlendInput] = []
         indices: list[int] = []
@@ -204,7 +204,7 @@ class JointPathPlanner:
             self._check_overlap(n)
 
     def _pieces(self, k: int, stop: int) -> list[CurvePiece]:
-        """Return the pieces from what has been seen to where the last leg is left."""
+        """Return the pieces from where the path is solved to where the last segment is left."""
         pieces: list[CurvePiece] = []
         for n in range(k, stop):
             draft = self._drafts[n]
@@ -220,7 +220,7 @@ class JointPathPlanner:
         return pieces
 
     def _entry(self, n: int) -> list[CurvePiece]:
-        """Return the piece into a leg: the corner, or the rest of the leg before."""
+        """Return the piece into a segment: the blend, or the rest of the segment before."""
         if n == 0:
             return []
         before = self._drafts[n - 1]
@@ -231,7 +231,7 @@ class JointPathPlanner:
         return []
 
     def _end(self, n: int) -> float:
-        """Return the ``u`` where a leg is left, also where its corner is not known yet."""
+        """Return the ``u`` where a segment is left, also where its blend is not made yet."""
         draft = self._drafts[n]
         if draft.blend_after is not None:
             return draft.blend_after.leave
@@ -240,7 +240,7 @@ class JointPathPlanner:
     def _arrivals(
         self, drafts: list[SegmentDraft], joint_path: JointPath, segments: np.ndarray
     ) -> list[Joints]:
-        """Return the configuration of the waypoint at the end of each leg, as far as found."""
+        """Return the configuration at the waypoint of each segment, as far as solved."""
         last = np.searchsorted(segments, [draft.index for draft in drafts], side='right') - 1
         if not len(joint_path.q):
             return [self._q for _ in drafts]
@@ -251,7 +251,7 @@ class JointPathPlanner:
             if self._end(draft.index - self._drafts[0].index) < 1.0
         ]
         if rounded:
-            # The arm does not come there; the report and joint moves from there want to know.
+            # The arm does not reach it, but the report and joint moves from there need it.
             ends = pose_rows(drafts[n].known_curve.end for n in rounded)
             there = nearest_rows(
                 self.kinematics.arm, compose_rows(ends, self.kinematics.T_tcp_flange), q[rounded]
@@ -266,7 +266,7 @@ class JointPathPlanner:
             self._q = (a, b, c, d, e, f)
 
     def _posture_refusal(self, draft: SegmentDraft, q: Joints) -> InvalidPosture | None:
-        """Return the refusal of a straight or circular leg that misses its posture."""
+        """Return the refusal of a line or an arc that misses its posture."""
         posture = self.goal.waypoints[draft.index].posture
         if not posture:
             return None
@@ -285,7 +285,7 @@ class JointPathPlanner:
         )
 
     def _replace(self, n: int, refusal: GoalRefused) -> None:
-        """Make a leg a joint move, or refuse the goal."""
+        """Make a segment a joint move, or refuse the goal."""
         draft = self._drafts[n]
         if not self._replaces or not isinstance(refusal, _NO_STRAIGHT_PATH):
             raise refusal
@@ -325,7 +325,7 @@ class JointPathPlanner:
         draft.checked_until = self._end(k)
 
     def _start_joints(self, k: int) -> Joints:
-        """Return the configuration in which a joint move begins: that of the waypoint before."""
+        """Return the configuration in which a joint move begins: that at the waypoint before."""
         if k == 0:
             return self._q_start
         before = self._drafts[k - 1]
@@ -333,8 +333,8 @@ class JointPathPlanner:
             return before.known_joints
         if isinstance(before.known_curve, JointLineCurve):
             return before.known_joints
-        # A blended waypoint may lie out of reach, but not one at which a joint line begins: there
-        # the robot has to know the joints to which the rest of the leg would bring it.
+        # A blended waypoint may be out of reach, but not one at which a joint line begins: the
+        # robot needs the joints in which the rest of the segment would arrive.
         rest = solve_joint_path(
             self.kinematics,
             [CurvePiece.part(before.index, before.known_curve, before.checked_until, 1.0)],
@@ -346,7 +346,7 @@ class JointPathPlanner:
         return (a, b, c, d, e, f)
 
     def _solve_entry(self, k: int) -> None:
-        """Look along what leads into a joint move."""
+        """Solve what leads into a joint move."""
         pieces = self._entry(k)
         if not pieces:
             return
@@ -397,9 +397,9 @@ class JointPathPlanner:
     # -- blends ----------------------------------------------------------------------------------
 
     def _is_blended(self, n: int) -> bool:
-        """Tell whether a leg is blended into the next one."""
+        """Tell whether a segment is blended into the next one."""
         if n + 1 >= len(self._drafts) or self._drafts[n].radius <= SAME_POSITION:
-            return False  # the wire rounds so small a radius to none
+            return False  # the wire rounds such a radius to 0
         return can_blend(self._drafts[n], self._drafts[n + 1])
 
     def _check_overlap(self, n: int) -> None:
@@ -416,7 +416,7 @@ class JointPathPlanner:
                     f'blend from {draft.kind.name} into {after.kind.name}'
                 )
 
-    # -- legs ------------------------------------------------------------------------------------
+    # -- segments --------------------------------------------------------------------------------
 
     def _geometries(self, times: Sequence[float | None]) -> Iterator[SegmentGeometry]:
         speed_bounds, margins = (
@@ -451,7 +451,7 @@ class JointPathPlanner:
         return is_same_pose(geometry.curve.start, geometry.curve.end)
 
     def _at_first_point(self, geometry: SegmentGeometry) -> SegmentGeometry:
-        """Return the leg to a first point at which the robot stands; others are refused."""
+        """Return the segment to a first point where the robot already is; refuse others."""
         i = geometry.index
         if i > 0:
             raise duplicate_point_error(self.goal, i)

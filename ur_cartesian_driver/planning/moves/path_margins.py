@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the look ahead has seen: all its places, and what of them burdens each segment most."""
+"""Path samples of a goal; per segment the joint speed bound and the tightest margin."""
 
 from __future__ import annotations
 
@@ -24,30 +24,30 @@ from ur_cartesian_driver.planning.preflight.margins import (
     TightestMargin,
 )
 
-# Places nearer than this are one, and say nothing about a speed.
+# Samples whose parameters differ by less say nothing about a speed.
 _MIN_STEP = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
 class SolvedPieces:
-    """Pieces that the arm can go along, one after the other, and the places on them."""
+    """Consecutive pieces that the arm can follow, with the samples on them."""
 
     pieces: Sequence[CurvePiece]
     joint_path: JointPath
-    #: (n,) and the fraction (n,) of it.
+    #: (n,) segment of each sample, and the fraction (n,) of it.
     segments: Ints
     fractions: Floats
     #: (n, 3) distances from singularities, inf where they do not count.
     measures: Floats
-    #: The configuration before the first place [rad].
+    #: The configuration before the first sample [rad].
     q_start: Joints
 
 
 class PathMargins:
-    """Collects places in order of time."""
+    """Collects the samples of a goal in order of time."""
 
     def __init__(self, arm: Arm) -> None:
-        """Begin with none."""
+        """Begin without samples."""
         self._arm = arm
         self._solved: list[SolvedPieces] = []
 
@@ -56,11 +56,11 @@ class PathMargins:
         return singularity_distance_rows(self._arm, q)
 
     def add(self, solved: SolvedPieces) -> None:
-        """Add what comes next."""
+        """Add the next pieces."""
         self._solved.append(solved)
 
     def samples(self) -> PathSamples:
-        """Return all places."""
+        """Return all samples."""
         return PathSamples(
             segment=np.concatenate([solved.segments for solved in self._solved]),
             fraction=np.concatenate([solved.fractions for solved in self._solved]),
@@ -69,7 +69,7 @@ class PathMargins:
         )
 
     def tightest_margin(self) -> dict[int, TightestMargin]:
-        """Return what comes nearest to its bound, by segment."""
+        """Return the tightest margin by segment."""
         samples = self.samples()
         measures = np.concatenate([solved.measures for solved in self._solved])
         return margins_by_segment(
@@ -77,7 +77,7 @@ class PathMargins:
         )
 
     def joint_speed_bounds(self) -> dict[int, JointSpeedBound]:
-        """Return the time that the joints need for each whole segment, by segment."""
+        """Return the time that the joints need for the whole segment, by segment."""
         limits = np.array(self._arm.model.max_joint_speed)
         parts = [_speed_samples(solved, limits) for solved in self._solved]
         segment, time, joint, fraction, joint_time, local_time = (
@@ -105,21 +105,21 @@ class PathMargins:
 
 
 class _SpeedSamples(NamedTuple):
-    """What places say of their segments, each (n,); those in corners do so of two."""
+    """What samples say about their segments, each (n,); a sample in a blend counts for two."""
 
     segment: Ints
-    #: The time of the whole segment at the pace there [s], and the joint that is the slowest.
+    #: Time of the whole segment at the rate there [s], and the joint that takes longest.
     time: Floats
     joint: NDArray[np.intp]
     fraction: Floats
-    #: The time from the place before [s]; half of it where that counts for two segments.
+    #: Time since the sample before [s]; half of it where the sample counts for two segments.
     joint_time: Floats
-    #: The time at the pace there, inf in corners, where joints may turn round.
+    #: The same as ``time``, but inf in blends, where joints may reverse.
     local_time: Floats
 
 
 def _speed_samples(solved: SolvedPieces, limits: Floats) -> _SpeedSamples:
-    """Return how fast a segment may go at each place."""
+    """Return how fast a segment may be at each sample."""
     joint_path = solved.joint_path
     begin = np.array([piece.begin for piece in solved.pieces])[joint_path.piece]
     before = np.concatenate([[0.0], joint_path.t[:-1]])
@@ -148,10 +148,10 @@ def _speed_samples(solved: SolvedPieces, limits: Floats) -> _SpeedSamples:
 
 def _blend_rates(pieces: Sequence[CurvePiece]) -> tuple[Floats, Floats]:
     """
-    Return how fast the paths' ``u`` goes per parameter of each piece, where it leaves and joins.
+    Return du/ds of each piece, for the curve that it leaves and the one that it joins.
 
-    A corner's ``s`` goes at a pace between those of its two legs, see the timing of corners: so
-    what a leg may have there, it may have at that end of the corner.
+    The rate of a blend's ``s`` lies between those of its two segments, see the timing of blends:
+    so a bound on a segment there holds at that end of the blend.
     """
     leaving, joining = np.ones(len(pieces)), np.zeros(len(pieces))
     for k, piece in enumerate(pieces):

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The planned tool path as samples with the time at which each is expected."""
+"""Sample the planned tool path, with the expected time of each sample."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from ur_cartesian_driver.planning.geometry.pose_rows import Floats, keep_hemisph
 from ur_cartesian_driver.planning.geometry.speed_profile import SpeedProfile, times_at
 from ur_cartesian_driver.planning.moves.segment_geometry import SegmentGeometry, SegmentTiming
 
-#: The fewest pieces of a joint move, for the sake of its times.
+#: Minimum number of pieces of a joint move, so that its times are accurate.
 _MIN_JOINT_SAMPLES = 8
 
 
@@ -28,10 +28,10 @@ def reference_path(
     start: Pose, geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming]
 ) -> ReferencePath:
     """
-    Return the path that the robot is expected to take, blends included.
+    Return the path that the robot is expected to follow, blends included.
 
-    Lines have their ends and the places where they change speed, curves as many samples as keep
-    the chords near (see :mod:`~.curves`), and no two rows differ by more than 10 degrees.
+    Lines are sampled at their ends and where their acceleration changes, other curves so that
+    their chords stay close (see :mod:`~.curves`); no two rows differ by more than 10 degrees.
     """
     sections = list(_sections(geometries, timings))
     count = [len(section.at) for section in sections]
@@ -56,22 +56,22 @@ def reference_path(
 
 
 class _PathSection(NamedTuple):
-    """The rows of one path or of one corner."""
+    """The rows of one curve or of one blend."""
 
     curve: SegmentCurve | Blend
     point: int
-    #: Where on it, and where it begins.
+    #: Parameters of the rows, and of its begin.
     at: list[float]
     begin: float
-    #: When it begins [s], how its length passes, and what of that one unit of ``at`` is.
+    #: When it begins [s], its speed profile, and the length in it of one unit of ``at``.
     now: float
     profile: SpeedProfile
     rate: float
-    #: How long the profile's second lasts [s].
+    #: Time of one unit of the profile's time [s].
     second: float = 1.0
 
 
-#: In corners ``s`` passes evenly.
+#: In blends ``s`` increases evenly.
 _UNIFORM = SpeedProfile(1.0, 1.0, 1.0, 1.0, 1.0)
 
 
@@ -131,7 +131,7 @@ def _poses(
 
 
 def _row_parameters(geometry: SegmentGeometry, timing: SegmentTiming) -> list[float]:
-    """Return the ``u`` of the rows of a leg, the first one left out (it is there already)."""
+    """Return the ``u`` of the rows of a segment without its start, which the row before is."""
     begin, end = geometry.u_join, geometry.u_leave
     span = max(end - begin, 0.0)
     if isinstance(

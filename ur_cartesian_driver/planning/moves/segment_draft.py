@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Legs in the making: what a goal alone says of its segments, before the arm is asked.
+Segment drafts: the segments as the goal alone defines them, before the kinematics is known.
 
-Lines and arcs are known from the points; joint moves are not, because they begin in the
-configuration in which the way before them arrives.
+Lines and arcs follow from the points; joint moves do not, because they begin in the configuration
+in which the path before them arrives.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ _LINEAR, _JOINT = SegmentType.LINEAR, SegmentType.JOINT
 _OPTIMIZED = (SegmentType.OPTIMIZED_LINEAR, SegmentType.OPTIMIZED_JOINT)
 #: Motions on straight lines in joint space.
 JOINT_SPACE_TYPES = (SegmentType.JOINT, SegmentType.OPTIMIZED_JOINT)
-#: Motions that can only be blended into from some others; all else stops before them.
+#: Motions that only some others can be blended into; all others stop before them.
 _BLENDS_FROM = {
     SegmentType.JOINT: (_LINEAR, _JOINT),
     SegmentType.OPTIMIZED_LINEAR: (_LINEAR, _JOINT, *_OPTIMIZED),
@@ -43,7 +43,7 @@ _BLENDS_FROM = {
 
 @dataclass(slots=True)
 class SegmentDraft:
-    """A leg in the making."""
+    """A segment while its curve and joints are being found."""
 
     index: int
     kind: SegmentType
@@ -54,28 +54,28 @@ class SegmentDraft:
     joints: Joints | None = None
     blend_before: Blend | None = None
     blend_after: Blend | None = None
-    #: How far its path has been looked at, where that ends before the leg does.
+    #: The ``u`` up to which its curve is solved.
     checked_until: float = 1.0
 
     @property
     def u_join(self) -> float:
-        """The ``u`` where its path is joined."""
+        """The ``u`` where its curve is joined."""
         return self.blend_before.join if self.blend_before else 0.0
 
     @property
     def u_leave(self) -> float:
-        """The ``u`` where its path is left, once its corner is known."""
+        """The ``u`` where its curve is left, once its blend is made."""
         return self.blend_after.leave if self.blend_after else 1.0
 
     @property
     def known_curve(self) -> SegmentCurve:
-        """Its path, which is known by now."""
+        """Its curve, where it is known."""
         assert self.curve is not None
         return self.curve
 
     @property
     def known_joints(self) -> Joints:
-        """Its configuration at the end, which is known by now."""
+        """Its configuration at the end, where it is known."""
         assert self.joints is not None
         return self.joints
 
@@ -85,13 +85,13 @@ class SegmentDraftBuilder:
     Makes the drafts of one goal.
 
     :param targets: the poses of all waypoints in base.
-    :param remarks: what is ignored or changed is added to these.
+    :param remarks: on what is ignored or changed; added to.
     """
 
     def __init__(
         self, goal: Goal, targets: Sequence[Pose], options: PlanningOptions, remarks: list[str]
     ) -> None:
-        """Take what the legs are made of."""
+        """Keep the goal."""
         self._goal, self._targets, self._options = goal, targets, options
         self._remarks = remarks
 
@@ -99,7 +99,7 @@ class SegmentDraftBuilder:
         """
         Return the drafts from a waypoint on.
 
-        :param start: where the tool is [base].
+        :param start: pose of the tool in base.
         """
         drafts: list[SegmentDraft] = []
         before, last = start, len(self._goal.waypoints) - 1
@@ -152,12 +152,12 @@ class SegmentDraftBuilder:
             return
         target = self._targets[first.index]
         if is_same_pose(start, target) and not self._goal.waypoints[first.index].posture:
-            first.radius = 0.0  # the robot stands there already, and the report says so
+            first.radius = 0.0  # the robot is already there, as the report says
             return
         check_blends_fit(first.index, start.distance_to(target), 0.0, first.radius)
 
 
 def can_blend(first: SegmentDraft, second: SegmentDraft) -> bool:
-    """Tell whether the robot can blend from the motion of one leg into that of the next."""
+    """Tell whether the robot can blend from the motion of one segment into that of the next."""
     allowed = _BLENDS_FROM.get(second.kind)
     return allowed is None or first.kind in allowed

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the planner knows of one segment: its way first, then how fast it goes."""
+"""A segment while it is planned: first its geometry, then its timing."""
 
 from __future__ import annotations
 
@@ -16,61 +16,61 @@ from ur_cartesian_driver.planning.preflight.margins import TightestMargin
 
 @dataclass(frozen=True, slots=True)
 class JointSpeedBound:
-    """How long the joints need for a segment, each of them at its limit at the most."""
+    """The time of a segment at the speed limits of the joints."""
 
-    #: All of it at the pace of the place where the joints are fastest [s].
+    #: At the rate of the sample where the joints are fastest [s].
     time: float
-    #: The number of the joint, and where on the segment.
+    #: The leading joint there, and the fraction of the segment.
     joint: int
     fraction: float
-    #: The same of the place where they are slowest, and with some joint at its limit everywhere.
+    #: At the rate of the sample where they are slowest; with some joint at its limit everywhere.
     shortest_time: float
     time_at_limits: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SegmentGeometry:
-    """A segment whose way is decided and whose speed is not."""
+    """A segment with its curve and joints, still without speed."""
 
     index: int
-    #: What will be sent: AUTO resolved, JOINT where a posture cannot be reached otherwise.
+    #: The type that is sent: AUTO resolved, JOINT where that replaces a line or an arc.
     kind: SegmentType
     waypoint: Waypoint
     segment: Segment
     curve: SegmentCurve
     #: Configuration at the end [rad].
     joints: Joints
-    #: What the joints and the singularities say about it.
+    #: What limits its speed, and its distance from singularities and joint limits.
     speed_bound: JointSpeedBound
     tightest_margin: TightestMargin
-    #: Time that the goal gives it [s]; None = speeds decide.
+    #: Time from the goal [s]; None = by speed.
     time: float | None
-    #: The corners at its ends; None = it stands there.
+    #: The blends at its ends; None = it is at rest there.
     blend_before: Blend | None = None
     blend_after: Blend | None = None
-    #: Where the path is joined after the corner before, and left for the corner after.
+    #: The ``u`` where the curve is joined after the blend before, and left for the blend after.
     u_join: float = 0.0
     u_leave: float = 1.0
-    #: The part of it between its corners; blends that touch leave nearly nothing.
+    #: The fraction of it between its blends; blends that touch leave nearly nothing.
     unblended_fraction: float = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SegmentTiming:
-    """How fast one leg goes."""
+    """The speed of one segment over time."""
 
     #: What the wire carries; ``wire_time`` 0 = speed and acceleration count.
     velocity: float
     acceleration: float
     wire_time: float
-    #: The leading quantity, its unit, and the motion between the corners.
+    #: The unit of the leading quantity, and its speed profile between the blends.
     unit: str
     profile: SpeedProfile
-    #: Expected time, half of each corner included [s].
+    #: Expected time, half of each blend included [s].
     duration: float
-    #: Time in the corner after it [s], 0 without one.
+    #: Time in the blend after it [s], 0 without one.
     blend_time: float = 0.0
     #: Where speed or time come from, for the report.
     source: str = ''
-    #: What was changed, empty if nothing.
+    #: On a change that the limits made; empty = none.
     remark: str = ''

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How fast each segment goes: from the times of the goal, from its speeds, or from the defaults.
+The speed of each segment: from the times of the goal, from its speeds, or from the defaults.
 
 ``movel`` and ``movej`` take a time on the wire. ``movec`` and ``movep`` do not: their speed is
-derived so that the time is met. All of it is about the quantity that leads a segment, see
+derived so that the time is met. All numbers are about the leading quantity of a segment, see
 :mod:`~.speed_limits`.
 """
 
@@ -36,14 +36,14 @@ from ur_cartesian_driver.planning.moves.speed_limits import (
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import is_optimized, point_field
 
-#: The lowest speed that the wire carries well enough: it counts in millionths.
+#: Minimum speed that the wire carries accurately enough: it counts in millionths.
 MIN_SPEED = 1e-5
-#: What an OPTIMIZED move is taken to accelerate with at fraction 1 [rad/s^2]; the robot's own
-#: limits are not published. It only serves to say about how long such a move takes.
+#: Assumed acceleration of an OPTIMIZED move at fraction 1 [rad/s^2]; the robot's own limits are
+#: not published. It only serves to estimate the time of such a move.
 _OPTIMIZED_JOINT_ACCELERATION = 40.0
-#: Motions whose messages have a time.
+#: Motions that take a time on the wire.
 _TIMED_ON_WIRE = (SegmentType.LINEAR, SegmentType.JOINT)
-#: Rounds in which speeds and the times in corners are made to agree.
+#: Iterations until speeds and the times in blends agree.
 _MAX_ITERATIONS = 12
 
 
@@ -51,7 +51,7 @@ def schedule(
     geometries: Sequence[SegmentGeometry], options: PlanningOptions, model: RobotModel
 ) -> list[SegmentTiming]:
     """
-    Return the timing of every leg.
+    Return the timing of every segment.
 
     :raises TooFast: a time needs more speed or acceleration than the limits allow.
     :raises InvalidGoal: a speed is too low for the wire.
@@ -66,7 +66,7 @@ def schedule(
         for k, geometry in enumerate(geometries)
         if geometry.time is not None and not _takes_time(geometry.kind, options)
     ]
-    # The time in a corner depends on the speeds on both of its sides, so go round a few times.
+    # The time in a blend depends on the speeds on both of its sides, so iterate.
     for _ in range(_MAX_ITERATIONS if any(is_blended(geometries[k]) for k in derived) else 1):
         changed = 0.0
         for k in derived:
@@ -99,7 +99,7 @@ def schedule(
 def _check_wire(
     geometry: SegmentGeometry, timing: SegmentTiming, options: PlanningOptions
 ) -> None:
-    """Refuse what would be zero on the wire, or next to it, and times that it does not carry."""
+    """Refuse speeds too small for the wire, and times too large for it."""
     if timing.wire_time > options.max_segment_time:
         raise InvalidGoal(
             point_field(geometry.index),
@@ -124,9 +124,9 @@ def _after_blend(
     geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming], k: int
 ) -> SegmentTiming:
     """
-    Return the timing of a leg that comes out of a corner no faster than both legs accelerate.
+    Return the timing of a segment that leaves a blend no faster than both segments accelerate.
 
-    In the corner the way of the first leg ends as r1 (1 - s)^2, that of the second begins as
+    In the blend the distance left on the first segment is r1 (1 - s)^2, that done on the second
     r2 s^2, so s' may grow to sqrt(a / 2r) of either.
     """
     before, old = timings[k - 1].profile, timings[k].profile
@@ -154,13 +154,13 @@ def _with_duration(
     geometry: SegmentGeometry, timing: SegmentTiming, before: float, after: float
 ) -> SegmentTiming:
     """
-    Return the timing with its expected duration, half of each corner included.
+    Return the timing with its expected duration, half of each blend included.
 
-    :param before: time in the corners before and after it [s].
+    :param before: time in the blend before it [s], and ``after`` in the one after it.
     """
     time_in_blends, profile = 0.5 * (before + after), timing.profile
     if timing.wire_time > 0.0 and time_in_blends > 0.0:
-        # What is sent as a time is kept in sum: corners are shorter, so what is left has longer.
+        # The time on the wire is met in total: blends are shorter, so the rest takes longer.
         left = max(timing.wire_time - time_in_blends, 0.05 * timing.wire_time)
         profile = profile_for_time(profile.length, left, *_rests_at_ends(geometry))
     return _with_profile(timing, profile, profile.duration + time_in_blends, after)
@@ -169,7 +169,7 @@ def _with_duration(
 def _with_profile(
     timing: SegmentTiming, profile: SpeedProfile, duration: float = 0.0, blend_time: float = 0.0
 ) -> SegmentTiming:
-    """Return the timing with another profile; ``replace`` takes twice as long, for each leg."""
+    """Return the timing with another profile; ``replace`` takes twice as long."""
     return SegmentTiming(
         velocity=timing.velocity,
         acceleration=timing.acceleration,
@@ -188,13 +188,13 @@ def _takes_time(kind: SegmentType, options: PlanningOptions) -> bool:
     Tell whether the wire carries a time for a motion.
 
     Never in the dialect that counts in milliseconds: a robot program that counts in microseconds
-    would run a segment a thousand times too fast, and nobody can ask a program how it counts.
+    would run a segment a thousand times too fast, and a program does not report how it counts.
     """
     return kind in _TIMED_ON_WIRE and not options.dialect.is_coarse
 
 
 def _own_acceleration(geometry: SegmentGeometry) -> float:
-    """Return the acceleration of a timed leg that the goal may choose, 0 = it has none."""
+    """Return the acceleration that the goal gives a timed segment; 0 = none."""
     return 0.0 if geometry.kind in _TIMED_ON_WIRE else geometry.segment.acceleration
 
 
@@ -203,7 +203,7 @@ def _rests_at_ends(geometry: SegmentGeometry) -> tuple[bool, bool]:
 
 
 def _stop_distance(geometry: SegmentGeometry, length: float) -> float:
-    """Return how far behind its end between corners the robot plans to stop, see trapezoid."""
+    """Return how far behind the start of its blend the robot plans to stop, see trapezoid."""
     if geometry.blend_after is not None and geometry.kind == SegmentType.PROCESS:
         return inf
     return length * (1.0 - geometry.u_leave)
@@ -233,7 +233,7 @@ def _by_speed(
     options: PlanningOptions,
     model: RobotModel,
 ) -> SegmentTiming:
-    """Return the timing of a leg without a time."""
+    """Return the timing of a segment without a time."""
     wanted, source = _wanted_speed(geometry, unit, options)
     acceleration = geometry.segment.acceleration or _default_acceleration(geometry, unit, options)
     limits = speed_limits(geometry, length, options, model)
@@ -288,7 +288,7 @@ def _wanted_speed(
     if not translates(geometry):
         return options.angular_velocity, 'speed from angular_velocity'
     if unit == 'rad' and geometry.kind != SegmentType.LINEAR:
-        # One number for both: as rad/s the turn may have more, but never more than the tool may.
+        # One number for both: the turn may be faster [rad/s], but no faster than the tool [m/s].
         fastest = options.max_tool_speed or options.angular_velocity
         return (
             max(options.linear_velocity, min(options.angular_velocity, fastest)),
@@ -320,7 +320,7 @@ def _turning_line(
     """
     Return the timing of a line on which the turn leads.
 
-    The robot's one number would turn the tool as slowly as it moves: a time is sent in which
+    One number for both would turn the tool as slowly as it moves: a time is sent instead, in which
     the tool keeps its speed [m/s] and turns no faster than the default.
     """
     remark = ''
@@ -365,7 +365,7 @@ def _by_time(
     options: PlanningOptions,
     model: RobotModel,
 ) -> SegmentTiming:
-    """Return the timing of a leg for which the wire carries the time."""
+    """Return the timing of a segment for which the wire carries the time."""
     assert geometry.time is not None
     limits = speed_limits(geometry, length, options, model)
     min_time = min_duration(length, limits.speed, limits.acceleration)
@@ -377,7 +377,7 @@ def _by_time(
         time * geometry.unblended_fraction,
         *_rests_at_ends(geometry),
     )
-    # The robot ignores speed and acceleration when it has a time; they say what it will need.
+    # The robot ignores speed and acceleration when it has a time; these are what it will need.
     velocity, acceleration = peak_speed_and_acceleration(length, time)
     return SegmentTiming(
         velocity=velocity,
@@ -400,9 +400,9 @@ def _by_speed_for_time(
     strict: bool = True,
 ) -> SegmentTiming:
     """
-    Return the timing of a leg that has to meet a time by its speed.
+    Return the timing of a segment that has to meet a time by its speed.
 
-    :param in_corners: the part of the time that passes in the corners at its ends [s].
+    :param time_in_blends: the part of the time spent in the blends at its ends [s].
     :param strict: whether a time that is too short is refused (not in a first guess).
     """
     assert geometry.time is not None
@@ -427,7 +427,7 @@ def _by_speed_for_time(
         ),
     )
     velocity = cruise_speed_for(distance, between, acceleration, sum(_rests_at_ends(geometry)))
-    if velocity is None:  # only before the corners are known, or within rounding
+    if velocity is None:  # only before the blends are known, or within rounding
         velocity = 2.0 * distance / between
     profile = trapezoid(
         distance, velocity, acceleration, inf if geometry.blend_before else 0.0, stop_distance
@@ -452,7 +452,7 @@ def _slow_or_refuse(
     limits: SpeedLimits,
     options: PlanningOptions,
 ) -> tuple[float, str]:
-    """Return the time that the limits allow and the remark, or refuse."""
+    """Return the shortest time within the limits with a remark, or refuse."""
     assert geometry.time is not None
     if min_time > options.max_segment_time:
         raise TooFast(
@@ -480,26 +480,26 @@ def _slow_or_refuse(
 def _min_time_by_speed(
     geometry: SegmentGeometry, distance: float, speed: float, acceleration: float
 ) -> float:
-    """Return the shortest time between the corners of a leg that is sent as a speed."""
+    """Return the shortest time between the blends of a segment that is sent as a speed."""
     ramps = sum(_rests_at_ends(geometry))
     peak = min(speed, sqrt(2.0 * acceleration * distance / ramps)) if ramps else speed
     return distance / peak + 0.5 * ramps * peak / acceleration
 
 
 def _max_acceleration(geometry: SegmentGeometry, limits: SpeedLimits) -> float:
-    """Return the largest acceleration that a time may lead to."""
+    """Return the maximum acceleration that may follow from a time."""
     if own := _own_acceleration(geometry):
         return min(own, limits.acceleration)
     return limits.acceleration
 
 
-# -- corners --------------------------------------------------------------------------------------
+# -- blends ---------------------------------------------------------------------------------------
 
 
 def _blend_time(
     geometries: Sequence[SegmentGeometry], timings: Sequence[SegmentTiming], k: int
 ) -> float:
-    """Return the time that a leg spends in its halves of the corners at its ends [s]."""
+    """Return the time that a segment spends in its halves of the blends at its ends [s]."""
     time = 0.0
     if geometries[k].blend_before is not None:
         time += blend_duration(geometries[k - 1], timings[k - 1], geometries[k], timings[k]) / 2.0
@@ -514,7 +514,7 @@ def blend_duration(
     second: SegmentGeometry,
     next_timing: SegmentTiming,
 ) -> float:
-    """Return the time in the corner between two legs [s]; the tool's speed changes evenly."""
+    """Return the time in the blend between two segments [s]; the tool's speed changes evenly."""
     assert first.blend_after is not None
     speeds = (
         timing.profile.leave

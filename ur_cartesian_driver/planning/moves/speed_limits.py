@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What leads a segment, and how fast that may be.
+The leading quantity of a segment and its speed limits.
 
-The robot has one speed for the translation and the turn of the tool, in m/s and rad/s, which
-neither may exceed; so the quantity that *leads* a segment is the larger of both numbers (for joint
-moves the joint that turns farthest). Tool, joints and accelerations bound it.
+The robot has one speed for the translation [m/s] and the turn [rad/s] of the tool, which neither
+may exceed; so the larger of both numbers *leads* a segment (for joint moves the joint that turns
+farthest). Tool, joints and accelerations bound it.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from ur_cartesian_driver.planning.moves.segment_geometry import JointSpeedBound,
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import is_optimized
 
-#: Where the robot stands at the first point already, the way there counts as this.
+#: Length of a segment to a first point where the robot already is.
 _MIN_LENGTH = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SpeedLimits:
-    """The largest speed of the leading quantity, what sets it, and the largest acceleration."""
+    """Maximum speed of the leading quantity, what sets it, and the maximum acceleration."""
 
     speed: float
     name: str
@@ -37,8 +37,7 @@ def leading_quantity(geometry: SegmentGeometry) -> tuple[float, str]:
     """
     Return the length of the leading quantity and its unit (m or rad; s for OPTIMIZED moves).
 
-    OPTIMIZED moves are measured by the time that they would take with some joint at its limit
-    everywhere.
+    The length of an OPTIMIZED move is its time with some joint at its limit everywhere.
     """
     path = geometry.curve
     if is_optimized(geometry.kind):
@@ -55,7 +54,7 @@ def leading_quantity(geometry: SegmentGeometry) -> tuple[float, str]:
 def speed_limits(
     geometry: SegmentGeometry, length: float, options: PlanningOptions, model: RobotModel
 ) -> SpeedLimits:
-    """Return what bounds the leading quantity of a leg."""
+    """Return the limits of the leading quantity of a segment."""
     tool = inf
     if options.max_tool_speed > 0.0 and translates(geometry):
         tool = options.max_tool_speed / _tool_travel_per_unit(geometry, length)
@@ -87,7 +86,7 @@ def speed_limits(
 def _limit_in_blends(
     geometry: SegmentGeometry, length: float, speed: float, name: str
 ) -> tuple[float, str]:
-    """Return the bound of a joint move, whose joints may turn faster where it is blended."""
+    """Return the limit of a joint move, whose joints may turn faster in its blends."""
     min_time = geometry.speed_bound.time
     if is_blended(geometry) and min_time > 0.0 and length / min_time < speed * (1.0 - 1e-9):
         return length / min_time, _joint_limit(geometry.speed_bound)
@@ -102,21 +101,21 @@ def _joint_limit(speed_bound: JointSpeedBound) -> str:
 
 
 def _tool_travel_per_unit(geometry: SegmentGeometry, length: float) -> float:
-    """Return the most metres that the tool goes per unit of the leading quantity."""
+    """Return the maximum distance of the tool [m] per unit of the leading quantity."""
     path = geometry.curve
-    if is_optimized(geometry.kind):  # the tool is fastest where the joints have the least to do
+    if is_optimized(geometry.kind):  # the tool is fastest where the joints turn least
         length = max(geometry.speed_bound.shortest_time, _MIN_LENGTH)
     uneven = path.unevenness if isinstance(path, JointLineCurve) else 1.0
     return path.length * uneven / length
 
 
 def is_blended(geometry: SegmentGeometry) -> bool:
-    """Tell whether a leg has a corner at one of its ends."""
+    """Tell whether a segment has a blend at one of its ends."""
     return geometry.blend_before is not None or geometry.blend_after is not None
 
 
 def translates(geometry: SegmentGeometry) -> bool:
-    """Tell whether the tool's position changes; if not the leg only turns it."""
+    """Tell whether the tool's position changes; if not, the segment only turns it."""
     return geometry.curve.length > SAME_POSITION
 
 
