@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A plan before it is run: where tool and joints are at which time, and a table for people.
+Preview a plan: tool and joints over time, and a table.
 
-For pictures, markers and a look before the first run; the robot keeps its own speed profile, so
+For pictures, markers and a check before the first run. The robot uses its own speed profile, so
 times are those expected at full speed.
 """
 
@@ -129,7 +129,7 @@ def _joints(
     plan: Plan, arm: Arm, T_tcp_flange: Pose, poses: list[Pose], row_position: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """
-    Return joint positions for poses at places of the reference path (rows and fractions).
+    Return joint positions for poses at row positions (row + fraction) of the reference path.
 
     The solution nearest to the one before; in joint moves, which may pass through singularities
     where branches meet, the one nearest to the straight line in joint space.

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How much room the arm takes: every link as a few cylinders, for many configurations at once.
+Collision bodies of the arm: every link as a few cylinders, for many configurations at once.
 
-A look ahead asks tens of thousands of configurations whether the arm meets itself or a plane.
+A preflight checks tens of thousands of configurations for collisions with itself and planes.
 Cylinders in capsules (all points within a radius of a segment) answer that in numpy for every
 model. They contain the true shape, so what they clear is clear; what they do not clear may still
 be, and :mod:`~.collision_meshes` tells exactly for the models whose meshes there are.

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What was asked: a goal as it came, in the frame in which it came.
+A goal as the client sent it, in the frame of the client.
 
-A goal may be nonsense; ``planning.validate`` finds that out and says where. Only a plan
-(:mod:`~ur_cartesian_driver.motion.plan`) is known to be sound.
+A goal may be wrong: ``planning.request.validate`` checks it. Only a plan
+(:mod:`~ur_cartesian_driver.motion.plan`) is known to be feasible.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class ArcMode(IntEnum):
 
 
 class ExecutionMode(IntEnum):
-    """Which way of execution was asked for; the numbers of the action's ``execution``."""
+    """How to execute a goal; the numbers of the action's ``execution``."""
 
     AUTO = 0
     PRIMITIVES = 1
@@ -92,7 +92,7 @@ class Segment:
     """
 
     type: SegmentType = SegmentType.AUTO
-    #: Distance from the waypoint at which the corner may be left [m].
+    #: Distance from the waypoint at which both segments are left [m].
     blend_radius: float = 0.0
     #: 0 = from the times, else the default.
     velocity: float = 0.0

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What the driver is going to do: primitives, the tool path they mean, and a report of the choices.
+A plan: primitives, the reference path of the tool, and a report of the choices.
 
-A plan is made by ``planning`` after every check has passed, and is immutable.
+``planning`` makes it after all checks have passed; it is immutable.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class ReferencePath:
     point: NDArray[np.int32]
     #: (m,) expected time from the start of the motion [s] at full speed, not decreasing.
     time: NDArray[np.float64]
-    #: (m, 2) [m], [rad] how far the robot's own way may lie beside the sample: 0 but for corners,
-    #: of which the robot's maker publishes the size and not the shape. Empty = 0 everywhere.
+    #: (m, 2) [m], [rad] how far the robot's own blend may lie beside the sample: 0 outside blends,
+    #: of which UR publishes the size and not the shape. Empty = 0 everywhere.
     blend_tolerance: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
 
     def __post_init__(self) -> None:
@@ -59,17 +59,17 @@ class PlannedSegment:
     primitive: Primitive
     #: Index of the waypoint at its end.
     waypoint: int
-    #: Path length of the tool [m] and its turn [rad], corner to corner.
+    #: Path length of the tool [m] and its turn [rad], from waypoint to waypoint.
     length: float
     angle: float
     #: Expected time at full speed [s].
     duration: float
     #: Joint positions predicted at its end [rad].
     joints: Joints
-    #: One line for people: what and why; empty where the line of another piece of the same
-    #: segment says it (a SPLINE takes several pieces from point to point).
+    #: Its line in the report; empty where another piece of the same segment has it (a SPLINE takes
+    #: several pieces from point to point).
     report_line: str
-    #: What is switched after it was begun, in this order.
+    #: The outputs that follow it on the wire, in this order.
     outputs: tuple[SwitchOutput, ...] = ()
 
 
@@ -91,7 +91,7 @@ class Plan:
     T_tcp_controlled: Pose = IDENTITY
     #: PRIMITIVES, SPLINE or SERVO: how it is carried out.
     execution: ExecutionMode = ExecutionMode.PRIMITIVES
-    #: What was ignored, slowed or changed, and what a reader should know about the whole.
+    #: What is ignored, slowed or changed, and remarks on the whole goal.
     remarks: tuple[str, ...] = field(default=())
 
     @property
@@ -109,7 +109,7 @@ class Plan:
 
     @property
     def instructions(self) -> Iterator[Instruction]:
-        """What stands on the wire, in its order."""
+        """The primitives and outputs, in the order of the wire."""
         for segment in self.segments:
             yield segment.primitive
             yield from segment.outputs

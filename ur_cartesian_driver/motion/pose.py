@@ -95,7 +95,7 @@ class Pose:
         return angle_between(self.quaternion, other.quaternion)
 
     def interpolate(self, other: Pose, fraction: float) -> Pose:
-        """Return the pose at a fraction of the way: straight line, shortest rotation."""
+        """Return the pose at a fraction between both: straight line, shortest rotation."""
         (ax, ay, az), (bx, by, bz) = self.position, other.position
         return Pose(
             (ax + fraction * (bx - ax), ay + fraction * (by - ay), az + fraction * (bz - az)),
@@ -238,7 +238,7 @@ def quaternion_from_rotation(r: Sequence[float]) -> Quaternion:
     """
     Return the unit quaternion of a rotation matrix given row by row, w >= 0.
 
-    Of the four ways (Shepperd) the one that divides by the largest component.
+    Of the four formulas (Shepperd) the one that divides by the largest component.
     """
     a, b, c, d, e, f, g, h, i = r
     trace = a + e + i

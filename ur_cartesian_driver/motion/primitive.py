@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What the robot is told: the motion primitives of the trajectory point interface.
+The motion primitives of the trajectory point interface.
 
 One class for each URScript motion. A target is either a :class:`Pose` (of the TCP, in the robot's
 base) or six joint positions [rad]; target and via of an arc may differ in kind. The wire's motion
@@ -60,7 +60,7 @@ class MoveL:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MoveP:
-    """Straight legs joined by circular fillets at constant tool speed; takes no duration."""
+    """Straight line at constant tool speed, blended by circular fillets; takes no duration."""
 
     target: Target
     q_near: Joints | None = None
@@ -123,9 +123,9 @@ class Spline:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SwitchOutput:
     """
-    Not a motion: the robot program switches an output as the tool passes a place.
+    Not a motion: the robot program switches an output as the tool passes the trigger pose.
 
-    It stands behind the motion during or after which that happens, and takes no time of its own.
+    It follows the motion during or after which that happens, and takes no time of its own.
     """
 
     output: OutputKind
@@ -133,18 +133,17 @@ class SwitchOutput:
     #: Digital 0 or 1; analog a fraction of the range.
     value: float
     domain: AnalogDomain = AnalogDomain.CURRENT
-    #: Where the tool (TCP, base) is when it is time; None = where the motion before this one has
-    #: ended, so at once.
+    #: Pose of the TCP in base at which to switch; None = when the motion before has ended.
     trigger_pose: Pose | None = None
-    #: The direction of the motion there, linear or angular, of length 1 and in the axes of the
-    #: place. It is time when the tool gets to its side of the plane through the place.
+    #: Unit direction of the motion there, linear or angular, in the axes of the trigger pose. The
+    #: output switches when the tool crosses the plane through the pose in this direction.
     trigger_direction: Vector6 = ZERO6
-    #: Whether the tool is on that side when the record is read, and comes round once more.
+    #: Whether the tool is beyond that plane when the record is read, and comes round again.
     starts_beyond: bool = False
-    #: After the end of the last motion: so much later than that [s].
+    #: Delay after the end of the last motion [s].
     delay: float = 0.0
 
 
 Primitive: TypeAlias = MoveJ | MoveL | MoveP | MoveC | OptimoveJ | OptimoveL | Spline
-#: What stands in a trajectory on the wire.
+#: One record of a trajectory on the wire.
 Instruction: TypeAlias = Primitive | SwitchOutput

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The motion of one rigid body as another point of it sees it.
+The motion of a rigid body at another reference point.
 
-Flange, TCP and every frame that a goal may move are fixed to each other. Their angular motion is
-the same; the linear one differs by the lever arm between their origins. The robot reports the TCP,
-a goal may be about another frame.
+Flange, TCP and every controlled frame are fixed to each other. Their angular motion is the same;
+the linear one differs by the offset between their origins. The robot reports the TCP, a goal may
+control another frame.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def twist_at(twist: Vector6, offset: Vector3) -> Vector6:
     Return the twist of a body at another point of it: v + w x r.
 
     :param twist: linear [m/s] and angular [rad/s] velocity at the first point.
-    :param lever: from the first point to the other one [m], in the axes of the twist.
+    :param offset: from the first point to the other one [m], in the axes of the twist.
     """
     v, w = twist[:3], twist[3:]
     return (*_sum(v, _cross(w, offset)), *w)
@@ -33,7 +33,7 @@ def acceleration_at(acceleration: Vector6, twist: Vector6, offset: Vector3) -> V
 
     :param acceleration: linear [m/s^2] and angular [rad/s^2], at the first point.
     :param twist: at any point.
-    :param lever: from the first point to the other one [m], in the axes of both.
+    :param offset: from the first point to the other one [m], in the axes of both.
     """
     a, e, w = acceleration[:3], acceleration[3:], twist[3:]
     return (*_sum(_sum(a, _cross(e, offset)), _cross(w, _cross(w, offset))), *e)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the robot says of streamed set-points, and what the driver tells of them."""
+"""Feedback of the robot on streamed set-points, and the report of the driver about them."""
 
 from __future__ import annotations
 

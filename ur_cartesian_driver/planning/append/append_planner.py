@@ -1,16 +1,16 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Goals that go on (keep_open): part by part, each from where the one before leads.
+Plan appended points (keep_open): part by part, each from the end of the one before.
 
-The last motion of a part is planned to end at rest, because nobody knows what comes, and may be
-given up: the driver keeps it back as the *ending* of the goal. When points come in time, it is
-planned again together with them, so that a blend or a spline goes through its end. Otherwise it
-was sent, the arm rests behind it, and the next part begins there.
+The last motion of a part is planned to end at rest, because the next point is unknown. The driver
+holds it back as the *ending* of the goal. If points come in time, it is planned again together
+with them, so that a blend or a spline passes through its end. Otherwise it is sent, the arm rests
+at its end, and the next part begins there.
 
-A straight motion is planned again with the two before it as context: its corner depends on them.
-A spline needs none, for its state at a point is position, velocity and acceleration; its ending
-is a piece that brakes behind the last point (:func:`~.spline_planner.plan_stop`).
+A primitive is planned again with the two before it as context, because its blend depends on them.
+A spline needs none, for its state at a point is position, velocity and acceleration; its ending is
+a piece that brakes after the last point (:func:`~.spline_planner.plan_stop`).
 """
 
 from __future__ import annotations
@@ -52,42 +52,42 @@ from ur_cartesian_driver.planning.spline.spline_planner import (
 )
 from ur_cartesian_driver.planning.spline.spline_points import point_remarks
 
-#: So many of the last points are planned again with the next ones: the one that is kept back, and
-#: one whose corner leads into its motion.
+#: Number of points that are planned again with the next ones: the last, which is held back, and
+#: the one whose blend leads into its motion.
 REPLANNED_POINTS = 2
-#: Two times nearer than this are one [s].
+#: Times that differ by less are the same [s].
 SAME_TIME = 1e-6
-#: How much later than at once a spline may begin again from rest [s]: the first that is possible.
+#: Delays after which a spline may start again from rest [s]; the first possible one is taken.
 START_DELAYS = (0.0, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-#: Rows of the reference along a closing piece.
+#: Rows of the reference path along a stopping piece.
 _STOP_ROWS = 16
-# Digits of a time that a client says [s]: nanoseconds.
+# Digits of a client's time [s]: nanoseconds.
 _DIGITS = 9
-#: What counts points in a sentence of the planner.
+#: The numbers of points in sentences of the planner.
 _NUMBER = re.compile(r'\b(point |points\[|segments\[)(\d+)')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AppendPlan:
-    """A part of an open goal that has passed all checks."""
+    """The plan of appended points, which passed all checks."""
 
-    #: Its segments, the ending among them, and its reference in the time of the whole motion.
+    #: Its segments including the ending; its reference path is in motion time.
     plan: Plan
-    #: How many records stay in front of it, and when they end [s].
+    #: How many records stay before it, and when they end [s].
     records_before: int
     start_time: float
     #: How many of its records are the ending.
     ending_records: int
-    #: When it ends, where the goal says times [s].
+    #: When it ends, if the goal has times [s].
     end_time: float | None
-    #: What the client is told.
+    #: The answer to the client.
     text: str
-    #: For the next part.
+    #: The goal to which the next points are appended.
     next_goal: AppendableGoal
 
 
 def plan_first_part(plan: Plan, arm: Arm, options: PlanningOptions) -> AppendPlan:
-    """Return the first part of a goal: its plan, and how it ends for now."""
+    """Return the first part of a goal, with its ending."""
     goal = plan.goal
     base = AppendableGoal(
         goal=replace(
@@ -121,10 +121,10 @@ def plan_append(
     from_rest: bool,
 ) -> AppendPlan:
     """
-    Return the part of a goal that goes on with an addition.
+    Return the plan of appended points.
 
-    :param from_rest: whether the ending was sent, so that the arm stands, or is about to.
-    :raises GoalRefused: with the reason; points are numbered from the start of the goal.
+    :param from_rest: whether the ending was sent, so that the arm rests, or is about to.
+    :raises GoalRefused: points are numbered from the start of the goal.
     """
     check_appended_points(appendable, appended, options)
     options = replace(
@@ -197,7 +197,7 @@ def _pending_commands(
     pending: int,
     start_time: float,
 ) -> tuple[IOCommand, ...]:
-    """Return the commands of a part; those before it that are still due count from its start."""
+    """Return the commands of a part, with those before it that are still due."""
     old = []
     for end_time, command in appendable.outputs:
         if command.waypoint == appendable.points - 1:
@@ -299,11 +299,10 @@ def _commands_of_ending(
     appendable: AppendableGoal, appended: AppendedPoints, new_plan: Plan, start_time: float
 ) -> tuple[tuple[float, IOCommand], ...]:
     """
-    Return the commands whose records belong to the ending: the next part looks at them again.
+    Return the commands whose records belong to the ending: the next part places them again.
 
-    Not those that are due later than the last firm motion ends: one that comes before the motion
-    behind it returns stands in front of that, and is firm. The earlier ones of the same kind are
-    those with the earlier records.
+    Records before the last motion are committed, even if they are due after the motion before it.
+    Of commands for the same output the earlier ones have the earlier records.
     """
     ends, now = {}, start_time
     for segment in new_plan.segments:
@@ -343,7 +342,7 @@ def _append_spline(
     options: PlanningOptions,
     from_rest: bool,
 ) -> AppendPlan:
-    """Return the part behind the end of a spline; from rest as soon as the limits allow."""
+    """Return the part after the end of a spline; from rest as soon as the limits allow."""
     assert appendable.state is not None
     if not from_rest:
         return _append_spline_from(
@@ -383,7 +382,7 @@ def _append_spline_from(
     arm: Arm,
     options: PlanningOptions,
 ) -> AppendPlan:
-    # Times count from the last point, so that they say how long the first segment is.
+    # Times count from the last point: the first one is the time of its segment.
     waypoints = tuple(
         replace(point, time=round(point.time - appendable.last_client_time, _DIGITS))
         for point in appended.waypoints
@@ -395,10 +394,10 @@ def _append_spline_from(
         io_commands=numbered(appended, appendable.points),
         keep_open=not appended.last,
     )
-    standing = _state_at_rest(appendable, start.q, arm)
+    state = _state_at_rest(appendable, start.q, arm)
     try:
         check(goal, options)
-        retargeted = retarget_to_tcp(goal, standing, options).goal
+        retargeted = retarget_to_tcp(goal, state, options).goal
         later = replace(
             retargeted,
             waypoints=tuple(
@@ -455,30 +454,30 @@ def _spline_append_plan(
     options: PlanningOptions,
 ) -> AppendPlan:
     """
-    Return a part whose ending is a piece to rest, where its last point moves.
+    Return a part whose ending is a stopping piece, if the arm moves at its last point.
 
-    Where outputs are due at the last point or later, the piece to that point belongs to the ending
-    too: they stand behind it on the wire, and where each of them is depends on what comes.
+    If outputs are due at the last point or later, the piece to that point belongs to the ending
+    too: they follow it on the wire, and their trigger poses depend on the next points.
     """
-    point, points_known = appendable.points + len(appended.waypoints) - 1, new_plan
+    point, plan_to_point = appendable.points + len(appended.waypoints) - 1, new_plan
     rest_time, q_rest = end.time, end.q
     if end.is_moving and not appended.last:
         new_plan = _with_stop(new_plan, end, point, arm, appendable, options)
         rest_time, q_rest = end.time + new_plan.segments[-1].duration, new_plan.segments[-1].joints
-    new_plan, end_time = _place_outputs(appendable, appended, new_plan, start_time)
+    new_plan, due_commands = _place_outputs(appendable, appended, new_plan, start_time)
     pending = tuple(
         (time, command)
-        for time, command in end_time
+        for time, command in due_commands
         if time >= end.time - SAME_TIME and not appended.last
     )
-    committed_records = len(points_known.segments) - (1 if pending else 0)
+    committed_records = len(plan_to_point.segments) - (1 if pending else 0)
     count, ending_records = (
         _record_count(new_plan.segments),
         _record_count(new_plan.segments[committed_records:]),
     )
     if appended.last:
         ending_records = 0
-    replanned_piece = (points_known.segments[-1], points_known.reference) if pending else None
+    replanned_piece = (plan_to_point.segments[-1], plan_to_point.reference) if pending else None
     next_goal = replace(
         appendable,
         points=point + 1,
@@ -510,9 +509,9 @@ def _spline_append_plan(
 def _place_outputs(
     appendable: AppendableGoal, appended: AppendedPoints, new_plan: Plan, start_time: float
 ) -> tuple[Plan, list[tuple[float, IOCommand]]]:
-    """Return a plan of pieces with the outputs on its way, and when each command is due [s]."""
+    """Return a plan of pieces with its outputs, and when each command is due [s]."""
     ends, now = {}, start_time
-    # A piece to rest leads to no point: what is due on it is due behind the last one.
+    # A stopping piece leads to no point: what is due on it is due after the last one.
     last = new_plan.segments[-1]
     closes = not last.report_line and last.length == 0.0
     segments = [replace(segment, outputs=()) for segment in new_plan.segments]
@@ -522,7 +521,7 @@ def _place_outputs(
         now += segment.duration
         ends[segment.waypoint] = now
     first = segments[0].waypoint
-    end_time = [
+    due_commands = [
         *appendable.outputs,
         *((ends[command.waypoint] + command.offset, command) for command in appended.io_commands),
     ]
@@ -535,7 +534,7 @@ def _place_outputs(
                 waypoint=max(command.waypoint, first),
                 offset=max(0.0, time - ends[max(command.waypoint, first)]),
             )
-            for time, command in end_time
+            for time, command in due_commands
         ],
         start_time=start_time,
     )
@@ -545,7 +544,7 @@ def _place_outputs(
             replace(segment, waypoint=old.waypoint, report_line=old.report_line)
             for segment, old in zip(found, new_plan.segments, strict=True)
         ),
-    ), end_time
+    ), due_commands
 
 
 def _path_from(path: ReferencePath, start_time: float) -> ReferencePath:
@@ -579,7 +578,7 @@ def _with_stop(
     appendable: AppendableGoal,
     options: PlanningOptions,
 ) -> Plan:
-    """Return a plan with the piece that brings it to rest."""
+    """Return a plan with the piece that brings the arm to rest."""
     piece = plan_stop(end, arm, options.keep_open_deceleration)
     times = np.linspace(0.0, piece.duration, _STOP_ROWS + 1)[1:]
     q, _, _ = JointSpline.of(end.q, [piece], velocities=end.qd, accelerations=end.qdd).rows(times)
@@ -614,7 +613,7 @@ def _with_stop(
 
 
 def _state_at_rest(appendable: AppendableGoal, q: Joints, arm: Arm) -> RobotState:
-    """Return the state of a robot that rests somewhere on the way."""
+    """Return the state of a robot at rest in a configuration of the goal."""
     pose = arm.forward(q) @ appendable.T_flange_active
     return RobotState(
         timestamp=0.0,
@@ -627,7 +626,7 @@ def _state_at_rest(appendable: AppendableGoal, q: Joints, arm: Arm) -> RobotStat
 
 
 def _output_delay(last: PlannedSegment) -> float:
-    """Return how long the robot program waits behind a motion for its outputs [s]."""
+    """Return how long the robot program waits after a motion for its outputs [s]."""
     return max((output.delay for output in last.outputs), default=0.0)
 
 
@@ -662,7 +661,7 @@ def _text(appendable: AppendableGoal, appended: AppendedPoints) -> str:
 
 
 def _append_remarks(appendable: AppendableGoal, appended: AppendedPoints) -> list[str]:
-    """Return what is to be said of points that ask for what is not done."""
+    """Return remarks on fields of appended points that have no effect."""
     goal = replace(
         appendable.goal,
         waypoints=appended.waypoints,

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What is known of a goal that may go on (keep_open), and what a client may append to it."""
+"""A goal with keep_open as planned so far, and the points that a client appends."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AppendedPoints:
-    """What a client appends."""
+    """The points of one append request."""
 
     waypoints: tuple[Waypoint, ...] = ()
     #: Empty, or one for each waypoint.
     segments: tuple[Segment, ...] = ()
     #: Their waypoints are numbered from the start of the goal.
     io_commands: tuple[IOCommand, ...] = ()
-    #: Whether nothing comes behind it.
+    #: Whether they are the last.
     last: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReplannablePoint:
-    """A point that may have to be planned again, and where the arm was before it."""
+    """A point that may be planned again, with the state of the arm before it."""
 
     waypoint: Waypoint
     segment: Segment
@@ -43,30 +43,31 @@ class ReplannablePoint:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AppendableGoal:
-    """What has to be remembered of a goal so that it can go on; as much, however long it is."""
+    """The state of a goal to which points can be appended; its size does not grow."""
 
     #: Without its points.
     goal: Goal
     T_flange_active: Pose
     T_flange_tcp: Pose | None
     points: int
-    #: On the wire, and how many of them are not given up.
+    #: Records on the wire, and how many of them are committed (not part of the ending).
     records: int
     committed_records: int
-    #: When the firm ones end and when all of them do, in the time of the motion [s].
+    #: When the committed ones end, and when all of them do; motion time [s].
     time: float
     rest_time: float
-    #: What the client's times lack to those of the motion, and the last of the client's [s].
+    #: Client time + offset = motion time [s].
     time_offset: float
+    #: Time of the last point, as the client gave it [s].
     last_client_time: float
-    #: Where the arm rests in the end [rad].
+    #: Where the arm rests after the ending [rad].
     q_rest: Joints
     replannable: tuple[ReplannablePoint, ...] = ()
-    #: Of a spline: behind its last point.
+    #: Of a spline: the state at its last point.
     state: SplineState | None = None
-    #: Its last piece with its way, where that is not firm because of outputs.
+    #: Its last piece and path, if outputs keep them from being committed.
     replanned_piece: tuple[PlannedSegment, ReferencePath] | None = None
-    #: Outputs that may not have been switched yet, and when that is due [s].
+    #: Commands that may not have switched yet, with the time at which they are due [s].
     outputs: tuple[tuple[float, IOCommand], ...] = ()
 
 
@@ -74,9 +75,9 @@ def check_appended_points(
     appendable: AppendableGoal, appended: AppendedPoints, options: PlanningOptions
 ) -> None:
     """
-    Check what can be known wrong of an addition without looking where the arm is.
+    Make the checks of appended points that do not depend on the state of the arm.
 
-    :raises GoalRefused: with the reason; points are numbered from the start of the goal.
+    :raises GoalRefused: points are numbered from the start of the goal.
     """
     count, first = len(appended.waypoints), appendable.points
     check_list_lengths(
@@ -95,7 +96,7 @@ def check_appended_points(
                 f'request are {first} to {first + count - 1}',
                 'name one of these',
             )
-    # By themselves, too: what is planned has older ones in front of them.
+    # The commands alone: the plan numbers them behind older ones.
     check_outputs(
         replace(
             appendable.goal, waypoints=appended.waypoints, io_commands=numbered(appended, first)
@@ -106,14 +107,14 @@ def check_appended_points(
 
 
 def numbered(appended: AppendedPoints, first: int) -> tuple[IOCommand, ...]:
-    """Return the commands of an addition, with waypoints counted from a point."""
+    """Return the appended commands, with waypoints counted from a point."""
     return tuple(
         replace(command, waypoint=command.waypoint - first) for command in appended.io_commands
     )
 
 
 def _check_times(appendable: AppendableGoal, appended: AppendedPoints) -> None:
-    """Refuse points that are not later than those before them, in the times of the client."""
+    """Refuse points that are not later than those before them, in client time."""
     before = appendable.last_client_time
     if before == 0.0 and not any(point.time for point in appended.waypoints):
         return

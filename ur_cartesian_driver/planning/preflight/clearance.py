@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether the arm stays clear of itself and of the workspace planes on its whole way.
+Check the clearance of the arm from itself and from the workspace planes along its whole path.
 
-Capsules tell it for every row; where they come near, the meshes tell exactly, for the models
-that have them (:mod:`~.collision_meshes`). The arm shall be able to leave a
-place where it is too near already: rows are let pass as long as what is too near at the start only
-goes away from it, until it is free; from then on the rule is the same as for all else.
+Capsules are checked in every row; where they come close, meshes measure exactly, for the models
+that have them (:mod:`~.collision_meshes`). An arm that starts too close can move away: rows pass
+as long as a pair that is too close at the start only separates, until it is clear; from then on it
+is treated like all others.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from ur_cartesian_driver.kinematics.collision_meshes import CollisionMeshes
 from ur_cartesian_driver.motion.errors import CollisionPredicted
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.planning.geometry.pose_rows import Floats
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 from ur_cartesian_driver.planning.workspace import parse_planes, Plane
 
-Floats: TypeAlias = NDArray[np.float64]
 Flags: TypeAlias = NDArray[np.bool_]
 
-# Rows that are judged together: bounds memory, and ends early where the way is refused.
+# Rows that are checked together: bounds memory, and ends early where a goal is refused.
 _BLOCK = 4096
-# What counts as not coming nearer [m]: samples of a way are not exact.
+# A distance may shrink by this and still count as receding [m]: samples are not exact.
 _RECEDING_TOLERANCE = 1e-4
 # Rounding of a tool that works on a plane with no margin [m].
 _ON_PLANE = 1e-6
@@ -42,28 +42,28 @@ _ON_PLANE = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Violation:
-    """The first row at which something is too near."""
+    """The first row at which a pair is too close."""
 
     #: Index into the rows that were given.
     row: int
-    #: A clause: what is too near to what, how near, and what is asked for.
+    #: A clause: what is too close to what, the distance, and the bound.
     text: str
-    #: What would help.
+    #: What to do.
     remedy: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClearanceResult:
-    """How clear a way is."""
+    """The clearance of a path."""
 
     #: What refuses the goal ...
     violation: Violation | None
-    #: ... and what is only worth saying, because capsules are thicker than the arm.
+    #: ... and what only warns, because capsules are thicker than the arm.
     warning: Violation | None
     #: The smallest distance of all rows [m], negative where capsules overlap or a plane is
     #: crossed, infinite where nothing is checked; between capsules it is a lower bound.
     margin: float
-    #: Between what it is.
+    #: The pair with that distance.
     description: str
 
 
@@ -76,7 +76,7 @@ class Clearance:
     """
 
     def __init__(self, arm: Arm, T_flange_tcp: Pose, options: PlanningOptions) -> None:
-        """Prepare bodies and planes, and load the meshes where they are asked for."""
+        """Prepare bodies and planes, and load the meshes if they are needed."""
         bodies = CollisionBodies(arm, T_flange_tcp, options.tool_radius)
         self._checkers: list[_SelfCollisionChecker | _PlaneChecker] = []
         if options.self_collision != 'off':
@@ -86,10 +86,10 @@ class Clearance:
 
     def check(self, q: Floats, q_start: Joints) -> ClearanceResult:
         """
-        Return the first row that is too near, and the smallest distance.
+        Return the first row that is too close, and the smallest distance.
 
-        :param q: (n, 6) [rad], all configurations of a goal, in the order of time.
-        :param q_start: where the arm stands; what is too near there may go away.
+        :param q: (n, 6) [rad], all configurations of a goal, in order of time.
+        :param q_start: the start; pairs that are too close there may separate.
         """
         violation: Violation | None = None
         warning: Violation | None = None
@@ -122,10 +122,10 @@ def clearance_remarks(
     clear: ClearanceResult, segment: NDArray[np.int32], fraction: Floats
 ) -> list[str]:
     """
-    Return what the report says of the clearance.
+    Return the report lines about the clearance.
 
-    :param segment: (n,) the waypoint to which the motion of each row leads.
-    :param fraction: (n,) how much of the way to it is gone, 0..1.
+    :param segment: (n,) the segment of each row.
+    :param fraction: (n,) the fraction of it, 0..1.
     :raises CollisionPredicted: a row is refused.
     """
     if clear.violation is not None:
@@ -148,12 +148,12 @@ def clearance_remarks(
 
 
 class _InitialViolations:
-    """What was too near at the start and is not free yet; one column for each thing watched."""
+    """The pairs that were too close at the start and are not clear yet; a column for each pair."""
 
     def __init__(self, checker: _SelfCollisionChecker | _PlaneChecker, start: Floats) -> None:
         lower, distances = checker.measure(start, np.ones(len(checker.bounds), dtype=np.bool_))
         self._bounds = checker.bounds
-        #: What is still too near, by column.
+        #: Whether a pair is still too close, by column.
         self.pending: Flags = distances[0] < checker.bounds
         self._lower, self._reached = lower[0], distances[0]
 
@@ -161,7 +161,7 @@ class _InitialViolations:
         """
         Return which (rows, columns) are refused.
 
-        :param lower: distances of capsules, which go on changing while meshes touch.
+        :param lower: distances of capsules, which keep changing while meshes touch.
         :param distances: those that count.
         """
         near = distances < self._bounds
@@ -175,7 +175,7 @@ class _InitialViolations:
 
 
 def _is_receding(values: Floats, reached: Floats) -> tuple[Floats, Flags]:
-    """Return the largest values, and where one is not below all before it; by columns."""
+    """Return the largest values so far, and where a value is no smaller; by columns."""
     largest = np.maximum.accumulate(np.vstack([reached, values]))
     receding: Flags = values >= largest[:-1] - _RECEDING_TOLERANCE
     return largest[-1], receding
@@ -190,7 +190,7 @@ class _SelfCollisionChecker:
         self._bound = options.min_clearance
         exact = np.array([self._has_mesh(pair) for pair in bodies.pairs], dtype=np.bool_)
         choice = options.self_collision
-        #: By column: the distance asked for, whether less is refused, and its name.
+        #: By column: the minimum distance, whether less is refused, and the pair.
         self.bounds = np.full(len(bodies.pairs), self._bound)
         self.refuses: Flags = (
             exact if choice == 'auto' else np.full(len(exact), choice == 'refuse')
@@ -204,8 +204,8 @@ class _SelfCollisionChecker:
         """
         Return distances (n, columns) of the capsules, and those that count.
 
-        :param held: the columns of which exact distances are wanted; of others it is enough to
-            know whether they are below the bound (then they are 0), because that is faster.
+        :param pending: the columns that need exact distances; the others only need to be known as
+            below the bound (then they are 0), which is faster.
         """
         lower = self._bodies.distances(q)
         if self._meshes is None:
@@ -253,7 +253,7 @@ class _PlaneChecker:
         moving = [k for k, link in enumerate(bodies.links) if link != Link.BASE]
         links = [bodies.links[k] for k in moving]
         self._moving = slice(moving[0], None)
-        # CollisionBodies of one link follow each other.
+        # Bodies of the same link are adjacent.
         self._begins = [i for i, link in enumerate(links) if i == 0 or links[i - 1] != link]
         self._names = [str(links[i]) for i in self._begins] + ['TCP']
         self.description = [
@@ -263,7 +263,7 @@ class _PlaneChecker:
         self.refuses: Flags = np.ones(len(self.description), dtype=np.bool_)
 
     def measure(self, q: Floats, pending: Flags) -> tuple[Floats, Floats]:
-        """Return how far above the planes all links and the TCP are, (n, columns), twice."""
+        """Return the heights of all links and the TCP above the planes, (n, columns), twice."""
         low = self._bodies.heights(q, self._normals)[:, :, self._moving]
         links = np.minimum.reduceat(low, self._begins, axis=2)
         frames = self._arm.frames_rows(q)
@@ -300,7 +300,7 @@ def _first(
     q: Floats,
     begin: int,
 ) -> Violation | None:
-    """Return the nearest thing in the first row that is refused."""
+    """Return the closest pair in the first row that is refused."""
     rows = np.flatnonzero(refused.any(axis=1))
     if not len(rows):
         return None

@@ -1,13 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The joints along the way of the tool: which configurations the arm goes through, or why it cannot.
+Solve the joint path along sampled curves, or find why the arm cannot follow them.
 
-All places of a goal are solved together. Between two of them the arm may do more than they show:
-beside a singularity joints swing round within a millimetre, and the solution that is nearest after
-a long step is then that of another branch. So where a joint turns far from one place to the next,
-where a branch changes, or where there is no solution, places are put in between, down to 2 um:
-what then still jumps, jumps.
+All samples of a goal are solved together. Between two of them the arm may do more than they show:
+beside a singularity joints swing round within a millimetre, and the solution closest after a long
+step then belongs to another branch. So where a joint turns far from one sample to the next, where
+the branch changes, or where there is no solution, samples are added in between, down to 2 um: a
+jump that remains is real.
 """
 
 from __future__ import annotations
@@ -34,38 +34,38 @@ from ur_cartesian_driver.planning.geometry.samples import (
 from ur_cartesian_driver.planning.preflight.tcp_kinematics import TcpKinematics
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-#: Places are put in between until no joint turns more than this from one to the next [rad] ...
+#: Samples are added until no joint turns more than this from one to the next [rad] ...
 _MAX_STEP = 0.1
-#: ... or they are this near [m], [rad]: a joint that still turns more than _JUMP jumps.
+#: ... or they are this close [m], [rad]: a joint that then turns more than _MAX_JUMP jumps.
 _MIN_LENGTH = 2e-6
 _MIN_ANGLE = 2e-5
 _MAX_JUMP = 0.5
-#: The same configuration, found in another way [rad].
+#: Configurations that differ by less are the same [rad].
 _SAME = 1e-6
-#: Places solved at a time after one at which more had to be put in between; then ever more.
+#: Samples solved at a time after a refinement; each later block is _GROWTH times as long.
 _FIRST_BLOCK = 64
-#: Places at which is looked how far a joint would go beyond its range.
+#: Samples that measure how far a joint would go beyond its range.
 _SAMPLES_BEYOND = 16
 _GROWTH = 8
 
 
 @dataclass(frozen=True, slots=True)
 class JointPath:
-    """The places that the arm comes to."""
+    """The samples that the arm reaches, with their joint positions."""
 
     #: (n,) not decreasing; (n,); (n, 7); (n, 6).
     piece: NDArray[np.intp]
     t: Floats
     poses: Floats
     q: Floats
-    #: Why it does not come to all of them, and the segment where; None = it does.
+    #: Why it does not reach all of them, and on which segment; None = it does.
     refusal: GoalRefused | None = None
     refused_segment: int = -1
 
 
 @dataclass(slots=True)
 class _JointPathBuilder:
-    """What has been found so far, in blocks."""
+    """Collects solved samples in blocks."""
 
     piece: list[NDArray[np.intp]] = field(default_factory=list)
     t: list[Floats] = field(default_factory=list)
@@ -91,12 +91,12 @@ class _JointPathBuilder:
 
 @dataclass(frozen=True, slots=True)
 class _Refinement:
-    """Places put in between on one piece: the last is where it goes on, or where it ends."""
+    """Samples added on one piece."""
 
     t: list[float]
     poses: list[Pose]
     q: list[Joints]
-    #: Where no configuration follows, and the one that would jump there (None: there is none).
+    #: Parameter at which no configuration follows; the one that would jump there, if any.
     stop: float | None = None
     jump: Joints | None = None
 
@@ -115,10 +115,10 @@ def solve_joint_path(
     samples: PoseSamples | None = None,
 ) -> JointPath:
     """
-    Return the places on pieces in the tool's space, one piece after the other, with the joints.
+    Return the samples on consecutive Cartesian pieces with their joint positions.
 
-    :param q_start: the configuration at the beginning of the first piece [rad].
-    :param places: those on the pieces; None = evenly along each of them.
+    :param q_start: the configuration at the start of the first piece [rad].
+    :param samples: those on the pieces; None = evenly along each of them.
     """
     samples = sample_poses(pieces) if samples is None else samples
     found, q = _JointPathBuilder(), q_start
@@ -149,7 +149,7 @@ def solve_joint_path(
 
 
 def _solve_block(kinematics: TcpKinematics, poses: Floats, q: Joints) -> tuple[Floats, list[int]]:
-    """Return the joints (n, 6) of places, and the rows to which the way has to be looked at."""
+    """Return the joints (n, 6) of samples, and the rows before which to refine."""
     path = solve_path(
         kinematics.arm, compose_rows(poses, kinematics.T_tcp_flange), q, skip_gaps=False
     )
@@ -159,7 +159,7 @@ def _solve_block(kinematics: TcpKinematics, poses: Floats, q: Joints) -> tuple[F
     bad = (np.abs(np.diff(rows, axis=0)).max(axis=1) > _MAX_STEP) | (np.diff(branch) != 0)
     bad |= ~path.found
     lost = np.flatnonzero(~path.found)
-    if len(lost):  # what follows is the business of the next block
+    if len(lost):  # the next block continues there
         stop = int(lost[0]) + 1
         return path.q[:stop], np.flatnonzero(bad[:stop]).tolist()
     return path.q, np.flatnonzero(bad).tolist()
@@ -172,7 +172,7 @@ def _refine(
     row: int,
     q: Joints,
 ) -> _Refinement:
-    """Return the places from the one before a row to it, as near as the joints need them."""
+    """Return the samples from the row before to a row, as dense as the joints need them."""
     piece = pieces[int(samples.piece[row])]
     is_first = row == 0 or samples.piece[row - 1] != samples.piece[row]
     t = piece.begin if is_first else float(samples.t[row - 1])
@@ -208,7 +208,7 @@ def _as_samples(piece: int, refinement: _Refinement) -> PoseSamples:
 def _refusal_at(
     kinematics: TcpKinematics, piece: CurvePiece, refinement: _Refinement, q: Joints
 ) -> tuple[GoalRefused, int]:
-    """Return why the arm does not go on from a configuration, and on which segment."""
+    """Return why the arm cannot continue from a configuration, and on which segment."""
     assert refinement.stop is not None
     index, fraction = piece.on_segment(refinement.stop)
     pose = piece.pose(refinement.stop)
@@ -221,7 +221,7 @@ def _refusal_at(
         return kinematics.discontinuity_error(pose, q, refinement.jump, where, poses_beyond), index
     refusal = kinematics.no_solution_error(pose, where)
     if not piece.is_blend and fraction < 1.0:
-        # There the value is just beyond its bound; at the point it says how far beyond.
+        # Here the value is just beyond its bound; the one at the point says how far beyond.
         at_end = kinematics.no_solution_error(piece.curve.end, where, 'at the point ')
         if type(at_end) is type(refusal) and kinematics.solution(piece.curve.end, q) is None:
             refusal = at_end
@@ -229,7 +229,7 @@ def _refusal_at(
 
 
 def describe_location(index: int, fraction: float) -> str:
-    """Return the words for a place on the way to a point."""
+    """Return the words for a fraction of the segment to a point."""
     field_name = point_field(index, 'pose')
     return (
         field_name
@@ -240,10 +240,10 @@ def describe_location(index: int, fraction: float) -> str:
 
 def _may_leave_line(kinematics: TcpKinematics, q: Joints, q_next: Joints) -> bool:
     """
-    Tell whether the arm may do more than go straight from one configuration to the other.
+    Tell whether the arm may do more than turn straight from one configuration to the other.
 
-    Beside a singularity the other branch is the nearer one after a long step, while the arm that
-    goes there in small steps swings round and stays on its own.
+    Beside a singularity another branch may be closer after a long step, while in small steps the
+    arm swings round and stays on its own.
     """
     if _max_joint_change(q, q_next) > _MAX_STEP:
         return True

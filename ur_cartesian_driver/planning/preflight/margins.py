@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How far the arm stays away from where it cannot go: singularities, and the ends of its joints.
+Margins: distances of the arm from its singularities and joint limits.
 
-The three singularities are where two solutions of the arm meet: the wrist straight (axes 4 and 6
-parallel), the elbow stretched or folded, the centre of the wrist above or below the shoulder. What
-is measured vanishes there: the angle of wrist 2, the angle of the elbow, and how far the centre of
-the wrist is in front of the plane of the axes 1 and 2.
+At the three singularities two solutions of the arm meet: the wrist is straight (axes 4 and 6
+parallel), the elbow is stretched or folded, the wrist centre is above or below the shoulder. The
+measured distances vanish there: the angle of wrist 2, the angle of the elbow, and the distance of
+the wrist centre from the plane of axes 1 and 2.
 """
 
 from __future__ import annotations
@@ -27,23 +27,23 @@ from ur_cartesian_driver.planning.geometry.samples import CurvePiece
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.preflight.joint_path import describe_location, JointPath
 
-#: So near to a start at rest the arm may be singular [m], [rad] ...
+#: This close to a start at rest the arm may be singular [m], [rad] ...
 START_LENGTH = 0.001
 START_ANGLE = 0.01
-#: ... and farther on as long as it gets away from there, but for rounding.
+#: ... and beyond as long as it moves away, but for rounding.
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class SingularityMeasure:
-    """A distance from a singularity, and how it is called."""
+    """A distance from a singularity, with its name and its parameter."""
 
     name: str
     unit: str
     option: str
-    #: What a reader can look at.
+    #: The configuration, for a reader.
     meaning: str
-    #: Distances are compared as parts of this.
+    #: Distances are compared as fractions of this.
     scale: float
 
 
@@ -75,22 +75,22 @@ _SCALES = np.array([*(measure.scale for measure in SINGULARITY_MEASURES), 1.0])
 
 @dataclass(frozen=True, slots=True)
 class TightestMargin:
-    """What came nearest to its bound on a segment."""
+    """The smallest distance of a segment from a singularity or a joint limit."""
 
     name: str
     value: float
     unit: str
     fraction: float
-    #: The value as a part of the scale of its quantity.
+    #: The value as a fraction of the scale of its quantity.
     normalized: float
 
     def __str__(self) -> str:
-        """Return it as a report says it."""
+        """Return the words of the report."""
         return f'{self.value:.3g} {self.unit} to {self.name} at {100.0 * self.fraction:.0f} %'
 
 
 def singularity_distance_rows(arm: Arm, q: Floats) -> Floats:
-    """Return the three measures (n, 3) of configurations (n, 6), all >= 0, as in MEASURES."""
+    """Return the SINGULARITY_MEASURES (n, 3), all >= 0, of configurations (n, 6)."""
     of = branch_measures(arm, q)
     return np.stack(
         (
@@ -103,7 +103,7 @@ def singularity_distance_rows(arm: Arm, q: Floats) -> Floats:
 
 
 def joint_limit_distances(arm: Arm, q: Floats) -> tuple[Floats, NDArray[np.intp]]:
-    """Return the least distance of a joint from an end of its range (n,) [rad], and which."""
+    """Return the smallest distance of a joint from its limits (n,) [rad], and which joint."""
     low, high = np.array(arm.model.position_limits).T
     distance = np.minimum(q - low, high - q)
     joint = np.argmin(distance, axis=1)
@@ -119,9 +119,9 @@ def near_singularity_refusal(
     options: PlanningOptions,
 ) -> tuple[NearSingularity, int] | None:
     """
-    Return the refusal of the first segment that is too near to a singularity, and which it is.
+    Return the refusal of the first segment too close to a singularity, and its index.
 
-    :param measures: (n, 3) of the places found.
+    :param measures: (n, 3) of the samples solved.
     :param segments: (n,) and ``fractions`` (n,) of them.
     """
     bounds = np.array(
@@ -151,8 +151,8 @@ def near_singularity_refusal(
 
 
 def _format_below(value: float, bound: float) -> str:
-    """Return a value below its bound in few digits, and so that it reads as below."""
-    text = f'{round(value, 6):.3g}'  # what is smaller is rounding
+    """Return a value in few digits that still read as less than its bound."""
+    text = f'{round(value, 6):.3g}'  # smaller values are rounding
     return text if float(text) < bound else format_distinct(value, bound)[0]
 
 
@@ -160,10 +160,10 @@ def _is_leaving(
     pieces: Sequence[CurvePiece], joint_path: JointPath, rows: NDArray[np.intp], measures: Floats
 ) -> NDArray[np.bool_]:
     """
-    Tell which places (n, 3) of a segment are on the way out of a singularity it starts in.
+    Tell which samples (n, 3) of a segment lead out of a singularity in which it starts.
 
-    Where the robot stands is not the goal's choice: so near to a start at rest nothing counts, nor
-    does what only grows from there.
+    The goal does not choose where the robot is: close to a start at rest no distance counts, nor
+    does one that only grows from there.
     """
     piece = pieces[int(joint_path.piece[rows[0]])]
     excused = np.zeros((len(rows), len(SINGULARITY_MEASURES)), dtype=np.bool_)
@@ -186,9 +186,9 @@ def is_leaving_rows(
     measures: Floats, length: Floats, angle: Floats, *, rests: bool
 ) -> NDArray[np.bool_]:
     """
-    Tell which places (n, 3) of a whole motion are on the way out of a singularity it starts in.
+    Tell which samples (n, 3) of a whole motion lead out of a singularity in which it starts.
 
-    :param length: (n,) the way since its start [m], and ``angle`` the turn [rad].
+    :param length: (n,) the path length since its start [m], and ``angle`` the turn [rad].
     :param rests: whether it starts at rest.
     """
     at_start = (rests & (length <= START_LENGTH) & (angle <= START_ANGLE))[:, None]
@@ -198,7 +198,7 @@ def is_leaving_rows(
 
 
 def _first_of(pieces: Sequence[CurvePiece], index: int) -> int:
-    """Return the number of the first piece on which the tool is on the way to a waypoint."""
+    """Return the number of the first piece of the segment to a waypoint."""
     for number, piece in enumerate(pieces):
         if piece.index == index or (piece.index == index - 1 and piece.is_blend):
             return number
@@ -209,15 +209,15 @@ def margins_by_segment(
     arm: Arm, q: Floats, measures: Floats, segments: NDArray[np.int32], fractions: Floats
 ) -> dict[int, TightestMargin]:
     """
-    Return what comes nearest to its bound, by segment.
+    Return the tightest margin by segment.
 
     :param measures: (n, 3), inf where they do not count.
     """
     distance, joint = joint_limit_distances(arm, q)
     values = np.concatenate([measures, distance[:, None]], axis=1)
-    shares = values / _SCALES
-    kind = np.argmin(shares, axis=1)
-    least = np.take_along_axis(shares, kind[:, None], axis=1)[:, 0]
+    normalized_values = values / _SCALES
+    kind = np.argmin(normalized_values, axis=1)
+    least = np.take_along_axis(normalized_values, kind[:, None], axis=1)[:, 0]
     order = np.lexsort((least, segments))
     first = order[np.flatnonzero(np.diff(segments[order], prepend=segments[order[0]] - 1))]
     columns = (
@@ -229,8 +229,8 @@ def margins_by_segment(
         least[first],
     )
     return {
-        segment: TightestMargin(_name(k, j), value, _unit(k), fraction, share)
-        for segment, k, j, value, fraction, share in zip(
+        segment: TightestMargin(_name(k, j), value, _unit(k), fraction, normalized)
+        for segment, k, j, value, fraction, normalized in zip(
             *(column.tolist() for column in columns), strict=True
         )
     }

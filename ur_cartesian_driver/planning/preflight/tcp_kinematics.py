@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-In which joint configuration the arm arrives, and why it cannot.
+Kinematics of an arm with a tool, with refusals that say why a pose cannot be reached.
 
-The robot is told poses; which of up to eight configurations it takes follows from where it comes
-from. So the configuration is predicted segment by segment: along a straight line or an arc by
-following the inverse kinematics (:mod:`~.joint_path`), for a joint move by choosing the solution
-that is then sent along as ``q_near``.
+The robot gets poses; which of up to eight configurations it takes depends on the one before. So
+the configuration is predicted segment by segment: along a line or an arc by following the inverse
+kinematics (:mod:`~.joint_path`), for a joint move by choosing the solution that is sent as
+``q_near``.
 """
 
 from __future__ import annotations
@@ -37,26 +37,26 @@ from ur_cartesian_driver.motion.goal import Posture
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 
-#: The named joints have to arrive this near to the chosen solution, turns included [rad].
+#: How far a named joint may arrive from the chosen solution, turns included [rad].
 ARRIVAL_TOLERANCE = 0.01
-#: A continued configuration is one that no joint turns farther to than this [rad].
+#: A solution continues a configuration if no joint turns farther than this [rad].
 _MAX_CONTINUED_STEP = 0.5
 #: Rounding of a configuration [rad].
 _ROUNDING = 1e-6
-# How near to the middle of its range a measure of a branch is, to compare the three [m].
+# Scale of the shoulder measure, to compare it with the angles of the others [m].
 _ARM_LENGTH = 0.3
 
 
 class TcpKinematics:
     """
-    One arm with one tool: the inverse kinematics of the TCP, with refusals that name the place.
+    The inverse kinematics of the TCP of one arm, with refusals that name the point.
 
     :param arm: the kinematics.
     :param T_flange_tcp: the active TCP.
     """
 
     def __init__(self, arm: Arm, T_flange_tcp: Pose) -> None:
-        """Prepare the way from the TCP back to the flange."""
+        """Prepare the transform from the TCP to the flange."""
         self.arm = arm
         self.T_flange_tcp = T_flange_tcp
         self.T_tcp_flange = T_flange_tcp.inverse()
@@ -73,7 +73,7 @@ class TcpKinematics:
         """
         Return the solution nearest to a configuration.
 
-        :param place: what the text of a refusal begins with, ``trajectory.points[2].pose``.
+        :param where: how a refusal begins, ``trajectory.points[2].pose``.
         :raises Unreachable: there is none.
         :raises JointLimitExceeded: each of them is outside the range of a joint.
         """
@@ -86,12 +86,12 @@ class TcpKinematics:
         self, T_base_tcp: Pose, named: dict[int, float], q_before: Joints, where: str
     ) -> Joints:
         """
-        Return the solution that a posture means.
+        Return the solution that a posture selects.
 
-        Of all solutions those nearest in the named joints, of them the one nearest to the
+        Of all solutions those nearest in the named joints, of these the one nearest to the
         configuration before. Raises as :meth:`nearest`.
         """
-        # Where the arm is already as near as counts, that is the one.
+        # If the arm is already within the tolerance, it stays.
         if hypot(*(q_before[k] - value for k, value in named.items())) <= ARRIVAL_TOLERANCE:
             here = self.solution(T_base_tcp, q_before)
             if here is not None and dist(here, q_before) < _ROUNDING:
@@ -103,9 +103,9 @@ class TcpKinematics:
 
     def no_solution_error(self, T_base_tcp: Pose, where: str, there: str = '') -> GoalRefused:
         """
-        Tell why a pose has no solution: out of reach, or outside of the joints' ranges.
+        Return why a pose has no solution: out of reach, or beyond joint limits.
 
-        :param there: where the pose is, if not at the place.
+        :param there: where the pose is, if not at ``where``.
         """
         T_base_flange = self.flange(T_base_tcp)
         reason = there + explain_unreachable(self.arm, T_base_flange)
@@ -127,9 +127,9 @@ class TcpKinematics:
         poses_beyond: Iterable[Pose] = (),
     ) -> GoalRefused:
         """
-        Tell why the configuration cannot be continued: end of a range, or a singularity.
+        Return why a configuration cannot be continued: a joint limit, or a singularity.
 
-        :param onward: where the tool would go from there, near to each other.
+        :param poses_beyond: how the path continues, in small steps.
         """
         goes_on = self._continue_branch(T_base_tcp, q)
         for k, (low, high) in enumerate(self.arm.model.position_limits):
@@ -153,7 +153,7 @@ class TcpKinematics:
         )
 
     def nearest_singularity(self, q: Joints) -> str:
-        """Return which singularity a configuration is nearest to: wrist, elbow or shoulder."""
+        """Return the nearest singularity: wrist, elbow or shoulder."""
         measures = branch_measures(self.arm, np.array([q]))
         distances = {
             'wrist': abs(float(measures.wrist[0])),
@@ -163,7 +163,7 @@ class TcpKinematics:
         return min(distances, key=lambda name: distances[name])
 
     def describe_flips(self, q: Joints, q_other: Joints) -> str:
-        """Return what has to flip from one configuration to another, '' if nothing does."""
+        """Return what has to flip between two configurations; '' if nothing does."""
         first, second = branch_measures(self.arm, np.array([q, q_other])).branch
         a, b = BRANCHES[first], BRANCHES[second]
         names = [
@@ -181,7 +181,7 @@ class TcpKinematics:
     def _joint_positions_beyond(
         self, k: int, q: Joints, poses_beyond: Iterable[Pose]
     ) -> Iterator[float]:
-        """Give the positions of a joint [rad] along a way, as far as it can be followed."""
+        """Yield the positions of a joint [rad] along poses, as far as the arm can follow."""
         yield q[k]
         for pose in poses_beyond:
             goes_on = self._continue_branch(pose, q)
@@ -191,7 +191,7 @@ class TcpKinematics:
             yield q[k]
 
     def _continue_branch(self, T_base_tcp: Pose, q: Joints) -> Joints | None:
-        """Return the solution next to a configuration, the limits of the joints aside."""
+        """Return the solution that continues a configuration, regardless of joint limits."""
 
         def around(found: Joints) -> Joints:
             a, b, c, d, e, f = (
@@ -218,7 +218,7 @@ def named_joints(posture: Posture, tf_prefix: str) -> dict[int, float]:
 
 
 def full_posture(named: dict[int, float]) -> Joints | None:
-    """Return the configuration of a posture that names every joint, else None."""
+    """Return the configuration of a posture that names all joints, else None."""
     if len(named) < 6:
         return None
     return (named[0], named[1], named[2], named[3], named[4], named[5])
@@ -226,10 +226,10 @@ def full_posture(named: dict[int, float]) -> Joints | None:
 
 def describe_miss(q: Joints, chosen: Joints, named: dict[int, float]) -> str:
     """
-    Return the clause that says which named joint does not arrive, empty if all do.
+    Return a clause with the first named joint that misses its value; '' if all arrive.
 
     :param q: where the motion arrives.
-    :param chosen: the solution that the posture means.
+    :param chosen: the solution that the posture selects.
     """
     for k in sorted(named):
         if abs(q[k] - chosen[k]) > ARRIVAL_TOLERANCE:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a tolerance of zero means: the parameter for that quantity."""
+"""Replace tolerances of zero by the parameters for their quantities."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ur_cartesian_driver.motion.goal import Goal, Tolerance
 from ur_cartesian_driver.motion.pose import Vector3, Vector6
 from ur_cartesian_driver.planning.options import PlanningOptions
 
-#: What tolerances limit, as in the names of the parameters ``path_tolerance_...``.
+#: The quantities in the names of the parameters ``path_tolerance_...``.
 _QUANTITIES = (
     'position',
     'orientation',
@@ -27,7 +27,7 @@ def named_tolerances(goal: Goal) -> tuple[tuple[str, Tolerance], tuple[str, Tole
 
 
 def apply_default_tolerances(goal: Goal, options: PlanningOptions) -> Goal:
-    """Return the goal with the parameters in place of zeros; what is still zero has no limit."""
+    """Return the goal with parameters instead of zeros; a tolerance still zero has no limit."""
     path, end = (
         _with_defaults(tolerance, name, options) for name, tolerance in named_tolerances(goal)
     )

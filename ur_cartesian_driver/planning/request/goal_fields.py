@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a goal says: the names of its fields, and what follows from them."""
+"""Names of a goal's fields, and predicates of goals and segments."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ur_cartesian_driver.motion.goal import (
     SegmentType,
 )
 
-#: A goal without segments has these.
+#: The segments of a goal without any.
 DEFAULT_SEGMENT = Segment()
 
 
@@ -31,7 +31,7 @@ def segment_of(goal: Goal, index: int) -> Segment:
 
 
 def resolve_execution_mode(goal: Goal) -> ExecutionMode:
-    """Return how a goal is carried out: AUTO means SPLINE where only that does what it asks."""
+    """Return the execution mode: AUTO is SPLINE where only that meets twists or accelerations."""
     if goal.execution != ExecutionMode.AUTO:
         return ExecutionMode(goal.execution)
     inner = goal.waypoints if goal.keep_open else goal.waypoints[:-1]
@@ -41,17 +41,17 @@ def resolve_execution_mode(goal: Goal) -> ExecutionMode:
 
 
 def is_spline(goal: Goal) -> bool:
-    """Tell whether the goal's points are joined by a spline, with times."""
+    """Tell whether a timed spline joins the points of a goal."""
     return resolve_execution_mode(goal) in (ExecutionMode.SPLINE, ExecutionMode.SERVO)
 
 
 def is_timed(goal: Goal) -> bool:
-    """Tell whether the goal gives times; if not, speeds decide."""
+    """Tell whether the goal has times; if not, speeds count."""
     return any(waypoint.time != 0.0 for waypoint in goal.waypoints)
 
 
 def is_straight(kind: SegmentType) -> bool:
-    """Tell whether the tool goes on a straight line."""
+    """Tell whether the tool moves on a straight line."""
     return kind in (
         SegmentType.AUTO,
         SegmentType.LINEAR,

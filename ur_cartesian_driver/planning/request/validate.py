@@ -356,7 +356,7 @@ def _via(index: int, segment: Segment) -> None:
                 'give a pose between the ends of the arc',
             )
         return
-    # The identity is what an unset pose of a ROS message looks like.
+    # An unset pose of a ROS message is the identity.
     for field, given in (
         ('via', segment.via not in (None, IDENTITY)),
         ('via_posture', bool(segment.via_posture)),

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The joint polynomials along which the tool keeps to a tool spline.
+Fit joint polynomials that keep the tool on a tool spline.
 
 A piece has the joint positions, velocities and accelerations of the tool spline at its ends; in
-between the tool is off it. How far is measured by the forward kinematics, and where it is more
-than allowed the piece is halved, until all are within.
+between the tool deviates. The forward kinematics measures by how much, and a piece that deviates
+more than allowed is halved, until none does.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from ur_cartesian_driver.planning.spline.spline_path import SplinePath
 
 #: Times of pieces are whole microseconds, as on the wire, so that sums of them do not drift.
 TICK = 1e-6
-#: Pieces are not halved below this [s]: one step of the fastest controllers.
+#: Pieces are not halved below this [s]: one cycle of the fastest controllers.
 _MIN_PIECE_TIME = 0.002
 # Digits of joint rates that are more than rounding.
 _DIGITS = 12
-#: Places inside a piece at which the tool is compared, at least and at most.
+#: Minimum and maximum number of samples inside a piece at which the tool is compared.
 _COMPARED_SAMPLES = 7, 23
 
 
@@ -48,7 +48,7 @@ class JointPolynomials:
     #: (n,) the piece of the tool spline that each is a part of.
     piece: NDArray[np.intp]
     quintic: bool
-    #: How far the tool is off the tool spline at the most [m], [rad].
+    #: Maximum deviation of the tool from the tool spline [m], [rad].
     distance: float
     angle: float
 
@@ -62,11 +62,11 @@ def fit_joint_polynomials(
     angle_tolerance: float,
 ) -> JointPolynomials:
     """
-    Return the pieces for a way.
+    Return the pieces for a spline path.
 
     :param start: the joints at its start (1, 6).
-    :param tolerance: how far the tool may be off [m], and ``angle_tolerance`` how far turned.
-    :raises TooFast: pieces as short as a step of the controller are not enough.
+    :param tolerance: maximum deviation of the tool [m], and ``angle_tolerance`` [rad].
+    :raises TooFast: pieces as short as a controller cycle are not enough.
     """
     return _PieceRefinement(kinematics, path, start, quintic).refine_within(
         tolerance, angle_tolerance
@@ -74,7 +74,7 @@ def fit_joint_polynomials(
 
 
 class _PieceRefinement:
-    """The pieces so far: ends in order of time, and which of them are not compared yet."""
+    """The pieces so far, in order of time, and which of them are not compared yet."""
 
     def __init__(
         self, kinematics: TcpKinematics, path: SplinePath, start: MotionRows, quintic: bool
@@ -136,7 +136,7 @@ class _PieceRefinement:
         return between(np.diff(self.times)[rows], start, end)
 
     def _deviations(self, rows: NDArray[np.intp]) -> Floats:
-        """Return how far the tool is off on pieces (n, 2) [m], [rad]."""
+        """Return the maximum deviations of the tool on pieces (n, 2) [m], [rad]."""
         begin, end = self.times[rows], self.times[rows + 1]
         sample_count = np.searchsorted(self._sample_times, end) - np.searchsorted(
             self._sample_times, begin
@@ -147,9 +147,9 @@ class _PieceRefinement:
         q = evaluate(coefficients, t.ravel()).x
         tool = tcp_rows(self.kinematics.arm, self.kinematics.T_flange_tcp, q)
         spline, piece = self.path.spline, np.repeat(self.piece[rows], count)
-        asked = spline.rows(piece, (begin[:, None] + t).ravel() - spline.times[piece]).poses
-        distance = np.linalg.norm(tool[:, :3] - asked[:, :3], axis=1)
-        deviation = np.stack([distance, angle_rows(asked[:, 3:], tool[:, 3:])], axis=1)
+        wanted = spline.rows(piece, (begin[:, None] + t).ravel() - spline.times[piece]).poses
+        distance = np.linalg.norm(tool[:, :3] - wanted[:, :3], axis=1)
+        deviation = np.stack([distance, angle_rows(wanted[:, 3:], tool[:, 3:])], axis=1)
         largest: Floats = deviation.reshape(len(rows), count, 2).max(axis=1)
         return largest
 

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether tool and joints keep their limits along a spline, whose speed is known at each place.
+Check the limits of tool and joints along a spline path.
 
-What is too fast can be slowed only as a whole: in f times the time the same way is gone with 1/f
-of the speeds and 1/f^2 of the accelerations.
+A spline can only be slowed as a whole: times multiplied by f follow the same path with 1/f of the
+speeds and 1/f^2 of the accelerations.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LimitExcess:
-    """What exceeds its limit by most."""
+    """The quantity that exceeds its limit most."""
 
-    #: How many times the time would be enough.
+    #: Times multiplied by this keep the limit.
     factor: float
-    #: The point on the way to which it does, and the share of the time to it.
+    #: The segment, and the fraction of its time.
     point: int
     fraction: float
-    #: What it is, the most that is needed, what is allowed, and the unit of both.
+    #: What it is, its peak, its limit, and the unit of both.
     what: str
     needed: float
     allowed: float
     unit: str
-    #: Which limit.
+    #: Name of the limit.
     name: str
 
     def refusal(self, *, may_slow: bool = True) -> TooFast:
@@ -74,7 +74,7 @@ class _Quantity:
 def worst_excess(
     kinematics: TcpKinematics, path: SplinePath, options: PlanningOptions
 ) -> LimitExcess | None:
-    """Return what exceeds its limit by most on a way, None if nothing does."""
+    """Return the quantity that exceeds its limit most, None if none does."""
     worst: LimitExcess | None = None
     for quantity in _quantities(kinematics, path, options):
         row = int(np.argmax(quantity.values))

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The arm along a tool spline: places as on all ways, but with times, and why it cannot go there.
+The spline path: the arm along a tool spline, sampled in time, or why it cannot follow.
 
-Places are evenly spaced in time on each piece, so near to each other that the tool moves 2 mm and
-turns a degree at the most where it is fastest, and that the chords between them stay within some
+Samples are evenly spaced in time on each piece, so densely that the tool moves at most 2 mm and
+turns at most a degree where it is fastest, and that the chords between them stay within some
 micrometres of the curve.
 """
 
@@ -56,29 +56,29 @@ from ur_cartesian_driver.planning.preflight.tcp_kinematics import (
 )
 from ur_cartesian_driver.planning.request.goal_fields import point_field
 
-# Where a piece is looked at for how fast it gets, and what it may be faster in between.
+# Samples of a piece that estimate its peak speed, and how much faster it may be in between.
 _COARSE_SAMPLES = 9
 _SPEED_MARGIN = 1.05
-#: The farthest turn from the begin of a piece [rad]: rotation vectors do not mean more.
+#: Maximum turn within a piece [rad]: rotation vectors are ambiguous beyond.
 _MAX_TURN = 2.0 * pi
-#: The most places of a goal; each takes a quarter of a kilobyte while it is looked at.
+#: Maximum number of samples of a goal; each takes a quarter of a kilobyte while it is checked.
 MAX_SAMPLES = 2_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SplinePath:
-    """A spline that the arm can follow, and the places at which it was looked at."""
+    """A spline that the arm can follow, with its samples."""
 
     spline: ToolSpline
     #: The number of the point at the end of the first piece.
     first: int
-    #: (m,) the piece of each place and the share of the piece's time; where it begins is row 0.
+    #: (m,) the piece of each sample and the fraction of the piece's time; row 0 is the start.
     piece: NDArray[np.intp]
     u: Floats
     #: (m, 7) the TCP in base, (m, 6) [rad].
     poses: Floats
     q: Floats
-    #: (m,) the way and the turn of the tool since the start [m], [rad].
+    #: (m,) path length and turn of the tool since the start [m], [rad].
     length: Floats
     angle: Floats
     #: By point.
@@ -86,18 +86,18 @@ class SplinePath:
 
     @property
     def times(self) -> Floats:
-        """(m,) when the tool is at each place [s]."""
+        """(m,) the time of each sample [s]."""
         begin = self.spline.times[self.piece]
         times: Floats = begin + self.u * (self.spline.times[self.piece + 1] - begin)
         return times
 
     @property
     def points(self) -> NDArray[np.int32]:
-        """(m,) the number of the point to which each place leads."""
+        """(m,) the segment of each sample."""
         return (self.first + self.piece).astype(np.int32)
 
     def stretch_times(self, factor: float) -> SplinePath:
-        """Return the same way in so many times the time."""
+        """Return the same path with all times multiplied by a factor."""
         return replace(self, spline=self.spline.stretch_times(factor))
 
 
@@ -112,13 +112,13 @@ def solve_spline_path(
     rests: bool,
 ) -> SplinePath:
     """
-    Return the arm's way along a spline.
+    Return the path of the arm along a spline.
 
     :param waypoints: those at the ends of its pieces.
     :param first: the number of the first of them.
     :param rests: whether the arm is at rest at its begin.
     :param q_start: the configuration at its begin [rad].
-    :raises GoalRefused: the arm cannot go there.
+    :raises GoalRefused: the arm cannot follow.
     """
     coarse = _coarse_samples(spline)
     _check_sizes(kinematics, spline, coarse, first)
@@ -161,12 +161,12 @@ def _check_path(
     waypoints: Sequence[Waypoint],
     options: PlanningOptions,
 ) -> None:
-    """Raise the first reason why the arm cannot go along."""
+    """Raise the first reason why the arm cannot follow."""
     first = pieces[0].index
     segments = first + joint_path.piece.astype(np.int32)
     refusal, index = joint_path.refusal, joint_path.refused_segment
     near = near_singularity_refusal(pieces, joint_path, measures, segments, joint_path.t, options)
-    # The end of a range behind a singularity is where the joints swing to beside it.
+    # Beside a singularity joints swing to a limit: the singularity is the cause.
     if near is not None and (
         refusal is None
         or near[1] < index
@@ -184,7 +184,7 @@ def _check_path(
 
 
 def _with_spline_advice(refusal: GoalRefused) -> GoalRefused:
-    """Return a refusal whose advice is good for splines, which have no JOINT segments."""
+    """Return a refusal with advice for splines, which have no JOINT segments."""
     if isinstance(refusal, NearSingularity | JointLimitExceeded):
         text = str(refusal)
         return type(refusal)(
@@ -216,7 +216,7 @@ def _check_posture(
 
 
 def _coarse_samples(spline: ToolSpline) -> tuple[NDArray[np.intp], Floats]:
-    """Return some places on all pieces: piece and time since it began."""
+    """Return a few samples on all pieces: piece and time since its start."""
     n = len(spline.positions)
     piece = np.repeat(np.arange(n), _COARSE_SAMPLES)
     return piece, np.tile(np.linspace(0.0, 1.0, _COARSE_SAMPLES), n) * np.diff(spline.times)[piece]
@@ -228,7 +228,7 @@ def _check_sizes(
     coarse: tuple[NDArray[np.intp], Floats],
     first: int,
 ) -> None:
-    """Refuse pieces that turn either way round, or on which rates carry the tool far away."""
+    """Refuse pieces with an ambiguous turn, and rates that carry the tool far away."""
     n = len(spline.positions)
     x, turn = spline.vectors(*coarse)
     x = x.reshape(n, _COARSE_SAMPLES, 3)
@@ -293,7 +293,7 @@ def _pose_samples(
 
 
 def _pieces(spline: ToolSpline, samples: PoseSamples, first: int) -> list[CurvePiece]:
-    """Return the pieces, with lengths by chords that begin at their first place."""
+    """Return the pieces, with lengths measured along chords."""
     n = len(spline.positions)
     starts = spline.rows(np.arange(n), np.zeros(n)).poses
     begins = np.searchsorted(samples.piece, np.arange(n))

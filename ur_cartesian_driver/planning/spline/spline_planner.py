@@ -4,9 +4,9 @@
 From points with times, twists and accelerations to joint spline pieces: SPLINE and SERVO.
 
 Points -> the tool over time (:mod:`~.tool_spline`) -> the arm along it (:mod:`~.spline_path`) ->
-limits -> joint polynomials (:mod:`~.joint_polynomials`). A motion may be planned in parts, from
-where the one before ends: :func:`plan_spline` takes any :class:`SplineState`, also a moving one,
-and :func:`closing` brings such a motion to rest.
+limits -> joint polynomials (:mod:`~.joint_polynomials`). A motion may be planned in parts:
+:func:`plan_spline` starts from any :class:`SplineState`, also a moving one, and :func:`plan_stop`
+brings such a motion to rest.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ from ur_cartesian_driver.planning.spline.spline_limits import worst_excess
 from ur_cartesian_driver.planning.spline.spline_path import solve_spline_path, SplinePath
 from ur_cartesian_driver.planning.spline.spline_points import point_remarks, tool_points
 
-#: What an angle counts as a length: tolerances of a tool spline are as much at this distance [m].
+#: An angular tolerance of a tool spline is its linear one at this distance [m].
 ANGLE_TOLERANCE_RADIUS = 0.1
-# Places at which a closing piece is looked at, and how much shorter the next try is.
+# Samples of a stopping piece, and how much shorter the next try is.
 _SAMPLES = 17
 _SHORTENING = 0.8
 _TRIES = 20
@@ -52,11 +52,11 @@ _TRIES = 20
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SplineState:
-    """Where a motion in spline pieces is at the end of one, as the robot program carries it on."""
+    """State of the joints at the end of a spline piece, as the robot program continues from it."""
 
     #: From the start of the motion [s].
     time: float = 0.0
-    #: [rad], [rad/s], [rad/s^2]; behind a cubic piece the acceleration counts as 0.
+    #: [rad], [rad/s], [rad/s^2]; after a cubic piece the acceleration counts as 0.
     q: Joints
     qd: Vector6 = ZERO6
     qdd: Vector6 = ZERO6
@@ -101,7 +101,7 @@ class SplinePieces:
     remarks: tuple[str, ...]
     #: At the last point.
     end: SplineState
-    #: By how much all times were stretched, 1 = not.
+    #: Factor by which all times were stretched.
     stretch: float = 1.0
 
 
@@ -118,13 +118,13 @@ def plan_spline(
     """
     Return the pieces from a state to points.
 
-    :param goal: its waypoints are those behind the state, and their times are from the start of
-        the motion. With ``keep_open`` it may end moving; then the way on which :func:`closing`
-        brings it to rest is checked as well.
+    :param goal: its waypoints come after the state, and their times count from the start of the
+        motion. With ``keep_open`` it may end moving; then the stop of :func:`plan_stop` is checked
+        as well.
     :param T_flange_tcp: the TCP of the motion.
-    :param first: the number of the first of the waypoints in the whole goal.
-    :param tools: where tools reach behind the flange, for collisions; empty = the TCP.
-    :raises GoalRefused: the subclass that fits; its text names point, quantity, value and bound.
+    :param first: the index of its first waypoint in the whole goal.
+    :param tool_tips: the TCPs to check for collisions; empty = the TCP.
+    :raises GoalRefused: a subclass; its text names point, quantity, value and bound.
     """
     kinematics = TcpKinematics(arm, T_flange_tcp)
     points = tool_points(goal, start.tool(arm, T_flange_tcp))
@@ -176,14 +176,14 @@ def end_state(plan: Plan) -> SplineState:
 
 def plan_stop(state: SplineState, arm: Arm, deceleration: float) -> Spline:
     """
-    Return the piece that brings a moving arm to rest, each joint on as it goes.
+    Return the piece that brings a moving arm to rest, each joint in its direction of motion.
 
-    Velocities end as cubics with no acceleration at the end, so the joint that is the fastest
-    brakes 1.5 times as hard as on average. It brakes harder than it is told to where it would
-    leave the range of a joint or, being accelerated still, exceed its speed.
+    Velocities fall as cubics to rest without acceleration, so the peak deceleration of the fastest
+    joint is 1.5 times its mean. It brakes harder if it would otherwise leave the range of a joint
+    or, while it still accelerates, exceed its speed limit.
 
-    :param deceleration: of the fastest joint, at the most [rad/s^2].
-    :raises JointLimitExceeded: the end of a range is too near.
+    :param deceleration: peak of the fastest joint [rad/s^2].
+    :raises JointLimitExceeded: the end of a range is too close.
     """
     v, a = np.array(state.qd), np.array(state.qdd)
     speed = np.maximum(arm.model.max_joint_speed, np.abs(v))
@@ -222,7 +222,7 @@ def _fit_to_limits(
     goal: Goal,
     options: PlanningOptions,
 ) -> tuple[SplinePath, float, list[str]]:
-    """Return the way in the time that the limits allow, the factor, and what is said of it."""
+    """Return the path in a time that keeps the limits, the factor, and its remarks."""
     found = worst_excess(kinematics, path, options)
     if found is None:
         return path, 1.0, []
@@ -326,7 +326,7 @@ def _clearance_remarks(
     start: SplineState,
     options: PlanningOptions,
 ) -> list[str]:
-    """Return what is said of collisions; behind a moving end the way to rest counts as well."""
+    """Return the remarks on clearance; the stop after a moving end counts as well."""
     q, points, u = path.q[1:], path.points[1:], path.u[1:]
     if end.is_moving:
         on = _rows_of(end, plan_stop(end, arm, options.keep_open_deceleration))[0]

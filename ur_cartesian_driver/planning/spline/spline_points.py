@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What the tool is to do at the points of a SPLINE or SERVO goal, NaN replaced by a choice.
+The tool points of a SPLINE or SERVO goal, with NaN replaced by chosen values.
 
-A point whose twist is 0 is a stop. What is NaN is chosen: velocities so that a parabola through
-the point and its neighbours has them, accelerations as the mean of what the cubics before and
-after the point have there.
+A point whose twist is 0 is a stop. NaN is chosen: a velocity as that of the parabola through the
+point and its neighbours, an acceleration as the mean of those of the cubics before and after the
+point.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from ur_cartesian_driver.planning.geometry.rotation_rows import log_rows, rotati
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints
 from ur_cartesian_driver.planning.request.ignored_fields import add_remark
 
-# Shorter ways are none, and a point beside one is not passed through [m], [rad].
+# A shorter step is none: the tool rests at both of its points [m], [rad].
 _MIN_DISTANCE = 1e-9
 
 
@@ -52,7 +52,7 @@ def tool_points(goal: Goal, start: ToolPoints) -> ToolPoints:
 
 
 def point_remarks(goal: Goal, first: int) -> list[str]:
-    """Return what the report says of twists and accelerations; points count from ``first``."""
+    """Return the remarks on twists and accelerations; the first point has the number ``first``."""
     points = list(enumerate(goal.waypoints, first))
     inner = points if goal.keep_open else points[:-1]
     lines: list[str] = []
@@ -161,7 +161,7 @@ def _chosen_accelerations(points: ToolPoints, twists: Floats) -> Floats:
     h = np.diff(points.times)[:, None]
     inner = slice(1, -1)
     poses, zero = points.poses, np.zeros((len(points.times) - 2, 3))
-    # All seen from the inner point: positions, and rotation vectors from its orientation.
+    # Relative to the inner point: positions, and rotation vectors from its orientation.
     there = []
     for around in (slice(None, -2), slice(2, None)):
         turn = rotation_rates(
