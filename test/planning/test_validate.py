@@ -572,6 +572,7 @@ def test_nonsense_of_any_kind_ends_in_a_refusal_or_passes_but_never_in_another_e
         ('stamp_tolerance', nan),
         ('spline_tolerance', 0.0),
         ('keep_open_deceleration', 0.0),
+        ('live_target_linear_velocity', 0.0),
     ],
 )
 def test_options_out_of_their_range_are_named(field, value):

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
-from typing import Literal, TypeAlias
+from typing import get_args, Literal, TypeAlias
 
 from ur_cartesian_driver.planning.workspace import parse_planes
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
@@ -17,6 +17,27 @@ MIN_SPLINE_TOLERANCE = 1e-6
 Choice: TypeAlias = Literal['refuse', 'slow']
 PostureChoice: TypeAlias = Literal['refuse', 'movej']
 CollisionChoice: TypeAlias = Literal['off', 'warn', 'refuse', 'auto']
+_CHOICES = {
+    'on_too_fast': Choice,
+    'on_posture_change': PostureChoice,
+    'self_collision': CollisionChoice,
+}
+#: Options that must not be 0.
+_POSITIVE = (
+    *(
+        f'{quantity}_{rate}'
+        for quantity in ('linear', 'angular', 'joint', 'optimized')
+        for rate in ('velocity', 'acceleration')
+    ),
+    'keep_open_deceleration',
+    'live_target_linear_velocity',
+    'live_target_linear_acceleration',
+    'live_target_angular_velocity',
+    'live_target_angular_acceleration',
+    'live_target_joint_velocity',
+    'live_target_max_age',
+    'live_target_timeout',
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,34 +149,17 @@ class PlanningOptions:
             value = getattr(self, name)
             if isinstance(value, float) and (not isfinite(value) or value < 0.0):
                 raise ValueError(f'{name} is {value}; it must be finite and not negative')
-        for name in (
-            'linear_velocity',
-            'linear_acceleration',
-            'angular_velocity',
-            'angular_acceleration',
-            'joint_velocity',
-            'joint_acceleration',
-            'optimized_velocity',
-            'optimized_acceleration',
-            'keep_open_deceleration',
-            *(field for field in self.__slots__ if field.startswith('servo_target_')),
-        ):
+        for name in _POSITIVE:
             if getattr(self, name) == 0.0:
                 raise ValueError(f'{name} is 0; it must be positive')
         for name in ('optimized_velocity', 'optimized_acceleration'):
             if getattr(self, name) > 1.0:
                 raise ValueError(f'{name} is {getattr(self, name)}; it must not exceed 1')
-        if self.on_too_fast not in ('refuse', 'slow'):
-            raise ValueError(f"on_too_fast is {self.on_too_fast!r}; it must be 'refuse' or 'slow'")
-        if self.on_posture_change not in ('refuse', 'movej'):
-            raise ValueError(
-                f"on_posture_change is {self.on_posture_change!r}; it must be 'refuse' or 'movej'"
-            )
-        if self.self_collision not in ('off', 'warn', 'refuse', 'auto'):
-            raise ValueError(
-                f"self_collision is {self.self_collision!r}; it must be 'off', "
-                "'warn', 'refuse' or 'auto'"
-            )
+        for name, choices in _CHOICES.items():
+            value = getattr(self, name)
+            if value not in get_args(choices):
+                *others, last = (repr(choice) for choice in get_args(choices))
+                raise ValueError(f'{name} is {value!r}; it must be {", ".join(others)} or {last}')
         if self.spline_tolerance < MIN_SPLINE_TOLERANCE:
             raise ValueError(
                 f'spline_tolerance is {self.spline_tolerance}; it must be at least '
