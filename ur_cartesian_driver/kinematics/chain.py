@@ -138,13 +138,8 @@ class Arm:
             return jacobian_at(frames, frames.position)
         return jacobian_at(frames, (self.forward(q) @ T_flange_tcp).position)
 
-    def jacobian_rows(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the Jacobians (n, 6, 6) of the flange at many joint positions (n, 6)."""
-        frames = self.frames_rows(q)
-        return jacobian_at(frames, frames.position)
-
     def frames(self, q: Sequence[float]) -> ChainFrames:
-        """Return the places and directions of all joints and of the flange [m]."""
+        """Return origins [m] and axes of all joints and of the flange."""
         return self._frames(
             [
                 (cos(angle + link.theta), sin(angle + link.theta))

@@ -102,43 +102,21 @@ def _quantities(
     qd, qdd = joint_rates(
         kinematics.arm, kinematics.T_flange_tcp, path.q, tool.twists, tool.accelerations
     )
+    v, a = _norms(tool.twists[:, :3]), _norms(tool.accelerations[:, :3])
+    e = _norms(tool.accelerations[:, 3:])
     if options.max_tool_speed > 0.0:
-        yield _Quantity(
-            'the tool',
-            _norms(tool.twists[:, :3]),
-            options.max_tool_speed,
-            1,
-            'm/s',
-            'max_tool_speed',
-        )
-    yield _Quantity(
-        'the tool',
-        _norms(tool.accelerations[:, :3]),
-        options.max_linear_acceleration,
-        2,
-        'm/s^2',
-        'max_linear_acceleration',
-    )
-    yield _Quantity(
-        'the tool',
-        _norms(tool.accelerations[:, 3:]),
-        options.max_angular_acceleration,
-        2,
-        'rad/s^2',
-        'max_angular_acceleration',
-    )
-    for k, (name, limit) in enumerate(
+        yield _Quantity('the tool', v, options.max_tool_speed, 1, 'm/s', 'max_tool_speed')
+    for values, name, unit in (
+        (a, 'max_linear_acceleration', 'm/s^2'),
+        (e, 'max_angular_acceleration', 'rad/s^2'),
+    ):
+        yield _Quantity('the tool', values, getattr(options, name), 2, unit, name)
+    bound, name = options.max_joint_acceleration, 'max_joint_acceleration'
+    for k, (joint, limit) in enumerate(
         zip(JOINT_NAMES, kinematics.arm.model.max_joint_speed, strict=True)
     ):
-        yield _Quantity(name, np.abs(qd[:, k]), limit, 1, 'rad/s', 'the joint speed limit')
-        yield _Quantity(
-            name,
-            np.abs(qdd[:, k]),
-            options.max_joint_acceleration,
-            2,
-            'rad/s^2',
-            'max_joint_acceleration',
-        )
+        yield _Quantity(joint, np.abs(qd[:, k]), limit, 1, 'rad/s', 'the joint speed limit')
+        yield _Quantity(joint, np.abs(qdd[:, k]), bound, 2, 'rad/s^2', name)
 
 
 def _norms(vectors: Floats) -> Floats:
