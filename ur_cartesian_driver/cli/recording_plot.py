@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-``ur-cartesian plot``: a recorded motion as a picture, and as a table for other programs.
+``ur-cartesian plot``: draw a recorded motion, or write it as a table.
 
-On the left the path, planned and executed; on the right, over time, how far off the tool was, how
-fast, what the controller made of the speed, and what happened.
+The picture shows on the left the planned and executed path, and on the right over time: deviation
+from the plan, tool speed, speed scaling, and points, outputs and events.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.driver.recordings.recording_format import OUTPUT_NAMES, PART_SUFFIX
 from ur_cartesian_driver.motion.state import RuntimeState
 
-#: No picture shows more packets.
+#: Largest number of packets in a picture.
 MAX_ROWS = 6000
-#: More points than that are not numbered.
+#: Largest number of points that are numbered.
 MAX_NUMBERED_POINTS = 12
 _AXES = 'xyz'
-#: From above, unless the height is that much more than the smaller width.
+#: Weights of the extents: the flat view is from above, unless the path is mainly vertical.
 _VIEW_WEIGHTS = np.array([1.0, 1.0, 0.4])
 _PLANNED, _TARGET, _ACTUAL, _MARK = '#9aa5b1', '#1f77b4', '#c8372d', '#2a9d5c'
 #: Events that are marked in all charts.
@@ -48,9 +48,9 @@ def plot(arguments: argparse.Namespace) -> int:
 
 def newest_recording(path: Path) -> Path:
     """
-    Return a recording: the path, or the newest one in a directory of recordings.
+    Return the path of a recording; for a directory, the newest one in it.
 
-    :raises OSError: there is none.
+    :raises OSError: the directory has none.
     """
     if path.is_dir() and path.suffix != PART_SUFFIX:
         found = sorted(path.glob('*_points*.npz')) or sorted(path.glob(f'*_points*{PART_SUFFIX}'))
@@ -122,7 +122,7 @@ def draw(recording: Recording, picture: Path, title: str = '') -> None:
         import matplotlib
     except ImportError:
         raise OSError(
-            'no picture without matplotlib; install it (extra `plot`), or take --csv'
+            'no picture without matplotlib; install it (extra `plot`), or use --csv'
         ) from None
     matplotlib.use('Agg')
     from matplotlib import pyplot
@@ -161,7 +161,7 @@ def _title(recording: Recording) -> str:
 
 
 def _draw_path(figure: Any, recording: Recording) -> None:
-    """Draw the path in space and from above, or from the side where it goes up and down most."""
+    """Draw the path in space, and from above, or from the side if it is mainly vertical."""
     planned, actual = recording.planned_pose[:, :3], recording.actual_pose[:, :3]
     space, flat = figure.add_subplot(2, 1, 1, projection='3d'), figure.add_subplot(2, 1, 2)
     low, high = (side(np.vstack((planned, actual)), axis=0) for side in (np.min, np.max))
@@ -208,14 +208,14 @@ def _draw_path(figure: Any, recording: Recording) -> None:
 
 
 def _switch_places(recording: Recording) -> NDArray[np.float64]:
-    """Return where the tool was when a digital output was reported to have switched."""
+    """Return the tool poses at which the robot reported a switched digital output."""
     digital = recording.digital_output
     changed = (digital[1:] != digital[:-1]) & (digital[:-1] >= 0)
     return np.asarray(recording.actual_pose[1:][changed])
 
 
 def _draw_time(figure: Any, recording: Recording) -> None:
-    """Draw what there is over time."""
+    """Draw all quantities over time."""
     rows = _timeline(recording)
     deviation, speed, scaling, line = figure.subplots(
         4, 1, sharex=True, height_ratios=(1.0, 1.0, 0.8, 0.35 + 0.16 * len(rows))
@@ -287,7 +287,7 @@ def _draw_scaling(axes: Any, recording: Recording) -> None:
 
 
 def _timeline(recording: Recording) -> list[tuple[str, NDArray[np.float64]]]:
-    """Return what is on or off over time, or between (0 to 1): outputs, pauses of the program."""
+    """Return the rows of the chart, each from 0 to 1 over time: outputs, program pauses."""
     digital, rows = recording.digital_output, []
     for bit, name in enumerate(OUTPUT_NAMES):
         is_on = (digital >= 0) & (digital >> bit & 1 > 0)
@@ -303,7 +303,7 @@ def _timeline(recording: Recording) -> list[tuple[str, NDArray[np.float64]]]:
 def _draw_timeline(
     axes: Any, recording: Recording, rows: list[tuple[str, NDArray[np.float64]]]
 ) -> None:
-    """Draw points, outputs and pauses as lines of one chart."""
+    """Draw points, outputs and pauses as rows of one chart."""
     time, points = (
         recording.time,
         [(at, text.rsplit(' ', 1)[-1]) for at, kind, text in recording.events if kind == 'point'],
