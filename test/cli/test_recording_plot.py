@@ -62,7 +62,7 @@ def test_without_matplotlib_one_sentence_says_so(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, 'matplotlib', None)
     assert main(['plot', str(tmp_path)]) == 1
     assert capsys.readouterr().err == (
-        'ur-cartesian plot: no picture without matplotlib; install it (extra `plot`), or take '
+        'ur-cartesian plot: no picture without matplotlib; install it (extra `plot`), or use '
         '--csv\n'
     )
 
