@@ -183,4 +183,4 @@ def test_a_goal_takes_its_place_and_people_may_guide_the_arm(ur_sim, cell_with):
     assert 'guides the arm by hand' in result.result().result.error_string
     assert freedrive_client(True)[0], 'it is on already'
     assert freedrive_client(False) == (True, 'The arm is held by the robot again.')
-    assert freedrive_client(False) == (True, 'Nobody guides the arm.')
+    assert freedrive_client(False) == (True, 'The arm is not guided by hand.')

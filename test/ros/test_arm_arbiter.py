@@ -44,7 +44,7 @@ def enqueued(arbiter, *names):
 def test_a_newer_claim_makes_all_older_goals_give_way_once(arbiter):
     oldest, older, newest = enqueued(arbiter, 'goal 1', 'goal 2', 'goal 3')
     arbiter.preempt(oldest.arm_request)
-    assert arbiter.is_held()
+    assert arbiter.holder
     release_count = arbiter.release_count
     arbiter.preempt(newest.arm_request)
     assert (oldest.arm_request.preempted_by, older.arm_request.preempted_by) == (
@@ -55,7 +55,7 @@ def test_a_newer_claim_makes_all_older_goals_give_way_once(arbiter):
     assert newest.arm_request.preempted == 'goal 1'
     assert arbiter.release_count == release_count + 1
     arbiter.release(newest.arm_request)
-    assert not arbiter.is_held()
+    assert not arbiter.holder
 
 
 def test_an_older_goal_that_passes_after_a_newer_one_is_too_late(arbiter):
@@ -65,7 +65,7 @@ def test_an_older_goal_that_passes_after_a_newer_one_is_too_late(arbiter):
     assert old.arm_request.preempted_by == 'goal 2'
     assert not new.arm_request.preempted_by
     arbiter.release(old.arm_request)
-    assert arbiter.is_held()
+    assert arbiter.holder
 
 
 def test_a_goal_that_is_not_in_line_yet_is_left_alone(arbiter):
@@ -89,9 +89,9 @@ def test_a_withdrawn_goal_waits_no_longer_and_does_not_get_the_arm(arbiter):
     thread.join(5.0)
     assert not thread.is_alive()
     arbiter.release(waiting.arm_request)
-    assert arbiter.is_held()
+    assert arbiter.holder
     arbiter.release(stubborn.arm_request)
-    assert not arbiter.is_held()
+    assert not arbiter.holder
 
 
 def test_the_arm_is_seized_only_when_it_is_free(arbiter):

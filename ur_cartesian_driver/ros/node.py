@@ -128,7 +128,7 @@ class CartesianDriverNode(Node):
 
     def _is_idle(self) -> bool:
         """Tell whether no goal or session depends on the present TCP and payload."""
-        return self.action_server.idle and not self.action_server.arbiter.is_held()
+        return self.action_server.idle and not self.action_server.arbiter.holder
 
     def _warn_if_name_is_taken(self) -> None:
         """Log once that another node has the same name: each would answer for both."""

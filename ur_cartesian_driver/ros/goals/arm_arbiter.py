@@ -59,10 +59,6 @@ class ArmArbiter:
         holder = self._holder
         return '' if holder is None else holder.name
 
-    def is_held(self) -> bool:
-        """Tell whether a request has the arm."""
-        return self._holder is not None
-
     def enqueue(self, arm_request: ArmRequest) -> None:
         """Append a request to the queue as the newest."""
         with self._condition:

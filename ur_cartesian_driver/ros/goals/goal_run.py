@@ -220,7 +220,7 @@ class GoalRun:
         arbiter = self._context.arbiter
         release_count = arbiter.release_count
         plan = self._plan_from_here(goal)
-        if arbiter.is_held():
+        if arbiter.holder:
             self._context.driver.check_can_preempt()
         arbiter.preempt(self.arm_request)
         self._check_wanted()

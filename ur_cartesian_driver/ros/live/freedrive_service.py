@@ -50,11 +50,11 @@ class FreedriveService:
                     return self._start()
                 return completed_answer('The arm can be guided by hand already.', ok=True)
         if motion is None:
-            return completed_answer('Nobody guides the arm.', ok=True)
+            return completed_answer('The arm is not guided by hand.', ok=True)
         return self._end(motion)
 
     def _start(self) -> Future[ServiceAnswer]:
-        arm_request = ArmRequest('a person who guides the arm', lambda: None)
+        arm_request = ArmRequest('freedrive', lambda: None)
         if not self._arbiter.acquire(arm_request):
             return completed_answer(
                 'A goal or a session of live targets has the arm; wait for its end or '

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf
 from typing import TypeAlias
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -51,15 +51,12 @@ class ParameterDeclaration:
             read_only=True,
             additional_constraints='one of: ' + ', '.join(self.choices) if self.choices else '',
         )
-        if isfinite(self.low) and isfinite(self.high) and not isinstance(default, bool):
-            if isinstance(default, int):
-                descriptor.integer_range = [
-                    IntegerRange(from_value=int(self.low), to_value=int(self.high))
-                ]
-            elif isinstance(default, float):
-                descriptor.floating_point_range = [
-                    FloatingPointRange(from_value=self.low, to_value=self.high)
-                ]
+        if type(default) is int:
+            integers = IntegerRange(from_value=int(self.low), to_value=int(self.high))
+            descriptor.integer_range = [integers]
+        elif type(default) is float:
+            floats = FloatingPointRange(from_value=self.low, to_value=self.high)
+            descriptor.floating_point_range = [floats]
         return descriptor
 
     def check(self, value: ParameterValue, default: ParameterValue) -> None:
