@@ -13,25 +13,25 @@ from random_frames import RANDOM_FRAMES
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.protocol.program import registers
 from ur_cartesian_driver.protocol.rtde.rtde_client import (
+    DataReceived,
+    FieldsNotFound,
+    HandshakeDone,
+    InputsInUse,
+    RtdeClientCodec,
+    RtdeState,
+    UnexpectedPackage,
+)
+from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType, INPUT_TYPES, OUTPUT_TYPES
+from ur_cartesian_driver.protocol.rtde.rtde_packages import (
     Acknowledgement,
     ControllerVersion,
     DataPackage,
-    DataReceived,
-    DataType,
     decode_reply,
-    FieldsNotFound,
-    HandshakeDone,
-    INPUT_TYPES,
-    InputsInUse,
-    OUTPUT_TYPES,
     PackageType,
     Recipe,
-    RtdeClientCodec,
-    RtdeState,
     RtdeTextMessage,
     SetupInputsReply,
     SetupOutputsReply,
-    UnexpectedPackage,
 )
 from ur_cartesian_driver.protocol.rtde.rtde_server import InputReceived, RtdeServerCodec
 

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
-from ur_cartesian_driver.protocol.rtde.rtde_client import (
+from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType
+from ur_cartesian_driver.protocol.rtde.rtde_packages import (
     ControllerVersion,
-    DataType,
     decode_reply,
     decode_request,
     Recipe,

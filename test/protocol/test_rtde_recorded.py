@@ -7,17 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from ur_cartesian_driver.protocol.rtde.rtde_client import (
+from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec, RtdeState
+from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType, INPUT_TYPES, OUTPUT_TYPES
+from ur_cartesian_driver.protocol.rtde.rtde_packages import (
     DataPackage,
-    DataType,
     decode_reply,
     decode_request,
-    INPUT_TYPES,
-    OUTPUT_TYPES,
     Recipe,
     RequestProtocolVersion,
-    RtdeClientCodec,
-    RtdeState,
 )
 
 GOLDEN = json.loads((Path(__file__).parent / 'golden' / 'rtde_handshake.json').read_text())

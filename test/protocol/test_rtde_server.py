@@ -11,7 +11,7 @@ import pytest
 from random_frames import RANDOM_FRAMES
 
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
-from ur_cartesian_driver.protocol.rtde.rtde_client import (
+from ur_cartesian_driver.protocol.rtde.rtde_packages import (
     ControllerVersion,
     DataPackage,
     decode_reply,

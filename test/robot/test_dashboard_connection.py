@@ -10,7 +10,7 @@ import pytest
 from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.dashboard import COMMAND_SPECS
-from ur_cartesian_driver.protocol.rtde.rtde_client import ControllerVersion
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.services import dashboard_connection
 from ur_cartesian_driver.robot.services.dashboard_connection import (
     DashboardConnection,

@@ -9,6 +9,7 @@ from math import nan
 from virtual_network import HOST, VirtualLoop
 
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
+from ur_cartesian_driver.protocol.client_interfaces.primary_state import KinematicsInfo
 from ur_cartesian_driver.robot.primary_client import PrimaryCallbacks, PrimaryClient
 
 PORT = 30001
@@ -54,9 +55,7 @@ def told_by(*frames):
 
 
 def test_kinematics_that_cannot_be_are_refused_with_the_numbers():
-    frame = primary.encode_state(
-        [primary.KinematicsInfo(theta=SIX, a=(nan, *SIX[1:]), d=SIX, alpha=SIX)]
-    )
+    frame = primary.encode_state([KinematicsInfo(theta=SIX, a=(nan, *SIX[1:]), d=SIX, alpha=SIX)])
     (kind, text), *_ = told_by(frame)
     assert kind == 'connection_error'
     assert 'impossible kinematics: The column a of a DH table' in text

@@ -11,7 +11,8 @@ from ur_cartesian_driver.motion.pose import normalize, Pose
 from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.protocol import dashboard
 import ur_cartesian_driver.protocol.program.script_command as script_command
-import ur_cartesian_driver.protocol.rtde.rtde_client as rtde
+from ur_cartesian_driver.protocol.rtde.rtde_fields import INPUT_TYPES
+from ur_cartesian_driver.protocol.rtde.rtde_packages import Recipe
 from ur_cartesian_driver.robot.services import rtde_input_writer, service_calls
 
 any_number = st.floats() | st.floats(-2.0, 2.0)
@@ -29,8 +30,8 @@ def made(call, /, **values):
 
 def frame(writing):
     """Return the package that a robot would get."""
-    types = [rtde.INPUT_TYPES[name] for name in writing.inputs]
-    return rtde.Recipe(tuple(writing.inputs), types).pack_named(writing.inputs)
+    types = [INPUT_TYPES[name] for name in writing.inputs]
+    return Recipe(tuple(writing.inputs), types).pack_named(writing.inputs)
 
 
 @given(three, four | st.just((0.0, 0.0, 0.0, 1.0)))

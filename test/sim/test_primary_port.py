@@ -12,16 +12,18 @@ from waiting import wait_for
 
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
-    ConfigurationData,
     ErrorCodeMessage,
     KeyMessage,
-    KinematicsInfo,
-    RobotModeData,
     RobotStateFrame,
     RuntimeExceptionMessage,
     SafetyModeMessage,
     TextMessage,
     VersionMessage,
+)
+from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
+    ConfigurationData,
+    KinematicsInfo,
+    RobotModeData,
 )
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 

@@ -4,7 +4,7 @@
 
 from hypothesis import strategies as st
 
-from ur_cartesian_driver.protocol.rtde.rtde_client import PackageType
+from ur_cartesian_driver.protocol.rtde.rtde_packages import PackageType
 
 
 def framed(kind, payload):

@@ -33,9 +33,10 @@ from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.program import PROGRAM_NAME, ProgramSettings, render, wrap_in_program
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
+from ur_cartesian_driver.protocol.client_interfaces.primary_state import ConfigurationData
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
-from ur_cartesian_driver.protocol.rtde.rtde_client import ControllerVersion
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.driver_status import (
     DriverStatus,
     has_ended,
@@ -422,7 +423,7 @@ class RobotLink:
             if robot.timestamp - self._program_dead_since > DEAD_PROGRAM_TIMEOUT:
                 self._program.drop('the robot reports that no program runs')
 
-    def _on_configuration(self, configuration: primary.ConfigurationData) -> None:
+    def _on_configuration(self, configuration: ConfigurationData) -> None:
         """Take the robot's report of itself: accept the robot, or refuse it."""
         if self._status.state is not ConnectionState.CONNECTING:
             return

@@ -16,6 +16,11 @@ from typing import NoReturn
 from ur_cartesian_driver.kinematics.robot_models import DhTable
 from ur_cartesian_driver.motion.errors import ProtocolError, RemoteProtocolError
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
+from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
+    ConfigurationData,
+    KinematicsInfo,
+    SubPackage,
+)
 from ur_cartesian_driver.protocol.framing import to_single_line
 from ur_cartesian_driver.robot.transport import Backoff, dial, TcpConnection
 
@@ -31,7 +36,7 @@ class PrimaryCallbacks:
     """Who is told what; all of it on the event loop."""
 
     #: The robot's configuration, at least once for each connection.
-    configuration: Callable[[primary.ConfigurationData], None]
+    configuration: Callable[[ConfigurationData], None]
     #: Its calibrated geometry, as often as it is reported.
     geometry: Callable[[DhTable], None]
     #: The robot says that something is wrong, with it or its program.
@@ -124,12 +129,12 @@ class PrimaryClient:
             if self._connection is not None:
                 self._connection.abort(str(error))
 
-    def _on_package(self, package: primary.SubPackage) -> None:
+    def _on_package(self, package: SubPackage) -> None:
         match package:
-            case primary.ConfigurationData():
+            case ConfigurationData():
                 self._has_configuration = True
                 self._listener.configuration(package)
-            case primary.KinematicsInfo():
+            case KinematicsInfo():
                 self._listener.geometry(_geometry(package))
 
     def _on_message(self, message: primary.PrimaryFrame) -> None:
@@ -149,7 +154,7 @@ class PrimaryClient:
                 self._listener.text(to_single_line(message.text))
 
 
-def _geometry(package: primary.KinematicsInfo) -> DhTable:
+def _geometry(package: KinematicsInfo) -> DhTable:
     """
     Return the arm's own geometry.
 

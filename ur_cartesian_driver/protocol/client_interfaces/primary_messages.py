@@ -34,79 +34,26 @@ that is too short; a safety-mode message on a change only.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 import re
 import struct
-from typing import Any, ClassVar, TypeAlias
+from typing import ClassVar, get_args, TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
-    AdditionalInfo,
-    CalibrationData,
-    CartesianInfo,
-    ConfigurationData,
-    decode_sub_packages,
-    encode_sub_package,
-    ForceModeData,
-    ImmiData,
-    JointData,
-    KinematicsInfo,
-    MasterboardData,
+from ur_cartesian_driver.protocol.client_interfaces.body_layout import (
+    Body,
+    BodyLayout,
     pack,
-    RawSubPackage,
-    RobotModeData,
-    RobotType,
-    SAFETY_DATA,
-    SubPackage,
-    ToolCommunication,
-    ToolData,
-    ToolModeInfo,
     unpack,
 )
+from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
+    decode_sub_packages,
+    encode_sub_package,
+    SubPackage,
+)
 from ur_cartesian_driver.protocol.framing import decode_text, FrameBuffer, hex_text
-
-__all__ = [
-    'SAFETY_DATA',
-    'AdditionalInfo',
-    'CalibrationData',
-    'CartesianInfo',
-    'ConfigurationData',
-    'ErrorCodeMessage',
-    'ForceModeData',
-    'FrameType',
-    'ImmiData',
-    'JointData',
-    'KeyMessage',
-    'KinematicsInfo',
-    'MasterboardData',
-    'PrimaryCommand',
-    'PrimaryDecoder',
-    'PrimaryFrame',
-    'PrimaryMessage',
-    'RawFrame',
-    'RawMessage',
-    'RawSubPackage',
-    'ReportLevel',
-    'RobotModeData',
-    'RobotStateFrame',
-    'RobotType',
-    'RuntimeExceptionMessage',
-    'SafetyModeMessage',
-    'ScriptUploadDecoder',
-    'SubPackage',
-    'TextMessage',
-    'ToolCommunication',
-    'ToolData',
-    'ToolModeInfo',
-    'VersionMessage',
-    'decode_frame',
-    'encode_command',
-    'encode_message',
-    'encode_program',
-    'encode_state',
-]
 
 
 class FrameType(IntEnum):
@@ -143,36 +90,32 @@ SOURCE_MOTION = -3
 
 _HEADER = struct.Struct('>iB')
 _MESSAGE = struct.Struct('>QbB')
-_VERSION = struct.Struct('>BBii')
-_SAFETY = struct.Struct('>iiBI4s')
-_ERROR = struct.Struct('>iiiII')
-_KEY = struct.Struct('>iiB')
-_EXCEPTION = struct.Struct('>II')
-#: Type of a datum -> its layout, where it is not u32.
-_DATUM = {2: struct.Struct('>i'), 3: struct.Struct('>f')}
-_DATUM_DEFAULT = struct.Struct('>I')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TextMessage:
+class _Message(Body):
+    """What all robot messages have; the body holds the fields of the subclass."""
+
+    message_type: ClassVar[int]
+    timestamp: int = 0
+    source: int = SOURCE_MOTION
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TextMessage(_Message):
     """A text from ``textmsg``."""
 
     message_type: ClassVar = 0
-    timestamp: int = 0
-    source: int = SOURCE_MOTION
+    layout: ClassVar = BodyLayout('text', 'text message')
     text: str
-
-    def body(self) -> bytes:
-        """Return what follows the message type."""
-        return self.text.encode()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VersionMessage:
+class VersionMessage(_Message):
     """The software of the controller; the first message on a connection."""
 
     message_type: ClassVar = 3
-    timestamp: int = 0
+    layout: ClassVar = BodyLayout('b:text B B i i text', 'version message')
     source: int = SOURCE_CONTROLLER
     project: str = 'URControl'
     major: int
@@ -181,43 +124,43 @@ class VersionMessage:
     build: int = 0
     date: str = ''
 
-    def body(self) -> bytes:
-        """Return what follows the message type."""
-        name = self.project.encode()
-        return (
-            pack(struct.Struct('>b'), len(name))
-            + name
-            + pack(_VERSION, self.major, self.minor, self.bugfix, self.build)
-            + self.date.encode()
-        )
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SafetyModeMessage:
+class SafetyModeMessage(_Message):
     """The safety mode changed to a number of :class:`SafetyMode`, or a newer one."""
 
     message_type: ClassVar = 5
-    timestamp: int = 0
-    source: int = SOURCE_MOTION
+    layout: ClassVar = BodyLayout('i i B I 4s', 'safety mode message')
     code: int = 0
     argument: int = 0
     safety_mode: int
     data_type: int = 0
     data: int | float = 0
 
-    def body(self) -> bytes:
-        """Return what follows the message type."""
-        data = pack(_DATUM.get(self.data_type, _DATUM_DEFAULT), self.data)
-        return pack(_SAFETY, self.code, self.argument, self.safety_mode, self.data_type, data)
+    def encode(self) -> bytes:
+        """Return the body."""
+        *values, datum = (getattr(self, name) for name in self.__slots__)
+        return self.layout.pack([*values, pack(self._datum_layout(self.data_type), datum)])
+
+    @classmethod
+    def decode(cls, body: bytes, **head: int) -> SafetyModeMessage:
+        """Return the content of a body; RemoteProtocolError if it is too short."""
+        *values, data_type, data = cls.layout.unpack(body)
+        (datum,) = cls._datum_layout(data_type).unpack(data)
+        values += [data_type, datum]
+        return cls(**dict(zip(cls.__slots__, values, strict=True)), **head)
+
+    @staticmethod
+    def _datum_layout(data_type: int) -> struct.Struct:
+        return struct.Struct({2: '>i', 3: '>f'}.get(data_type, '>I'))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ErrorCodeMessage:
+class ErrorCodeMessage(_Message):
     """An error of the controller; ``level`` is a number of :class:`ReportLevel`, or newer."""
 
     message_type: ClassVar = 6
-    timestamp: int = 0
-    source: int = SOURCE_MOTION
+    layout: ClassVar = BodyLayout('i i i I I text', 'error code message')
     code: int
     argument: int = 0
     level: int = ReportLevel.WARNING
@@ -230,46 +173,29 @@ class ErrorCodeMessage:
         """Return the error as the manuals write it, for example ``C209A0``."""
         return f'C{self.code}A{self.argument}'
 
-    def body(self) -> bytes:
-        """Return what follows the message type."""
-        return (
-            pack(_ERROR, self.code, self.argument, self.level, self.data_type, self.data)
-            + self.text.encode()
-        )
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class KeyMessage:
+class KeyMessage(_Message):
     """An event by name, as ``PROGRAM_XXX_STARTED`` or ``..._STOPPED`` with a program's name."""
 
     message_type: ClassVar = 7
-    timestamp: int = 0
+    layout: ClassVar = BodyLayout('i i B:text text', 'key message')
     source: int = SOURCE_CONTROLLER
     code: int = 0
     argument: int = 0
     title: str
     text: str = ''
 
-    def body(self) -> bytes:
-        """Return what follows the message type."""
-        title = self.title.encode()
-        return pack(_KEY, self.code, self.argument, len(title)) + title + self.text.encode()
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RuntimeExceptionMessage:
+class RuntimeExceptionMessage(_Message):
     """A program did not compile or failed at a place (line and column from 1)."""
 
     message_type: ClassVar = 10
-    timestamp: int = 0
-    source: int = SOURCE_MOTION
+    layout: ClassVar = BodyLayout('I I text', 'runtime exception message')
     line: int
     column: int
     text: str
-
-    def body(self) -> bytes:
-        """Return what follows the message type."""
-        return pack(_EXCEPTION, self.line, self.column) + self.text.encode()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -281,20 +207,20 @@ class RawMessage:
     source: int = SOURCE_MOTION
     content: bytes = b''
 
-    def body(self) -> bytes:
-        """Return what follows the message type."""
+    def encode(self) -> bytes:
+        """Return the body."""
         return self.content
 
 
-PrimaryMessage: TypeAlias = (
+_TypedMessage: TypeAlias = (
     TextMessage
     | VersionMessage
     | SafetyModeMessage
     | ErrorCodeMessage
     | KeyMessage
     | RuntimeExceptionMessage
-    | RawMessage
 )
+PrimaryMessage: TypeAlias = _TypedMessage | RawMessage
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -331,7 +257,7 @@ def encode_message(message: PrimaryMessage) -> bytes:
     :raises LocalProtocolError: a value does not fit, or the frame is too long.
     """
     head = pack(_MESSAGE, message.timestamp, message.source, message.message_type)
-    return _frame(FrameType.ROBOT_MESSAGE, head + message.body())
+    return _frame(FrameType.ROBOT_MESSAGE, head + message.encode())
 
 
 def decode_frame(data: bytes) -> PrimaryFrame:
@@ -381,82 +307,14 @@ def _decode_message(body: bytes) -> PrimaryMessage:
     timestamp, source, message_type = unpack(_MESSAGE, body, 'robot message')
     content = body[_MESSAGE.size :]
     head = {'timestamp': timestamp, 'source': source}
-    reader = _MESSAGES.get(message_type)
-    if reader is None:
+    message = _MESSAGES.get(message_type)
+    if message is None:
         return RawMessage(message_type=message_type, content=content, **head)
-    return reader(content, head)
+    return message.decode(content, **head)
 
 
-def _version_message(content: bytes, head: dict[str, Any]) -> VersionMessage:
-    (length,) = unpack(struct.Struct('>b'), content, 'version message')
-    if length < 0:
-        raise RemoteProtocolError(
-            f'A version message has a name of {length} bytes: {hex_text(content)}.'
-        )
-    end = 1 + length
-    major, minor, bugfix, build = unpack(_VERSION, content, 'version message', end)
-    return VersionMessage(
-        project=decode_text(content[1:end]),
-        major=major,
-        minor=minor,
-        bugfix=bugfix,
-        build=build,
-        date=decode_text(content[end + _VERSION.size :]),
-        **head,
-    )
-
-
-def _safety_mode_message(content: bytes, head: dict[str, Any]) -> SafetyModeMessage:
-    code, argument, mode, data_type, data = unpack(_SAFETY, content, 'safety mode message')
-    (datum,) = _DATUM.get(data_type, _DATUM_DEFAULT).unpack(data)
-    return SafetyModeMessage(
-        code=code, argument=argument, safety_mode=mode, data_type=data_type, data=datum, **head
-    )
-
-
-def _error_code_message(content: bytes, head: dict[str, Any]) -> ErrorCodeMessage:
-    code, argument, level, data_type, data = unpack(_ERROR, content, 'error code message')
-    return ErrorCodeMessage(
-        code=code,
-        argument=argument,
-        level=level,
-        data_type=data_type,
-        data=data,
-        text=decode_text(content[_ERROR.size :]),
-        **head,
-    )
-
-
-def _key_message(content: bytes, head: dict[str, Any]) -> KeyMessage:
-    code, argument, length = unpack(_KEY, content, 'key message')
-    end = _KEY.size + length
-    if len(content) < end:
-        raise RemoteProtocolError(
-            f'A key message has a title of {length} bytes, but is shorter: {hex_text(content)}.'
-        )
-    return KeyMessage(
-        code=code,
-        argument=argument,
-        title=decode_text(content[_KEY.size : end]),
-        text=decode_text(content[end:]),
-        **head,
-    )
-
-
-def _runtime_exception(content: bytes, head: dict[str, Any]) -> RuntimeExceptionMessage:
-    line, column = unpack(_EXCEPTION, content, 'runtime exception message')
-    return RuntimeExceptionMessage(
-        line=line, column=column, text=decode_text(content[_EXCEPTION.size :]), **head
-    )
-
-
-_MESSAGES: Mapping[int, Callable[[bytes, dict[str, Any]], PrimaryMessage]] = {
-    TextMessage.message_type: lambda content, head: TextMessage(text=decode_text(content), **head),
-    VersionMessage.message_type: _version_message,
-    SafetyModeMessage.message_type: _safety_mode_message,
-    ErrorCodeMessage.message_type: _error_code_message,
-    KeyMessage.message_type: _key_message,
-    RuntimeExceptionMessage.message_type: _runtime_exception,
+_MESSAGES: Mapping[int, type[_TypedMessage]] = {
+    message.message_type: message for message in get_args(_TypedMessage)
 }
 
 

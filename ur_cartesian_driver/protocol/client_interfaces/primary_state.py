@@ -36,15 +36,22 @@ a, d, alpha, theta in ConfigurationData.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 import struct
-from typing import Any, cast, ClassVar, TypeAlias
+from typing import cast, ClassVar, TypeAlias
 
-from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.motion.goal import ZERO6
 from ur_cartesian_driver.motion.pose import Vector6
 from ur_cartesian_driver.motion.state import RobotMode, SafetyMode
+from ur_cartesian_driver.protocol.client_interfaces.body_layout import (
+    Body,
+    BodyLayout,
+    pack,
+    unpack,
+)
 from ur_cartesian_driver.protocol.framing import hex_text
 
 Integers6: TypeAlias = tuple[int, int, int, int, int, int]
@@ -55,20 +62,10 @@ Pairs6: TypeAlias = tuple[Pair, Pair, Pair, Pair, Pair, Pair]
 JOINT_RUNNING = 253
 
 _SUB_HEADER = struct.Struct('>IB')
-_MODE = struct.Struct('>Q7?bB3d')
 _JOINT = struct.Struct('>3d4fB')
-_CARTESIAN = struct.Struct('>12d')
-_KINEMATICS = struct.Struct('>6I24dI')
-_CALIBRATION = struct.Struct('>6d')
-_BOARD_HEAD = struct.Struct('>IIBBddbbdd4fB??')
-_BOARD_IMMI = struct.Struct('>IIff')
-_BOARD_TAIL = struct.Struct('>IB?B')
-_TOOL = struct.Struct('>BBddfBffB')
-_CONFIGURATION = struct.Struct('>53d4i')
-_FORCE = struct.Struct('>7d')
-_ADDITIONAL = struct.Struct('>3?B')
-_TOOL_COMMUNICATION = struct.Struct('>?3i2f')
-_TOOL_MODE = struct.Struct('>3B')
+_CONFIGURATION = BodyLayout('12d 12d d d d d d 6d 6d 6d 6d i i i i', 'configuration data')
+_BOARD_HEAD = BodyLayout('I I 2B 2d 2b 2d f f f f B ? ?', 'masterboard data')
+_BOARD_TAIL = BodyLayout('I B ? B', 'masterboard data')
 
 
 class RobotType(IntEnum):
@@ -85,32 +82,6 @@ class RobotType(IntEnum):
     UR15 = 9
 
 
-def pack(layout: struct.Struct, *values: Any) -> bytes:
-    """
-    Return packed values.
-
-    :raises LocalProtocolError: one does not fit.
-    """
-    try:
-        return layout.pack(*values)
-    except (struct.error, OverflowError) as error:
-        raise LocalProtocolError(f'{values} cannot be sent: {error}.') from None
-
-
-def unpack(layout: struct.Struct, body: bytes, what: str, offset: int = 0) -> tuple[Any, ...]:
-    """
-    Return the values at a place of a body, which may be longer.
-
-    :raises RemoteProtocolError: the body is too short.
-    """
-    if len(body) < offset + layout.size:
-        raise RemoteProtocolError(
-            f'A {what} has at least {offset + layout.size} bytes, but {len(body)} came: '
-            f'{hex_text(body)}.'
-        )
-    return layout.unpack_from(body, offset)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RawSubPackage:
     """A sub-package as it came."""
@@ -124,10 +95,11 @@ class RawSubPackage:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RobotModeData:
+class RobotModeData(Body):
     """Power, stops and program; ``robot_mode`` is a number of :class:`RobotMode`, or newer."""
 
     sub_type: ClassVar = 0
+    layout: ClassVar = BodyLayout('Q ? ? ? ? ? ? ? b B d d d', 'robot mode data', padding=1)
     timestamp: int = 0
     real_robot_connected: bool = True
     real_robot_enabled: bool = True
@@ -141,30 +113,6 @@ class RobotModeData:
     target_speed_fraction: float = 1.0
     speed_scaling: float = 1.0
     target_speed_fraction_limit: float = 1.0
-
-    def encode(self) -> bytes:
-        """Return the body."""
-        return pack(
-            _MODE,
-            self.timestamp,
-            self.real_robot_connected,
-            self.real_robot_enabled,
-            self.power_on,
-            self.emergency_stopped,
-            self.protective_stopped,
-            self.program_running,
-            self.program_paused,
-            self.robot_mode,
-            self.control_mode,
-            self.target_speed_fraction,
-            self.speed_scaling,
-            self.target_speed_fraction_limit,
-        ) + bytes(1)
-
-    @classmethod
-    def decode(cls, body: bytes) -> RobotModeData:
-        """Return the content of a body; RemoteProtocolError if it is too short."""
-        return cls(**dict(zip(cls.__slots__, unpack(_MODE, body, 'robot mode data'), strict=True)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,41 +130,26 @@ class JointData:
 
     def encode(self) -> bytes:
         """Return the body; the unused temperature of the electronics is 0."""
+        columns = (getattr(self, name) for name in self.__slots__)
         return b''.join(
-            pack(_JOINT, q, target, qd, current, voltage, temperature, 0.0, mode)
-            for q, target, qd, current, voltage, temperature, mode in zip(
-                self.q_actual,
-                self.q_target,
-                self.qd_actual,
-                self.current,
-                self.voltage,
-                self.temperature,
-                self.mode,
-                strict=True,
-            )
+            pack(_JOINT, *numbers, 0.0, mode) for *numbers, mode in zip(*columns, strict=True)
         )
 
     @classmethod
     def decode(cls, body: bytes) -> JointData:
         """Return the content of a body; RemoteProtocolError if it is too short."""
         joints = [unpack(_JOINT, body, 'joint data', i * _JOINT.size) for i in range(6)]
-        q, target, qd, current, voltage, temperature, _, mode = zip(*joints, strict=True)
-        return cls(
-            q_actual=cast(Vector6, q),
-            q_target=cast(Vector6, target),
-            qd_actual=cast(Vector6, qd),
-            current=cast(Vector6, current),
-            voltage=cast(Vector6, voltage),
-            temperature=cast(Vector6, temperature),
-            mode=cast(Integers6, mode),
-        )
+        *columns, _, mode = zip(*joints, strict=True)
+        construct: Callable[..., JointData] = cls
+        return construct(**dict(zip(cls.__slots__, [*columns, mode], strict=True)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ToolData:
+class ToolData(Body):
     """The tool connector: inputs [V or A by range], voltages [V], current [A], heat [deg C]."""
 
     sub_type: ClassVar = 2
+    layout: ClassVar = BodyLayout('2B 2d f B f f B', 'tool data')
     analog_input_range: tuple[int, int] = (1, 1)
     analog_input: Pair = (0.0, 0.0)
     voltage_48v: float = 0.0
@@ -225,38 +158,12 @@ class ToolData:
     temperature: float = 0.0
     mode: int = JOINT_RUNNING
 
-    def encode(self) -> bytes:
-        """Return the body."""
-        return pack(
-            _TOOL,
-            *self.analog_input_range,
-            *self.analog_input,
-            self.voltage_48v,
-            self.output_voltage,
-            self.current,
-            self.temperature,
-            self.mode,
-        )
-
-    @classmethod
-    def decode(cls, body: bytes) -> ToolData:
-        """Return the content of a body; RemoteProtocolError if it is too short."""
-        v = unpack(_TOOL, body, 'tool data')
-        return cls(
-            analog_input_range=v[0:2],
-            analog_input=v[2:4],
-            voltage_48v=v[4],
-            output_voltage=v[5],
-            current=v[6],
-            temperature=v[7],
-            mode=v[8],
-        )
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ImmiData:
+class ImmiData(Body):
     """The injection moulding machine interface (Euromap 67): bits, supply [V], current [A]."""
 
+    layout: ClassVar = BodyLayout('I I f f', 'masterboard data')
     input_bits: int = 0
     output_bits: int = 0
     voltage_24v: float = 0.0
@@ -297,100 +204,41 @@ class MasterboardData:
 
     def encode(self) -> bytes:
         """Return the body."""
-        head = pack(
-            _BOARD_HEAD,
-            self.digital_input_bits,
-            self.digital_output_bits,
-            *self.analog_input_range,
-            *self.analog_input,
-            *self.analog_output_domain,
-            *self.analog_output,
-            self.temperature,
-            self.robot_voltage_48v,
-            self.robot_current,
-            self.io_current,
-            self.safety_mode,
-            self.reduced_mode,
-            self.immi is not None,
-        )
-        immi = (
-            b''
-            if self.immi is None
-            else pack(
-                _BOARD_IMMI,
-                self.immi.input_bits,
-                self.immi.output_bits,
-                self.immi.voltage_24v,
-                self.immi.current,
-            )
-        )
+        values = [getattr(self, name) for name in self.__slots__]
+        head, immi, tail = values[:12], self.immi, values[13:]
         return (
-            head
-            + immi
-            + pack(
-                _BOARD_TAIL,
-                self.reserved_1,
-                self.operational_mode_selector,
-                self.three_position_enabling_device,
-                self.reserved_2,
-            )
+            _BOARD_HEAD.pack([*head, immi is not None])
+            + (immi.encode() if immi else b'')
+            + _BOARD_TAIL.pack(tail)
         )
 
     @classmethod
     def decode(cls, body: bytes) -> MasterboardData:
         """Return the content of a body; RemoteProtocolError if it is too short."""
-        v = unpack(_BOARD_HEAD, body, 'masterboard data')
+        *head, has_immi = _BOARD_HEAD.unpack(body)
         offset = _BOARD_HEAD.size
         immi = None
-        if v[16]:
-            i = unpack(_BOARD_IMMI, body, 'masterboard data', offset)
-            immi = ImmiData(input_bits=i[0], output_bits=i[1], voltage_24v=i[2], current=i[3])
-            offset += _BOARD_IMMI.size
+        if has_immi:
+            immi = ImmiData.decode(body[offset:])
+            offset += ImmiData.layout.size
         if len(body) >= offset + 4:  # older software ends behind the reserved word
             body = body.ljust(offset + _BOARD_TAIL.size, b'\0')
-        tail = unpack(_BOARD_TAIL, body, 'masterboard data', offset)
-        return cls(
-            digital_input_bits=v[0],
-            digital_output_bits=v[1],
-            analog_input_range=v[2:4],
-            analog_input=v[4:6],
-            analog_output_domain=v[6:8],
-            analog_output=v[8:10],
-            temperature=v[10],
-            robot_voltage_48v=v[11],
-            robot_current=v[12],
-            io_current=v[13],
-            safety_mode=v[14],
-            reduced_mode=v[15],
-            immi=immi,
-            reserved_1=tail[0],
-            operational_mode_selector=tail[1],
-            three_position_enabling_device=tail[2],
-            reserved_2=tail[3],
-        )
+        values = [*head, immi, *_BOARD_TAIL.unpack(body, offset)]
+        return cls(**dict(zip(cls.__slots__, values, strict=True)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CartesianInfo:
+class CartesianInfo(Body):
     """The TCP in the base, and in the flange: ``x y z rx ry rz`` [m, rad]."""
 
     sub_type: ClassVar = 4
+    layout: ClassVar = BodyLayout('6d 6d', 'Cartesian info')
     tcp_pose: Vector6
     tcp_offset: Vector6 = ZERO6
 
-    def encode(self) -> bytes:
-        """Return the body."""
-        return pack(_CARTESIAN, *self.tcp_pose, *self.tcp_offset)
-
-    @classmethod
-    def decode(cls, body: bytes) -> CartesianInfo:
-        """Return the content of a body; RemoteProtocolError if it is too short."""
-        v = unpack(_CARTESIAN, body, 'Cartesian info')
-        return cls(tcp_pose=cast(Vector6, v[:6]), tcp_offset=cast(Vector6, v[6:]))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class KinematicsInfo:
+class KinematicsInfo(Body):
     """
     The Denavit-Hartenberg parameters of this very arm [m, rad], as calibrated in the factory.
 
@@ -398,31 +246,13 @@ class KinematicsInfo:
     """
 
     sub_type: ClassVar = 5
+    layout: ClassVar = BodyLayout('6I 6d 6d 6d 6d I', 'kinematics info')
     checksum: Integers6 = (0xFFFFFFFF,) * 6
     theta: Vector6
     a: Vector6
     d: Vector6
     alpha: Vector6
     status: int = 0
-
-    def encode(self) -> bytes:
-        """Return the body."""
-        return pack(
-            _KINEMATICS, *self.checksum, *self.theta, *self.a, *self.d, *self.alpha, self.status
-        )
-
-    @classmethod
-    def decode(cls, body: bytes) -> KinematicsInfo:
-        """Return the content of a body; RemoteProtocolError if it is too short."""
-        v = unpack(_KINEMATICS, body, 'kinematics info')
-        return cls(
-            checksum=cast(Integers6, v[:6]),
-            theta=cast(Vector6, v[6:12]),
-            a=cast(Vector6, v[12:18]),
-            d=cast(Vector6, v[18:24]),
-            alpha=cast(Vector6, v[24:30]),
-            status=v[30],
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -457,119 +287,58 @@ class ConfigurationData:
 
     def encode(self) -> bytes:
         """Return the body."""
-        limits = [x for pair in (*self.position_limits, *self.motion_limits) for x in pair]
-        return pack(
-            _CONFIGURATION,
-            *limits,
-            self.v_joint_default,
-            self.a_joint_default,
-            self.v_tool_default,
-            self.a_tool_default,
-            self.eq_radius,
-            *self.a,
-            *self.d,
-            *self.alpha,
-            *self.theta,
-            self.masterboard_version,
-            self.controller_box_type,
-            self.robot_type,
-            self.robot_sub_type,
-        ) + b''.join(pack(struct.Struct('>h'), word) for word in self.reserved)
+        numbers = [getattr(self, name) for name in self.__slots__[:-1]]
+        reserved = struct.Struct(f'>{len(self.reserved)}h')
+        return _CONFIGURATION.pack(numbers) + pack(reserved, *self.reserved)
 
     @classmethod
     def decode(cls, body: bytes) -> ConfigurationData:
         """Return the content of a body; RemoteProtocolError if it is too short."""
-        v = unpack(_CONFIGURATION, body, 'configuration data')
+        position_limits, motion_limits, *numbers = _CONFIGURATION.unpack(body)
         surplus = min(len(body) - _CONFIGURATION.size, 4) // 2
-        return cls(
-            position_limits=_pairs(v[0:12]),
-            motion_limits=_pairs(v[12:24]),
-            v_joint_default=v[24],
-            a_joint_default=v[25],
-            v_tool_default=v[26],
-            a_tool_default=v[27],
-            eq_radius=v[28],
-            a=cast(Vector6, v[29:35]),
-            d=cast(Vector6, v[35:41]),
-            alpha=cast(Vector6, v[41:47]),
-            theta=cast(Vector6, v[47:53]),
-            masterboard_version=v[53],
-            controller_box_type=v[54],
-            robot_type=v[55],
-            robot_sub_type=v[56],
-            reserved=struct.unpack_from(f'>{surplus}h', body, _CONFIGURATION.size),
-        )
+        reserved = struct.unpack_from(f'>{surplus}h', body, _CONFIGURATION.size)
+        values = [_pairs(position_limits), _pairs(motion_limits), *numbers, reserved]
+        construct: Callable[..., ConfigurationData] = cls
+        return construct(**dict(zip(cls.__slots__, values, strict=True)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ForceModeData:
+class ForceModeData(Body):
     """Force [N] and torque [Nm] at the TCP, and a measure of the distance to singularities."""
 
     sub_type: ClassVar = 7
+    layout: ClassVar = BodyLayout('6d d', 'force mode data')
     wrench: Vector6 = ZERO6
     dexterity: float = 0.0
 
-    def encode(self) -> bytes:
-        """Return the body."""
-        return pack(_FORCE, *self.wrench, self.dexterity)
-
-    @classmethod
-    def decode(cls, body: bytes) -> ForceModeData:
-        """Return the content of a body; RemoteProtocolError if it is too short."""
-        v = unpack(_FORCE, body, 'force mode data')
-        return cls(wrench=cast(Vector6, v[:6]), dexterity=v[6])
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class AdditionalInfo:
+class AdditionalInfo(Body):
     """Buttons for freedrive."""
 
     sub_type: ClassVar = 8
+    layout: ClassVar = BodyLayout('? ? ? B', 'additional info')
     teach_button_pressed: bool = False
     freedrive_button_enabled: bool = True
     io_enabled_freedrive: bool = False
     reserved: int = 0
 
-    def encode(self) -> bytes:
-        """Return the body."""
-        return pack(
-            _ADDITIONAL,
-            self.teach_button_pressed,
-            self.freedrive_button_enabled,
-            self.io_enabled_freedrive,
-            self.reserved,
-        )
-
-    @classmethod
-    def decode(cls, body: bytes) -> AdditionalInfo:
-        """Return the content of a body; RemoteProtocolError if it is too short."""
-        return cls(
-            **dict(zip(cls.__slots__, unpack(_ADDITIONAL, body, 'additional info'), strict=True))
-        )
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CalibrationData:
+class CalibrationData(Body):
     """Six numbers for the manufacturer's own use."""
 
     sub_type: ClassVar = 9
+    layout: ClassVar = BodyLayout('6d', 'calibration data')
     values: Vector6 = ZERO6
-
-    def encode(self) -> bytes:
-        """Return the body."""
-        return pack(_CALIBRATION, *self.values)
-
-    @classmethod
-    def decode(cls, body: bytes) -> CalibrationData:
-        """Return the content of a body; RemoteProtocolError if it is too short."""
-        return cls(values=cast(Vector6, unpack(_CALIBRATION, body, 'calibration data')))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ToolCommunication:
+class ToolCommunication(Body):
     """The serial port of the tool connector."""
 
     sub_type: ClassVar = 11
+    layout: ClassVar = BodyLayout('? i i i f f', 'tool communication info')
     enabled: bool = False
     baud_rate: int = 115200
     parity: int = 0
@@ -577,46 +346,16 @@ class ToolCommunication:
     rx_idle_chars: float = 1.5
     tx_idle_chars: float = 3.5
 
-    def encode(self) -> bytes:
-        """Return the body."""
-        return pack(
-            _TOOL_COMMUNICATION,
-            self.enabled,
-            self.baud_rate,
-            self.parity,
-            self.stop_bits,
-            self.rx_idle_chars,
-            self.tx_idle_chars,
-        )
-
-    @classmethod
-    def decode(cls, body: bytes) -> ToolCommunication:
-        """Return the content of a body; RemoteProtocolError if it is too short."""
-        values = unpack(_TOOL_COMMUNICATION, body, 'tool communication info')
-        return cls(**dict(zip(cls.__slots__, values, strict=True)))
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ToolModeInfo:
+class ToolModeInfo(Body):
     """How the outputs of the tool connector are driven."""
 
     sub_type: ClassVar = 12
+    layout: ClassVar = BodyLayout('B B B', 'tool mode info')
     output_mode: int = 0
     digital_output_mode_0: int = 1
     digital_output_mode_1: int = 1
-
-    def encode(self) -> bytes:
-        """Return the body."""
-        return pack(
-            _TOOL_MODE, self.output_mode, self.digital_output_mode_0, self.digital_output_mode_1
-        )
-
-    @classmethod
-    def decode(cls, body: bytes) -> ToolModeInfo:
-        """Return the content of a body; RemoteProtocolError if it is too short."""
-        return cls(
-            **dict(zip(cls.__slots__, unpack(_TOOL_MODE, body, 'tool mode info'), strict=True))
-        )
 
 
 #: The content is the manufacturer's own; only the size is known.

@@ -26,9 +26,8 @@ answers within a second).
 Real controllers send text messages at any time, and data before the reply to S; a data package
 counts as that reply. Up to five other packages out of turn are reported and borne in each state.
 
-The packages themselves, with the controller's side of them, are in
-:mod:`~ur_cartesian_driver.protocol.rtde.rtde_packages` and can be imported from here too; what a
-controller does with a whole connection is in `rtde_server`.
+The packages are in :mod:`~ur_cartesian_driver.protocol.rtde.rtde_packages`; the controller's side
+of the connection is in `rtde_server`.
 """
 
 from __future__ import annotations
@@ -45,20 +44,17 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import (
     ControllerVersion,
     DataPackage,
     decode_reply,
-    decode_request,
     GetControllerVersion,
     IN_USE,
     LATEST_PROTOCOL_VERSION,
     NOT_FOUND,
     PackageType,
-    PauseStreaming,
     Recipe,
     RequestProtocolVersion,
     RtdeFrameBuffer,
     RtdeReply,
     RtdeRequest,
     RtdeTextMessage,
-    RtdeValue,
     RtdeValues,
     SetupInputs,
     SetupInputsReply,
@@ -66,45 +62,6 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import (
     SetupOutputsReply,
     StartStreaming,
 )
-
-__all__ = [
-    'INPUT_TYPES',
-    'IN_USE',
-    'LATEST_PROTOCOL_VERSION',
-    'NOT_FOUND',
-    'OUTPUT_TYPES',
-    'Acknowledgement',
-    'ControllerVersion',
-    'DataPackage',
-    'DataReceived',
-    'DataType',
-    'FieldsNotFound',
-    'GetControllerVersion',
-    'HandshakeDone',
-    'InputsInUse',
-    'PackageType',
-    'PauseStreaming',
-    'Recipe',
-    'RequestProtocolVersion',
-    'RtdeClientCodec',
-    'RtdeEvent',
-    'RtdeFrameBuffer',
-    'RtdeReply',
-    'RtdeRequest',
-    'RtdeState',
-    'RtdeTextMessage',
-    'RtdeValue',
-    'RtdeValues',
-    'SetupInputs',
-    'SetupInputsReply',
-    'SetupOutputs',
-    'SetupOutputsReply',
-    'StartStreaming',
-    'UnexpectedPackage',
-    'decode_reply',
-    'decode_request',
-    'max_frequency',
-]
 
 #: How many packages out of turn are borne in each state of the handshake.
 MAX_UNEXPECTED_PACKAGES = 5

@@ -9,12 +9,14 @@ from collections.abc import Callable, Mapping, Sequence
 
 from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.protocol.rtde.rtde_client import (
-    ControllerVersion,
     DataReceived,
     HandshakeDone,
-    Recipe,
     RtdeClientCodec,
     RtdeEvent,
+)
+from ur_cartesian_driver.protocol.rtde.rtde_packages import (
+    ControllerVersion,
+    Recipe,
     RtdeValue,
     RtdeValues,
 )

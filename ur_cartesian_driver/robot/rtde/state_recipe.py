@@ -25,8 +25,8 @@ from ur_cartesian_driver.motion.state import (
     SafetyMode,
     STATE_TABLE,
 )
-from ur_cartesian_driver.protocol.rtde.rtde_client import OUTPUT_TYPES, RtdeValues
-from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType
+from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType, OUTPUT_TYPES
+from ur_cartesian_driver.protocol.rtde.rtde_packages import RtdeValues
 
 REQUIRED_FIELDS = tuple(row.rtde.name for row in STATE_TABLE if not row.rtde.optional)
 OPTIONAL_FIELDS = tuple(row.rtde.name for row in STATE_TABLE if row.rtde.optional)

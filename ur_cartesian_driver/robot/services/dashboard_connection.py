@@ -25,7 +25,7 @@ from ur_cartesian_driver.protocol.dashboard import (
 )
 from ur_cartesian_driver.protocol.dashboard import DashboardClientCodec as Codec
 from ur_cartesian_driver.protocol.framing import LineBuffer
-from ur_cartesian_driver.protocol.rtde.rtde_client import ControllerVersion
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
 #: How long the dashboard may take to greet, and to answer [s].

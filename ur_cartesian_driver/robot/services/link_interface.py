@@ -11,7 +11,7 @@ from typing import Protocol
 from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
-from ur_cartesian_driver.protocol.rtde.rtde_client import ControllerVersion
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.driver_status import DriverStatus
 
 #: How often an effect is looked for [s].

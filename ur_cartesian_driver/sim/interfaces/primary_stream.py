@@ -8,12 +8,15 @@ from collections.abc import Iterator
 
 from ur_cartesian_driver.motion.state import RobotMode, RobotStatus, RuntimeState, SafetyMode
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
+    encode_message,
+    encode_state,
+    VersionMessage,
+)
+from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
     AdditionalInfo,
     CalibrationData,
     CartesianInfo,
     ConfigurationData,
-    encode_message,
-    encode_state,
     ForceModeData,
     JointData,
     KinematicsInfo,
@@ -24,7 +27,6 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     ToolCommunication,
     ToolData,
     ToolModeInfo,
-    VersionMessage,
 )
 from ur_cartesian_driver.sim.controller import Controller
 
