@@ -22,7 +22,8 @@ from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.reverse import ReverseDecoder, TrajectoryAction
 from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES
-from ur_cartesian_driver.protocol.rtde.rtde_packages import Recipe, RtdeFrameBuffer
+from ur_cartesian_driver.protocol.rtde.rtde_packages import RtdeFrameBuffer
+from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe
 from ur_cartesian_driver.robot.rtde.state_recipe import OPTIONAL_FIELDS, REQUIRED_FIELDS
 from ur_cartesian_driver.sim.faults.fault_values import (
     AfterDistance,

@@ -28,11 +28,11 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import (
     DataPackage,
     decode_reply,
     PackageType,
-    Recipe,
     RtdeTextMessage,
     SetupInputsReply,
     SetupOutputsReply,
 )
+from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe
 from ur_cartesian_driver.protocol.rtde.rtde_server import InputReceived, RtdeServerCodec
 
 VERSION = ControllerVersion(major=5, minor=21, bugfix=0)

@@ -14,12 +14,12 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import (
     ControllerVersion,
     decode_reply,
     decode_request,
-    Recipe,
     RequestProtocolVersion,
     RtdeTextMessage,
     SetupInputs,
     SetupInputsReply,
 )
+from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe
 
 TEXT = RtdeTextMessage(text='Fieldbus', source='PROFINET', level=2)
 

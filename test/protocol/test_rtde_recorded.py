@@ -13,9 +13,9 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import (
     DataPackage,
     decode_reply,
     decode_request,
-    Recipe,
     RequestProtocolVersion,
 )
+from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe
 
 GOLDEN = json.loads((Path(__file__).parent / 'golden' / 'rtde_handshake.json').read_text())
 CONNECTIONS = ['handshake', 'handshake_protocol_v1', 'handshake_with_types']

@@ -12,7 +12,7 @@ from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.protocol import dashboard
 import ur_cartesian_driver.protocol.program.script_command as script_command
 from ur_cartesian_driver.protocol.rtde.rtde_fields import INPUT_TYPES
-from ur_cartesian_driver.protocol.rtde.rtde_packages import Recipe
+from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe
 from ur_cartesian_driver.robot.services import rtde_input_writer, service_calls
 
 any_number = st.floats() | st.floats(-2.0, 2.0)

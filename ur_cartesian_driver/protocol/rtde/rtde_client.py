@@ -49,19 +49,18 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import (
     LATEST_PROTOCOL_VERSION,
     NOT_FOUND,
     PackageType,
-    Recipe,
     RequestProtocolVersion,
     RtdeFrameBuffer,
     RtdeReply,
     RtdeRequest,
     RtdeTextMessage,
-    RtdeValues,
     SetupInputs,
     SetupInputsReply,
     SetupOutputs,
     SetupOutputsReply,
     StartStreaming,
 )
+from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValues
 
 #: How many packages out of turn are borne in each state of the handshake.
 MAX_UNEXPECTED_PACKAGES = 5

@@ -32,16 +32,14 @@ first S and P.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from operator import itemgetter
 import struct
-from typing import Any, cast, TypeAlias
+from typing import ClassVar, TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 from ur_cartesian_driver.protocol.framing import decode_text, FrameBuffer, hex_text
-from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType
 
 
 class PackageType(IntEnum):
@@ -61,13 +59,8 @@ NOT_FOUND = 'NOT_FOUND'
 IN_USE = 'IN_USE'
 LATEST_PROTOCOL_VERSION = 2
 
-_HEADER = struct.Struct('>HB')
+HEADER = struct.Struct('>HB')
 _VERSION = struct.Struct('>4I')
-
-#: A number, a flag, or a vector of numbers.
-RtdeValue: TypeAlias = int | float | tuple[float, ...]
-#: Values in the order of a recipe.
-RtdeValues: TypeAlias = tuple[RtdeValue, ...]
 
 
 class RtdeFrameBuffer(FrameBuffer):
@@ -78,239 +71,89 @@ class RtdeFrameBuffer(FrameBuffer):
         super().__init__(size_width=2, min_size=3, max_size=65535, what='RTDE package')
 
 
-class Recipe:
-    """
-    An agreed list of fields, with their bytes.
+class _Package:
+    """A package of one type."""
 
-    ``pack`` and ``unpack`` go through one precompiled struct, because they run 500 times a second.
-    """
+    __slots__ = ()
+    type: ClassVar[PackageType]
 
-    __slots__ = (
-        '_frame',
-        '_head',
-        '_lengths',
-        '_pick',
-        '_size',
-        '_struct',
-        'names',
-        'recipe_id',
-        'types',
-    )
+    def payload(self) -> bytes:
+        """Return what follows the type."""
+        return b''
 
-    def __init__(
-        self, names: Sequence[str], types: Sequence[DataType], recipe_id: int | None = 1
-    ) -> None:
-        """
-        Compile the recipe.
-
-        :param recipe_id: the byte before the values; None = there is none (outputs of version 1).
-        :raises ValueError: there are not as many types as names, or no names.
-        """
-        if len(names) != len(types) or not names:
-            raise ValueError(f'{len(names)} names and {len(types)} types make no RTDE recipe.')
-        self.names = tuple(names)
-        self.types = tuple(types)
-        self.recipe_id = recipe_id
-        codes = ''.join(data_type.codes for data_type in types)
-        head = '' if recipe_id is None else 'x'
-        self._struct = struct.Struct(f'>{head}{codes}')
-        self._frame = struct.Struct(f'>HB{"" if recipe_id is None else "B"}{codes}')
-        self._size = self._struct.size
-        self._head = _HEADER.pack(self._frame.size, PackageType.DATA_PACKAGE)
-        self._lengths = tuple(data_type.length for data_type in types)
-        keys: list[int | slice] = []
-        start = 0
-        for length in self._lengths:
-            keys.append(start if length == 1 else slice(start, start + length))
-            start += length
-        # With a single key itemgetter gives the bare item, so that case is left to unpack().
-        self._pick = itemgetter(*keys) if len(keys) > 1 else None
-
-    def unpack(self, payload: bytes) -> RtdeValues:
-        """
-        Return the values of a data package without its first three bytes; vectors are tuples.
-
-        The recipe id is not looked at: controllers exist that send another one than agreed.
-
-        :raises RemoteProtocolError: the package has another size than the recipe.
-        """
-        if len(payload) != self._size:
-            raise RemoteProtocolError(
-                f'An RTDE data package of this recipe has {self._size} bytes, but {len(payload)} '
-                f'came: {hex_text(payload)}.'
-            )
-        flat = self._struct.unpack(payload)
-        if self._pick is None:
-            return flat if len(flat) == 1 else (flat,)
-        return cast(RtdeValues, self._pick(flat))
-
-    def unpack_frame(self, data: bytes) -> RtdeValues | None:
-        """Return the values of a whole frame; None where the bytes are anything else."""
-        if len(data) != self._frame.size or self._pick is None or data[:3] != self._head:
-            return None
-        return cast(RtdeValues, self._pick(self._struct.unpack_from(data, _HEADER.size)))
-
-    def pack(self, values: Sequence[RtdeValue]) -> bytes:
-        """
-        Return the whole frame of a data package.
-
-        :param values: in the order of the recipe; vectors as tuples.
-        :raises LocalProtocolError: number, length or range of the values is wrong.
-        """
-        flat: list[Any] = [] if self.recipe_id is None else [self.recipe_id]
-        try:
-            for value, length in zip(values, self._lengths, strict=True):
-                if length == 1:
-                    flat.append(value)
-                # A number has no length: that is one of the errors below.
-                elif len(value) == length:  # type: ignore[arg-type]
-                    flat.extend(value)  # type: ignore[arg-type]
-                else:
-                    raise self._packing_error(values)
-            return self._frame.pack(self._frame.size, PackageType.DATA_PACKAGE, *flat)
-        except (struct.error, OverflowError, TypeError, ValueError):
-            raise self._packing_error(values) from None
-
-    def pack_named(self, values: Mapping[str, RtdeValue]) -> bytes:
-        """
-        Return the whole frame of a data package with values by name.
-
-        :raises LocalProtocolError: a value is missing, surplus or wrong.
-        """
-        if len(values) != len(self.names) or not all(name in values for name in self.names):
-            missing = ', '.join(set(self.names) - set(values)) or 'none'
-            surplus = ', '.join(set(values) - set(self.names)) or 'none'
-            raise LocalProtocolError(
-                f'An RTDE package needs all values of its recipe; missing: {missing}, '
-                f'surplus: {surplus}.'
-            )
-        return self.pack([values[name] for name in self.names])
-
-    def named(self, values: RtdeValues) -> dict[str, RtdeValue]:
-        """Return values by name."""
-        return dict(zip(self.names, values, strict=True))
-
-    def zeros(self) -> RtdeValues:
-        """Return zero for each field."""
-        return tuple(0 if t.length == 1 else (0,) * t.length for t in self.types)
-
-    def index(self, name: str) -> int:
-        """Return the place of a field in the values; ValueError if it is not in the recipe."""
-        return self.names.index(name)
-
-    def __eq__(self, other: object) -> bool:
-        """Compare names, types and id."""
-        return isinstance(other, Recipe) and self._key() == other._key()
-
-    def __hash__(self) -> int:
-        """Hash names, types and id."""
-        return hash(self._key())
-
-    def __repr__(self) -> str:
-        """Return the recipe as text."""
-        fields = ', '.join(f'{n}: {t.name}' for n, t in zip(self.names, self.types, strict=True))
-        return f'Recipe({self.recipe_id}: {fields})'
-
-    def _key(self) -> tuple[object, ...]:
-        return self.names, self.types, self.recipe_id
-
-    def _packing_error(self, values: Sequence[RtdeValue]) -> LocalProtocolError:
-        """Return the error that names the value which cannot be packed."""
-        if len(values) != len(self.names):
-            return LocalProtocolError(
-                f'{len(values)} values do not fill an RTDE recipe of {len(self.names)} fields.'
-            )
-        problems = [
-            f'{name} is {value!r}, which is no {data_type.name}'
-            for name, data_type, value in zip(self.names, self.types, values, strict=True)
-            if not _fits_type(data_type, value)
-        ]
-        return LocalProtocolError('; '.join(problems) + '.')
-
-
-def _fits_type(data_type: DataType, value: Any) -> bool:
-    try:
-        struct.pack(f'>{data_type.codes}', *(value if data_type.length > 1 else (value,)))
-    except (struct.error, OverflowError, TypeError):
-        return False
-    return True
+    def encode(self) -> bytes:
+        """Return the frame."""
+        return encode_frame(self.type, self.payload())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RequestProtocolVersion:
-    """Client: let us speak this version."""
+class RequestProtocolVersion(_Package):
+    """Client: requests a protocol version."""
 
+    type: ClassVar = PackageType.REQUEST_PROTOCOL_VERSION
     version: int
 
-    def encode(self) -> bytes:
-        """Return the frame."""
-        return encode_frame(
-            PackageType.REQUEST_PROTOCOL_VERSION, _pack_checked('>H', self.version)
-        )
+    def payload(self) -> bytes:
+        """Return what follows the type."""
+        return _pack_checked('>H', self.version)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GetControllerVersion:
-    """Client: which software is this."""
+class GetControllerVersion(_Package):
+    """Client: asks for the controller's software version."""
 
-    def encode(self) -> bytes:
-        """Return the frame."""
-        return encode_frame(PackageType.GET_URCONTROL_VERSION)
+    type: ClassVar = PackageType.GET_URCONTROL_VERSION
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetupOutputs:
-    """Client: stream these; the frequency [Hz] is None in version 1."""
+class SetupOutputs(_Package):
+    """Client: requests these outputs; the frequency [Hz] is None in version 1."""
 
+    type: ClassVar = PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS
     names: tuple[str, ...]
     frequency: float | None = None
 
-    def encode(self) -> bytes:
-        """Return the frame."""
+    def payload(self) -> bytes:
+        """Return what follows the type."""
         head = b'' if self.frequency is None else _pack_checked('>d', self.frequency)
-        return encode_frame(
-            PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS, head + encode_names(self.names)
-        )
+        return head + encode_names(self.names)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetupInputs:
-    """Client: these are what I shall write."""
+class SetupInputs(_Package):
+    """Client: announces the inputs that it will write."""
 
+    type: ClassVar = PackageType.CONTROL_PACKAGE_SETUP_INPUTS
     names: tuple[str, ...]
 
-    def encode(self) -> bytes:
-        """Return the frame."""
-        return encode_frame(PackageType.CONTROL_PACKAGE_SETUP_INPUTS, encode_names(self.names))
+    def payload(self) -> bytes:
+        """Return what follows the type."""
+        return encode_names(self.names)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StartStreaming:
-    """Client: start streaming."""
+class StartStreaming(_Package):
+    """Client: starts the data."""
 
-    def encode(self) -> bytes:
-        """Return the frame."""
-        return encode_frame(PackageType.CONTROL_PACKAGE_START)
+    type: ClassVar = PackageType.CONTROL_PACKAGE_START
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PauseStreaming:
-    """Client: pause streaming."""
+class PauseStreaming(_Package):
+    """Client: pauses the data."""
 
-    def encode(self) -> bytes:
-        """Return the frame."""
-        return encode_frame(PackageType.CONTROL_PACKAGE_PAUSE)
+    type: ClassVar = PackageType.CONTROL_PACKAGE_PAUSE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DataPackage:
-    """Either side: values, to be read with a recipe; the payload includes a recipe id."""
+    """Either side: values, to be unpacked with a recipe; the payload includes the recipe id."""
 
     payload: bytes
 
     @property
     def recipe_id(self) -> int:
-        """Return the first byte, which is the recipe id but in outputs of version 1."""
+        """Return the first byte: the recipe id, except in outputs of version 1."""
         return self.payload[0]
 
     def encode(self) -> bytes:
@@ -333,21 +176,16 @@ class RtdeTextMessage:
     def encode(self, version: int = LATEST_PROTOCOL_VERSION) -> bytes:
         """Return the frame."""
         text, source = self.text.encode(), self.source.encode()
+        level = _pack_checked('>B', self.level)
         if version == 1:
-            return encode_frame(PackageType.TEXT_MESSAGE, _pack_checked('>B', self.level) + text)
+            return encode_frame(PackageType.TEXT_MESSAGE, level + text)
         if max(len(text), len(source)) > 255:
             raise LocalProtocolError(
                 f'text has {len(text)} and source {len(source)} bytes, but an RTDE text message '
                 'holds at most 255 of each.'
             )
-        return encode_frame(
-            PackageType.TEXT_MESSAGE,
-            bytes([len(text)])
-            + text
-            + bytes([len(source)])
-            + source
-            + _pack_checked('>B', self.level),
-        )
+        payload = bytes([len(text)]) + text + bytes([len(source)]) + source + level
+        return encode_frame(PackageType.TEXT_MESSAGE, payload)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -363,20 +201,18 @@ class Acknowledgement:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ControllerVersion:
-    """Controller: my software."""
+class ControllerVersion(_Package):
+    """Controller: its software version."""
 
+    type: ClassVar = PackageType.GET_URCONTROL_VERSION
     major: int
     minor: int
     bugfix: int
     build: int = 0
 
-    def encode(self) -> bytes:
-        """Return the frame."""
-        return encode_frame(
-            PackageType.GET_URCONTROL_VERSION,
-            _pack_checked('>4I', self.major, self.minor, self.bugfix, self.build),
-        )
+    def payload(self) -> bytes:
+        """Return what follows the type."""
+        return _pack_checked('>4I', self.major, self.minor, self.bugfix, self.build)
 
     def __str__(self) -> str:
         """Return the version with dots."""
@@ -384,33 +220,30 @@ class ControllerVersion:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetupOutputsReply:
+class SetupOutputsReply(_Package):
     """Controller: types of the outputs as text; the recipe id is None in version 1."""
 
+    type: ClassVar = PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS
     types: tuple[str, ...]
     recipe_id: int | None = 1
 
-    def encode(self) -> bytes:
-        """Return the frame."""
+    def payload(self) -> bytes:
+        """Return what follows the type."""
         head = b'' if self.recipe_id is None else _pack_checked('>B', self.recipe_id)
-        return encode_frame(
-            PackageType.CONTROL_PACKAGE_SETUP_OUTPUTS, head + encode_names(self.types)
-        )
+        return head + encode_names(self.types)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SetupInputsReply:
+class SetupInputsReply(_Package):
     """Controller: types of the inputs as text."""
 
+    type: ClassVar = PackageType.CONTROL_PACKAGE_SETUP_INPUTS
     types: tuple[str, ...]
     recipe_id: int = 1
 
-    def encode(self) -> bytes:
-        """Return the frame."""
-        return encode_frame(
-            PackageType.CONTROL_PACKAGE_SETUP_INPUTS,
-            _pack_checked('>B', self.recipe_id) + encode_names(self.types),
-        )
+    def payload(self) -> bytes:
+        """Return what follows the type."""
+        return _pack_checked('>B', self.recipe_id) + encode_names(self.types)
 
 
 RtdeRequest: TypeAlias = (
@@ -439,13 +272,13 @@ def encode_frame(package_type: PackageType, payload: bytes = b'') -> bytes:
 
     :raises LocalProtocolError: it would be longer than 65535 bytes.
     """
-    size = _HEADER.size + len(payload)
+    size = HEADER.size + len(payload)
     if size > 65535:
         raise LocalProtocolError(
             f'An RTDE package of {size} bytes cannot be sent, 65535 are possible; ask for fewer '
             'fields.'
         )
-    return _HEADER.pack(size, package_type) + payload
+    return HEADER.pack(size, package_type) + payload
 
 
 def _pack_checked(layout: str, *values: float) -> bytes:
@@ -525,7 +358,7 @@ def decode_reply(data: bytes, version: int = LATEST_PROTOCOL_VERSION) -> RtdeRep
 
 
 def _split_frame(data: bytes) -> tuple[PackageType, bytes]:
-    if len(data) < _HEADER.size:
+    if len(data) < HEADER.size:
         raise RemoteProtocolError(f'An RTDE package is too short: {hex_text(data)}.')
     try:
         return PackageType(data[2]), data[3:]

@@ -37,18 +37,17 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import (
     NOT_FOUND,
     PackageType,
     PauseStreaming,
-    Recipe,
     RequestProtocolVersion,
     RtdeFrameBuffer,
     RtdeReply,
     RtdeTextMessage,
-    RtdeValues,
     SetupInputs,
     SetupInputsReply,
     SetupOutputs,
     SetupOutputsReply,
     StartStreaming,
 )
+from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValues
 
 #: Recipe ids are bytes and 0 means invalid.
 MAX_RECIPES = 255

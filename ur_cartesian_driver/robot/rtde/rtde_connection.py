@@ -14,12 +14,8 @@ from ur_cartesian_driver.protocol.rtde.rtde_client import (
     RtdeClientCodec,
     RtdeEvent,
 )
-from ur_cartesian_driver.protocol.rtde.rtde_packages import (
-    ControllerVersion,
-    Recipe,
-    RtdeValue,
-    RtdeValues,
-)
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
+from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValue, RtdeValues
 from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
 #: How long the robot may take to agree on what it streams [s].

@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.servo import ServoFeedback
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.protocol.program.registers import SERVO_INPUTS, SERVO_OUTPUTS
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
-from ur_cartesian_driver.protocol.rtde.rtde_packages import RtdeValues
+from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 
 SERVO_FIELDS = ('timestamp', 'speed_scaling', 'runtime_state', *SERVO_OUTPUTS)

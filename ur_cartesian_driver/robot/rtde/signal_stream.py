@@ -21,7 +21,7 @@ from ur_cartesian_driver.motion.signals import (
     Signals,
 )
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
-from ur_cartesian_driver.protocol.rtde.rtde_packages import RtdeValues
+from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection, SILENCE_TIMEOUT
 from ur_cartesian_driver.robot.transport import Backoff
 

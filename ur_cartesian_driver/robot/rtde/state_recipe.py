@@ -26,7 +26,7 @@ from ur_cartesian_driver.motion.state import (
     STATE_TABLE,
 )
 from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType, OUTPUT_TYPES
-from ur_cartesian_driver.protocol.rtde.rtde_packages import RtdeValues
+from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 
 REQUIRED_FIELDS = tuple(row.rtde.name for row in STATE_TABLE if not row.rtde.optional)
 OPTIONAL_FIELDS = tuple(row.rtde.name for row in STATE_TABLE if row.rtde.optional)

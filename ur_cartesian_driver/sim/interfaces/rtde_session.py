@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from math import floor
 
 from ur_cartesian_driver.protocol.rtde.rtde_fields import DataType
-from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion, Recipe
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
+from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe
 from ur_cartesian_driver.protocol.rtde.rtde_server import (
     InputReceived,
     OutputStream,
