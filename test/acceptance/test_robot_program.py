@@ -70,7 +70,7 @@ def test_a_program_with_other_names_does_the_same(served, ur_sim):
         'run_trajectory',
         'kind',
         'read_timeout',
-        'dial_all',
+        'connect_sockets',
     ):
         text, count = re.subn(rf'\b{name}\b', f'renamed_{name}', text)
         assert count >= 2

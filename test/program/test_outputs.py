@@ -260,7 +260,7 @@ def test_delays_count_from_the_end_of_the_motion_and_success_waits_for_them(robo
     ('text', 'changed', 'far'),
     [
         ('OUTPUT_LEAD = 1.5', 'OUTPUT_LEAD = 21.5', 20.0),
-        ('looking = outputs_done < outputs_due', 'looking = True', 25.0),
+        ('due = outputs_done < outputs_due', 'due = True', 25.0),
     ],
 )
 def test_a_changed_text_changes_the_place(text, changed, far):

@@ -173,9 +173,9 @@ def test_an_include_stands_in_its_place_and_takes_its_settings():
     assert not [line for line in lines if line.startswith('#!')]
     for line in (
         'SERVOJ_GAIN = 300.0',
-        'SERVO_DEPTH = 3',
+        'SERVO_BUFFER_DEPTH = 3',
         'SERVO_ONES = [1.0, 1.0, 1.0]',
-        'SERVO_ALLOW_TEACH = True',
+        'SERVO_ALLOW_FREEDRIVE = True',
     ):
         assert line in lines
 

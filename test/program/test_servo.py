@@ -198,7 +198,7 @@ def unknown_mode(servo):
         (stale, 'no new sequence number in time'),
         (too_far, 'divergence thresholds'),
         (error, 'reports the error 1'),
-        pytest.param(unknown_mode, 'a mode that there is not', marks=pytest.mark.exhaustive),
+        pytest.param(unknown_mode, 'requests an unknown mode', marks=pytest.mark.exhaustive),
     ],
 )
 def test_the_arm_brakes_before_the_program_halts(cause, text):
@@ -286,7 +286,7 @@ def test_teaching_ends_before_the_arm_brakes_for_a_halt():
 def test_a_refusal_of_teaching_is_told_once():
     servo = Servo(allow_freedrive=False).enter(ServoMode.TEACH)
     servo.cycle(20)
-    assert servo.log.count('teach mode is not allowed') == 1
+    assert servo.log.count('freedrive is not allowed') == 1
     assert servo[OutputInteger.ACTUAL_MODE] == ServoMode.IDLE
 
 

@@ -13,7 +13,7 @@ program that start with ``#!`` are instructions for this module:
     the file ``NAME.script`` stands here.
 ``#! if FEATURE`` ... ``#! end``
     kept only where the controller's software has the feature, because a controller refuses a
-    program that names a function which it does not know. ``teach`` is no matter of the software:
+    program that names a function which it does not know. ``freedrive`` is no matter of the software:
     it is kept where teaching is allowed.
 """
 
@@ -55,14 +55,14 @@ SPLINE_CONSTANTS: dict[str, float] = {
     'CORRECTION': 0.4,
     #: How hard the last piece may end in motion [rad/s^2], and the greatest mean speed of a
     #: joint [rad/s]; the client library's numbers, as the next one.
-    'BRAKING': 15.0,
+    'MAX_DECELERATION': 15.0,
     'MAX_SPEED': 20.0,
     #: A first point without time may lie so far from where the arm is [rad].
-    'AT_START': 0.01,
+    'START_TOLERANCE': 0.01,
     #: Slower than this is at rest [rad/s].
-    'REST': 0.0001,
+    'REST_SPEED': 0.0001,
     #: Where a step is less than this nobody can tell how far it led [rad].
-    'CREEP': 1e-06,
+    'MIN_STEP': 1e-06,
     #: Less than this [s] or [rad] comes from rounding.
     'ROUNDING': 1e-10,
 }
@@ -144,7 +144,7 @@ def _lines(name: str, settings: ProgramSettings) -> Iterator[str]:
                 yield from constants(settings)
             case ['#!', 'include', part]:
                 yield from _lines(part, settings)
-            case ['#!', 'if', 'teach']:
+            case ['#!', 'if', 'freedrive']:
                 keep = settings.allow_freedrive
             case ['#!', 'if', feature] if feature in FEATURES:
                 keep = has_feature(feature, settings.version)
@@ -184,7 +184,7 @@ def constants(settings: ProgramSettings) -> Iterator[str]:
     yield from _enum('RESULT', TrajectoryResult)
     yield from _enum('COMMAND', script_command.ScriptCommand)
     yield from _enum('TCP', script_command.TcpPersistence)
-    yield f'OUTPUTS_WAITING = {trajectory.MAX_PENDING_OUTPUTS}'
+    yield f'MAX_PENDING_OUTPUTS = {trajectory.MAX_PENDING_OUTPUTS}'
     yield f'OUTPUT_WORDS = {OUTPUT_WORDS}'
     # Of floats, as the matrices that are made with them.
     yield f'OUTPUT_ONES = {[1.0] * trajectory.MAX_PENDING_OUTPUTS}'
@@ -202,8 +202,8 @@ def _servo_constants(settings: ProgramSettings) -> Iterator[str]:
     """Yield those of the buffered servo."""
     yield f'SERVOJ_GAIN = {settings.servoj_gain}'
     yield f'SERVOJ_LOOKAHEAD_TIME = {settings.servoj_lookahead_time}'
-    yield f'SERVO_ALLOW_TEACH = {settings.allow_freedrive}'
-    yield f'SERVO_DEPTH = {settings.servo_buffer_depth}'
+    yield f'SERVO_ALLOW_FREEDRIVE = {settings.allow_freedrive}'
+    yield f'SERVO_BUFFER_DEPTH = {settings.servo_buffer_depth}'
     # A list as long as the buffer: old controllers have no other way to make one.
     yield f'SERVO_ONES = {[1.0] * settings.servo_buffer_depth}'
     yield f'SERVO_ROW = {[0.0] * 6}'

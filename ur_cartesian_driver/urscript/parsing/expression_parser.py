@@ -8,6 +8,8 @@ The grammar stands at the head of :mod:`~ur_cartesian_driver.urscript.parsing.pa
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from ur_cartesian_driver.urscript.parsing import syntax_tree as tree
 from ur_cartesian_driver.urscript.parsing.scanner import TokenKind
 from ur_cartesian_driver.urscript.parsing.token_reader import (
@@ -25,23 +27,11 @@ class ExpressionParser(TokenReader):
 
     def _expression(self) -> tree.Expression:
         """Read conjunction { ( "or" | "xor" ) conjunction }."""
-        left = self._conjunction()
-        for token in self._operators('or', 'xor'):
-            right = self._conjunction()
-            left = tree.LogicalExpression(
-                operator=token.text, left=left, right=right, **source_position(token)
-            )
-        return left
+        return self._chain(self._conjunction, tree.LogicalExpression, 'or', 'xor')
 
     def _conjunction(self) -> tree.Expression:
         """Read inversion { "and" inversion }."""
-        left = self._inversion()
-        for token in self._operators('and'):
-            right = self._inversion()
-            left = tree.LogicalExpression(
-                operator=token.text, left=left, right=right, **source_position(token)
-            )
-        return left
+        return self._chain(self._inversion, tree.LogicalExpression, 'and')
 
     def _inversion(self) -> tree.Expression:
         """Read "not" inversion | comparison."""
@@ -53,31 +43,28 @@ class ExpressionParser(TokenReader):
 
     def _comparison(self) -> tree.Expression:
         """Read sum { ( "==" | "!=" | "<" | "<=" | ">" | ">=" ) sum }."""
-        left = self._sum()
-        for token in self._operators('==', '!=', '<', '<=', '>', '>='):
-            right = self._sum()
-            left = tree.BinaryExpression(
-                operator=token.text, left=left, right=right, **source_position(token)
-            )
-        return left
+        operators = ('==', '!=', '<', '<=', '>', '>=')
+        return self._chain(self._sum, tree.BinaryExpression, *operators)
 
     def _sum(self) -> tree.Expression:
         """Read product { ( "+" | "-" ) product }."""
-        left = self._product()
-        for token in self._operators('+', '-'):
-            right = self._product()
-            left = tree.BinaryExpression(
-                operator=token.text, left=left, right=right, **source_position(token)
-            )
-        return left
+        return self._chain(self._product, tree.BinaryExpression, '+', '-')
 
     def _product(self) -> tree.Expression:
         """Read unary { ( "*" | "/" | "%" ) unary }."""
-        left = self._unary()
-        for token in self._operators('*', '/', '%'):
-            right = self._unary()
-            left = tree.BinaryExpression(
-                operator=token.text, left=left, right=right, **source_position(token)
+        return self._chain(self._unary, tree.BinaryExpression, '*', '/', '%')
+
+    def _chain(
+        self,
+        operand: Callable[[], tree.Expression],
+        node: type[tree.BinaryExpression | tree.LogicalExpression],
+        *operators: str,
+    ) -> tree.Expression:
+        """Read operand { operator operand }, left-associative."""
+        left = operand()
+        for token in self._operators(*operators):
+            left = node(
+                operator=token.text, left=left, right=operand(), **source_position(token)
             )
         return left
 
