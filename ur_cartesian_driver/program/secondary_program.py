@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Programs that run beside whatever runs on the robot, within one step of its controller.
+Secondary programs: they run beside the running program, within one step of the controller.
 
-They are for what has to be done when our own program is not there to do it.
+They do what has to be done while our own program does not run.
 """
 
 from __future__ import annotations

@@ -63,9 +63,7 @@ class ExpressionParser(TokenReader):
         """Read operand { operator operand }, left-associative."""
         left = operand()
         for token in self._operators(*operators):
-            left = node(
-                operator=token.text, left=left, right=operand(), **source_position(token)
-            )
+            left = node(operator=token.text, left=left, right=operand(), **source_position(token))
         return left
 
     def _unary(self) -> tree.Expression:
