@@ -158,7 +158,7 @@ def test_answers_belong_to_commands_in_order_also_in_pieces():
 def test_an_answer_to_nothing_is_an_error():
     client = DashboardClientCodec()
     client.feed(encode_line(BANNER))
-    with pytest.raises(RemoteProtocolError, match='without being asked'):
+    with pytest.raises(RemoteProtocolError, match='no command waits for a reply'):
         client.feed(b'Stopped\n')
 
 
@@ -173,7 +173,7 @@ def test_the_number_of_waiting_commands_is_bounded():
     client = DashboardClientCodec()
     for _ in range(64):
         client.send('play')
-    with pytest.raises(LocalProtocolError, match='wait for an answer'):
+    with pytest.raises(LocalProtocolError, match='wait for a reply'):
         client.send('play')
 
 

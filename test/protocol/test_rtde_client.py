@@ -226,7 +226,7 @@ def test_five_foreign_packages_are_borne_in_each_state_and_no_more(place):
     client, events = started([*STEPS[:place], *[foreign] * 5, *STEPS[place:]])
     assert client.state is RtdeState.READY
     assert events.count(UnexpectedPackage(package=foreign)) == 5
-    with pytest.raises(RemoteProtocolError, match='out of turn'):
+    with pytest.raises(RemoteProtocolError, match='unexpected RTDE packages'):
         started([*STEPS[:place], *[foreign] * 6])
 
 
@@ -255,7 +255,7 @@ def test_the_end_of_the_data_is_no_error_between_packages():
     ('steps', 'text'),
     [
         ([REFUSED, REFUSED], 'neither version 2 nor version 1'),
-        ([*STEPS[:2], SetupOutputsReply(types=('DOUBLE', 'DOUBLE'))], '2 types to 1'),
+        ([*STEPS[:2], SetupOutputsReply(types=('DOUBLE', 'DOUBLE'))], '2 types for 1'),
         ([*STEPS[:3], Acknowledgement(type=S, accepted=False)], 'refused to start'),
         ([*STEPS, DataPackage(payload=b'\1' + bytes(9))], '01000000000000000000'),
         ([*STEPS, DataPackage(payload=b'\1' + bytes(7))], 'has 9 bytes, but 8'),

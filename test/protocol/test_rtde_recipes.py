@@ -67,7 +67,7 @@ SIX = (0.0,) * 6
         ((1.5, SIX, True), 'speed_slider_mask is 1.5'),
         ((1, SIX[1:], True), 'external_force_torque'),
         ((1, 1.0, True), 'external_force_torque'),
-        ((1, SIX), '2 values do not fill'),
+        ((1, SIX), 'cannot take 2 values'),
         ((10**400, SIX, True), 'UINT32'),
     ],
 )

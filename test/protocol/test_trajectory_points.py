@@ -227,7 +227,7 @@ FIELD_ERRORS = [
     (MoveL(target=Pose(), velocity=float('inf')), 'velocity is inf'),
     (MoveL(target=Pose(), blend_radius=-0.1), 'blend_radius is -0.1'),
     (MoveL(target=Pose(), duration=2147.4836471), 'duration is 2147.4836471'),
-    (MoveL(target=ZERO6, q_near=ZERO6), 'a q_near goes with a pose only'),
+    (MoveL(target=ZERO6, q_near=ZERO6), 'only poses can have a q_near'),
     (OptimoveL(target=Pose(), velocity=1.5), 'velocity is 1.5'),
     (
         Spline(target=ZERO6, velocities=(0.0, 3e3, 0.0, 0.0, 0.0, 0.0), duration=1.0),

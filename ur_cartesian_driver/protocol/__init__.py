@@ -3,7 +3,7 @@
 """
 The robot's wire protocols: bytes to messages and back, one module for each interface.
 
-Nothing here opens a socket, reads a clock or logs. Bytes that come in go to a decoder's ``feed``,
-which returns messages (``b''`` is the end of the stream); messages that go out become bytes. Both
-ends of every connection are covered, because the simulated controller is the other end.
+Nothing here opens a socket, reads a clock or logs. A decoder's ``feed`` takes received bytes
+(``b''`` is the end of the stream) and returns messages; messages to send become bytes. Both ends
+of every connection are covered, because the simulated controller is the other end.
 """

@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The dashboard: one line asks, one line answers.
+The dashboard (29999): a command is one line of text, and so is its reply.
 
-The server greets with one line. Then each command, a line of text, gets exactly one line in
-return, in order; there is nothing else that joins the two. A command that is refused is answered
-by a sentence for people, so success is recognised by its form (:data:`COMMAND_SPECS`).
+The server greets with one line. Then it answers each command with exactly one line, in order;
+nothing else links reply and command. The reply to a refused command is a sentence for people, so
+success is recognized by its form (:data:`COMMAND_SPECS`).
 
-Which commands there are depends on the software: CB3 robots count to 3, e-Series robots from 5.
-PolyScope X has no dashboard.
+The available commands depend on the software: CB3 robots have versions up to 3, e-Series robots
+from 5. PolyScope X has no dashboard.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from ur_cartesian_driver.protocol.framing import LineBuffer
 BANNER = 'Connected: Universal Robots Dashboard Server'
 #: Longest line in either direction [bytes].
 MAX_LINE_LENGTH = 8192
-#: Most commands that may wait for their answers.
+#: Most commands that may wait for their replies.
 MAX_PENDING_REQUESTS = 64
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CommandSpec:
     """
-    A command and what its success looks like.
+    A command and its reply on success.
 
-    :param reply: the answer, with ``{}`` for the part that tells something.
-    :param takes: whether a text follows the command.
-    :param cb3: first software of a CB3 robot that has it; None = none has.
-    :param e_series: the same of an e-Series robot.
+    :param reply: the reply, with ``{}`` for its value.
+    :param takes_argument: whether a text follows the command.
+    :param cb3: first CB3 software that has the command; None = none has.
+    :param e_series: the same for e-Series.
     """
 
     reply: str
@@ -46,17 +46,17 @@ class CommandSpec:
     e_series: tuple[int, int] | None = (5, 0)
 
     def reply_pattern(self) -> re.Pattern[str]:
-        """Return what matches the whole answer; group 1 is the telling part."""
+        """Return a pattern of the whole reply; group 1 is the value."""
         before, value, after = self.reply.partition('{}')
         return re.compile(re.escape(before) + ('(.*)' if value else '') + re.escape(after))
 
     def is_available(self, version: tuple[int, int]) -> bool:
-        """Tell whether software of a version has the command."""
+        """Tell whether a software version has the command."""
         min_version = self.cb3 if version < (5, 0) else self.e_series
         return min_version is not None and version >= min_version
 
 
-#: All commands of the dashboard that we know.
+#: All known dashboard commands.
 COMMAND_SPECS: Mapping[str, CommandSpec] = MappingProxyType(
     {
         'load': CommandSpec(reply='Loading program: {}', takes_argument=True, cb3=(1, 4)),
@@ -113,7 +113,7 @@ COMMAND_SPECS: Mapping[str, CommandSpec] = MappingProxyType(
     }
 )
 
-#: Answers that have no words of their own, by the forms that are possible.
+#: Possible values of replies that consist of nothing else.
 _VALUE_PATTERNS: Mapping[str, re.Pattern[str]] = MappingProxyType(
     {
         'running': re.compile('true|false'),
@@ -133,16 +133,16 @@ _NAMES = sorted(COMMAND_SPECS, key=len, reverse=True)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DashboardRequest:
-    """A command with its text."""
+    """A command with its argument."""
 
     name: str
     argument: str = ''
 
     def __post_init__(self) -> None:
-        """Check that it is one line of a command that exists."""
+        """Check that the command exists and is one line."""
         spec = COMMAND_SPECS.get(self.name)
         if spec is None:
-            raise LocalProtocolError(f'{self.name!r} is not a command of the dashboard.')
+            raise LocalProtocolError(f'{self.name!r} is not a dashboard command.')
         if '\n' in self.argument or '\r' in self.argument:
             raise LocalProtocolError(
                 f'{self.name} takes one line of text, but it got {self.argument!r}.'
@@ -161,10 +161,10 @@ class DashboardRequest:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DashboardReply:
     """
-    An answer and the command that it belongs to.
+    A reply and the command that it belongs to.
 
     :param text: the line.
-    :param value: its telling part when the command succeeded ('' if there is none), else None.
+    :param value: its value if the command succeeded ('' if it has none), otherwise None.
     """
 
     request: DashboardRequest
@@ -185,7 +185,7 @@ class DashboardGreeting:
 
 
 def parse_reply(request: DashboardRequest, line: str) -> DashboardReply:
-    """Return what an answer means."""
+    """Return the meaning of a reply."""
     match = COMMAND_SPECS[request.name].reply_pattern().fullmatch(line.rstrip())
     value = None if match is None else ''.join(match.groups())
     value_pattern = _VALUE_PATTERNS.get(request.name)
@@ -195,7 +195,7 @@ def parse_reply(request: DashboardRequest, line: str) -> DashboardReply:
 
 
 class DashboardClientCodec:
-    """The asking side: joins answers to commands by their order."""
+    """The client: matches replies with commands by their order."""
 
     def __init__(self) -> None:
         """Wait for the greeting."""
@@ -205,24 +205,24 @@ class DashboardClientCodec:
 
     def send(self, name: str, argument: str = '') -> bytes:
         """
-        Return the line of a command and remember that it wants an answer.
+        Return the line of a command and remember that its reply is due.
 
-        :raises LocalProtocolError: there is no such command, or too many wait for an answer.
+        :raises LocalProtocolError: there is no such command, or too many wait for a reply.
         """
         request = DashboardRequest(name=name, argument=argument)
         if len(self._pending) >= MAX_PENDING_REQUESTS:
             raise LocalProtocolError(
-                f'{MAX_PENDING_REQUESTS} dashboard commands wait for an answer; connect anew.'
+                f'{MAX_PENDING_REQUESTS} dashboard commands wait for a reply; reconnect.'
             )
         self._pending.append(request)
         return request.encode()
 
     def feed(self, data: bytes) -> list[DashboardGreeting | DashboardReply]:
         """
-        Take bytes from the server (none at all = its end) and return the answers in them.
+        Take bytes from the server (none at all = its end) and return the replies in them.
 
-        :raises RemoteProtocolError: an answer to nothing, a line that is too long or cut off, or
-            the end while a command waits.
+        :raises RemoteProtocolError: a reply without a command, a line that is too long or
+            truncated, or the end while a command waits.
         """
         events: list[DashboardGreeting | DashboardReply] = []
         lines = self._lines.feed(data)
@@ -238,12 +238,14 @@ class DashboardClientCodec:
             elif self._pending:
                 events.append(parse_reply(self._pending.popleft(), line))
             else:
-                raise RemoteProtocolError(f'The dashboard said {line!r:.100} without being asked.')
+                raise RemoteProtocolError(
+                    f'The dashboard sent {line!r:.100}, but no command waits for a reply.'
+                )
         return events
 
 
 class DashboardServerCodec:
-    """The answering side: reads commands; answer with :func:`success` or in free words."""
+    """The server: decodes commands; reply with :func:`success` or any text."""
 
     def __init__(self) -> None:
         """Start empty."""
@@ -253,7 +255,7 @@ class DashboardServerCodec:
         """
         Take bytes from a client (none at all = its end) and return its commands.
 
-        A line that is no command is returned as it is; it wants an answer too
+        A line that is not a command is returned as it is; it needs a reply, too
         (:func:`not_understood`).
 
         :raises RemoteProtocolError: a line is too long, or the stream ended inside one.
@@ -262,7 +264,7 @@ class DashboardServerCodec:
 
 
 def parse_request(line: str) -> DashboardRequest | str:
-    """Return the command of a line, or the line when it is none."""
+    """Return the command of a line, or the line if it is not a command."""
     for name in _NAMES:
         if line == name or line.startswith(name + ' '):
             try:
@@ -279,9 +281,9 @@ def encode_line(text: str) -> bytes:
 
 def success(request: DashboardRequest, value: str | None = None) -> bytes:
     """
-    Return the answer that says a command succeeded.
+    Return the reply to a command that succeeded.
 
-    :param value: the telling part; None = the text that came with the command.
+    :param value: the value; None = the argument of the command.
     """
     return encode_line(
         COMMAND_SPECS[request.name].reply.replace(
@@ -291,5 +293,5 @@ def success(request: DashboardRequest, value: str | None = None) -> bytes:
 
 
 def not_understood(line: str) -> bytes:
-    """Return the answer to a line that is no command."""
+    """Return the reply to a line that is not a command."""
     return encode_line(f"could not understand: '{line}'")

@@ -1,15 +1,15 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What all wire formats share: fixed-point numbers and bounded buffers.
+Basics of all wire formats: fixed-point numbers and bounded buffers.
 
-Every number on the robot program's sockets is a big-endian int32, most of them a value times
-1,000,000. A value that does not fit raises here, before a byte is sent; the robot would see a
+Every number on the robot program's sockets is a big-endian int32, usually a value times 1,000,000.
+A value that does not fit raises an error before a byte is sent; otherwise the robot would read a
 wrapped number and move there.
 
-A stream is cut into records (of one size), frames (with their size in front) or lines. Each buffer
-holds at most one incomplete unit, of a bounded size, so a peer that sends nonsense cannot make us
-grow. A stream that ends inside a unit is an error, because something was lost.
+A stream is cut into records (of one size), frames (that begin with their size) or lines. Each
+buffer holds at most one incomplete unit, of a bounded size, so a peer that sends nonsense cannot
+exhaust the memory. A stream that ends inside a unit is an error, because something was lost.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Generic, TypeVar
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
 
-#: What a value is multiplied by before it is rounded to an integer.
+#: Factor of a value before it is rounded to an integer.
 FIXED_POINT = 1_000_000
 
 INT32_MIN = -(2**31)
@@ -29,23 +29,23 @@ INT32_MAX = 2**31 - 1
 T = TypeVar('T')
 E = TypeVar('E', bound=IntEnum)
 
-#: Longest piece of a stream that an error text quotes [bytes].
+#: Most bytes of a stream that an error text quotes.
 _MAX_QUOTED = 48
 
 
 def to_fixed(value: float, field: str, scale: int = FIXED_POINT) -> int:
     """
-    Return the int32 that stands for a value, ties rounded away from zero.
+    Return the int32 of a value, ties rounded away from zero.
 
-    :param field: the name for the error text.
+    :param field: its name, for the error text.
     :raises LocalProtocolError: the value is not finite or does not fit.
     """
     scaled = value * scale
-    # Written so that NaN fails. The rounding below moves a number by half a unit at most.
+    # NaN fails this comparison. The rounding below moves a number by at most half a unit.
     if not INT32_MIN - 0.5 < scaled < INT32_MAX + 0.5:
         raise range_error(value, field, scale)
     whole = int(scaled)
-    # The difference is exact, while adding 0.5 first would round 0.49999999999999994 up.
+    # The difference is exact; adding 0.5 first would round 0.49999999999999994 up.
     rest = scaled - whole
     if rest >= 0.5:
         return whole + 1
@@ -53,12 +53,12 @@ def to_fixed(value: float, field: str, scale: int = FIXED_POINT) -> int:
 
 
 def from_fixed(raw: int, scale: int = FIXED_POINT) -> float:
-    """Return the value that an int32 stands for."""
+    """Return the value of an int32."""
     return raw / scale
 
 
 def range_error(value: float, field: str, scale: int = FIXED_POINT) -> LocalProtocolError:
-    """Return the error for a value that no int32 can stand for."""
+    """Return the error for a value that does not fit into an int32."""
     return LocalProtocolError(
         f'{field} is {value!r}, but only finite numbers from {INT32_MIN / scale!r} to '
         f'{INT32_MAX / scale!r} can be sent to the robot.'
@@ -67,7 +67,7 @@ def range_error(value: float, field: str, scale: int = FIXED_POINT) -> LocalProt
 
 def checked_int32(value: int, field: str) -> int:
     """
-    Return an integer that is sent as it is.
+    Return an integer that is sent unscaled.
 
     :raises LocalProtocolError: the value does not fit.
     """
@@ -80,20 +80,20 @@ def checked_int32(value: int, field: str) -> int:
 
 
 def hex_text(data: bytes) -> str:
-    """Return bytes as hexadecimal digits for an error text, cut when they are many."""
+    """Return bytes as hexadecimal digits for an error text, truncated if they are many."""
     text = data[:_MAX_QUOTED].hex()
     return f'{text}... ({len(data)} bytes)' if len(data) > _MAX_QUOTED else text or 'no bytes'
 
 
 def checked_size(data: bytes, size: int, what: str) -> bytes:
     """
-    Return a record of one fixed size.
+    Return a record whose size was checked.
 
     :raises RemoteProtocolError: the record has another size.
     """
     if len(data) != size:
         raise RemoteProtocolError(
-            f'A {what} has {size} bytes, but {len(data)} came: {hex_text(data)}.'
+            f'A {what} has {size} bytes, but {len(data)} arrived: {hex_text(data)}.'
         )
     return data
 
@@ -182,7 +182,7 @@ def encode_result(result: IntEnum) -> bytes:
 
 class FrameBuffer:
     """
-    Cuts a stream into frames that start with their own total size, big-endian.
+    Cuts a stream into frames that begin with their own total size, big-endian.
 
     ::
 
@@ -196,10 +196,10 @@ class FrameBuffer:
         """
         Start empty.
 
-        :param width: bytes of the size field.
-        :param smallest: least size of a frame [bytes].
-        :param largest: greatest size that is believed [bytes]; it bounds the memory.
-        :param what: what the frames are, for error texts.
+        :param size_width: bytes of the size field.
+        :param min_size: smallest size of a frame [bytes].
+        :param max_size: largest size that is accepted [bytes]; it bounds the memory.
+        :param what: what a frame is, for error texts.
         """
         self._width = size_width
         self._bounds = (min_size, max_size)
@@ -231,7 +231,7 @@ class FrameBuffer:
         return frames
 
     def _size_at(self, start: int) -> int:
-        """Return the size of the frame that starts there; 0 = not known yet."""
+        """Return the size of the frame at an offset; 0 = not known yet."""
         head = self._buffer[start : start + self._width]
         if len(head) < self._width:
             return 0
@@ -239,8 +239,8 @@ class FrameBuffer:
         min_size, max_size = self._bounds
         if not min_size <= size <= max_size:
             raise RemoteProtocolError(
-                f'A {self._what} says that it has {size} bytes, but only {min_size} to {max_size} '
-                f'are possible: {hex_text(bytes(self._buffer[start:]))}.'
+                f'The size of a {self._what} is given as {size} bytes, but only {min_size} to '
+                f'{max_size} are possible: {hex_text(bytes(self._buffer[start:]))}.'
             )
         return size
 
@@ -249,15 +249,15 @@ class LineBuffer:
     """
     Cuts a stream into lines of text; a carriage return before the line feed is dropped.
 
-    Bytes that are not UTF-8 appear as backslash escapes: an odd character in a text for people is
-    no reason to give up a connection.
+    Bytes that are not UTF-8 appear as backslash escapes: an odd character in a text for people
+    does not end a connection.
     """
 
     def __init__(self, limit: int = 65536) -> None:
         """
         Start empty.
 
-        :param limit: longest line that is believed [bytes]; it bounds the memory.
+        :param limit: longest line that is accepted [bytes]; it bounds the memory.
         """
         self._limit = limit
         self._rest = b''
@@ -287,15 +287,15 @@ def decode_text(data: bytes) -> str:
     return data.decode('utf-8', 'backslashreplace')
 
 
-#: Longest text of a robot that is shown to people.
+#: Longest text of a robot that people get to see.
 _MAX_SHOWN = 400
 
 
 def to_single_line(text: str) -> str:
     """
-    Return a text of a robot as it may stand in a log or a message: one line, of bounded length.
+    Return a text of a robot for a log or a message: one line of bounded length.
 
-    Control characters could forge lines, or speak to the terminal.
+    Control characters are removed: they could forge lines or control the terminal.
     """
     shown = ''.join(c if c.isprintable() else ' ' for c in text[:_MAX_SHOWN]).strip()
     return f'{shown}...' if len(text) > _MAX_SHOWN else shown

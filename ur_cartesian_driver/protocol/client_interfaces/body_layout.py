@@ -40,7 +40,7 @@ def unpack(layout: struct.Struct, body: bytes, what: str, offset: int = 0) -> tu
     """
     if len(body) < offset + layout.size:
         raise RemoteProtocolError(
-            f'A {what} has at least {offset + layout.size} bytes, but {len(body)} came: '
+            f'A {what} has at least {offset + layout.size} bytes, but {len(body)} arrived: '
             f'{hex_text(body)}.'
         )
     return layout.unpack_from(body, offset)

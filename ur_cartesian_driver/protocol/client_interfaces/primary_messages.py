@@ -3,14 +3,13 @@
 """
 The primary interface: state and messages from the controller, programs and commands to it.
 
-To us: frames, big-endian. ``int32`` size of the whole frame, ``uint8`` type, body.
+From the controller: frames, big-endian. ``int32`` size of the whole frame, ``uint8`` type, body.
 
-* type 16, robot state: sub-packages, see `primary_state`; ten
-  times a second.
+* type 16, robot state: sub-packages, see `primary_state`; ten times a second.
 * type 20, robot message: ``u64`` timestamp, ``i8`` source, ``u8`` message type, then
 
   ====  ==================  ====================================================================
-  type  class               body (texts run to the end of the frame, without terminator)
+  type  class               body (texts extend to the end of the frame, without terminator)
   ====  ==================  ====================================================================
   0     TextMessage         text
   3     VersionMessage      i8 length, name; u8 major, u8 minor, i32 bugfix, i32 build; date
@@ -22,14 +21,14 @@ To us: frames, big-endian. ``int32`` size of the whole frame, ``uint8`` type, bo
   10    RuntimeException    u32 line, u32 column (from 1); text
   ====  ==================  ====================================================================
 
-* everything else is passed on as :class:`RawFrame`.
+* every other type becomes a :class:`RawFrame`.
 
 To the controller: text. A line is a command; ``def`` or ``sec`` begins a program, which replaces
-the running one (``sec``: runs beside it) when its ``end`` has come.
+the running one (``sec``: runs beside it) when its ``end`` has arrived.
 
-Obligations of a controller towards the manufacturer's library: the version message first on each
-connection; a frame in one piece and at most 4091 bytes long (checked here); never a sub-package
-that is too short; a safety-mode message on a change only.
+Obligations of a controller towards the manufacturer's library: send the version message first on
+each connection; send a frame in one piece of at most 4091 bytes (checked here); never send a
+sub-package that is too short; send a safety mode message only when the mode changes.
 """
 
 from __future__ import annotations
@@ -64,7 +63,7 @@ class FrameType(IntEnum):
 
 
 class ReportLevel(IntEnum):
-    """How bad an error is; from 128 the same for developers."""
+    """Severity of an error; the levels from 128 are for developers."""
 
     DEBUG = 0
     INFO = 1
@@ -80,11 +79,11 @@ class ReportLevel(IntEnum):
     DEVL_CRITICAL_FAULT = 133
 
 
-#: Largest frame that the manufacturer's library can read.
+#: Longest frame that the manufacturer's library can read [bytes].
 MAX_SENT_FRAME_SIZE = 4091
-#: Frames with the values of all variables of a program can be long.
+#: Longest frame that is accepted; frames with all variables of a program can be long [bytes].
 MAX_FRAME_SIZE = 1 << 20
-#: Sources of messages: the controller, and its motion control.
+#: Sources of messages: the controller and its motion control.
 SOURCE_CONTROLLER = -2
 SOURCE_MOTION = -3
 
@@ -127,7 +126,7 @@ class VersionMessage(_Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SafetyModeMessage(_Message):
-    """The safety mode changed to a number of :class:`SafetyMode`, or a newer one."""
+    """The safety mode changed, to a number of :class:`SafetyMode` or a newer one."""
 
     message_type: ClassVar = 5
     layout: ClassVar = BodyLayout('i i B I 4s', 'safety mode message')
@@ -157,7 +156,7 @@ class SafetyModeMessage(_Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorCodeMessage(_Message):
-    """An error of the controller; ``level`` is a number of :class:`ReportLevel`, or newer."""
+    """An error of the controller; ``level`` is a :class:`ReportLevel` or a newer number."""
 
     message_type: ClassVar = 6
     layout: ClassVar = BodyLayout('i i i I I text', 'error code message')
@@ -176,7 +175,7 @@ class ErrorCodeMessage(_Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeyMessage(_Message):
-    """An event by name, as ``PROGRAM_XXX_STARTED`` or ``..._STOPPED`` with a program's name."""
+    """A named event, such as ``PROGRAM_XXX_STARTED`` or ``..._STOPPED`` with a program's name."""
 
     message_type: ClassVar = 7
     layout: ClassVar = BodyLayout('i i B:text text', 'key message')
@@ -189,7 +188,7 @@ class KeyMessage(_Message):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RuntimeExceptionMessage(_Message):
-    """A program did not compile or failed at a place (line and column from 1)."""
+    """A program failed, or did not compile, at a line and column (from 1)."""
 
     message_type: ClassVar = 10
     layout: ClassVar = BodyLayout('I I text', 'runtime exception message')
@@ -262,7 +261,7 @@ def encode_message(message: PrimaryMessage) -> bytes:
 
 def decode_frame(data: bytes) -> PrimaryFrame:
     """
-    Return the content of one whole frame; the size field is not looked at.
+    Return the content of one whole frame; its size field is not checked.
 
     :raises RemoteProtocolError: something is shorter than it must be.
     """
@@ -276,7 +275,7 @@ def decode_frame(data: bytes) -> PrimaryFrame:
 
 
 class PrimaryDecoder:
-    """Reads what the controller sends."""
+    """Decodes what the controller sends."""
 
     def __init__(self) -> None:
         """Start empty."""
@@ -298,7 +297,7 @@ def _frame(frame_type: FrameType, body: bytes) -> bytes:
     size = _HEADER.size + len(body)
     if size > MAX_SENT_FRAME_SIZE:
         raise LocalProtocolError(
-            f'A primary frame has {size} bytes, but clients read {MAX_SENT_FRAME_SIZE} at most.'
+            f'A primary frame has {size} bytes, but clients read at most {MAX_SENT_FRAME_SIZE}.'
         )
     return _HEADER.pack(size, frame_type) + body
 
@@ -319,11 +318,11 @@ _MESSAGES: Mapping[int, type[_TypedMessage]] = {
 
 
 class PrimaryCommand(Enum):
-    """Commands of one line that need no program."""
+    """Commands of one line, outside programs."""
 
     POWER_ON = 'power on'
     POWER_OFF = 'power off'
-    #: Power on, if need be, and release the brakes.
+    #: Power on if necessary, and release the brakes.
     RUN = 'set robotmode run'
     UNLOCK_PROTECTIVE_STOP = 'set unlock protective stop'
     STOP_PROGRAM = 'stop program'
@@ -339,7 +338,7 @@ def encode_program(program_text: str) -> bytes:
     return program_text.encode() + b'\n'
 
 
-#: Longest program that is believed [bytes]; it bounds the memory.
+#: Longest program that is accepted [bytes]; it bounds the memory.
 MAX_PROGRAM_SIZE = 4 << 20
 
 _FIRST_WORD = re.compile(r'\s*(\w+)')
@@ -349,10 +348,10 @@ _BLOCK_WORDS = frozenset({'def', 'sec', 'thread', 'if', 'while', 'for', 'switch'
 
 class ScriptUploadDecoder:
     """
-    Reads what a client sends to the controller: commands and whole programs.
+    Decodes what a client sends to the controller: commands and whole programs.
 
-    A program ends with the ``end`` that closes its ``def`` or ``sec``, whatever its indentation.
-    One that is cut off by the end of the stream is passed on as it is, and will not compile.
+    A program ends with the ``end`` that closes its ``def`` or ``sec``, at any indentation. If the
+    stream ends inside a program, the received part is returned; it will not compile.
     """
 
     def __init__(self) -> None:
@@ -366,7 +365,7 @@ class ScriptUploadDecoder:
         """
         Take bytes from a client (none at all = its end) and return commands and programs.
 
-        :raises RemoteProtocolError: a program or line is too long to be meant.
+        :raises RemoteProtocolError: a program or line is too long.
         """
         *lines, self._rest = (self._rest + (data or b'\n')).split(b'\n')
         texts = [text for line in lines if (text := self._line(line)) is not None]

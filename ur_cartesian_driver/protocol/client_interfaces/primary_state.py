@@ -3,15 +3,15 @@
 """
 The sub-packages of a robot state frame on the primary interface.
 
-Each is ``uint32`` size (these five bytes included), ``uint8`` type, body; big-endian. A UR5e sends
-them in the order and sizes of this table, 1386 bytes with the frame's header. A reader takes what
-it knows from the front of a body: newer software appends to it, but never sends less.
+Each is ``uint32`` size (including these five bytes), ``uint8`` type, body; big-endian. A UR5e
+sends them in the order and sizes of this table, 1386 bytes with the frame's header. We decode the
+known part at the front of a body: newer software appends to it, but never sends less.
 
 ====  ====================  ====  ===============================================================
 type  class                 size  body
 ====  ====================  ====  ===============================================================
 0     RobotModeData         47    u64 timestamp; 7 flags; i8 robot mode; u8 control mode;
-                                  f64 target speed fraction, speed scaling, greatest fraction;
+                                  f64 target speed fraction, speed scaling, max fraction;
                                   1 reserved
 1     JointData             251   6 x (f64 q, q target, qd; f32 current, voltage, temperature,
                                   not used; u8 mode)
@@ -96,7 +96,7 @@ class RawSubPackage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotModeData(Body):
-    """Power, stops and program; ``robot_mode`` is a number of :class:`RobotMode`, or newer."""
+    """Power, stops and program; ``robot_mode`` is a :class:`RobotMode` or a newer number."""
 
     sub_type: ClassVar = 0
     layout: ClassVar = BodyLayout('Q ? ? ? ? ? ? ? b B d d d', 'robot mode data', padding=1)
@@ -117,7 +117,7 @@ class RobotModeData(Body):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointData:
-    """Joints: positions [rad], velocities [rad/s], currents [A], voltages [V], motors [deg C]."""
+    """Joints [rad, rad/s]: currents [A], voltages [V], motor temperatures [deg C]."""
 
     sub_type: ClassVar = 1
     q_actual: Vector6
@@ -146,7 +146,7 @@ class JointData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToolData(Body):
-    """The tool connector: inputs [V or A by range], voltages [V], current [A], heat [deg C]."""
+    """Tool connector: inputs [V or A, by range], voltages [V], current [A], heat [deg C]."""
 
     sub_type: ClassVar = 2
     layout: ClassVar = BodyLayout('2B 2d f B f f B', 'tool data')
@@ -161,7 +161,7 @@ class ToolData(Body):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImmiData(Body):
-    """The injection moulding machine interface (Euromap 67): bits, supply [V], current [A]."""
+    """Injection moulding machine interface (Euromap 67): bits, supply [V], current [A]."""
 
     layout: ClassVar = BodyLayout('I I f f', 'masterboard data')
     input_bits: int = 0
@@ -179,8 +179,8 @@ class MasterboardData:
     domains, 2 f64 outputs, f32 temperature [deg C], voltage 48 V [V], current of the robot [A], of
     the IO [A], u8 safety mode, flag reduced, flag IMMI; with IMMI: u32 inputs, u32 outputs, f32
     voltage, f32 current; u32 reserved, u8 operational mode selector, flag three-position switch,
-    1 reserved. Older software ends before the selector. ``safety_mode`` is a number of
-    :class:`SafetyMode`, or a newer one.
+    1 reserved. Older software ends before the selector. ``safety_mode`` is a :class:`SafetyMode`
+    or a newer number.
     """
 
     sub_type: ClassVar = 3
@@ -221,7 +221,7 @@ class MasterboardData:
         if has_immi:
             immi = ImmiData.decode(body[offset:])
             offset += ImmiData.layout.size
-        if len(body) >= offset + 4:  # older software ends behind the reserved word
+        if len(body) >= offset + 4:  # older software ends after the reserved word
             body = body.ljust(offset + _BOARD_TAIL.size, b'\0')
         values = [*head, immi, *_BOARD_TAIL.unpack(body, offset)]
         return cls(**dict(zip(cls.__slots__, values, strict=True)))
@@ -229,7 +229,7 @@ class MasterboardData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CartesianInfo(Body):
-    """The TCP in the base, and in the flange: ``x y z rx ry rz`` [m, rad]."""
+    """TCP in the base and in the flange: ``x y z rx ry rz`` [m, rad]."""
 
     sub_type: ClassVar = 4
     layout: ClassVar = BodyLayout('6d 6d', 'Cartesian info')
@@ -240,7 +240,7 @@ class CartesianInfo(Body):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KinematicsInfo(Body):
     """
-    The Denavit-Hartenberg parameters of this very arm [m, rad], as calibrated in the factory.
+    Denavit-Hartenberg parameters of this arm [m, rad], as calibrated in the factory.
 
     :param status: 0 = the checksums are right.
     """
@@ -258,9 +258,9 @@ class KinematicsInfo(Body):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConfigurationData:
     """
-    What the arm is and may do.
+    Model and limits of the arm.
 
-    Body: 6 x 2 f64 position limits [rad]; 6 x 2 f64 greatest speed [rad/s] and acceleration
+    Body: 6 x 2 f64 position limits [rad]; 6 x 2 f64 max speed [rad/s] and acceleration
     [rad/s^2]; f64 default speeds and accelerations of joints and tool, radius for tool rotations
     [m]; 6 f64 each: a, d, alpha, theta [m, rad]; i32 masterboard version, type of the controller
     box, type of the robot, sub type; 0 to 2 i16 reserved.
@@ -280,7 +280,7 @@ class ConfigurationData:
     theta: Vector6
     masterboard_version: int = 6
     controller_box_type: int = 4
-    #: A number of :class:`RobotType`, or a newer one.
+    #: A :class:`RobotType` or a newer number.
     robot_type: int
     robot_sub_type: int = 0
     reserved: tuple[int, ...] = ()
@@ -304,7 +304,7 @@ class ConfigurationData:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceModeData(Body):
-    """Force [N] and torque [Nm] at the TCP, and a measure of the distance to singularities."""
+    """Force [N] and torque [Nm] at the TCP, and a measure of distance to singularities."""
 
     sub_type: ClassVar = 7
     layout: ClassVar = BodyLayout('6d d', 'force mode data')
@@ -314,7 +314,7 @@ class ForceModeData(Body):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AdditionalInfo(Body):
-    """Buttons for freedrive."""
+    """Freedrive buttons."""
 
     sub_type: ClassVar = 8
     layout: ClassVar = BodyLayout('? ? ? B', 'additional info')
@@ -326,7 +326,7 @@ class AdditionalInfo(Body):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CalibrationData(Body):
-    """Six numbers for the manufacturer's own use."""
+    """Six numbers for the manufacturer only."""
 
     sub_type: ClassVar = 9
     layout: ClassVar = BodyLayout('6d', 'calibration data')
@@ -335,7 +335,7 @@ class CalibrationData(Body):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToolCommunication(Body):
-    """The serial port of the tool connector."""
+    """Serial port of the tool connector."""
 
     sub_type: ClassVar = 11
     layout: ClassVar = BodyLayout('? i i i f f', 'tool communication info')
@@ -349,7 +349,7 @@ class ToolCommunication(Body):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToolModeInfo(Body):
-    """How the outputs of the tool connector are driven."""
+    """Modes of the tool connector's outputs."""
 
     sub_type: ClassVar = 12
     layout: ClassVar = BodyLayout('B B B', 'tool mode info')
@@ -358,7 +358,7 @@ class ToolModeInfo(Body):
     digital_output_mode_1: int = 1
 
 
-#: The content is the manufacturer's own; only the size is known.
+#: The content is for the manufacturer only; we know its size.
 SAFETY_DATA = RawSubPackage(sub_type=10, body=bytes(38))
 
 SubPackage: TypeAlias = (
@@ -388,10 +388,10 @@ def decode_sub_packages(body: bytes) -> tuple[SubPackage, ...]:
     """
     Return the sub-packages of a state frame without the frame's header.
 
-    Types 0, 3, 5 and 6 are read, because the driver needs them. The others stay raw: their size
-    varies with the software, and ``decode`` of their class reads them where that is wanted.
+    Types 0, 3, 5 and 6 are decoded, because the driver needs them. The others stay raw: their size
+    depends on the software; ``decode`` of their class decodes them on request.
 
-    :raises RemoteProtocolError: a size is impossible, or a body that is read is too short.
+    :raises RemoteProtocolError: a size is impossible, or a decoded body is too short.
     """
     packages: list[SubPackage] = []
     start = 0
@@ -399,8 +399,8 @@ def decode_sub_packages(body: bytes) -> tuple[SubPackage, ...]:
         size, sub_type = unpack(_SUB_HEADER, body, 'state sub-package', start)
         if not _SUB_HEADER.size <= size <= len(body) - start:
             raise RemoteProtocolError(
-                f'A state sub-package says that it has {size} bytes, but {len(body) - start} '
-                f'are left: {hex_text(body[start:])}.'
+                f'The size of a state sub-package is given as {size} bytes, but '
+                f'{len(body) - start} are left: {hex_text(body[start:])}.'
             )
         content = body[start + _SUB_HEADER.size : start + size]
         reader = _READ.get(sub_type)

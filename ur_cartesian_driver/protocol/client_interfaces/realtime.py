@@ -3,10 +3,9 @@
 """
 The packet of the real-time interface (port 30003), which the controller sends in every cycle.
 
-``int32`` size (these four bytes included), then big-endian doubles only, also for what is a whole
-number: modes, and the bits of inputs and outputs as the number that they make. Software has grown
-the packet at its end and never changed what stands before, so one table describes all versions
-and the size says where a packet stops::
+``int32`` size (including these four bytes), then big-endian doubles only, also for integers:
+modes, and the bits of inputs and outputs as one number. Newer software appended fields and never
+changed earlier ones, so one table describes all versions, and the size tells where a packet ends::
 
     size [bytes]   from PolyScope    the last field
     1060           3.2               program_state
@@ -15,7 +14,7 @@ and the size says where a packet stops::
     1140           3.14, 5.9         three values for the manufacturer only
     1220           5.10              payload_inertia
 
-From the manufacturer's tables of the client interfaces, as far as those are public.
+From the manufacturer's public tables of the client interfaces.
 """
 
 from __future__ import annotations
@@ -51,13 +50,13 @@ _SIZE = struct.Struct('>i')
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RealtimeData:
     """
-    One packet, its fields in the order of the wire; older packets leave the last ones at 0.
+    One packet, its fields in the order of the wire; fields that an older packet lacks are 0.
 
     Joints in rad, rad/s, rad/s^2, A, Nm, V; poses of the TCP and twists in the base frame in m,
     rad (rotation vector), m/s, rad/s. ``reserved_*`` are for the manufacturer only.
     """
 
-    #: Since the controller has started [s].
+    #: Since the start of the controller [s].
     time: float
     q_target: Vector6 = ZERO6
     qd_target: Vector6 = ZERO6
@@ -77,7 +76,7 @@ class RealtimeData:
     digital_input_bits: float = 0.0
     #: [degrees Celsius]
     joint_temperatures: Vector6 = ZERO6
-    #: What the cycle took the controller [s].
+    #: Computing time of the cycle [s].
     controller_timer: float = 0.0
     reserved_test: float = 0.0
     robot_mode: float = 0.0
@@ -111,7 +110,7 @@ class RealtimeData:
         """
         Return the packet.
 
-        :param size: see :func:`packet_size`; what does not fit into it is left out.
+        :param size: see :func:`packet_size`; fields beyond it are omitted.
         :raises LocalProtocolError: no packet has this size.
         """
         if size not in PACKET_SIZES:
@@ -125,9 +124,9 @@ class RealtimeData:
 
 def packet_size(version: tuple[int, ...]) -> int:
     """
-    Return how long the packets of a controller are [bytes].
+    Return the size of a controller's packets [bytes].
 
-    :param version: of PolyScope: major, minor, and more that does not matter.
+    :param version: of PolyScope: major, minor; further numbers are ignored.
     """
     found = _PACKET_SIZES[0][1]
     for first, size in _PACKET_SIZES:
@@ -138,14 +137,15 @@ def packet_size(version: tuple[int, ...]) -> int:
 
 def decode_packet(data: bytes) -> RealtimeData:
     """
-    Read one packet, its size included; what a newer one has behind our last field is left out.
+    Decode one packet with its size; fields of newer packets after our last one are ignored.
 
     :raises RemoteProtocolError: the size is wrong.
     """
     stated = _SIZE.unpack_from(data)[0] if len(data) >= _SIZE.size else 0
     if stated != len(data) or stated < min(PACKET_SIZES) or (stated - _SIZE.size) % 8:
         raise RemoteProtocolError(
-            f'A real-time packet of {len(data)} bytes says that it has {stated}: {hex_text(data)}.'
+            f'A real-time packet of {len(data)} bytes gives its size as {stated}: '
+            f'{hex_text(data)}.'
         )
     count = min(_count(stated), _ENDS[-1])
     numbers = struct.unpack_from(f'>{count}d', data, _SIZE.size)
@@ -153,7 +153,7 @@ def decode_packet(data: bytes) -> RealtimeData:
     for field, length, end in zip(fields(RealtimeData), _LENGTHS, _ENDS, strict=True):
         if end <= count:
             values[field.name] = numbers[end - 1] if length == 1 else numbers[end - length : end]
-    # `_LENGTHS` says which fields are tuples; mypy cannot follow names that come from `fields`.
+    # `_LENGTHS` knows which fields are tuples; mypy cannot check names that come from `fields`.
     return RealtimeData(**values)  # type: ignore[arg-type]
 
 
@@ -161,21 +161,22 @@ class RealtimeDecoder:
     """Cuts a stream into packets."""
 
     def __init__(self) -> None:
-        """Begin with nothing."""
+        """Start empty."""
         self._rest = b''
 
     def feed(self, data: bytes) -> Iterator[RealtimeData]:
         """
-        Yield the packets that are complete now.
+        Yield the packets that are complete.
 
-        :raises RemoteProtocolError: a size is none that a packet has.
+        :raises RemoteProtocolError: a size is impossible.
         """
         self._rest += data
         while len(self._rest) >= _SIZE.size:
             size = _SIZE.unpack_from(self._rest)[0]
             if not min(PACKET_SIZES) <= size <= 4 * max(PACKET_SIZES):
                 raise RemoteProtocolError(
-                    f'A real-time packet says that it has {size} bytes: {hex_text(self._rest)}.'
+                    f'The size of a real-time packet is given as {size} bytes: '
+                    f'{hex_text(self._rest)}.'
                 )
             if len(self._rest) < size:
                 return
@@ -191,7 +192,7 @@ def _count(size: int) -> int:
     return (size - _SIZE.size) // 8
 
 
-#: Numbers in each field, and in all up to its end.
+#: Count of numbers in each field, and in all fields up to its end.
 _LENGTHS: Final = [
     len(cast(tuple[float, ...], field.default)) if isinstance(field.default, tuple) else 1
     for field in fields(RealtimeData)

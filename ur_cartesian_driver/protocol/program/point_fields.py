@@ -184,9 +184,9 @@ _OPTIMOVES = frozenset(
 
 def motion_type(primitive: Instruction) -> MotionType:
     """
-    Return the wire's number for a primitive: its class and the kind of its target (and via).
+    Return the motion type of a primitive: its class and the kind of its target (and via).
 
-    :raises LocalProtocolError: it is no primitive, nor an output.
+    :raises LocalProtocolError: it is neither a primitive nor an output.
     """
     if isinstance(primitive, SwitchOutput):
         return MotionType.SWITCH_OUTPUT
@@ -202,10 +202,10 @@ def motion_type(primitive: Instruction) -> MotionType:
 
 def to_fields(primitive: Instruction, dialect: Dialect = NEWEST_DIALECT) -> PointFields:
     """
-    Return the 21 numbers of a primitive in SI units, see the table above.
+    Return the 21 numbers of a primitive, in SI units.
 
-    :raises LocalProtocolError: joint positions come with a q_near, which belongs to poses; or the
-        dialect has no such motion, or no q_near.
+    :raises LocalProtocolError: the target is joint positions and has a q_near, or the dialect
+        lacks this motion or q_near.
     """
     kind = motion_type(primitive)
     if kind not in dialect.motion_types:
@@ -221,8 +221,8 @@ def to_fields(primitive: Instruction, dialect: Dialect = NEWEST_DIALECT) -> Poin
     q_near = primitive.q_near
     if q_near is not None and not isinstance(primitive.target, Pose):
         raise LocalProtocolError(
-            f'{type(primitive).__name__} has joint positions as its target and a q_near; a q_near '
-            'goes with a pose only.'
+            f'{type(primitive).__name__} has joint positions as its target and a q_near; only '
+            'poses can have a q_near.'
         )
     words = dialect.encode_move(q_near, v, a)
     duration = primitive.duration if isinstance(primitive, MoveJ | MoveL) else 0
@@ -255,7 +255,7 @@ def _spline_fields(piece: Spline) -> PointFields:
 
 def from_fields(fields: Sequence[float], dialect: Dialect = NEWEST_DIALECT) -> Instruction:
     """
-    Return the primitive, or the output, of the 21 numbers.
+    Return the primitive or output of 21 numbers.
 
     :raises RemoteProtocolError: motion type, spline kind, arc mode or output is unknown.
     """
@@ -323,7 +323,7 @@ def _move(fields: Sequence[float], kind: MotionType, dialect: Dialect) -> Primit
 
 def check_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> None:
     """
-    Refuse what URCL refuses to send: it would mean something else to the robot, or nothing.
+    Refuse what URCL refuses to send: the robot would misunderstand or ignore it.
 
     :raises LocalProtocolError: names the field, its value, the bound and the dialect.
     """
@@ -331,7 +331,7 @@ def check_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> None
     if duration and (duration > dialect.max_duration or 0.0 < duration < dialect.min_duration):
         raise _duration_error(duration, dialect)
     if kind == MotionType.SWITCH_OUTPUT and not 0.0 <= duration <= dialect.max_duration:
-        raise LocalProtocolError(f'delay is {duration!r} s, but it must not be negative.')
+        raise LocalProtocolError(f'delay is {duration!r} s, but must not be negative.')
     if kind in (MotionType.SPLINE, MotionType.SWITCH_OUTPUT):
         return
     v_at, a_at = NEWEST_DIALECT.speed_words if kind in _ARCS else dialect.speed_words
@@ -346,7 +346,7 @@ def check_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> None
             )
             if value < 0.0
         )
-        raise LocalProtocolError(f'{name} is {value!r}, but it must not be negative.')
+        raise LocalProtocolError(f'{name} is {value!r}, but must not be negative.')
     if kind in _OPTIMOVES and not (0.0 < velocity <= 1.0 and 0.0 < acceleration <= 1.0):
         raise LocalProtocolError(
             f'velocity is {velocity!r} and acceleration is {acceleration!r}, but an optimove '
@@ -358,11 +358,11 @@ def _duration_error(duration: float, dialect: Dialect) -> LocalProtocolError:
     if duration < dialect.min_duration:
         return LocalProtocolError(
             f'duration is {duration!r} s, but wire dialect {dialect.name} counts in '
-            f'{1.0 / dialect.time_scale:g} s, and 0 would mean that the velocity counts.'
+            f'{1.0 / dialect.time_scale:g} s, and 0 would mean that the velocity applies.'
         )
     return LocalProtocolError(
-        f'duration is {duration!r} s, but at most {dialect.max_duration} s can be sent in one '
-        f'point in wire dialect {dialect.name}.'
+        f'duration is {duration!r} s, but one point can take at most {dialect.max_duration} s '
+        f'in wire dialect {dialect.name}.'
     )
 
 

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Which RTDE register means what, between the driver and the robot program.
+The RTDE registers between the driver and the robot program.
 
-The numbers 24 and up are those that the controller keeps for external clients; the lower ones
-belong to fieldbuses. The servo numbers are those of the manufacturer's guide to buffered
-``servoj``, so a program after that guide can be driven too.
+The controller reserves the numbers from 24 for external clients and the lower ones for fieldbuses.
+The servo numbers are those of the manufacturer's guide to buffered ``servoj``, so a program after
+that guide works, too.
 
 =================  ==========  =========  ====================================================
 direction          kind        number     meaning
@@ -15,21 +15,21 @@ to the program     int         25         sequence number, changes with every me
 to the program     int         26         external error (:class:`ExternalError`)
 to the program     int         27         synchronization (:class:`SyncState`)
 to the program     double      24 - 29    joint positions [rad]
-to the program     double      30 - 35    greatest distance of the arm from them [rad]
+to the program     double      30 - 35    max deviation of the joints from them [rad]
 to the program     double      46         time of these joint positions [s]
 from the program   int         24         actual mode
-from the program   int         25         the last sequence number that was read
-from the program   int         26         points of the running trajectory that were begun
+from the program   int         25         last sequence number that the program read
+from the program   int         26         points begun of the running trajectory
 from the program   double      24         lag: motion time in the buffer [s]
-from the program   int         27         set-points that were carried out
-from the program   int         28         how often one was repeated, the arm not being near it
-from the program   int         29         sequence numbers that were never read
+from the program   int         27         set-points carried out
+from the program   int         28         repetitions of set-points that the arm was not near
+from the program   int         29         sequence numbers skipped
 from the program   int         30         set-points in the buffer
-from the program   int         31         set-points that found the buffer full
+from the program   int         31         set-points lost to a full buffer
 =================  ==========  =========  ====================================================
 
-From int 27 on the numbers are ours; a program after the guide does not write them. All counts
-begin with 0 when the program enters the control mode ``BUFFERED_SERVO``.
+The ints from 27 are ours; a program after the guide does not write them. All counts start at 0
+when the program enters the control mode ``BUFFERED_SERVO``.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class InputInteger(IntEnum):
 
 
 class InputDouble(IntEnum):
-    """Double registers that the driver writes; the first two are the first of six."""
+    """Double registers that the driver writes; the first two begin groups of six."""
 
     DESIRED_JOINT_POSITIONS = 24
     MAX_JOINT_DIVERGENCE_THRESHOLDS = 30
@@ -59,7 +59,7 @@ class OutputInteger(IntEnum):
 
     ACTUAL_MODE = 24
     LAST_SEQUENCE_ID = 25
-    #: How many points of the running trajectory the program has begun; 0 = none.
+    #: Number of points begun of the running trajectory; 0 = none.
     POINTS_BEGUN = 26
     SETPOINTS_DONE = 27
     REPEATS = 28
@@ -83,7 +83,7 @@ class ServoMode(IntEnum):
 
 
 class SyncState(IntEnum):
-    """Who follows whom."""
+    """Whether the robot follows the driver's set-points."""
 
     WAITING_TO_CONNECT = 0
     NONE = 1
@@ -92,7 +92,7 @@ class SyncState(IntEnum):
 
 
 class ExternalError(IntEnum):
-    """What the driver has to report."""
+    """Error that the driver reports."""
 
     NONE = 0
     HALT = 1
@@ -130,7 +130,7 @@ SERVO_INPUTS = (
     *six_register_names(InputDouble.MAX_JOINT_DIVERGENCE_THRESHOLDS),
     register_name(InputDouble.STATE_TIME),
 )
-#: What the buffered servo reports, in this order: first what the guide's program does, too.
+#: Reports of the buffered servo, in this order; the guide's program has the first three, too.
 SERVO_OUTPUTS = (
     register_name(OutputInteger.ACTUAL_MODE),
     register_name(OutputInteger.LAST_SEQUENCE_ID),

@@ -3,8 +3,8 @@
 """
 The script command interface: single commands to the robot program beside the motion.
 
-A command is 28 big-endian int32, 112 bytes: word 0 the number, then the arguments, then zeros.
-All scaled by 1,000,000 but the words marked raw.
+A command is 28 big-endian int32, 112 bytes: word 0 is the number, then follow the arguments, then
+zeros. All words are scaled by 1,000,000 except those marked raw.
 
 ==  =========================  =================================================================
 0   command                    words 1 ..
@@ -21,16 +21,16 @@ All scaled by 1,000,000 but the words marked raw.
 8   FT_RTDE_INPUT_ENABLE       1 on (0, 1; raw), 2 mass of the sensor [kg], 3-5 its offset [m],
                                6-8 its centre of gravity [m]
 9   SET_GRAVITY                1-3 acceleration [m/s^2], pointing away from the earth
-10  SET_TCP_OFFSET             1-6 pose of the TCP in the flange, 7 for how long (raw; ours: other
-                               robot programs do not look at it)
+10  SET_TCP_OFFSET             1-6 pose of the TCP in the flange, 7 persistence (raw; ours: other
+                               robot programs ignore it)
 11  SET_FRICTION_SCALES        1-6 viscous, 7-12 Coulomb, limited to [0, 1]
 12  SET_TARGET_PAYLOAD         1 mass [kg], 2-4 centre of gravity [m], 5-10 inertia
                                xx yy zz xy xz yz [kg m^2], 11 transition time [s]
 ==  =========================  =================================================================
 
-Only tool contact answers: one int32, 0 = contact was made, 1 = it was ended before.
+Only tool contact has an answer: one int32, 0 = contact, 1 = ended before a contact.
 
-Poses are ``x y z rx ry rz`` [m, rad] here, as the robot writes them.
+Poses are ``x y z rx ry rz`` [m, rad], as in URScript.
 """
 
 from __future__ import annotations
@@ -74,19 +74,18 @@ class ScriptCommand(IntEnum):
 
 
 class TcpPersistence(IntEnum):
-    """For how long a TCP is set; known to our own robot program only."""
+    """How long a TCP stays set; only our own robot program knows it."""
 
-    #: Until somebody sets another one.
+    #: Until another TCP is set.
     PERMANENT = 0
-    #: Until LENT is taken back: the program remembers the TCP that it finds, and puts it back by
-    #: itself before it ends.
+    #: Until RESTORE: the program remembers the TCP before it, and restores it before it ends.
     TEMPORARY = 1
-    #: The end of LENT: the program puts back what it remembers, else what the message says.
+    #: End of TEMPORARY: the program restores the remembered TCP, or sets the one given here.
     RESTORE = 2
 
 
 class ToolContactResult(IntEnum):
-    """What the robot program answers to START_TOOL_CONTACT."""
+    """Answer of the robot program to START_TOOL_CONTACT."""
 
     SUCCESS = 0
     CANCELED = 1
@@ -105,14 +104,14 @@ SoftwareVersion: TypeAlias = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZeroFtSensorCommand:
-    """Take the present force as zero."""
+    """Take the current force as zero."""
 
     command: ClassVar = ScriptCommand.ZERO_FTSENSOR
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetPayloadCommand:
-    """Set mass [kg] and centre of gravity [m] (in the flange) of what the flange carries."""
+    """Set mass [kg] and centre of gravity in the flange [m] of the payload."""
 
     command: ClassVar = ScriptCommand.SET_PAYLOAD
     mass: float
@@ -121,7 +120,7 @@ class SetPayloadCommand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetToolVoltageCommand:
-    """Set the voltage at the tool connector: 0, 12 or 24 V."""
+    """Set the voltage of the tool connector: 0, 12 or 24 V."""
 
     command: ClassVar = ScriptCommand.SET_TOOL_VOLTAGE
     voltage: int
@@ -129,7 +128,7 @@ class SetToolVoltageCommand:
     def __post_init__(self) -> None:
         """Check the voltage."""
         if self.voltage not in (0, 12, 24):
-            raise LocalProtocolError(f'voltage is {self.voltage} V, but it must be 0, 12 or 24.')
+            raise LocalProtocolError(f'voltage is {self.voltage} V, but must be 0, 12 or 24.')
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,8 +138,8 @@ class StartForceModeCommand:
 
     :param task_frame: pose in the base.
     :param selection: which axes are compliant.
-    :param wrench: force [N] and torque [Nm] that is sought in these.
-    :param type: 1 to 3, how the task frame is transformed.
+    :param wrench: target force [N] and torque [Nm] in these axes.
+    :param type: 1 to 3, transformation of the task frame.
     :param limits: speed [m/s, rad/s] in compliant axes, deviation [m, rad] in the others.
     :param damping: 0 to 1.
     :param gain_scaling: 0 to 2; has no effect on CB3.
@@ -171,21 +170,21 @@ class EndForceModeCommand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartToolContactCommand:
-    """Watch for a contact of the tool; it answers with a :class:`ToolContactResult`."""
+    """Detect a contact of the tool; the answer is a :class:`ToolContactResult`."""
 
     command: ClassVar = ScriptCommand.START_TOOL_CONTACT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EndToolContactCommand:
-    """Stop watching for a contact."""
+    """Stop detecting contacts."""
 
     command: ClassVar = ScriptCommand.END_TOOL_CONTACT
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetFrictionCompensationCommand:
-    """Turn friction compensation for torque control on or off."""
+    """Switch friction compensation for torque control on or off."""
 
     command: ClassVar = ScriptCommand.SET_FRICTION_COMPENSATION
     enabled: bool
@@ -193,7 +192,7 @@ class SetFrictionCompensationCommand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FtRtdeInputEnableCommand:
-    """Take forces from RTDE's ``external_force_torque``; describes that sensor."""
+    """Use forces from RTDE's ``external_force_torque``, and describe that sensor."""
 
     command: ClassVar = ScriptCommand.FT_RTDE_INPUT_ENABLE
     enabled: bool
@@ -204,7 +203,7 @@ class FtRtdeInputEnableCommand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetGravityCommand:
-    """Set the acceleration [m/s^2] that holds the base up: it points away from the earth."""
+    """Set the acceleration that opposes gravity [m/s^2]: it points away from the earth."""
 
     command: ClassVar = ScriptCommand.SET_GRAVITY
     gravity: Vector3
@@ -221,7 +220,7 @@ class SetTcpOffsetCommand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetFrictionScalesCommand:
-    """Scale the friction compensation of each joint; what lies outside [0, 1] is limited."""
+    """Scale the friction compensation of each joint; values are limited to [0, 1]."""
 
     command: ClassVar = ScriptCommand.SET_FRICTION_SCALES
     viscous: Fractions6
@@ -230,7 +229,7 @@ class SetFrictionScalesCommand:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetTargetPayloadCommand:
-    """Set mass [kg], centre of gravity [m] and inertia [kg m^2], reached in a time [s]."""
+    """Set mass [kg], centre of gravity [m] and inertia [kg m^2] within a time [s]."""
 
     command: ClassVar = ScriptCommand.SET_TARGET_PAYLOAD
     mass: float
@@ -255,7 +254,7 @@ AnyScriptCommand: TypeAlias = (
     | SetTargetPayloadCommand
 )
 
-#: Software from which a command works: CB3 and e-Series software 3 to 5, PolyScope X.
+#: First software with a command: CB3 and e-Series (3 to 5), PolyScope X.
 MIN_VERSIONS: Mapping[ScriptCommand, tuple[SoftwareVersion, SoftwareVersion]] = {
     ScriptCommand.SET_FRICTION_COMPENSATION: ((5, 23, 0), (10, 10, 0)),
     ScriptCommand.SET_FRICTION_SCALES: ((5, 25, 1), (10, 12, 1)),
@@ -266,7 +265,7 @@ def encode(command: AnyScriptCommand, robot_version: SoftwareVersion | None = No
     """
     Return the 112 bytes of a command.
 
-    :param robot_version: the robot's software, to refuse what it does not know; None = unknown.
+    :param robot_version: the robot's software, to refuse commands that it lacks; None = unknown.
     :raises LocalProtocolError: a value cannot be sent, or the software is too old.
     """
     if robot_version is not None:
@@ -277,7 +276,7 @@ def encode(command: AnyScriptCommand, robot_version: SoftwareVersion | None = No
 
 def decode(data: bytes) -> AnyScriptCommand:
     """
-    Return the command of 112 bytes; words beyond its arguments are not looked at.
+    Return the command of 112 bytes; words after its arguments are ignored.
 
     :raises RemoteProtocolError: size, number or an argument is impossible.
     """
@@ -285,7 +284,7 @@ def decode(data: bytes) -> AnyScriptCommand:
     try:
         return _command(ScriptCommand(number), words)
     except (ValueError, LocalProtocolError) as error:
-        raise RemoteProtocolError(f'A script command is wrong: {error} {hex_text(data)}') from None
+        raise RemoteProtocolError(f'Invalid script command: {error} {hex_text(data)}') from None
 
 
 class ScriptCommandDecoder(RecordDecoder[AnyScriptCommand]):
@@ -355,7 +354,7 @@ def _raw(kind: type[int]) -> _Words:
 
 def _as_int(value: float, field: str) -> int:
     if value != int(value):
-        raise LocalProtocolError(f'{field} is {value!r}, but it must be a whole number.')
+        raise LocalProtocolError(f'{field} is {value!r}, but must be a whole number.')
     return int(value)
 
 
@@ -404,4 +403,4 @@ def _dotted(version: SoftwareVersion) -> str:
 
 def _check_range(name: str, value: float, low: float, high: float) -> None:
     if not low <= value <= high:
-        raise LocalProtocolError(f'{name} is {value!r}, but it must lie within {low} and {high}.')
+        raise LocalProtocolError(f'{name} is {value!r}, but must lie within {low} and {high}.')

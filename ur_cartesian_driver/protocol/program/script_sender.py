@@ -8,8 +8,8 @@ The script sender: how the External Control URCap fetches the robot program.
     robot -> driver   request_program\n                 (16 bytes)
     driver -> robot   the program, and one more \n
 
-The connection stays open and the robot may ask again. The reply carries no length; the reader
-finds the end by the marker that the program contains.
+The connection stays open and the robot may ask again. The reply contains no length; the reader
+finds the end by a marker in the program.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from __future__ import annotations
 from ur_cartesian_driver.motion.errors import RemoteProtocolError
 from ur_cartesian_driver.protocol.framing import hex_text, truncated_stream
 
-#: What the robot sends.
+#: Request of the robot.
 REQUEST = b'request_program\n'
 
 
@@ -30,9 +30,9 @@ class RequestDecoder:
 
     def feed(self, data: bytes) -> int:
         """
-        Take bytes from the robot (none at all = its end) and return how many requests they ended.
+        Take bytes from the robot (none at all = its end) and return the number of requests.
 
-        :raises RemoteProtocolError: something else was sent, or the stream ended inside a request.
+        :raises RemoteProtocolError: the bytes are no request, or the stream ended inside one.
         """
         if not data:
             if self._rest:

@@ -61,7 +61,7 @@ _POINT = struct.Struct('>21i')
 
 def encode_fields(fields: PointFields, dialect: Dialect = NEWEST_DIALECT) -> bytes:
     """
-    Return the 84 bytes of the 21 numbers.
+    Return the 84 bytes of 21 numbers.
 
     :raises LocalProtocolError: a number cannot be sent.
     """
@@ -78,7 +78,7 @@ def decode_fields(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> PointFields
     """
     Return the 21 numbers of 84 bytes, in SI units.
 
-    :raises RemoteProtocolError: there are more or fewer bytes.
+    :raises RemoteProtocolError: the size is wrong.
     """
     words = _POINT.unpack(checked_size(data, POINT_SIZE, 'trajectory point'))
     scale = dialect.time_scale
@@ -102,9 +102,9 @@ def encode_point(primitive: Instruction, dialect: Dialect = NEWEST_DIALECT) -> b
 
 def decode_point(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> Instruction:
     """
-    Return the primitive, or the output, of 84 bytes.
+    Return the primitive or output of 84 bytes.
 
-    :raises RemoteProtocolError: it has another size, or a type, kind or mode that is unknown.
+    :raises RemoteProtocolError: the size is wrong, or a type, kind or mode is unknown.
     """
     try:
         return from_fields(decode_fields(data, dialect), dialect)
@@ -112,13 +112,13 @@ def decode_point(data: bytes, dialect: Dialect = NEWEST_DIALECT) -> Instruction:
         raise RemoteProtocolError(f'{error} Bytes: {hex_text(data)}') from None
 
 
-#: Points that are encoded at once: large enough for numpy, small enough for the cache.
+#: Points encoded at once: large enough for numpy, small enough for the cache.
 _CHUNK = 4096
 
 
 def encode_points(primitives: Iterable[Instruction], dialect: Dialect = NEWEST_DIALECT) -> bytes:
     """
-    Return the bytes of many of them, the same as :func:`encode_point` one by one but faster.
+    Return the bytes of many primitives, as :func:`encode_point` does one by one, but faster.
 
     :raises LocalProtocolError: names the point (from 0), the field and the bound.
     """
@@ -144,9 +144,9 @@ def _encode_chunk(primitives: list[Instruction], first: int, dialect: Dialect) -
 
 
 def _encode_rows(fields: NDArray[np.float64], first: int, dialect: Dialect) -> bytes:
-    """Return the bytes of rows of fields (n, 21) which were checked but for their range."""
+    """Return the bytes of rows of fields (n, 21), and check their range."""
     scales = np.array([FIXED_POINT] * 18 + [dialect.time_scale] * 2 + [1], dtype=np.float64)
-    with np.errstate(over='ignore'):  # what becomes infinite is refused below
+    with np.errstate(over='ignore'):  # infinite values are refused below
         scaled = fields * scales
     spline = fields[:, 20] == MotionType.SPLINE
     scaled[spline, 19] = fields[spline, 19]
@@ -159,7 +159,7 @@ def _encode_rows(fields: NDArray[np.float64], first: int, dialect: Dialect) -> b
             int(scales[column]),
         )
         raise LocalProtocolError(f'Point {first + row}: {error}')
-    # Ties away from zero, as to_fixed() does it.
+    # Ties away from zero, as in to_fixed().
     size = np.abs(scaled)
     whole = np.floor(size)
     whole += size - whole >= 0.5

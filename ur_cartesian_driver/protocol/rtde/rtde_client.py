@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-RTDE, the client: agree on what is streamed, then turn data packages into values.
+The RTDE client: negotiate the recipes, then decode data packages to values.
 
 ::
 
@@ -19,12 +19,13 @@ RTDE, the client: agree on what is streamed, then turn data packages into values
                               |
                             READY --> data packages, texts
 
-The client opens no socket and knows no time. Whoever owns the socket sends ``data_to_send()``
-after each ``feed()``, and gives up when ``state`` stands still for too long (the controller
+The client opens no socket and knows no time. The owner of the socket sends ``data_to_send()``
+after each ``feed()``, and gives up when ``state`` does not change for too long (the controller
 answers within a second).
 
 Real controllers send text messages at any time, and data before the reply to S; a data package
-counts as that reply. Up to five other packages out of turn are reported and borne in each state.
+counts as that reply. In each state, up to five other unexpected packages are reported and
+tolerated.
 
 The packages are in :mod:`~ur_cartesian_driver.protocol.rtde.rtde_packages`; the controller's side
 of the connection is in `rtde_server`.
@@ -62,12 +63,12 @@ from ur_cartesian_driver.protocol.rtde.rtde_packages import (
 )
 from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe, RtdeValues
 
-#: How many packages out of turn are borne in each state of the handshake.
+#: Unexpected packages that are tolerated in each state of the handshake.
 MAX_UNEXPECTED_PACKAGES = 5
 
 
 class FieldsNotFound(RemoteProtocolError):
-    """The controller does not know a field that is needed."""
+    """The controller lacks a required field."""
 
     def __init__(self, kind: str, names: Sequence[str], version: ControllerVersion) -> None:
         """Build the sentence from the names and the controller's version."""
@@ -79,7 +80,7 @@ class FieldsNotFound(RemoteProtocolError):
 
 
 class InputsInUse(RemoteProtocolError):
-    """Another client or fieldbus writes an input that we need."""
+    """Another client or fieldbus writes a required input."""
 
     def __init__(self, names: Sequence[str]) -> None:
         """Build the sentence from the names."""
@@ -91,7 +92,7 @@ class InputsInUse(RemoteProtocolError):
 
 
 class RtdeState(Enum):
-    """What the client waits for."""
+    """State of the handshake; the value is what the client waits for."""
 
     NEW = 'start()'
     PROTOCOL_VERSION = 'the answer to the protocol version'
@@ -106,12 +107,12 @@ class RtdeState(Enum):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HandshakeDone:
     """
-    The handshake is over and data come.
+    The handshake is done; data follow.
 
-    :param frequency: what was asked for [Hz]; version 1 has one frequency only.
-    :param outputs: what the data packages contain.
-    :param missing: optional outputs that this controller does not know.
-    :param inputs: one recipe for each group, to ``pack`` values with.
+    :param frequency: the requested one [Hz]; version 1 has only one frequency.
+    :param outputs: content of the data packages.
+    :param missing: optional outputs that this controller lacks.
+    :param inputs: one recipe for each group, to ``pack`` values.
     """
 
     protocol_version: int
@@ -124,14 +125,14 @@ class HandshakeDone:
 
 @dataclass(frozen=True, slots=True)
 class DataReceived:
-    """Values in the order of ``Ready.outputs``; vectors are tuples."""
+    """Values in the order of ``HandshakeDone.outputs``; vectors are tuples."""
 
     values: RtdeValues
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class UnexpectedPackage:
-    """A package that nobody asked for; of no consequence, but worth a line in a log."""
+    """A package that was not requested; harmless, but worth a line in a log."""
 
     package: RtdeReply
 
@@ -145,7 +146,7 @@ def max_frequency(version: ControllerVersion) -> float:
 
 
 class RtdeClientCodec:
-    """One RTDE connection, seen from the client; use it once."""
+    """The client's end of one RTDE connection; use it once."""
 
     def __init__(
         self,
@@ -156,26 +157,24 @@ class RtdeClientCodec:
         input_groups: Sequence[Sequence[str]] = (),
     ) -> None:
         """
-        Say what is wanted.
+        Choose outputs and inputs.
 
-        :param outputs: names of what shall be streamed, in order.
-        :param inputs: names of what will be written, in one package.
-        :param frequency: [Hz]; 0 = as fast as the controller can.
-        :param optional_outputs: which of the outputs the controller need not know.
-        :param input_groups: further groups of inputs, each written in a package of its own.
-        :raises LocalProtocolError: no outputs, a name twice, or an impossible frequency.
+        :param outputs: names of the outputs to stream, in order.
+        :param inputs: names of the inputs to write, in one package.
+        :param frequency: [Hz]; 0 = the highest of the controller.
+        :param optional_outputs: outputs that the controller may lack.
+        :param input_groups: further groups of inputs, each written in its own package.
+        :raises LocalProtocolError: no outputs, a duplicate name, or an impossible frequency.
         """
         self._groups = [tuple(group) for group in (inputs, *input_groups) if group]
         for names in (outputs, [name for group in self._groups for name in group]):
             duplicates = sorted({name for name in names if list(names).count(name) > 1})
             if duplicates:
-                raise LocalProtocolError(
-                    f'{", ".join(duplicates)} stands twice in an RTDE recipe.'
-                )
+                raise LocalProtocolError(f'An RTDE recipe contains {", ".join(duplicates)} twice.')
         if not outputs or not 0.0 <= frequency <= 500.0:
             raise LocalProtocolError(
                 f'An RTDE connection needs outputs and a frequency of 0 to 500 Hz, but '
-                f'{len(outputs)} outputs and {frequency!r} Hz were asked for.'
+                f'{len(outputs)} outputs and {frequency!r} Hz were requested.'
             )
         self.state = RtdeState.NEW
         self._outputs = tuple(outputs)
@@ -192,9 +191,9 @@ class RtdeClientCodec:
 
     def start(self) -> bytes:
         """
-        Begin the handshake and return the first bytes to send.
+        Start the handshake and return the first bytes to send.
 
-        :raises LocalProtocolError: it was started before.
+        :raises LocalProtocolError: it has already started.
         """
         if self.state is not RtdeState.NEW:
             raise LocalProtocolError('An RtdeClientCodec serves one connection; make a new one.')
@@ -204,15 +203,15 @@ class RtdeClientCodec:
         return self.data_to_send()
 
     def data_to_send(self) -> bytes:
-        """Return the bytes that are due, once."""
+        """Return the bytes to send, once."""
         data, self._to_send = self._to_send, b''
         return data
 
     def values_in(self, data: bytes) -> RtdeValues | None:
         """
-        Return the values where the bytes are one data package and no more, as nearly always.
+        Return the values if the bytes are exactly one data package, as they nearly always are.
 
-        None otherwise: then they are for :meth:`feed`, which is slower.
+        Otherwise return None: then :meth:`feed` has to take them, which is slower.
         """
         if self._recipe is None or self.state is not RtdeState.READY or not self._frames.is_empty:
             return None
@@ -222,10 +221,10 @@ class RtdeClientCodec:
         """
         Take bytes from the controller (none at all = its end) and return what happened.
 
-        :raises RemoteProtocolError: the controller broke the rules or closed the connection too
-            early, does not know a field (:class:`FieldsNotFound`), or another client writes an
-            input (:class:`InputsInUse`). The client is of no use after that.
-        :raises LocalProtocolError: this controller cannot stream at the frequency asked for.
+        :raises RemoteProtocolError: the controller violated the protocol, closed the connection
+            too early, or lacks a field (:class:`FieldsNotFound`), or another client writes an
+            input (:class:`InputsInUse`). The client cannot be used after that.
+        :raises LocalProtocolError: this controller cannot stream at the requested frequency.
         """
         if self.state is RtdeState.BROKEN:
             raise RemoteProtocolError('The RTDE connection is broken; open a new one.')
@@ -233,7 +232,7 @@ class RtdeClientCodec:
             frames = self._frames.feed(data)
             if not data and self.state is not RtdeState.READY:
                 raise RemoteProtocolError(
-                    f'The robot closed the RTDE connection, expected was {self.state.value}.'
+                    f'The robot closed the RTDE connection before it sent {self.state.value}.'
                 )
             return [event for frame in frames for event in self._frame(frame)]
         except (RemoteProtocolError, LocalProtocolError):
@@ -241,7 +240,7 @@ class RtdeClientCodec:
             raise
 
     def _frame(self, frame: bytes) -> list[RtdeEvent]:
-        # The way of 500 frames a second.
+        # Fast path: 500 frames a second.
         if (
             self._recipe is not None
             and frame[2] == PackageType.DATA_PACKAGE
@@ -261,7 +260,7 @@ class RtdeClientCodec:
     def _handlers(
         self,
     ) -> dict[RtdeState, tuple[PackageType, Callable[[RtdeReply], list[RtdeEvent]]]]:
-        """Return state -> the package that it waits for, and what is done with it."""
+        """Return for each state the expected package and its handler."""
         return {
             RtdeState.PROTOCOL_VERSION: (
                 PackageType.REQUEST_PROTOCOL_VERSION,
@@ -277,7 +276,7 @@ class RtdeClientCodec:
         }
 
     def _send_request(self, state: RtdeState, request: RtdeRequest) -> list[RtdeEvent]:
-        """Send a request and wait for its answer."""
+        """Send a request and wait for its reply."""
         self.state = state
         self._unexpected = 0
         self._to_send += request.encode()
@@ -295,7 +294,7 @@ class RtdeClientCodec:
             self._unexpected += 1
             if self._unexpected > MAX_UNEXPECTED_PACKAGES:
                 raise RemoteProtocolError(
-                    f'The robot sent {self._unexpected} RTDE packages out of turn, expected was '
+                    f'The robot sent {self._unexpected} unexpected RTDE packages instead of '
                     f'{self.state.value}; the last one was {reply!r:.200}.'
                 )
         return [UnexpectedPackage(package=reply)]
@@ -304,7 +303,9 @@ class RtdeClientCodec:
         if _require_accepted(reply):
             return self._send_request(RtdeState.CONTROLLER_VERSION, GetControllerVersion())
         if self._version == 1:
-            raise RemoteProtocolError('The robot speaks neither version 2 nor version 1 of RTDE.')
+            raise RemoteProtocolError(
+                'The robot supports neither version 2 nor version 1 of RTDE.'
+            )
         self._version = 1
         return self._send_request(RtdeState.PROTOCOL_VERSION, RequestProtocolVersion(version=1))
 
@@ -315,7 +316,7 @@ class RtdeClientCodec:
         if self._frequency > limit:
             raise LocalProtocolError(
                 f'The robot, software {reply}, streams at {limit:g} Hz at most, but '
-                f'{self._frequency:g} Hz were asked for.'
+                f'{self._frequency:g} Hz were requested.'
             )
         self._frequency = self._frequency or limit
         return self._request_outputs()
@@ -346,7 +347,7 @@ class RtdeClientCodec:
         return self._request_inputs()
 
     def _request_inputs(self) -> list[RtdeEvent]:
-        """Ask for the next group of inputs, or start when all are agreed."""
+        """Request the next group of inputs, or start when all are agreed."""
         if len(self._inputs) < len(self._groups):
             return self._send_request(
                 RtdeState.INPUTS, SetupInputs(names=self._groups[len(self._inputs)])
@@ -393,22 +394,22 @@ def _require_accepted(reply: RtdeReply) -> bool:
 def _check_count(types: Sequence[str], names: Sequence[str]) -> None:
     if len(types) != len(names):
         raise RemoteProtocolError(
-            f'The robot answered {len(types)} types to {len(names)} RTDE fields: '
+            f'The robot answered with {len(types)} types for {len(names)} RTDE fields: '
             f'{", ".join(types):.200}.'
         )
 
 
 def _type(name: str, text: str, expected_type: DataType | None) -> DataType:
     """
-    Return the type that the controller states.
+    Return the type that the controller gave.
 
-    A controller that answers something else (the manufacturer's test server repeats the names) is
-    believed to mean the usual type.
+    Where a controller gives anything else (the manufacturer's test server repeats the names), the
+    usual type is assumed.
     """
     if text in DataType.__members__:
         return DataType[text]
     if expected_type is None:
         raise RemoteProtocolError(
-            f'The robot says that the RTDE field {name} is of type {text!r:.60}, which is unknown.'
+            f'The robot gives the RTDE field {name} the unknown type {text!r:.60}.'
         )
     return expected_type

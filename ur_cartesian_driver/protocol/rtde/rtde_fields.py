@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The names and types of everything that RTDE can stream, as one table.
+Names and types of everything that RTDE can stream, in one table.
 
-A controller of an older software knows fewer; it answers ``NOT_FOUND``.
+Older software has fewer; it answers ``NOT_FOUND``.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 
 class DataType(Enum):
-    """A type by its name on the wire, with its codes for ``struct`` (big-endian, unpadded)."""
+    """A type with its name on the wire and its ``struct`` codes (big-endian, unpadded)."""
 
     BOOL = '?'
     UINT8 = 'B'
@@ -34,7 +34,7 @@ class DataType(Enum):
 
     @property
     def length(self) -> int:
-        """Return how many numbers it holds; 1 = not a vector."""
+        """Return how many numbers it has; 1 = not a vector."""
         return len(self.value)
 
 
@@ -53,7 +53,7 @@ def _table(names: Mapping[DataType, str]) -> dict[str, DataType]:
     return {name: data_type for data_type, text in names.items() for name in text.split()}
 
 
-#: What a client may write.
+#: Fields that a client may write.
 INPUT_TYPES: Mapping[str, DataType] = MappingProxyType(
     {
         **_table(
@@ -73,7 +73,7 @@ INPUT_TYPES: Mapping[str, DataType] = MappingProxyType(
     }
 )
 
-#: What a client may read; the input registers can be read back.
+#: Fields that a client may read; the input registers can be read back.
 OUTPUT_TYPES: Mapping[str, DataType] = MappingProxyType(
     {
         **_table(

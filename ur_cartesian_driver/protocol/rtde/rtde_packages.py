@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-RTDE packages: what client and controller say to each other, as bytes.
+RTDE packages: the messages between client and controller, as bytes.
 
 Frame, big-endian: ``uint16`` size of the whole frame, ``uint8`` type, payload.
 
@@ -21,12 +21,12 @@ U 85  data                u8 recipe id, values                        v2: u8 rec
 M 77  text message        v2: u8 length, text, u8 length, source, u8 level;  v1: u8 level, text
 ====  ==================  ==========================================  ===========================
 
-Names and types are text separated by commas. Instead of a type the controller writes
-``NOT_FOUND``, or, for inputs, ``IN_USE`` when another client writes it already; the recipe id is 0
+Names and types are texts separated by commas. Instead of a type the controller writes
+``NOT_FOUND``, or ``IN_USE`` for an input that another client already writes; the recipe id is 0
 then.
 
-Obligations of a controller towards the manufacturer's library: send a frame in one piece and keep
-it below 4092 bytes; answer V and v within a second; send no text message between the reply to the
+Obligations of a controller towards the manufacturer's library: send a frame in one piece of less
+than 4092 bytes; answer V and v within a second; send no text message between the reply to the
 first S and P.
 """
 
@@ -43,7 +43,7 @@ from ur_cartesian_driver.protocol.framing import decode_text, FrameBuffer, hex_t
 
 
 class PackageType(IntEnum):
-    """The type byte; the members' values are the letters of the table."""
+    """The type byte: the letters of the table."""
 
     REQUEST_PROTOCOL_VERSION = ord('V')
     GET_URCONTROL_VERSION = ord('v')
@@ -275,7 +275,7 @@ def encode_frame(package_type: PackageType, payload: bytes = b'') -> bytes:
     size = HEADER.size + len(payload)
     if size > 65535:
         raise LocalProtocolError(
-            f'An RTDE package of {size} bytes cannot be sent, 65535 are possible; ask for fewer '
+            f'An RTDE package of {size} bytes cannot be sent, the maximum is 65535; request fewer '
             'fields.'
         )
     return HEADER.pack(size, package_type) + payload
@@ -290,7 +290,7 @@ def _pack_checked(layout: str, *values: float) -> bytes:
 
 def encode_names(names: Sequence[str]) -> bytes:
     """
-    Return names as the wire has them.
+    Return names as bytes of the wire.
 
     :raises LocalProtocolError: a name is empty or contains a comma.
     """
@@ -302,9 +302,9 @@ def encode_names(names: Sequence[str]) -> bytes:
 
 def decode_request(data: bytes, version: int = LATEST_PROTOCOL_VERSION) -> RtdeRequest:
     """
-    Return what a client said in one frame.
+    Return the request in one frame of a client.
 
-    :param version: the protocol version that was agreed.
+    :param version: the agreed protocol version.
     :raises RemoteProtocolError: type or length is impossible.
     """
     kind, payload = _split_frame(data)
@@ -332,9 +332,9 @@ def decode_request(data: bytes, version: int = LATEST_PROTOCOL_VERSION) -> RtdeR
 
 def decode_reply(data: bytes, version: int = LATEST_PROTOCOL_VERSION) -> RtdeReply:
     """
-    Return what a controller said in one frame.
+    Return the reply in one frame of a controller.
 
-    :param version: the protocol version that was agreed.
+    :param version: the agreed protocol version.
     :raises RemoteProtocolError: type or length is impossible.
     """
     kind, payload = _split_frame(data)
@@ -364,12 +364,12 @@ def _split_frame(data: bytes) -> tuple[PackageType, bytes]:
         return PackageType(data[2]), data[3:]
     except ValueError:
         raise RemoteProtocolError(
-            f'{data[2]} is not a type of RTDE package: {hex_text(data)}.'
+            f'{data[2]} is not an RTDE package type: {hex_text(data)}.'
         ) from None
 
 
 def _split_names(payload: bytes) -> tuple[str, ...]:
-    """Return the items of a list; clients in use (ur_rtde) end it with a comma."""
+    """Return the items of a list; some clients (ur_rtde) end it with a comma."""
     items = decode_text(payload).removesuffix(',')
     return tuple(items.split(',')) if items else ()
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Recipes: the fields that client and controller agreed on, and the bytes of their values."""
+"""RTDE recipes: the fields that client and controller agreed on, and the bytes of their values."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ RtdeValues: TypeAlias = tuple[RtdeValue, ...]
 
 class Recipe:
     """
-    An agreed list of fields, with their bytes.
+    An agreed list of fields; packs and unpacks their values.
 
-    ``pack`` and ``unpack`` go through one precompiled struct, because they run 500 times a second.
+    ``pack`` and ``unpack`` use a precompiled struct, because they run 500 times a second.
     """
 
     __slots__ = (
@@ -45,11 +45,13 @@ class Recipe:
         """
         Compile the recipe.
 
-        :param recipe_id: the byte before the values; None = there is none (outputs of version 1).
-        :raises ValueError: there are not as many types as names, or no names.
+        :param recipe_id: the byte before the values; None = none (outputs of version 1).
+        :raises ValueError: the numbers of names and types differ, or there are no names.
         """
         if len(names) != len(types) or not names:
-            raise ValueError(f'{len(names)} names and {len(types)} types make no RTDE recipe.')
+            raise ValueError(
+                f'An RTDE recipe cannot have {len(names)} names and {len(types)} types.'
+            )
         self.names = tuple(names)
         self.types = tuple(types)
         self.recipe_id = recipe_id
@@ -65,21 +67,21 @@ class Recipe:
         for length in self._lengths:
             keys.append(start if length == 1 else slice(start, start + length))
             start += length
-        # With a single key itemgetter gives the bare item, so that case is left to unpack().
+        # With a single key, itemgetter returns the bare item; unpack() handles that case.
         self._pick = itemgetter(*keys) if len(keys) > 1 else None
 
     def unpack(self, payload: bytes) -> RtdeValues:
         """
         Return the values of a data package without its first three bytes; vectors are tuples.
 
-        The recipe id is not looked at: controllers exist that send another one than agreed.
+        The recipe id is not checked: some controllers send another one than agreed.
 
         :raises RemoteProtocolError: the package has another size than the recipe.
         """
         if len(payload) != self._size:
             raise RemoteProtocolError(
                 f'An RTDE data package of this recipe has {self._size} bytes, but {len(payload)} '
-                f'came: {hex_text(payload)}.'
+                f'arrived: {hex_text(payload)}.'
             )
         flat = self._struct.unpack(payload)
         if self._pick is None:
@@ -87,7 +89,7 @@ class Recipe:
         return cast(RtdeValues, self._pick(flat))
 
     def unpack_frame(self, data: bytes) -> RtdeValues | None:
-        """Return the values of a whole frame; None where the bytes are anything else."""
+        """Return the values of a whole frame; None if the bytes are anything else."""
         if len(data) != self._frame.size or self._pick is None or data[:3] != self._head:
             return None
         return cast(RtdeValues, self._pick(self._struct.unpack_from(data, HEADER.size)))
@@ -104,7 +106,7 @@ class Recipe:
             for value, length in zip(values, self._lengths, strict=True):
                 if length == 1:
                     flat.append(value)
-                # A number has no length: that is one of the errors below.
+                # A number has no length: caught below.
                 elif len(value) == length:  # type: ignore[arg-type]
                     flat.extend(value)  # type: ignore[arg-type]
                 else:
@@ -137,7 +139,7 @@ class Recipe:
         return tuple(0 if t.length == 1 else (0,) * t.length for t in self.types)
 
     def index(self, name: str) -> int:
-        """Return the place of a field in the values; ValueError if it is not in the recipe."""
+        """Return the index of a field in the values; ValueError if the recipe lacks it."""
         return self.names.index(name)
 
     def __eq__(self, other: object) -> bool:
@@ -157,13 +159,13 @@ class Recipe:
         return self.names, self.types, self.recipe_id
 
     def _packing_error(self, values: Sequence[RtdeValue]) -> LocalProtocolError:
-        """Return the error that names the value which cannot be packed."""
+        """Return the error that names the value that cannot be packed."""
         if len(values) != len(self.names):
             return LocalProtocolError(
-                f'{len(values)} values do not fill an RTDE recipe of {len(self.names)} fields.'
+                f'An RTDE recipe of {len(self.names)} fields cannot take {len(values)} values.'
             )
         problems = [
-            f'{name} is {value!r}, which is no {data_type.name}'
+            f'{name} is {value!r}, which is not a {data_type.name}'
             for name, data_type, value in zip(self.names, self.types, values, strict=True)
             if not _fits_type(data_type, value)
         ]

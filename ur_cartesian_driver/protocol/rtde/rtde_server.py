@@ -1,21 +1,21 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-RTDE, the controller: one connection of a client, seen from the robot.
+The RTDE server: the controller's end of one connection.
 
-It answers requests as a controller does and keeps the agreed recipes. When and with which values
-data packages are sent is up to its owner, who knows the time::
+It answers requests as a controller does and keeps the agreed recipes. Its owner knows the time,
+and decides when to send data packages with which values::
 
     for data in socket: events = server.feed(data); socket.send(server.data_to_send())
     if server.streaming:
         for output in server.outputs: socket.send(output.recipe.pack(values))
 
-* A client may agree on several output recipes; each has its own id and frequency. In version 1 it
-  has one, without an id.
+* A client may set up several output recipes; each has its own id and frequency. In version 1 it
+  has only one, without an id.
 * An unknown field makes the whole recipe invalid: types with ``NOT_FOUND``, id 0, nothing agreed.
-* An input belongs to one client: everybody else is told ``IN_USE``. The client itself may have it
-  in several recipes, one for each kind of command it sends. The set of taken names is shared by
-  all connections; ``close()`` gives ours back.
+* An input belongs to one client; the others receive ``IN_USE``. The client itself may use it in
+  several recipes, one for each kind of command that it sends. All connections share the set of
+  taken names; ``close()`` releases ours.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ MAX_RECIPES = 255
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutputStream:
-    """What a client wants to be sent, and how often [Hz]."""
+    """A recipe that a client receives, and its frequency [Hz]."""
 
     recipe: Recipe
     frequency: float
@@ -70,7 +70,7 @@ class InputReceived:
 
 
 class RtdeServerCodec:
-    """One connection, seen from the controller."""
+    """The controller's end of one connection."""
 
     def __init__(
         self,
@@ -83,8 +83,8 @@ class RtdeServerCodec:
         """
         Wait for requests.
 
-        :param taken_inputs: inputs that some client writes; shared by all connections.
-        :param frequency: the rate of the controller [Hz], and the greatest that a client gets.
+        :param taken_inputs: inputs that any client writes; shared by all connections.
+        :param frequency: rate of the controller [Hz], the highest that a client gets.
         """
         self.streaming = False
         self.outputs: list[OutputStream] = []
@@ -100,11 +100,11 @@ class RtdeServerCodec:
 
     @property
     def protocol_version(self) -> int:
-        """Return the version that was agreed."""
+        """Return the agreed version."""
         return self._protocol
 
     def data_to_send(self) -> bytes:
-        """Return the answers that are due, once."""
+        """Return the replies to send, once."""
         data, self._to_send = self._to_send, b''
         return data
 
@@ -112,7 +112,7 @@ class RtdeServerCodec:
         """
         Take bytes from the client (none at all = its end) and return what it wrote.
 
-        :raises RemoteProtocolError: the client broke the rules; close the connection.
+        :raises RemoteProtocolError: the client violated the protocol; close the connection.
         """
         events: list[InputReceived | RtdeTextMessage] = []
         for frame in self._frames.feed(data):
@@ -126,7 +126,7 @@ class RtdeServerCodec:
         return events
 
     def close(self) -> None:
-        """Give back the inputs of this client."""
+        """Release the inputs of this client."""
         self.streaming = False
         for recipe in self._inputs:
             self._taken.difference_update(recipe.names)
@@ -179,7 +179,7 @@ class RtdeServerCodec:
         )
 
     def _granted_frequency(self, frequency: float | None) -> float:
-        """Return the frequency that a client gets [Hz]."""
+        """Return the granted frequency [Hz]."""
         if frequency is None or not math.isfinite(frequency) or frequency <= 0.0:
             return self._frequency
         return min(frequency, self._frequency)
@@ -206,9 +206,9 @@ class RtdeServerCodec:
         return SetupInputsReply(types=tuple(texts), recipe_id=recipe_id)
 
     def _input(self, data: DataPackage) -> InputReceived:
-        """Read an input package; a client with one recipe may give it any id."""
+        """Decode an input package; a client with one recipe may use any id."""
         if not self._inputs:
-            raise RemoteProtocolError('An RTDE client wrote inputs before it had set them up.')
+            raise RemoteProtocolError('An RTDE client wrote inputs before it set them up.')
         number = data.recipe_id if len(self._inputs) > 1 else 1
         if not 1 <= number <= len(self._inputs):
             raise RemoteProtocolError(
@@ -220,4 +220,4 @@ class RtdeServerCodec:
 
 def _check_number(recipes: Sequence[object]) -> None:
     if len(recipes) >= MAX_RECIPES:
-        raise RemoteProtocolError(f'An RTDE client asked for more than {MAX_RECIPES} recipes.')
+        raise RemoteProtocolError(f'An RTDE client set up more than {MAX_RECIPES} recipes.')
