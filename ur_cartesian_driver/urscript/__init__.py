@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-URScript, the language of the robot's programs, and nothing of the robot.
+URScript, the language of the robot's programs, without a robot.
 
-Text to tokens (`scanner`), to a tree (`syntax`, `parser`), to checked names (`scopes`), to Python
-closures (`closures`, `expressions`, `compiler`), to threads that run frame by frame
-(`interpreter`) and compute with `values`. What a program can do to
-a robot are builtins, given by whoever runs it; `builtins` holds those that need no robot.
+`parsing` turns text into tokens and a syntax tree, `compiling` resolves the names and turns the
+tree into Python closures, and `running` runs them in threads, one controller cycle at a time, with
+the values of `script_values`. Builtins give a program access to a robot; the owner of the
+interpreter provides them. `core_builtins` contains those that need no robot.
 """
 
 from ur_cartesian_driver.urscript.compiling.scopes import Builtin

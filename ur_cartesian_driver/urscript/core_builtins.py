@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Functions that every controller has and that need no robot: mathematics, lists, text.
+Builtins of every controller that need no robot: mathematics, lists, text.
 
 Parameter names are those of the script manual, because programs may pass arguments by name.
-Outside its domain a function raises rather than returning nan.
+Outside its domain a function raises an error instead of returning nan.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ur_cartesian_driver.urscript.script_values import (
     make_list as make_list_value,
 )
 
-#: The controller refuses to make longer strings.
+#: Longest string that a controller makes.
 MAX_STRING = 1023
 
 _INTEGER = re.compile(r'[+-]?[0-9]+')
@@ -125,7 +125,7 @@ def str_sub(src: Value, index: Value, len: Value = MAX_STRING) -> str:
 
 
 def str_find(src: Value, target: Value, start_from: Value = 0) -> int:
-    """Return the first place of `target` at or after `start_from`, or -1."""
+    """Return the first index of `target` at or after `start_from`, or -1."""
     text, start = _string(src), _int(start_from)
     if start < 0:
         raise RuntimeException(f'Index out of range: {start}')
@@ -133,7 +133,7 @@ def str_find(src: Value, target: Value, start_from: Value = 0) -> int:
 
 
 def to_num(str: Value) -> int | float:
-    """Return the number that a string stands for: decimal, or hexadecimal after 0x."""
+    """Return the number in a string: decimal, or hexadecimal after 0x."""
     text = _string(str).strip()
     if _INTEGER.fullmatch(text):
         return _int_range(int(text))
@@ -250,7 +250,7 @@ MAX_LIST_LENGTH = 100_000
 
 
 def make_list(length: Value, initial_value: Value, capacity: Value = None) -> Value:
-    """Return a list of equal items; its capacity is checked and otherwise without effect."""
+    """Return a list of equal items; the capacity is checked and has no other effect."""
     count = _int(length)
     max_items = count if capacity is None else _int(capacity)
     if not 0 <= count <= max_items:

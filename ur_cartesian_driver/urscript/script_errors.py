@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The two ways in which a program can be wrong: before it runs, and while it runs.
+The two errors of a program: before it runs, and while it runs.
 
-Both carry a position in the text that was sent, because that is what the controller reports to
-its clients and what a person needs to find the place.
+Both have a position in the program's text: the controller reports it to its clients, and people
+need it to find the error.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from __future__ import annotations
 
 class CompileError(Exception):
     """
-    The text is not a program that can be started; nothing has run.
+    The text is not a program that can start; nothing has run.
 
     :param line: 1-based line in the text that was parsed.
     :param column: 1-based column of the offending token.
     :param text: the controller's own wording, as clients see it.
-    :param reason: one clause for people: what was expected.
+    :param reason: one clause for people, such as what was expected.
     """
 
     def __init__(self, line: int, column: int, text: str, reason: str = '') -> None:
@@ -34,10 +34,10 @@ class CompileError(Exception):
 
 class RuntimeException(Exception):
     """
-    The program did something that the controller cannot do; it has ended.
+    The program did something that the controller cannot do, and ended.
 
-    Raised without a position by values and builtins; the interpreter adds the place in the
-    program by `at`. Line 0 means that the place is not known yet.
+    Values and builtins raise it without a position; the interpreter adds the position with `at`.
+    Line 0 means that the position is not known yet.
     """
 
     def __init__(self, text: str, line: int = 0, column: int = 0) -> None:
@@ -55,5 +55,5 @@ class RuntimeException(Exception):
 
 
 def name_not_found(name: str, line: int, column: int) -> CompileError:
-    """Return the error for a name that means nothing where it stands."""
+    """Return the error for a name that is unknown in its scope."""
     return CompileError(line, column, f'compile_error_name_not_found:{name}:')

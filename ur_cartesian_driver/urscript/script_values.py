@@ -1,17 +1,16 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What a URScript program computes with.
+The values of URScript programs.
 
-A value is an int, float, bool, str or None of Python; a `list` of values; a `Pose`; a `Matrix`
-(a list of lists of equal length); a `Struct`; a `ThreadHandle`; or a `RemoteObject`. Lists,
-matrices and structs are values, not references: `copy` is applied wherever one is assigned,
-passed or returned, so a builtin may keep what it gets.
+A value is an int, float, bool, str or None of Python; a `list` of values; a `ScriptPose`; a
+`Matrix` (a list of lists of equal length); a `Struct`; a `ThreadHandle`; or a `RemoteObject`.
+Lists, matrices and structs are values, not references: they are copied (`copy`) when they are
+assigned, passed or returned, so a builtin may keep its arguments.
 
-Decided where the controller's behaviour is not documented:
-integers have 32 bits and a result outside raises, `/` is always a true division, `%` takes the
-sign of the dividend (as in C), True and False are not numbers in arithmetic, and values of
-different types are unequal rather than an error.
+Our decisions where the controller's behaviour is not documented: integers have 32 bits and an
+overflow raises, `/` is always a true division, `%` takes the sign of the dividend (as in C), True
+and False are not numbers in arithmetic, and values of different types are unequal, not an error.
 """
 
 from __future__ import annotations
@@ -62,14 +61,14 @@ class Matrix:
 
 @dataclass(slots=True)
 class Struct:
-    """Named fields, fixed when it is made."""
+    """Named fields; no field can be added later."""
 
     fields: dict[str, Value] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class ThreadHandle:
-    """What `run` returns; the number is unique within one run of a program."""
+    """Result of `run`; the number is unique within one run of a program."""
 
     number: int
 
@@ -113,7 +112,7 @@ def copy(value: Value) -> Value:
 
 
 def make_list(items: Sequence[Value]) -> Value:
-    """Return the value of `[items]`: a matrix if they are lists."""
+    """Return the value of `[items]`: a matrix if the items are lists."""
     kinds = set(map(type, items))
     if list in kinds and len(kinds) == 1:
         return Matrix([item[:] for item in items])
@@ -134,7 +133,7 @@ def make_pose(items: Sequence[Value]) -> ScriptPose:
 
 
 def truth(value: Value) -> bool:
-    """Return what a value means as a condition: non-zero, non-empty."""
+    """Return a value as a condition: true if non-zero or non-empty."""
     if type(value) is bool:
         return value
     if isinstance(value, int | float | str | list):
@@ -162,7 +161,7 @@ def _unsupported(symbol: str, a: Value, b: Value) -> RuntimeException:
 
 
 def _checked(result: int | float) -> int | float:
-    """Return a number that has been computed, if it fits into 32 bits."""
+    """Return a computed number if it fits into 32 bits."""
     if type(result) is int and not INT_MIN <= result <= INT_MAX:
         raise RuntimeException(f'Integer overflow: {result} does not fit into 32 bits')
     return result
@@ -284,7 +283,7 @@ BINARY: dict[str, Callable[[Value, Value], Value]] = {
     '>=': _ordering('>=', operator.ge),
 }
 
-#: What BINARY comes to for two floats, where nothing can go wrong.
+#: The operations of BINARY on two floats that cannot fail.
 ON_FLOATS: dict[str, Callable[[Value, Value], Value]] = {
     '+': operator.add, '-': operator.sub, '*': operator.mul, '==': operator.eq,
     '!=': operator.ne, '<': operator.lt, '<=': operator.le, '>': operator.gt, '>=': operator.ge,
@@ -365,7 +364,7 @@ def _items(container: Value, key: tuple[Value, ...]) -> Value:
 
 
 def _position(index: Value, length: int) -> int:
-    """Check an index; a float that is a whole number, as `/` makes it, will do."""
+    """Check an index; a whole float, such as a result of `/`, is accepted."""
     if type(index) is float and index.is_integer():
         index = int(index)
     if type(index) is not int:

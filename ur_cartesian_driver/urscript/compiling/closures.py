@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What compiled code is, and what it asks of the machine that runs it.
+Compiled code, and the interface of the interpreter that runs it.
 
 The code of an expression or statement is a function of the frame (the list of a function's local
-values). What cannot take time is a plain function; what can (a generator builtin, `join`, a call
-of a function that contains one) is a generator function, and only this is reached by
-`yield from`. The code of a statement returns None to go on, or one of the signals below.
+values). Code that cannot take time is a plain function. Code that can (a generator builtin,
+`join`, a call of a function that contains one) is a generator function; only such code is called
+by `yield from`. The code of a statement returns None to continue, or one of the signals below.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ StackFrame = list[Any]
 ScriptSteps = Generator[None, None, Value]
 RunFunction = Callable[[StackFrame], Any]
 
-# What a statement says about how to go on.
+# Signals of statements.
 BREAK = 'break'
 CONTINUE = 'continue'
 RETURN = 'return'
@@ -39,18 +39,18 @@ UNSET = _Unset()
 
 
 class ProgramHalted(BaseException):
-    """Unwinds the running thread because the whole program ends; not an error."""
+    """Unwinds the running thread because the program ends; not an error."""
 
 
 class Thread(Protocol):
-    """What compiled code needs of the thread that runs it."""
+    """The thread that runs compiled code."""
 
     depth: int
     location: tuple[int, int]
 
 
 class Runtime(Protocol):
-    """What compiled code needs of the machine that runs it."""
+    """The interpreter that runs compiled code."""
 
     fuel: int
     paused: bool
@@ -58,24 +58,24 @@ class Runtime(Protocol):
 
     @property
     def thread(self) -> Thread:
-        """The thread that is running now."""
+        """The running thread."""
 
     def raise_budget_exceeded(self, line: int, column: int) -> NoReturn:
-        """Raise, because the thread used up its frame without yielding."""
+        """Raise: the thread used up its budget without yielding."""
 
     def spawn(self, procedure: CompiledFunction) -> ThreadHandle:
         """Start a thread."""
 
     def alive(self, handle: Value) -> bool:
-        """Tell whether a value is the handle of a thread that has not ended."""
+        """Tell whether a value is the handle of a live thread."""
 
     def kill(self, handle: Value) -> None:
-        """End a thread, if the value is the handle of one."""
+        """End a thread; ignore values that are not handles."""
 
 
 @dataclass(frozen=True, slots=True)
 class CompiledNode:
-    """A compiled node: how to run it, whether that can take time, and what it costs."""
+    """A compiled node: its code, whether it can take time, and its cost."""
 
     run: RunFunction
     suspends: bool = False
@@ -84,7 +84,7 @@ class CompiledNode:
 
 @dataclass(slots=True, kw_only=True)
 class CompiledFunction:
-    """A compiled function or thread; filled after all have been made, as they call each other."""
+    """A compiled function or thread; its body is set later, because functions call each other."""
 
     name: str
     suspends: bool
@@ -93,7 +93,7 @@ class CompiledFunction:
     body: CompiledNode = CompiledNode(lambda frame: None)
 
     def steps(self) -> ScriptSteps:
-        """Run as the whole of a thread."""
+        """Run as the main function of a thread."""
         frame = self.template.copy()
         if self.body.suspends:
             yield from self.body.run(frame)
@@ -132,7 +132,7 @@ def sequence(
 def choose_runner(
     plain: RunFunction, steps: RunFunction, parts: Sequence[CompiledNode]
 ) -> CompiledNode:
-    """Choose the generator if one of the parts is one."""
+    """Choose the generator if any part is a generator."""
     suspends = any(part.suspends for part in parts)
     return CompiledNode(
         steps if suspends else plain, suspends, 1 + sum(part.weight for part in parts)
@@ -140,5 +140,5 @@ def choose_runner(
 
 
 def recursion_error(line: int, column: int) -> RuntimeException:
-    """Return the error for a recursion without an end."""
+    """Return the error for an endless recursion."""
     return RuntimeException('Function calls are nested too deeply.', line, column)

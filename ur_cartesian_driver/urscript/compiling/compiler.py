@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Syntax tree to Python closures, made once per program so that a frame costs little.
+Compiles syntax trees to Python closures, once per program, so that a frame costs little.
 
-Work is counted in nodes of the tree, a block at a time: entering a block pays for all of it.
+Work is counted in nodes of the tree, a block at a time: entering a block pays for all its nodes.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ def compile_program(
     procedures: dict[int, CompiledFunction],
 ) -> CompiledFunction:
     """
-    Compile a checked program; the result is the body of its main thread.
+    Compile a checked program and return the body of its main thread.
 
-    :param procedures: the functions that exist already, by the identity of their scopes; those of
-        the program are added.
+    :param procedures: existing functions by the identity of their scopes; the program's functions
+        are added.
     """
     procedures |= {id(scope): _procedure(scope) for scope in root.walk()}
     for scope in root.walk():
@@ -52,7 +52,7 @@ def compile_program(
 
 
 def _procedure(scope: Scope) -> CompiledFunction:
-    """Return a function without its body, as functions call each other."""
+    """Return a function without its body, because functions call each other."""
     return CompiledFunction(
         name=scope.definition.name if scope.definition else '',
         suspends=scope.suspends,
@@ -72,7 +72,7 @@ class _Compiler(ExpressionCompiler):
                 procedure.defaults[slot] = self.copied_expression(parameter.default)
 
     def _block(self, statements: tree.StatementBlock, owner: tree.SyntaxNode) -> CompiledNode:
-        """Compile statements that run one after the other, and pay for them at the beginning."""
+        """Compile consecutive statements, and pay for them at the beginning."""
         first = statements[0] if statements else owner
         call_location = (first.line, first.column)
         codes = [code for statement in statements for code in self._statement(statement)]
@@ -133,9 +133,9 @@ class _Compiler(ExpressionCompiler):
                 kill = self._runtime.kill
                 yield sequence([self.expression(node.handle)], lambda frame, found: kill(*found))
             case tree.CriticalStatement() | tree.LabelStatement() | tree.FunctionDefinition():
-                # Threads switch only where one takes time, so nothing can come between the
-                # statements of a critical section, and a thread that takes time inside one lets
-                # the others run, as on the robot.
+                # Threads switch only where one takes time, so nothing can interleave with the
+                # statements of a critical section. A thread that takes time inside one lets the
+                # others run, as on the robot.
                 return
 
     def _call_statement(self, node: tree.CallStatement) -> CompiledNode:
@@ -172,7 +172,7 @@ class _Compiler(ExpressionCompiler):
         return choose_runner(plain_local if is_local else plain_global, steps, [value])
 
     def _assign_part(self, node: tree.AssignStatement) -> CompiledNode:
-        """Compile an assignment to a place inside a variable, as in `a.b[i] = value`."""
+        """Compile an assignment to a part of a variable, such as `a.b[i] = value`."""
         base, keys, indices = self._path(node.target)
         read = self._name(base).run
         slot, is_local = self._slot(base.identifier)
@@ -320,4 +320,4 @@ def _finish(steps: ScriptSteps) -> Value:
         next(steps)
     except StopIteration as end:
         return end.value
-    raise AssertionError('code that takes time where none was expected')
+    raise AssertionError('code took time where none was expected')

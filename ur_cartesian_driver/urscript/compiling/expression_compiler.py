@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Expressions to closures.
+Compiles expressions to closures.
 
-What is stored, passed or returned is copied where it may be stored elsewhere too, since lists are
-values in this language. An error gets the position of the operator, index or call that raised it.
+A value is copied when it is stored, passed or returned and may also be stored elsewhere, because
+lists are values in this language. An error gets the position of its operator, index or call.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class ExpressionCompiler:
         self._scope = scope
         self._builtins = builtins
         self._runtime = runtime
-        #: By the id of their scope; their bodies need not be there yet.
+        #: By the id of their scope; their bodies may be missing yet.
         self._procedures = procedures
 
     def expression(self, node: tree.Expression) -> CompiledNode:
@@ -81,7 +81,7 @@ class ExpressionCompiler:
         raise AssertionError(node)
 
     def copied_expression(self, node: tree.Expression) -> CompiledNode:
-        """Compile an expression whose value is about to be stored or handed over."""
+        """Compile an expression whose value will be stored or passed on."""
         code = self.expression(node)
         if self._is_temporary(node):
             return code
@@ -98,7 +98,7 @@ class ExpressionCompiler:
         return CompiledNode(steps if code.suspends else plain, code.suspends, code.weight)
 
     def _is_temporary(self, node: tree.Expression) -> bool:
-        """Tell whether the value of an expression is stored nowhere else and needs no copy."""
+        """Tell whether the value of an expression is stored nowhere else, so needs no copy."""
         if isinstance(node, tree.CallExpression):
             return self._scope.function(node.function) is not None
         stored = (
@@ -116,7 +116,7 @@ class ExpressionCompiler:
         parts: Sequence[CompiledNode],
         finish: Callable[[StackFrame, list[Value]], Value],
     ) -> CompiledNode:
-        """Evaluate parts in sequence; what goes wrong in `finish` went wrong at this node."""
+        """Evaluate parts in sequence; errors in `finish` get the position of this node."""
 
         def positioned(frame: StackFrame, found: list[Value]) -> Value:
             try:
@@ -211,7 +211,7 @@ class ExpressionCompiler:
     def _item(
         node: tree.IndexExpression, target: CompiledNode, index: CompiledNode
     ) -> CompiledNode:
-        """Compile the common `list[int]`, quick where nothing is wrong."""
+        """Compile the common `list[int]`, fast if nothing is wrong."""
         run_target, run_index = target.run, index.run
 
         def run(frame: StackFrame) -> Value:
@@ -290,7 +290,7 @@ class ExpressionCompiler:
         return sequence(arguments, new_frame)
 
     def _enter(self, node: tree.CallExpression) -> Callable[[], Thread]:
-        """Return what counts a call in the thread that makes it, and bounds their depth."""
+        """Return a function that counts a call in its thread and limits the depth."""
         runtime = self._runtime
         call_location = (node.line, node.column)
 
@@ -328,7 +328,7 @@ class ExpressionCompiler:
     def _suspending(
         self, node: tree.CallExpression | tree.MethodCallExpression, call: CompiledNode
     ) -> CompiledNode:
-        """Run the generator that a call returns, if it is one, frame by frame."""
+        """If a call returns a generator, run it frame by frame."""
         name = node.function if isinstance(node, tree.CallExpression) else node.method
 
         def steps(frame: StackFrame) -> ScriptSteps:
@@ -385,7 +385,7 @@ def _unset(node: tree.NameExpression) -> RuntimeException:
 def _from_builtin(
     node: tree.CallExpression | tree.MethodCallExpression, error: Exception, name: str = ''
 ) -> RuntimeException | RecursionError:
-    """Turn whatever a builtin raised into a runtime exception at its call."""
+    """Turn any error of a builtin into a runtime exception at its call."""
     if isinstance(error, RecursionError):
         return error
     if isinstance(error, RuntimeException):

@@ -1,17 +1,17 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What each name means, decided before anything runs.
+Resolves the meaning of each name before anything runs.
 
-The rules: what the body of the program assigns is global, however it is marked. In a function or
-thread `local x = ...` makes x a local of the whole function, `global x = ...` makes a global of
-the program, and a bare assignment writes the global of that name if the program has one anywhere
-and makes a local otherwise. A function does not see the locals of the function around it; what it
-does see are the functions around it, wherever in the text they are defined. If a name is defined
-twice in one place the later definition holds, since exported programs include a file twice.
+The rules: every variable that the body of the program assigns is global, however it is marked. In
+a function or thread `local x = ...` makes x a local of the whole function and `global x = ...`
+makes it a global of the program. A bare assignment writes the global of that name if the program
+has one anywhere, and otherwise makes a local. A function does not see the locals of the enclosing
+function, but all functions around it, wherever the text defines them. If a scope defines a name
+twice, the later definition applies, because exported programs include a file twice.
 
-The same walk finds unknown names, calls that do not fit, and which functions can take time: only
-those need a Python generator.
+The same walk finds unknown names, calls with wrong arguments, and the functions that can take
+time: only those need a Python generator.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Scope:
     globals: dict[str, int]
     locals: dict[str, int] = field(default_factory=dict)
     functions: dict[str, Scope] = field(default_factory=dict)
-    #: Functions called from here, and whether something here takes time by itself.
+    #: Functions that this one calls, and whether it takes time itself.
     calls: list[Scope] = field(default_factory=list)
     suspends: bool = False
 
@@ -75,8 +75,8 @@ def resolve(
     """
     Check a program and return the scope of its body.
 
-    :param around: of a program that this one is a later part of; it stays as it is.
-    :raises CompileError: an unknown name or a call that does not fit, the first in the text.
+    :param enclosing: scope of the program that this one continues; it is not changed.
+    :raises CompileError: the first unknown name or call with wrong arguments.
     """
     root = Scope(
         parent=enclosing, owner=program, globals=dict(enclosing.globals) if enclosing else {}
@@ -90,7 +90,7 @@ def resolve(
 
 
 def _own_nodes(nodes: Iterable[tree.SyntaxNode]) -> Iterator[tree.SyntaxNode]:
-    """Yield all nodes below, without entering function definitions."""
+    """Yield all nodes and their descendants, without entering function definitions."""
     for node in nodes:
         yield node
         if not isinstance(node, tree.FunctionDefinition):
@@ -152,7 +152,7 @@ def bind(
     """
     Match the arguments of a call with the parameters of a function of the program.
 
-    :raises CompileError: too many, unknown, doubled or missing arguments.
+    :raises CompileError: too many, unknown, duplicate or missing arguments.
     """
     parameters = [parameter.name for parameter in definition.parameters]
     bound: dict[str, tree.CallArgument] = {}
@@ -172,7 +172,7 @@ def bind(
 
 
 class _NameChecker:
-    """Walks the program in the order of the text."""
+    """Checks the names of a program in the order of the text."""
 
     def __init__(self, builtins: Mapping[str, Builtin]) -> None:
         self._builtins = builtins

@@ -1,9 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The rules of expressions, one method each, loosest binding first.
+The grammar rules of expressions, one method each, lowest precedence first.
 
-The grammar stands at the head of :mod:`~ur_cartesian_driver.urscript.parsing.parser`.
+The head of the following module describes the grammar:
+:mod:`~ur_cartesian_driver.urscript.parsing.parser`.
 """
 
 from __future__ import annotations

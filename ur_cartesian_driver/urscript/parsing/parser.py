@@ -3,12 +3,12 @@
 """
 Tokens to syntax tree: recursive descent, one method per rule.
 
-Programs and statements are read here, expressions in
+This module parses programs and statements; expressions are in
 :mod:`~ur_cartesian_driver.urscript.parsing.expression_parser`.
 
-The language is free of lines: a statement ends where its expression cannot go on, so
-`a = 1 b = 2` are two statements and an operator at the end of a line continues it. Lines matter
-in two places only: the value of `return` stands on its line, and so do the texts of a label.
+Line ends do not matter: a statement ends where its expression cannot continue, so `a = 1 b = 2`
+are two statements, and an operator at the end of a line continues the expression. There are two
+exceptions: the value of `return` and the texts of a label must be on the same line.
 
     program     = ("def" | "sec") NAME "(" ")" ":" block "end"
     block       = { statement }
@@ -67,7 +67,7 @@ def parse(text: str) -> tree.ScriptProgram:
 
 def parse_line(text: str) -> tree.ScriptProgram:
     """
-    Parse statements that belong to a program that runs already, as if they were one.
+    Parse statements that belong to a running program, as if they were a program.
 
     :raises CompileError: at the first token that fits no rule.
     """
@@ -155,7 +155,7 @@ class Parser(ExpressionParser):
     # Statements
 
     def _statement(self) -> tree.Statement:
-        """Read the statement that the first token announces."""
+        """Read the statement that begins with the next token."""
         token = self._token
         rule = {
             'def': self._function, 'thread': self._function, 'if': self._if,
@@ -220,7 +220,7 @@ class Parser(ExpressionParser):
 
     def _case_has_end(self, switch: Token) -> bool:
         """
-        Tell from the end of the first case whether cases have an `end` of their own.
+        Tell from the end of the first case whether cases have their own `end`.
 
         Both styles occur. An `end` before another `end` could be either; then it belongs to the
         switch if it stands in the column of the switch.
@@ -248,7 +248,7 @@ class Parser(ExpressionParser):
         return tree.WhileStatement(condition=condition, body=body, **source_position(start))
 
     def _return(self) -> tree.ReturnStatement:
-        """Read "return" [ expression ]; a value stands on the line of the keyword."""
+        """Read "return" [ expression ]; the value is on the line of the keyword."""
         start = self._advance()
         value = self._expression() if self._same_line() and self._starts_expression() else None
         return tree.ReturnStatement(value=value, **source_position(start))
@@ -320,7 +320,7 @@ class Parser(ExpressionParser):
     def _assignment(
         self, target: tree.Expression, qualifier: Literal['', 'global', 'local'], start: Token
     ) -> tree.AssignStatement:
-        """Read the value; what stands before "=" must be a name or a place inside one."""
+        """Read the value; the target must be a variable or a part of one."""
         base: tree.Expression = target
         while isinstance(base, tree.IndexExpression | tree.FieldExpression):
             base = base.target

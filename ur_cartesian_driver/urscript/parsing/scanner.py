@@ -3,8 +3,8 @@
 """
 Text to tokens.
 
-Newlines are white space; a token knows its line, and the parser looks at lines only in the few
-places where the language does.
+Newlines are white space. A token knows its line; the parser uses it only in the few places where
+the language depends on lines.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from ur_cartesian_driver.urscript.script_errors import CompileError
 
-#: `sec` is none: it is also a field of what `time()` returns.
+#: Without `sec`, which is also a field of the result of `time()`.
 KEYWORDS = frozenset({
     'and', 'break', 'case', 'continue', 'def', 'default', 'elif', 'else', 'end', 'enter_critical',
     'exit_critical', 'false', 'False', 'global', 'halt', 'if', 'join', 'kill', 'local', 'None',
@@ -47,7 +47,7 @@ class TokenKind(Enum):
 
 
 class Token(NamedTuple):
-    """A word of the text; `text` of a string is what stands between the quotes."""
+    """A token; `text` of a string is the text between the quotes."""
 
     kind: TokenKind
     text: str

@@ -3,8 +3,8 @@
 """
 The syntax tree: data only.
 
-Every node is frozen and carries the 1-based line and column of the token that a reader would
-point at. The parser makes these nodes; the static check and the compiler read them.
+Every node is frozen and has the 1-based line and column of its most characteristic token. The
+parser makes the nodes; the scopes and the compiler read them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Literal as OneOf
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SyntaxNode:
-    """Anything that stands at a place in the text."""
+    """Anything with a position in the text."""
 
     line: int
     column: int
@@ -147,7 +147,7 @@ class FieldExpression(Expression):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AssignStatement(Statement):
-    """`target = value`; the target is a name, or a place inside a named variable."""
+    """`target = value`; the target is a variable or a part of one."""
 
     target: NameExpression | IndexExpression | FieldExpression
     value: Expression
@@ -156,14 +156,14 @@ class AssignStatement(Statement):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CallStatement(Statement):
-    """A call (or `run`) whose value is dropped."""
+    """A call (or `run`) whose value is ignored."""
 
     call: Expression
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConditionalBlock(SyntaxNode):
-    """A condition (of `if`, `elif`) or a value (of `case`) and what it guards."""
+    """A condition (of `if`, `elif`) or a value (of `case`), and its block."""
 
     condition: Expression
     body: StatementBlock
@@ -201,7 +201,7 @@ class BreakStatement(Statement):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContinueStatement(Statement):
-    """Go on with the next turn of the innermost loop."""
+    """Continue with the next iteration of the innermost loop."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -244,7 +244,7 @@ class CriticalStatement(Statement):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LabelStatement(Statement):
-    """`$ 12 "text"`: where a PolyScope program stands; no effect."""
+    """`$ 12 "text"`: a position in a PolyScope program; no effect."""
 
     number: int
     text: str
@@ -270,7 +270,7 @@ class FunctionDefinition(Statement):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScriptProgram(SyntaxNode):
-    """What is sent to a controller: `def` (primary) or `sec` (secondary), with its name."""
+    """A program for a controller: `def` (primary) or `sec` (secondary), with its name."""
 
     name: str
     kind: OneOf['def', 'sec']

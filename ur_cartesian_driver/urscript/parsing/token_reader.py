@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Reading tokens from left to right: what all rules of the grammar are made of."""
+"""Reads tokens from left to right: the base of all grammar rules."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from typing import TypedDict, TypeVar
 from ur_cartesian_driver.urscript.parsing.scanner import scan, syntax_error, Token, TokenKind
 from ur_cartesian_driver.urscript.script_errors import CompileError
 
-#: Blocks, brackets and signs inside one another.
+#: Largest nesting of blocks, brackets and signs.
 MAX_NESTING = 50
-#: Operators of one precedence in a row; each makes the tree one node deeper.
+#: Most operators of one precedence in a row; each makes the tree one node deeper.
 MAX_CHAIN = 100
 
 T = TypeVar('T')
@@ -32,7 +32,7 @@ def source_position(token: Token) -> SourcePosition:
 
 
 class TokenReader:
-    """The tokens of one text, and the place of the next one."""
+    """The tokens of one text, and the index of the next one."""
 
     def __init__(self, text: str) -> None:
         self._text = text
@@ -78,7 +78,7 @@ class TokenReader:
         return token.kind.value if token.kind is TokenKind.END else repr(token.text)
 
     def _same_line(self) -> bool:
-        """Tell whether the next token stands on the line of the one before it."""
+        """Tell whether the next token is on the line of the previous one."""
         return self._token.line == self._previous.line
 
     def error(self, reason: str, token: Token | None = None) -> CompileError:
@@ -88,7 +88,7 @@ class TokenReader:
 
     @contextmanager
     def _nested(self) -> Iterator[None]:
-        """Bound the depth of what is inside something else."""
+        """Limit the nesting depth."""
         self._nesting += 1
         if self._nesting > MAX_NESTING:
             raise self.error(f'more than {MAX_NESTING} levels inside one another')
@@ -107,7 +107,7 @@ class TokenReader:
         return tuple(items)
 
     def _operators(self, *texts: str) -> Iterator[Token]:
-        """Yield the operators of one chain, which is bounded as it makes a tree as deep."""
+        """Yield the operators of one chain; it is limited because the tree is as deep."""
         for _ in range(MAX_CHAIN):
             token = self._match(*texts)
             if token is None:

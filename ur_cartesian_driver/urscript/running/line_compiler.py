@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Lines that a running program is given one by one, as in interpreter mode.
+Compiles lines for a running program, as in interpreter mode.
 
-A line is any number of statements, or definitions of functions. It sees the program's global
-variables and functions and those of the lines before it. A variable that it assigns and that the
-program does not have belongs to the lines; it and their functions can be forgotten, all at once.
+A line is any number of statements or function definitions. It sees the global variables and
+functions of the program and of earlier lines. New variables and functions belong to the lines, and
+can be forgotten, all at once.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from ur_cartesian_driver.urscript.script_errors import CompileError
 
 @dataclass(frozen=True, slots=True)
 class CompiledLine:
-    """A line that can be run in a thread of the program, once."""
+    """A line that can run once, in a thread of the program."""
 
     steps: ScriptSteps
-    #: Names of the functions that it calls by itself, not within a function that it defines.
+    #: Names of the functions that it calls directly, not inside a function that it defines.
     calls: frozenset[str]
 
 
 class LineCompiler:
-    """Compiles the lines of one program and knows what they have made."""
+    """Compiles the lines of one program and keeps their variables and functions."""
 
     def __init__(
         self,
@@ -46,7 +46,7 @@ class LineCompiler:
         runtime: Runtime,
     ) -> None:
         """
-        Begin without lines.
+        Start without lines.
 
         :param program: the scope of the program's body.
         :param procedures: the program's compiled functions, by the identity of their scopes.
@@ -68,9 +68,9 @@ class LineCompiler:
 
     def compile(self, text: str) -> CompiledLine:
         """
-        Compile a line; nothing of it has run, but its functions are known from now on.
+        Compile a line without running it; its functions are known from now on.
 
-        :raises CompileError: it is no line, or names something unknown.
+        :raises CompileError: the text is not a line, or contains an unknown name.
         """
         program = parse_line(text)
         try:

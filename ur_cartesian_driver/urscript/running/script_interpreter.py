@@ -1,17 +1,17 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The machine that runs one program, a controller frame at a time.
+Runs one program, a controller cycle (frame) at a time.
 
 Threads are cooperative. In each frame every live thread runs, in the order in which they were
-started, until it takes time: calls something that yields, waits in `join`, or ends. A thread that
-is started runs in the same frame, after those before it. Nothing else switches threads, which is
-what gives critical sections their meaning: their statements cannot be interleaved, and a thread
-that takes time inside one lets the others run. A killed thread holds nothing that must be given
-back. A thread that evaluates more than the budget in one frame ends the program.
+started, until it takes time: it calls a builtin that yields, waits in `join`, or ends. A new
+thread runs in the same frame, after the earlier ones. Nothing else switches threads, and that is
+how critical sections work: their statements cannot interleave, and a thread that takes time inside
+one lets the others run. A killed thread holds nothing that must be released. A thread that
+evaluates more nodes than its budget in one frame ends the program.
 
-The program ends when its main thread ends, and then all other threads end. A thread that ends by
-itself leaves the threads that it started running; one that is killed takes them along.
+The program ends when its main thread ends, and all other threads end with it. When a thread ends
+by itself, the threads that it started go on; when it is killed, they are killed, too.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ BUDGET_EXCEEDED = (
     'The program used too much time without instructing the robot what to do. '
     'Consider using a Wait or sync() in the loop.'
 )
-#: The manual names no limit; threads that start threads would soon take all time and memory.
+#: The manual gives no limit; threads that start threads would soon use all time and memory.
 MAX_THREADS = 256
 
 
@@ -58,7 +58,7 @@ class _Thread:
     alive: bool = True
 
     def descends_from(self, other: _Thread) -> bool:
-        """Tell whether this is the other thread or was started, however indirectly, by it."""
+        """Tell whether the other thread is this one or started it, also indirectly."""
         thread: _Thread | None = self
         while thread is not None and thread is not other:
             thread = thread.parent
@@ -71,10 +71,10 @@ class ScriptInterpreter:
 
     :param program: what `parse` returned.
     :param builtins: the functions that the program can call. A plain function takes no time. In a
-        generator function each bare `yield` gives up the rest of the frame, and what it returns
+        generator function each bare `yield` gives up the rest of the frame, and its return value
         is the value of the call. Arguments are passed by position and name as in Python.
     :param instruction_budget: nodes of the tree that a thread may evaluate in one frame.
-    :raises CompileError: the program cannot run; nothing of it has.
+    :raises CompileError: the program cannot run; nothing of it has run.
     """
 
     def __init__(
@@ -84,9 +84,9 @@ class ScriptInterpreter:
         *,
         instruction_budget: int = 100_000,
     ) -> None:
-        #: Called with the id of each thread that has ended, however it ended.
+        #: Called with the id of each thread that ends, for any reason.
         self.on_thread_end: Callable[[Hashable], None] | None = None
-        #: Set by the statement `pause`; until `resume` a step does nothing.
+        #: Set by `pause`; a step does nothing until `resume`.
         self.paused = False
         #: The runtime exception that ended the program.
         self.error: RuntimeException | None = None
@@ -106,30 +106,30 @@ class ScriptInterpreter:
             reason = 'the program is nested too deeply'
             raise CompileError(program.line, program.column, text, reason) from None
         self._threads = [_Thread(0, main.steps(), None)]
-        #: How many threads there have been; the next one gets this number.
+        #: Number of threads started so far; the next one gets this number.
         self.threads_started = 1
-        #: Compiles lines that the program is given while it runs.
+        #: Compiles lines for the running program.
         self.lines = LineCompiler(scope, procedures, builtins, self)
 
     @property
     def running(self) -> bool:
-        """Whether the program has not ended; it is running before its first step too."""
+        """Whether the program has not ended; true also before its first step."""
         return bool(self._threads)
 
     @property
     def thread(self) -> _Thread:
-        """The thread that is running now; for compiled code."""
+        """The running thread; for compiled code."""
         assert self._current is not None
         return self._current
 
     @property
     def current_thread(self) -> Hashable:
-        """Id of the thread whose builtin is being executed, None between steps."""
+        """Id of the thread whose builtin is running; None between steps."""
         return None if self._current is None else self._current.number
 
     @property
     def location(self) -> tuple[int, int]:
-        """Line and column of the call that is being executed."""
+        """Line and column of the running call."""
         return (0, 0) if self._current is None else self._current.location
 
     @property
@@ -156,10 +156,10 @@ class ScriptInterpreter:
 
     def stop(self) -> None:
         """
-        End the program at once; builtins that wait see their generator closed.
+        End the program at once; the generators of waiting builtins are closed.
 
-        Called by a builtin it ends the program as soon as that builtin yields or returns to the
-        scheduler, since a thread cannot be unwound from inside.
+        If a builtin calls it, the program ends as soon as that builtin yields or returns, because
+        a thread cannot be unwound from inside.
         """
         if self._current is not None:
             self._halted = True
@@ -193,7 +193,7 @@ class ScriptInterpreter:
             self._end(thread)
 
     def _end(self, thread: _Thread) -> None:
-        """Close a thread, as itself, so that builtins see who they clean up for."""
+        """Close a thread as the current one, so that builtins know what they clean up."""
         thread.alive = False
         previous, self._current = self._current, thread
         try:
@@ -205,14 +205,14 @@ class ScriptInterpreter:
         if self.on_thread_end is not None:
             self.on_thread_end(thread.number)
 
-    # What compiled code calls
+    # Called by compiled code
 
     def raise_budget_exceeded(self, line: int, column: int) -> NoReturn:
-        """Raise, because the thread used up its frame without yielding."""
+        """Raise: the thread used up its budget without yielding."""
         raise RuntimeException(BUDGET_EXCEEDED, line, column)
 
     def spawn(self, procedure: CompiledFunction) -> ThreadHandle:
-        """Start a thread; it runs in this frame, after all that were started before."""
+        """Start a thread; it runs in this frame, after all earlier ones."""
         if self._is_secondary:
             raise RuntimeException('A secondary program cannot start threads.')
         if len(self._threads) >= MAX_THREADS:
@@ -223,11 +223,11 @@ class ScriptInterpreter:
         return ThreadHandle(thread.number)
 
     def alive(self, handle: Value) -> bool:
-        """Tell whether a value is the handle of a thread that has not ended."""
+        """Tell whether a value is the handle of a live thread."""
         return self._find(handle) is not None
 
     def kill(self, handle: Value) -> None:
-        """End a thread and all that it started; anything but the handle of one is ignored."""
+        """End a thread and all threads that it started; ignore values that are not handles."""
         target = self._find(handle)
         if target is None:
             return
@@ -239,7 +239,7 @@ class ScriptInterpreter:
             raise _ThreadKilled
 
     def kill_since(self, number: int) -> None:
-        """End the threads that the current one has started from a number on, with theirs."""
+        """End children of the current thread from a number on, and their children."""
         for thread in tuple(self._threads):
             if thread.parent is self._current and thread.number >= number:
                 self.kill(ThreadHandle(thread.number))
