@@ -12,10 +12,8 @@ import yaml
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import MODELS, robot_model
-from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
-    KinematicsInfo,
-    PrimaryDecoder,
-)
+from ur_cartesian_driver.protocol.client_interfaces.primary_messages import PrimaryDecoder
+from ur_cartesian_driver.protocol.client_interfaces.primary_state import KinematicsInfo
 from ur_cartesian_driver.sim import assemble, SimulatorConfig
 from ur_cartesian_driver.sim.calibration import random_calibration, read_calibration
 from ur_cartesian_driver.sim.interfaces.primary_stream import PrimaryStream
