@@ -81,7 +81,7 @@ def apart(a, b):
     return hypot(*(x - y for x, y in zip(a, b, strict=True)))
 
 
-def test_at_once_after_a_stop_and_in_order(robot):
+def test_outputs_without_trigger_pose_switch_at_once_and_in_order(robot):
     watched = Watched(robot)
     run = robot.run(
         [
@@ -101,7 +101,7 @@ def test_at_once_after_a_stop_and_in_order(robot):
         assert apart(change[2], watched.at(x=0.02).position) < 1e-5
 
 
-def test_at_a_place_on_a_straight_line(robot):
+def test_an_output_switches_at_its_trigger_pose_on_a_line(robot):
     watched = Watched(robot)
     places = [watched.at(x=0.01 + 0.0071 * k) for k in range(9)]
     run = robot.run(
@@ -124,7 +124,7 @@ def test_at_a_place_on_a_straight_line(robot):
         assert apart(change[2], place.position) < 0.6 * SPEED * STEP
 
 
-def test_in_the_middle_of_a_corner_without_stopping(robot):
+def test_an_output_switches_in_the_middle_of_a_blend_without_stopping(robot):
     """The plane that halves the corner: whatever the corner's shape, its middle lies there."""
     watched = Watched(robot)
     corner = watched.at(x=0.06)
@@ -144,7 +144,7 @@ def test_in_the_middle_of_a_corner_without_stopping(robot):
 
 
 @pytest.mark.slow
-def test_a_place_that_is_come_round_to_waits_for_the_second_time(robot):
+def test_an_output_that_starts_beyond_its_plane_waits_for_the_next_crossing(robot):
     """Three quarters around a circle: the tool begins beyond the plane of a place on it."""
     watched = Watched(robot)
     moves = [line(watched.at(y=0.01)), line(watched.at())]
@@ -168,7 +168,7 @@ def test_a_place_that_is_come_round_to_waits_for_the_second_time(robot):
     assert apart(watched.changes[0][2], place.position) < 0.1 * STEP
 
 
-def test_a_turn_in_place_has_a_heading_too(robot):
+def test_a_rotation_in_place_has_a_trigger_direction(robot):
     watched = Watched(robot)
     axis = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 2**-0.5, 2**-0.5))
     half = Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.3826834323650898, 0.9238795325112867))
@@ -192,7 +192,7 @@ def test_a_turn_in_place_has_a_heading_too(robot):
     assert seen[watched.changes[0][3] - 1] < 0.5 * STEP
 
 
-def test_on_a_spline_between_two_of_its_pieces(robot):
+def test_an_output_switches_between_two_pieces_of_a_spline(robot):
     watched = Watched(robot)
     arm = Arm(robot_model('ur5e'))
     middle = tuple(a + b for a, b in zip(HOME, (0.1, 0.05, 0, 0, 0, 0), strict=True))
@@ -221,7 +221,7 @@ def test_on_a_spline_between_two_of_its_pieces(robot):
     assert watched.changes[0][3] * STEP == pytest.approx(0.7, abs=3 * STEP)
 
 
-def test_a_place_that_the_tool_never_gets_to_is_not_forgotten(robot):
+def test_an_output_is_switched_although_the_tool_never_reaches_its_trigger_pose(robot):
     watched = Watched(robot)
     nowhere = watched.at(x=0.5)
     run = robot.run(
@@ -263,7 +263,7 @@ def test_delays_count_from_the_end_of_the_motion_and_success_waits_for_them(robo
         ('due = outputs_done < outputs_due', 'due = True', 25.0),
     ],
 )
-def test_a_changed_text_changes_the_place(text, changed, far):
+def test_a_changed_program_changes_where_outputs_switch(text, changed, far):
     """So the tests above would find it: in steps of the tool along the line."""
 
     def edit(program):
@@ -293,7 +293,7 @@ def test_a_changed_text_changes_the_place(text, changed, far):
         (OutputKind.TOOL_DIGITAL, 16, 2),
     ],
 )
-def test_each_output_is_the_one_that_was_meant(robot, output, first, pins):
+def test_each_output_switches_the_right_pin(robot, output, first, pins):
     watched = Watched(robot)
     run = robot.run(
         [line(watched.at(x=0.01)), *(switch(pin, output=output) for pin in range(pins))],
@@ -320,7 +320,7 @@ def test_analog_outputs_in_both_domains(robot, domain, expected):
     assert robot.controller.io.analog_out_voltage[1] == (domain is AnalogDomain.VOLTAGE)
 
 
-def test_too_many_at_one_time_are_a_failure_and_the_arm_stands(robot):
+def test_too_many_pending_outputs_are_a_failure(robot):
     watched = Watched(robot)
     place = watched.at(x=0.05)
     many = [
@@ -334,7 +334,7 @@ def test_too_many_at_one_time_are_a_failure_and_the_arm_stands(robot):
     assert not robot.run([*moves[:-2], moves[-1]]).trouble
 
 
-def test_what_ends_a_trajectory_forgets_what_waits(robot):
+def test_the_end_of_a_trajectory_discards_pending_outputs(robot):
     watched = Watched(robot)
     place = watched.at(x=0.05)
     late = switch(1, trigger_pose=place, trigger_direction=heading(place, 1, 0))

@@ -71,11 +71,11 @@ def test_every_wire_constant_comes_from_its_enum(prefix, members):
         assert f'{prefix}_{member.name} = {member.value}' in lines
 
 
-def test_the_register_of_the_progress_is_the_one_that_the_driver_reads():
+def test_the_progress_register_is_the_one_that_the_driver_reads():
     assert f'REGISTER_POINTS_BEGUN = {int(POINTS_BEGUN)}' in text().splitlines()
 
 
-def test_there_are_no_numbers_of_the_protocol_in_the_statements():
+def test_statements_contain_no_numbers_of_the_protocol():
     """Small ones index, count or are units; everything else has a name."""
     statements = [line for line in text().splitlines() if not re.match(r'\s*#|[A-Z_]+ = ', line)]
     numbers = {
@@ -97,7 +97,7 @@ def test_there_are_no_numbers_of_the_protocol_in_the_statements():
         ('target_payload', (5, 10, 0), True),
     ],
 )
-def test_functions_are_named_only_where_the_controller_knows_them(feature, version, known):
+def test_functions_are_called_only_if_the_controller_has_them(feature, version, known):
     assert has_feature(feature, version) == known
     name = {'optimove': 'optimovej(', 'target_payload': 'set_target_payload('}[feature]
     assert (name in text(version=version)) == known
@@ -105,13 +105,13 @@ def test_functions_are_named_only_where_the_controller_knows_them(feature, versi
 
 
 @pytest.mark.parametrize('allowed', [False, True])
-def test_the_functions_that_let_the_arm_go_are_named_only_where_that_is_allowed(allowed):
+def test_freedrive_functions_are_called_only_if_freedrive_is_allowed(allowed):
     program = text(allow_freedrive=allowed)
     assert (' teach_mode()' in program) is (' end_teach_mode()' in program) is allowed
     assert parse(wrap_in_program(program))
 
 
-def test_nothing_inside_a_function_has_the_name_of_a_global():
+def test_no_local_has_the_name_of_a_global():
     """Which of the two a controller means is written for assignments only."""
     everywhere, function, inside = set(), '', []
     for line in text(allow_freedrive=True).splitlines():
@@ -143,7 +143,7 @@ def test_handles_of_threads_are_killed_and_not_compared():
 
 
 @pytest.mark.parametrize('host', ['', '1.2.3.4"', 'a b', 'x\n'])
-def test_a_host_cannot_smuggle_text_into_the_program(host):
+def test_a_host_cannot_inject_text_into_the_program(host):
     with pytest.raises(LocalProtocolError, match='reverse_ip'):
         ProgramSettings(**SETTINGS | {'host': host})
 
@@ -167,7 +167,7 @@ def test_an_uploaded_program_is_one_indented_definition():
     assert all(not line or line.startswith('\t') for line in lines[1:-1])
 
 
-def test_an_include_stands_in_its_place_and_takes_its_settings():
+def test_an_include_is_inserted_with_its_settings():
     lines = text(servoj_gain=300.0, servo_buffer_depth=3, allow_freedrive=True).splitlines()
     assert lines.count('thread servo_control():') == 1
     assert not [line for line in lines if line.startswith('#!')]

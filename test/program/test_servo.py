@@ -129,7 +129,7 @@ def test_setpoints_are_carried_out_one_by_one_and_reported():
     assert servo.controller.motion.q[0] > servo.home[0] + 0.05
 
 
-def test_an_older_number_is_not_taken_though_it_comes_again():
+def test_an_older_sequence_number_is_ignored():
     servo = Servo().enter()
     servo.swing(50)
     q, state_time = servo.q, servo.state_time
@@ -225,7 +225,7 @@ def test_the_arm_brakes_before_the_program_halts(cause, text):
         pytest.param(lambda servo: servo.enter(ServoMode.IDLE), marks=pytest.mark.exhaustive),
     ],
 )
-def test_leaving_brakes_and_the_program_goes_on(leave):
+def test_leaving_the_servo_brakes_and_the_program_continues(leave):
     servo = Servo().enter()
     servo.swing(200)
     leave(servo)
@@ -253,7 +253,7 @@ def test_a_driver_that_hangs_up_brakes_the_arm_too():
 
 
 @pytest.mark.parametrize('allowed', [pytest.param(False, marks=pytest.mark.exhaustive), True])
-def test_teaching_is_possible_where_it_is_allowed_and_from_idle(allowed):
+def test_freedrive_is_possible_if_allowed_and_from_idle(allowed):
     servo = Servo(allow_freedrive=allowed)
     servo.enter(ServoMode.TEACH)
     guided = FreedriveState.TEACH if allowed else FreedriveState.OFF
@@ -272,7 +272,7 @@ def test_teaching_is_possible_where_it_is_allowed_and_from_idle(allowed):
     assert servo.controller.freedrive is FreedriveState.OFF, 'teaching ends with the mode'
 
 
-def test_teaching_ends_before_the_arm_brakes_for_a_halt():
+def test_freedrive_ends_before_the_arm_brakes_for_a_halt():
     servo = Servo(allow_freedrive=True).enter(ServoMode.TEACH)
     assert servo.controller.freedrive is FreedriveState.TEACH
     servo.error = 1
@@ -283,7 +283,7 @@ def test_teaching_ends_before_the_arm_brakes_for_a_halt():
     assert 'reports the error 1' in servo.log
 
 
-def test_a_refusal_of_teaching_is_told_once():
+def test_a_refusal_of_freedrive_is_logged_once():
     servo = Servo(allow_freedrive=False).enter(ServoMode.TEACH)
     servo.cycle(20)
     assert servo.log.count('freedrive is not allowed') == 1

@@ -144,7 +144,7 @@ def test_in_scaled_time_path_and_time_are_the_same(robot, slider):
 
 
 @pytest.mark.exhaustive
-def test_nothing_drifts_within_minutes(robot):
+def test_splines_do_not_drift_within_minutes(robot):
     """A place that is passed every second is passed at the second, to the end."""
     there, back = tuple(START + 0.05), tuple(START - 0.05)
     fast = (0.15,) * 6
@@ -183,7 +183,7 @@ def test_a_first_point_without_time_is_where_the_arm_is(robot, offset, result):
     assert robot.run([spline(offset, 0.0), spline(0.1, 0.5)]).result is result
 
 
-def test_a_later_point_without_time_is_canceled_and_nothing_moves_on(robot):
+def test_a_later_point_without_time_is_canceled(robot):
     robot.place(HOME, IDENTITY)
     run = robot.run([spline(0.1, 0.5), spline(0.1, 0.0), spline(0.2, 0.5)])
     assert run.result is TrajectoryResult.CANCELED
@@ -200,7 +200,7 @@ def test_more_than_20_rad_per_second_is_canceled(robot, duration, result):
     assert run.result is result
 
 
-def test_a_kind_that_nobody_knows_is_a_failure(robot):
+def test_an_unknown_spline_kind_is_a_failure(robot):
     robot.place(HOME, IDENTITY)
     data = bytearray(encode_points([spline(0.1, 0.5)]))
     data[19 * 4 : 20 * 4] = (3).to_bytes(4, 'big')
@@ -209,7 +209,7 @@ def test_a_kind_that_nobody_knows_is_a_failure(robot):
     assert run.q == pytest.approx(START)
 
 
-def test_another_motion_forgets_speed_and_acceleration(robot):
+def test_another_motion_discards_speed_and_acceleration(robot):
     """The spline after it begins at rest: it does not swing back first."""
     robot.place(HOME, IDENTITY)
     moves = [spline(0.1, 0.5, qd=0.4), MoveJ(target=tuple(START + 0.3)), spline(0.4, 1.0)]
@@ -220,7 +220,7 @@ def test_another_motion_forgets_speed_and_acceleration(robot):
     assert last[250, 0] == pytest.approx(START[0] + 0.35, abs=0.005)
 
 
-def test_a_cubic_forgets_the_acceleration(robot):
+def test_a_cubic_piece_discards_the_acceleration(robot):
     robot.place(HOME, IDENTITY)
     moves = [
         Spline(
@@ -237,7 +237,7 @@ def test_a_cubic_forgets_the_acceleration(robot):
     assert np.abs(run.joints - polynomial(moves, times)).max() < 4e-5
 
 
-def test_a_blend_has_no_way_into_a_spline_so_the_arm_stops_before(robot):
+def test_a_blend_into_a_spline_becomes_a_stop(robot):
     robot.place(HOME, IDENTITY)
     run = robot.run([MoveJ(target=tuple(START + 0.3), blend_radius=0.05), spline(0.4, 1.0)])
     assert not run.trouble
@@ -264,7 +264,7 @@ def test_the_last_point_ends_at_rest_whatever_it_says(robot, announced):
         assert 0.0 < run.q[0] - points[-1].target[0] < 0.6**2 / 2 / 4.0 + 2 * STEP * 0.6
 
 
-def test_a_pause_on_the_way_is_waited_for_as_between_moves(robot):
+def test_a_spline_waits_during_a_pause_as_moves_do(robot):
     """An arm that stands needs no point within one step: there are 0.5 s."""
     robot.place(HOME, IDENTITY)
     first, second = spline(0.1, 0.5), spline(0.2, 0.5)
@@ -293,7 +293,7 @@ def test_a_pause_on_the_way_is_waited_for_as_between_moves(robot):
         ('spline_qdd = qdd', 'spline_qdd = 0 * qdd', 1e-4),
     ],
 )
-def test_a_changed_law_changes_the_motion(line, replacement, size):
+def test_a_changed_program_changes_the_motion(line, replacement, size):
     """So the tests above would find it."""
 
     def edit(text):

@@ -53,7 +53,7 @@ ANSWERS = [
 
 
 @pytest.mark.parametrize(('name', 'argument', 'answer', 'value'), ANSWERS)
-def test_success_is_recognised_by_the_shape_of_the_answer(name, argument, answer, value):
+def test_success_is_recognized_by_the_form_of_the_reply(name, argument, answer, value):
     client = DashboardClientCodec()
     assert client.feed(encode_line(BANNER)) == [DashboardGreeting(text=BANNER)]
     line = client.send(name, argument)
@@ -102,7 +102,7 @@ def test_the_two_ends_understand_each_other(name):
     assert reply.ok
 
 
-def test_the_longer_of_two_commands_is_understood():
+def test_the_longer_of_two_matching_commands_is_parsed():
     assert parse_request('load installation a') == DashboardRequest(
         name='load installation', argument='a'
     )
@@ -112,7 +112,7 @@ def test_the_longer_of_two_commands_is_understood():
 
 
 @pytest.mark.parametrize('line', ['brake_release', 'play it', 'load', '', 'Play'])
-def test_a_line_that_is_no_command_is_returned_and_answered(line):
+def test_a_line_that_is_not_a_command_is_returned_and_answered(line):
     assert DashboardServerCodec().feed(line.encode() + b'\r\n') == [line]
     answer = not_understood(line).decode().rstrip('\n')
     assert not parse_reply(DashboardRequest(name='play'), answer).ok
@@ -122,7 +122,7 @@ def test_a_line_that_is_no_command_is_returned_and_answered(line):
     ('name', 'argument'),
     [('fly', ''), ('load', ''), ('play', 'now'), ('popup', 'two\nplay'), ('addToLog', 'a\rb')],
 )
-def test_what_is_no_command_cannot_be_sent(name, argument):
+def test_an_invalid_command_cannot_be_sent(name, argument):
     with pytest.raises(LocalProtocolError):
         DashboardClientCodec().send(name, argument)
 
@@ -144,7 +144,7 @@ def test_commands_have_a_first_version(name, version, available):
     assert COMMAND_SPECS[name].is_available(version) is available
 
 
-def test_answers_belong_to_commands_in_order_also_in_pieces():
+def test_replies_match_commands_in_order_also_in_pieces():
     client = DashboardClientCodec()
     client.send('robotmode')
     client.send('play')
@@ -155,14 +155,14 @@ def test_answers_belong_to_commands_in_order_also_in_pieces():
     assert client.feed(b'') == []
 
 
-def test_an_answer_to_nothing_is_an_error():
+def test_a_reply_without_a_command_is_an_error():
     client = DashboardClientCodec()
     client.feed(encode_line(BANNER))
     with pytest.raises(RemoteProtocolError, match='no command waits for a reply'):
         client.feed(b'Stopped\n')
 
 
-def test_an_end_instead_of_an_answer_is_an_error():
+def test_an_end_instead_of_a_reply_is_an_error():
     client = DashboardClientCodec()
     client.send('play')
     with pytest.raises(RemoteProtocolError, match='play'):

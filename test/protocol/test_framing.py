@@ -36,7 +36,7 @@ from ur_cartesian_driver.protocol.framing import (
         (2147.483647, 2147483647),
     ],
 )
-def test_ties_go_away_from_zero(value, raw):
+def test_ties_round_away_from_zero(value, raw):
     assert to_fixed(value, 'x') == raw
 
 
@@ -56,7 +56,7 @@ def test_a_fixed_point_number_is_within_half_a_unit(value):
 
 
 @given(st.integers(-(2**31), 2**31 - 1))
-def test_every_word_survives_the_way_to_a_value_and_back(raw):
+def test_every_word_round_trips_through_its_value(raw):
     assert to_fixed(from_fixed(raw), 'x') == raw
 
 
@@ -75,7 +75,7 @@ STREAMS = [b'abcdefgh', b'\x00\x03a\x00\x05abc\x00\x03z', b'one\r\ntwo\n\n']
 
 
 @pytest.mark.parametrize(('make', 'stream'), list(zip(BUFFERS, STREAMS, strict=True)))
-def test_byte_by_byte_gives_the_same_as_at_once(make, stream):
+def test_byte_by_byte_decodes_as_all_at_once(make, stream):
     at_once = make().feed(stream)
     buffer = make()
     assert [unit for i in range(len(stream)) for unit in buffer.feed(stream[i : i + 1])] == at_once
@@ -105,17 +105,17 @@ def test_a_line_without_end_is_refused():
         buffer.feed(b'x')
 
 
-def test_odd_bytes_in_a_text_are_shown_and_not_fatal():
+def test_odd_bytes_in_a_text_are_shown_as_escapes():
     assert LineBuffer().feed(b'Temp\xc3\xa9rature \xff\n') == ['Temp\u00e9rature \\xff']
 
 
-def test_a_long_quotation_is_cut():
+def test_a_long_quotation_is_truncated():
     assert len(hex_text(bytes(10_000))) < 130
     assert '10000 bytes' in hex_text(bytes(10_000))
 
 
 @given(st.lists(st.binary(max_size=200)))
-def test_random_bytes_raise_nothing_else_and_are_not_hoarded(chunks):
+def test_random_bytes_raise_only_remote_errors_and_are_not_kept(chunks):
     for make in BUFFERS:
         buffer = make()
         with suppress(RemoteProtocolError):

@@ -175,7 +175,7 @@ def test_frames_are_read_as_by_the_library(frame):
             ), name
 
 
-def test_a_float_datum_is_big_endian_as_all_else_though_the_library_swaps_it():
+def test_a_float_datum_is_big_endian_although_the_library_swaps_it():
     body = struct.pack('>iiBIf', 0, 0, 3, 3, 1.5)
     assert decode_frame(message(5, body)).data == 1.5
 
@@ -183,7 +183,7 @@ def test_a_float_datum_is_big_endian_as_all_else_though_the_library_swaps_it():
 @pytest.mark.parametrize(
     'frame', [f for f in FRAMES if f['frame_type'] in (16, 20)], ids=lambda f: f['name']
 )
-def test_frames_are_written_as_they_came(frame):
+def test_encoded_frames_equal_the_received_ones(frame):
     data = bytes.fromhex(frame['hex'])
     content = decode_frame(data)
     written = (
@@ -302,7 +302,7 @@ def test_a_simulated_state_has_the_sizes_and_the_order_of_a_ur5e():
 
 
 @pytest.mark.parametrize('package', full_state(), ids=lambda p: type(p).__name__)
-def test_a_sub_package_comes_back_as_it_was_also_with_a_surplus(package):
+def test_a_sub_package_round_trips_also_with_surplus_bytes(package):
     if not isinstance(package, RawSubPackage):
         assert type(package).decode(package.encode()) == package
         if not isinstance(package, ConfigurationData):
@@ -367,7 +367,7 @@ def message(kind, content):
     ],
     ids=bytes.hex,
 )
-def test_a_frame_without_sense_is_refused(data):
+def test_an_invalid_frame_is_refused(data):
     with pytest.raises(RemoteProtocolError):
         PrimaryDecoder().feed(data)
 
@@ -441,7 +441,7 @@ MESSAGES = st.one_of(
 
 
 @given(st.lists(MESSAGES, max_size=5))
-def test_messages_come_back_as_they_were(messages):
+def test_messages_round_trip(messages):
     assert PrimaryDecoder().feed(b''.join(map(encode_message, messages)) or b'') == messages
 
 
@@ -482,7 +482,7 @@ FLAT = 'def f():\nif True:\nend\nend\n'
 
 @pytest.mark.parametrize('in_pieces', [False, True])
 @pytest.mark.parametrize('end', [b'\n', b'\r\n'])
-def test_commands_and_programs_are_told_apart(end, in_pieces):
+def test_commands_and_programs_are_distinguished(end, in_pieces):
     stream = (
         encode_command(PrimaryCommand.STOP_PROGRAM)
         + encode_program(PROGRAM)
@@ -509,7 +509,7 @@ def test_a_command_without_line_feed_is_complete_at_the_end():
     assert decoder.feed(b'') == ['power on']
 
 
-def test_a_program_that_is_cut_off_is_passed_on_at_the_end():
+def test_a_truncated_program_is_returned_at_the_end():
     decoder = ScriptUploadDecoder()
     assert decoder.feed(b'def f():\n  x = ') == []
     assert decoder.feed(b'') == ['def f():\n  x = \n']

@@ -77,7 +77,7 @@ def numbered() -> RealtimeData:
 
 
 @pytest.mark.parametrize('name', PLACES)
-def test_each_field_stands_where_the_tables_say(name):
+def test_each_field_is_where_the_tables_say(name):
     count = VECTORS.get(name, 1)
     values = tuple(float(-1 - i) for i in range(count))
     data = replace(RealtimeData(time=0.0), **{name: values if name in VECTORS else values[0]})
@@ -119,13 +119,13 @@ def test_an_older_packet_is_the_front_of_a_newer_one(size):
         assert getattr(read, name) == expected
 
 
-def test_what_a_newer_packet_appends_is_left_out():
+def test_appended_fields_of_newer_packets_are_ignored():
     packet = numbered().encode(1220)
     assert decode_packet(struct.pack('>i', 1228) + packet[4:] + bytes(8)) == numbered()
 
 
 @given(st.lists(st.floats(allow_nan=False, width=64), min_size=12, max_size=12))
-def test_what_is_written_is_read(numbers):
+def test_packets_round_trip(numbers):
     data = RealtimeData(time=1.5, q_actual=tuple(numbers[:6]), payload_inertia=tuple(numbers[6:]))
     assert decode_packet(data.encode(1220)) == data
 
@@ -140,7 +140,7 @@ def test_packets_are_found_in_any_pieces(data):
     assert read == [0.0, 1.0, 2.0]
 
 
-def test_a_size_that_no_version_has_is_refused():
+def test_an_unknown_packet_size_is_refused():
     with pytest.raises(LocalProtocolError, match='1221'):
         RealtimeData(time=0.0).encode(1221)
     with pytest.raises(RemoteProtocolError, match='1000000'):

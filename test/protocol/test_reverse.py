@@ -144,7 +144,7 @@ def test_all_messages_of_the_library_are_read_from_one_stream_in_pieces():
         (ControlMode.STOPPED, 5000, 2, 100),
     ],
 )
-def test_the_arm_never_moves_on_for_more_than_200_ms_unasked(mode, wish, step, word):
+def test_a_real_time_mode_never_lasts_more_than_200_ms_without_a_message(mode, wish, step, word):
     assert read_timeout_for(mode, wish, step) == word
 
 
@@ -175,7 +175,7 @@ def test_no_invalid_message_can_be_made(make):
         'ffffffff' + '00' * 28,
     ],
 )
-def test_a_message_without_sense_is_refused_with_its_bytes(text):
+def test_an_invalid_message_is_refused_with_its_bytes(text):
     with pytest.raises(RemoteProtocolError, match=text):
         ReverseMessage.decode(bytes.fromhex(text))
 
@@ -185,7 +185,7 @@ def test_a_message_without_sense_is_refused_with_its_bytes(text):
     st.tuples(*[st.floats(-2147.0, 2147.0)] * 6),
     st.integers(0, 10_000),
 )
-def test_a_set_point_comes_back_within_half_a_unit(mode, values, timeout):
+def test_a_set_point_round_trips_within_half_a_unit(mode, values, timeout):
     message = setpoint(mode, values, timeout)
     back = ReverseMessage.decode(message.encode())
     assert back == message

@@ -132,7 +132,7 @@ def test_optional_outputs_that_are_unknown_are_left_out():
     assert [output.recipe.names for output in link.server.outputs] == [('timestamp', 'actual_q')]
 
 
-def test_needed_outputs_that_are_unknown_are_named():
+def test_required_outputs_that_are_unknown_are_named():
     with pytest.raises(FieldsNotFound, match=r'outputs payload_x.*5\.21\.0\.0') as error:
         Link(RtdeClientCodec(['timestamp', 'payload_x', 'payload'], optional_outputs=['payload']))
     assert error.value.names == ('payload_x',)
@@ -183,7 +183,7 @@ def test_an_old_controller_is_asked_for_125_hz():
         {'outputs': ['timestamp'], 'inputs': ['a'], 'input_groups': [['a']]},
     ],
 )
-def test_an_impossible_wish_is_refused_at_once(options):
+def test_an_impossible_request_is_refused_at_once(options):
     with pytest.raises(LocalProtocolError):
         RtdeClientCodec(**options)
 
@@ -214,14 +214,14 @@ def started(steps, outputs=('timestamp',)):
 
 
 @pytest.mark.parametrize('place', range(5))
-def test_text_messages_are_welcome_at_any_time(place):
+def test_text_messages_are_accepted_at_any_time(place):
     client, events = started([*STEPS[:place], *[TEXT] * 10, *STEPS[place:]])
     assert client.state is RtdeState.READY
     assert events.count(TEXT) == 10
 
 
 @pytest.mark.parametrize('place', range(4))
-def test_five_foreign_packages_are_borne_in_each_state_and_no_more(place):
+def test_five_unexpected_packages_are_tolerated_in_each_state(place):
     foreign = SetupInputsReply(types=('DOUBLE',))
     client, events = started([*STEPS[:place], *[foreign] * 5, *STEPS[place:]])
     assert client.state is RtdeState.READY
@@ -238,7 +238,7 @@ def test_data_before_the_reply_to_start_counts_as_reply():
     assert [type(event) for event in events] == [HandshakeDone, *[DataReceived] * 3]
 
 
-def test_a_controller_that_stops_short_is_an_error_that_says_where():
+def test_an_early_end_is_an_error_that_names_the_state():
     client, _ = started(STEPS[:2])
     with pytest.raises(RemoteProtocolError, match='types of the outputs'):
         client.feed(b'')
@@ -246,7 +246,7 @@ def test_a_controller_that_stops_short_is_an_error_that_says_where():
         client.feed(b'')
 
 
-def test_the_end_of_the_data_is_no_error_between_packages():
+def test_an_end_between_data_packages_is_not_an_error():
     client, _ = started(STEPS)
     assert client.feed(b'') == []
 
@@ -261,12 +261,12 @@ def test_the_end_of_the_data_is_no_error_between_packages():
         ([*STEPS, DataPackage(payload=b'\1' + bytes(7))], 'has 9 bytes, but 8'),
     ],
 )
-def test_what_a_controller_must_not_say(steps, text):
+def test_invalid_replies_of_a_controller_are_errors(steps, text):
     with pytest.raises(RemoteProtocolError, match=text):
         started(steps)
 
 
-def test_a_type_that_is_stated_is_believed_more_than_the_table():
+def test_a_stated_type_overrides_the_table():
     _, events = started([*STEPS[:2], SetupOutputsReply(types=('UINT32',)), ACCEPTED[S]])
     assert events[0].outputs.types == (DataType.UINT32,)
 
@@ -278,7 +278,7 @@ def test_a_field_unknown_to_us_can_be_streamed_if_its_type_is_stated():
         started([*STEPS[:2], SetupOutputsReply(types=('brand_new',))], outputs=['brand_new'])
 
 
-def test_a_package_that_comes_alone_needs_no_feeding():
+def test_a_single_data_package_is_decoded_without_feed():
     names = ('timestamp', 'speed_scaling')
     client, _ = started(
         [STEPS[0], VERSION, SetupOutputsReply(types=('DOUBLE', 'DOUBLE')), STEPS[3]], names
@@ -292,7 +292,7 @@ def test_a_package_that_comes_alone_needs_no_feeding():
     assert client.values_in(data) == (1.0, 2.0)
 
 
-def test_before_the_start_nothing_is_a_package_of_values():
+def test_before_the_start_no_package_has_values():
     client, _ = started(STEPS[:3], ('timestamp',))
     assert client.values_in(Recipe(['timestamp'], [DataType.DOUBLE]).pack((1.0,))) is None
 

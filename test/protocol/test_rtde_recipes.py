@@ -71,12 +71,12 @@ SIX = (0.0,) * 6
         ((10**400, SIX, True), 'UINT32'),
     ],
 )
-def test_a_value_that_cannot_be_packed_is_named(values, text):
+def test_the_error_names_a_value_that_cannot_be_packed(values, text):
     with pytest.raises(LocalProtocolError, match=text):
         MIXED.pack(values)
 
 
-def test_two_wrong_lengths_do_not_make_a_right_one():
+def test_wrong_lengths_with_the_right_sum_are_refused():
     recipe = Recipe(['a', 'b'], [DataType.VECTOR3D, DataType.VECTOR3D])
     with pytest.raises(LocalProtocolError, match='a is'):
         recipe.pack(((1.0, 2.0), (3.0, 4.0, 5.0, 6.0)))
@@ -117,7 +117,7 @@ def values_of(data_type):
     ),
     st.none() | st.integers(0, 255),
 )
-def test_values_come_back_as_they_were(types_and_values, recipe_id):
+def test_recipe_values_round_trip(types_and_values, recipe_id):
     types, values = types_and_values
     recipe = Recipe([f'x{i}' for i in range(len(types))], types, recipe_id)
     data = recipe.pack(values)

@@ -80,7 +80,7 @@ def test_data_packages_have_the_bytes_of_the_library(package):
 
 
 @pytest.mark.parametrize('name', CONNECTIONS)
-def test_streamed_and_written_values_are_those_recorded(name):
+def test_streamed_and_written_values_equal_the_recording(name):
     connection = GOLDEN[name]
     outputs, inputs = connection['output_recipe'], connection['input_recipe']
     version = connection['protocol_version']

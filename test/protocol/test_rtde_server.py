@@ -29,7 +29,7 @@ def server(**options):
     return RtdeServerCodec(VERSION, set(), **options)
 
 
-def test_a_client_may_have_several_output_recipes_with_frequencies_of_their_own():
+def test_a_client_may_have_several_output_recipes_with_their_own_frequencies():
     controller = server()
     controller.feed(
         SetupOutputs(names=('timestamp',), frequency=10.0).encode()
@@ -59,7 +59,7 @@ def test_in_version_1_there_is_one_output_recipe_without_id():
     assert controller.data_to_send().endswith(b'OVECTOR6D')
 
 
-def test_a_client_with_one_recipe_may_give_it_any_id():
+def test_a_client_with_one_recipe_may_use_any_id():
     controller = server()
     controller.feed(SetupInputs(names=('input_int_register_24',)).encode())
     for number in (0, 1, 200):
@@ -67,7 +67,7 @@ def test_a_client_with_one_recipe_may_give_it_any_id():
         assert event.values == (5,)
 
 
-def test_with_several_recipes_the_id_counts():
+def test_with_several_recipes_the_id_selects_one():
     controller = server()
     for number in (24, 25):
         controller.feed(SetupInputs(names=(f'input_int_register_{number}',)).encode())

@@ -98,7 +98,7 @@ def test_reading_gives_back_the_command_and_the_bytes(case):
 
 
 @pytest.mark.parametrize('case', REFUSED, ids=case_id)
-def test_what_the_software_does_not_know_is_refused(case):
+def test_a_command_that_the_software_lacks_is_refused(case):
     with pytest.raises(LocalProtocolError, match=case['robot_version']):
         encode(command_of(case), version_of(case))
 
@@ -143,7 +143,7 @@ def test_a_value_out_of_range_is_refused_with_its_name(make, text):
         [3, *[0] * 18, 1_500_000],
     ],
 )
-def test_a_command_without_sense_is_refused_with_its_bytes(words):
+def test_an_invalid_command_is_refused_with_its_bytes(words):
     data = struct.pack('>28i', *words, *[0] * (28 - len(words)))
     with pytest.raises(RemoteProtocolError, match=data[:40].hex()):
         decode(data)
@@ -164,7 +164,7 @@ def test_commands_are_read_from_a_stream_in_pieces():
 
 
 @given(st.tuples(*[st.floats(-2147, 2147)] * 6), st.floats(0, 100), st.floats(0, 2147))
-def test_values_come_back_within_half_a_unit(six, mass, time):
+def test_values_round_trip_within_half_a_unit(six, mass, time):
     command = SetTargetPayloadCommand(mass=mass, cog=six[:3], inertia=six, transition_time=time)
     back = decode(encode(command))
     assert (back.mass, *back.cog, *back.inertia, back.transition_time) == pytest.approx(
@@ -192,7 +192,7 @@ def test_results_of_a_tool_contact(result, text):
 
 
 @pytest.mark.parametrize('persistence', list(TcpPersistence))
-def test_a_tcp_says_for_how_long_in_a_word_that_others_do_not_read(persistence):
+def test_the_persistence_of_a_tcp_is_a_word_that_other_programs_ignore(persistence):
     plain = encode(SetTcpOffsetCommand(offset=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6)))
     command = SetTcpOffsetCommand(offset=(0.1, 0.2, 0.3, 0.4, 0.5, 0.6), persistence=persistence)
     sent = encode(command)

@@ -17,7 +17,7 @@ def test_the_bytes():
     assert reply('textmsg("\u00e9")') == b'textmsg("\xc3\xa9")\n'
 
 
-def test_requests_come_glued_together_or_in_pieces():
+def test_requests_are_counted_when_joined_or_in_pieces():
     assert RequestDecoder().feed(REQUEST * 3) == 3
     decoder = RequestDecoder()
     assert sum(decoder.feed(bytes([byte])) for byte in REQUEST * 2) == 2

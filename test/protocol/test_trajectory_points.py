@@ -190,7 +190,7 @@ def test_what_overflows_in_the_library_is_refused(case):
         encode_points([MoveJ(target=ZERO6), primitive_of(case)])
 
 
-def test_something_that_is_no_primitive_is_refused():
+def test_something_else_than_a_primitive_is_refused():
     (case,) = [case for case in GOLDEN['cases'] if case['type'] is None]
     assert case['refused']
     with pytest.raises(LocalProtocolError, match='not a motion primitive'):
@@ -210,7 +210,7 @@ def test_float32_scalars_of_older_calls_give_the_same_words(case):
         assert encode_fields(fields_of(case)).hex() == case['hex']
 
 
-def test_many_points_are_encoded_as_one_by_one():
+def test_many_points_are_encoded_as_single_points_are():
     sent = [case for case in SENT if not case['note'].startswith('other mode')]
     primitives = [primitive_of(case) for case in sent] * 60
     assert len(primitives) > 2 * 4096
@@ -262,7 +262,7 @@ def test_the_spline_kind_follows_from_the_accelerations():
     assert decode_point(encode_point(quintic)) == quintic
 
 
-def test_the_fields_have_the_places_that_the_robot_program_reads():
+def test_the_fields_have_the_indices_that_the_robot_program_reads():
     near = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
     line = struct.unpack(
         '>21i',
@@ -294,7 +294,7 @@ def test_the_fields_have_the_places_that_the_robot_program_reads():
     assert (arc[PointField.ARC_MODE], arc[PointField.SECOND]) == (1_000_000, 8_000_000)
 
 
-def test_the_fields_of_an_output_have_the_places_that_the_robot_program_reads():
+def test_the_fields_of_an_output_have_the_indices_that_the_robot_program_reads():
     words = struct.unpack(
         '>21i',
         encode_point(
@@ -348,7 +348,7 @@ def words_with(**changes):
         words_with(w20=3, w14=500_000),
     ],
 )
-def test_a_point_without_sense_is_refused_with_its_bytes(data):
+def test_an_invalid_point_is_refused_with_its_bytes(data):
     with pytest.raises(RemoteProtocolError) as error:
         decode_point(data)
     assert (data[:40].hex() or 'no bytes') in str(error.value)
@@ -405,7 +405,7 @@ PRIMITIVES = st.one_of(
 
 
 @given(PRIMITIVES)
-def test_reading_what_was_written_is_the_same_within_half_a_unit(primitive):
+def test_points_round_trip_within_half_a_unit(primitive):
     back = decode_point(encode_point(primitive))
     assert motion_type(back) is motion_type(primitive)
     numbers, again = to_fields(primitive), to_fields(back)
@@ -414,7 +414,7 @@ def test_reading_what_was_written_is_the_same_within_half_a_unit(primitive):
 
 @settings(max_examples=50)
 @given(st.lists(PRIMITIVES, max_size=4))
-def test_the_fast_way_gives_the_same_bytes(primitives):
+def test_vectorized_encoding_gives_the_same_bytes(primitives):
     assert encode_points(primitives) == b''.join(map(encode_point, primitives))
 
 
@@ -438,7 +438,7 @@ def test_results(result, text):
     assert TrajectoryResultDecoder().feed(bytes.fromhex(text)) == [result]
 
 
-def test_results_glued_together_or_in_pieces_are_all_read():
+def test_results_are_read_when_joined_or_in_pieces():
     """The library loses two results in one segment; a stream has no segments."""
     stream = b''.join(bytes.fromhex(text) for _, text in RESULTS)
     assert TrajectoryResultDecoder().feed(stream) == [result for result, _ in RESULTS]
@@ -450,7 +450,7 @@ def test_results_glued_together_or_in_pieces_are_all_read():
 
 
 @pytest.mark.parametrize('text', ['00000003', 'ffffffff', '7fffffff'])
-def test_a_number_that_is_no_result_is_refused_with_its_bytes(text):
+def test_an_unknown_result_is_refused_with_its_bytes(text):
     with pytest.raises(RemoteProtocolError, match=text):
         TrajectoryResultDecoder().feed(bytes.fromhex(text))
 

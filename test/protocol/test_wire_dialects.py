@@ -162,7 +162,7 @@ def test_what_a_dialect_does_not_have_is_refused_with_its_name(name, primitive, 
             encode(primitive, DIALECTS[name])
 
 
-def test_a_motion_type_from_the_future_is_refused():
+def test_a_motion_type_of_a_newer_dialect_is_refused():
     data = encode_point(MoveJ(target=POSE, q_near=Q))
     with pytest.raises(RemoteProtocolError, match=r'6 is an unknown motion type .* 2\.10'):
         decode_point(data, DIALECTS['2.10'])
@@ -199,7 +199,7 @@ def test_the_longest_durations_fit():
 
 @pytest.mark.parametrize('name', DIALECTS)
 @given(st.floats(0.001, 2000.0), st.floats(0.0, 2.0), st.floats(0.0, 10.0))
-def test_reading_what_was_written_is_the_same_within_half_a_unit(name, duration, blend, v):
+def test_points_round_trip_within_half_a_unit(name, duration, blend, v):
     line = MoveL(
         target=POSE, velocity=v, acceleration=2.0 * v, duration=duration, blend_radius=blend
     )
@@ -214,14 +214,14 @@ def test_reading_what_was_written_is_the_same_within_half_a_unit(name, duration,
 
 
 @given(st.floats(0.0, 2.0))
-def test_a_radius_that_the_wire_carries_is_never_larger(radius):
+def test_a_radius_is_never_rounded_up(radius):
     whole = DIALECTS['2.0'].round_down_radius(radius)
     assert radius - 0.001 < whole <= radius + 1e-9
     assert words(MoveP(target=POSE, blend_radius=whole), '2.0')[19] == round(whole * 1000)
     assert NEWEST_DIALECT.round_down_radius(radius) == radius
 
 
-def test_splines_are_known_to_all():
+def test_all_dialects_have_splines():
     for name in DIALECTS:
         assert words(Spline(target=Q, velocities=ZERO6, duration=1.0), name)[19:] == (1, 51)
 

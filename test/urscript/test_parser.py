@@ -29,7 +29,7 @@ def walk(node: tree.SyntaxNode) -> list[tree.SyntaxNode]:
 
 
 @pytest.mark.parametrize(('text', 'kind'), [('def a(): end', 'def'), ('sec a(): end', 'sec')])
-def test_kind_and_name_of_a_program_are_known(text: str, kind: str) -> None:
+def test_a_program_has_its_kind_and_name(text: str, kind: str) -> None:
     parsed = parse(text)
     assert (parsed.name, parsed.kind, parsed.body) == ('a', kind, ())
 
@@ -45,7 +45,7 @@ def test_line_ends_of_windows_count_once() -> None:
     assert [(node.line, node.column) for node in body] == [(2, 3), (3, 3)]
 
 
-def test_nodes_stand_where_a_reader_would_point() -> None:
+def test_nodes_have_the_position_of_their_main_token() -> None:
     text = program('  total = first + second(3, k=4)[5].six')
     places = {(type(node).__name__, node.line, node.column) for node in walk(parse(text).body[0])}
     assert {
@@ -60,7 +60,7 @@ def test_nodes_stand_where_a_reader_would_point() -> None:
     } <= places
 
 
-def test_binding_strength_orders_the_operators() -> None:
+def test_precedence_orders_the_operators() -> None:
     value = first_value('not a or b and c == d + e * -f')
     assert isinstance(value, tree.LogicalExpression)
     assert value.operator == 'or'

@@ -101,7 +101,7 @@ def stream(sample: ScriptInterpreter, robot: Robot, frames: int) -> list[float]:
 
 
 @pytest.mark.slow
-def test_the_servoj_sample_moves_through_every_way_point(
+def test_the_servoj_sample_moves_through_every_waypoint(
     sample: ScriptInterpreter, robot: Robot
 ) -> None:
     robot.integers[DESIRED_MODE] = MODE_SERVO
@@ -116,9 +116,7 @@ def test_the_servoj_sample_moves_through_every_way_point(
     assert abs(robot.output_floats[LAG_TIME]) < 3 * STEP
 
 
-def test_the_servoj_sample_halts_when_it_is_told_to(
-    sample: ScriptInterpreter, robot: Robot
-) -> None:
+def test_the_servoj_sample_halts_on_request(sample: ScriptInterpreter, robot: Robot) -> None:
     stream(sample, robot, 3)
     assert sample.running
     robot.integers[EXTERNAL_ERROR] = ERROR_HALT

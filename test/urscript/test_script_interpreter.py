@@ -67,7 +67,7 @@ def test_nothing_runs_before_the_first_step() -> None:
     assert seen == []
 
 
-def test_a_machine_that_has_ended_stays_as_it_is() -> None:
+def test_an_interpreter_that_has_ended_does_not_change() -> None:
     running = machine('a = 1')
     running.step()
     running.step()
@@ -82,7 +82,7 @@ def test_a_secondary_program_that_waits_is_still_running_after_its_frame() -> No
     assert running.running
 
 
-def test_builtins_get_and_give_values_of_the_language() -> None:
+def test_builtins_take_and_return_script_values() -> None:
     seen: list[Any] = []
 
     def give() -> Struct:
@@ -172,7 +172,7 @@ def test_a_builtin_that_waits_cleans_up_as_the_thread_it_belongs_to(body: str) -
     assert cleaned == [1]
 
 
-def test_stop_ends_the_program_and_closes_what_waits() -> None:
+def test_stop_ends_the_program_and_closes_waiting_builtins() -> None:
     closed: list[bool] = []
 
     def move() -> Generator[None, None, None]:
@@ -265,7 +265,7 @@ def test_a_paused_program_stays_until_it_is_resumed() -> None:
 # Budget
 
 
-def test_a_thread_that_exceeds_its_budget_ends_the_program_with_a_place() -> None:
+def test_a_thread_that_exceeds_its_budget_ends_the_program_with_a_position() -> None:
     body = parse('def f():\n  i = 0\n  while True:\n    i = i + 1\n  end\nend')
     running = ScriptInterpreter(body, {}, instruction_budget=1000)
     running.step()
@@ -323,7 +323,7 @@ def test_a_runtime_error_has_the_innermost_position() -> None:
     'error',
     [ValueError('v'), TypeError('t'), ZeroDivisionError('z'), OverflowError('o'), OSError()],
 )
-def test_whatever_a_builtin_raises_ends_the_program_only(error: Exception) -> None:
+def test_an_error_of_a_builtin_ends_only_the_program(error: Exception) -> None:
     def now() -> None:
         raise error
 
