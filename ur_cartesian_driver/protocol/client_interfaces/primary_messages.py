@@ -93,7 +93,7 @@ _MESSAGE = struct.Struct('>QbB')
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Message(Body):
-    """What all robot messages have; the body holds the fields of the subclass."""
+    """Common head of robot messages; the body contains the fields of the subclass."""
 
     message_type: ClassVar[int]
     timestamp: int = 0

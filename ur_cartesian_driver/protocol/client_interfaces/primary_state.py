@@ -117,7 +117,7 @@ class RobotModeData(Body):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointData:
-    """Joints [rad, rad/s]: currents [A], voltages [V], motor temperatures [deg C]."""
+    """Joint positions [rad], speeds [rad/s], currents [A], voltages [V], motor heat [deg C]."""
 
     sub_type: ClassVar = 1
     q_actual: Vector6

@@ -362,7 +362,7 @@ _FLOAT = _Words(
     1, lambda value, name: [to_fixed(value, name)], lambda words, _: from_fixed(words[0])
 )
 _VECTOR6 = _vector(6)
-#: By the annotation of the field; the fields of a command stand in the order of the wire.
+#: By the annotation of a field: how it is sent. Fields are in the order of the wire.
 _ARGUMENTS: Mapping[str, _Words] = {
     'float': _FLOAT,
     'int': _Words(1, _FLOAT.encode, lambda words, name: _as_int(from_fixed(words[0]), name)),
