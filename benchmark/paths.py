@@ -12,8 +12,9 @@ import numpy as np
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal import Goal, Segment, Waypoint
-from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.simulator_config import HOME
 
 MODEL = 'ur5e'

@@ -74,7 +74,8 @@ async def a_late_producer(cell: Any) -> Any:
     """Go round and round on points that come when half a second is left, but for once."""
     from append_goals import AppendMotion, circle
 
-    from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, ZERO6
+    from ur_cartesian_driver.motion.goal import ExecutionMode, Goal
+    from ur_cartesian_driver.motion.vectors import ZERO6
 
     home = cell.memory.read().actual_tcp_pose
     motion = AppendMotion(

@@ -28,8 +28,8 @@ from ur_cartesian_driver.motion.goal import (
     Goal,
     IOCommand,
     OutputKind,
-    ZERO6,
 )
+from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]

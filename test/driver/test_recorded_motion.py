@@ -21,9 +21,9 @@ from ur_cartesian_driver.motion.goal import (
     OutputKind,
     Segment,
     Waypoint,
-    ZERO6,
 )
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.faults.fault_values import (
     AfterDistance,

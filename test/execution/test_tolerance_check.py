@@ -8,7 +8,7 @@ from math import nan, pi
 import pytest
 
 from ur_cartesian_driver.execution.monitoring.tolerance_check import QUANTITIES, ToleranceCheck
-from ur_cartesian_driver.motion.goal import Tolerance, ZERO6
+from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.pose import (
     IDENTITY,
     multiply,
@@ -17,6 +17,7 @@ from ur_cartesian_driver.motion.pose import (
     rotate,
 )
 from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.vectors import ZERO6
 
 DOWN = quaternion_from_rotation_vector((pi, 0.0, 0.0))
 WANTED = Pose((0.4, -0.2, 0.3), DOWN)

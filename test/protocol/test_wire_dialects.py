@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 import pytest
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.motion.goal import ZERO6
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import (
     MoveC,
@@ -28,6 +27,7 @@ from ur_cartesian_driver.motion.primitive import (
     OptimoveL,
     Spline,
 )
+from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.protocol.program.point_fields import MotionType
 from ur_cartesian_driver.protocol.program.reverse import trajectory, TrajectoryAction
 from ur_cartesian_driver.protocol.program.trajectory_points import (

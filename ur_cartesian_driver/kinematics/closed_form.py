@@ -19,8 +19,9 @@ from math import atan2, cos, hypot, pi, remainder, sin, sqrt, tau
 from typing import NamedTuple
 
 from ur_cartesian_driver.kinematics.ideal_arm import IdealArm
-from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion, Vector3
+from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import Vector3
 
 # A square this far below zero counts as zero [m^2]: the flange lies a nanometre out of reach, as
 # the poses do that a robot rounds when it reports its own stretched arm.

@@ -27,8 +27,8 @@ from ur_cartesian_driver.motion.pose import (
     multiply,
     Pose,
     rotation_vector_from_quaternion,
-    Vector6,
 )
+from ur_cartesian_driver.motion.vectors import Vector6
 
 _SAMPLES = 24
 _ITERATIONS = 5

@@ -25,8 +25,9 @@ from ur_cartesian_driver.kinematics.closed_form import (
 )
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of, IdealArm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, PositionLimits
-from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion, Vector3
+from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import Vector3
 
 # How far a position may lie outside its limit by rounding [rad].
 _LIMIT_ROUNDING = 1e-9

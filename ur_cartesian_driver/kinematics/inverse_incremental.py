@@ -17,8 +17,9 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames, jacobian_at
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
-from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion, Vector3
+from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import Vector3
 
 #: An error of metres and radians whose square is below this leaves one of 1e-10 after the next
 #: step, as long as the arm is not singular to the same degree.

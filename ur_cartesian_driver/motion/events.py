@@ -10,10 +10,10 @@ from math import nan
 from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import error_of_outcome, ErrorCode
-from ur_cartesian_driver.motion.goal import ZERO6
-from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.servo import ServoFeedback
 from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
 
 
 class TrajectoryResult(IntEnum):

@@ -12,10 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector3, Vector6
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.signals import AnalogDomain
-
-ZERO6: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3, ZERO6
 
 
 class SegmentType(IntEnum):
@@ -127,8 +126,8 @@ class Tolerance:
     the controlled frame, twist [m/s, rad/s] and acceleration [m/s^2, rad/s^2].
     """
 
-    position: Vector3 = (0.0, 0.0, 0.0)
-    orientation: Vector3 = (0.0, 0.0, 0.0)
+    position: Vector3 = ZERO3
+    orientation: Vector3 = ZERO3
     twist: Vector6 = ZERO6
     acceleration: Vector6 = ZERO6
 

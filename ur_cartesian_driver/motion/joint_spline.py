@@ -17,10 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.goal import ZERO6
 from ur_cartesian_driver.motion.polynomials import cubic_rows, evaluate, MotionRows, quintic_rows
-from ur_cartesian_driver.motion.pose import Vector6
 from ur_cartesian_driver.motion.primitive import Joints, Spline
+from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
 
 Floats = NDArray[np.float64]
 

@@ -22,10 +22,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-Vector3: TypeAlias = tuple[float, float, float]
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3
+
 Quaternion: TypeAlias = tuple[float, float, float, float]
-#: Six floats: joint positions [rad], a twist [m/s, rad/s] or a pose ``x y z rx ry rz`` [m, rad].
-Vector6: TypeAlias = tuple[float, float, float, float, float, float]
 
 _SMALL_ANGLE = 1e-9
 
@@ -38,7 +37,7 @@ class Pose:
     ``T_base_tool @ T_tool_nozzle`` is the nozzle in the base frame.
     """
 
-    position: Vector3 = (0.0, 0.0, 0.0)
+    position: Vector3 = ZERO3
     quaternion: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
     @classmethod

@@ -13,9 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, ZERO6
-from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.goal import ArcMode, OutputKind
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.signals import AnalogDomain
+from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
 
 Joints: TypeAlias = Vector6
 Target: TypeAlias = Pose | Joints

@@ -12,8 +12,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose, rotate, Vector3, Vector6
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose, rotate
 from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.vectors import add, cross, Vector3, Vector6
 
 
 def twist_at(twist: Vector6, offset: Vector3) -> Vector6:
@@ -24,7 +25,7 @@ def twist_at(twist: Vector6, offset: Vector3) -> Vector6:
     :param offset: from the first point to the other one [m], in the axes of the twist.
     """
     v, w = twist[:3], twist[3:]
-    return (*_sum(v, _cross(w, offset)), *w)
+    return (*add(v, cross(w, offset)), *w)
 
 
 def acceleration_at(acceleration: Vector6, twist: Vector6, offset: Vector3) -> Vector6:
@@ -36,7 +37,7 @@ def acceleration_at(acceleration: Vector6, twist: Vector6, offset: Vector3) -> V
     :param offset: from the first point to the other one [m], in the axes of both.
     """
     a, e, w = acceleration[:3], acceleration[3:], twist[3:]
-    return (*_sum(_sum(a, _cross(e, offset)), _cross(w, _cross(w, offset))), *e)
+    return (*add(add(a, cross(e, offset)), cross(w, cross(w, offset))), *e)
 
 
 def shift_reference_point(state: RobotState, T_tcp_frame: Pose) -> RobotState:
@@ -67,11 +68,3 @@ def shift_reference_point(state: RobotState, T_tcp_frame: Pose) -> RobotState:
 
 def _known(acceleration: Vector6 | None, twist: Vector6, offset: Vector3) -> Vector6 | None:
     return None if acceleration is None else acceleration_at(acceleration, twist, offset)
-
-
-def _cross(a: Vector3, b: Vector3) -> Vector3:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def _sum(a: Vector3, b: Vector3) -> Vector3:
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])

@@ -14,9 +14,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.goal import ZERO6
-from ur_cartesian_driver.motion.pose import Vector6
 from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
 
 
 def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Hashable
 from typing import Protocol
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.motion.pose import Pose, Vector3, Vector6
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import (
     RobotMode,
     RobotStatus,
@@ -22,6 +22,7 @@ from ur_cartesian_driver.motion.state import (
     SafetyMode,
     SafetyStatus,
 )
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6
 from ur_cartesian_driver.sim.motion import MotionGenerator
 from ur_cartesian_driver.sim.motion.actual_motion import ActualMotion
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState, MotionOwnership

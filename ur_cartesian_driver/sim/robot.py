@@ -18,8 +18,9 @@ import threading
 from types import TracebackType
 from typing import Any, TypeVar
 
-from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
+from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.assembly import assemble
 from ur_cartesian_driver.sim.clock import Clock, Lateness, RealClock, VirtualClock
 from ur_cartesian_driver.sim.controller import Controller

@@ -10,7 +10,7 @@ from math import pi
 from typing import Literal
 
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model, RobotModel
-from ur_cartesian_driver.motion.pose import Vector6
+from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.faults.fault_values import Fault
 
 #: Upright enough to move anywhere, away from every singularity [rad].

@@ -19,8 +19,9 @@ import struct
 import tempfile
 from typing import Any
 
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row, Vector6
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.state import RobotState, STATE_TABLE
+from ur_cartesian_driver.motion.vectors import Vector6
 
 _COUNTER = struct.Struct('<Q')
 #: How many numbers the types of fields hold that hold more than one.

@@ -22,11 +22,11 @@ from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoSe
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Event
-from ur_cartesian_driver.motion.goal import ZERO6
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.servo import ServoFeedback
 from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.protocol.program.registers import ServoMode
 
 #: The arm goes where it is led: no plan is there that it could leave.

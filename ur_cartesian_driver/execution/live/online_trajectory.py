@@ -29,10 +29,9 @@ from ur_cartesian_driver.motion.pose import (
     Pose,
     Quaternion,
     rotation_vector_from_quaternion,
-    Vector3,
-    Vector6,
 )
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6
 
 ZERO: Vector3 = (0.0, 0.0, 0.0)
 #: Of the acceleration so much is planned with when braking for a target: the rest corrects.

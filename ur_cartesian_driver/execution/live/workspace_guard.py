@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Link
-from ur_cartesian_driver.motion.pose import Pose, Vector3
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import Vector3
 
 #: No link is thicker [m].
 _THICKNESS = 0.3

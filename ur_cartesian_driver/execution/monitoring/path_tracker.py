@@ -27,7 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.plan import ReferencePath
-from ur_cartesian_driver.motion.pose import Pose, pose_from_row, Vector6
+from ur_cartesian_driver.motion.pose import Pose, pose_from_row
+from ur_cartesian_driver.motion.vectors import Vector6
 
 #: How much a radian counts in the distance that decides which place is the nearest [m/rad].
 METRES_PER_RADIAN = 0.1

@@ -23,10 +23,9 @@ from ur_cartesian_driver.motion.pose import (
     Quaternion,
     rotate,
     rotation_vector_from_quaternion,
-    Vector3,
-    Vector6,
 )
 from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6
 
 _AXES = ('x', 'y', 'z')
 _UNKNOWN: Vector6 = (nan,) * 6

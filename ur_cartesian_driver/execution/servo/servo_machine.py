@@ -50,9 +50,9 @@ from ur_cartesian_driver.motion.events import (
     StateReceived,
     TrajectoryEnded,
 )
-from ur_cartesian_driver.motion.pose import Vector6
 from ur_cartesian_driver.motion.servo import ServoFeedback, UNKNOWN6
 from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.vectors import Vector6
 
 #: The connection to the inputs, as it is called in :class:`LinkLost`.
 SERVO_LINK = 'RTDE inputs'

@@ -9,7 +9,7 @@ from typing import cast, Protocol
 import numpy as np
 
 from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.pose import Vector6
+from ur_cartesian_driver.motion.vectors import Vector6
 
 #: So many set-points of a spline are computed at a time: a row of an array costs a fiftieth of
 #: what it costs alone.

@@ -25,9 +25,9 @@ from ur_cartesian_driver.motion.pose import (
     Quaternion,
     quaternion_from_rotation_vector,
     slerp,
-    Vector3,
 )
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import Vector3
 from ur_cartesian_driver.planning.geometry.pose_rows import (
     compose_rows,
     Floats,

@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ur_cartesian_driver.motion.goal import Goal, Tolerance
-from ur_cartesian_driver.motion.pose import Vector3, Vector6
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6
 from ur_cartesian_driver.planning.options import PlanningOptions
 
 #: The quantities in the names of the parameters ``path_tolerance_...``.

@@ -21,12 +21,13 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.differential_kinematics import tool_rates
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
 from ur_cartesian_driver.motion.errors import InvalidGoal, JointLimitExceeded
-from ur_cartesian_driver.motion.goal import Goal, ZERO6
+from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.polynomials import MotionRows
-from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints, Spline
+from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.pose_rows import Floats, keep_hemisphere
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline

@@ -26,11 +26,8 @@ import struct
 from typing import cast, Final
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.motion.goal import ZERO6
-from ur_cartesian_driver.motion.pose import Vector3, Vector6
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3, ZERO6
 from ur_cartesian_driver.protocol.framing import hex_text
-
-ZERO3: Final[Vector3] = (0.0, 0.0, 0.0)
 
 #: Size of the packet [bytes] from a version (major, minor) on, oldest first.
 _PACKET_SIZES: Final = (

@@ -47,8 +47,8 @@ from enum import IntEnum
 from typing import cast, TypeAlias, TypeVar
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, ZERO6
-from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.goal import ArcMode, OutputKind
+from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import (
     Instruction,
     MoveC,
@@ -63,6 +63,7 @@ from ur_cartesian_driver.motion.primitive import (
     Target,
 )
 from ur_cartesian_driver.motion.signals import AnalogDomain
+from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_DIALECT
 
 

@@ -42,8 +42,7 @@ import struct
 from typing import Any, ClassVar, get_args, TypeAlias
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
-from ur_cartesian_driver.motion.goal import ZERO6
-from ur_cartesian_driver.motion.pose import Vector3, Vector6
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO6
 from ur_cartesian_driver.protocol.framing import (
     checked_size,
     FIXED_POINT,

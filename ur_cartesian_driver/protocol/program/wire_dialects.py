@@ -38,7 +38,7 @@ from math import floor
 from types import MappingProxyType
 
 from ur_cartesian_driver.motion.errors import LocalProtocolError
-from ur_cartesian_driver.motion.goal import ZERO6
+from ur_cartesian_driver.motion.vectors import ZERO6
 from ur_cartesian_driver.protocol.framing import FIXED_POINT, INT32_MAX
 
 _LINES_AND_ARCS = frozenset(range(4))

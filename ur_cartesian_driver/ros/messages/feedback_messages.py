@@ -17,7 +17,8 @@ from geometry_msgs.msg import Accel, Twist, Vector3
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.events import Outcome, Progress
-from ur_cartesian_driver.motion.pose import Pose, pose_error, rotate, Vector6
+from ur_cartesian_driver.motion.pose import Pose, pose_error, rotate
+from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 from ur_cartesian_driver.ros.message_fields import duration_message, pose_message
 

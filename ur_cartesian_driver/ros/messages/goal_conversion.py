@@ -26,10 +26,10 @@ from ur_cartesian_driver.motion.goal import (
     SegmentType,
     Tolerance,
     Waypoint,
-    ZERO6,
 )
-from ur_cartesian_driver.motion.pose import IDENTITY, Pose, Vector3, Vector6
+from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.signals import AnalogDomain
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO6
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
 from ur_cartesian_driver.ros.message_fields import (
     Message,

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from math import isfinite
 
-from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import (
     INT_MAX,

@@ -10,7 +10,7 @@ applied; it ends with the program.
 
 from __future__ import annotations
 
-from ur_cartesian_driver.motion.pose import Vector6
+from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.builtins.arguments import (
     not_negative,
     number,

@@ -15,8 +15,9 @@ from math import hypot
 from types import MappingProxyType
 from typing import Any
 
-from ur_cartesian_driver.motion.pose import IDENTITY, Vector3, Vector6
+from ur_cartesian_driver.motion.pose import IDENTITY
 from ur_cartesian_driver.motion.state import RobotMode
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.motion.point_motion import (
     dot,

@@ -21,8 +21,8 @@ from ur_cartesian_driver.motion.pose import (
     multiply,
     Pose,
     quaternion_from_rotation_vector,
-    Vector6,
 )
+from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
 _ZERO: Vector6 = (0.0,) * 6

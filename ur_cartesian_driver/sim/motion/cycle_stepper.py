@@ -13,7 +13,8 @@ from __future__ import annotations
 from math import inf, log
 from typing import NamedTuple, TypeAlias
 
-from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.joint_kinematics import is_singular
 from ur_cartesian_driver.sim.motion.move_paths import Setpoint

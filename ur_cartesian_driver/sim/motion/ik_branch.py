@@ -14,7 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, log2
 
-from ur_cartesian_driver.motion.pose import Pose, Vector6
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.motion.joint_kinematics import JointKinematics, max_joint_difference
 from ur_cartesian_driver.sim.motion.move_paths import JointMovePath, MovePath, Setpoint
 

@@ -13,8 +13,8 @@ from ur_cartesian_driver.motion.pose import (
     multiply,
     Pose,
     rotation_vector_from_quaternion,
-    Vector6,
 )
+from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.motion.move_paths import MovePath
 from ur_cartesian_driver.sim.motion.moves import MotionFault
 from ur_cartesian_driver.sim.motion.path_motion import ProfileParameters

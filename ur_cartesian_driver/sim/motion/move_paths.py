@@ -21,9 +21,8 @@ from ur_cartesian_driver.motion.pose import (
     multiply,
     Pose,
     quaternion_from_rotation_vector,
-    Vector3,
-    Vector6,
 )
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6
 from ur_cartesian_driver.sim.motion.moves import MotionError
 
 Setpoint: TypeAlias = Vector6 | Pose

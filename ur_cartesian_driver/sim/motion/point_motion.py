@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ur_cartesian_driver.kinematics.chain import ChainFrames
-from ur_cartesian_driver.motion.pose import Vector3, Vector6
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6
 
 _ZERO: Vector3 = (0.0, 0.0, 0.0)
 

@@ -17,9 +17,8 @@ from ur_cartesian_driver.motion.pose import (
     multiply,
     Pose,
     quaternion_from_rotation_vector,
-    Vector3,
-    Vector6,
 )
+from ur_cartesian_driver.motion.vectors import Vector3, Vector6
 from ur_cartesian_driver.sim.motion.joint_kinematics import difference_rate, STILL
 from ur_cartesian_driver.sim.motion.move_paths import Setpoint
 

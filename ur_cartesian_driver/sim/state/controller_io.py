@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from ur_cartesian_driver.motion.pose import Vector6
+from ur_cartesian_driver.motion.vectors import Vector6
 
 REGISTER_BITS, REGISTER_INTEGERS, REGISTER_FLOATS = 128, 48, 48
 STANDARD, CONFIGURABLE, TOOL = 8, 8, 2
