@@ -192,7 +192,7 @@ def test_the_word_that_nothing_follows_ends_a_goal_where_it_is_known_to_end():
         moving = AppendMotion(cell, goal('spline', home, 6))
         said = await moving.append(last=True)
         assert said.text == 'The goal ends with the 6 points that it has.'
-        with pytest.raises(GoalRefused, match=r'were said to be the last\.$'):
+        with pytest.raises(GoalRefused, match=r'closed by an earlier request with last: true\.$'):
             await moving.append(circle(home, 7, 1))
         assert (await moving.ended()).succeeded
         waiting, *_ = await closed(cell, 'lines')

@@ -4,6 +4,7 @@
 
 from types import SimpleNamespace
 
+from goal_machines import servo_machine
 import numpy as np
 import pytest
 from servo_cell import GuideCell
@@ -12,7 +13,6 @@ from ur_cartesian_driver.execution import (
     EnterServo,
     Finish,
     MotionJob,
-    ServoMachine,
     ServoSettings,
     WriteServo,
 )
@@ -82,7 +82,7 @@ def state_of(controller):
 def drive(slider=1.0, cancel_after=None):
     """Run a goal on the sample program; return what was seen of it."""
     cell = GuideCell()
-    goal = ServoMachine(job(cell.q), settings=ServoSettings(lookahead_time=0.06))
+    goal = servo_machine(job(cell.q), ServoSettings(lookahead_time=0.06))
     seen = SimpleNamespace(
         commands=goal.start(state_of(cell.controller)),
         home=cell.q,
@@ -96,10 +96,10 @@ def drive(slider=1.0, cancel_after=None):
     def take(feedback):
         commands = goal.step(ServoReceived(feedback=feedback), cell.time)
         commands += goal.step(StateReceived(state=state_of(cell.controller)), cell.time)
-        if cancel_after is not None and goal.stream.motion_time >= cancel_after:
+        if cancel_after is not None and goal.feeder.stream.motion_time >= cancel_after:
             commands += goal.step(CancelRequested(), cell.time)
         seen.commands += commands
-        seen.motion.append(goal.stream.motion_time)
+        seen.motion.append(goal.feeder.stream.motion_time)
         seen.q.append(cell.q)
         rows = [command.values for command in commands if isinstance(command, WriteServo)]
         return rows[-1] if rows else None

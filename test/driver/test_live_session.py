@@ -11,7 +11,8 @@ from ur_cartesian_driver.driver.ipc.channel import LENGTH, pack, SetLiveTarget, 
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.live_session import live_setup, stationary_job, stationary_plan
 from ur_cartesian_driver.driver.loop.machine_factory import is_slow_to_make, make_machine
-from ur_cartesian_driver.execution.live.live_machine import FreedriveMachine, LiveMachine
+from ur_cartesian_driver.execution.live.freedrive import FreedriveFeeder
+from ur_cartesian_driver.execution.live.live_feeder import LiveFeeder
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import RobotNotReady
@@ -79,13 +80,14 @@ def start(arm=ARM, **fields):
 
 
 def test_a_session_and_its_targets_come_through_the_pipe():
-    machine = make_machine(start(), DriverConfig())
-    assert isinstance(machine, LiveMachine)
+    feeder = make_machine(start(), DriverConfig()).feeder
+    assert isinstance(feeder, LiveFeeder)
     set_target = sent(SetLiveTarget(motion=7, T_base_tcp=HERE, age=0.05))
-    machine.set_target(set_target.T_base_tcp, set_target.age, 10.0)
-    assert machine.live.accepted == 1
+    feeder.set_target(set_target.T_base_tcp, set_target.age, 10.0)
+    assert feeder.targets.accepted == 1
     assert isinstance(
-        make_machine(replace(start(), live=None, freedrive=True), DriverConfig()), FreedriveMachine
+        make_machine(replace(start(), live=None, freedrive=True), DriverConfig()).feeder,
+        FreedriveFeeder,
     )
 
 

@@ -6,9 +6,10 @@ from __future__ import annotations
 
 from math import pi
 
+from goal_machines import point_machine
 import pytest
 
-from ur_cartesian_driver.execution import GoalMachine, job_from_plan
+from ur_cartesian_driver.execution import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -71,7 +72,7 @@ class Cell:
         :returns: the machine, and the commands of each packet.
         """
         job = job_from_plan(made)
-        machine = GoalMachine(job, **settings)
+        machine = point_machine(job, **settings)
         robot = MotionGenerator(self.arm, CYCLE, made.start)
         robot.T_flange_tcp = self.T_flange_tcp
         time, begun, twists, answers = 0.0, 0, ZERO6, []

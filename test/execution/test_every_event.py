@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 
+from goal_machines import append_machine, point_machine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -12,9 +13,7 @@ import pytest
 from ur_cartesian_driver.execution import (
     AnswerAppend,
     AppendJob,
-    AppendMachine,
     Finish,
-    GoalMachine,
     MotionJob,
     SendControl,
     SendPoints,
@@ -44,7 +43,7 @@ BOUND = 10.0
 
 def machine(T_flange_tcp):
     poses = np.array([[0.1 * i, 0.0, 0.2, 0.0, 0.0, 0.0, 1.0] for i in range(POINTS + 1)])
-    return GoalMachine(
+    return point_machine(
         MotionJob(
             points=POINTS,
             duration=3.0,
@@ -62,7 +61,7 @@ def machine(T_flange_tcp):
 
 def stream(T_flange_tcp, deviation):
     job = replace(machine(T_flange_tcp).job, keep_open=True, ending_records=1)
-    return AppendMachine(job, max_plan_deviation=(deviation, deviation))
+    return append_machine(job, max_plan_deviation=(deviation, deviation))
 
 
 def robot(part=0.0, off=0.0, speed=0.0, begun=0, T_flange_tcp=IDENTITY, **changes):

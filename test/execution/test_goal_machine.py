@@ -4,12 +4,12 @@
 
 from dataclasses import replace
 
+from goal_machines import append_machine, point_machine
 import numpy as np
 import pytest
 
 from ur_cartesian_driver.execution import (
     Finish,
-    GoalMachine,
     MotionJob,
     ReportProgress,
     RestoreTcp,
@@ -18,12 +18,7 @@ from ur_cartesian_driver.execution import (
     SetTemporaryTcp,
     StopProgram,
 )
-from ur_cartesian_driver.execution.goal.append_machine import AppendMachine, FIRST_POINTS_TIMEOUT
-from ur_cartesian_driver.execution.goal.goal_machine import (
-    CAUSE_TIMEOUT,
-    STOP_TIMEOUT,
-    TCP_TIMEOUT,
-)
+from ur_cartesian_driver.execution.goal.append_feeder import FIRST_POINTS_TIMEOUT
 from ur_cartesian_driver.execution.goal.monitor import STALL_TIMEOUT
 from ur_cartesian_driver.execution.goal.states import (
     GoalSignal,
@@ -32,6 +27,7 @@ from ur_cartesian_driver.execution.goal.states import (
     TRANSITIONS,
 )
 from ur_cartesian_driver.execution.goal.temporary_tcp import SET_TIMEOUT
+from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT, CAUSE_TIMEOUT, STOP_TIMEOUT
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,
@@ -87,7 +83,7 @@ def robot(part=0.0, timestamp=0.0, qd=MOVING, **changes):
 
 def started(**changes):
     # These robots leap from place to place: where that does not matter it is no deviation.
-    machine = GoalMachine(job(**changes), max_plan_deviation=(0.0, 0.0))
+    machine = point_machine(job(**changes), max_plan_deviation=(0.0, 0.0))
     machine.start(robot().state)
     machine.step(robot(), 0.0)
     return machine
@@ -100,7 +96,7 @@ def with_tcp(T_flange_tcp, part=0.0, qd=REST, **changes):
 
 def lent(**changes):
     """Return a machine whose goal needs another TCP, in ARMING, and its first commands."""
-    machine = GoalMachine(
+    machine = point_machine(
         job(T_flange_active=OWN, T_flange_tcp=NOZZLE, **changes), max_plan_deviation=(0.0, 0.0)
     )
     return machine, machine.start(with_tcp(OWN).state)
@@ -122,7 +118,7 @@ def brought_to(state):
         assert machine.state is state
         return machine
     if state in (GoalState.RUNNING_OUT, GoalState.AWAITING_POINTS):
-        machine = AppendMachine(
+        machine = append_machine(
             job(keep_open=True, ending_records=1), max_plan_deviation=(0.0, 0.0)
         )
         machine.start(robot().state)
@@ -152,7 +148,7 @@ def outcome(commands):
 
 
 def test_a_motion_starts_with_start_and_its_points():
-    commands = GoalMachine(job(points=3)).start(robot().state)
+    commands = point_machine(job(points=3)).start(robot().state)
     assert commands == [
         SendControl(action=TrajectoryAction.START, count=3),
         SendPoints(first=0, end=3),
@@ -173,7 +169,7 @@ def test_a_motion_that_arrives_succeeds():
 
 
 def test_points_beyond_the_window_wait_for_the_robot():
-    machine = GoalMachine(job(points=2000))
+    machine = point_machine(job(points=2000))
     assert machine.start(robot().state)[1] == SendPoints(first=0, end=500)
     machine.step(robot(0.0), 0.05)
     commands = machine.step(robot(0.0, points_begun=10), 0.1)
@@ -185,7 +181,7 @@ def test_points_beyond_the_window_wait_for_the_robot():
 
 
 def test_the_count_of_the_last_trajectory_is_not_taken_for_this_one_s():
-    machine = GoalMachine(job(points=4))
+    machine = point_machine(job(points=4))
     machine.start(robot(points_begun=4).state)
 
     def place(count, part):
@@ -313,7 +309,7 @@ def test_leaving_the_path_stops_the_arm_and_names_point_axis_value_and_limit():
     ],
 )
 def test_a_controller_that_makes_another_motion_is_stopped_in_the_same_step(pose, text):
-    machine = GoalMachine(job())
+    machine = point_machine(job())
     machine.start(robot().state)
     machine.step(robot(), 0.0)
     commands = machine.step(robot(0.05, timestamp=0.1, target_tcp_pose=pose), 0.1)
@@ -327,7 +323,7 @@ def test_a_controller_that_makes_another_motion_is_stopped_in_the_same_step(pose
 
 @pytest.mark.parametrize('limits', [(0.01, 0.02), (0.0, 0.0)])
 def test_a_controller_within_the_bounds_or_without_any_goes_on(limits):
-    machine = GoalMachine(job(), max_plan_deviation=limits)
+    machine = point_machine(job(), max_plan_deviation=limits)
     machine.start(robot().state)
     machine.step(robot(), 0.0)
     machine.step(robot(0.05, timestamp=0.1, target_tcp_pose=Pose((0.41, 0.005, 0.2))), 0.1)
@@ -336,7 +332,7 @@ def test_a_controller_within_the_bounds_or_without_any_goes_on(limits):
 
 def test_nothing_is_watched_before_the_program_has_begun():
     """The TCP may still be another one; it is changed before the first point."""
-    machine = GoalMachine(job(path_tolerance=Tolerance(position=(0.001,) * 3)))
+    machine = point_machine(job(path_tolerance=Tolerance(position=(0.001,) * 3)))
     elsewhere = {
         'actual_tcp_pose': Pose((0.4, 0, 0)),
         'target_tcp_pose': Pose((0.4, 0, 0)),
@@ -416,7 +412,7 @@ def test_an_arm_may_settle_without_end():
 
 
 def test_progress_is_reported_at_its_rate():
-    machine = GoalMachine(job(), feedback_period=0.1)
+    machine = point_machine(job(), feedback_period=0.1)
     machine.start(robot().state)
     reports = [
         c
@@ -654,10 +650,10 @@ def test_nothing_is_reported_about_another_tcp():
 def test_a_robot_that_does_not_take_the_tcp_is_not_moved():
     machine, _ = lent()
     machine.step(with_tcp(OWN), 0.0)
-    assert machine.step(with_tcp(OWN), TCP_TIMEOUT - 0.01) == []
-    commands = machine.step(Tick(), TCP_TIMEOUT)
+    assert machine.step(with_tcp(OWN), ARMING_TIMEOUT - 0.01) == []
+    commands = machine.step(Tick(), ARMING_TIMEOUT)
     assert commands == [RestoreTcp(T_flange_tcp=OWN)]
-    end = outcome(machine.step(with_tcp(OWN), TCP_TIMEOUT + 0.01))
+    end = outcome(machine.step(with_tcp(OWN), ARMING_TIMEOUT + 0.01))
     assert end.code is ErrorCode.ROBOT_NOT_READY
     assert 'did not take the TCP of the goal within 1 s' in end.text
     assert 'nothing was moved' in end.text
@@ -667,9 +663,9 @@ def test_an_arm_that_went_away_before_it_was_armed_is_not_moved():
     machine, _ = lent()
     elsewhere = Pose((0.4, 0.05, 0.2))
     machine.step(with_tcp(NOZZLE, actual_tcp_pose=elsewhere), 0.0)
-    commands = machine.step(with_tcp(NOZZLE, actual_tcp_pose=elsewhere), TCP_TIMEOUT)
+    commands = machine.step(with_tcp(NOZZLE, actual_tcp_pose=elsewhere), ARMING_TIMEOUT)
     assert RestoreTcp(T_flange_tcp=OWN) in commands
-    end = outcome(machine.step(with_tcp(OWN), TCP_TIMEOUT + 0.01))
+    end = outcome(machine.step(with_tcp(OWN), ARMING_TIMEOUT + 0.01))
     assert end.code is ErrorCode.ROBOT_NOT_READY
     assert 'the arm is 0.0500 m' in end.text.lower()
 
@@ -697,7 +693,7 @@ def test_a_tcp_that_does_not_come_back_is_said_and_left_to_the_owner():
     machine = armed()
     machine.step(TrajectoryEnded(result=TrajectoryResult.SUCCESS), 2.0)
     machine.step(with_tcp(NOZZLE, 1.0), 2.01)
-    commands = machine.step(Tick(), 2.01 + TCP_TIMEOUT)
+    commands = machine.step(Tick(), 2.01 + ARMING_TIMEOUT)
     assert not any(isinstance(c, StopProgram) for c in commands)
     end = outcome(commands)
     assert end.succeeded

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
 import pytest
+from servo_cell import OpenLoopStream
 
 from ur_cartesian_driver.execution.servo.servo_clock import ServoClock
 from ur_cartesian_driver.execution.servo.servo_stream import (
@@ -211,8 +212,7 @@ def test_a_paused_program_is_sent_no_more_than_is_under_way():
 
 
 def test_with_the_loop_open_the_lag_grows_by_what_the_slider_takes():
-    opened = ServoSettings(closed_loop=False, max_lag=0.5)
-    stream, robot = ServoStream(Ramp(), opened), Robot()
+    stream, robot = OpenLoopStream(Ramp(), ServoSettings(max_lag=0.5)), Robot()
     run(stream, robot, seconds=0.2)
     lags = []
     run(
@@ -292,7 +292,7 @@ def test_a_spline_is_sampled_where_it_is():
     )
 )
 def test_the_clock_is_never_negative_nor_fast_and_leaves_the_rest_of_the_buffer(passed):
-    clock = ServoClock(step=STEP, target=0.04, most=0.2)
+    clock = ServoClock(step=STEP, target=0.04, max_lag=0.2)
     for time, scaling, in_flight in passed:
         clock.advance(time, scaling, in_flight)
         assert 0.0 <= clock.rate <= 1.5

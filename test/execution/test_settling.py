@@ -5,10 +5,11 @@
 from dataclasses import replace
 from math import inf
 
+from goal_machines import point_machine
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution import Finish, GoalMachine, MotionJob
+from ur_cartesian_driver.execution import Finish, MotionJob
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     StateReceived,
@@ -74,7 +75,7 @@ WRONG = [
 
 def arrived(late=0.0, **job):
     """A machine that was told SUCCESS, so long after the goal was due; and what it answered."""
-    machine = GoalMachine(replace(POINT, **job), max_plan_deviation=(0.0, 0.0))
+    machine = point_machine(replace(POINT, **job), max_plan_deviation=(0.0, 0.0))
     on_the_way = replace(AT_REST, target_q=(0.1,) + (0.0,) * 5)
     machine.start(on_the_way)
     machine.step(StateReceived(state=on_the_way), 0.0)

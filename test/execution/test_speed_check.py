@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """A program that reads the points in another way is told from one that is slow or fast."""
 
+from goal_machines import point_machine
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution import Finish, GoalMachine, MotionJob, SendControl
+from ur_cartesian_driver.execution import Finish, MotionJob, SendControl
 from ur_cartesian_driver.execution.monitoring.speed_check import (
     MAX_SLOWDOWN,
     MAX_START_DELAY,
@@ -91,7 +92,7 @@ def robot(time, x=0.4, v=0.0, begun=0, qd=0.0):
 
 
 def machine(**changes):
-    made = GoalMachine(MotionJob(points=2, reference=PATH, duration=3.0, **changes))
+    made = point_machine(MotionJob(points=2, reference=PATH, duration=3.0, **changes))
     made.start(robot(0.0).state)
     made.step(robot(0.0), 0.0)
     return made

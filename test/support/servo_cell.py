@@ -10,7 +10,8 @@ test may vary; so it needs no real time and is always the same.
 from collections import deque
 from pathlib import Path
 
-from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings
+from ur_cartesian_driver.execution.servo.servo_clock import ServoClock
+from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
 from ur_cartesian_driver.motion.servo import ServoFeedback
 from ur_cartesian_driver.motion.state import RuntimeState
 from ur_cartesian_driver.protocol.program import registers
@@ -28,6 +29,25 @@ GUIDE = Path(__file__).parents[1] / 'acceptance' / 'programs' / 'servoj_guide.sc
 CYCLE = 0.002
 SETTINGS = ServoSettings()
 OUTPUTS = ('timestamp', 'speed_scaling', 'runtime_state', *registers.SERVO_OUTPUTS)
+
+
+class OpenLoopClock(ServoClock):
+    """Runs at rate 1, whatever the robot does with the set-points."""
+
+    def advance(self, passed, scaling, in_flight):
+        super().advance(passed, 1.0, self.target)
+
+
+class OpenLoopStream(ServoStream):
+    """Set-points as fast as the packets of the robot, to see what the feedback is good for."""
+
+    def __init__(self, source, settings):
+        super().__init__(source, settings)
+        self._fill_target = 0.0
+
+    def _make_clock(self, step):
+        clock = super()._make_clock(step)
+        return OpenLoopClock(step=step, target=clock.target, max_lag=clock.max_lag)
 
 
 class GuideCell:

@@ -14,7 +14,7 @@ from functools import lru_cache
 from math import pi, sin
 
 import numpy as np
-from servo_cell import CYCLE, GUIDE, GuideCell
+from servo_cell import CYCLE, GUIDE, GuideCell, OpenLoopStream
 
 from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoSettings, ServoStream
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -157,13 +157,12 @@ def buffered(slider, seconds, late=0, *, closed_loop=True):
     """Let our side stream to the guide's sample program."""
     experiment = Experiment(GUIDE)
     source = UpAndDown(experiment.rows)
-    stream = ServoStream(
-        source,
-        ServoSettings(
-            closed_loop=closed_loop,
-            lookahead_time=0.06,
-            **({} if closed_loop else {'max_lag': 10.0, 'buffer_depth': 5000}),
-        ),
+    stream = (
+        ServoStream(source, ServoSettings(lookahead_time=0.06))
+        if closed_loop
+        else OpenLoopStream(
+            source, ServoSettings(lookahead_time=0.06, max_lag=10.0, buffer_depth=5000)
+        )
     )
     experiment.cell.controller.set_slider(slider)
 

@@ -19,6 +19,7 @@ from typing import TypeAlias
 
 from ur_cartesian_driver.driver.ipc.channel import AppendToMotion
 from ur_cartesian_driver.execution import AnswerAppend, AppendJob, job_from_plan, MotionJob
+from ur_cartesian_driver.execution.goal.append_feeder import CLOSED_BY_CLIENT
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
 from ur_cartesian_driver.motion.events import Progress
@@ -121,7 +122,7 @@ class Appender:
         :raises GoalRefused: as of :meth:`append`.
         """
         if not self._is_open:
-            raise RobotNotReady('The last points of the goal were said to be the last.')
+            raise RobotNotReady(CLOSED_BY_CLIENT)
         appended = yield from (
             self._append(new_points) if new_points.waypoints else self._close(new_points)
         )

@@ -269,6 +269,7 @@ def stationary_job(plan: Plan) -> MotionJob:
         points=1,
         reference=plan.reference,
         duration=0.0,
+        has_speed_profile=False,
         T_flange_active=plan.T_flange_active,
         execution=plan.execution,
     )

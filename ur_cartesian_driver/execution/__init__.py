@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What to do next: pure state machines, fed with events and the time, answering with commands."""
 
-from ur_cartesian_driver.execution.goal.append_machine import AppendMachine, AppendSettings
+from ur_cartesian_driver.execution.goal.append_feeder import AppendFeeder, AppendSettings
+from ur_cartesian_driver.execution.goal.feeder import Feeder
 from ur_cartesian_driver.execution.goal.goal_commands import (
     AnswerAppend,
     EnterServo,
@@ -21,35 +22,42 @@ from ur_cartesian_driver.execution.goal.goal_commands import (
     WriteServo,
 )
 from ur_cartesian_driver.execution.goal.goal_machine import GoalMachine
+from ur_cartesian_driver.execution.goal.monitor import GoalMonitor
 from ur_cartesian_driver.execution.goal.motion_job import AppendJob, job_from_plan, MotionJob
+from ur_cartesian_driver.execution.goal.point_feeder import PointFeeder
 from ur_cartesian_driver.execution.goal.temporary_tcp import same_tcp, TemporaryTcp
-from ur_cartesian_driver.execution.servo.servo_machine import SERVO_LINK, ServoMachine
-from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings
-from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource
+from ur_cartesian_driver.execution.servo.servo_feeder import SERVO_LINK, ServoFeeder
+from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
+from ur_cartesian_driver.execution.servo.setpoint_source import SetpointSource, SplineSetpoints
 
 __all__ = [
     'SERVO_LINK',
     'AnswerAppend',
+    'AppendFeeder',
     'AppendJob',
-    'AppendMachine',
     'AppendSettings',
     'EnterServo',
+    'Feeder',
     'Finish',
     'GoalCommand',
     'GoalMachine',
+    'GoalMonitor',
     'LeaveServo',
     'LogWarning',
     'MotionJob',
     'OpenServo',
+    'PointFeeder',
     'ReportProgress',
     'ReportServo',
     'RestoreTcp',
     'SendControl',
     'SendPoints',
-    'ServoMachine',
+    'ServoFeeder',
     'ServoSettings',
+    'ServoStream',
     'SetTemporaryTcp',
     'SetpointSource',
+    'SplineSetpoints',
     'StopProgram',
     'TemporaryTcp',
     'WriteServo',

@@ -1,22 +1,30 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Which machine takes a motion through the robot program."""
+"""Composes the machine of a motion: its monitor, the feeder that its mode needs, and settings."""
 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
-from ur_cartesian_driver.driver.ipc.channel import StartMotion
+from ur_cartesian_driver.driver.ipc.channel import LiveSetup, StartMotion
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.execution import (
-    AppendMachine,
+    AppendFeeder,
     AppendSettings,
+    Feeder,
     GoalMachine,
-    ServoMachine,
+    GoalMonitor,
+    MotionJob,
+    PointFeeder,
+    ServoFeeder,
     ServoSettings,
+    ServoStream,
+    SplineSetpoints,
 )
-from ur_cartesian_driver.execution.live.live_machine import FreedriveMachine, LiveMachine
+from ur_cartesian_driver.execution.live.freedrive import FreedriveFeeder
+from ur_cartesian_driver.execution.live.live_feeder import ANY_DEVIATION, LiveFeeder
+from ur_cartesian_driver.execution.live.live_targets import LiveTargets
+from ur_cartesian_driver.execution.live.online_trajectory import OnlineTrajectoryGenerator
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
@@ -25,33 +33,29 @@ from ur_cartesian_driver.motion.goal import ExecutionMode
 
 def make_machine(request: StartMotion, config: DriverConfig) -> GoalMachine:
     """Return the machine of a motion."""
-    settings: dict[str, Any] = {
-        'feedback_period': 1.0 / config.feedback_rate,
-        'max_plan_deviation': (config.max_plan_deviation, config.max_plan_deviation_angle),
-        'resume_after_stop': config.on_robot_stop == 'continue',
-    }
-    if request.job.keep_open:
-        return AppendMachine(
-            request.job,
-            settings=AppendSettings(
-                horizon=config.keep_open_horizon,
-                margin=config.keep_open_margin,
-                timeout=config.keep_open_timeout,
-            ),
-            **settings,
-        )
-    if request.job.execution is ExecutionMode.SERVO:
-        return _servo_machine(
-            request,
-            **settings,
-            settings=ServoSettings(
-                target_lag=config.servo_target_lag,
-                buffer_depth=config.servo_buffer_depth,
-                max_divergence=config.servo_max_divergence,
-                lookahead_time=config.servoj_lookahead_time,
-            ),
-        )
-    return GoalMachine(request.job, **settings)
+    return GoalMachine(
+        make_feeder(request, config),
+        feedback_period=1.0 / config.feedback_rate,
+        resume_after_stop=config.on_robot_stop == 'continue',
+    )
+
+
+def make_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
+    """Return what feeds a motion."""
+    job, deviation = request.job, (config.max_plan_deviation, config.max_plan_deviation_angle)
+    if job.execution is ExecutionMode.SERVO:
+        return _servo_feeder(request, config)
+    monitor = GoalMonitor(job, deviation)
+    if not job.keep_open:
+        return PointFeeder(monitor)
+    return AppendFeeder(
+        monitor,
+        AppendSettings(
+            horizon=config.keep_open_horizon,
+            margin=config.keep_open_margin,
+            timeout=config.keep_open_timeout,
+        ),
+    )
 
 
 def is_slow_to_make(request: StartMotion) -> bool:
@@ -60,19 +64,35 @@ def is_slow_to_make(request: StartMotion) -> bool:
     return live is not None and live.geometry != robot_model(live.ur_type).geometry
 
 
-def _servo_machine(request: StartMotion, **settings: Any) -> ServoMachine:
-    live = request.live
-    if live is not None:
-        return LiveMachine(
-            request.job, live.settings, _arm(live.ur_type, live.geometry), live.start, **settings
-        )
-    kind = FreedriveMachine if request.freedrive else ServoMachine
-    return kind(request.job, **settings)
+def _servo_feeder(request: StartMotion, config: DriverConfig) -> ServoFeeder:
+    settings = ServoSettings(
+        target_lag=config.servo_target_lag,
+        buffer_depth=config.servo_buffer_depth,
+        max_divergence=config.servo_max_divergence,
+        lookahead_time=config.servoj_lookahead_time,
+    )
+    if request.live is not None:
+        monitor = GoalMonitor(request.job, ANY_DEVIATION)
+        return LiveFeeder(monitor, _live_targets(request.live, request.job), settings)
+    if request.freedrive:
+        return FreedriveFeeder(GoalMonitor(request.job, ANY_DEVIATION), settings)
+    assert request.job.spline is not None
+    monitor = GoalMonitor(
+        request.job, (config.max_plan_deviation, config.max_plan_deviation_angle)
+    )
+    return ServoFeeder(monitor, ServoStream(SplineSetpoints(request.job.spline), settings))
+
+
+def _live_targets(live: LiveSetup, job: MotionJob) -> LiveTargets:
+    generator = OnlineTrajectoryGenerator(
+        _arm(live.ur_type, live.geometry), job.T_flange_active, live.start, live.settings.limits
+    )
+    return LiveTargets(generator, live.settings)
 
 
 @lru_cache(maxsize=4)
 def _arm(ur_type: str, geometry: DhTable) -> Arm:
-    """Return the arm of a robot; what takes long about a calibrated one is done once."""
+    """Return the arm of a robot; the slow computations of a calibrated one are done once."""
     arm = Arm(robot_model(ur_type), geometry)
     ideal_arm_of(arm)
     return arm

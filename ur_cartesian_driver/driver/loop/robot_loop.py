@@ -58,7 +58,6 @@ from ur_cartesian_driver.driver.loop.point_buffer import PointBuffer
 from ur_cartesian_driver.driver.recordings.recorder import motion_metadata, Recorder
 from ur_cartesian_driver.execution import (
     AnswerAppend,
-    AppendMachine,
     EnterServo,
     Finish,
     GoalCommand,
@@ -79,7 +78,6 @@ from ur_cartesian_driver.execution import (
     TemporaryTcp,
     WriteServo,
 )
-from ur_cartesian_driver.execution.live.live_machine import LiveMachine
 from ur_cartesian_driver.kinematics.robot_models import DhTable
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
@@ -234,8 +232,8 @@ class RobotLoop:
             case AppendToMotion():
                 self._append(request)
             case SetLiveTarget(motion=motion, T_base_tcp=T_base_tcp, age=age):
-                if motion == self._motion and isinstance(self._machine, LiveMachine):
-                    self._machine.set_target(T_base_tcp, age, self._now())
+                if motion == self._motion and self._machine is not None:
+                    self._machine.feeder.set_target(T_base_tcp, age, self._now())
             case CancelMotion(motion=motion, preempted_by=by):
                 if motion == self._motion:
                     self._recorder.add_event('cancel', by and f'preempted by {by}')
@@ -282,7 +280,7 @@ class RobotLoop:
 
     def _append(self, request: AppendToMotion) -> None:
         """Offer points to the motion that runs, if it is theirs."""
-        if request.motion == self._motion and isinstance(self._machine, AppendMachine):
+        if request.motion == self._motion and self._machine is not None:
             self._pending_append = request
             self._execute_commands(self._machine.step(request.append_job, self._now()))
         else:

@@ -40,16 +40,16 @@ class GoalMonitor:
     """The newest packet, the place on the path, and what is held against them."""
 
     def __init__(
-        self, job: MotionJob, records: WireRecords, max_plan_deviation: tuple[float, float]
+        self, job: MotionJob, max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION
     ) -> None:
         """
-        Prepare for an order.
+        Prepare.
 
-        :param records: those of the order.
         :param max_plan_deviation: how far the controller's own target may be from the plan [m],
             [rad]; 0 = any way, any angle.
         """
-        self._order, self._records = job, records
+        #: The motion, with what was appended last, and all its records.
+        self.job, self.records = job, WireRecords(job)
         self._start = pose_from_row(job.reference.poses[0])
         self._tracker = PathTracker(job.reference)
         self._speed_check = SpeedCheck(job.reference) if job.has_speed_profile else None
@@ -60,12 +60,14 @@ class GoalMonitor:
         self._clearly_allowed = tuple(limit or inf for limit in max_plan_deviation)
         #: Whether the robot program has read START: it has begun a point, or the target moves.
         self._has_begun = False
-        #: The count of the goal before, as long as the robot reports it; None afterwards.
-        self._stale_begun: int | None = None
+        #: The motions that the robot reports as begun, and by how many motions its target may be
+        #: behind; None = not reported.
+        self._reported_begun: int | None = None
+        self._behind = 0
+        #: Whether that count may still be that of the goal before, and which it is.
+        self._awaits_count, self._stale_begun = False, 0
         #: How many motions of the goal the robot had begun in trajectories before this one.
         self._motions_before = 0
-        #: By how many motions the controller's target may be behind the one that was begun last.
-        self.lag_motions = 0
         #: How long the target has stood still while nothing held it [s].
         self._stalled_time = 0.0
         #: The same of the controller's own time, and how much of that the plan itself may stand.
@@ -77,13 +79,29 @@ class GoalMonitor:
 
     # ---- what goes on -------------------------------------------------------------------------
 
-    def start(self, state: RobotState) -> None:
-        """Take note that START is sent, and which count of points the robot reports until then."""
-        self._stale_begun = state.points_begun
+    def start(self, stale_begun: int, sent: int = 0) -> None:
+        """
+        Take note that a trajectory starts, perhaps from rest in the middle of the goal.
 
-    def update(self, state: RobotState, *, moving: bool) -> None:
-        """Take a packet; while the goal moves the arm: also time, and place on the path."""
+        :param stale_begun: how many motions the robot reports as begun until it has read START.
+        :param sent: how many records of the goal were sent before.
+        """
+        self._awaits_count, self._stale_begun = True, stale_begun
+        self._motions_before = self.records.motions_before(sent)
+        self._stalled_time = self._stalled_scaled = 0.0
+        self.scaled_time = self._tracker.time()  # waiting at rest is no delay of the motion
+
+    def update(
+        self, state: RobotState, begun: int | None, behind: int = 0, *, moving: bool
+    ) -> None:
+        """
+        Take a packet; while the goal moves the arm: also time, and position on the path.
+
+        :param begun: how many motions the robot reports as begun; None = it reports none.
+        :param behind: by how many motions the controller's target may be behind that.
+        """
         before, self.latest = self.latest, state
+        self._reported_begun, self._behind = begun, behind
         if not moving:
             return
         passed = 0.0
@@ -104,30 +122,23 @@ class GoalMonitor:
 
     def append(self, job: MotionJob, records_before: int) -> None:
         """Take note of what comes behind so many records."""
-        self._tracker.append(job.reference, self._records.end_time(records_before))
-        self._records.append(job, records_before)
-        self._order = job
+        self._tracker.append(job.reference, self.records.end_time(records_before))
+        self.records.append(job, records_before)
+        self.job = job
         self._stall_timeout = max(self._stall_timeout, _stall_timeout(job))
         if self.latest is not None:
-            self._records.forget(self.records_begun(self.latest) - 2)
-
-    def resume(self, state: RobotState, sent: int) -> None:
-        """Take note that the motion goes on from rest, behind so many records."""
-        self.start(state)
-        self._motions_before = self._records.motions_before(sent)
-        self._stalled_time = self._stalled_scaled = 0.0
-        self.scaled_time = self._tracker.time()  # waiting is nobody's delay
+            self.records.forget(self.records_begun() - 2)
 
     def _track(self, before: RobotState | None, state: RobotState, passed: float) -> None:
         """Find the place on the path."""
-        begun, fastest = self._motions_begun(state), tracker_speed(state.target_tcp_twist)
+        begun, fastest = self._motions_begun(), tracker_speed(state.target_tcp_twist)
         self._has_begun = self._has_begun or begun > self._motions_before or fastest > 0.0
         if before is not None:  # it may have braked since
             fastest = max(fastest, tracker_speed(before.target_tcp_twist))
         self._tracker.update(
             state.target_tcp_pose,
             2.0 * passed * fastest,
-            self._records.running_waypoints(begun, self.lag_motions),
+            self.records.running_waypoints(begun, self._behind),
         )
 
     # ---- how far it is ------------------------------------------------------------------------
@@ -142,40 +153,44 @@ class GoalMonitor:
 
     def buffered(self, sent: int) -> float:
         """Return how much planned time of what was sent the arm has before it [s]."""
-        return max(0.0, self._records.end_time(sent) - self._tracker.time())
+        return max(0.0, self.records.end_time(sent) - self._tracker.time())
 
-    def records_begun(self, state: RobotState) -> int:
+    def records_begun(self) -> int:
         """Return how many records of this goal the robot has begun at least."""
         return max(
-            self._records.begun_records(self._motions_begun(state)),
-            self._records.count_before_waypoint(self.waypoint()),
+            self.records.begun_records(self._motions_begun()),
+            self.records.count_before_waypoint(self.waypoint()),
         )
 
-    def _motions_begun(self, state: RobotState) -> int:
+    def _motions_begun(self) -> int:
         """
         Return how many motions of this goal the robot has begun; 0 = unknown.
 
         The register keeps the count of the goal before until the robot program has read START, so
         it is believed once it changes.
         """
-        if not self._order.reports_points_begun or state.points_begun == self._stale_begun:
+        begun = self._reported_begun
+        if begun is None or (self._awaits_count and begun == self._stale_begun):
             return self._motions_before
-        self._stale_begun = None
-        return self._motions_before + state.points_begun
+        self._awaits_count = False
+        return self._motions_before + begun
 
     def awaits_count(self) -> bool:
         """Tell whether the program has not reported a point of this goal since START."""
-        return self._stale_begun is not None
+        return self._awaits_count
 
-    def progress(self, sent: int, *, at_end: bool, waits: bool = False) -> Progress:
+    def progress(
+        self, *, buffered: float, lag: float, at_end: bool, waits: bool = False
+    ) -> Progress:
         """
         Return a report about the newest packet.
 
-        :param sent: how many records were sent to the robot.
+        :param buffered: motion time that the robot has got and not yet run [s].
+        :param lag: how far the arm is behind the newest set-point [s].
         :param at_end: whether the arm should be at the end, and not on its way.
         :param waits: whether it rests until more points come.
         """
-        state, job = self.latest, self._order
+        state, job = self.latest, self.job
         assert state is not None
         seen = shift_reference_point(state, job.T_tcp_controlled)
         time = self._tracker.time()
@@ -193,8 +208,9 @@ class GoalMonitor:
             time=time,
             time_remaining=max(0.0, job.duration - time),
             speed_scaling=state.speed_scaling,
-            points_received=self._records.points,
-            buffered=self.buffered(sent),
+            points_received=self.records.points,
+            buffered=buffered,
+            lag=lag,
             timestamp=state.timestamp,
             awaiting_points=waits,
         )
@@ -283,7 +299,7 @@ class GoalMonitor:
 
     def _speed_violation(self, state: RobotState) -> tuple[GoalSignal, str] | None:
         """Return that a program which tells no progress goes much faster or slower, or None."""
-        if self._speed_check is None or self._stale_begun is None:
+        if self._speed_check is None or not self._awaits_count:
             return None
         clause = self._speed_check.violation(
             state.target_tcp_twist, self.scaled_time, self._tracker.time()
@@ -312,7 +328,7 @@ class GoalMonitor:
         """Return what a check says of the controlled frame; ``desired`` is of the TCP."""
         if self._checks_tcp:
             return check.violation(desired, state)
-        T_tcp_controlled = self._order.T_tcp_controlled
+        T_tcp_controlled = self.job.T_tcp_controlled
         return check.violation(
             desired @ T_tcp_controlled, shift_reference_point(state, T_tcp_controlled)
         )

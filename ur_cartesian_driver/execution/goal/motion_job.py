@@ -135,6 +135,7 @@ def job_from_plan(
         ending_records=ending_records,
         has_speed_profile=not (
             goal.keep_open
+            or plan.execution is ExecutionMode.SERVO
             or any(
                 isinstance(segment.primitive, OptimoveJ | OptimoveL) for segment in plan.segments
             )

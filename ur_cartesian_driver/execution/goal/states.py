@@ -6,9 +6,10 @@ The states of a goal on its way through the robot program, and what leads from o
 Events are first turned into signals (:class:`GoalSignal`); :data:`TRANSITIONS` says what a signal
 means in the present state: the next state and how the goal ends, if it does.
 
-* **ARMING**: the goal moves another frame than the robot's TCP, and the message that sets the TCP
-  there is on the wire. Nothing moves before the robot reports it, and itself where the plan
-  begins. Goals about the TCP itself begin in MOVING.
+* **ARMING**: every goal begins here. Where it moves another frame than the robot's TCP, the
+  message that sets the TCP there is on the wire: nothing moves before the robot reports it, and
+  itself where the plan begins. Set-points need the robot's inputs and the answer of its program.
+  Where nothing has to be prepared, ARMED follows at once.
 * **MOVING**: the robot program runs points. The result SUCCESS leads to SETTLING; whatever stops
   the arm by itself (safety, connection) ends the goal at once, because nothing that we could send
   would be read; a reason of ours to stop (cancel, preemption, tolerance)
@@ -52,6 +53,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import auto, Enum
 from types import MappingProxyType
+from typing import TypeAlias
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import TrajectoryResult
@@ -99,6 +101,12 @@ class GoalSignal(Enum):
     UNANSWERED = auto()
 
 
+#: What an event means, with a clause for the outcome's text; None = nothing.
+Meaning: TypeAlias = tuple[GoalSignal | None, str]
+NO_MEANING: Meaning = (None, '')
+
+#: In which a goal begins; where nothing has to be armed, ARMED follows at once.
+INITIAL_STATE = GoalState.ARMING
 #: In these the robot program runs points of the goal.
 RUNNING_STATES = frozenset({GoalState.MOVING, GoalState.RUNNING_OUT})
 
@@ -295,8 +303,15 @@ _SAFETY_STOPS = _EMERGENCY_STOPS | int(
     | SafetyStatus.FAULT
 )
 NO_STOP = SafetyStatus(0)
+#: Below this speed of each joint the arm is at rest [rad/s].
+REST_SPEED = 1e-3
 #: Stops after which a robot goes on with its program, where somebody unlocks and plays it.
 RESUMABLE_STOPS = SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED
+
+
+def is_at_rest(state: RobotState) -> bool:
+    """Tell whether the arm is at rest."""
+    return max(map(abs, state.actual_qd)) < REST_SPEED
 
 
 def detect_stop(

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from math import inf
 
+from ur_cartesian_driver.execution.goal.states import is_at_rest
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState
 
@@ -21,8 +22,6 @@ TCP_RESOLUTION = 2e-6
 #: How long the robot may take from a message that sets a TCP to reporting it [s]; after that a
 #: message that nobody has carried out is taken for lost.
 SET_TIMEOUT = 0.5
-#: Below this joint speed the arm stands, and its TCP may be changed [rad/s].
-REST_SPEED = 1e-3
 #: The first and the longest pause before the TCP is put back once more [s].
 MIN_RETRY_PERIOD, MAX_RETRY_PERIOD = 0.2, 10.0
 
@@ -76,7 +75,7 @@ class TemporaryTcp:
             self.is_restored
             or not self.is_active(state)
             or now < self._next_retry
-            or max(map(abs, state.actual_qd)) >= REST_SPEED
+            or not is_at_rest(state)
         ):
             return False
         self._next_retry = now + self._retry_period

@@ -53,7 +53,7 @@ class LiveTargets:
         self.accepted = self.dropped = 0
         #: How often the arm was stopped because the newest target was too old.
         self.pauses = 0
-        self._settings = settings
+        self.settings = settings
         self._stamp = -inf
         self._last_came = inf
         self._is_over = False
@@ -68,7 +68,7 @@ class LiveTargets:
         """
         stamp = now - max(0.0, age)
         self._last_came = now
-        if stamp <= self._stamp or not age <= self._settings.max_age:  # NaN is no age
+        if stamp <= self._stamp or not age <= self.settings.max_age:  # NaN is no age
             self.dropped += 1
             return
         self._stamp = stamp
@@ -79,12 +79,12 @@ class LiveTargets:
     def update(self, now: float) -> None:
         """Let time pass: see whether the newest target is too old, and whether it was the last."""
         generator = self.generator
-        if generator.target is not None and now - self._stamp > self._settings.max_age:
+        if generator.target is not None and now - self._stamp > self.settings.max_age:
             # An arm that rests where it was to be is not stopped by that.
             self.pauses += not generator.arrived
             generator.clear_target()
         self._last_came = min(self._last_came, now)
-        self._is_over = now - self._last_came > self._settings.timeout
+        self._is_over = now - self._last_came > self.settings.timeout
 
     def next(self, dt: float) -> Joints:
         """Return the set-point [rad] that follows ``dt`` [s] of nominal time after the last."""
@@ -116,13 +116,13 @@ class LiveTargets:
         if self.dropped:
             lines.append(
                 f'{self.dropped} came after a newer one or were older than '
-                f'{self._settings.max_age:g} s, and were left out'
+                f'{self.settings.max_age:g} s, and were left out'
             )
         if self.pauses:
             times = 'once' if self.pauses == 1 else f'{self.pauses} times'
             lines.append(
                 f'the arm was stopped {times} because the newest target was older than '
-                f'{self._settings.max_age:g} s'
+                f'{self.settings.max_age:g} s'
             )
         return (*lines, *(f'the arm was stopped: {reason}' for reason in self._reasons.values()))
 

@@ -42,13 +42,11 @@ class ServoClock:
     :param step: the robot's control step [s].
     :param target: motion time that is to be under way [s].
     :param max_lag: motion time that may be under way [s].
-    :param closed: False = the rate is 1 whatever the robot does, to see why that is no good.
     """
 
     step: float
     target: float
     max_lag: float
-    closed: bool = True
     rate: float = 0.0
     _pending: float = 0.0
 
@@ -60,7 +58,7 @@ class ServoClock:
         :param scaling: what the controller runs at, 0 when its program does not.
         :param in_flight: L of the module's description [s].
         """
-        target_rate = scaling + (self.target - in_flight) / CORRECTION_TIME if self.closed else 1.0
+        target_rate = scaling + (self.target - in_flight) / CORRECTION_TIME
         target_rate = min(max(target_rate, 0.0), MAX_RATE)
         change = MAX_RATE_CHANGE * passed
         self.rate = min(max(target_rate, self.rate - change), self.rate + change)

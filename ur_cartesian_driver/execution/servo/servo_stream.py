@@ -160,8 +160,6 @@ class ServoSettings:
     max_divergence: float = 0.3
     #: How far ``servoj`` lags behind its set-points by itself [s].
     lookahead_time: float = 0.03
-    #: False = set-points come as fast as the robot's packets, whatever the robot does with them.
-    closed_loop: bool = True
 
     def __post_init__(self) -> None:
         """Refuse what lets the buffer overflow."""
@@ -185,7 +183,7 @@ class ServoStream:
         """Wait for the first packet."""
         self.phase = ServoPhase.OPENING
         self._source = source
-        self._settings = settings
+        self.settings = settings
         self._clock = self._make_clock(MIN_STEP)
         self._times: list[float] = []
         self._latest: ServoFeedback | None = None
@@ -194,7 +192,7 @@ class ServoStream:
         self._first = self._first_servo = self._first_idle = 0
         self._state_time = 0.0
         self._joints: Vector6 = source.next(0.0)
-        self._fill_target = START_FILL * settings.target_lag if settings.closed_loop else 0.0
+        self._fill_target = START_FILL * settings.target_lag
         #: Set-points that the robot has not read yet: sequence number and state time.
         self._unread: deque[tuple[int, float]] = deque()
         self._read_time = 0.0
@@ -209,11 +207,10 @@ class ServoStream:
         self._sent = self._underruns = 0
 
     def _make_clock(self, step: float) -> ServoClock:
-        settings = self._settings
+        settings = self.settings
         return ServoClock(
             step=step,
             target=settings.target_lag,
-            closed=settings.closed_loop,
             max_lag=min(settings.max_lag, settings.buffer_depth * step),
         )
 
@@ -228,7 +225,7 @@ class ServoStream:
     @property
     def lag(self) -> float:
         """How far the arm is behind the newest set-point [s], that of ``servoj`` included."""
-        return self.in_flight + self._settings.lookahead_time
+        return self.in_flight + self.settings.lookahead_time
 
     @property
     def buffered(self) -> float:
@@ -241,7 +238,7 @@ class ServoStream:
 
         :param joint_error: target - actual [rad].
         """
-        state, settings = self._latest, self._settings
+        state, settings = self._latest, self.settings
         if state is None:
             return None
         return ServoReport(
@@ -409,6 +406,6 @@ class ServoStream:
             ExternalError.NONE,
             SyncState.EXTERNAL_TO_ROBOT if moves else SyncState.NONE,
             *self._joints,
-            *(self._settings.max_divergence,) * 6,
+            *(self.settings.max_divergence,) * 6,
             self._state_time,
         )

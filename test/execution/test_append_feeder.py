@@ -4,12 +4,12 @@
 
 from dataclasses import replace
 
+from goal_machines import append_machine
 import numpy as np
 
 from ur_cartesian_driver.execution import (
     AnswerAppend,
     AppendJob,
-    AppendMachine,
     AppendSettings,
     Finish,
     MotionJob,
@@ -17,7 +17,7 @@ from ur_cartesian_driver.execution import (
     SendPoints,
     SetTemporaryTcp,
 )
-from ur_cartesian_driver.execution.goal.append_machine import FIRST_POINTS_TIMEOUT
+from ur_cartesian_driver.execution.goal.append_feeder import CLOSED_BY_CLIENT, FIRST_POINTS_TIMEOUT
 from ur_cartesian_driver.execution.goal.states import GoalState
 from ur_cartesian_driver.execution.goal.wire_records import WireRecords
 from ur_cartesian_driver.motion.events import StateReceived, TrajectoryEnded, TrajectoryResult
@@ -86,7 +86,7 @@ def actions(commands):
 
 
 def started(count=30, **settings):
-    machine = AppendMachine(job(1, count), settings=AppendSettings(**settings))
+    machine = append_machine(job(1, count), settings=AppendSettings(**settings))
     return machine, machine.start(packet(0.0, moves=False).state)
 
 
@@ -155,7 +155,7 @@ def test_a_motion_goes_on_when_a_packet_shows_the_arm_at_rest_and_counts_its_own
 
 def test_the_time_at_rest_makes_nothing_late():
     machine, _ = started(count=10)
-    machine.job = replace(machine.job, goal_time_tolerance=0.2)
+    machine.feeder.monitor.job = replace(machine.job, goal_time_tolerance=0.2)
     run(machine, 0.0, 0.98)
     for k in range(100):
         machine.step(rest_at(1.0 + 0.01 * k, 1.0, 10), 1.0 + 0.01 * k)
@@ -188,7 +188,7 @@ def test_the_word_that_they_are_the_last_sends_the_ending_with_the_others():
     assert sent(commands) == [(9, 10)]
     assert actions(commands) == [(TrajectoryAction.STREAM_END, 10)]
     (answer,) = machine.step(AppendJob(number=2, records_before=10, job=job(11, 5)), 0.02)
-    assert 'said to be the last' in answer.refusal
+    assert answer.refusal == CLOSED_BY_CLIENT
 
 
 def test_a_goal_that_is_only_an_ending_waits_a_moment_for_more():
@@ -200,7 +200,7 @@ def test_a_goal_that_is_only_an_ending_waits_a_moment_for_more():
 
 
 def test_points_may_come_before_the_tcp_of_the_goal_is_set():
-    machine = AppendMachine(job(1, 5, T_flange_tcp=NOZZLE))
+    machine = append_machine(job(1, 5, T_flange_tcp=NOZZLE))
     (lend,) = machine.start(packet(0.0, moves=False).state)
     assert isinstance(lend, SetTemporaryTcp)
     assert machine.step(
@@ -223,7 +223,8 @@ def test_what_was_passed_is_forgotten():
             0.0,
         )
         records_before += 15
-        held.append((machine._records.kept, len(machine._monitor._tracker.path.time)))
+        monitor = machine.feeder.monitor
+        held.append((monitor.records.kept, len(monitor._tracker.path.time)))
     assert max(records for records, _ in held) < 40
     assert max(rows for _, rows in held) < 60
     assert machine.state is GoalState.MOVING

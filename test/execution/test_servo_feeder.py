@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whatever happens to a goal that is streamed, it ends once, and the inputs are given back."""
 
+from goal_machines import servo_machine
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -14,8 +15,6 @@ from ur_cartesian_driver.execution import (
     MotionJob,
     OpenServo,
     SERVO_LINK,
-    ServoMachine,
-    ServoSettings,
     SetTemporaryTcp,
     WriteServo,
 )
@@ -52,7 +51,7 @@ def machine(T_flange_tcp=None):
         REST,
         [Spline(target=(LENGTH,) * 6, velocities=REST, accelerations=REST, duration=DURATION)],
     )
-    return ServoMachine(
+    return servo_machine(
         MotionJob(
             points=1,
             duration=DURATION,
@@ -66,7 +65,6 @@ def machine(T_flange_tcp=None):
             ),
             goal_tolerance=Tolerance(position=(0.001,) * 3),
         ),
-        settings=ServoSettings(),
     )
 
 
@@ -247,7 +245,8 @@ def test_lost_inputs_end_a_moving_goal_and_the_program_is_told_to_brake():
 @pytest.mark.slow
 def test_a_dwell_is_no_stall_while_the_program_reads():
     goal = machine()
-    goal.stream._source = type('Dwell', (), {'done': False, 'next': lambda self, dt: (0.0,) * 6})()
+    source = type('Dwell', (), {'done': False, 'next': lambda self, dt: (0.0,) * 6})
+    goal.feeder.stream._source = source()
     cell = Cell(goal).until(GoalState.MOVING)
     for _ in range(1050):  # 2.1 s, longer than an arm may stand for no reason
         cell.cycle()
@@ -261,8 +260,8 @@ def test_a_dwell_is_no_stall_while_the_program_reads():
 def test_due_counts_from_when_the_arm_can_follow():
     goal = machine()
     Cell(goal).until(GoalState.SETTLING)
-    assert goal.job.due == pytest.approx(DURATION + 0.1, abs=0.1)
-    assert goal.job.due > DURATION
+    assert goal.job.due + goal.feeder.start_delay == pytest.approx(DURATION + 0.1, abs=0.1)
+    assert goal.job.due + goal.feeder.start_delay > DURATION
 
 
 SAFETY = [
@@ -378,7 +377,7 @@ def test_a_target_that_trails_by_many_dense_points_is_on_the_path():
     points, lag_motions = 100, 20  # 2 ms each; 40 ms of servoj at 0.5 m/s are 20 mm
     at = np.linspace(0.0, 1.0, points + 1)
     speed = (LENGTH / DURATION,) * 6
-    goal = ServoMachine(
+    goal = servo_machine(
         MotionJob(
             points=points,
             duration=DURATION,
@@ -401,7 +400,6 @@ def test_a_target_that_trails_by_many_dense_points_is_on_the_path():
                 time=DURATION * at,
             ),
         ),
-        settings=ServoSettings(),
     )
 
     class Trailing(Cell):

@@ -1,0 +1,53 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Machines of goals, composed as the driver does it, with settings of their own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ur_cartesian_driver.execution import (
+    AppendFeeder,
+    AppendSettings,
+    GoalMachine,
+    GoalMonitor,
+    MotionJob,
+    PointFeeder,
+    ServoFeeder,
+    ServoSettings,
+    ServoStream,
+    SplineSetpoints,
+)
+from ur_cartesian_driver.execution.goal.monitor import MAX_PLAN_DEVIATION
+
+
+def point_machine(
+    job: MotionJob,
+    *,
+    max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION,
+    feedback_period: float = 0.04,
+    resume_after_stop: bool = False,
+) -> GoalMachine:
+    """Return the machine of a goal whose points are all known."""
+    return GoalMachine(
+        PointFeeder(GoalMonitor(job, max_plan_deviation)),
+        feedback_period=feedback_period,
+        resume_after_stop=resume_after_stop,
+    )
+
+
+def append_machine(
+    job: MotionJob,
+    settings: AppendSettings | None = None,
+    *,
+    max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION,
+) -> GoalMachine:
+    """Return the machine of a goal to which points are appended."""
+    return GoalMachine(AppendFeeder(GoalMonitor(job, max_plan_deviation), settings))
+
+
+def servo_machine(job: MotionJob, settings: ServoSettings | None = None) -> GoalMachine:
+    """Return the machine of a goal whose spline goes through the buffered servo."""
+    assert job.spline is not None
+    stream = ServoStream(SplineSetpoints(job.spline), settings or ServoSettings())
+    return GoalMachine(ServoFeeder(GoalMonitor(replace(job, has_speed_profile=False)), stream))

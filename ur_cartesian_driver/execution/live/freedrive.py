@@ -1,0 +1,94 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Lets a person guide the arm by hand: a servo goal with the mode TEACH instead of set-points."""
+
+from __future__ import annotations
+
+from ur_cartesian_driver.execution.goal.monitor import GoalMonitor
+from ur_cartesian_driver.execution.goal.states import GoalSignal, GoalState, Meaning
+from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
+from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoSettings, ServoStream
+from ur_cartesian_driver.motion.events import Event, ServoReceived
+from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.servo import ServoFeedback
+from ur_cartesian_driver.motion.vectors import ZERO6
+from ur_cartesian_driver.protocol.program.registers import ServoMode
+
+#: How long the robot program may take to let the arm be guided [s].
+FREEDRIVE_TIMEOUT = 1.0
+
+
+class FreedriveFeeder(ServoFeeder):
+    """Keeps the robot program in freedrive until the goal ends."""
+
+    stream: FreedriveStream
+
+    def __init__(self, monitor: GoalMonitor, settings: ServoSettings) -> None:
+        """Prepare; the arm cannot be guided yet."""
+        super().__init__(monitor, FreedriveStream(settings))
+
+    @property
+    def has_progress(self) -> bool:
+        """Whether the arm can be guided: the first progress report tells the owner so."""
+        return self.stream.is_active
+
+    def interpret(self, event: Event, state: GoalState) -> Meaning | None:
+        """Return what an answer of the robot program means."""
+        if isinstance(event, ServoReceived) and self.stream.failure:
+            # A program ends freedrive by itself where it is about to end.
+            signal = GoalSignal.PROGRAM_STOPPED if self.stream.is_active else GoalSignal.FAILURE
+            return signal, self.stream.failure
+        return super().interpret(event, state)
+
+    def location(self, *, started: bool) -> str:
+        """Return when freedrive ended, as a clause."""
+        return 'during freedrive' if started else 'before freedrive was active'
+
+
+class FreedriveStream(ServoStream):
+    """The registers of the buffered servo, with the mode TEACH in the place of set-points."""
+
+    def __init__(self, settings: ServoSettings) -> None:
+        """Wait for the first packet."""
+        super().__init__(_NoSetpoints(), settings)
+        self._begun = False
+        self._requested_at = 0.0
+        #: Whether the robot program has let the arm be guided.
+        self.is_active = False
+        #: Why it does not (any more), as a clause.
+        self.failure = ''
+
+    def begin(self) -> None:
+        """Let the arm be guided from now on."""
+        self._begun = True
+
+    def on_feedback(self, feedback: ServoFeedback, now: float) -> tuple[float, ...] | None:
+        """Take a packet; return what to write, None = nothing."""
+        if self._begun and self._requested_at == 0.0:
+            self._requested_at = now
+        is_teaching = feedback.mode == ServoMode.TEACH
+        if self._begun and self.phase is ServoPhase.READY and not is_teaching:
+            if self.is_active:
+                self.failure = 'the robot program has ended freedrive by itself'
+            elif now > self._requested_at + FREEDRIVE_TIMEOUT:
+                self.failure = (
+                    'the robot program does not enter freedrive: it is paused, '
+                    'or was started without allow_freedrive'
+                )
+        self.is_active = self.is_active or is_teaching
+        return super().on_feedback(feedback, now)
+
+    def _row(self) -> tuple[float, ...]:
+        mode, *rest = super()._row()
+        freedrive = self._begun and self.phase is ServoPhase.READY
+        return (ServoMode.TEACH if freedrive else mode, *rest)
+
+
+class _NoSetpoints:
+    """Fills the joint registers, which are not read in freedrive."""
+
+    done = False
+
+    def next(self, dt: float) -> Joints:
+        """Return zeros."""
+        return ZERO6

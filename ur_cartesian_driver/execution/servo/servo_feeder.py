@@ -1,0 +1,209 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Feeds a goal through the buffered servo: not points but set-points go to the robot.
+
+They come from a source, one for each packet of the robot (:mod:`~.servo_stream`). In the states of
+a goal (:mod:`~.states`) that means:
+
+* in ARMING the inputs of the robot are taken, the divergence thresholds are written and the
+  robot program has to answer. Inputs that belong to another client, or a program that does not
+  answer, end the goal before anything moves;
+* MOVING begins with a full buffer and ends when the last set-point was carried out;
+* SETTLING holds that set-point until the arm is there and at rest;
+* in CANCELLING the mode IDLE is written instead of a CANCEL; the program leaves the servo, and
+  that is the answer.
+
+However the goal ends, the robot program is told to brake and stop reading, and the inputs are
+released.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+
+from ur_cartesian_driver.execution.goal.feeder import Feeder
+from ur_cartesian_driver.execution.goal.goal_commands import (
+    EnterServo,
+    GoalCommand,
+    LeaveServo,
+    OpenServo,
+    ReportServo,
+    WriteServo,
+)
+from ur_cartesian_driver.execution.goal.monitor import GoalMonitor, START_ANGLE_TOLERANCE
+from ur_cartesian_driver.execution.goal.states import GoalSignal, GoalState, Meaning, NO_MEANING
+from ur_cartesian_driver.execution.goal.timeouts import ARMING_TIMEOUT
+from ur_cartesian_driver.execution.servo.servo_stream import ServoPhase, ServoStream
+from ur_cartesian_driver.motion.events import Event, LinkLost, ServoReceived, TrajectoryEnded
+from ur_cartesian_driver.motion.servo import ServoFeedback, UNKNOWN6
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.vectors import subtract6, Vector6
+
+#: The connection to the inputs, as :class:`LinkLost` names it.
+SERVO_LINK = 'RTDE inputs'
+#: A robot program that has read one of our sequence numbers so lately is not stalled, wherever the
+#: arm stands [s].
+ANSWER_TIMEOUT = 1.0
+#: The controller's target is behind the set-point that the arm is led to by about the lookahead
+#: time of ``servoj``, by more with a low gain: so many lookahead times at most.
+MAX_LAG_LOOKAHEADS = 4.0
+
+
+class ServoFeeder(Feeder):
+    """Answers each packet of the servo's registers with a set-point."""
+
+    def __init__(self, monitor: GoalMonitor, stream: ServoStream) -> None:
+        """
+        Prepare; the inputs are not taken yet.
+
+        :param stream: of the set-points of the goal's spline, or of another source.
+        """
+        super().__init__(monitor)
+        self.stream = stream
+        self._spline = monitor.job.spline
+        self._max_servo_lag = MAX_LAG_LOOKAHEADS * stream.settings.lookahead_time
+        self._last_read, self._last_answer = -1, -inf
+        self._has_filled = False
+
+    # ---- what to send -------------------------------------------------------------------------
+
+    def prepare(self) -> list[GoalCommand]:
+        """Return what takes the inputs."""
+        return [OpenServo()]
+
+    def why_not_ready(self, packet: RobotState | None) -> str:
+        """Return why the arm cannot follow set-points yet."""
+        if self.stream.phase is ServoPhase.OPENING:
+            return (
+                f'the robot did not give its RTDE inputs within {ARMING_TIMEOUT:g} s; '
+                'nothing was moved'
+            )
+        if self.stream.phase is not ServoPhase.READY:
+            return (
+                'the robot program did not answer through its registers within '
+                f'{ARMING_TIMEOUT:g} s: it is paused, or knows no buffered servo; '
+                'nothing was moved'
+            )
+        error = self._start_joint_error(packet)
+        if error > START_ANGLE_TOLERANCE:
+            return (
+                f'a joint is {error:.4f} rad away from where the set-points begin: the arm was '
+                'moved meanwhile'
+            )
+        return ''
+
+    def _start_joint_error(self, packet: RobotState | None) -> float:
+        """
+        Return how far a joint is from the first set-point of a plan [rad].
+
+        The servo would pull an arm there that was moved since it was planned.
+        """
+        if self._spline is None or packet is None:
+            return 0.0
+        start = self._spline.at(float(self._spline.times[0]))[0]
+        return float(np.abs(start - packet.target_q).max())
+
+    def enter(self, state: GoalState, packet: RobotState) -> list[GoalCommand]:
+        """Begin the set-points in MOVING, end them where the goal ends."""
+        match state:
+            case GoalState.MOVING:
+                self.monitor.start(0)
+                self.stream.begin()  # the next packet is answered with the first set-point
+            case GoalState.CANCELLING | GoalState.RESTORING | GoalState.PROGRAM_LOST:
+                # A program that begins after it was lost must not find set-points in the inputs.
+                return self._stop()
+            case GoalState.ENDED:
+                return [*self._stop(), LeaveServo(), *self.extra_reports()]
+        return []
+
+    def _stop(self) -> list[GoalCommand]:
+        row = self.stream.stop()
+        return [] if row is None else [WriteServo(values=row)]
+
+    # ---- what the robot confirms --------------------------------------------------------------
+
+    def take(self, event: Event, now: float) -> list[GoalCommand]:
+        """Answer a packet of the servo's registers with a write."""
+        return self._write(event.feedback, now) if isinstance(event, ServoReceived) else []
+
+    def _write(self, feedback: ServoFeedback, now: float) -> list[GoalCommand]:
+        if feedback.last_sequence != self._last_read:
+            self._last_read, self._last_answer = feedback.last_sequence, now
+        before = self.stream.phase
+        row = self.stream.on_feedback(feedback, now)
+        if self.stream.phase is ServoPhase.SERVOING and not self._has_filled:
+            # The time of the goal begins with its motion: not with the filling of the buffer.
+            self._has_filled = True
+            self.start_delay = self.monitor.scaled_time + self.stream.lag
+        commands: list[GoalCommand] = [] if row is None else [WriteServo(values=row)]
+        if before is ServoPhase.OPENING and self.stream.phase is ServoPhase.ENTERING:
+            commands.append(EnterServo())
+        return commands
+
+    def interpret(self, event: Event, state: GoalState) -> Meaning | None:
+        """Return what an answer of the servo means to the goal."""
+        match event:
+            case ServoReceived():
+                return self._interpret_phase(state)
+            case TrajectoryEnded():  # of a goal before this one
+                return NO_MEANING
+            case LinkLost(link=link, reason=reason) if (
+                link == SERVO_LINK and state is GoalState.ARMING
+            ):
+                return GoalSignal.TIMEOUT, (
+                    f'the robot does not take set-points: {reason}'.rstrip('.')
+                )
+        return None
+
+    def _interpret_phase(self, state: GoalState) -> Meaning:
+        if self.stream.phase is ServoPhase.ARRIVED and state is GoalState.MOVING:
+            return GoalSignal.SUCCESS, ''
+        if self.stream.phase is not ServoPhase.LEFT:
+            return NO_MEANING
+        if state is GoalState.CANCELLING:
+            return GoalSignal.CANCELED, ''
+        if state in (GoalState.MOVING, GoalState.SETTLING):
+            # It does so where it is about to end, for a reason that we may hear of in a moment.
+            return GoalSignal.PROGRAM_STOPPED, (
+                'the robot program left the servo by itself; its log on the pendant says why'
+            )
+        return NO_MEANING
+
+    def motions_begun(self, packet: RobotState) -> tuple[int | None, int]:
+        """Return how many pieces of the spline the arm has begun."""
+        if self._spline is None:
+            return None, 0
+        begun = self._pieces_begun(self.stream.motion_time)
+        return begun, begun - self._pieces_begun(self.stream.motion_time - self._max_servo_lag)
+
+    def _pieces_begun(self, time: float) -> int:
+        """Return how many pieces of the spline begin until a time [s]; 0 = none yet."""
+        return 0 if self._spline is None or time <= 0.0 else self._spline.piece(time) + 1
+
+    def confirms(self, now: float) -> bool:
+        """Tell whether the robot program has lately read a set-point."""
+        return now - self._last_answer < ANSWER_TIMEOUT
+
+    # ---- what to report -----------------------------------------------------------------------
+
+    @property
+    def buffered(self) -> float:
+        """Motion time in the robot's buffer [s]."""
+        return self.stream.buffered
+
+    @property
+    def lag(self) -> float:
+        """How far the arm is behind the newest set-point [s]."""
+        return self.stream.lag
+
+    def extra_reports(self) -> list[GoalCommand]:
+        """Return the state of the servo."""
+        report = self.stream.report(self._joint_error())
+        return [] if report is None else [ReportServo(report=report)]
+
+    def _joint_error(self) -> Vector6:
+        packet = self.monitor.latest
+        return UNKNOWN6 if packet is None else subtract6(packet.target_q, packet.actual_q)
