@@ -18,7 +18,8 @@ from typing import Any
 
 from figures import Figure
 
-from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 
 #: From point to point, a cycle of the controller [s]; one request has so many, and is made when

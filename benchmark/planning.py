@@ -15,7 +15,8 @@ import paths
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.goal import ExecutionMode, Goal
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 #: Of the corners that are blended [m]; two of them fit between points that are 5 mm apart.

@@ -28,7 +28,8 @@ from processes import Child, simulator
 
 from ur_cartesian_driver.driver import Driver, DriverConfig
 from ur_cartesian_driver.motion.events import Progress
-from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.pose import Pose

@@ -47,7 +47,7 @@ def a_goal(
         from ur_cartesian_driver.cli.commands import goal_file
         from ur_cartesian_driver.kinematics.chain import Arm
         from ur_cartesian_driver.kinematics.robot_models import robot_model
-        from ur_cartesian_driver.motion.goal import ExecutionMode
+        from ur_cartesian_driver.motion.execution_modes import ExecutionMode
         from ur_cartesian_driver.planning import plan, PlanningOptions
         from ur_cartesian_driver.ros.client import load_goal
         from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
@@ -74,7 +74,8 @@ async def a_late_producer(cell: Any) -> Any:
     """Go round and round on points that come when half a second is left, but for once."""
     from append_goals import AppendMotion, circle
 
-    from ur_cartesian_driver.motion.goal import ExecutionMode, Goal
+    from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+    from ur_cartesian_driver.motion.goal import Goal
     from ur_cartesian_driver.motion.vectors import ZERO6
 
     home = cell.memory.read().actual_tcp_pose

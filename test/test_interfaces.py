@@ -11,7 +11,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.errors import ErrorCode
-from ur_cartesian_driver.motion.goal import ArcMode, ExecutionMode, OutputKind, SegmentType
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, SegmentType
 from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.motion.state import RobotMode, SafetyMode
 from ur_cartesian_driver.msg import (

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
-from ur_cartesian_driver.motion.goal import ExecutionMode
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
@@ -61,7 +60,7 @@ def sample(plan: Plan, arm: Arm, T_flange_tcp: Pose, period: float) -> Preview:
     fraction[time >= end] = 1.0
     poses = [_between(reference, int(k), float(f)) for k, f in zip(row, fraction, strict=True)]
     tcp = T_flange_tcp if plan.T_flange_tcp is None else plan.T_flange_tcp
-    if plan.execution in (ExecutionMode.SPLINE, ExecutionMode.SERVO):
+    if plan.execution.traits.is_spline:
         joints = _spline(plan).rows(time)[0]
     else:
         joints = _joints(plan, arm, tcp.inverse(), poses, row + fraction)

@@ -23,8 +23,8 @@ from robot_cell import CYCLE, run_cell
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode, GoalRefused
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
-    ExecutionMode,
     Goal,
     IOCommand,
     OutputKind,

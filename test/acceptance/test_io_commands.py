@@ -18,8 +18,8 @@ from robot_in_memory import RobotInMemory
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
-    ExecutionMode,
     Goal,
     IOCommand,
     OutputKind,

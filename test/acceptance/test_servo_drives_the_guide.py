@@ -20,7 +20,8 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import CancelRequested, ServoReceived, StateReceived
-from ur_cartesian_driver.motion.goal import ExecutionMode, Tolerance
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.primitive import Spline

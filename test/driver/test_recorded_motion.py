@@ -14,8 +14,8 @@ from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
-    ExecutionMode,
     Goal,
     IOCommand,
     OutputKind,

@@ -9,7 +9,8 @@ import pytest
 from ur_cartesian_driver.execution import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import plan, PlanningOptions

@@ -30,7 +30,8 @@ from ur_cartesian_driver.motion.events import (
     TrajectoryEnded,
     TrajectoryResult,
 )
-from ur_cartesian_driver.motion.goal import ExecutionMode, Tolerance
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose

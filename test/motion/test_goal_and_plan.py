@@ -11,9 +11,9 @@ import pytest
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
-    ExecutionMode,
     Goal,
     OutputKind,
     Posture,

@@ -11,8 +11,8 @@ import pytest
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import GoalRefused, InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
-    ExecutionMode,
     Goal,
     IOCommand,
     OutputKind,

@@ -17,8 +17,8 @@ from ur_cartesian_driver.motion.errors import (
     TooFast,
     Unreachable,
 )
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
-    ExecutionMode,
     Goal,
     Posture,
     Segment,

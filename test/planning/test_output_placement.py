@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
-    ExecutionMode,
     Goal,
     IOCommand,
     OutputKind,

@@ -25,7 +25,8 @@ from ur_cartesian_driver.motion.errors import (
     TooFast,
     Unreachable,
 )
-from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Posture, Segment, Waypoint
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, Waypoint
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector, rotate
 from ur_cartesian_driver.motion.primitive import Spline

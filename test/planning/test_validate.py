@@ -17,9 +17,9 @@ from ur_cartesian_driver.motion.errors import (
     NotAvailable,
     OldHeaderTimestamp,
 )
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
-    ExecutionMode,
     Goal,
     IOCommand,
     OutputKind,

@@ -7,7 +7,7 @@ import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.goal import ExecutionMode
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, Spline
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import check, plan, PlanningOptions

@@ -15,7 +15,8 @@ from ur_cartesian_driver.motion.errors import (
     GoalRefused,
     InvalidGoal,
 )
-from ur_cartesian_driver.motion.goal import ArcMode, ExecutionMode, OutputKind, SegmentType
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import ArcMode, OutputKind, SegmentType
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.msg import (

@@ -24,7 +24,8 @@ from ur_cartesian_driver.execution.live.online_trajectory import LiveLimits
 from ur_cartesian_driver.execution.live.workspace_guard import KeepOutPlane, LiveWorkspace
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import InvalidGoal, RobotNotReady
-from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Waypoint
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.primitive import Joints

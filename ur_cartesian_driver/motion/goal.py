@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.signals import AnalogDomain
 from ur_cartesian_driver.motion.vectors import Vector3, Vector6, ZERO3, ZERO6
@@ -34,15 +35,6 @@ class ArcMode(IntEnum):
 
     UNCONSTRAINED = 0
     FIXED = 1
-
-
-class ExecutionMode(IntEnum):
-    """How to execute a goal; the numbers of the action's ``execution``."""
-
-    AUTO = 0
-    PRIMITIVES = 1
-    SPLINE = 2
-    SERVO = 3
 
 
 class OutputKind(IntEnum):

@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.goal import ExecutionMode, Goal
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.primitive import Instruction, Joints, Primitive, SwitchOutput
 

@@ -10,11 +10,13 @@ the report. The first reason for a refusal is raised.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 import gc
 from itertools import pairwise
+from pkgutil import resolve_name
+from typing import TypeAlias
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import (
@@ -64,7 +66,6 @@ from ur_cartesian_driver.planning.request.dialect_adaptation import (
     explain_poses_only,
 )
 from ur_cartesian_driver.planning.request.goal_fields import (
-    is_spline,
     is_timed,
     point_field,
     resolve_execution_mode,
@@ -88,6 +89,11 @@ _UNTIMED_MOVES: dict[SegmentType, type[MoveP] | type[OptimoveJ] | type[OptimoveL
     SegmentType.OPTIMIZED_JOINT: OptimoveJ,
     SegmentType.OPTIMIZED_LINEAR: OptimoveL,
 }
+
+
+#: A planner of the registry of execution modes. It gets a checked goal about the TCP, where that
+#: came from, and the TCP that the robot has.
+PlanGoal: TypeAlias = Callable[['GoalPlanner', RetargetedGoal, Pose], Plan]
 
 
 def plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> Plan:
@@ -125,9 +131,15 @@ def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> 
     T_flange_active = state.T_flange_tcp
     retargeted = retarget_to_tcp(goal, state, options)
     goal, state = retargeted.goal, retargeted.state
-    planner = _Planner(goal, state, arm, options)
-    if is_spline(goal):
-        return _spline_plan(planner, retargeted, T_flange_active)
+    planner = GoalPlanner(goal, state, arm, options)
+    plan_goal: PlanGoal = resolve_name(planner.mode.traits.planner)
+    return plan_goal(planner, retargeted, T_flange_active)
+
+
+def plan_moves(planner: GoalPlanner, retargeted: RetargetedGoal, T_flange_active: Pose) -> Plan:
+    """Return the plan of a goal whose points are joined by motions of the robot."""
+    goal, state, options = planner.goal, planner.state, planner.options
+    arm = planner.kinematics.arm
     geometries = planner.geometries()
     samples = planner.joint_path_planner.path_margins.samples()
     clearance_lines = list(
@@ -169,10 +181,13 @@ def _plan(goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> 
         T_flange_active=T_flange_active,
         T_flange_tcp=retargeted.T_flange_tcp,
         T_tcp_controlled=retargeted.T_tcp_controlled,
+        execution=planner.mode,
     )
 
 
-def _spline_plan(planner: _Planner, retargeted: RetargetedGoal, T_flange_active: Pose) -> Plan:
+def plan_spline_goal(
+    planner: GoalPlanner, retargeted: RetargetedGoal, T_flange_active: Pose
+) -> Plan:
     """Return the plan of a SPLINE or SERVO goal."""
     goal, state, options = planner.goal, planner.state, planner.options
     begin = planner.begin()
@@ -199,11 +214,11 @@ def _spline_plan(planner: _Planner, retargeted: RetargetedGoal, T_flange_active:
         T_flange_active=T_flange_active,
         T_flange_tcp=retargeted.T_flange_tcp,
         T_tcp_controlled=retargeted.T_tcp_controlled,
-        execution=resolve_execution_mode(goal),
+        execution=planner.mode,
     )
 
 
-class _Planner:
+class GoalPlanner:
     """The data that the stages of one goal share."""
 
     def __init__(self, goal: Goal, state: RobotState, arm: Arm, options: PlanningOptions) -> None:
@@ -213,8 +228,8 @@ class _Planner:
         #: By point: reasons for a primitive other than the plain one.
         self.reasons: dict[int, list[str]] = {}
         self.targets = [goal.T_base_frame @ point.pose for point in goal.waypoints]
-        self.timed = is_timed(goal)
-        if self.timed and options.dialect.is_coarse and not is_spline(goal):
+        self.timed, self.mode = is_timed(goal), resolve_execution_mode(goal)
+        if self.timed and options.dialect.is_coarse and not self.mode.traits.is_spline:
             self.remarks.append(
                 'all points: sent with speeds instead of times, because robot programs of wire '
                 f'dialect {options.dialect.name} count in milliseconds'

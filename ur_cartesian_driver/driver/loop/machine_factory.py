@@ -4,7 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
+from pkgutil import resolve_name
+from typing import TypeAlias
 
 from ur_cartesian_driver.driver.ipc.channel import LiveSetup, StartMotion
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
@@ -28,11 +31,14 @@ from ur_cartesian_driver.execution.live.online_trajectory import OnlineTrajector
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
-from ur_cartesian_driver.motion.goal import ExecutionMode
+
+#: What the registry of execution modes names as feeder.
+MakeFeeder: TypeAlias = Callable[[StartMotion, DriverConfig], Feeder]
 
 
 def make_machine(request: StartMotion, config: DriverConfig) -> GoalMachine:
     """Return the machine of a motion."""
+    make_feeder: MakeFeeder = resolve_name(request.job.execution.traits.feeder)
     return GoalMachine(
         make_feeder(request, config),
         feedback_period=1.0 / config.feedback_rate,
@@ -40,13 +46,10 @@ def make_machine(request: StartMotion, config: DriverConfig) -> GoalMachine:
     )
 
 
-def make_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
-    """Return what feeds a motion."""
-    job, deviation = request.job, (config.max_plan_deviation, config.max_plan_deviation_angle)
-    if job.execution is ExecutionMode.SERVO:
-        return _servo_feeder(request, config)
-    monitor = GoalMonitor(job, deviation)
-    if not job.keep_open:
+def point_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
+    """Return what sends points, at once or as they are appended."""
+    monitor = _monitor(request, config)
+    if not request.job.keep_open:
         return PointFeeder(monitor)
     return AppendFeeder(
         monitor,
@@ -58,13 +61,9 @@ def make_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
     )
 
 
-def is_slow_to_make(request: StartMotion) -> bool:
-    """Tell whether a machine takes long to make: the kinematics of a calibrated arm do."""
-    live = request.live
-    return live is not None and live.geometry != robot_model(live.ur_type).geometry
-
-
-def _servo_feeder(request: StartMotion, config: DriverConfig) -> ServoFeeder:
+def servo_feeder(request: StartMotion, config: DriverConfig) -> Feeder:
+    """Return what streams set-points: of a spline, to live targets, or none in freedrive."""
+    job = request.job
     settings = ServoSettings(
         target_lag=config.servo_target_lag,
         buffer_depth=config.servo_buffer_depth,
@@ -72,15 +71,23 @@ def _servo_feeder(request: StartMotion, config: DriverConfig) -> ServoFeeder:
         lookahead_time=config.servoj_lookahead_time,
     )
     if request.live is not None:
-        monitor = GoalMonitor(request.job, ANY_DEVIATION)
-        return LiveFeeder(monitor, _live_targets(request.live, request.job), settings)
+        targets = _live_targets(request.live, job)
+        return LiveFeeder(GoalMonitor(job, ANY_DEVIATION), targets, settings)
     if request.freedrive:
-        return FreedriveFeeder(GoalMonitor(request.job, ANY_DEVIATION), settings)
-    assert request.job.spline is not None
-    monitor = GoalMonitor(
-        request.job, (config.max_plan_deviation, config.max_plan_deviation_angle)
-    )
-    return ServoFeeder(monitor, ServoStream(SplineSetpoints(request.job.spline), settings))
+        return FreedriveFeeder(GoalMonitor(job, ANY_DEVIATION), settings)
+    assert job.spline is not None
+    stream = ServoStream(SplineSetpoints(job.spline), settings)
+    return ServoFeeder(_monitor(request, config), stream)
+
+
+def _monitor(request: StartMotion, config: DriverConfig) -> GoalMonitor:
+    return GoalMonitor(request.job, (config.max_plan_deviation, config.max_plan_deviation_angle))
+
+
+def is_slow_to_make(request: StartMotion) -> bool:
+    """Tell whether a machine takes long to make: the kinematics of a calibrated arm do."""
+    live = request.live
+    return live is not None and live.geometry != robot_model(live.ur_type).geometry
 
 
 def _live_targets(live: LiveSetup, job: MotionJob) -> LiveTargets:

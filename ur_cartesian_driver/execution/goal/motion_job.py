@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ur_cartesian_driver.motion.goal import ExecutionMode, Tolerance
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import Tolerance
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
@@ -135,7 +136,7 @@ def job_from_plan(
         ending_records=ending_records,
         has_speed_profile=not (
             goal.keep_open
-            or plan.execution is ExecutionMode.SERVO
+            or plan.execution.traits.streams_setpoints
             or any(
                 isinstance(segment.primitive, OptimoveJ | OptimoveL) for segment in plan.segments
             )
@@ -148,7 +149,7 @@ def job_from_plan(
         end_times=np.repeat(end_times, records),
         request_times=np.repeat(request_times, records),
         spline=JointSpline.of(plan.start, splines)
-        if plan.execution is ExecutionMode.SERVO
+        if plan.execution.traits.streams_setpoints
         else None,
     )
 

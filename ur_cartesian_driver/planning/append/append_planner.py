@@ -24,7 +24,7 @@ import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.errors import GoalRefused
-from ur_cartesian_driver.motion.goal import ExecutionMode, IOCommand, Segment
+from ur_cartesian_driver.motion.goal import IOCommand, Segment
 from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.primitive import Joints, SwitchOutput
@@ -107,7 +107,7 @@ def plan_first_part(plan: Plan, arm: Arm, options: PlanningOptions) -> AppendPla
     appended = AppendedPoints(
         waypoints=goal.waypoints, segments=goal.segments, io_commands=goal.io_commands
     )
-    if plan.execution is ExecutionMode.SPLINE:
+    if plan.execution.traits.is_spline:
         return _spline_append_plan(base, appended, plan, end_state(plan), 0, 0.0, arm, options)
     return _moves_append_plan(base, appended, plan, 0.0, 0)
 
@@ -130,7 +130,7 @@ def plan_append(
     options = replace(
         options, max_approach_distance=0.0, max_points=options.max_points + REPLANNED_POINTS
     )
-    if appendable.goal.execution is ExecutionMode.SPLINE:
+    if appendable.goal.execution.traits.is_spline:
         return _append_spline(appendable, appended, arm, options, from_rest)
     return _append_moves(appendable, appended, arm, options, from_rest)
 
@@ -428,7 +428,7 @@ def _append_spline_from(
         start=start.q,
         T_flange_active=appendable.T_flange_active,
         T_flange_tcp=appendable.T_flange_tcp,
-        execution=ExecutionMode.SPLINE,
+        execution=appendable.goal.execution,
         remarks=found.remarks,
     )
     return _spline_append_plan(
@@ -668,6 +668,6 @@ def _append_remarks(appendable: AppendableGoal, appended: AppendedPoints) -> lis
         segments=appended.segments,
         keep_open=not appended.last,
     )
-    return (point_remarks if goal.execution is ExecutionMode.SPLINE else ignored_remarks)(
+    return (point_remarks if goal.execution.traits.is_spline else ignored_remarks)(
         goal, appendable.points
     )

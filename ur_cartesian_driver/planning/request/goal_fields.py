@@ -4,8 +4,8 @@
 
 from __future__ import annotations
 
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
-    ExecutionMode,
     Goal,
     Segment,
     SegmentType,
@@ -42,7 +42,7 @@ def resolve_execution_mode(goal: Goal) -> ExecutionMode:
 
 def is_spline(goal: Goal) -> bool:
     """Tell whether a timed spline joins the points of a goal."""
-    return resolve_execution_mode(goal) in (ExecutionMode.SPLINE, ExecutionMode.SERVO)
+    return resolve_execution_mode(goal).traits.is_spline
 
 
 def is_timed(goal: Goal) -> bool:

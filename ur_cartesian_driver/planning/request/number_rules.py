@@ -10,7 +10,8 @@ from math import hypot, isfinite, isnan, sqrt
 from typing import TypeVar
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
-from ur_cartesian_driver.motion.goal import ArcMode, ExecutionMode, Goal, SegmentType, Waypoint
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
+from ur_cartesian_driver.motion.goal import ArcMode, Goal, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import Quaternion
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.default_tolerances import named_tolerances

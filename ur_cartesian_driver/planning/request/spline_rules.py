@@ -7,7 +7,7 @@ from __future__ import annotations
 from math import isnan
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
-from ur_cartesian_driver.motion.goal import ExecutionMode, Goal, Segment, SegmentType
+from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     DEFAULT_SEGMENT,
@@ -83,7 +83,8 @@ def _check_support(goal: Goal, name: str, options: PlanningOptions) -> None:
             'unknown',
             remedy,
         )
-    if goal.execution == ExecutionMode.SERVO:
+    traits = resolve_execution_mode(goal).traits
+    if traits.streams_setpoints:
         if not options.dialect.supports_servo:
             raise NotAvailable(
                 'execution',
@@ -91,7 +92,7 @@ def _check_support(goal: Goal, name: str, options: PlanningOptions) -> None:
                 f'{options.dialect.name} do not support',
                 remedy,
             )
-        if goal.io_commands:
+        if goal.io_commands and not traits.switches_outputs:
             raise NotAvailable(
                 'io_commands',
                 f'is not empty, but {name} switches no outputs',

@@ -24,7 +24,6 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
-    ExecutionMode,
     Goal,
     Posture,
     Segment,
@@ -45,6 +44,7 @@ from ur_cartesian_driver.planning.request.goal_fields import (
     is_straight,
     is_timed,
     point_field,
+    resolve_execution_mode,
     segment_field,
     segment_of,
 )
@@ -131,10 +131,11 @@ def _supported(goal: Goal, options: PlanningOptions) -> None:
             'number of points at the start',
             'send all points at once, or use a robot program of wire dialect 2.14',
         )
-    if goal.keep_open and goal.execution == ExecutionMode.SERVO:
+    mode = resolve_execution_mode(goal)
+    if goal.keep_open and not mode.traits.can_keep_open:
         raise NotAvailable(
             'keep_open',
-            'is set, but a SERVO goal needs all its points at the start',
+            f'is set, but a {mode.name} goal needs all its points at the start',
             'set execution to SPLINE or PRIMITIVES',
         )
     check_outputs(goal, options)

@@ -15,9 +15,9 @@ from enum import IntEnum
 from typing import TypeVar
 
 from ur_cartesian_driver.motion.errors import InvalidGoal
+from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import (
     ArcMode,
-    ExecutionMode,
     Goal,
     IOCommand,
     OutputKind,
