@@ -101,7 +101,7 @@ def test_a_robot_loop_that_does_not_answer_is_not_asked_again(goal, sent):
     """It may have the points or not, and where others would have to begin depends on that."""
     appender = goal(timeout=0.0)
     for waypoints in ((point(2),), (point(2), point(3))):
-        with pytest.raises(RobotNotReady, match='has not answered: nothing can be appended'):
+        with pytest.raises(RobotNotReady, match='did not answer: nothing can be appended'):
             appender.append(AppendedPoints(waypoints=waypoints))
     assert number(sent) == 1
     assert sent.empty()

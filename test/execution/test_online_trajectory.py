@@ -219,7 +219,7 @@ STOP_SIGNALS = {
         replace(LIMITS, workspace=LiveWorkspace(planes=(TABLE,), tool_radius=0.05)),
         HOME,
         lambda flight: flight.beside(z=-0.5),
-        'workspace plane "table", 0.0100 m is asked for',
+        'workspace plane "table", its margin is 0.0100 m',
     ),
     'itself': (
         replace(ANYWHERE, workspace=LiveWorkspace(min_clearance=0.02, tool_radius=0.05)),

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A goal that is continued while it runs, from the side of its owner.
+Append points to an open goal while it runs (keep_open).
 
-Points are planned here, in the thread that appends them, and offered to the robot loop. That takes
-all of them or none: it alone knows whether the motion has been closed in the meantime. If it has,
-they are planned again, from rest.
+Points are planned here, in the thread that appends them, and offered to the robot loop. It takes
+all of them or none, because it alone knows whether the ending was sent meanwhile. If it was, they
+are planned again, from rest.
 """
 
 from __future__ import annotations
@@ -29,19 +29,19 @@ from ur_cartesian_driver.planning.append.appendable_goal import AppendableGoal, 
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect
 
-#: How long the robot loop may take to an answer [s]; it stops the arm when it hangs for so long.
+#: How long the robot loop may take to answer [s]; the arm is stopped when it hangs for so long.
 ANSWER_TIMEOUT = 5.0
-#: So many times as many points as one message may hold can be ahead of the arm.
+#: How many points may be ahead of the arm, as a multiple of ``max_points``.
 MESSAGES_AHEAD = 2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AppendResult:
-    """Points that a goal has taken."""
+    """The result of an append."""
 
-    #: How many it has now.
+    #: How many points the goal has now.
     points: int
-    #: What becomes of them.
+    #: A sentence for people.
     text: str
 
 
@@ -49,7 +49,7 @@ Offers: TypeAlias = Generator[AppendToMotion, AnswerAppend, AppendResult]
 
 
 def encode_plan(part: AppendPlan, dialect: Dialect) -> tuple[bytes, MotionJob]:
-    """Return the records of a part, and what the machine needs of it."""
+    """Return the records of an append plan, encoded, and its job."""
     plan = part.plan
     job = job_from_plan(
         plan, dialect, start_time=part.start_time, ending_records=part.ending_records
@@ -58,7 +58,7 @@ def encode_plan(part: AppendPlan, dialect: Dialect) -> tuple[bytes, MotionJob]:
 
 
 class Appender:
-    """What the driver knows of a goal with an open end; thread-safe."""
+    """Appends points to one open goal; thread-safe."""
 
     def __init__(
         self,
@@ -74,7 +74,7 @@ class Appender:
         """
         Prepare.
 
-        :param planning_inputs: for planning, as they are then.
+        :param planning_inputs: returns arm and options as they are now.
         :param progress: the newest report of the motion.
         :param timeout: how long to wait for an answer [s].
         """
@@ -88,18 +88,18 @@ class Appender:
         # Guards what follows.
         self._lock = threading.Lock()
         self._pending_answers: dict[int, Future[AnswerAppend]] = {}
-        #: Why nothing can be appended any more; empty = it can.
+        #: Why nothing can be appended any more; empty = points can be appended.
         self._ended = ''
         self._numbers = itertools.count(1)
 
     @property
     def points(self) -> int:
-        """How many the goal has."""
+        """How many points the goal has."""
         return self._goal.points
 
     def append(self, new_points: AppendedPoints) -> AppendResult:
         """
-        Plan points and have them taken, all or none; it takes as long as the planning.
+        Plan points and have all or none of them taken; takes as long as planning does.
 
         :raises GoalRefused: they are not taken, and the goal is as it was.
         """
@@ -115,9 +115,9 @@ class Appender:
 
     def offers(self, new_points: AppendedPoints) -> Offers:
         """
-        Return what is offered to the robot loop, one by one, for an addition.
+        Yield the offers to the robot loop, one by one.
 
-        Each offer is to be sent, and its answer to be sent in here.
+        Send each offer, and send its answer into the generator.
 
         :raises GoalRefused: as of :meth:`append`.
         """
@@ -159,7 +159,7 @@ class Appender:
         raise RobotNotReady(answer.refusal)
 
     def _is_at_rest(self) -> bool:
-        """Tell whether the arm surely rests behind all points that the goal has."""
+        """Tell whether the arm surely rests behind all points of the goal."""
         progress = self._progress()
         return (
             progress is not None
@@ -197,14 +197,14 @@ class Appender:
         try:
             return future.result(self._timeout)
         except TimeoutError:
-            # It may have taken them all the same; so nobody knows where more would begin.
-            self._ended = 'The robot loop has not answered: nothing can be appended any more.'
+            # It may have taken them all the same, so it is unknown where more would begin.
+            self._ended = 'The robot loop did not answer: nothing can be appended any more.'
             return AnswerAppend(number=number, refusal=self._ended)
         finally:
             with self._lock:
                 self._pending_answers.pop(number, None)
 
-    # ---- told by the driver -------------------------------------------------------------------
+    # ---- called by the driver -----------------------------------------------------------------
 
     def answer(self, answer: AnswerAppend) -> None:
         """Take the answer of the robot loop."""
@@ -214,7 +214,7 @@ class Appender:
             future.set_result(answer)
 
     def end(self) -> None:
-        """Take note that the motion has ended; who waits for an answer gets that one."""
+        """End with the motion; pending appends are refused."""
         with self._lock:
             self._ended = 'The goal has ended.'
             pending, self._pending_answers = self._pending_answers, {}
@@ -225,9 +225,9 @@ class Appender:
 
 def _from_rest(timed: bool) -> str:
     """
-    Return what is said where the motion had been closed.
+    Return the sentence about points that continue from rest.
 
-    Not how much later: the arm may have waited, and may still wait.
+    It does not say how much later: the arm may have waited, and may still wait.
     """
     clause = ', later than their times say' if timed else ''
     return f' The motion had come to rest before them, and goes on from there{clause}.'

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Sessions of live targets, from the side of their owner; and the arm in the hands of a person.
+Live sessions and freedrive, as methods of a driver.
 
 Both are motions like that of a goal: there is one at a time, it is cancelled in the same way, and
-has one outcome. Only where it goes is told while it runs.
+it has one outcome. Only where it goes is decided while it runs.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from ur_cartesian_driver.motion.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.workspace import parse_planes
 
@@ -38,7 +39,7 @@ UNIT_TOLERANCE = 1e-3
 
 
 class LiveSession:
-    """A session that runs."""
+    """A live session that runs."""
 
     def __init__(self, motion: MotionHandle, send: Callable[[int, Pose, float], None]) -> None:
         """Be made by :meth:`~.api.Driver.start_live_session`."""
@@ -48,7 +49,7 @@ class LiveSession:
 
     def set_target(self, T_base_tcp: Pose, *, age: float = 0.0) -> None:
         """
-        Go to another target from now on; in a session that has ended it means nothing.
+        Go to another target from now on; ignored by a session that has ended.
 
         :param T_base_tcp: where the active TCP is to be, in the robot's base.
         :param age: how long ago that was true [s].
@@ -58,7 +59,7 @@ class LiveSession:
 
 
 class InteractiveMotions(ABC):
-    """Motions that are led while they run, as methods of a driver."""
+    """Motions that are led while they run."""
 
     config: DriverConfig
     options: PlanningOptions
@@ -84,7 +85,7 @@ class InteractiveMotions(ABC):
         live: LiveSetup | None = None,
         freedrive: bool = False,
     ) -> MotionHandle:
-        """Begin a motion that goes nowhere by itself."""
+        """Start a motion without a path of its own."""
 
     @abstractmethod
     def _send_target(self, number: int, T_base_tcp: Pose, age: float) -> None:
@@ -92,7 +93,7 @@ class InteractiveMotions(ABC):
 
     def start_live_session(self, T_base_tcp: Pose, *, age: float = 0.0) -> LiveSession:
         """
-        Go to a target, and to others that are told while the arm moves; return at once.
+        Go to a target, and to others that are sent while the arm moves; return at once.
 
         The tool goes straight, with bounded speed and acceleration (``live_target_*`` of the
         options), to the newest target that is not too old.
@@ -125,18 +126,18 @@ class InteractiveMotions(ABC):
 
     def start_freedrive(self, on_active: Callable[[], None] = lambda: None) -> MotionHandle:
         """
-        Let a person guide the arm by hand, until the motion that is returned is cancelled.
+        Let a person guide the arm by hand, until the returned motion is cancelled.
 
-        Only where ``allow_freedrive`` of the configuration was set when the robot program began.
+        Needs ``allow_freedrive`` in the configuration with which the robot program was started.
 
-        :param on_active: called, now and then, from when the arm can be guided.
-        :raises RobotNotReady: it is not allowed, or something else has the arm.
+        :param on_active: called from when the arm can be guided, again and again.
+        :raises RobotNotReady: it is not allowed, or another motion runs.
         """
-        state = self._state_for('let the arm be guided')
+        state = self._state_for('enter freedrive')
         if not self.config.allow_freedrive:
             raise RobotNotReady(
-                'Nobody may guide the arm: allow_freedrive is false; set it to true, '
-                'and start the driver again.'
+                'Freedrive is not allowed: allow_freedrive is false; set it to true, '
+                'and restart the driver.'
             )
         self._freedrive = self._start_stationary(
             stationary_plan(state), lambda _: on_active(), freedrive=True
@@ -145,14 +146,14 @@ class InteractiveMotions(ABC):
 
     @property
     def is_freedrive_active(self) -> bool:
-        """Tell whether a person guides the arm."""
+        """Tell whether freedrive is active."""
         return self._freedrive is not None and not self._freedrive.done()
 
     def _state_for(self, what: str) -> RobotState:
         """
         Return the newest state.
 
-        :raises RobotNotReady: there is none, or the robot program cannot do this.
+        :raises RobotNotReady: there is none, or the robot program cannot do what is asked.
         """
         if not self.config.dialect.supports_servo:
             raise RobotNotReady(
@@ -167,7 +168,7 @@ class InteractiveMotions(ABC):
 
 def check_pose(pose: Pose) -> None:
     """
-    Refuse what is no pose.
+    Refuse a malformed pose.
 
     :raises InvalidGoal: a number is not finite, or the quaternion is not of length 1.
     """
@@ -185,7 +186,7 @@ def check_pose(pose: Pose) -> None:
 
 def check_target(T_base_tcp: Pose, state: RobotState, options: PlanningOptions) -> None:
     """
-    Refuse a target that cannot be meant.
+    Refuse a target that cannot be intended.
 
     :raises InvalidGoal: it is malformed, or farther than ``max_approach_distance`` from the tool.
     """
@@ -204,22 +205,21 @@ def check_target(T_base_tcp: Pose, state: RobotState, options: PlanningOptions) 
 
 def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
     """
-    Return how targets are followed by the parameters.
+    Return the settings of a live session.
 
-    :param start: where the arm stands [rad].
+    :param start: present joint positions [rad].
     """
     max_speed = options.live_target_linear_velocity
     if options.max_tool_speed > 0.0:
         max_speed = min(max_speed, options.max_tool_speed)
-    a, b, c, d, e, f = (
-        min(speed, options.live_target_joint_velocity) for speed in arm.model.max_joint_speed
-    )
     limits = LiveLimits(
         linear_velocity=max_speed,
         linear_acceleration=options.live_target_linear_acceleration,
         angular_velocity=options.live_target_angular_velocity,
         angular_acceleration=options.live_target_angular_acceleration,
-        joint_velocity=(a, b, c, d, e, f),
+        joint_velocity=vector6(
+            min(speed, options.live_target_joint_velocity) for speed in arm.model.max_joint_speed
+        ),
         singularity_margins=(
             options.singularity_margin_wrist,
             options.singularity_margin_elbow,
@@ -232,7 +232,7 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
                 )
                 for plane in parse_planes(options.workspace_planes)
             ),
-            # Capsules are thicker than the arm: they stop it only where they refuse goals.
+            # Capsules are thicker than the arm: they stop it only if they also refuse goals.
             min_clearance=options.min_clearance if options.self_collision == 'refuse' else None,
             tool_radius=options.tool_radius,
         ),
@@ -250,7 +250,7 @@ def live_setup(arm: Arm, start: Joints, options: PlanningOptions) -> LiveSetup:
 
 
 def stationary_plan(state: RobotState) -> Plan:
-    """Return the plan of a motion that goes nowhere by itself."""
+    """Return the plan of a motion without a path of its own."""
     here = state.target_tcp_pose
     return Plan(
         goal=Goal(waypoints=(Waypoint(pose=here),), execution=ExecutionMode.SERVO),
@@ -265,7 +265,7 @@ def stationary_plan(state: RobotState) -> Plan:
 
 
 def stationary_job(plan: Plan) -> MotionJob:
-    """Return the order of such a plan: there is nothing on the wire."""
+    """Return the job of such a plan: it has no records."""
     return MotionJob(
         points=1,
         reference=plan.reference,

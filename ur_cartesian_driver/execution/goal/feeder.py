@@ -43,7 +43,7 @@ class Feeder(ABC):
         """Return what to send before the motion may begin."""
         return []
 
-    def why_not_ready(self, packet: RobotState | None) -> str:
+    def explain_not_ready(self, packet: RobotState | None) -> str:
         """
         Return why the motion cannot begin yet, as a clause; empty if it can.
 

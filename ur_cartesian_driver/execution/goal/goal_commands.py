@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a machine wants done; the owner of the sockets does it."""
+"""Commands of a goal machine; the owner of the sockets carries them out."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class SetTemporaryTcp:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RestoreTcp:
-    """Put back the TCP that the robot had before :class:`SetTemporaryTcp`."""
+    """Restore the TCP that the robot had before :class:`SetTemporaryTcp`."""
 
     T_flange_tcp: Pose
 
@@ -52,30 +52,30 @@ class StopProgram:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportProgress:
-    """Tell where the motion is."""
+    """Report the progress of the motion."""
 
     progress: Progress
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AnswerAppend:
-    """Tell whether points are taken; either they all are, or the goal is as it was."""
+    """Answer an append: all points are taken, or none."""
 
     number: int
-    #: Why not; empty = they are.
+    #: Why they are not taken; empty = they are.
     refusal: str = ''
-    #: Plan them from where the arm is going to rest, and they are taken: the goal has been closed.
+    #: They would be taken if they were planned from rest: the ending has been sent.
     replan_from_rest: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OpenServo:
-    """Take the RTDE inputs of the buffered servo, and report what the robot says of it."""
+    """Take the RTDE inputs of the buffered servo, and report the robot's outputs for it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EnterServo:
-    """Have the robot program listen to these inputs."""
+    """Have the robot program read these inputs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,19 +87,19 @@ class WriteServo:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeaveServo:
-    """Have the robot program brake and listen no more, and give the inputs back."""
+    """Have the robot program brake and stop reading, and release the inputs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportServo:
-    """Tell how the streaming of set-points is going."""
+    """Report the state of the servo."""
 
     report: ServoReport
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogWarning:
-    """Write a sentence into the log: something a person may want to look at."""
+    """Write a warning into the log."""
 
     text: str
 

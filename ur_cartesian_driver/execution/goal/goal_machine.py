@@ -111,7 +111,7 @@ class GoalMachine:
         if T_flange_tcp is not None:
             self.temporary_tcp = TemporaryTcp(self.job.T_flange_active, T_flange_tcp)
             commands.append(SetTemporaryTcp(T_flange_tcp=T_flange_tcp))
-        elif not self.feeder.why_not_ready(packet):
+        elif not self.feeder.explain_not_ready(packet):
             commands += self._apply(GoalSignal.ARMED, '', -inf)  # MOVING has no deadline
         return commands
 
@@ -214,7 +214,7 @@ class GoalMachine:
         tcp = self.temporary_tcp
         return (
             tcp is None or (tcp.is_active(packet) and self._monitor.start_offset(packet) is None)
-        ) and not self.feeder.why_not_ready(packet)
+        ) and not self.feeder.explain_not_ready(packet)
 
     def _is_tcp_restored(self) -> bool:
         return self.temporary_tcp is None or self.temporary_tcp.is_restored

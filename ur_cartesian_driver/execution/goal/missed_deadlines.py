@@ -38,7 +38,7 @@ def missed_deadline(state: GoalState, feeder: Feeder, tcp: TemporaryTcp | None) 
 
 def _why_not_armed(feeder: Feeder, tcp: TemporaryTcp | None) -> str:
     packet = feeder.monitor.latest
-    if clause := feeder.why_not_ready(packet):
+    if clause := feeder.explain_not_ready(packet):
         return clause
     if packet is not None and tcp is not None and tcp.is_active(packet):
         return feeder.monitor.start_offset(packet) or ''

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What the packets of the robot show of one goal: how far it is, and whether it is what was planned.
+Compare each packet of the robot with the plan of a goal: progress, and faults.
 
-It only looks. What follows from a deviation in the present state, the machine decides
-(:mod:`~.goal_machine`).
+The monitor finds faults and decides nothing: what follows from one in the present state is in the
+table of :mod:`~.states`.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from ur_cartesian_driver.motion.pose import IDENTITY, Pose, pose_from_row
 from ur_cartesian_driver.motion.rigid_body import shift_reference_point
 from ur_cartesian_driver.motion.state import RobotState, RuntimeState
 
-#: How far the arm may have gone from where the plan begins until it is armed [m], [rad].
+#: How far the arm may have moved away from the start of the plan until it is armed [m], [rad].
 START_POSITION_TOLERANCE, START_ANGLE_TOLERANCE = 0.001, 0.01
-#: How long the target may stand still in the middle of a goal that nothing holds [s].
+#: How long the target may stand still in the middle of a goal while nothing holds it [s].
 STALL_TIMEOUT = 2.0
-#: How much longer than planned it may stand where the plan itself waits, if that is longer [s].
+#: How much longer than planned it may stand where the plan itself waits [s].
 STALL_MARGIN = 1.0
-#: Rows of a path that differ by less are one place, at which the plan waits [m], [rad].
+#: Rows of a path that differ by less are the same pose, at which the plan waits [m], [rad].
 SAME_POSE = 1e-9
 #: How far the controller's own target may be from the plan [m], [rad].
 MAX_PLAN_DEVIATION = (0.002, 0.02)
 
 
 class GoalMonitor:
-    """The newest packet, the place on the path, and what is held against them."""
+    """The newest packet, the position on the path, and the checks of both."""
 
     def __init__(
         self, job: MotionJob, max_plan_deviation: tuple[float, float] = MAX_PLAN_DEVIATION
@@ -70,11 +70,11 @@ class GoalMonitor:
         self._motions_before = 0
         #: How long the target has stood still while nothing held it [s].
         self._stalled_time = 0.0
-        #: The same of the controller's own time, and how much of that the plan itself may stand.
+        #: The same in scaled time, and how much of that is allowed.
         self._stalled_scaled, self._stall_timeout = 0.0, _stall_timeout(job)
         #: The newest packet; None before the first.
         self.latest: RobotState | None = None
-        #: Time since the start in which the controller's own clock ran [s].
+        #: Scaled time: time since the start, as the controller's clock ran [s].
         self.scaled_time = 0.0
 
     # ---- what goes on -------------------------------------------------------------------------
@@ -117,11 +117,11 @@ class GoalMonitor:
             self._stalled_time = self._stalled_scaled = 0.0
 
     def finish(self, time: float = inf) -> None:
-        """Take note that the robot program has reported the end, or the rest at a time [s]."""
+        """Move to the end of the path, or to rest at a time [s]: the robot program reports it."""
         self._tracker.finish(time)
 
     def append(self, job: MotionJob, records_before: int) -> None:
-        """Take note of what comes behind so many records."""
+        """Take a job that follows after so many records."""
         self._tracker.append(job.reference, self.records.end_time(records_before))
         self.records.append(job, records_before)
         self.job = job
@@ -130,7 +130,7 @@ class GoalMonitor:
             self.records.forget(self.records_begun() - 2)
 
     def _track(self, before: RobotState | None, state: RobotState, passed: float) -> None:
-        """Find the place on the path."""
+        """Find the position on the path."""
         begun, fastest = self._motions_begun(), tracker_speed(state.target_tcp_twist)
         self._has_begun = self._has_begun or begun > self._motions_before or fastest > 0.0
         if before is not None:  # it may have braked since
@@ -144,19 +144,19 @@ class GoalMonitor:
     # ---- how far it is ------------------------------------------------------------------------
 
     def time(self) -> float:
-        """Return the planned time of the place where the arm is [s]."""
+        """Return the planned time of the arm's position on the path [s]."""
         return self._tracker.time()
 
     def waypoint(self) -> int:
-        """Return the point that the arm is on its way to."""
+        """Return the index of the next point of the goal."""
         return self._tracker.waypoint()
 
     def buffered(self, sent: int) -> float:
-        """Return how much planned time of what was sent the arm has before it [s]."""
+        """Return the planned time of the records that were sent and lie ahead of the arm [s]."""
         return max(0.0, self.records.end_time(sent) - self._tracker.time())
 
     def records_begun(self) -> int:
-        """Return how many records of this goal the robot has begun at least."""
+        """Return how many records of this goal the robot has begun, at least."""
         return max(
             self.records.begun_records(self._motions_begun()),
             self.records.count_before_waypoint(self.waypoint()),
@@ -216,17 +216,17 @@ class GoalMonitor:
         )
 
     def _desired(self, state: RobotState) -> Pose:
-        """Return where the tool should be on its way: around its progress."""
+        """Return where the tool should be, near its progress."""
         return self._tracker.desired(state.actual_tcp_pose, state.target_tcp_twist)
 
     # ---- whether it is what was planned -------------------------------------------------------
 
     def start_offset(self, state: RobotState) -> str | None:
-        """Return a clause that says how far the arm is from where the plan begins, or None."""
+        """Return how far the arm is from the start of the plan, as a clause, or None."""
         return self._offset_clause(self._start, state.actual_tcp_pose)
 
     def rest_offset(self, state: RobotState) -> str | None:
-        """Return a clause that says how far the arm is from where it waits, or None."""
+        """Return how far the target is from where the arm waits, as a clause, or None."""
         return self._offset_clause(self._tracker.pose(), state.target_tcp_pose)
 
     def _offset_clause(self, start: Pose, pose: Pose) -> str | None:
@@ -234,7 +234,7 @@ class GoalMonitor:
         if distance <= START_POSITION_TOLERANCE and angle <= START_ANGLE_TOLERANCE:
             return None
         return (
-            f'the arm is {distance:.4f} m and {angle:.4f} rad away from where the plan begins: '
+            f'the arm is {distance:.4f} m and {angle:.4f} rad away from the start of the plan: '
             'it moved meanwhile'
         )
 
@@ -242,9 +242,9 @@ class GoalMonitor:
         self, state: RobotState, *, may_stand_still: bool = False
     ) -> tuple[GoalSignal, str] | None:
         """
-        Return what is wrong on the way, with a clause for the outcome's text, or None.
+        Return the fault of a motion, with a clause for the outcome's text, or None.
 
-        :param may_stand_still: an arm that stands waits for nothing that was lost.
+        :param may_stand_still: an arm that stands is not stalled.
         """
         return (
             self._plan_deviation(state)
@@ -254,7 +254,7 @@ class GoalMonitor:
         )
 
     def missed_end(self, state: RobotState) -> str:
-        """Return that the controller's target is not at the end, as a clause, or nothing."""
+        """Return that the controller's target is not at the end, as a clause; empty = it is."""
         off = [
             value
             for value, limit in zip(
@@ -269,17 +269,17 @@ class GoalMonitor:
             if not off
             else (
                 f'the robot program reports the end {off[0]:.4f} m or rad away from the last '
-                'point: it left out motions that it does not know; set wire_dialect to the '
+                'point: it skipped motions that it does not know; set wire_dialect to the '
                 'version of that program'
             )
         )
 
     def goal_violation(self, state: RobotState) -> str | None:
-        """Return a clause that says how far the arm is outside the goal tolerance, or None."""
+        """Return how far the arm is outside the goal tolerance, as a clause, or None."""
         return self._violation(self._goal_check, self._tracker.pose(), state)
 
     def _plan_deviation(self, state: RobotState) -> tuple[GoalSignal, str] | None:
-        """Return that the controller does something else than the plan, or None."""
+        """Return that the controller's target left the plan, or None."""
         if not self._has_begun or self._tracker.is_within(*self._clearly_allowed):
             return None
         for name, unit, value, limit in zip(
@@ -292,13 +292,13 @@ class GoalMonitor:
             if 0.0 < limit < value:
                 return GoalSignal.DEVIATION, (
                     f'the controller itself left the plan by {value:.6f} {unit}, {name} is '
-                    f'{limit:.6f} {unit}: the arm is on another branch, or something else than '
+                    f'{limit:.6f} {unit}: the arm is on another branch, or something other than '
                     'this goal moves it'
                 )
         return None
 
     def _speed_violation(self, state: RobotState) -> tuple[GoalSignal, str] | None:
-        """Return that a program which tells no progress goes much faster or slower, or None."""
+        """Return that a program without progress reports is much too fast or slow, or None."""
         if self._speed_check is None or not self._awaits_count:
             return None
         clause = self._speed_check.violation(
@@ -307,7 +307,7 @@ class GoalMonitor:
         return None if clause is None else (GoalSignal.DEVIATION, clause)
 
     def _stall_fault(self) -> tuple[GoalSignal, str] | None:
-        """Return that the arm stands for no reason, or None."""
+        """Return that the arm stands although nothing holds it, or None."""
         if self._stalled_time < STALL_TIMEOUT or self._stalled_scaled < self._stall_timeout:
             return None
         return GoalSignal.STALLED, (
@@ -325,7 +325,7 @@ class GoalMonitor:
         return GoalSignal.VIOLATION, f'on the way to point {self._tracker.waypoint()} {clause}'
 
     def _violation(self, check: ToleranceCheck, desired: Pose, state: RobotState) -> str | None:
-        """Return what a check says of the controlled frame; ``desired`` is of the TCP."""
+        """Check the controlled frame; ``desired`` is of the TCP."""
         if self._checks_tcp:
             return check.violation(desired, state)
         T_tcp_controlled = self.job.T_tcp_controlled

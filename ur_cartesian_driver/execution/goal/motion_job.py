@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the machine is told of a goal: less than the plan, as it crosses to another process."""
+"""What the robot process needs of a plan: small, because it is sent to another process."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, NEWEST_D
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MotionJob:
-    """What of a plan the machine needs; small to send to another process."""
+    """What a goal machine needs of a plan."""
 
     #: How many records there are on the wire: motions and outputs.
     points: int
@@ -33,34 +33,35 @@ class MotionJob:
     #: How long after the end of the motion the last output is switched [s]; ``due`` contains it.
     output_delay: float = 0.0
     T_base_frame: Pose = IDENTITY
-    #: The TCP that the plan found, the one that it needs (None = that one), and where the
-    #: controlled frame is behind it.
+    #: The TCP that the robot had when it was planned, the one that the plan needs (None = the
+    #: same), and the controlled frame relative to that.
     T_flange_active: Pose = IDENTITY
     T_flange_tcp: Pose | None = None
     T_tcp_controlled: Pose = IDENTITY
     path_tolerance: Tolerance = field(default_factory=Tolerance)
     goal_tolerance: Tolerance = field(default_factory=Tolerance)
-    #: 0 = the default, negative = without end [s].
+    #: 0 = the default, negative = no limit [s].
     goal_time_tolerance: float = 0.0
-    #: Whether the robot program tells how many points it has begun; if not, nobody looks there.
+    #: Whether the robot program reports how many points it has begun.
     reports_points_begun: bool = True
-    #: Whether the plan knows its speeds: not those of OPTIMIZED moves.
+    #: Whether speeds are checked against the plan: not for OPTIMIZED moves, whose speeds the robot
+    #: chooses, nor for open goals and set-points.
     has_speed_profile: bool = True
     execution: ExecutionMode = ExecutionMode.PRIMITIVES
-    #: (records,) the waypoint of the goal that each record leads to, or belongs to; empty = each
-    #: record is the motion to the waypoint of its number.
+    #: (records,) index of the waypoint that each record leads to or belongs to; empty = record i
+    #: is the motion to waypoint i.
     waypoint: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, dtype=np.int32))
-    #: (records,) which of them are motions: these the robot program counts; empty = all.
+    #: (records,) which of them are motions, which the robot program counts; empty = all.
     is_motion: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
     #: (records,) when each is planned to end [s]; outputs: as the motion that they belong to.
-    #: Empty = where the reference arrives at their points.
+    #: Empty = when the reference path arrives at their waypoints.
     end_times: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    #: (records,) when the robot program asks for the record behind it [s]: where it ends, or
-    #: where its blend begins. Empty = at ``ends``.
+    #: (records,) when the robot program asks for the next record [s]: when this one ends, or when
+    #: its blend begins. Empty = at ``end_times``.
     request_times: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
-    #: Whether more may come behind it (keep_open).
+    #: Whether points may be appended (keep_open).
     keep_open: bool = False
-    #: Of an open one: how many records at its end take the arm to rest where nothing else comes.
+    #: How many records at the end of an open goal bring the arm to rest if nothing is appended.
     ending_records: int = 0
     #: SERVO: the joints over time.
     spline: JointSpline | None = None
@@ -81,14 +82,14 @@ class MotionJob:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AppendJob:
-    """What comes behind the records that a goal with an open end has."""
+    """Records that are appended to an open goal."""
 
-    #: By which its answer is known.
+    #: Identifies the answer.
     number: int
-    #: How many records stay in front of it; the ending that was planned there is given up.
+    #: How many records stay in front of it; the ending that was planned there is dropped.
     records_before: int
-    #: Times count from the start of the goal, rows of the reference from behind those that stay.
-    #: None = nothing comes any more, and the goal ends where it is known to end.
+    #: Times count from the start of the goal; the reference path follows the records that stay.
+    #: None = the client closes the goal, which ends with the points that it has.
     job: MotionJob | None
 
 
@@ -100,9 +101,9 @@ def job_from_plan(
     ending_records: int = 0,
 ) -> MotionJob:
     """
-    Return what of a plan the machine needs, for a robot program of this dialect.
+    Return the job of a plan, for a robot program of a dialect.
 
-    :param start_time: when its first segment begins [s]; not 0 for what continues a goal.
+    :param start_time: when its first segment begins [s]; not 0 for appended points.
     :param ending_records: see :class:`MotionJob`.
     """
     goal = plan.goal
@@ -121,7 +122,7 @@ def job_from_plan(
         points=len(waypoints),
         reference=plan.reference,
         duration=duration,
-        # What was slowed as the owner wants it (on_too_fast) is not late by that.
+        # A goal that was slowed as the client allows (on_too_fast) is not late because of that.
         due=max(times, duration) + output_delay if times > 0.0 else None,
         output_delay=output_delay,
         T_base_frame=goal.T_base_frame,
@@ -160,9 +161,9 @@ def _last_output_delay(plan: Plan) -> float:
 
 
 def _blend_lead_time(segment: PlannedSegment) -> float:
-    """Return how long before the end of a motion its blend begins, rather too long [s]."""
+    """Return an upper bound of the time from the start of a blend to the end of its motion [s]."""
     radius = 0.0 if isinstance(segment.primitive, Spline) else segment.primitive.blend_radius
     if radius <= 0.0:
         return 0.0
-    # The tool is slower before than in the blend, but for the one that it comes out of.
+    # The tool is slower in the segment than in its blend, except in the blend that it comes from.
     return segment.duration * min(1.0, radius / max(segment.length, radius))

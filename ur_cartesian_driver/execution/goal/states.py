@@ -1,50 +1,50 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The states of a goal on its way through the robot program, and what leads from one to another.
+The states of a goal while the robot program runs it, and the table of transitions.
 
-Events are first turned into signals (:class:`GoalSignal`); :data:`TRANSITIONS` says what a signal
-means in the present state: the next state and how the goal ends, if it does.
+Events are first turned into signals (:class:`GoalSignal`). :data:`TRANSITIONS` gives, for each
+state and signal, the next state and, where it is decided there, the code of the outcome.
 
 * **ARMING**: every goal begins here. Where it moves another frame than the robot's TCP, the
   message that sets the TCP there is on the wire: nothing moves before the robot reports it, and
   itself where the plan begins. Set-points need the robot's inputs and the answer of its program.
   Where nothing has to be prepared, ARMED follows at once.
-* **MOVING**: the robot program runs points. The result SUCCESS leads to SETTLING; whatever stops
-  the arm by itself (safety, connection) ends the goal at once, because nothing that we could send
-  would be read; a reason of ours to stop (cancel, preemption, tolerance)
-  leads to CANCELLING.
-* **RUNNING_OUT**: of a goal that can be continued (keep_open) no more points came in time. What
-  takes the arm to rest at the last known point, or behind it, is on the wire, and the number of
-  its records. Points that come now wait for the SUCCESS of the program: they go on from rest.
+* **MOVING**: the robot program runs points. The result SUCCESS leads to SETTLING. Whatever stops
+  the arm by itself (safety, connection) ends the goal at once, because the robot program would
+  read nothing that we send; our own reasons to stop (cancel, preemption, tolerance) lead to
+  CANCELLING.
+* **RUNNING_OUT**: no more points were appended in time to an open goal (keep_open). The ending,
+  which brings the arm to rest at the last known point or behind it, is on the wire, with the
+  number of records. Points that come now wait for the SUCCESS of the program: they continue from
+  rest.
 * **AWAITING_POINTS**: the arm is at rest there, and the program has no trajectory. APPENDED starts
-  the next one; NO_MORE_POINTS, the word that no points will come, leads to SETTLING. Without
-  either the goal ends after ``keep_open_timeout`` (TIMEOUT), as CANCELLED: it was given up, and
+  the next one; NO_MORE_POINTS, sent when the client closes the goal, leads to SETTLING. Without
+  either the goal ends after ``keep_open_timeout`` (TIMEOUT), as CANCELLED: it was abandoned, and
   nothing failed.
-* **SETTLING**: the program says that the last point is reached. The arm has to be inside the goal
-  tolerance and at rest, within the goal's time tolerance. Where the controller's own target is
+* **SETTLING**: the program has reported the last point as reached. The arm has to be at rest
+  inside the goal tolerance, within the goal's time tolerance. Where the controller's target is
   elsewhere, the program left something out (DEVIATION).
 * **CANCELLING**: CANCEL is on the wire. The program brakes, discards the points that it has not
   run and answers CANCELED. A SUCCESS in this state means that the last point was reached before
   the program read the CANCEL; it is no answer, CANCELED still follows.
 * **COMING_TO_REST**: the program has answered; the arm is coming to rest.
-* **RESTORING**: how the goal ends is decided, and nothing moves; the TCP of before is on the wire.
-  The outcome waits until the robot reports it, so the next goal finds it. Goals that changed no
+* **RESTORING**: the outcome is decided, and nothing moves; the original TCP is on the wire. The
+  outcome waits until the robot reports that TCP, so the next goal finds it. Goals that changed no
   TCP pass through at once.
-* **PROGRAM_LOST**: the robot program is gone. Programs end because the safety system, the power or
-  the whole controller has gone as well, and which of them we hear of first is chance: so for a
-  moment a deeper reason still counts.
-* **ENDED**: the outcome is out. Later events mean nothing.
+* **PROGRAM_LOST**: the robot program is gone. Often it ends because of the safety system, the
+  power or the whole controller, and any of these may be reported first: so for a moment a deeper
+  reason still replaces this one.
+* **ENDED**: the outcome is out. Later events are ignored.
 
-Everything has a bound: an answer that does not come in CANCELLING or COMING_TO_REST ends the goal
-after ``STOP_TIMEOUT`` by ending the robot program. A program that somebody has paused reads
-nothing: the arm stands, and the goal ends as it was to end (UNANSWERED); an arm that still moves
-is a failure (TIMEOUT). A TCP that is not set in time ends the goal before it began; one that is
-not back in time, or not at the end because the robot stopped, is the business of whoever carries
-out the commands (the ``temporary_tcp`` of the machine). MOVING and RUNNING_OUT have none, because
-a speed slider at zero is no error; but an arm that stands for ``STALL_TIMEOUT`` while nothing
-holds it waits for something that will not come: a command or a result was lost (STALLED). RTDE
-packets that stop coming are a lost connection.
+Nearly every state has a deadline (:mod:`~.timeouts`). Where no answer comes in CANCELLING or
+COMING_TO_REST, the robot program is ended. A paused program reads nothing: where the arm is at
+rest, the goal ends with the code that was decided (UNANSWERED); where it still moves, that is a
+failure (TIMEOUT). A TCP that is not set in time ends the goal before it begins; one that is not
+restored in time, or not at all because the robot stopped, is left to whoever carries out the
+commands (``temporary_tcp`` of the machine). MOVING and RUNNING_OUT have no deadline, because a
+speed slider at zero is no error; but where the arm stands for ``STALL_TIMEOUT`` and nothing holds
+it, a command or a result was lost (STALLED). RTDE packets that stop are a lost connection.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState
 
 
 class GoalState(Enum):
-    """Where a goal is."""
+    """State of a goal."""
 
     ARMING = auto()
     MOVING = auto()
@@ -110,8 +110,8 @@ INITIAL_STATE = GoalState.ARMING
 #: In these the robot program runs points of the goal.
 RUNNING_STATES = frozenset({GoalState.MOVING, GoalState.RUNNING_OUT})
 
-#: What stops the arm in every state but ENDED, and the code that the goal ends with where none is
-#: decided yet.
+#: Signals that stop the arm in every state but ENDED, and the code with which the goal ends where
+#: none is decided yet.
 STOP_SIGNALS: Mapping[GoalSignal, ErrorCode] = MappingProxyType(
     {
         GoalSignal.PROTECTIVE_STOP: ErrorCode.PROTECTIVE_STOP,
@@ -130,7 +130,7 @@ class Transition:
     code: ErrorCode | None = None
 
 
-#: After these the robot program is paused or deaf, and not ended.
+#: After these the robot program is paused or reads nothing, but has not ended.
 STOP_PROGRAM_AFTER = frozenset(
     {
         GoalSignal.PROTECTIVE_STOP,
@@ -158,10 +158,10 @@ def _ignore(state: GoalState, *signals: GoalSignal) -> dict[GoalSignal, Transiti
     return {signal: Transition(state) for signal in signals}
 
 
-#: What people ask for; the first of them says how the goal ends.
+#: Requests of users; the first of them decides how the goal ends.
 _USER_STOPS = (GoalSignal.CANCEL, GoalSignal.PREEMPT)
 
-#: What a trajectory that runs is stopped by, or ends by itself with.
+#: How a trajectory that runs is stopped, or ends by itself.
 _WHILE_RUNNING: Mapping[GoalSignal, Transition] = MappingProxyType(
     {
         **_ON_STOP,
@@ -176,8 +176,7 @@ _WHILE_RUNNING: Mapping[GoalSignal, Transition] = MappingProxyType(
 )
 
 #: What each signal means in each state. STARVING, APPENDED, NO_MORE_POINTS, ARMED, SETTLED,
-#: RESTORED, AT_REST, TIMEOUT and UNANSWERED are about the state they are given for: not possible
-#: in the others.
+#: RESTORED, AT_REST, TIMEOUT and UNANSWERED cannot happen in the states that do not list them.
 TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = MappingProxyType(
     {
         GoalState.ARMING: {
@@ -274,7 +273,7 @@ TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = MappingProxyT
 )
 
 
-#: What the robot program says of a trajectory, with a clause for the outcome's text.
+#: The robot program's result of a trajectory, with a clause for the outcome's text.
 RESULT_SIGNALS: Mapping[TrajectoryResult, tuple[GoalSignal, str]] = MappingProxyType(
     {
         TrajectoryResult.SUCCESS: (GoalSignal.SUCCESS, ''),
@@ -295,7 +294,7 @@ _EMERGENCY_STOPS = int(
     | SafetyStatus.ROBOT_EMERGENCY_STOPPED
     | SafetyStatus.SYSTEM_EMERGENCY_STOPPED
 )
-#: In plain numbers, as this is looked at in every packet and operations on flags are slow.
+#: As plain numbers, because every packet is checked and operations on flags are slow.
 _SAFETY_STOPS = _EMERGENCY_STOPS | int(
     SafetyStatus.PROTECTIVE_STOPPED
     | SafetyStatus.SAFEGUARD_STOPPED
@@ -305,7 +304,7 @@ _SAFETY_STOPS = _EMERGENCY_STOPS | int(
 NO_STOP = SafetyStatus(0)
 #: Below this speed of each joint the arm is at rest [rad/s].
 REST_SPEED = 1e-3
-#: Stops after which a robot goes on with its program, where somebody unlocks and plays it.
+#: Stops after which the robot continues its program once somebody unlocks and plays it.
 RESUMABLE_STOPS = SafetyStatus.PROTECTIVE_STOPPED | SafetyStatus.SAFEGUARD_STOPPED
 
 
@@ -320,7 +319,7 @@ def detect_stop(
     """
     Return why the robot cannot go on by itself, or None when it can.
 
-    :param ignored_stops: stops of the safety system that are not taken for a reason.
+    :param ignored_stops: safety stops that do not end the goal.
     """
     safety = int(state.safety_status) & _SAFETY_STOPS & ~int(ignored_stops)
     if safety:
@@ -335,7 +334,7 @@ def detect_stop(
 
 
 def _safety_stop(safety: int, state: RobotState) -> tuple[GoalSignal, str]:
-    """Return what a stop of the safety system means."""
+    """Return the meaning of a safety stop."""
     if safety & _EMERGENCY_STOPS:
         return GoalSignal.EMERGENCY_STOP, 'an emergency stop cut the power of the arm'
     if safety & SafetyStatus.PROTECTIVE_STOPPED:

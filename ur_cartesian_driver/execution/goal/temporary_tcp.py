@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The robot's TCP, lent to a goal that moves another frame, and whether it is back.
+The TCP that is set for the time of a goal that moves another frame, until it is restored.
 
-What the robot reports decides, never what was sent: a program that is paused reads nothing, one
-that ended may have put the TCP back by itself, and somebody else may have set another one, which
-is theirs then and not ours to overwrite.
+What the robot reports decides, never what was sent: a paused program reads nothing, one that ended
+may have restored the TCP by itself, and somebody else may have set another one, which must not be
+overwritten.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from ur_cartesian_driver.execution.goal.states import is_at_rest
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.state import RobotState
 
-#: A TCP comes back from the robot as it went there within this [m], [rad]: the wire's resolution
-#: on each axis.
+#: How much a TCP that the robot reports may differ from the one that was sent [m], [rad]: the
+#: resolution of the wire on each axis.
 TCP_RESOLUTION = 2e-6
-#: How long the robot may take from a message that sets a TCP to reporting it [s]; after that a
-#: message that nobody has carried out is taken for lost.
+#: How long the robot may take from a message that sets a TCP to reporting it [s]; after that the
+#: message counts as lost.
 SET_TIMEOUT = 0.5
-#: The first and the longest pause before the TCP is put back once more [s].
+#: Shortest and longest pause before the TCP is restored once more [s].
 MIN_RETRY_PERIOD, MAX_RETRY_PERIOD = 0.2, 10.0
 
 
@@ -32,17 +32,17 @@ def same_tcp(a: Pose, b: Pose) -> bool:
 
 
 class TemporaryTcp:
-    """One TCP that was set for a goal, until it is back."""
+    """A TCP that was set for a goal, until the one before it is restored."""
 
     def __init__(self, T_flange_original: Pose, T_flange_temporary: Pose) -> None:
         """
-        Take note of a loan; the message that sets the TCP is on its way.
+        Begin; the message that sets the TCP is on its way.
 
-        :param T_flange_original: what has to be put back.
+        :param T_flange_original: the TCP to restore.
         """
         self.T_flange_original = T_flange_original
         self.T_flange_temporary = T_flange_temporary
-        #: Whether the robot does not have the TCP any more, or never had it.
+        #: Whether the robot has the temporary TCP no more, or never had it.
         self.is_restored = False
         #: Whether the robot has reported it.
         self._was_reported = False
@@ -62,12 +62,12 @@ class TemporaryTcp:
             self.is_restored = True
 
     def is_active(self, state: RobotState) -> bool:
-        """Tell whether the robot's TCP is the one that was lent."""
+        """Tell whether the robot has the temporary TCP."""
         return same_tcp(state.T_flange_tcp, self.T_flange_temporary)
 
     def is_restore_due(self, state: RobotState, now: float) -> bool:
         """
-        Tell whether it is time to put the TCP back, again: ever more seldom, and at rest only.
+        Tell whether to restore the TCP now: at rest only, with ever longer pauses between tries.
 
         :returns: True once for each try.
         """
@@ -83,5 +83,5 @@ class TemporaryTcp:
         return True
 
     def retry_now(self) -> None:
-        """Try again at once: something has changed that may let the next try succeed."""
+        """Try again at once, because something has changed that may let the next try succeed."""
         self._retry_period, self._next_retry = MIN_RETRY_PERIOD, -inf

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The records of a goal on the wire, and what they are to the goal.
+The records of a goal on the wire, and the points that they belong to.
 
 A goal counts points, the wire counts records, and the robot program counts the motions that it
-has begun. These are three things: a spline takes several motions from point to point, an output
-that is switched on the way is a record and no motion, and a first point at time 0 has no record.
+has begun. These differ: a spline has several motions between two points, an output that is
+switched during a motion is a record but no motion, and a first point at time 0 has no record.
 """
 
 from __future__ import annotations
@@ -17,26 +17,26 @@ from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 
 
 class WireRecords:
-    """What is known of each record; they are numbered from the start of the goal."""
+    """Waypoint and times of each record, numbered from the start of the goal."""
 
     def __init__(self, job: MotionJob) -> None:
-        """Take the records of an order."""
+        """Take the records of a job."""
         self._waypoints = array('i', job.waypoint.tobytes())
         self._end_times = array('d', job.end_times.tobytes())
         self._request_times = array('d', job.request_times.tobytes())
-        #: The numbers of those that are motions.
+        #: The numbers of the records that are motions.
         self._motions = _motions(job, 0)
-        #: How many records, and motions, are forgotten.
+        #: How many records, and motions, were forgotten.
         self._first = self._first_motion = 0
 
     @property
     def total(self) -> int:
-        """How many there are, and were."""
+        """How many records there are, those that were forgotten included."""
         return self._first + len(self._waypoints)
 
     @property
     def kept(self) -> int:
-        """How many are in memory."""
+        """How many records are in memory."""
         return len(self._waypoints)
 
     @property
@@ -45,7 +45,7 @@ class WireRecords:
         return self._waypoints[-1] + 1
 
     def begun_records(self, motions: int) -> int:
-        """Return how many records are begun when so many motions are."""
+        """Return how many records have begun when so many motions have."""
         if motions <= self._first_motion:
             return self._first
         return self._motions[self._index(motions)] + 1
@@ -54,9 +54,9 @@ class WireRecords:
         """
         Return to which points the motion that was begun last and the one before it lead.
 
-        :param motions: how many are begun; None is returned for 0.
-        :param lag_motions: so many motions earlier is the one before it, because the arm may be
-        there.
+        :param motions: how many have begun; None is returned for 0.
+        :param lag_motions: how many motions earlier "the one before it" is, because the target
+            may lag by so many.
         """
         if motions <= self._first_motion:
             return None
@@ -68,29 +68,29 @@ class WireRecords:
         )
 
     def count_before_waypoint(self, waypoint: int) -> int:
-        """Return how many records stand before those of a point."""
+        """Return how many records come before those of a point."""
         return self._first + bisect_left(self._waypoints, waypoint)
 
     def motions_before(self, record: int) -> int:
-        """Return how many motions stand before a record."""
+        """Return how many motions come before a record."""
         return self._first_motion + bisect_left(self._motions, record)
 
     def end_time(self, records: int) -> float:
-        """Return when the last one of so many is planned to end [s]."""
+        """Return when the last of so many records is planned to end [s]."""
         return self._end_times[records - 1 - self._first] if records > 0 else 0.0
 
     def request_time(self, records: int) -> float:
-        """Return when the robot program asks for the one behind so many [s]."""
+        """Return when the robot program asks for the next one after so many records [s]."""
         return self._request_times[records - 1 - self._first] if records > 0 else 0.0
 
     def count_until(self, time: float) -> int:
-        """Return how many it takes for the last one to end at a time [s] or later."""
+        """Return how many records it takes until one ends at a time [s] or later."""
         return min(self.total, self._first + bisect_left(self._end_times, time) + 1)
 
-    # ---- goals that go on ---------------------------------------------------------------------
+    # ---- open goals ---------------------------------------------------------------------------
 
     def append(self, job: MotionJob, records_before: int) -> None:
-        """Put those of an order behind the first so many, in the place of what is there."""
+        """Put the records of a job behind the first so many, and drop what was there."""
         kept = records_before - self._first
         for values, new in (
             (self._waypoints, job.waypoint),
@@ -103,7 +103,7 @@ class WireRecords:
         self._motions.extend(_motions(job, records_before))
 
     def forget(self, records: int) -> None:
-        """Forget the first so many; nobody asks for them any more."""
+        """Forget the first so many records, which are not needed any more."""
         gone = records - self._first
         if gone <= 0:
             return
@@ -119,5 +119,5 @@ class WireRecords:
 
 
 def _motions(job: MotionJob, first: int) -> array[int]:
-    """Return the numbers of an order's motions, its records numbered from ``first``."""
+    """Return the numbers of a job's motions, its records numbered from ``first``."""
     return array('q', (job.is_motion.nonzero()[0] + first).astype('int64').tobytes())

@@ -50,7 +50,7 @@ class FreedriveStream(ServoStream):
 
     def __init__(self, settings: ServoSettings) -> None:
         """Wait for the first packet."""
-        super().__init__(_NoSetpoints(), settings)
+        super().__init__(_ZeroSetpoints(), settings)
         self._begun = False
         self._requested_at = 0.0
         #: Whether the robot program has let the arm be guided.
@@ -84,7 +84,7 @@ class FreedriveStream(ServoStream):
         return (ServoMode.TEACH if freedrive else mode, *rest)
 
 
-class _NoSetpoints:
+class _ZeroSetpoints:
     """Fills the joint registers, which are not read in freedrive."""
 
     done = False

@@ -1,12 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A session of live targets: what becomes of targets that come too late, twice, or no more.
+The targets of a live session, and what happens when they are late, out of order, or stop.
 
-The newest target is the one with the newest stamp, in whatever order they come in. It is followed
-until it is ``max_age`` old; then the arm brakes, stands, and waits. A newer one continues. When
-none has come for ``timeout`` the session is over. All times are of one steady clock and come in as
-arguments; where the set-points go is the business of the machine that asks for them.
+The newest target is the one with the newest stamp, in whatever order they arrive. It is followed
+until it is ``max_age`` old; then the arm brakes and waits at rest. A newer one continues. When
+none has arrived for ``timeout``, the session is over. All times are of one steady clock.
 """
 
 from __future__ import annotations
@@ -25,15 +24,15 @@ from ur_cartesian_driver.motion.primitive import Joints
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveSettings:
     """
-    How a session goes about targets; the defaults are those of ``config/driver.yaml``.
+    Bounds and times of a session; the defaults are those of ``config/driver.yaml``.
 
     :raises ValueError: a time is not positive.
     """
 
     limits: LiveLimits = field(default_factory=LiveLimits)
-    #: How old a target may be that is followed [s].
+    #: How old a target may be to be followed [s].
     max_age: float = 0.2
-    #: The session is over when no target has come for so long [s].
+    #: The session is over when no target has arrived for so long [s].
     timeout: float = 2.0
 
     def __post_init__(self) -> None:
@@ -49,7 +48,8 @@ class LiveTargets:
     def __init__(self, generator: OnlineTrajectoryGenerator, settings: LiveSettings) -> None:
         """Begin with no target."""
         self.generator = generator
-        #: How many targets were followed, and how many came in after a newer one or too old.
+        #: How many targets were followed, and how many were ignored as older than another one or
+        #: too old.
         self.accepted = self.dropped = 0
         #: How often the arm was stopped because the newest target was too old.
         self.pauses = 0
@@ -77,10 +77,10 @@ class LiveTargets:
         self.generator.set_target(T_base_tcp)
 
     def update(self, now: float) -> None:
-        """Let time pass: see whether the newest target is too old, and whether it was the last."""
+        """Drop the newest target if it is too old; end the session after the timeout."""
         generator = self.generator
         if generator.target is not None and now - self._stamp > self.settings.max_age:
-            # An arm that rests where it was to be is not stopped by that.
+            # An arm that rests at its target is not stopped by that.
             self.pauses += not generator.arrived
             generator.clear_target()
         self._last_came = min(self._last_came, now)
@@ -97,7 +97,7 @@ class LiveTargets:
 
     @property
     def done(self) -> bool:
-        """Tell whether the session is over: no targets any more, and the arm stands."""
+        """Tell whether the session is over: no targets arrive any more, and the arm is at rest."""
         return self._is_over and self.generator.at_rest
 
     @property
@@ -107,7 +107,7 @@ class LiveTargets:
 
     @property
     def report(self) -> tuple[str, ...]:
-        """What the session was, in lines for people."""
+        """What became of the targets, as lines of the report."""
         lines = [
             '1 target was followed'
             if self.accepted == 1
@@ -116,7 +116,7 @@ class LiveTargets:
         if self.dropped:
             lines.append(
                 f'{self.dropped} came after a newer one or were older than '
-                f'{self.settings.max_age:g} s, and were left out'
+                f'{self.settings.max_age:g} s, and were ignored'
             )
         if self.pauses:
             times = 'once' if self.pauses == 1 else f'{self.pauses} times'
@@ -128,5 +128,5 @@ class LiveTargets:
 
 
 def _without_numbers(reason: str) -> str:
-    """Return what of a reason stays the same when the target trembles."""
+    """Return the part of a reason that stays the same while the target jitters."""
     return ' '.join(word for word in reason.split() if not word[:1].isdigit())

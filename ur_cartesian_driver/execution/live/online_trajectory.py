@@ -1,22 +1,22 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-From where the tool is to the newest target, one set-point for each control cycle.
+Generate the motion from the present pose to the newest target, one set-point per control cycle.
 
-A target that sensors correct comes when it comes, jumps, and may be anywhere. What the arm does
-with it must not: the tool goes straight towards the newest target with bounded speed and
-acceleration, brakes in time to arrive at rest, and never goes where it could not stop. For that
-each cycle looks at two places: the next one, and the one where the tool would rest if it braked
-from there. Is the second one out of reach, beyond a limit of a joint, too near to a singularity
-or behind a workspace plane, the arm brakes instead, on a way that earlier cycles have looked at.
+A target from a sensor arrives at any time, jumps, and may be anywhere. The motion of the arm must
+not: the tool goes straight towards the newest target with bounded speed and acceleration, brakes
+in time to arrive at rest, and never goes where it could not stop. To ensure that, each cycle
+checks two poses: the next one, and the one where the tool would come to rest if it braked from
+there. If the second one is out of reach, beyond a joint limit, too near to a singularity or behind
+a workspace plane, the arm brakes instead, along a path that earlier cycles have checked.
 
-Time comes in as the length of a cycle; nobody here knows a clock.
+The length of a cycle is an argument; there is no clock in here.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import cos, hypot, inf, isfinite, sin, sqrt
+from math import cos, inf, isfinite, sin, sqrt
 
 from ur_cartesian_driver.execution.live.workspace_guard import LiveWorkspace, WorkspaceGuard
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -31,17 +31,16 @@ from ur_cartesian_driver.motion.pose import (
     rotation_vector_from_quaternion,
 )
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6
+from ur_cartesian_driver.motion.vectors import add, norm, scale, subtract, Vector3, Vector6, ZERO3
 
-ZERO: Vector3 = (0.0, 0.0, 0.0)
-#: Of the acceleration so much is planned with when braking for a target: the rest corrects.
+#: Part of the acceleration that braking for a target is planned with; the rest is for corrections.
 _BRAKING_FRACTION = 0.8
-#: A target this near is reached [m, rad].
+#: A target within this distance is reached [m, rad].
 _ARRIVAL_TOLERANCE = 1e-9
-#: An arm that was stopped goes on when it could go at least so far [m], [rad]; else it would
-#: tremble at a bound.
+#: A stopped arm goes on only if it can go at least so far [m], [rad]; otherwise it would jitter at
+#: a bound.
 _MIN_RESTART_MOTION = (0.002, 0.01)
-#: What counts as not coming nearer to a bound [rad, m].
+#: Coming nearer to a bound by less does not count [rad, m].
 _ROUNDING = 1e-9
 #: How far joints stay away from the ends of their ranges [rad].
 LIMIT_MARGIN = 0.01
@@ -55,9 +54,9 @@ _SINGULARITIES = (
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveLimits:
     """
-    How fast the tool may follow, and how near it may come to where it cannot go.
+    Bounds on the motion of the tool and the joints, and on where they may go.
 
-    :raises ValueError: a bound of speed or acceleration is not positive.
+    :raises ValueError: a bound on speed or acceleration is not positive.
     """
 
     #: Of the tool [m/s], [m/s^2], [rad/s], [rad/s^2].
@@ -69,7 +68,7 @@ class LiveLimits:
     joint_velocity: Vector6 = (inf,) * 6
     #: Distances from the singularities: wrist [rad], elbow [rad], shoulder [m]; 0 = any.
     singularity_margins: Vector3 = (0.05, 0.05, 0.02)
-    #: What the arm keeps away from, and itself.
+    #: Workspace planes and self-clearance.
     workspace: LiveWorkspace = field(default_factory=LiveWorkspace)
 
     def __post_init__(self) -> None:
@@ -89,52 +88,52 @@ class LiveLimits:
 
 class OnlineTrajectoryGenerator:
     """
-    Follows targets from a state of rest on; one owner calls :meth:`step` once in each cycle.
+    Follows targets, beginning at rest; its owner calls :meth:`step` once in each cycle.
 
     :param arm: nominal or calibrated.
-    :param T_flange_tcp: the TCP that is to be at the targets.
+    :param T_flange_tcp: the TCP that moves to the targets.
     :param q: joint positions at the start [rad].
     """
 
     def __init__(self, arm: Arm, T_flange_tcp: Pose, q: Joints, limits: LiveLimits) -> None:
         """Begin at rest with no target."""
         self.limits = limits
-        #: The newest set-point: joints [rad], and where it has the tool.
+        #: The newest set-point: joints [rad] and TCP pose.
         self.q = q
         self.T_base_tcp = arm.forward(q) @ T_flange_tcp
         #: Speed of the tool at the newest set-point [m/s], [rad/s], base axes.
-        self.linear: Vector3 = ZERO
-        self.angular: Vector3 = ZERO
-        #: Why the arm stops or stands although it has a target, as a clause; empty: it does not.
+        self.linear: Vector3 = ZERO3
+        self.angular: Vector3 = ZERO3
+        #: Why the arm does not go to its target, as a clause; empty: it does.
         self.blocked = ''
-        #: Speed over allowed speed of the fastest joint where that slowed the tool down, else 1.
+        #: Speed over allowed speed of the fastest joint if that slowed the tool down, else 1.
         self.joint_speed_ratio = 1.0
         self._arm = arm
         self._T_tcp_flange = T_flange_tcp.inverse()
         self._target: Pose | None = None
         self._bounds_check = _BoundsCheck(arm, T_flange_tcp, limits)
-        # The joints of the place where the tool would rest, from the last cycle.
+        # The joints where the tool would come to rest, from the last cycle.
         self._q_stop = q
         #: Length of the last cycle [s].
         self._dt = 0.0
-        # Whether the target is another one than that which the arm was stopped for.
+        # Whether the target has changed since the arm was stopped.
         self._is_target_new = False
 
     def reset(self, q: Joints) -> None:
-        """Begin again at rest at other joint positions [rad], towards the same target."""
+        """Begin again, at rest at other joint positions [rad], towards the same target."""
         self.q = self._q_stop = q
         self.T_base_tcp = self._arm.forward(q) @ self._T_tcp_flange.inverse()
-        self.linear = self.angular = ZERO
+        self.linear = self.angular = ZERO3
 
     @property
     def target(self) -> Pose | None:
-        """Where the tool is to go; None: it is to stop, or stands."""
+        """Where the tool is to go; None: it brakes or rests."""
         return self._target
 
     @property
     def at_rest(self) -> bool:
         """Tell whether the newest set-point does not move."""
-        return self.linear == ZERO and self.angular == ZERO
+        return self.linear == ZERO3 and self.angular == ZERO3
 
     @property
     def arrived(self) -> bool:
@@ -152,7 +151,7 @@ class OnlineTrajectoryGenerator:
         self._target = T_base_tcp
 
     def clear_target(self) -> None:
-        """Have no target any more: brake, and rest."""
+        """Drop the target: brake, and rest."""
         self._target = None
         self.blocked, self._is_target_new = '', False
 
@@ -163,7 +162,7 @@ class OnlineTrajectoryGenerator:
         :param dt: nominal time to it [s].
         """
         self.joint_speed_ratio = 1.0
-        # The speed of the cycle before was chosen for its length, and cannot be undone in less.
+        # The speed of the last cycle was chosen for its length; less time cannot undo it.
         change, self._dt = max(dt, self._dt), dt
         if self.blocked and self._is_target_new and self.at_rest:
             self._is_target_new = False
@@ -175,8 +174,8 @@ class OnlineTrajectoryGenerator:
             if self.blocked:
                 self._is_target_new = False
                 linear, angular = self._braking_velocity(change)
-        if linear == ZERO and angular == ZERO:
-            self.linear = self.angular = ZERO
+        if linear == ZERO3 and angular == ZERO3:
+            self.linear = self.angular = ZERO3
         else:
             self._move(linear, angular, dt)
         return self.q
@@ -187,7 +186,7 @@ class OnlineTrajectoryGenerator:
         """
         Return the speeds of the next cycle towards the target, or towards rest.
 
-        :param change: for so long they may change [s].
+        :param change: time in which they may change [s].
         """
         if self._target is None or self.blocked:
             return self._braking_velocity(change)
@@ -210,28 +209,28 @@ class OnlineTrajectoryGenerator:
     def _braking_velocity(self, change: float) -> tuple[Vector3, Vector3]:
         limits = self.limits
         return (
-            _limit_change(self.linear, ZERO, limits.linear_acceleration * change),
-            _limit_change(self.angular, ZERO, limits.angular_acceleration * change),
+            _limit_change(self.linear, ZERO3, limits.linear_acceleration * change),
+            _limit_change(self.angular, ZERO3, limits.angular_acceleration * change),
         )
 
-    # ---- places -------------------------------------------------------------------------------
+    # ---- poses --------------------------------------------------------------------------------
 
     def _move(self, linear: Vector3, angular: Vector3, dt: float) -> None:
-        """Take a step, as much of it as the joints allow."""
+        """Take a step, shortened where the joints are not fast enough."""
         pose, q = self._next_pose(linear, angular, dt)
-        if q is None:  # next to what was looked at: it does not happen but by rounding
+        if q is None:  # beside a pose that was checked: happens by rounding only
             self.blocked = (
                 self.blocked
                 or explain_unreachable(self._arm, pose @ self._T_tcp_flange)
                 or 'the joint positions jump'
             )
-            self.linear = self.angular = ZERO
+            self.linear = self.angular = ZERO3
             return
         allowed = self.limits.joint_velocity
         fastest = max([abs(b - a) / (dt * v) for a, b, v in zip(self.q, q, allowed, strict=True)])
         if fastest > 1.0:
             self.joint_speed_ratio = fastest
-            linear, angular = _scaled(linear, 1.0 / fastest), _scaled(angular, 1.0 / fastest)
+            linear, angular = scale(linear, 1.0 / fastest), scale(angular, 1.0 / fastest)
             pose, q_slow = self._next_pose(linear, angular, dt)
             q = q_slow or q
         self.linear, self.angular = linear, angular
@@ -247,17 +246,17 @@ class OnlineTrajectoryGenerator:
         """
         Return why the tool must not get these speeds; empty if it could still stop in time.
 
-        The place where it would rest is looked at, with all the acceleration that there is.
+        Checks the pose where the tool would come to rest with the full acceleration.
         """
         limits = self.limits
-        if linear == ZERO and angular == ZERO:
+        if linear == ZERO3 and angular == ZERO3:
             return ''
         stop = _integrate(
             self.T_base_tcp,
             linear,
             angular,
-            dt + 0.5 * hypot(*linear) / limits.linear_acceleration,
-            dt + 0.5 * hypot(*angular) / limits.angular_acceleration,
+            dt + 0.5 * norm(linear) / limits.linear_acceleration,
+            dt + 0.5 * norm(angular) / limits.angular_acceleration,
         )
         return self._violation_at_stop(stop)
 
@@ -271,7 +270,7 @@ class OnlineTrajectoryGenerator:
         return self._bounds_check.violation(q, self.q)
 
     def _is_path_clear(self) -> bool:
-        """Tell whether the way to the target is open again for a stretch that is worth it."""
+        """Tell whether the tool can go towards the target again for a minimal distance."""
         if self._target is None:
             return False
         ratio = max(
@@ -287,7 +286,7 @@ class OnlineTrajectoryGenerator:
 
 
 class _BoundsCheck:
-    """Where the joints, and all that they move, may be."""
+    """Checks joint limits, singularity margins and the workspace."""
 
     def __init__(self, arm: Arm, T_flange_tcp: Pose, limits: LiveLimits) -> None:
         self._arm = arm
@@ -300,7 +299,7 @@ class _BoundsCheck:
         """
         Return why the arm must not come to rest at q [rad]; empty if it may.
 
-        What is too near to a bound already may get away from it.
+        What is too near to a bound already may move away from it.
         """
         for joint, (angle, now, (low, high)) in enumerate(
             zip(q, q_now, self._ranges, strict=True)
@@ -333,9 +332,8 @@ class _BoundsCheck:
 
 def _pose_difference(here: Pose, there: Pose) -> tuple[Vector3, Vector3]:
     """Return translation and rotation vector from one pose to another, both in base axes."""
-    (ax, ay, az), (bx, by, bz) = here.position, there.position
     return (
-        (bx - ax, by - ay, bz - az),
+        subtract(there.position, here.position),
         rotation_vector_from_quaternion(multiply(there.quaternion, conjugate(here.quaternion))),
     )
 
@@ -344,53 +342,44 @@ def _approach_velocity(
     difference: Vector3, limit: float, acceleration: float, dt: float
 ) -> Vector3:
     """
-    Return the speed that is wanted in the next cycle on a way that is to end at rest.
+    Return the velocity of the next cycle for a path that ends at rest.
 
-    The speed v of which the cycle of length dt and braking by b dt in each one after it cover the
-    distance d is v = sqrt((b dt / 2)^2 + 2 b d) - b dt / 2: after each such cycle the formula
+    The speed v at which one cycle of length dt, followed by braking by b dt in each cycle, covers
+    the distance d is v = sqrt((b dt / 2)^2 + 2 b d) - b dt / 2: after each such cycle the formula
     gives exactly b dt less. The last step is d / dt.
     """
-    distance = hypot(*difference)
+    distance = norm(difference)
     if distance < _ARRIVAL_TOLERANCE:
-        return ZERO
+        return ZERO3
     half = 0.5 * _BRAKING_FRACTION * acceleration * dt
     speed = min(
         limit,
         sqrt(half * half + 2.0 * _BRAKING_FRACTION * acceleration * distance) - half,
         distance / dt,
     )
-    return _scaled(difference, speed / distance)
+    return scale(difference, speed / distance)
 
 
 def _limit_change(speed: Vector3, desired: Vector3, limit: float) -> Vector3:
-    """Return the wanted speed, or the one on the way to it that the acceleration allows."""
-    x, y, z = desired[0] - speed[0], desired[1] - speed[1], desired[2] - speed[2]
-    size = hypot(x, y, z)
-    if size <= limit:
-        return desired
-    fraction = limit / size
-    return (speed[0] + fraction * x, speed[1] + fraction * y, speed[2] + fraction * z)
-
-
-def _scaled(v: Vector3, factor: float) -> Vector3:
-    return (v[0] * factor, v[1] * factor, v[2] * factor)
+    """Return the desired velocity, or the nearest one that the acceleration allows."""
+    change = subtract(desired, speed)
+    size = norm(change)
+    return desired if size <= limit else add(speed, scale(change, limit / size))
 
 
 def _integrate(
     pose: Pose, linear: Vector3, angular: Vector3, seconds: float, turning: float
 ) -> Pose:
-    """Return a pose that moves and turns (base axes) for some time each."""
-    (x, y, z), (vx, vy, vz) = pose.position, linear
+    """Return a pose after it has moved and turned (base axes), for a time each."""
     return Pose(
-        (x + vx * seconds, y + vy * seconds, z + vz * seconds),
+        add(pose.position, scale(linear, seconds)),
         multiply(_rotation_after(angular, turning), pose.quaternion)
-        if angular != ZERO
+        if angular != ZERO3
         else pose.quaternion,
     )
 
 
 def _rotation_after(angular: Vector3, seconds: float) -> Quaternion:
-    speed = hypot(*angular)
+    speed = norm(angular)
     half = 0.5 * speed * seconds
-    scale = sin(half) / speed
-    return (angular[0] * scale, angular[1] * scale, angular[2] * scale, cos(half))
+    return (*scale(angular, sin(half) / speed), cos(half))

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What an arm keeps away from while it is led: workspace planes, and itself.
+Keep an arm that follows live targets away from workspace planes and from itself.
 
-To look costs more than a control cycle has, and is needed only near by: nothing of the arm moves
-farther than the joints turn, times how far it can be from an axis. So after a look it is known how
-far the joints may turn until the next one.
+A check takes longer than a control cycle, and is needed only near a bound: no part of the arm
+moves farther than the joints turn, times its largest distance from an axis. So each check also
+gives how far the joints may turn until the next one.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from ur_cartesian_driver.motion.vectors import Vector3
 
 #: No link is thicker [m].
 _THICKNESS = 0.3
-#: What counts as not coming nearer [m].
+#: Coming nearer by less does not count [m].
 _ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeepOutPlane:
-    """A workspace plane: what moves stays on the side to which its normal points."""
+    """A workspace plane: the arm stays on the side to which its normal points."""
 
     name: str
     point: Vector3
@@ -40,21 +40,21 @@ class KeepOutPlane:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveWorkspace:
-    """What there is to keep away from."""
+    """The bounds to keep away from."""
 
     planes: tuple[KeepOutPlane, ...] = ()
-    #: How near the capsules around links may come to each other [m]; None = nobody looks.
+    #: Smallest distance of the capsules around the links [m]; None = not checked.
     min_clearance: float | None = None
     #: Radius of the tool between flange and TCP [m]; 0 = no tool.
     tool_radius: float = 0.0
 
     def __bool__(self) -> bool:
-        """Tell whether there is anything."""
+        """Tell whether there is any bound."""
         return bool(self.planes) or self.min_clearance is not None
 
 
 class WorkspaceGuard:
-    """Sees to it that one arm with one tool keeps away."""
+    """Checks one arm with one tool."""
 
     def __init__(self, arm: Arm, T_flange_tcp: Pose, workspace: LiveWorkspace) -> None:
         """Prepare bodies and planes."""
@@ -84,7 +84,7 @@ class WorkspaceGuard:
         """
         Return what would be too near to what, as a clause; empty: nothing.
 
-        What is too near already may get away.
+        What is too near already may move away.
 
         :param q: where the arm would be [rad].
         :param q_now: where it is.
@@ -108,7 +108,7 @@ class WorkspaceGuard:
         return self._clause(index, float(slacks[index]))
 
     def _clearance_slacks(self, q: Joints) -> NDArray[np.float64]:
-        """Return how far everything is from what it keeps away from, less what is asked [m]."""
+        """Return all distances, less the margin or clearance that they must keep [m]."""
         row = np.array([q])
         slacks = np.empty(0)
         if self._workspace.planes:
@@ -134,7 +134,7 @@ class WorkspaceGuard:
                 else (f'go {-height:.4f} m beyond')
             )
             return f'{name} would {near} the workspace plane "{plane.name}"' + (
-                f', {plane.margin:.4f} m is asked for' if plane.margin else ''
+                f', its margin is {plane.margin:.4f} m' if plane.margin else ''
             )
         clearance = self._workspace.min_clearance or 0.0
         a, b = self._bodies.pairs[index - len(planes) * len(self._names)]

@@ -1,18 +1,19 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Where the controller is on the planned path, and where the tool should be.
+Find where the controller is on the planned path, and where the tool should be.
 
-The reference path is compared as a geometric line: a robot that was slowed down, or that has its
-own speed profile, is not off the path because of that.
+The reference path is compared as a geometric line, so a robot that was slowed down, or that has
+its own speed profile, is not off the path.
 
-Progress is that of the controller's own target, which has no noise and which nothing pushes: only
-where *it* leaves the path does the robot another motion than it was told. What is desired of the
-tool is the place nearest to it within what a lag behind the target explains. The controller goes
-on while the arm is pushed along its path, so that is an error too, beyond the lag.
+Progress is that of the controller's target, which has no noise and cannot be pushed: where the
+*target* leaves the path, the robot makes another motion than the planned one. The desired pose is
+the one on the path that is nearest to the tool, within a plausible lag behind the target. The
+controller goes on while somebody pushes the arm along its path, so beyond the lag that is an error
+too.
 
-All of this stands between a packet and a CANCEL, and most packets concern one or two edges of the
-path. So these are computed in plain floats: an array of seven numbers costs more than its numbers.
+All of this runs between a packet and a CANCEL, and most packets concern one or two edges of the
+path. Those are computed in plain floats: numpy costs more than the seven numbers.
 """
 
 from __future__ import annotations
@@ -30,21 +31,21 @@ from ur_cartesian_driver.motion.plan import ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.vectors import Vector6
 
-#: How much a radian counts in the distance that decides which place is the nearest [m/rad].
+#: Weight of a radian in the distance that decides which position is the nearest [m/rad].
 METRES_PER_RADIAN = 0.1
-#: How far the target may be from the place found before, beyond what its speed explains [m].
+#: How much farther the target may have come than its speed explains [m].
 SEARCH_MARGIN = 0.005
-#: How far the tool may be before or behind its target and be on time: this long at the speed of
-#: the target [s], and this far [m]. Position controllers of arms lag by some cycles.
+#: How far the tool may be ahead of or behind its target: this long at the speed of the target
+#: [s], and this far [m]. Position controllers of arms lag by some cycles.
 LAG_TIME = 0.02
 LAG_DISTANCE = 0.0005
-#: Times nearer to each other than this are one [s]; the wire counts in microseconds.
+#: Times that differ by less are the same [s]; the wire counts in microseconds.
 SAME_TIME = 5e-7
-#: How long ago a place may be that the tool still lags behind at [s].
+#: How much of the path behind the target is kept, because the tool may lag [s].
 HISTORY_TIME = 1.0
-#: Up to so many edges are looked at one by one.
+#: Up to so many edges are searched one by one.
 MAX_SCALAR_EDGES = 8
-#: So many edges are kept in plain floats.
+#: How many edges are cached as plain floats.
 MAX_CACHED_EDGES = 256
 
 #: A pose in the coordinates of :class:`PathTracker`.
@@ -53,7 +54,7 @@ TrackerPoint: TypeAlias = tuple[float, float, float, float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class PathPosition:
-    """A place on the reference path: between row ``row`` and the next, at ``fraction``."""
+    """A position on the reference path: between row ``row`` and the next, at ``fraction``."""
 
     row: int
     fraction: float
@@ -61,7 +62,7 @@ class PathPosition:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A row of the path and the way to the next one, as poses and in the tracker's coordinates."""
+    """A row of the path and the next one, as poses and in the tracker's coordinates."""
 
     start: Pose
     end: Pose
@@ -71,7 +72,7 @@ class Edge:
     length_squared: float
 
     def nearest(self, point: TrackerPoint, lowest: float, highest: float) -> tuple[float, float]:
-        """Return the fraction of the way that is nearest, and the square of the distance there."""
+        """Return the nearest fraction of the edge, and the square of the distance there."""
         px, py, pz, pa, pb, pc, pd = point
         ox, oy, oz, oa, ob, oc, od = self.origin
         ex, ey, ez, ea, eb, ec, ed = self.vector
@@ -103,7 +104,7 @@ class PathTracker:
     so a straight line in these coordinates is a straight line of the tool with a steady turn. The
     search reaches as far as the target can have come since the last packet, and, where the robot
     program reports it, not beyond the point that it is running; so a path that crosses itself or
-    goes back the way it came is followed in the right order.
+    turns back is followed in the right order.
     """
 
     def __init__(self, path: ReferencePath) -> None:
@@ -114,7 +115,7 @@ class PathTracker:
         """
         self._load(path)
         self.path_position = PathPosition(0, 0.0)
-        #: How far the target was from its place at the last update, in the coordinates of above.
+        #: Distance of the target from the path at the last update, in the tracker's coordinates.
         self.residual = inf
 
     def _load(self, path: ReferencePath) -> None:
@@ -140,13 +141,13 @@ class PathTracker:
         self, target: Pose, max_advance: float, running: tuple[int, int] | None = None
     ) -> PathPosition:
         """
-        Move on to the place nearest to the controller's target.
+        Move on to the position nearest to the controller's target.
 
         :param target: pose of the TCP in base.
-        :param max_advance: the longest way that the target can have come since the last call [m].
-        :param running: the points to which the motion leads that the robot program has begun
-            last, and the one before it (-1 = there was none); None = unknown.
-        :returns: the new place, never behind the one before.
+        :param max_advance: longest path that the target can have covered since the last call [m].
+        :param running: the points to which the motion that the robot program has begun last, and
+            the one before it (-1 = there was none), lead; None = unknown.
+        :returns: the new position, never behind the one before.
         """
         first, end = self._window(max_advance, running)
         self.residual = inf
@@ -159,10 +160,10 @@ class PathTracker:
 
     def desired(self, actual: Pose, twist: Vector6) -> Pose:
         """
-        Return the planned pose that is nearest to the tool, around the place of the target.
+        Return the planned pose that is nearest to the tool, around the target's position.
 
         :param actual: pose of the TCP in base.
-        :param twist: of the target, which says how far a lag may reach.
+        :param twist: of the target; its speed bounds the lag.
         """
         here, lag = self._arc_length(), LAG_DISTANCE + LAG_TIME * tracker_speed(twist)
         first = max(bisect_right(self._arc, here - lag) - 1, 0)
@@ -182,7 +183,7 @@ class PathTracker:
         """
         Return how far the controller's target is from the plan, [m] and [rad].
 
-        In a corner whose shape only the robot knows, the room for that shape is taken off.
+        In a blend, whose shape only the robot knows, the blend tolerance is subtracted.
         """
         here = self.pose()
         distance, angle = here.distance_to(target), here.angle_to(target)
@@ -194,17 +195,17 @@ class PathTracker:
 
     def is_within(self, distance: float, angle: float) -> bool:
         """
-        Tell whether the target is surely no farther from its place than that [m], [rad].
+        Tell whether the target is surely within a distance [m] and angle [rad] of the path.
 
-        A radian counts as :data:`METRES_PER_RADIAN` in :attr:`residual`. Half of it is given away,
-        because the straight line between two quaternions is not quite the turn from one to the
-        other; where they are so far apart that this matters, the line is farther from the target
-        than that.
+        A radian counts as :data:`METRES_PER_RADIAN` in :attr:`residual`. Only half of the bound is
+        used, because the straight line between two quaternions is not quite the turn from one to
+        the other; where they are so far apart that this matters, the line is farther away than
+        that.
         """
         return self.residual <= 0.5 * min(distance, METRES_PER_RADIAN * angle)
 
     def finish(self, time: float = inf) -> PathPosition:
-        """Move on to the end of the path, or to where it is at a time [s]."""
+        """Move on to the end of the path, or to its position at a time [s]."""
         self.path_position = PathPosition(
             max(bisect_right(self._time, time + SAME_TIME) - 1, 0), 0.0
         )
@@ -212,9 +213,9 @@ class PathTracker:
 
     def append(self, path: ReferencePath, since: float) -> None:
         """
-        Let a path follow from a time on [s], and forget what lies far behind.
+        Append a path from a time on [s], and forget what lies far behind.
 
-        The time is that of a place at which both paths are the same, and which is still ahead.
+        At that time both paths have the same pose, and the arm has not reached it yet.
         """
         old, row = self.path, self.path_position.row
         first = max(0, min(bisect_left(self._time, self._time[row] - HISTORY_TIME), row))
@@ -235,7 +236,7 @@ class PathTracker:
         )
 
     def pose(self, path_position: PathPosition | None = None) -> Pose:
-        """Return the planned pose at a place, the present one if none is given."""
+        """Return the planned pose at a position, by default the present one."""
         at = self.path_position if path_position is None else path_position
         if at.row == self.last_row:
             return self._end
@@ -243,13 +244,13 @@ class PathTracker:
         return edge.start.interpolate(edge.end, at.fraction) if at.fraction else edge.start
 
     def time(self) -> float:
-        """Return the planned time at the place [s]."""
+        """Return the planned time of the present position [s]."""
         row, fraction = self.path_position.row, self.path_position.fraction
         here = self._time[row]
         return here + fraction * (self._time[row + 1] - here) if fraction else here
 
     def waypoint(self) -> int:
-        """Return the index of the goal's point that the place leads to."""
+        """Return the index of the goal's point that comes next."""
         row = self.path_position.row + (1 if self.path_position.fraction > 0.0 else 0)
         return self._points[min(row, self.last_row)]
 
@@ -257,7 +258,7 @@ class PathTracker:
         """Return the rows between which the tool may be."""
         points = self._points
         if running is not None:
-            # The program runs that motion, or is in the blend that leads to it: what comes before
+            # The program runs that motion, or is in the blend that leads to it: everything before
             # was passed, perhaps between two packets.
             passed = bisect_left(points, running[1]) - 1
             if passed > self.path_position.row:
@@ -270,13 +271,13 @@ class PathTracker:
         return first, max(end, first)
 
     def _arc_length(self) -> float:
-        """Return the length of the path up to the place [m]."""
+        """Return the length of the path up to the present position [m]."""
         row, fraction = self.path_position.row, self.path_position.fraction
         here = self._arc[row]
         return here + fraction * (self._arc[row + 1] - here) if fraction else here
 
     def _fraction(self, row: int, distance: float) -> float:
-        """Return where an edge has that much of the path behind it, within 0 to 1."""
+        """Return the fraction of an edge, 0 to 1, at a distance from the start of the path."""
         start, end = self._arc[row], self._arc[row + 1]
         return min(1.0, max(0.0, (distance - start) / (end - start))) if end > start else 1.0
 
@@ -312,12 +313,12 @@ class PathTracker:
         self, point: TrackerPoint, first: int, end: int, lowest: float, highest: float = 1.0
     ) -> tuple[PathPosition, float]:
         """
-        Return the nearest place on the edges ``first`` to ``end``, and how far it is.
+        Return the nearest position on the edges ``first`` to ``end``, and its distance.
 
-        Of places that are equally near it is the earliest.
+        Of positions that are equally near it is the earliest.
 
-        :param lowest: where it may be on the first edge at the earliest.
-        :param highest: where it may be on the last edge at the latest.
+        :param lowest: smallest fraction of the first edge.
+        :param highest: largest fraction of the last edge.
         """
         if end - first > MAX_SCALAR_EDGES:
             return self._nearest_of_many(point, first, end, lowest, highest)
@@ -336,13 +337,13 @@ class PathTracker:
     def _nearest_of_many(
         self, point: TrackerPoint, first: int, end: int, lowest: float, highest: float
     ) -> tuple[PathPosition, float]:
-        """Return the same by arrays, whose overhead is nothing beside so many edges."""
+        """Return the same from arrays, which are faster for many edges."""
         start = self._rows[first:end]
         edge = self._rows[first + 1 : end + 1] - start
         away = np.array(point) - start
         length_squared = np.einsum('ij,ij->i', edge, edge)
         along = np.einsum('ij,ij->i', away, edge)
-        with np.errstate(over='ignore'):  # a robot may say that it is anywhere; then it is an end
+        with np.errstate(over='ignore'):  # a robot may report any position; then it is an end
             fraction = np.divide(
                 along, length_squared, out=np.ones_like(along), where=length_squared > 0.0
             )
@@ -360,12 +361,12 @@ class PathTracker:
 
 
 def _float_array(values: NDArray[np.float64]) -> array[float]:
-    """Return an array that can be searched without making arrays of its numbers."""
+    """Return an array whose search needs no numpy scalars."""
     return array('d', np.ascontiguousarray(values, dtype=np.float64).tobytes())
 
 
 def _continuous_signs(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the signs that make neighbouring quaternions of a path near to each other."""
+    """Return the signs that make neighbouring quaternions of a path close to each other."""
     dots = np.einsum('ij,ij->i', quaternions[1:], quaternions[:-1])
     return np.concatenate(([1.0], np.cumprod(np.where(dots < 0.0, -1.0, 1.0))))
 

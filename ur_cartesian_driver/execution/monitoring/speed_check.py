@@ -1,13 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether a robot program that says nothing on its way goes about as fast as it was told.
+Check that a robot program which reports no progress moves about as fast as planned.
 
 Our own program counts the points that it begins, which shows that it reads them as they were
-meant. Another program may read them in another wire dialect, and nothing on the wire tells: a
-time becomes a thousand times as long, or an acceleration a speed. The place on the path is then
-right and the pace is wrong. The bounds are wide, because they are not there to judge a motion: it
-is the plan's, or another one.
+meant. Another program may read them in another wire dialect, and nothing on the wire shows it: a
+time becomes a thousand times as long, or an acceleration becomes a speed. The path is then right
+and the speed is wrong. The bounds are wide: they only tell the plan's motion from another one.
 """
 
 from __future__ import annotations
@@ -22,18 +21,18 @@ from ur_cartesian_driver.motion.vectors import Vector6
 
 #: The peak of a motion from rest to rest is at most twice its average.
 PEAK_TO_MEAN = 2.0
-#: Speeds that harm nobody [m/s], [rad/s].
+#: Speeds that are always harmless [m/s], [rad/s].
 MIN_SPEED_LIMITS = (0.02, 0.1)
-#: So many times longer than planned, beyond the time that a program may need to begin [s].
+#: Longest duration as a multiple of the planned one, beside the time to begin [s].
 MAX_SLOWDOWN, MAX_START_DELAY = 20.0, 3.0
 _CAUSE = (
-    'the robot program reads the points in another way than they were meant; set '
+    'the robot program reads the points in another wire dialect; set '
     'wire_dialect to the version of that program'
 )
 
 
 class SpeedCheck:
-    """The speeds that a plan leads to."""
+    """Bounds on speed and duration that follow from a plan."""
 
     def __init__(self, path: ReferencePath) -> None:
         """Find the largest speeds of the planned path."""
@@ -50,18 +49,18 @@ class SpeedCheck:
 
     def violation(self, twist: Vector6, elapsed: float, planned: float) -> str | None:
         """
-        Return what is wrong with the pace, as a clause, or None.
+        Return which bound on speed or duration is exceeded, as a clause, or None.
 
         :param twist: that of the controller's own target.
         :param elapsed: time since the start in which the controller's clock ran [s].
-        :param planned: when the plan has the tool at its present place [s].
+        :param planned: planned time of the present position on the path [s].
         """
         speeds = hypot(*twist[:3]), hypot(*twist[3:])
         for speed, limit, unit in zip(speeds, self._limits, ('m/s', 'rad/s'), strict=True):
             if speed > limit:
                 return (
-                    f'the controller moves the tool with {speed:.3f} {unit}, and the plan '
-                    f'with no more than {limit:.3f} {unit}: {_CAUSE}'
+                    f'the controller moves the tool at {speed:.3f} {unit}, the plan at '
+                    f'no more than {limit:.3f} {unit}: {_CAUSE}'
                 )
         if elapsed > MAX_START_DELAY + MAX_SLOWDOWN * planned:
             return (

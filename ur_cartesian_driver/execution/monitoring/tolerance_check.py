@@ -1,12 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether the arm is near enough to where it should be, axis by axis.
+Check the arm against the path or goal tolerance, axis by axis.
 
 An error is desired - actual. Position and orientation are compared with the planned path; twist
-and acceleration with what the controller itself wants at that moment, as both report them in one
-packet. So nothing here knows a speed profile: what the slider, a pause, a blend or the robot's own
-limits make of the speed changes both sides alike.
+and acceleration with the controller's target of the same packet. So no speed profile is needed:
+the slider, a pause, a blend or the robot's own limits change target and actual speed alike.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from ur_cartesian_driver.motion.pose import (
     rotation_vector_from_quaternion,
 )
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6
+from ur_cartesian_driver.motion.vectors import subtract, Vector3, Vector6
 
 _AXES = ('x', 'y', 'z')
 _UNKNOWN: Vector6 = (nan,) * 6
@@ -33,7 +32,7 @@ _UNKNOWN: Vector6 = (nan,) * 6
 
 @dataclass(frozen=True, slots=True)
 class ToleranceQuantity:
-    """Three axes that are measured alike."""
+    """A quantity with three axes and one unit."""
 
     name: str
     unit: str
@@ -43,15 +42,14 @@ class ToleranceQuantity:
 
 
 class ToleranceCheck:
-    """A tolerance that packets are held against; it costs nothing for what has no limit."""
+    """Compares packets with a tolerance; quantities without a limit cost nothing."""
 
     def __init__(self, tolerance: Tolerance, T_base_frame: Pose) -> None:
         """
         Prepare a tolerance.
 
-        :param tolerance: zero and negative mean no limit: defaults were filled in before.
-        :param T_base_frame: the frame of the goal, along whose axes all but the orientation is
-            compared.
+        :param tolerance: zero and negative mean no limit; defaults were filled in before.
+        :param T_base_frame: frame of the goal; all but the orientation is compared along its axes.
         """
         self._q_frame_base = conjugate(T_base_frame.quaternion)
         self._limited = tuple(
@@ -68,8 +66,7 @@ class ToleranceCheck:
         """
         Return a clause that names an axis outside its limit, value and limit; or None.
 
-        Of several axes it is the one that is outside by the largest factor. What is not a number
-        is outside.
+        Of several axes the one with the largest ratio of error to limit is named. NaN is outside.
 
         :param desired: planned pose of the TCP in base.
         """
@@ -90,7 +87,7 @@ def _clause(quantity: ToleranceQuantity, axis: str, error: float, limit: float) 
 
 
 def _position(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
-    return rotate(q_frame_base, _minus(desired.position, state.actual_tcp_pose.position))
+    return rotate(q_frame_base, subtract(desired.position, state.actual_tcp_pose.position))
 
 
 def _orientation(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
@@ -100,21 +97,21 @@ def _orientation(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> 
 
 
 def _linear_velocity(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
-    return rotate(q_frame_base, _minus(state.target_tcp_twist[:3], state.actual_tcp_twist[:3]))
+    return rotate(q_frame_base, subtract(state.target_tcp_twist[:3], state.actual_tcp_twist[:3]))
 
 
 def _angular_velocity(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
-    return rotate(q_frame_base, _minus(state.target_tcp_twist[3:], state.actual_tcp_twist[3:]))
+    return rotate(q_frame_base, subtract(state.target_tcp_twist[3:], state.actual_tcp_twist[3:]))
 
 
 def _linear_acceleration(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
     target, actual = _accelerations(state)
-    return rotate(q_frame_base, _minus(target[:3], actual[:3]))
+    return rotate(q_frame_base, subtract(target[:3], actual[:3]))
 
 
 def _angular_acceleration(desired: Pose, state: RobotState, q_frame_base: Quaternion) -> Vector3:
     target, actual = _accelerations(state)
-    return rotate(q_frame_base, _minus(target[3:], actual[3:]))
+    return rotate(q_frame_base, subtract(target[3:], actual[3:]))
 
 
 def _accelerations(state: RobotState) -> tuple[Vector6, Vector6]:
@@ -122,11 +119,7 @@ def _accelerations(state: RobotState) -> tuple[Vector6, Vector6]:
     return state.target_tcp_acceleration or _UNKNOWN, state.actual_tcp_acceleration or _UNKNOWN
 
 
-def _minus(a: Vector3, b: Vector3) -> Vector3:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-#: Everything that has a tolerance.
+#: All quantities that have a tolerance.
 QUANTITIES: tuple[ToleranceQuantity, ...] = (
     ToleranceQuantity('position', 'm', lambda t: t.position, _position),
     ToleranceQuantity('orientation', 'rad', lambda t: t.orientation, _orientation),

@@ -74,7 +74,7 @@ class ServoFeeder(Feeder):
         """Return what takes the inputs."""
         return [OpenServo()]
 
-    def why_not_ready(self, packet: RobotState | None) -> str:
+    def explain_not_ready(self, packet: RobotState | None) -> str:
         """Return why the arm cannot follow set-points yet."""
         if self.stream.phase is ServoPhase.OPENING:
             return (

@@ -3,29 +3,28 @@
 """
 Set-points through RTDE registers, packet by packet: the driver's side of the buffered servo.
 
-Each packet of the robot is answered by one write with a new sequence number, so the robot program
-knows that somebody is there; most of them carry a set-point. The phases, and what leads from one
-to another (:data:`TRANSITIONS`):
+Each packet of the robot is answered by one write with a new sequence number, which shows the robot
+program that the client is alive; most of them carry a set-point. The phases, whose transitions are
+in :data:`TRANSITIONS`:
 
-* **OPENING**: the inputs are asked for. The first packets show the control step of the robot, and
-  the sequence number that it has read last, perhaps from an earlier client; ours begin behind it.
+* **OPENING**: the inputs are requested. The first packets show the control step of the robot, and
+  the sequence number that it read last, perhaps from an earlier client; ours continue after it.
 * **ENTERING**: the divergence thresholds are written, with the mode IDLE, and the robot program is
-  told to listen (a program after the guide does so always). It has answered when it has read one
-  of our sequence numbers.
-* **READY**: it listens. Nothing moves before somebody begins.
-* **FILLING**: mode SERVO; set-points are where the arm stands, until enough motion time is under
-  way.
-* **SERVOING**: set-points come from the source, as fast as the clock says
-  (:mod:`~.servo_clock`).
-* **HOLDING**: the buffer ran empty, because nothing came through for longer than was under way.
-  The arm stands at the last set-point, or comes to it; set-points repeat that until the buffer is
-  full again, then the motion goes on slowly and gets faster.
-* **DRAINING**: the source is at its end; the last set-point is written again and again.
-* **ARRIVED**: all of them were carried out.
+  asked to read the inputs (a program after the guide always does). It has answered when it has
+  read one of our sequence numbers.
+* **READY**: it reads them. Nothing moves before :meth:`ServoStream.begin`.
+* **FILLING**: mode SERVO; set-points repeat the present position until enough motion time is in
+  flight.
+* **SERVOING**: set-points come from the source, at the rate of the clock (:mod:`~.servo_clock`).
+* **HOLDING**: the buffer ran empty, because nothing came through for longer than was in flight.
+  The arm stops at the last set-point; it is repeated until the buffer is full again, then the
+  motion continues slowly and speeds up.
+* **DRAINING**: the source is at its end; the last set-point is repeated.
+* **ARRIVED**: all set-points were carried out.
 * **LEAVING**: mode IDLE is written; the arm brakes.
-* **LEFT**: the robot program says so; or it has left by itself.
+* **LEFT**: the robot program has confirmed that, or has left by itself.
 
-This knows registers only, no reverse socket: so it drives the sample program of the guide, too.
+Only registers are used, not the reverse socket, so the sample program of the guide works too.
 """
 
 from __future__ import annotations
@@ -44,25 +43,25 @@ from ur_cartesian_driver.motion.servo import ServoActivity, ServoFeedback, Servo
 from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.protocol.program.registers import ExternalError, ServoMode, SyncState
 
-#: The part of a control step that lies between two writes at least: of two in one step the robot
-#: would see the second one only.
+#: Shortest time between two writes, as a part of a control step: of two writes in one step the
+#: robot would read only the second.
 MIN_WRITE_PERIOD = 0.5
-#: The part of the wanted motion time that is under way when the arm starts.
+#: Part of ``target_lag`` that is in flight when the arm starts.
 START_FILL = 0.75
-#: How much faster the motion gets in a second, once it goes on after the buffer was empty [1/s].
+#: How fast the rate of the motion recovers after the buffer was empty [1/s].
 RESTART_ACCELERATION = 2.0
-#: Behind this number sequences begin again: long before the register is at its end.
+#: After this sequence number they begin at 0 again, long before the register overflows.
 MAX_SEQUENCE = 2**30
-#: A clock that jumps by more, or backwards, has not run [s].
+#: Longer or negative steps of the robot's clock count as 0 [s].
 MAX_CLOCK_GAP = 1.0
-#: Control steps of the robots that there are [s].
+#: Shortest and longest control step of existing robots [s].
 MIN_STEP, MAX_STEP = 0.002, 0.008
-#: So many packets show how long the robot's control step is.
+#: How many packets it takes to measure the robot's control step.
 STEP_SAMPLES = 4
 
 
 class ServoPhase(Enum):
-    """Where the streaming is."""
+    """Phase of the streaming."""
 
     OPENING = auto()
     ENTERING = auto()
@@ -77,7 +76,7 @@ class ServoPhase(Enum):
 
 
 class ServoEvent(Enum):
-    """What leads from one phase to another."""
+    """What changes the phase."""
 
     OPENED = auto()
     ANSWERED = auto()
@@ -92,7 +91,7 @@ class ServoEvent(Enum):
 
 _STOPS = {ServoEvent.STOP: ServoPhase.LEAVING, ServoEvent.PROGRAM_LEFT: ServoPhase.LEFT}
 
-#: What is not named leaves the phase as it is.
+#: Events that are not listed leave the phase unchanged.
 TRANSITIONS: Mapping[ServoPhase, Mapping[ServoEvent, ServoPhase]] = MappingProxyType(
     {
         ServoPhase.OPENING: {
@@ -121,7 +120,7 @@ TRANSITIONS: Mapping[ServoPhase, Mapping[ServoEvent, ServoPhase]] = MappingProxy
     }
 )
 
-#: Phases in which the arm belongs to the set-points.
+#: Phases in which set-points lead the arm.
 STREAMING = frozenset(
     {
         ServoPhase.FILLING,
@@ -147,16 +146,16 @@ class ServoSettings:
     """
     How set-points are streamed.
 
-    :raises ValueError: the values cannot work together.
+    :raises ValueError: the values contradict each other.
     """
 
-    #: Motion time that is to be under way to the arm [s]: so long may nothing come through.
+    #: Motion time to keep in flight [s]: a gap in the packets may be so long.
     target_lag: float = 0.04
-    #: Motion time that may be under way [s].
+    #: Longest motion time in flight [s].
     max_lag: float = 0.2
     #: How many set-points the robot's buffer holds.
     buffer_depth: int = 250
-    #: How far each joint may be from its set-point [rad]: beyond, the robot program stops the arm.
+    #: How far each joint may be from its set-point [rad]; beyond, the robot program stops the arm.
     max_divergence: float = 0.3
     #: How far ``servoj`` lags behind its set-points by itself [s].
     lookahead_time: float = 0.03
@@ -165,7 +164,7 @@ class ServoSettings:
         """Refuse what lets the buffer overflow."""
         if not MAX_STEP <= self.target_lag <= self.max_lag:
             raise ValueError(
-                f'servo_target_lag is {self.target_lag:g} s, it has to be within '
+                f'servo_target_lag is {self.target_lag:g} s; it must be between '
                 f'{MAX_STEP:g} and {self.max_lag:g} s.'
             )
         if self.target_lag > MIN_STEP * self.buffer_depth:
@@ -188,7 +187,7 @@ class ServoStream:
         self._times: list[float] = []
         self._latest: ServoFeedback | None = None
         self._sequence = 0
-        #: The first number of ours, of those that want SERVO, and of those that want IDLE again.
+        #: Our first sequence number, the first with mode SERVO, and the first with IDLE again.
         self._first = self._first_servo = self._first_idle = 0
         self._state_time = 0.0
         self._joints: Vector6 = source.next(0.0)
@@ -196,12 +195,12 @@ class ServoStream:
         #: Set-points that the robot has not read yet: sequence number and state time.
         self._unread: deque[tuple[int, float]] = deque()
         self._read_time = 0.0
-        #: How far the source was asked [s]; of what is under way: state time, time of the source.
+        #: Time of the source [s]; of what is in flight: state time, time of the source.
         self._source_time = 0.0
         self._unfinished: deque[tuple[float, float]] = deque()
-        #: The time of the source that the arm was led to last [s].
+        #: Time of the source at the set-point that the arm was led to last [s].
         self.motion_time = 0.0
-        #: How fast the motion runs in the time of the set-points, 0 to 1.
+        #: Rate of the motion relative to the set-points, 0 to 1.
         self._motion_rate = 1.0
         self._last_write = -inf
         self._sent = self._underruns = 0
@@ -214,7 +213,7 @@ class ServoStream:
             max_lag=min(settings.max_lag, settings.buffer_depth * step),
         )
 
-    # ---- what is known ------------------------------------------------------------------------
+    # ---- state --------------------------------------------------------------------------------
 
     @property
     def in_flight(self) -> float:
@@ -234,7 +233,7 @@ class ServoStream:
 
     def report(self, joint_error: Vector6 = UNKNOWN6) -> ServoReport | None:
         """
-        Return how it is going; None before the first packet.
+        Return the state of the servo; None before the first packet.
 
         :param joint_error: target - actual [rad].
         """
@@ -258,7 +257,7 @@ class ServoStream:
             skipped=state.skipped,
         )
 
-    # ---- what happens -------------------------------------------------------------------------
+    # ---- events -------------------------------------------------------------------------------
 
     def begin(self) -> None:
         """Let the arm follow the set-points from now on."""
@@ -268,7 +267,7 @@ class ServoStream:
         self._joints = self._source.next(0.0)
 
     def stop(self) -> tuple[float, ...] | None:
-        """Leave the servo; return what is to be written at once, if anything can be."""
+        """Leave the servo; return what to write at once, None = nothing."""
         before = self.phase
         self._apply(ServoEvent.STOP)
         if self.phase is before or self.phase is ServoPhase.LEFT:
@@ -279,7 +278,7 @@ class ServoStream:
 
     def on_feedback(self, feedback: ServoFeedback, now: float) -> tuple[float, ...] | None:
         """
-        Take a packet; return what is to be written, None = nothing.
+        Take a packet; return what to write, None = nothing.
 
         :param now: time of a steady clock [s].
         """
@@ -301,7 +300,7 @@ class ServoStream:
         return self._row()
 
     def _open(self, feedback: ServoFeedback) -> bool:
-        """Learn from the first packets; return whether they were enough."""
+        """Measure the control step in the first packets; return whether they were enough."""
         self._times.append(feedback.timestamp)
         if len(self._times) < STEP_SAMPLES:
             return False
@@ -316,18 +315,18 @@ class ServoStream:
 
     def _update_read(self, feedback: ServoFeedback) -> None:
         """Forget what the robot has read."""
-        if feedback.last_sequence <= self._sequence:  # else it is not about ours
+        if feedback.last_sequence <= self._sequence:  # else it is not one of ours
             while self._unread and self._unread[0][0] <= feedback.last_sequence:
                 self._read_time = self._unread.popleft()[1]
 
     def _update_motion_time(self) -> None:
-        """Find how far the arm was led."""
+        """Update the time of the source that the arm has reached."""
         done = self._state_time - self.in_flight + 0.5 * self._clock.step
         while self._unfinished and self._unfinished[0][0] <= done:
             self.motion_time = self._unfinished.popleft()[1]
 
     def _update_phase(self, feedback: ServoFeedback) -> None:
-        """Find what the packet changes."""
+        """Change the phase as the packet requires."""
         phase = self.phase
         if phase is ServoPhase.ENTERING and self._has_read(self._first):
             self._apply(ServoEvent.ANSWERED)
@@ -351,7 +350,7 @@ class ServoStream:
             self._apply(ServoEvent.DONE)
 
     def _has_left(self, feedback: ServoFeedback) -> bool:
-        """Tell whether the program is not in SERVO, after it was told to be or not to be."""
+        """Tell whether the program is out of SERVO, on our request or by itself."""
         if self.phase is ServoPhase.LEAVING:
             return self._has_read(self._first_idle) and feedback.mode != ServoMode.SERVO
         return (
@@ -370,7 +369,7 @@ class ServoStream:
             self._motion_rate = min(1.0, self._motion_rate + RESTART_ACCELERATION * passed)
 
     def _next_write(self) -> None:
-        """Give the next write a number, and make a set-point of it if one is due."""
+        """Give the next write a number, and a set-point if one is due."""
         self._sequence += 1
         if self.phase in (ServoPhase.FILLING, ServoPhase.SERVOING, ServoPhase.HOLDING):
             steps = self._clock.take_steps(self.in_flight)

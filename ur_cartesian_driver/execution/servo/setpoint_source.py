@@ -1,42 +1,41 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Where the set-points of the buffered servo come from."""
+"""Sources of set-points for the buffered servo."""
 
 from __future__ import annotations
 
-from typing import cast, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from ur_cartesian_driver.motion.joint_spline import JointSpline
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.vectors import Vector6, vector6
 
-#: So many set-points of a spline are computed at a time: a row of an array costs a fiftieth of
-#: what it costs alone.
+#: How many set-points of a spline are computed at a time: in an array each costs a fiftieth.
 BATCH = 128
 _TIME_TOLERANCE = 1e-12
 
 
 class SetpointSource(Protocol):
-    """Joint positions, one after the other; the streaming decides how fast time passes."""
+    """Gives joint positions one after the other; the stream decides how fast time passes."""
 
     def next(self, dt: float) -> Vector6:
         """
-        Return the joint positions [rad] so much later [s], in nominal time; 0 = hold.
+        Return the next joint positions [rad].
 
-        :param dt: since the last call.
+        :param dt: nominal time since the last call [s]; 0 = hold.
         """
 
     @property
     def done(self) -> bool:
-        """Whether the last positions were the end, where the arm is to arrive."""
+        """Whether the last positions were the end, where the arm comes to rest."""
 
 
 class SplineSetpoints:
-    """A joint spline, from its beginning to its end."""
+    """The set-points of a joint spline, from its beginning to its end."""
 
     def __init__(self, spline: JointSpline) -> None:
-        """Begin at the start of the curve."""
+        """Begin at the start of the spline."""
         self._spline = spline
         self._time = float(spline.times[0])
         self._end = float(spline.times[-1])
@@ -47,7 +46,7 @@ class SplineSetpoints:
 
     @property
     def done(self) -> bool:
-        """Whether the end of the curve is reached."""
+        """Whether the end of the spline is reached."""
         return self._time >= self._end - _TIME_TOLERANCE
 
     def next(self, dt: float) -> Vector6:
@@ -62,13 +61,13 @@ class SplineSetpoints:
         return self._current
 
     def _compute_batch(self, dt: float) -> None:
-        """Compute what comes next, if the steps stay as they are."""
+        """Compute the next set-points, for steps of the same length."""
         count = BATCH if abs(dt - self._step) <= _TIME_TOLERANCE else 1
         self._step, self._row = dt, 0
         times = self._time + dt * np.arange(1, count + 1, dtype=np.float64)
         q, _, _ = self._spline.rows(times.astype(np.float64))
-        self._rows = [cast(Vector6, tuple(row)) for row in q.tolist()]
+        self._rows = [vector6(row) for row in q.tolist()]
 
     def _at(self, time: float) -> Vector6:
         q, _, _ = self._spline.at(time)
-        return cast(Vector6, tuple(q.tolist()))
+        return vector6(q.tolist())
