@@ -62,12 +62,12 @@ class SegmentTiming:
     #: What the wire carries; ``wire_time`` 0 = speed and acceleration count.
     velocity: float
     acceleration: float
-    wire_time: float
+    wire_time: float = 0.0
     #: The unit of the leading quantity, and its speed profile between the blends.
     unit: str
     profile: SpeedProfile
-    #: Expected time, half of each blend included [s].
-    duration: float
+    #: Expected time, half of each blend included [s]; 0 until the blends are timed.
+    duration: float = 0.0
     #: Time in the blend after it [s], 0 without one.
     blend_time: float = 0.0
     #: Where speed or time come from, for the report.

@@ -262,10 +262,8 @@ def _by_speed(
     return SegmentTiming(
         velocity=velocity,
         acceleration=acceleration,
-        wire_time=0.0,
         unit=unit,
         profile=profile,
-        duration=profile.duration,
         source=source,
         remark=remark,
     )
@@ -349,7 +347,6 @@ def _turning_line(
         wire_time=wire_time,
         unit='rad',
         profile=profile,
-        duration=time,
         source=f'{source}, turn within angular_velocity',
         remark=remark,
     )
@@ -385,7 +382,6 @@ def _by_time(
         wire_time=time,
         unit=unit,
         profile=profile,
-        duration=time,
         source=_time_source(geometry),
         remark=remark,
     )
@@ -435,10 +431,8 @@ def _by_speed_for_time(
     return SegmentTiming(
         velocity=velocity,
         acceleration=acceleration,
-        wire_time=0.0,
         unit=unit,
         profile=profile,
-        duration=time,
         source=_time_source(geometry),
         remark=remark,
     )
