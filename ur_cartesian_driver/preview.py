@@ -24,6 +24,7 @@ from ur_cartesian_driver.motion.joint_spline import JointSpline
 from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row
 from ur_cartesian_driver.motion.primitive import Joints, MoveJ, OptimoveJ, Spline
+from ur_cartesian_driver.motion.vectors import vector6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -157,8 +158,7 @@ class _JointMove:
 
     def at(self, row_position: float) -> Joints:
         u = min(1.0, max(0.0, (row_position - self.first) / max(1, self.last - self.first)))
-        a, b, c, d, e, f = (x + u * (y - x) for x, y in zip(self.q_start, self.q_end, strict=True))
-        return (a, b, c, d, e, f)
+        return vector6(x + u * (y - x) for x, y in zip(self.q_start, self.q_end, strict=True))
 
 
 def _joint_moves(plan: Plan) -> dict[int, _JointMove]:

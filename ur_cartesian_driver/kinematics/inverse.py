@@ -27,7 +27,7 @@ from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of, IdealArm
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, PositionLimits
 from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.vectors import Vector3
+from ur_cartesian_driver.motion.vectors import Vector3, vector6
 
 # How far a position may lie outside its limit by rounding [rad].
 _LIMIT_ROUNDING = 1e-9
@@ -125,7 +125,7 @@ def nearest_to_posture(
     :param named: wanted positions [rad] by the index of the joint.
     :param q_before: the configuration before [rad].
     """
-    wanted = _six(named.get(i, position) for i, position in enumerate(q_before))
+    wanted = vector6(named.get(i, position) for i, position in enumerate(q_before))
     candidates = [
         q
         for solution in solutions(arm, T_base_flange, wanted)
@@ -198,7 +198,7 @@ def _twins(arm: Arm, q: Joints) -> list[Joints]:
 
 
 def _step_along(q: Joints, direction: NDArray[np.float64], distance: float) -> Joints:
-    return _six(a + distance * float(b) for a, b in zip(q, direction, strict=True))
+    return vector6(a + distance * float(b) for a, b in zip(q, direction, strict=True))
 
 
 def _nearest_of(
@@ -249,7 +249,7 @@ def _refine(arm: Arm, T_base_flange: Pose, start: Joints) -> Joints | None:
     # The error of the orientation is a sine: it also vanishes for half a turn.
     if not _is_near(arm.forward(q), T_base_flange):
         return None
-    return _six(wrap(angle) for angle in q)
+    return vector6(wrap(angle) for angle in q)
 
 
 def _columns(T_base_flange: Pose) -> tuple[Vector3, Vector3, Vector3]:
@@ -279,7 +279,7 @@ def _step(q: Joints, frames: ChainFrames, error: list[float], square: float) -> 
     normal.flat[::7] += max(square, MIN_DAMPING)
     step: list[float] = np.linalg.solve(normal, jacobian.T @ np.array(error)).tolist()
     scale = min(1.0, _MAX_JOINT_STEP / max(max(step), -min(step), 1e-300))
-    return _six(angle + scale * change for angle, change in zip(q, step, strict=True))
+    return vector6(angle + scale * change for angle, change in zip(q, step, strict=True))
 
 
 def _is_near(T_base_a: Pose, T_base_b: Pose) -> bool:
@@ -287,11 +287,6 @@ def _is_near(T_base_a: Pose, T_base_b: Pose) -> bool:
 
 
 # --- Angles, turns and distances -------------------------------------------------------------
-
-
-def _six(values: Iterator[float]) -> Joints:
-    a, b, c, d, e, f = values
-    return (a, b, c, d, e, f)
 
 
 def _same(a: Joints, b: Joints) -> bool:
@@ -327,7 +322,7 @@ def _nearest_turns(
             if low <= other <= high and abs(other - before) < abs(best - before):
                 best = other
         turned.append(best)
-    return _six(iter(turned))
+    return vector6(iter(turned))
 
 
 def _nearest_turn(angle: float, target: float, low: float, high: float) -> float | None:

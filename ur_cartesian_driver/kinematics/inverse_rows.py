@@ -38,6 +38,7 @@ from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.inverse import MIN_DAMPING, MISFIT_FACTORS, nearest, solutions
 from ur_cartesian_driver.motion.pose import pose_from_row
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import vector6
 
 # Rows solved together: as many as have their numbers in the cache of a core.
 _BLOCK = 1024
@@ -270,8 +271,7 @@ def _max_joint_change(changes: Floats) -> Floats:
 
 
 def _joints(row: Floats) -> Joints:
-    a, b, c, d, e, f = row.tolist()
-    return (a, b, c, d, e, f)
+    return vector6(row.tolist())
 
 
 # --- The calibrated arm ----------------------------------------------------------------------

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
+from ur_cartesian_driver.motion.vectors import Vector6, vector6, ZERO6
 
 
 def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState:
@@ -45,5 +45,4 @@ def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState
 
 
 def _extrapolate(q: Vector6, qd: Vector6, time: float) -> Vector6:
-    a, b, c, d, e, f = (x + v * time for x, v in zip(q, qd, strict=True))
-    return a, b, c, d, e, f
+    return vector6(x + v * time for x, v in zip(q, qd, strict=True))

@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.pose import (
     slerp,
 )
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.vectors import Vector3
+from ur_cartesian_driver.motion.vectors import cross, dot, scale, subtract, Vector3, vector6
 from ur_cartesian_driver.planning.geometry.pose_rows import (
     compose_rows,
     Floats,
@@ -158,13 +158,13 @@ class ArcCurve:
         :raises ValueError: the three positions make no circle; the text is a clause that says why.
         """
         center, axis, radius = _circle(start.position, via, end.position)
-        e1 = _scale(_minus(start.position, center), 1.0 / radius)
-        e2 = _cross(axis, e1)
-        sweep = _angle_on(e1, e2, _minus(end.position, center))
+        e1 = scale(subtract(start.position, center), 1.0 / radius)
+        e2 = cross(axis, e1)
+        sweep = _angle_on(e1, e2, subtract(end.position, center))
         if mode is ArcMode.FIXED:
-            turn = quaternion_from_rotation_vector(_scale(axis, sweep))
+            turn = quaternion_from_rotation_vector(scale(axis, sweep))
             end = Pose(end.position, multiply(turn, start.quaternion))
-        u_via = _angle_on(e1, e2, _minus(via, center)) / sweep
+        u_via = _angle_on(e1, e2, subtract(via, center)) / sweep
         return cls(start, end, center, axis, radius, sweep, mode, u_via)
 
     @property
@@ -185,15 +185,15 @@ class ArcCurve:
 
     def pose(self, u: float) -> Pose:
         """Return the pose at ``u``."""
-        turn = quaternion_from_rotation_vector(_scale(self.axis, u * self.sweep))
-        swing = Pose(self.center, turn) @ Pose(_minus(self.start.position, self.center))
+        turn = quaternion_from_rotation_vector(scale(self.axis, u * self.sweep))
+        swing = Pose(self.center, turn) @ Pose(subtract(self.start.position, self.center))
         return Pose(swing.position, self._orientation(turn, u))
 
     def rows(self, u: Floats) -> Floats:
         """Return the poses (n, 7) at many ``u`` (n,)."""
         rows = interpolate_rows(np.array([self.start.row()]), np.array([self.end.row()]), u)
-        spoke = _minus(self.start.position, self.center)  # at a right angle to the axis
-        angle, across = u[:, None] * self.sweep, _cross(self.axis, spoke)
+        spoke = subtract(self.start.position, self.center)  # at a right angle to the axis
+        angle, across = u[:, None] * self.sweep, cross(self.axis, spoke)
         rows[:, :3] = self.center + np.cos(angle) * spoke + np.sin(angle) * across
         if self.mode is ArcMode.FIXED:
             turn = np.concatenate([np.sin(0.5 * angle) * self.axis, np.cos(0.5 * angle)], axis=1)
@@ -261,8 +261,7 @@ class JointLineCurve:
     @property
     def travel(self) -> Joints:
         """How far each joint turns [rad], all >= 0."""
-        a, b, c, d, e, f = (abs(y - x) for x, y in zip(self.q_start, self.q_end, strict=True))
-        return (a, b, c, d, e, f)
+        return vector6(abs(y - x) for x, y in zip(self.q_start, self.q_end, strict=True))
 
     @property
     def joint_travel(self) -> float:
@@ -337,7 +336,7 @@ def is_same_pose(a: Pose, b: Pose) -> bool:
 
 def _circle(a: Vector3, b: Vector3, c: Vector3) -> tuple[Vector3, Vector3, float]:
     """Return center, axis (unit) and radius of the circle that goes a, b, c in this order."""
-    ab, ac = _minus(b, a), _minus(c, a)
+    ab, ac = subtract(b, a), subtract(c, a)
     chord = hypot(*ac)
     for name, distance_apart in (
         ('the start and the end', chord),
@@ -348,35 +347,19 @@ def _circle(a: Vector3, b: Vector3, c: Vector3) -> tuple[Vector3, Vector3, float
             raise ValueError(f'{name} of the arc coincide ({1e3 * distance_apart:.3f} mm apart)')
     if max(chord, hypot(*ab)) > MAX_ARC_SIZE:
         raise ValueError(f'the points of the arc are more than {MAX_ARC_SIZE:g} m apart')
-    normal = _cross(ab, ac)
+    normal = cross(ab, ac)
     area = hypot(*normal)
     if area / max(chord, hypot(*ab), distance(b, c)) < MIN_ARC_HEIGHT:
         raise ValueError('the start, the via and the end of the arc lie on one straight line')
     # Circumcenter seen from a: ((|ab|^2 ac - |ac|^2 ab) x (ab x ac)) / (2 |ab x ac|^2).
     ab2, ac2 = hypot(*ab) ** 2, chord**2
-    mixed = _minus(_scale(ac, ab2), _scale(ab, ac2))
-    offset = _scale(_cross(mixed, normal), 0.5 / area**2)
+    mixed = subtract(scale(ac, ab2), scale(ab, ac2))
+    offset = scale(cross(mixed, normal), 0.5 / area**2)
     center = (a[0] + offset[0], a[1] + offset[1], a[2] + offset[2])
-    return center, _scale(normal, 1.0 / area), hypot(*offset)
+    return center, scale(normal, 1.0 / area), hypot(*offset)
 
 
 def _angle_on(e1: Vector3, e2: Vector3, v: Vector3) -> float:
     """Return the angle of a vector in the plane of e1 and e2, in (0, 2 pi]."""
-    angle = atan2(_dot(e2, v), _dot(e1, v))
+    angle = atan2(dot(e2, v), dot(e1, v))
     return angle if angle > 0.0 else angle + 2.0 * pi
-
-
-def _minus(a: Vector3, b: Vector3) -> Vector3:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-def _scale(a: Vector3, s: float) -> Vector3:
-    return (s * a[0], s * a[1], s * a[2])
-
-
-def _dot(a: Vector3, b: Vector3) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Vector3, b: Vector3) -> Vector3:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])

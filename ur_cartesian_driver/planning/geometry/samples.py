@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning.geometry.blend import Blend, blend_rows, crossfade, path_rows
 from ur_cartesian_driver.planning.geometry.curves import Curve, JointLineCurve, SegmentCurve
 from ur_cartesian_driver.planning.geometry.pose_rows import Floats
@@ -51,8 +52,7 @@ class PathSamples:
         """Return the joint positions at the sample of a segment closest to a fraction."""
         first, last = np.searchsorted(self.segment, (segment, segment + 1))
         row = int(first) + int(np.argmin(np.abs(self.fraction[first:last] - fraction)))
-        a, b, c, d, e, f = self.q[row].tolist()
-        return (a, b, c, d, e, f)
+        return vector6(self.q[row].tolist())
 
 
 @dataclass(frozen=True, slots=True)

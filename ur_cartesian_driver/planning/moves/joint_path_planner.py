@@ -27,6 +27,7 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.goal import Goal, SegmentType
 from ur_cartesian_driver.motion.pose import Pose, pose_rows
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning.geometry.blend import BlendInput, blends
 from ur_cartesian_driver.planning.geometry.curves import (
     is_same_pose,
@@ -262,8 +263,7 @@ class JointPathPlanner:
     def _finish_run(self, draft: SegmentDraft, joint_path: JointPath) -> None:
         draft.checked_until = self._end(draft.index - self._drafts[0].index)
         if len(joint_path.q):
-            a, b, c, d, e, f = joint_path.q[-1].tolist()
-            self._q = (a, b, c, d, e, f)
+            self._q = vector6(joint_path.q[-1].tolist())
 
     def _posture_refusal(self, draft: SegmentDraft, q: Joints) -> InvalidPosture | None:
         """Return the refusal of a line or an arc that misses its posture."""
@@ -342,8 +342,7 @@ class JointPathPlanner:
         )
         if rest.refusal is not None:
             raise rest.refusal
-        a, b, c, d, e, f = rest.q[-1].tolist()
-        return (a, b, c, d, e, f)
+        return vector6(rest.q[-1].tolist())
 
     def _solve_entry(self, k: int) -> None:
         """Solve what leads into a joint move."""
@@ -368,8 +367,7 @@ class JointPathPlanner:
         )
         if near is not None:
             raise near[0]
-        a, b, c, d, e, f = joint_path.q[-1].tolist()
-        self._q = (a, b, c, d, e, f)
+        self._q = vector6(joint_path.q[-1].tolist())
         line = self._drafts[k].known_curve
         assert isinstance(line, JointLineCurve)
         joins = line.joints(self._drafts[k].u_join)
@@ -391,8 +389,7 @@ class JointPathPlanner:
         self.path_margins.add(
             SolvedPieces(pieces, joint_path, segments, fractions, nothing, self._q)
         )
-        a, b, c, d, e, f = joint_path.q[-1].tolist()
-        self._q = (a, b, c, d, e, f)
+        self._q = vector6(joint_path.q[-1].tolist())
 
     # -- blends ----------------------------------------------------------------------------------
 

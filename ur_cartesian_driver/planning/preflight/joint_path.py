@@ -23,6 +23,7 @@ from ur_cartesian_driver.kinematics.inverse_rows import branch_measures, solve_p
 from ur_cartesian_driver.motion.errors import GoalRefused
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.pose_rows import compose_rows, Floats
 from ur_cartesian_driver.planning.geometry.samples import (
@@ -256,8 +257,7 @@ def _max_joint_change(a: Joints, b: Joints) -> float:
 
 
 def _joints(row: Floats) -> Joints:
-    a, b, c, d, e, f = row.tolist()
-    return (a, b, c, d, e, f)
+    return vector6(row.tolist())
 
 
 def max_path_length(kinematics: TcpKinematics) -> float:

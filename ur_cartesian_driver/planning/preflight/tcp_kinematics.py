@@ -36,6 +36,7 @@ from ur_cartesian_driver.motion.errors import (
 from ur_cartesian_driver.motion.goal import Posture
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import vector6
 
 #: How far a named joint may arrive from the chosen solution, turns included [rad].
 ARRIVAL_TOLERANCE = 0.01
@@ -194,10 +195,9 @@ class TcpKinematics:
         """Return the solution that continues a configuration, regardless of joint limits."""
 
         def around(found: Joints) -> Joints:
-            a, b, c, d, e, f = (
+            return vector6(
                 x + 2.0 * pi * round((y - x) / (2.0 * pi)) for x, y in zip(found, q, strict=True)
             )
-            return (a, b, c, d, e, f)
 
         every = (around(found) for found in solutions(self.arm, self.flange(T_base_tcp), q))
         found = min(every, key=lambda found: dist(found, q), default=None)

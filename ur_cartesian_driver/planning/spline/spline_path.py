@@ -26,6 +26,7 @@ from ur_cartesian_driver.motion.errors import (
 )
 from ur_cartesian_driver.motion.goal import Waypoint
 from ur_cartesian_driver.motion.primitive import Joints
+from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning.geometry.curves import ARC_CHORD_ERROR, HALF_TURN
 from ur_cartesian_driver.planning.geometry.pose_rows import angle_rows, Floats
 from ur_cartesian_driver.planning.geometry.samples import (
@@ -201,8 +202,7 @@ def _check_posture(
     options: PlanningOptions,
 ) -> None:
     named = named_joints(point.posture, options.tf_prefix)
-    a, b, c, d, e, f = q.tolist()
-    arrives = (a, b, c, d, e, f)
+    arrives = vector6(q.tolist())
     chosen = kinematics.solve_posture(
         piece.pose(1.0), named, arrives, point_field(piece.index, 'pose')
     )

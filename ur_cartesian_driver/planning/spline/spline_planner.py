@@ -27,7 +27,7 @@ from ur_cartesian_driver.motion.plan import Plan, PlannedSegment, ReferencePath
 from ur_cartesian_driver.motion.polynomials import MotionRows
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import Joints, Spline
-from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
+from ur_cartesian_driver.motion.vectors import Vector6, vector6, ZERO6
 from ur_cartesian_driver.planning.geometry.curves import tcp_rows
 from ur_cartesian_driver.planning.geometry.pose_rows import Floats, keep_hemisphere
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolPoints, ToolSpline
@@ -364,8 +364,7 @@ def _tightest_remark(path: SplinePath) -> str:
 
 
 def _six(values: Floats) -> Vector6:
-    a, b, c, d, e, f = values.tolist()
-    return (a, b, c, d, e, f)
+    return vector6(values.tolist())
 
 
 def stretch_times(goal: Goal, factor: float) -> Goal:

@@ -17,7 +17,7 @@ from typing import Any
 
 from ur_cartesian_driver.motion.pose import IDENTITY
 from ur_cartesian_driver.motion.state import RobotMode
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6
+from ur_cartesian_driver.motion.vectors import add, Vector3, Vector6
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.motion.point_motion import (
     dot,
@@ -73,7 +73,7 @@ def _accelerometer(controller: Controller) -> Vector3:
     frames = controller.arm.frames(motion.q)
     acceleration = point_motion(frames, motion.qd, motion.qdd, frames.position).acceleration
     ex, ey, ez, _, _, _ = controller.actual.acceleration_error
-    specific_force = _sum(_sum(acceleration, (ex, ey, ez)), controller.gravity)
+    specific_force = add(add(acceleration, (ex, ey, ez)), controller.gravity)
     return (
         dot(specific_force, frames.x),
         dot(specific_force, frames.y),
@@ -89,12 +89,8 @@ def _payload_moments(controller: Controller) -> Vector6:
     frames = controller.arm.frames(motion.q)
     centre = flange_point(frames, controller.payload.cog)
     acceleration = point_motion(frames, motion.qd, motion.qdd, centre).acceleration
-    x, y, z = _sum(acceleration, controller.gravity)
+    x, y, z = add(acceleration, controller.gravity)
     return moments_for(frames, centre, (mass * x, mass * y, mass * z))
-
-
-def _sum(a: Vector3, b: Vector3) -> Vector3:
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 def _powered(controller: Controller) -> bool:

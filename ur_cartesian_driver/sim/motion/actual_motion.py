@@ -22,7 +22,7 @@ from ur_cartesian_driver.motion.pose import (
     Pose,
     quaternion_from_rotation_vector,
 )
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.vectors import add6, scale6, Vector6, vector6
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
 _ZERO: Vector6 = (0.0,) * 6
@@ -53,8 +53,8 @@ class ActualMotion:
         if acceleration is None:
             self._drift, self._twist = _ZERO, twist
         else:
-            self._drift = _sum(self._drift, _times(acceleration, self._motion.cycle))
-            self._twist = self._drift if twist is None else _sum(self._drift, twist)
+            self._drift = add6(self._drift, scale6(acceleration, self._motion.cycle))
+            self._twist = self._drift if twist is None else add6(self._drift, twist)
 
     @property
     def T_base_tcp(self) -> Pose:
@@ -82,35 +82,24 @@ class ActualMotion:
     def tcp_twist(self) -> Vector6:
         """Twist of the tool centre point in base axes [m/s, rad/s]."""
         twist = self._motion.tcp_twist
-        return twist if self._twist is None else _sum(twist, self._twist)
+        return twist if self._twist is None else add6(twist, self._twist)
 
     @property
     def qd(self) -> Vector6:
         """Joint speeds for the deviated twist [rad/s]."""
         if self._twist is None:
             return self._motion.qd
-        return _sum(self._motion.qd, self._joint_change(self._twist))
+        return add6(self._motion.qd, self._joint_change(self._twist))
 
     def _solve(self, deviation: Vector6) -> Vector6:
         motion = self._motion
         T_base_flange = self.T_base_tcp @ motion.T_flange_tcp.inverse()
         q = nearest(motion.arm, T_base_flange, motion.q)
         if q is None or dist(q, motion.q) > _BRANCH_JUMP:
-            return _sum(motion.q, self._joint_change(deviation))
+            return add6(motion.q, self._joint_change(deviation))
         return q
 
     def _joint_change(self, change: Vector6) -> Vector6:
         """Return the joint change for a small change of the TCP; the smallest one if singular."""
         jacobian = self._motion.arm.jacobian(self._motion.q, self._motion.T_flange_tcp)
-        a, b, c, d, e, f = (float(v) for v in np.linalg.pinv(jacobian, rcond=1e-6) @ change)
-        return a, b, c, d, e, f
-
-
-def _sum(left: Vector6, right: Vector6) -> Vector6:
-    a, b, c, d, e, f = (x + y for x, y in zip(left, right, strict=True))
-    return a, b, c, d, e, f
-
-
-def _times(vector: Vector6, factor: float) -> Vector6:
-    a, b, c, d, e, f = (factor * v for v in vector)
-    return a, b, c, d, e, f
+        return vector6(float(v) for v in np.linalg.pinv(jacobian, rcond=1e-6) @ change)

@@ -12,7 +12,7 @@ joint positions or a pose of the TCP in the base.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import atan2, cos, hypot, pi, sin, sqrt, tan
+from math import atan2, cos, pi, sin, sqrt, tan
 from typing import Protocol, TypeAlias
 
 from ur_cartesian_driver.motion.pose import (
@@ -22,7 +22,17 @@ from ur_cartesian_driver.motion.pose import (
     Pose,
     quaternion_from_rotation_vector,
 )
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6
+from ur_cartesian_driver.motion.vectors import (
+    add,
+    cross,
+    dot,
+    norm,
+    scale,
+    subtract,
+    unit,
+    Vector3,
+    Vector6,
+)
 from ur_cartesian_driver.sim.motion.moves import MotionError
 
 Setpoint: TypeAlias = Vector6 | Pose
@@ -134,17 +144,17 @@ class CircularMovePath:
 
     def __init__(self, start: Pose, via: Vector3, end: Pose, fixed: bool) -> None:
         """Find centre, axes and angle of the arc."""
-        a, b = _minus(via, start.position), _minus(end.position, start.position)
-        n = _cross(a, b)
+        a, b = subtract(via, start.position), subtract(end.position, start.position)
+        n = cross(a, b)
         _check_circle(a, b, n)
         # The centre of the circle through 0, a, b: (|a|^2 b - |b|^2 a) x n / 2|n|^2.
-        aa, bb, nn = _dot(a, a), _dot(b, b), _dot(n, n)
-        offset = _times(_cross(_minus(_times(b, aa), _times(a, bb)), n), 0.5 / nn)
-        self.centre = _plus(start.position, offset)
-        self.radius = _norm(offset)
-        self.normal = _times(n, 1.0 / sqrt(nn))
-        self._x = _times(offset, -1.0 / self.radius)
-        self._y = _cross(self.normal, self._x)
+        aa, bb, nn = dot(a, a), dot(b, b), dot(n, n)
+        offset = scale(cross(subtract(scale(b, aa), scale(a, bb)), n), 0.5 / nn)
+        self.centre = add(start.position, offset)
+        self.radius = norm(offset)
+        self.normal = scale(n, 1.0 / sqrt(nn))
+        self._x = scale(offset, -1.0 / self.radius)
+        self._y = cross(self.normal, self._x)
         self.angle = self._angle_of(end.position)
         self.start, self._fixed = start, fixed
         self.end = self._setpoint(self.angle) if fixed else end
@@ -160,19 +170,19 @@ class CircularMovePath:
 
     def _angle_of(self, point: Vector3) -> float:
         # The normal is such that start, via, end come in this order with growing angle.
-        r = _minus(point, self.centre)
-        return atan2(_dot(r, self._y), _dot(r, self._x)) % (2.0 * pi)
+        r = subtract(point, self.centre)
+        return atan2(dot(r, self._y), dot(r, self._x)) % (2.0 * pi)
 
     def _setpoint(self, angle: float) -> Pose:
-        position = _plus(
+        position = add(
             self.centre,
-            _plus(
-                _times(self._x, self.radius * cos(angle)),
-                _times(self._y, self.radius * sin(angle)),
+            add(
+                scale(self._x, self.radius * cos(angle)),
+                scale(self._y, self.radius * sin(angle)),
             ),
         )
         if self._fixed:
-            turn = quaternion_from_rotation_vector(_times(self.normal, angle))
+            turn = quaternion_from_rotation_vector(scale(self.normal, angle))
             return Pose(position, multiply(turn, self.start.quaternion))
         fraction = angle / self.angle
         return Pose(position, self.start.interpolate(self.end, fraction).quaternion)
@@ -232,7 +242,7 @@ class ToolBlendPath:
         b = self._after.pose(self._head * u * u)
         back = conjugate(self._waypoint.quaternion)
         return Pose(
-            _minus(_plus(a.position, b.position), self._waypoint.position),
+            subtract(add(a.position, b.position), self._waypoint.position),
             multiply(a.quaternion, multiply(back, b.quaternion)),
         )
 
@@ -252,13 +262,13 @@ class FilletBlendPath:
         self._turn = ToolBlendPath(before, tail, after, head)
         entry = before.pose(before.length - tail).position
         waypoint = before.end.position
-        into = _unit(_minus(waypoint, entry))
-        onwards = _unit(_minus(after.end.position, waypoint))
+        into = unit(subtract(waypoint, entry))
+        onwards = unit(subtract(after.end.position, waypoint))
         self.angle = fillet_angle(before, after)
         self.radius = distance(entry, waypoint) / tan(0.5 * self.angle)
-        inwards = _unit(_minus(onwards, _times(into, _dot(onwards, into))))
-        self.centre = _plus(entry, _times(inwards, self.radius))
-        self._x, self._y = _times(inwards, -1.0), into
+        inwards = unit(subtract(onwards, scale(into, dot(onwards, into))))
+        self.centre = add(entry, scale(inwards, self.radius))
+        self._x, self._y = scale(inwards, -1.0), into
         arc = self.radius * self.angle
         self.entry_rate = arc * before.length / before.distance
         self.exit_rate = arc * after.length / after.distance
@@ -270,11 +280,11 @@ class FilletBlendPath:
             return turned
         phi = self.angle * u
         return Pose(
-            _plus(
+            add(
                 self.centre,
-                _plus(
-                    _times(self._x, self.radius * cos(phi)),
-                    _times(self._y, self.radius * sin(phi)),
+                add(
+                    scale(self._x, self.radius * cos(phi)),
+                    scale(self._y, self.radius * sin(phi)),
                 ),
             ),
             turned.quaternion,
@@ -286,9 +296,9 @@ BlendPath: TypeAlias = JointBlendPath | ToolBlendPath | FilletBlendPath
 
 def fillet_angle(before: LinearMovePath, after: LinearMovePath) -> float:
     """Return the angle between the directions of two lines [rad]."""
-    a = _unit(_minus(before.end.position, before.start.position))
-    b = _unit(_minus(after.end.position, after.start.position))
-    return 2.0 * atan2(_norm(_minus(a, b)), _norm(_plus(a, b)))
+    a = unit(subtract(before.end.position, before.start.position))
+    b = unit(subtract(after.end.position, after.start.position))
+    return 2.0 * atan2(norm(subtract(a, b)), norm(add(a, b)))
 
 
 def make_blend(
@@ -358,42 +368,14 @@ def _exit_parameter(pose: Callable[[float], Pose], radius: float, length: float)
 
 
 def _check_circle(a: Vector3, b: Vector3, n: Vector3) -> None:
-    sides = _norm(a), _norm(b), _norm(_minus(b, a))
+    sides = norm(a), norm(b), norm(subtract(b, a))
     if min(sides) < _COINCIDENT:
         raise MotionError(
             'movec needs three different points: start, via and target; two of them are '
             f'{min(sides):.2g} m apart. A full circle takes two arcs.'
         )
-    if _norm(n) < _COLLINEAR * sides[0] * sides[1]:
+    if norm(n) < _COLLINEAR * sides[0] * sides[1]:
         raise MotionError(
             'movec: start, via and target lie on one straight line, which is no circle; '
             'use movel or move the via point aside.'
         )
-
-
-def _plus(a: Vector3, b: Vector3) -> Vector3:
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
-
-
-def _minus(a: Vector3, b: Vector3) -> Vector3:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-def _times(a: Vector3, f: float) -> Vector3:
-    return (a[0] * f, a[1] * f, a[2] * f)
-
-
-def _dot(a: Vector3, b: Vector3) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def _cross(a: Vector3, b: Vector3) -> Vector3:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def _norm(a: Vector3) -> float:
-    return hypot(a[0], a[1], a[2])
-
-
-def _unit(a: Vector3) -> Vector3:
-    return _times(a, 1.0 / _norm(a))
