@@ -9,7 +9,8 @@ import socket
 from ur_cartesian_driver.driver import DriverConfig
 from ur_cartesian_driver.driver.ipc import channel
 from ur_cartesian_driver.driver.ipc.state_memory import create, StateMemory
-from ur_cartesian_driver.driver.loop.robot_loop import MAX_UNREAD, RobotLoop
+from ur_cartesian_driver.driver.loop.owner_pipe import MAX_UNREAD
+from ur_cartesian_driver.driver.loop.robot_loop import RobotLoop
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 
@@ -25,9 +26,9 @@ def test_an_owner_that_does_not_read_costs_no_memory_and_misses_no_end():
         loop = RobotLoop(channel.Configure(config=DriverConfig()), memory, writer)
         line = channel.LogMessage(level=20, text='x' * 10_000)
         for _ in range(1000):
-            loop._send(line)
+            loop._pipe.send(line)
         assert writer.transport.get_write_buffer_size() < MAX_UNREAD + 20_000
-        loop._send(ended)
+        loop._pipe.send(ended)
         ours.settimeout(5.0)
         told = [line]
         while told[-1] == line:

@@ -136,9 +136,10 @@ def clear_network_log(cell):
 def retained_sizes(cell):
     """Return what the robot loop keeps of the goal that runs: records, rows of path, messages."""
     loop = cell.loop_task.get_coro().cr_frame.f_locals['self']
-    monitor = loop._machine.feeder.monitor
+    motion = loop._motion
+    monitor = motion._machine.feeder.monitor
     return {
         'records': monitor.records.kept,
         'rows': len(monitor._tracker.path.time),
-        'unsent': len(loop._points),
+        'unsent': len(motion._points),
     }

@@ -1,0 +1,54 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Service calls of the owner, carried out beside the motion that runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine
+import logging
+
+from ur_cartesian_driver.driver.ipc.channel import CallAnswered, CallRobot
+from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
+from ur_cartesian_driver.robot.services.service_calls import failed
+from ur_cartesian_driver.robot.services.service_dispatcher import ServiceDispatcher
+
+#: How many calls are carried out at a time.
+MAX_CALLS = 32
+
+
+class CallRunner:
+    """Answers every call, whatever happens to it."""
+
+    def __init__(
+        self,
+        dispatcher: ServiceDispatcher,
+        pipe: OwnerPipe,
+        spawn: Callable[[Coroutine[None, None, None]], None],
+    ) -> None:
+        """
+        Prepare.
+
+        :param spawn: runs a coroutine beside everything else.
+        """
+        self._dispatcher, self._pipe, self._spawn = dispatcher, pipe, spawn
+        self._running = 0
+
+    def start(self, request: CallRobot) -> None:
+        """Carry out a call, or refuse it when too many are being carried out."""
+        if self._running < MAX_CALLS:
+            self._running += 1
+            self._spawn(self._answer(request))
+        else:
+            answer = failed(f'{MAX_CALLS} calls are being carried out; wait for some.')
+            self._pipe.send(CallAnswered(number=request.number, answer=answer))
+
+    async def _answer(self, request: CallRobot) -> None:
+        try:
+            answer = await self._dispatcher.dispatch(request.call)
+        except Exception as error:  # the caller waits for an answer
+            text = f'The driver has a defect, {type(error).__name__}: {error}.'
+            self._pipe.log(logging.ERROR, f'{text} The call was {request.call}.')
+            answer = failed(text)
+        finally:
+            self._running -= 1
+        self._pipe.send(CallAnswered(number=request.number, answer=answer))

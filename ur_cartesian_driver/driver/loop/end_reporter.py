@@ -1,0 +1,70 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Reports how a motion ended, with what led to it."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+
+from ur_cartesian_driver.driver.ipc.channel import MotionEnded
+from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
+from ur_cartesian_driver.driver.recordings.recorder import Recorder
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.robot.link import RobotLink
+
+#: Outcomes whose sentence does not say what led to them: the event log does.
+CODES_WITH_CAUSE = frozenset(
+    {
+        ErrorCode.PROTECTIVE_STOP,
+        ErrorCode.EMERGENCY_STOP,
+        ErrorCode.PROGRAM_STOPPED,
+        ErrorCode.CONNECTION_LOST,
+        ErrorCode.EXECUTION_FAILED,
+    }
+)
+#: For these the robot sends the cause on another connection, in the same cycle or soon after it.
+#: The end waits that long for it [s].
+CODES_WITH_LATE_CAUSE = frozenset({ErrorCode.PROTECTIVE_STOP, ErrorCode.EMERGENCY_STOP})
+CAUSE_TIMEOUT = 0.05
+
+
+class EndReporter:
+    """Tells the owner, the recording and the status of the link."""
+
+    def __init__(self, link: RobotLink, pipe: OwnerPipe, recorder: Recorder) -> None:
+        """Begin with nothing to report."""
+        self._link, self._pipe, self._recorder = link, pipe, recorder
+        #: An end that waits for its cause.
+        self._pending: MotionEnded | None = None
+
+    @property
+    def is_pending(self) -> bool:
+        """Tell whether the end of a motion waits for its cause."""
+        return self._pending is not None
+
+    def report(self, ended: MotionEnded) -> None:
+        """Report an end, as soon as its cause is known."""
+        if ended.outcome.code in CODES_WITH_LATE_CAUSE and not self._link.robot_error():
+            self._pending = ended
+            asyncio.get_running_loop().call_later(CAUSE_TIMEOUT, self.report_pending)
+        else:
+            self._report_now(ended)
+
+    def report_pending(self) -> None:
+        """Report the end that waits for its cause, with what is known by now."""
+        ended, self._pending = self._pending, None
+        if ended is not None:
+            self._report_now(ended)
+
+    def _report_now(self, ended: MotionEnded) -> None:
+        outcome = ended.outcome
+        if outcome.code in CODES_WITH_CAUSE:
+            text = outcome.text
+            if error := self._link.robot_error():
+                text = f'{text} {error[:1].upper()}{error[1:].rstrip(".")}.'
+            causes = tuple(f'why: {line}' for line in self._link.event_chain())
+            outcome = replace(outcome, text=text, report=(*outcome.report, *causes))
+            self._link.explain(text)
+        self._recorder.end(outcome)
+        self._pipe.send(replace(ended, outcome=outcome))

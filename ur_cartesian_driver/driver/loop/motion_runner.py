@@ -1,0 +1,343 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The motion that runs in a robot loop: its machine, points, recording and end."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from contextlib import suppress
+from functools import partial
+import logging
+from typing import TypeVar
+
+from ur_cartesian_driver.driver.ipc.channel import (
+    AppendAnswered,
+    AppendToMotion,
+    CancelMotion,
+    MotionEnded,
+    MotionProgress,
+    ServoProgress,
+    SetLiveTarget,
+    StartMotion,
+    TemporaryTcpRestored,
+    TemporaryTcpSet,
+)
+from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
+from ur_cartesian_driver.driver.loop.end_reporter import EndReporter
+from ur_cartesian_driver.driver.loop.machine_factory import is_slow_to_make, make_machine
+from ur_cartesian_driver.driver.loop.newest_state import NewestState
+from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
+from ur_cartesian_driver.driver.loop.point_buffer import PointBuffer
+from ur_cartesian_driver.driver.loop.tcp_restorer import TcpRestorer
+from ur_cartesian_driver.driver.recordings.recorder import motion_metadata, Recorder
+from ur_cartesian_driver.execution import (
+    AnswerAppend,
+    EnterServo,
+    Finish,
+    GoalCommand,
+    GoalMachine,
+    LeaveServo,
+    LogWarning,
+    MotionJob,
+    OpenServo,
+    ReportProgress,
+    ReportServo,
+    RestoreTcp,
+    same_tcp,
+    SendControl,
+    SendPoints,
+    SERVO_LINK,
+    SetTemporaryTcp,
+    StopProgram,
+    WriteServo,
+)
+from ur_cartesian_driver.motion.errors import ErrorCode
+from ur_cartesian_driver.motion.events import (
+    CancelRequested,
+    Event,
+    LinkLost,
+    Outcome,
+    PreemptRequested,
+    ServoReceived,
+    StateReceived,
+)
+from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.signals import Signals
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.robot.link import RobotLink
+from ur_cartesian_driver.robot.rtde.servo_connection import ServoConnection
+
+#: More than this takes longer than a few milliseconds to unpack or prepare [bytes].
+MIN_THREAD_SIZE = 1 << 18
+#: How long the end of the loop waits until the recording of the last motion is a file [s].
+RECORD_TIMEOUT = 1.0
+
+T = TypeVar('T')
+
+
+class MotionRunner:
+    """Runs one motion at a time: events to its machine, and the machine's commands to the link."""
+
+    def __init__(
+        self,
+        config: DriverConfig,
+        link: RobotLink,
+        newest: NewestState,
+        pipe: OwnerPipe,
+        tcp_restorer: TcpRestorer,
+        *,
+        spawn: Callable[[Coroutine[None, None, None]], None],
+        is_changing_settings: Callable[[], bool],
+    ) -> None:
+        """
+        Prepare.
+
+        :param spawn: runs a coroutine beside everything else.
+        :param is_changing_settings: tells whether TCP or payload are being set.
+        """
+        self._config, self._link, self._newest, self._pipe = config, link, newest, pipe
+        self._tcp_restorer, self._spawn = tcp_restorer, spawn
+        self._is_changing_settings = is_changing_settings
+        self._machine: GoalMachine | None = None
+        self._number = 0
+        self._points = PointBuffer()
+        #: The inputs of a motion that is streamed as set-points.
+        self._servo: ServoConnection | None = None
+        #: What is offered to the machine at this moment.
+        self._pending_append: AppendToMotion | None = None
+        self._recorder = Recorder(
+            config.record_directory,
+            config.record_max_size,
+            partial(_call_soon, asyncio.get_running_loop(), pipe.log, logging.WARNING),
+        )
+        self._ends = EndReporter(link, pipe, self._recorder)
+
+    @property
+    def is_running(self) -> bool:
+        """Tell whether a motion runs."""
+        return self._machine is not None
+
+    # ---- requests -----------------------------------------------------------------------------
+
+    async def start(self, request: StartMotion) -> None:
+        """Start a motion, or refuse it with the reason."""
+        machine = await run_in_thread_if_large(
+            MIN_THREAD_SIZE if is_slow_to_make(request) else len(request.points),
+            make_machine,
+            request,
+            self._config,
+        )
+        if reason := self._refusal(request.job):
+            refusal = Outcome(code=ErrorCode.ROBOT_NOT_READY, text=reason)
+            self._pipe.send(MotionEnded(motion=request.motion, outcome=refusal))
+            return
+        state = self._newest.latest
+        assert state is not None  # else the link is not ready
+        self._number, self._points = request.motion, PointBuffer(request.points)
+        self._machine = machine
+        self._link.set_executing(True)
+        self._record(request, state)
+        self._execute(machine.start(state))
+
+    def _refusal(self, job: MotionJob) -> str:
+        """Return why a motion cannot start now; empty if it can."""
+        if self.is_running or self._ends.is_pending:
+            return 'Another motion is running; wait for its end or cancel it.'
+        if self._is_changing_settings():
+            return 'TCP or payload are being set at this moment; send the goal again.'
+        if reason := self._link.not_ready():
+            return reason
+        state = self._newest.latest
+        if state is None or same_tcp(state.T_flange_tcp, job.T_flange_active):
+            return ''
+        return (
+            'The TCP of the robot was changed after the goal had been planned; send the goal '
+            'again.'
+        )
+
+    def append(self, request: AppendToMotion) -> None:
+        """Offer points to the motion that runs, if they are for it."""
+        if request.motion == self._number and self._machine is not None:
+            self._pending_append = request
+            self._execute(self._machine.step(request.append_job, _now()))
+        else:
+            answer = AnswerAppend(number=request.append_job.number, refusal='The goal has ended.')
+            self._pipe.send(AppendAnswered(motion=request.motion, answer=answer))
+
+    def set_live_target(self, request: SetLiveTarget) -> None:
+        """Give the session that runs another target, if it is for it."""
+        if request.motion == self._number and self._machine is not None:
+            self._machine.feeder.set_target(request.T_base_tcp, request.age, _now())
+
+    def cancel(self, request: CancelMotion) -> None:
+        """Stop the motion, if it is the one that runs."""
+        by = request.preempted_by
+        if request.motion == self._number:
+            self._recorder.add_event('cancel', by and f'preempted by {by}')
+            self.handle_event(PreemptRequested(by=by) if by else CancelRequested())
+
+    def close(self) -> None:
+        """End the motion that runs, because the loop ends."""
+        if self.is_running:
+            self._finish(Outcome(code=ErrorCode.CANCELLED, text='The driver was shut down.'))
+        self._ends.report_pending()
+
+    def close_recorder(self) -> None:
+        """Finish the recording of the last motion; a disk may make this take a while."""
+        self._recorder.close(RECORD_TIMEOUT)
+
+    # ---- events and commands ------------------------------------------------------------------
+
+    def handle_event(self, event: Event) -> None:
+        """Give an event to the machine, and carry out what it commands."""
+        if self._machine is not None:
+            self._execute(self._machine.step(event, _now()))
+        elif isinstance(event, StateReceived):
+            self._tcp_restorer.observe(event.state)
+        self._newest.publish()
+
+    def _execute(self, commands: list[GoalCommand]) -> None:
+        for command in commands:
+            match command:
+                case SendControl(action=action, count=count):
+                    self._link.send_control(action, count)
+                case SendPoints(first=first, end=end):
+                    self._link.send_points(self._points.take(first, end))
+                case SetTemporaryTcp(T_flange_tcp=T_flange_tcp):
+                    self._set_temporary_tcp(T_flange_tcp)
+                case RestoreTcp(T_flange_tcp=T_flange_tcp):
+                    self._link.restore_tcp(T_flange_tcp)
+                case StopProgram(reason=reason):
+                    self._link.stop_program(reason)
+                case ReportProgress(progress=progress):
+                    self._pipe.send(MotionProgress(motion=self._number, progress=progress))
+                case WriteServo(values=values):
+                    if self._servo is not None:
+                        self._servo.write_row(values)
+                case OpenServo():
+                    self._open_servo()
+                case EnterServo():
+                    self._link.send_servo(True)
+                case LeaveServo():
+                    self._leave_servo()
+                case ReportServo(report=report):
+                    self._pipe.send(ServoProgress(motion=self._number, report=report))
+                case LogWarning(text=text):
+                    self._pipe.log(logging.WARNING, text)
+                case AnswerAppend():
+                    self._answer_append(command)
+                case Finish(outcome=outcome):
+                    self._finish(outcome)
+
+    def _answer_append(self, answer: AnswerAppend) -> None:
+        """Keep the points that the machine has taken, and tell their owner."""
+        pending, self._pending_append = self._pending_append, None
+        assert pending is not None
+        if not answer.refusal and pending.points:
+            self._points.put(pending.append_job.records_before, pending.points)
+            if pending.append_job.job is not None and self._machine is not None:
+                self._recorder.add_plan(
+                    pending.append_job.job.reference,
+                    self._machine.end_time_of(pending.append_job.records_before),
+                )
+        self._pipe.send(AppendAnswered(motion=self._number, answer=answer))
+
+    def _open_servo(self) -> None:
+        """Take the inputs of the servo for the motion that runs."""
+        self._servo = ServoConnection(
+            lambda feedback: self.handle_event(ServoReceived(feedback=feedback))
+        )
+        self._spawn(
+            self._servo.run(
+                self._config.robot_ip,
+                self._config.rtde_port,
+                lambda reason: self.handle_event(LinkLost(link=SERVO_LINK, reason=reason)),
+            )
+        )
+
+    def _leave_servo(self) -> None:
+        """Have the robot program leave the servo, and give the inputs back."""
+        if self._servo is not None:
+            self._link.send_servo(False)
+            self._servo.close()
+            self._servo = None
+
+    def _set_temporary_tcp(self, T_flange_tcp: Pose) -> None:
+        """Set the TCP for a goal; the owner remembers it in case this process dies."""
+        assert self._machine is not None
+        assert self._machine.temporary_tcp is not None
+        temporary_tcp = self._machine.temporary_tcp
+        self._pipe.send(
+            TemporaryTcpSet(
+                T_flange_original=temporary_tcp.T_flange_original,
+                T_flange_temporary=temporary_tcp.T_flange_temporary,
+            )
+        )
+        self._link.set_temporary_tcp(T_flange_tcp)
+
+    def _finish(self, outcome: Outcome) -> None:
+        self._leave_servo()
+        machine, number = self._machine, self._number
+        self._number, self._machine = 0, None
+        self._points = PointBuffer()
+        if machine is not None and machine.temporary_tcp is not None:
+            if machine.temporary_tcp.is_restored:
+                self._pipe.send(TemporaryTcpRestored())
+            else:
+                self._tcp_restorer.restore_later(machine.temporary_tcp)
+        self._link.set_executing(False)
+        self._ends.report(MotionEnded(motion=number, outcome=outcome))
+
+    # ---- recording ----------------------------------------------------------------------------
+
+    def _record(self, request: StartMotion, state: RobotState) -> None:
+        """Begin the recording of a motion, where motions are recorded."""
+        if not self._config.record_directory:
+            return
+        status = self._link.status
+        mode = 'FREEDRIVE' if request.freedrive else ''
+        metadata = motion_metadata(
+            request.job,
+            plan_metadata_json=request.plan_metadata,
+            parameters=self._config,
+            mode='LIVE_TARGETS' if request.live is not None else mode,
+            robot={
+                'model': status.robot_model,
+                'polyscope_version': status.polyscope_version,
+                'serial_number': status.serial_number,
+            },
+        )
+        self._recorder.start(request.job, metadata, state)
+
+    def record_state(self, state: RobotState) -> None:
+        """Record a state of the motion that runs."""
+        if self._recorder.is_recording and self._machine is not None:
+            self._recorder.add_state(state, *self._machine.motion_status())
+
+    def record_signals(self, signals: Signals) -> None:
+        """Record inputs and outputs of the motion that runs."""
+        self._recorder.add_signals(signals)
+
+
+def _now() -> float:
+    return asyncio.get_running_loop().time()
+
+
+def _call_soon(
+    loop: asyncio.AbstractEventLoop, function: Callable[..., None], *arguments: object
+) -> None:
+    """Have the loop call a function, from another thread; nothing, if the loop has ended."""
+    with suppress(RuntimeError):
+        loop.call_soon_threadsafe(function, *arguments)
+
+
+async def run_in_thread_if_large(size: int, function: Callable[..., T], *arguments: object) -> T:
+    """
+    Call a function; in a thread when it has much to do, because keepalives cannot wait.
+
+    :param size: how much it has to do [bytes].
+    """
+    if size < MIN_THREAD_SIZE:
+        return function(*arguments)
+    return await asyncio.to_thread(function, *arguments)

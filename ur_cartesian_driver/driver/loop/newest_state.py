@@ -1,0 +1,59 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The newest robot state in the robot loop, and when it goes into the shared memory."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from math import inf
+
+from ur_cartesian_driver.driver.ipc.state_memory import StateMemory
+from ur_cartesian_driver.motion.state import RobotState
+
+
+class NewestState:
+    """
+    Keeps the newest state, and publishes it later.
+
+    A packet may lead to a CANCEL, which must not wait for the shared memory. So a state is
+    published after the packet was handled, but before any notification: an owner that hears of
+    something finds the state that belongs to it.
+    """
+
+    def __init__(self, memory: StateMemory, on_publish: Callable[[RobotState], None]) -> None:
+        """
+        Prepare.
+
+        :param on_publish: called once with each state that is published.
+        """
+        self._memory, self._on_publish = memory, on_publish
+        self.latest: RobotState | None = None
+        self._is_published = True
+        self._last_report = inf
+        self._longest_gap = 0.0
+
+    def keep(self, state: RobotState) -> None:
+        """Take a state; :meth:`publish` publishes it."""
+        self.latest, self._is_published = state, False
+
+    def publish(self) -> None:
+        """Write the newest state into the shared memory, unless it is there."""
+        if self._is_published or self.latest is None:
+            return
+        self._is_published = True
+        self._memory.write(self.latest)
+        self._on_publish(self.latest)
+        now = asyncio.get_running_loop().time()
+        self._longest_gap = max(self._longest_gap, now - self._last_report)
+        self._last_report = now
+
+    def clear(self) -> None:
+        """Take note that the robot is lost."""
+        self._memory.clear()
+        self._last_report = inf
+
+    def take_gap(self) -> float:
+        """Return the longest pause between two states since the last call [s]."""
+        gap, self._longest_gap = self._longest_gap, 0.0
+        return gap
