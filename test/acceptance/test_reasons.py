@@ -117,7 +117,7 @@ def test_the_chain_says_who_did_what_and_when(fault, code, links):
     print(outcome.text, *chain, status.last_error, sep='\n')
     for link in links:
         assert any(link in line for line in chain), (link, chain)
-    assert 'it waits 0.2 s for one, the longest pause between two was 0.02' in chain[-1]
+    assert 'its timeout is 0.2 s; the longest pause between two was 0.02' in chain[-1]
     for line in chain:
         assert line.partition(' before: ')[2] in status.last_error
 

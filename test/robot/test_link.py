@@ -12,8 +12,9 @@ import pytest
 from ur_cartesian_driver.motion.state import RobotState, RuntimeState
 from ur_cartesian_driver.robot.driver_status import DriverStatus
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
-from ur_cartesian_driver.robot.link import LOG_DELAY, RobotLink
+from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.link_settings import LinkSettings
+from ur_cartesian_driver.robot.link_status import LOG_DELAY
 
 
 class Ear:

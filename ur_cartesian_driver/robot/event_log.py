@@ -1,27 +1,38 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What happened lately at one robot, for whoever asks why something ended.
+What happened lately at one robot, to explain why something ended.
 
-"The connection dropped" helps nobody: the connection drops because a program has ended, which
-ended because of a stop, which has a code. Each of these is told by another connection at another
-moment, so they are noted as they come, and read together when something has ended.
+"The connection dropped" helps nobody: it drops because a program has ended, which ended because of
+a stop, which has a code. Each of these arrives on another connection at another moment. So they
+are noted as they come, and read together when something has ended.
 
-Pure: no socket, no clock; the time comes in.
+Pure: no socket; the clock comes in.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite
+from typing import Protocol
 
 from ur_cartesian_driver.motion.state import RobotState
 
-#: What is older does not belong to what has just ended [s].
+#: Older entries do not explain what has just ended [s].
 MAX_AGE = 3.0
-#: So many notes are kept: it bounds the memory, and what a person has to read.
+#: Bounds the memory, and what a person has to read.
 MAX_ENTRIES = 12
+
+
+class KeepaliveTimes(Protocol):
+    """When keepalives were sent to the robot program."""
+
+    #: When the last one was sent [s].
+    last_keepalive: float
+    #: The longest pause between two since this was reset [s].
+    max_keepalive_gap: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,52 +45,80 @@ class EventLogEntry:
 
 
 class EventLog:
-    """The newest notes, the oldest first."""
+    """The newest events, the robot's last report and the keepalives."""
 
-    def __init__(self) -> None:
-        """Begin with nothing."""
+    def __init__(
+        self, clock: Callable[[], float], keepalives: KeepaliveTimes, timeout: float
+    ) -> None:
+        """
+        Begin with no entries.
+
+        :param timeout: how long the robot program waits for a keepalive [s].
+        """
+        self._clock, self._keepalives, self._timeout = clock, keepalives, timeout
         self._entries: deque[EventLogEntry] = deque(maxlen=MAX_ENTRIES)
+        #: The robot's last report, also after the robot is lost, and its time [s].
+        self._last_state: RobotState | None = None
+        self._last_report = inf
+        #: The longest pause between keepalives in the period before this one [s].
+        self._last_gap = 0.0
 
-    def add(self, text: str, now: float, *, is_robot_error: bool = False) -> None:
-        """Note something; ``is_robot_error`` marks what the robot itself says is wrong."""
-        self._entries.append(EventLogEntry(now, text, is_robot_error))
+    def note(self, text: str, *, is_robot_error: bool = False) -> None:
+        """Note what happens now; ``is_robot_error`` marks errors that the robot reports."""
+        self._entries.append(EventLogEntry(self._clock(), text, is_robot_error))
 
-    def robot_error(self, now: float) -> str:
-        """Return what the robot last said is wrong; empty when it said nothing lately."""
-        return next((note.text for note in reversed(self._recent(now)) if note.is_robot_error), '')
+    def note_report(self, robot: RobotState) -> None:
+        """Take what the robot reports now."""
+        self._last_state, self._last_report = robot, self._clock()
 
-    def lines(self, now: float) -> tuple[str, ...]:
-        """Return the chain, each link with how long before now it was."""
-        return tuple(f'{now - note.time:.3f} s before: {note.text}' for note in self._recent(now))
+    def robot_error(self) -> str:
+        """Return the newest error that the robot reported lately; empty if none."""
+        entries = reversed(self._recent())
+        return next((entry.text for entry in entries if entry.is_robot_error), '')
 
-    def _recent(self, now: float) -> list[EventLogEntry]:
-        return [note for note in self._entries if now - note.time <= MAX_AGE]
+    def keepalive_gap(self) -> float:
+        """Return the longest pause between two keepalives since the last call [s]."""
+        self._last_gap, self._keepalives.max_keepalive_gap = (
+            self._keepalives.max_keepalive_gap,
+            0.0,
+        )
+        return self._last_gap
 
+    def keepalive_age(self) -> float:
+        """Return how long ago the last keepalive was sent [s]."""
+        return self._clock() - self._keepalives.last_keepalive
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LinkTiming:
-    """
-    How the two sides have heard of each other [s].
-
-    :param report: how long ago the robot's last report came.
-    :param keepalive: how long ago the last sign of life for the robot program was sent.
-    :param max_gap: the longest pause between two of them lately.
-    :param timeout: how long the robot program was last told to wait for one.
-    """
-
-    report: float
-    keepalive: float
-    max_gap: float
-    timeout: float
-
-    def line(self) -> str:
-        """Return it in words."""
-        if not isfinite(self.keepalive):
-            return ''
+    def event_chain(self) -> tuple[str, ...]:
+        """Return what led to an end, the first event first; then modes and keepalives."""
+        now = self._clock()
         return (
-            f'the last sign of life for the robot program was sent {self.keepalive:.3f} s before '
-            f'(it waits {self.timeout:g} s for one, the longest pause between two was '
-            f'{self.max_gap:.3f} s)'
+            *(f'{now - entry.time:.3f} s before: {entry.text}' for entry in self._recent()),
+            self._modes(),
+            *self._keepalive_line(),
+        )
+
+    def _recent(self) -> list[EventLogEntry]:
+        now = self._clock()
+        return [entry for entry in self._entries if now - entry.time <= MAX_AGE]
+
+    def _modes(self) -> str:
+        robot = self._last_state
+        if robot is None:
+            return 'the robot has reported nothing'
+        return (
+            f'program {robot.runtime_state.name}, safety mode {robot.safety_mode.name}, robot '
+            f'mode {robot.robot_mode.name}, as the robot reported '
+            f'{self._clock() - self._last_report:.3f} s before'
+        )
+
+    def _keepalive_line(self) -> tuple[str, ...]:
+        age = self.keepalive_age()
+        if not isfinite(age):
+            return ()
+        gap = max(self._last_gap, self._keepalives.max_keepalive_gap)
+        return (
+            f'the last keepalive was sent to the robot program {age:.3f} s before (its timeout '
+            f'is {self._timeout:g} s; the longest pause between two was {gap:.3f} s)',
         )
 
 
@@ -94,16 +133,3 @@ def mode_changes(before: RobotState, after: RobotState) -> tuple[str, ...]:
         )
         if old is not new
     )
-
-
-def describe_present(robot: RobotState | None, timing: LinkTiming) -> tuple[str, ...]:
-    """Return what holds at the end: the modes, as the robot reported them last, and the pulse."""
-    modes = (
-        'the robot has reported nothing'
-        if robot is None
-        else (
-            f'program {robot.runtime_state.name}, safety mode {robot.safety_mode.name}, robot '
-            f'mode {robot.robot_mode.name}, as the robot reported {timing.report:.3f} s before'
-        )
-    )
-    return tuple(filter(None, (modes, timing.line())))

@@ -45,7 +45,7 @@ class EndReporter:
 
     def report(self, ended: MotionEnded) -> None:
         """Report an end, as soon as its cause is known."""
-        if ended.outcome.code in CODES_WITH_LATE_CAUSE and not self._link.robot_error():
+        if ended.outcome.code in CODES_WITH_LATE_CAUSE and not self._link.event_log.robot_error():
             self._pending = ended
             asyncio.get_running_loop().call_later(CAUSE_TIMEOUT, self.report_pending)
         else:
@@ -61,9 +61,9 @@ class EndReporter:
         outcome = ended.outcome
         if outcome.code in CODES_WITH_CAUSE:
             text = outcome.text
-            if error := self._link.robot_error():
+            if error := self._link.event_log.robot_error():
                 text = f'{text} {error[:1].upper()}{error[1:].rstrip(".")}.'
-            causes = tuple(f'why: {line}' for line in self._link.event_chain())
+            causes = tuple(f'why: {line}' for line in self._link.event_log.event_chain())
             outcome = replace(outcome, text=text, report=(*outcome.report, *causes))
             self._link.explain(text)
         self._recorder.end(outcome)

@@ -203,7 +203,7 @@ class MotionRunner:
                 case SendControl(action=action, count=count):
                     self._link.send_control(action, count)
                 case SendPoints(first=first, end=end):
-                    self._link.send_points(self._points.take(first, end))
+                    self._link.program.send_points(self._points.take(first, end))
                 case SetTemporaryTcp(T_flange_tcp=T_flange_tcp):
                     self._set_temporary_tcp(T_flange_tcp)
                 case RestoreTcp(T_flange_tcp=T_flange_tcp):

@@ -169,7 +169,9 @@ class RobotLoop:
 
     def _send_heartbeat(self) -> None:
         self._pipe.resend_signals()
-        gaps = LinkGaps(reports=self._newest.take_gap(), keepalives=self._link.keepalive_gap())
+        gaps = LinkGaps(
+            reports=self._newest.take_gap(), keepalives=self._link.event_log.keepalive_gap()
+        )
         self._pipe.send(LoopHeartbeat(gaps=gaps))
 
     def _stop_for_silent_owner(self) -> None:

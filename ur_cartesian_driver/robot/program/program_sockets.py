@@ -23,9 +23,11 @@ from typing import NoReturn
 
 from ur_cartesian_driver.motion.errors import ProtocolError
 from ur_cartesian_driver.motion.events import TrajectoryResult
+from ur_cartesian_driver.program import ProgramSettings, render
 from ur_cartesian_driver.protocol.program import reverse, script_sender
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 from ur_cartesian_driver.protocol.program.trajectory_points import TrajectoryResultDecoder
+from ur_cartesian_driver.protocol.rtde.rtde_packages import ControllerVersion
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.transport import TcpConnection, TcpListener
 
@@ -116,6 +118,29 @@ class ProgramSockets:
         for port in (*self._program_ports, self._sender):
             if not port.is_open:
                 await port.open(host, getattr(self._settings, port.name), allowed)
+
+    def render(self, host: str, version: ControllerVersion) -> None:
+        """
+        Render the robot program for the ports that are open.
+
+        :param host: the address at which the robot reaches us.
+        :raises DriverError: it cannot be made from the settings.
+        """
+        s, ports = self._settings, self.ports
+        self.text = render(
+            ProgramSettings(
+                host=host,
+                reverse_port=ports['reverse_port'],
+                trajectory_port=ports['trajectory_port'],
+                script_command_port=ports['script_command_port'],
+                version=(version.major, version.minor, version.bugfix),
+                stop_deceleration=s.stop_deceleration,
+                servoj_gain=s.servoj_gain,
+                servoj_lookahead_time=s.servoj_lookahead_time,
+                servo_buffer_depth=s.servo_buffer_depth,
+                allow_freedrive=s.allow_freedrive,
+            )
+        )
 
     def close(self) -> None:
         """Tell the robot program to stop the arm and end, and close all ports."""

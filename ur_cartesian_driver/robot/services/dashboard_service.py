@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.motion.state import RobotMode, RobotState, RuntimeState, SafetyMode
+from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.services.dashboard_connection import (
     DashboardConnection,
     explain_refusal,
     unavailable_reason,
 )
-from ur_cartesian_driver.robot.services.link_interface import (
+from ur_cartesian_driver.robot.services.polling import (
     describe_modes,
-    LinkInterface,
     wait_for_state,
 )
 from ur_cartesian_driver.robot.services.service_calls import (
@@ -76,43 +76,43 @@ EXPECTED_EFFECTS: Mapping[str, ExpectedEffect] = {
 class DashboardService:
     """The dashboard of a robot, from one event loop; several calls at a time."""
 
-    def __init__(self, host: str, port: int, robot: LinkInterface) -> None:
+    def __init__(self, host: str, port: int, link: RobotLink) -> None:
         """Prepare; every call connects by itself."""
         self._client = DashboardConnection(host, port)
-        self._robot = robot
+        self._link = link
 
     async def request(self, call: DashboardCall) -> ServiceAnswer:
         """Give a command, and wait until the robot has done it."""
-        version = self._robot.version
+        version = self._link.version
         if version is not None and (reason := unavailable_reason(call.command, version)):
             return failed(reason)
         reply = await self._client.request(call.command, call.argument)
         if not reply.ok:
             return failed(
                 explain_refusal(
-                    call.command, reply.text, self._robot.robot, await self.remote_control()
+                    call.command, reply.text, self._link.robot, await self.remote_control()
                 )
             )
         effect = EXPECTED_EFFECTS.get(call.command)
         if effect is not None and not await wait_for_state(
-            self._robot, effect.is_reached, effect.timeout
+            self._link, effect.is_reached, effect.timeout
         ):
             return failed(
                 f'The robot answers {reply.text!r}, but is not {effect.target_mode} after '
-                f'{effect.timeout:g} s: {describe_modes(self._robot)}'
+                f'{effect.timeout:g} s: {describe_modes(self._link)}'
             )
         return succeeded(reply.value or reply.text)
 
     async def request_raw(self, call: DashboardLineCall) -> ServiceAnswer:
         """Send any line and return the one that comes back."""
-        version = self._robot.version
+        version = self._link.version
         if version is not None and (reason := unavailable_reason('quit', version)):
             return failed(reason)
         return succeeded(await self._client.request_raw(call.line))
 
     async def remote_control(self) -> bool | None:
         """Return whether clients may control the robot; None = it cannot be known."""
-        version = self._robot.version
+        version = self._link.version
         if version is None or unavailable_reason('is in remote control', version):
             return None
         try:

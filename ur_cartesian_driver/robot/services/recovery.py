@@ -9,6 +9,7 @@ from collections.abc import Awaitable, Callable, Mapping
 
 from ur_cartesian_driver.motion.errors import DriverError
 from ur_cartesian_driver.protocol.client_interfaces import primary_messages as primary
+from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.services.dashboard_connection import POLYSCOPE_X, TOO_EARLY
 from ur_cartesian_driver.robot.services.dashboard_service import (
     DashboardService,
@@ -16,9 +17,8 @@ from ur_cartesian_driver.robot.services.dashboard_service import (
     EXPECTED_EFFECTS,
     ExpectedEffect,
 )
-from ur_cartesian_driver.robot.services.link_interface import (
+from ur_cartesian_driver.robot.services.polling import (
     describe_modes,
-    LinkInterface,
     POLL_PERIOD,
     wait_for_state,
 )
@@ -68,7 +68,7 @@ class RecoveryRunner:
 
     def __init__(
         self,
-        robot: LinkInterface,
+        link: RobotLink,
         dashboard: DashboardService,
         send_program: Callable[[], Awaitable[ServiceAnswer]],
         *,
@@ -80,7 +80,7 @@ class RecoveryRunner:
         :param send_program: uploads the robot program and waits until it has called.
         :param headless: that is how the program comes; else a program on the robot asks for it.
         """
-        self._robot, self._dashboard = robot, dashboard
+        self._link, self._dashboard = link, dashboard
         self._send_program, self._headless = send_program, headless
         self._is_running = False
 
@@ -107,14 +107,14 @@ class RecoveryRunner:
                 return failed(_report(done, upcoming.text))
             if upcoming.step is RecoveryStep.WAIT:
                 # A robot that was never there will not come by waiting.
-                lost = self._robot.robot is None and not done
+                lost = self._link.robot is None and not done
                 if loop.time() - last_step_time > (DISCONNECTED_TIMEOUT if lost else STEP_TIMEOUT):
-                    return failed(_report(done, upcoming.text or describe_modes(self._robot)))
+                    return failed(_report(done, upcoming.text or describe_modes(self._link)))
                 await asyncio.sleep(POLL_PERIOD)
                 continue
             if STEP_NAMES[upcoming.step] in done:
                 return failed(
-                    _report(done, f'The robot needs a person: {describe_modes(self._robot)}')
+                    _report(done, f'The robot needs a person: {describe_modes(self._link)}')
                 )
             try:
                 answer = await self._do(upcoming.step)
@@ -143,12 +143,12 @@ class RecoveryRunner:
         return upcoming
 
     def _situation(self, remote: bool | None) -> RecoverySituation:
-        robot = self._robot
+        link = self._link
         return RecoverySituation(
-            connection=robot.status.state,
-            message=robot.status.message,
-            robot=robot.robot,
-            program_connected=robot.program_connected,
+            connection=link.status.state,
+            message=link.status.message,
+            robot=link.robot,
+            program_connected=link.program.connected,
             headless=self._headless,
             remote_control=remote,
         )
@@ -157,7 +157,7 @@ class RecoveryRunner:
         """Do one step and wait until it is done."""
         if step is RecoveryStep.SEND_PROGRAM:
             return await self._send_program()
-        version = self._robot.version
+        version = self._link.version
         *before, command = STEP_COMMANDS[step]
         if version is not None and version.major >= POLYSCOPE_X and step in PRIMARY_COMMANDS:
             return await self._do_without_dashboard(step, EXPECTED_EFFECTS[command])
@@ -171,7 +171,7 @@ class RecoveryRunner:
             answer.ok
             and step is RecoveryStep.PLAY
             and not await wait_for_state(
-                self._robot, lambda _: self._robot.program_connected, EFFECT_TIMEOUT
+                self._link, lambda _: self._link.program.connected, EFFECT_TIMEOUT
             )
         ):
             return failed(
@@ -184,11 +184,11 @@ class RecoveryRunner:
         self, step: RecoveryStep, effect: ExpectedEffect
     ) -> ServiceAnswer:
         for _ in range(2):  # an unlock is refused for 5 s after the stop
-            if not self._robot.send_primary(PRIMARY_COMMANDS[step]):
+            if not self._link.send_primary(PRIMARY_COMMANDS[step]):
                 return failed('there is no connection to the primary interface of the robot.')
-            if await wait_for_state(self._robot, effect.is_reached, effect.timeout):
+            if await wait_for_state(self._link, effect.is_reached, effect.timeout):
                 return succeeded('')
-        return failed(f'the robot is not {effect.target_mode}; {describe_modes(self._robot)}')
+        return failed(f'the robot is not {effect.target_mode}; {describe_modes(self._link)}')
 
 
 def _report(done: list[str], text: str) -> str:

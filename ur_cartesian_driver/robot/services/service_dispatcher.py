@@ -18,10 +18,11 @@ from ur_cartesian_driver.motion.pose import angle_between, normalize, Pose
 from ur_cartesian_driver.motion.state import RobotState, RuntimeState
 from ur_cartesian_driver.protocol.program import script_command
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
+from ur_cartesian_driver.robot.link import RobotLink
 from ur_cartesian_driver.robot.link_settings import LinkSettings
 from ur_cartesian_driver.robot.services import rtde_input_writer
 from ur_cartesian_driver.robot.services.dashboard_service import DashboardService, EFFECT_TIMEOUT
-from ur_cartesian_driver.robot.services.link_interface import LinkInterface, wait_for_state
+from ur_cartesian_driver.robot.services.polling import wait_for_state
 from ur_cartesian_driver.robot.services.recovery import RecoveryRunner
 from ur_cartesian_driver.robot.services.service_calls import (
     DashboardCall,
@@ -79,13 +80,13 @@ INTERFERING_COMMANDS = frozenset({'load', 'load installation', 'restart safety'}
 class ServiceDispatcher:
     """Answers calls, from one event loop; several at a time, but one recovery."""
 
-    def __init__(self, settings: LinkSettings, dashboard_port: int, robot: LinkInterface) -> None:
+    def __init__(self, settings: LinkSettings, dashboard_port: int, link: RobotLink) -> None:
         """Prepare; nothing is sent before the first call."""
         self._settings = settings
-        self._robot = robot
-        self._dashboard = DashboardService(settings.robot_ip, dashboard_port, robot)
+        self._link = link
+        self._dashboard = DashboardService(settings.robot_ip, dashboard_port, link)
         self._recovery = RecoveryRunner(
-            robot, self._dashboard, self._send_program, headless=settings.headless_mode
+            link, self._dashboard, self._send_program, headless=settings.headless_mode
         )
         self._pending_settings = 0
 
@@ -131,12 +132,12 @@ class ServiceDispatcher:
 
     def _refusal(self, call: ServiceCall) -> ServiceAnswer | None:
         """Refuse what must not be done now."""
-        status = self._robot.status
+        status = self._link.status
         if isinstance(call, DashboardCall) and call.command in QUERY_COMMANDS:
             return None
         if status.state is ConnectionState.REFUSED:
             return failed(status.message)
-        if isinstance(call, SetTcpCall) and self._robot.tcp_restore_pending:
+        if isinstance(call, SetTcpCall) and self._link.tcp_restore_pending:
             return failed(
                 'The TCP that a goal has lent is being put back; try again when the status '
                 'is READY.'
@@ -155,21 +156,21 @@ class ServiceDispatcher:
 
     def _command(self, command: script_command.AnyScriptCommand) -> ServiceAnswer | None:
         """Send a command to the robot program; an answer only if it cannot be sent."""
-        robot = self._robot.robot
+        robot = self._link.robot
         if robot is not None and robot.runtime_state is not RuntimeState.PLAYING:
             return failed(
                 f'The robot program does not read commands now, it is '
-                f'{robot.runtime_state.name}. {self._robot.status.message}'.rstrip()
+                f'{robot.runtime_state.name}. {self._link.status.message}'.rstrip()
             )
-        if not self._robot.send_command(script_command.encode(command)):
+        if not self._link.program.send_command(script_command.encode(command)):
             return failed(
                 'The robot program does not run, and it is what does this. '
-                f'{self._robot.status.message}'.rstrip()
+                f'{self._link.status.message}'.rstrip()
             )
         return None
 
     def _zero_ftsensor(self) -> ServiceAnswer:
-        version = self._robot.version
+        version = self._link.version
         if version is not None and version.major < E_SERIES:
             return failed(
                 f'A CB3 robot (software {version}) has no force sensor to be zeroed: '
@@ -204,7 +205,7 @@ class ServiceDispatcher:
         )
         if refusal is not None:
             return refusal
-        if await wait_for_state(self._robot, is_reported, SETTING_TIMEOUT):
+        if await wait_for_state(self._link, is_reported, SETTING_TIMEOUT):
             return succeeded('The TCP is set.')
         return failed(
             f'The robot does not report the new TCP within {SETTING_TIMEOUT:g} s: its '
@@ -216,7 +217,7 @@ class ServiceDispatcher:
         refusal = self._command(script_command.SetPayloadCommand(mass=call.mass, cog=call.cog))
         if refusal is not None:
             return refusal
-        signals, rate = self._robot.signals, self._settings.io_publish_rate
+        signals, rate = self._link.signals, self._settings.io_publish_rate
         if signals is None:
             return succeeded(
                 'The payload was sent; nothing reports it while inputs and outputs are not '
@@ -225,7 +226,7 @@ class ServiceDispatcher:
         if isnan(signals.payload):
             return succeeded('The payload was sent; the software of the robot does not report it.')
         within = SETTING_TIMEOUT + 1.0 / rate
-        if await wait_for_state(self._robot, lambda _: self._has_payload(call), within):
+        if await wait_for_state(self._link, lambda _: self._has_payload(call), within):
             return succeeded('The payload is set.')
         return failed(
             f'The robot does not report the new payload within {within:g} s: its program '
@@ -233,7 +234,7 @@ class ServiceDispatcher:
         )
 
     def _has_payload(self, call: SetPayloadCall) -> bool:
-        signals = self._robot.signals
+        signals = self._link.signals
         return (
             signals is not None
             and dist((signals.payload, *signals.payload_cog), (call.mass, *call.cog))
@@ -246,21 +247,21 @@ class ServiceDispatcher:
                 'The parameter headless_mode is false: play a program with External '
                 'Control on the pendant.'
             )
-        if self._robot.robot is None:
-            return failed(self._robot.status.message)
-        replaces = self._robot.program_connected
-        self._robot.upload_program()
+        if self._link.robot is None:
+            return failed(self._link.status.message)
+        replaces = self._link.program.connected
+        self._link.upload_program()
         if replaces:  # its predecessor hangs up first
             await wait_for_state(
-                self._robot, lambda _: not self._robot.program_connected, SETTING_TIMEOUT
+                self._link, lambda _: not self._link.program.connected, SETTING_TIMEOUT
             )
         if await wait_for_state(
-            self._robot,
-            lambda _: self._robot.status.state is ConnectionState.READY,
+            self._link,
+            lambda _: self._link.status.state is ConnectionState.READY,
             EFFECT_TIMEOUT,
         ):
             return succeeded('The robot program runs.')
-        needed = self._robot.status.message
+        needed = self._link.status.message
         if await self._dashboard.remote_control() is False:
             needed = 'The robot is in local control: switch it to remote control, then try again.'
         return failed(

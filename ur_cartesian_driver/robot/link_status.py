@@ -1,0 +1,79 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The status of a link: its state, what is needed next, and the last error."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import replace
+import logging
+
+from ur_cartesian_driver.robot.driver_status import DriverStatus, timestamped
+from ur_cartesian_driver.robot.lifecycle import ConnectionEvent, ConnectionState, next_state
+
+#: In these states nothing is known of the robot, or it is the wrong one: the reason is the
+#: message.
+OUT_OF_REACH = frozenset({ConnectionState.DISCONNECTED, ConnectionState.REFUSED})
+#: How long a robot waits for its program before the log says so [s]: a program that is about to
+#: connect needs no help.
+LOG_DELAY = 1.0
+
+
+class LinkStatus:
+    """Changes the status, and reports and logs each change; used from one event loop."""
+
+    def __init__(
+        self,
+        message: str,
+        required_action: Callable[[ConnectionState], str],
+        on_status: Callable[[DriverStatus], None],
+        on_log: Callable[[int, str], None],
+    ) -> None:
+        """
+        Begin disconnected.
+
+        :param required_action: what is needed in a state, as a sentence.
+        """
+        self._required_action, self._on_status, self._on_log = required_action, on_status, on_log
+        self.current = DriverStatus(message=message)
+
+    @property
+    def state(self) -> ConnectionState:
+        """The state of the connection."""
+        return self.current.state
+
+    def apply(self, event: ConnectionEvent, **changes: object) -> None:
+        """Go to the state that the table of the life cycle names, with other changes."""
+        self.update(state=next_state(self.state, event), **changes)
+
+    def update(self, **changes: object) -> None:
+        """Change fields of the status, and work out what is needed now."""
+        # Callers name fields; mypy cannot follow names.
+        status = replace(self.current, **changes)  # type: ignore[arg-type]
+        if status.state not in OUT_OF_REACH:
+            status = replace(status, message=self._required_action(status.state))
+        if status != self.current:
+            before, self.current = self.current, status
+            self._on_status(status)
+            self._log_change(before, status)
+
+    def error(self, text: str) -> None:
+        """Take a text as the last error, and log it."""
+        self.update(last_error=timestamped(text))
+        self._on_log(logging.ERROR, text)
+
+    def _log_change(self, before: DriverStatus, now: DriverStatus) -> None:
+        """Log what is needed, for those who do not see the status."""
+        if now.message and now.message != before.message:
+            if now.state is ConnectionState.CONNECTED:
+                asyncio.get_running_loop().call_later(LOG_DELAY, self._log_if_still, now.message)
+            else:
+                self._on_log(logging.INFO, now.message)
+        idle = (ConnectionState.READY, ConnectionState.EXECUTING)
+        if now.state is ConnectionState.READY and before.state not in idle:
+            self._on_log(logging.INFO, 'The robot program is connected: ready for goals.')
+
+    def _log_if_still(self, message: str) -> None:
+        if self.current.message == message:
+            self._on_log(logging.INFO, message)
