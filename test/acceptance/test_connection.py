@@ -199,7 +199,7 @@ def test_the_robot_loop_s_process_can_die_or_hang(
     driver = make_driver(robot_loop='process')
     driver.wait_ready(10.0)
     motion = moving(driver, long_goal)
-    os.kill(driver._host.pid, number)
+    os.kill(driver._loop.host.pid, number)
     outcome = motion.result(bound)
     assert outcome.code is ErrorCode.CONNECTION_LOST
     wait_for(lambda: at_rest(ur_sim))
@@ -211,7 +211,7 @@ def test_a_driver_with_a_robot_loop_that_hangs_can_be_closed(make_driver, driver
     wait_for(lambda: ur_sim.state().runtime_state.name == 'STOPPED')
     driver = make_driver(robot_loop='process')
     driver.wait_ready(10.0)
-    os.kill(driver._host.pid, signal.SIGSTOP)
+    os.kill(driver._loop.host.pid, signal.SIGSTOP)
     begin = monotonic()
     driver.close()
     assert monotonic() - begin < 10.0
@@ -226,7 +226,7 @@ def test_a_robot_loop_that_dies_does_not_bring_back_a_program_that_was_stopped(
     driver.wait_ready(10.0)
     ur_sim.stop_program()
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
-    os.kill(driver._host.pid, signal.SIGKILL)
+    os.kill(driver._loop.host.pid, signal.SIGKILL)
     wait_for(lambda: driver.status.state is ConnectionState.DISCONNECTED)
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED, 10.0)
     sleep(0.5)

@@ -342,7 +342,7 @@ def test_the_robot_program_puts_the_tcp_back_when_the_driver_dies(make_driver, u
     driver = make_driver(robot_loop='process')
     driver.wait_ready(10.0)
     motion = moving(driver)
-    os.kill(driver._host.pid, signal.SIGKILL)
+    os.kill(driver._loop.host.pid, signal.SIGKILL)
     assert motion.result(5.0).code is ErrorCode.CONNECTION_LOST
     wait_for(lambda: has_own_tcp(ur_sim))
 
@@ -406,9 +406,9 @@ def test_a_robot_loop_that_follows_a_dead_one_pays_its_debts(make_driver, ur_sim
     driver = make_driver(robot_loop='process')
     driver.wait_ready(10.0)
     motion = moving(driver)
-    os.kill(driver._host.pid, signal.SIGSTOP)
+    os.kill(driver._loop.host.pid, signal.SIGSTOP)
     ur_sim.stop_program()
-    os.kill(driver._host.pid, signal.SIGKILL)
+    os.kill(driver._loop.host.pid, signal.SIGKILL)
     assert motion.result(5.0).code is ErrorCode.CONNECTION_LOST
     assert not has_own_tcp(ur_sim, 1e-3)
     wait_for(lambda: has_own_tcp(ur_sim, 1e-11))

@@ -337,7 +337,7 @@ def test_calls_are_answered_when_the_robot_loop_dies_or_the_driver_closes(make_d
     driver = make_driver(robot_loop='process')
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
     pending = driver.call(DashboardCall(command='power on'))
-    os.kill(driver._host.pid, signal.SIGKILL)
+    os.kill(driver._loop.host.pid, signal.SIGKILL)
     assert 'robot loop ended unexpectedly' in pending.result(5.0).text
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
     pending = driver.call(RecoverCall())

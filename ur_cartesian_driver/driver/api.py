@@ -14,7 +14,6 @@ from types import TracebackType
 
 from ur_cartesian_driver.driver.appender import Appender, encode_plan
 from ur_cartesian_driver.driver.callbacks import LOG, run_callback
-from ur_cartesian_driver.driver.ipc import channel
 from ur_cartesian_driver.driver.ipc.channel import (
     AppendAnswered,
     CallAnswered,
@@ -32,7 +31,6 @@ from ur_cartesian_driver.driver.ipc.channel import (
     ResendProgram,
     ServoProgress,
     SetLiveTarget,
-    Shutdown,
     SignalsChanged,
     StartMotion,
     StatusChanged,
@@ -45,7 +43,7 @@ from ur_cartesian_driver.driver.live_session import (
     InteractiveMotions,
     stationary_job,
 )
-from ur_cartesian_driver.driver.loop import host
+from ur_cartesian_driver.driver.loop_connection import LoopConnection
 from ur_cartesian_driver.driver.motion_handle import ActiveMotion, MotionHandle, OnProgress
 from ur_cartesian_driver.driver.recordings.recorder import plan_metadata
 from ur_cartesian_driver.driver.robot_services import RobotServices
@@ -81,10 +79,8 @@ from ur_cartesian_driver.robot.driver_status import (
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.services.service_calls import ServiceAnswer, ServiceCall
 
-#: Pause before a robot loop that died is replaced [s]: what ends it may end the next one too.
-RESTART_PAUSE = 0.5
-
 NO_STATE = 'The robot does not report its state.'
+LOOP_LOST = 'The robot loop ended unexpectedly, or hangs; the robot program stops the arm.'
 
 #: How long a cancelled motion may need to its outcome [s], whatever the robot does.
 CANCEL_TIMEOUT = 2.0 * STOP_TIMEOUT + 1.0
@@ -114,8 +110,16 @@ class Driver(RobotServices, InteractiveMotions):
         self.config = config
         self.options = options if options is not None else PlanningOptions()
         self._arm = Arm(robot_model(config.ur_type))
-        self._auto_heartbeat = auto_heartbeat
-        self._host: host.LoopHost | None = None
+        self._loop = LoopConnection(
+            config,
+            auto_heartbeat=auto_heartbeat,
+            on_notification=self._handle,
+            on_lost=self._on_loop_lost,
+            reconfigure=self._reconfigure,
+        )
+        #: Also guards the running motions and calls.
+        self._lock = self._loop.lock
+        self._send = self._loop.send
         self._status = DriverStatus()
         self._status_listeners: list[Callable[[DriverStatus], None]] = []
         self._ready = threading.Event()
@@ -127,10 +131,8 @@ class Driver(RobotServices, InteractiveMotions):
         self._servo_listeners: list[Callable[[ServoReport], None]] = []
         self._gaps = LinkGaps()
         self._numbers = itertools.count(1)
-        # Guards the pipe (several threads send), the running motions and opening and closing.
-        self._lock = threading.RLock()
-        self._closed = threading.Event()
-        self._threads: list[threading.Thread] = []
+        #: Whether a loop that replaces another one may upload the robot program.
+        self._may_upload = True
 
     def __enter__(self) -> Driver:
         """Open."""
@@ -150,29 +152,12 @@ class Driver(RobotServices, InteractiveMotions):
 
     def open(self) -> None:
         """Start the robot loop and return; it connects, and connects again, by itself."""
-        with self._lock:
-            if self._host is not None:
-                return
-            self._closed.clear()
-            self._host = host.start(self.config.robot_loop)
-            self._send(Configure(config=self.config))
-            self._start_thread('driver reader', self._read)
-            if self._auto_heartbeat:
-                self._start_thread('driver heartbeat', self._send_heartbeats)
+        self._loop.open()
 
     def close(self) -> None:
         """Stop a running motion and end the robot loop and all threads. May be called twice."""
-        with self._lock:
-            if self._host is None or self._closed.is_set():
-                return
-            self._closed.set()
-            self._send(Shutdown())
-        for thread in self._threads:
-            if thread is not threading.current_thread():
-                thread.join()
-        with self._lock:
-            self._host.join()
-            self._host, self._threads = None, []
+        if not self._loop.close():
+            return
         # First the status, so that no motion can begin that nobody would end.
         self._set_status(DriverStatus(message='The driver is closed; open it.'))
         self._abort_all('The driver was closed.')
@@ -191,13 +176,7 @@ class Driver(RobotServices, InteractiveMotions):
     @property
     def state(self) -> RobotState | None:
         """The newest robot state; None before the first and when the robot is lost."""
-        running = self._host
-        if running is None or self._closed.is_set():
-            return None
-        try:
-            return running.memory.read()
-        except ValueError:  # closed at this moment
-            return None
+        return self._loop.state
 
     @property
     def rest_state(self) -> RobotState | None:
@@ -269,10 +248,13 @@ class Driver(RobotServices, InteractiveMotions):
 
         :raises GoalRefused: with the reason.
         """
-        state = self.rest_state
+        state = self._required(self.rest_state)
+        return plan(goal, state, self.arm, self._options(state))
+
+    def _required(self, state: RobotState | None) -> RobotState:
         if state is None:
             raise RobotNotReady(self._status.message or NO_STATE)
-        return plan(goal, state, self.arm, self._options(state))
+        return state
 
     def _options(self, state: RobotState) -> PlanningOptions:
         """Return the options for the robot that is connected."""
@@ -297,10 +279,8 @@ class Driver(RobotServices, InteractiveMotions):
         :raises LocalProtocolError: a value of the plan does not fit into a message.
         """
         if plan.goal.keep_open:
-            state = self.state
-            if state is None:
-                raise RobotNotReady(self._status.message or NO_STATE)
-            part = plan_first_part(plan, self.arm, self._options(state))
+            options = self._options(self._required(self.state))
+            part = plan_first_part(plan, self.arm, options)
             points, job = encode_plan(part, self.config.dialect)
             return self._start_motion(plan, points, job, on_progress, part=part)
         points = encode_points(plan.instructions, self.config.dialect)
@@ -349,10 +329,7 @@ class Driver(RobotServices, InteractiveMotions):
         """Return the owner's side of a goal with an open end."""
 
         def planning_inputs() -> tuple[Arm, PlanningOptions]:
-            state = self.state
-            if state is None:
-                raise RobotNotReady(self._status.message or NO_STATE)
-            return self.arm, self._options(state)
+            return self.arm, self._options(self._required(self.state))
 
         return Appender(
             motion.number,
@@ -408,9 +385,7 @@ class Driver(RobotServices, InteractiveMotions):
         :raises RobotNotReady: a person guides the arm; or the robot program is held: it would
             read neither the stop nor the next motion.
         """
-        state = self.state
-        if state is None:
-            raise RobotNotReady(self._status.message or NO_STATE)
+        state = self._required(self.state)
         if self.is_freedrive_active:
             raise RobotNotReady('Somebody guides the arm by hand; end that first.')
         if is_paused(state) or is_stopped(state):
@@ -464,7 +439,7 @@ class Driver(RobotServices, InteractiveMotions):
         future: Future[ServiceAnswer] = Future()
         future.set_running_or_notify_cancel()
         with self._lock:
-            if self._host is not None and not self._closed.is_set():
+            if self._loop.is_open:
                 number = next(self._numbers)
                 self._calls[number] = future
                 self._send(CallRobot(number=number, call=call))
@@ -474,58 +449,16 @@ class Driver(RobotServices, InteractiveMotions):
 
     # ---- inside -------------------------------------------------------------------------------
 
-    def _start_thread(self, name: str, target: Callable[[], None]) -> None:
-        thread = threading.Thread(target=target, name=name, daemon=True)
-        self._threads.append(thread)
-        thread.start()
+    def _on_loop_lost(self) -> None:
+        self._may_upload = self._status.program_running  # one that somebody stopped stays stopped
+        self._set_status(DriverStatus(message=LOOP_LOST, last_error=timestamped(LOOP_LOST)))
+        self._abort_all(LOOP_LOST)
 
-    def _send(self, request: Request) -> None:
-        data = channel.pack(request)
-        # When the loop is gone the reader thread sees that and says so.
-        with self._lock, contextlib.suppress(OSError):
-            if self._host is not None:
-                self._host.pipe.sendall(data)
-
-    def _send_heartbeats(self) -> None:
-        while not self._closed.wait(self.config.node_timeout / 4.0):
-            self.heartbeat()
-
-    def _read(self) -> None:
-        """Serve notices; when the loop dies or hangs, tell everybody and start another one."""
-        while (running := self._host) is not None:  # None: closed by a callback of ours
-            notification = channel.receive(running.pipe)
-            if notification is not None:
-                self._handle(notification)
-            elif self._closed.is_set():
-                return
-            else:
-                self._restart()
-
-    def _restart(self) -> None:
-        """
-        Replace a robot loop that died or hangs.
-
-        The robot program stops the arm: its sockets are closed, or silent for too long.
-        """
-        LOG.error('the robot loop ended unexpectedly, or hangs, and is started again')
-        text = 'The robot loop ended unexpectedly, or hangs; the robot program stops the arm.'
-        # A program that somebody stopped stays stopped.
-        may_upload = self._status.program_running
-        self._set_status(DriverStatus(message=text, last_error=timestamped(text)))
-        self._abort_all(text)
-        if self._closed.wait(RESTART_PAUSE):
-            return
-        with self._lock:
-            if self._host is None or self._closed.is_set():
-                return
-            self._abort_calls(text)  # also those that were sent since
-            self._host.join()
-            self._host = host.start(self.config.robot_loop)
-            self._send(
-                Configure(
-                    config=self.config, may_upload=may_upload, temporary_tcp=self._temporary_tcp
-                )
-            )
+    def _reconfigure(self) -> Configure:
+        self._abort_calls(LOOP_LOST)  # those that were made since
+        return Configure(
+            config=self.config, may_upload=self._may_upload, temporary_tcp=self._temporary_tcp
+        )
 
     def _handle(self, notification: Notification | Request) -> None:
         match notification:

@@ -1,0 +1,141 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The owner's end of a robot loop: starts it, talks to it, replaces it when it dies or hangs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+import contextlib
+import threading
+
+from ur_cartesian_driver.driver.callbacks import LOG
+from ur_cartesian_driver.driver.ipc import channel
+from ur_cartesian_driver.driver.ipc.channel import (
+    Configure,
+    Notification,
+    OwnerHeartbeat,
+    Request,
+    Shutdown,
+)
+from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
+from ur_cartesian_driver.driver.loop import host
+from ur_cartesian_driver.motion.state import RobotState
+
+#: Pause before a robot loop that died is replaced [s]: what ended it may end the next one too.
+RESTART_PAUSE = 0.5
+
+
+class LoopConnection:
+    """Thread-safe; callbacks run on a reader thread of its own."""
+
+    def __init__(
+        self,
+        config: DriverConfig,
+        *,
+        auto_heartbeat: bool,
+        on_notification: Callable[[Notification | Request], None],
+        on_lost: Callable[[], None],
+        reconfigure: Callable[[], Configure],
+    ) -> None:
+        """
+        Prepare; :meth:`open` starts the loop.
+
+        :param on_lost: the loop died or hangs.
+        :param reconfigure: called before another loop starts; returns its configuration.
+        """
+        self._config, self._auto_heartbeat = config, auto_heartbeat
+        self._on_notification, self._on_lost = on_notification, on_lost
+        self._reconfigure = reconfigure
+        #: Guards the pipe (several threads send), opening and closing, and what callers guard
+        #: together with these.
+        self.lock = threading.RLock()
+        self.host: host.LoopHost | None = None
+        self._closed = threading.Event()
+        self._threads: list[threading.Thread] = []
+
+    @property
+    def is_open(self) -> bool:
+        """Tell whether the loop runs, or is being replaced."""
+        return self.host is not None and not self._closed.is_set()
+
+    @property
+    def state(self) -> RobotState | None:
+        """The newest robot state; None before the first and when the robot is lost."""
+        running = self.host
+        if running is None or self._closed.is_set():
+            return None
+        try:
+            return running.memory.read()
+        except ValueError:  # closed at this moment
+            return None
+
+    def open(self) -> None:
+        """Start the loop, if it does not run."""
+        with self.lock:
+            if self.host is not None:
+                return
+            self._closed.clear()
+            self.host = host.start(self._config.robot_loop)
+            self.send(Configure(config=self._config))
+            self._start_thread('driver reader', self._read)
+            if self._auto_heartbeat:
+                self._start_thread('driver heartbeat', self._send_heartbeats)
+
+    def close(self) -> bool:
+        """End the loop and all threads; False if it did not run."""
+        with self.lock:
+            if self.host is None or self._closed.is_set():
+                return False
+            self._closed.set()
+            self.send(Shutdown())
+        for thread in self._threads:
+            if thread is not threading.current_thread():
+                thread.join()
+        with self.lock:
+            self.host.join()
+            self.host, self._threads = None, []
+        return True
+
+    def send(self, request: Request) -> None:
+        """Send a request; a loop that is gone is noticed by the reader thread."""
+        data = channel.pack(request)
+        with self.lock, contextlib.suppress(OSError):
+            if self.host is not None:
+                self.host.pipe.sendall(data)
+
+    def _start_thread(self, name: str, target: Callable[[], None]) -> None:
+        thread = threading.Thread(target=target, name=name, daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
+    def _send_heartbeats(self) -> None:
+        while not self._closed.wait(self._config.node_timeout / 4.0):
+            self.send(OwnerHeartbeat())
+
+    def _read(self) -> None:
+        while (running := self.host) is not None:  # None: closed by a callback of ours
+            notification = channel.receive(running.pipe)
+            if notification is not None:
+                self._on_notification(notification)
+            elif self._closed.is_set():
+                return
+            else:
+                self._restart()
+
+    def _restart(self) -> None:
+        """
+        Replace a robot loop that died or hangs.
+
+        The robot program stops the arm: its sockets are closed, or silent for too long.
+        """
+        LOG.error('the robot loop ended unexpectedly, or hangs, and is started again')
+        self._on_lost()
+        if self._closed.wait(RESTART_PAUSE):
+            return
+        with self.lock:
+            if self.host is None or self._closed.is_set():
+                return
+            configure = self._reconfigure()
+            self.host.join()
+            self.host = host.start(self._config.robot_loop)
+            self.send(configure)
