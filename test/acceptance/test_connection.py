@@ -360,7 +360,7 @@ def test_a_foreign_program_is_not_replaced(make_driver, ur_sim, paused):
     sleep(0.3)
     assert not driver.status.program_running
     assert ur_sim.state().runtime_state is before
-    assert 'has not called this driver' in driver.status.message
+    assert 'Another program runs on the robot' in driver.status.message
     ur_sim.stop_program()
     sleep(0.3)
     assert ur_sim.state().runtime_state.name == 'STOPPED'

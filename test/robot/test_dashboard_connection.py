@@ -134,7 +134,7 @@ def version(text):
         ('power on', '3.15.0', ''),
         ('power on', '10.11.0', 'PolyScope X has no dashboard server'),
         ('power on', '10.8.0', 'with software 10.8.0.0; call recover, or do it on the pendant.'),
-        ('robotmode', '10.8.0', '; the topic robot_mode tells it.'),
+        ('robotmode', '10.8.0', '; see the topic robot_mode.'),
         ('load', '10.8.0', '; do it on the pendant.'),
         ('is in remote control', '5.5.0', 'needs software 5.6 or newer'),
         ('is in remote control', '3.15.0', 'has no command'),

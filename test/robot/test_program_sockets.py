@@ -85,7 +85,7 @@ def test_the_ports_move_with_our_address():
             assert here.sockets.connected
             assert here.sockets.ports == before
             await here.sockets.open('127.0.0.2', frozenset())
-            assert await here.next() == 'lost, our address is 127.0.0.2 now'
+            assert await here.next() == 'lost, the address of the driver is 127.0.0.2 now'
             for port in here.sockets.ports.values():
                 _, writer = await asyncio.open_connection('127.0.0.2', port)
                 writer.close()

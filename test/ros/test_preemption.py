@@ -142,7 +142,7 @@ def test_a_paused_robot_is_not_made_ready_by_a_newer_goal(single_cell):
     cell.spin_until(lambda: not moving(cell))
     status, result = cell.run(place.goal((1.0, 0.0, 0.01, 0.0)))
     assert (status, result.error_code) == (ABORTED, ErrorCode.ROBOT_NOT_READY)
-    assert 'held by a pause' in result.error_string
+    assert 'paused or stopped' in result.error_string
     cell.sim.play_program()
     assert outcomes(cell, [old]) == [(SUCCEEDED, 0)]
 

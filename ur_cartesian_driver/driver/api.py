@@ -375,7 +375,7 @@ class Driver(RobotServices, InteractiveMotions):
             try:
                 motion.result(CANCEL_TIMEOUT)
             except TimeoutError:
-                raise RobotNotReady('The motion before this one did not end.') from None
+                raise RobotNotReady('The previous motion did not end.') from None
         return bool(motions)
 
     def check_can_preempt(self) -> None:
@@ -387,11 +387,11 @@ class Driver(RobotServices, InteractiveMotions):
         """
         state = self._required(self.state)
         if self.is_freedrive_active:
-            raise RobotNotReady('Somebody guides the arm by hand; end that first.')
+            raise RobotNotReady('A person guides the arm by hand; end freedrive first.')
         if is_paused(state) or is_stopped(state):
             raise RobotNotReady(
-                'A motion is running, and the robot program is held by a pause or a stop, so that '
-                'nothing else can take its place; let it go on, or cancel it.'
+                'A motion is running that is paused or stopped, so no other motion can preempt '
+                'it; resume or cancel it.'
             )
 
     def execute(
@@ -511,8 +511,8 @@ class Driver(RobotServices, InteractiveMotions):
         if 0.0 < limit < deviation:
             LOG.warning(
                 'the calibration of the robot moves the flange by up to %.1f mm from where the '
-                'model %s has it, max_calibration_difference is %.1f mm: check ur_type, and '
-                'whether the arm was repaired and calibrated since',
+                'model %s has it; max_calibration_difference is %.1f mm: check ur_type, and '
+                'whether the arm was repaired and calibrated again',
                 1e3 * deviation,
                 model.name,
                 1e3 * limit,

@@ -104,7 +104,7 @@ def required_action(
     """
     if state is ConnectionState.CONNECTING or robot is None:
         return (
-            'The robot answers; waiting for its report of itself on the primary interface '
+            'The robot answers; waiting for its configuration on the primary interface '
             '(primary_port).'
         )
     if state is ConnectionState.STOPPED:
@@ -121,21 +121,21 @@ def required_action(
             return 'The robot program is paused; play it on the pendant.'
         if program_is_ending:
             return (
-                'The robot program was told to end, and is still there; if it does not go, '
-                'stop it on the pendant.'
+                'The robot program was told to end but is still connected; if it stays, stop it '
+                'on the pendant.'
             )
         return (
             (
-                'The TCP that the last goal had set is still to be put back; should it stay, set '
-                'the right one on the robot.'
+                'The TCP of the last goal is still active and will be restored; if this takes '
+                'long, set the right one on the robot.'
             )
             if tcp_restore_pending
             else ''
         )
     if foreign_program:
         return (
-            'A program runs on the robot, and it has not called this driver: it is another '
-            'one, or it belongs to another driver. Let it end, or stop it; then '
+            'Another program runs on the robot, maybe that of another driver. Let it end, or '
+            'stop it; then '
             + (
                 'call resend_robot_program.'
                 if headless_mode

@@ -229,14 +229,11 @@ class RobotLink:
             return 'a goal is running; cancel it first'
         if self._tracker.foreign_program_runs(self.robot):
             return (
-                'another program runs on the robot, maybe of another driver; let it end, or '
-                'stop it'
+                'another program runs on the robot, maybe that of another driver; let it end, '
+                'or stop it'
             )
         if not self.program.text:
-            return (
-                'wire_dialect says that the robot has an older one of its own; play that on '
-                'the pendant'
-            )
+            return 'wire_dialect says that the robot has an older one; play that on the pendant'
         return ''
 
     def not_ready(self) -> str:
@@ -354,8 +351,7 @@ class RobotLink:
                 ConnectionEvent.ROBOT_REFUSED,
                 robot_model=found,
                 polyscope_version=str(self.version),
-                message=f'The robot is a {found}, but ur_type is {expected}; set ur_type to the '
-                'model that is there.',
+                message=f'The robot is a {found}, but ur_type is {expected}; correct ur_type.',
             )
 
     def _on_kinematics(self, geometry: DhTable) -> None:

@@ -309,7 +309,7 @@ class TcpListener:
             )
         elif self.connection is not None and self._is_taken():
             self._reject(
-                connection, f'{peer} was turned away, the robot program is connected already'
+                connection, f'{peer} was rejected: the robot program is connected already'
             )
         else:
             self.disconnect()

@@ -39,7 +39,7 @@ class CallRunner:
             self._running += 1
             self._spawn(self._answer(request))
         else:
-            answer = failed(f'{MAX_CALLS} calls are being carried out; wait for some.')
+            answer = failed(f'{MAX_CALLS} service calls are running; wait until one has ended.')
             self._pipe.send(CallAnswered(number=request.number, answer=answer))
 
     async def _answer(self, request: CallRobot) -> None:

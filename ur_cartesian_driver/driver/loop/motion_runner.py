@@ -145,16 +145,13 @@ class MotionRunner:
         if self.is_running or self._ends.is_pending:
             return 'Another motion is running; wait for its end or cancel it.'
         if self._is_changing_settings():
-            return 'TCP or payload are being set at this moment; send the goal again.'
+            return 'TCP or payload is being set; send the goal again.'
         if reason := self._link.not_ready():
             return reason
         state = self._newest.latest
         if state is None or same_tcp(state.T_flange_tcp, job.T_flange_active):
             return ''
-        return (
-            'The TCP of the robot was changed after the goal had been planned; send the goal '
-            'again.'
-        )
+        return 'The TCP of the robot changed after the goal was planned; send the goal again.'
 
     def append(self, request: AppendToMotion) -> None:
         """Offer points to the motion that runs, if they are for it."""

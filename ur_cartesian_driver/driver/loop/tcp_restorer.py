@@ -41,7 +41,7 @@ class TcpRestorer:
             self._pending = None
             self._link.set_tcp_restore_pending(False)
             self._pipe.send(TemporaryTcpRestored())
-            self._pipe.log(logging.INFO, 'the TCP that the last goal had set is not set any more')
+            self._pipe.log(logging.INFO, 'the TCP of the last goal is no longer active')
         else:
             self.restore_if_due(state)
 

@@ -137,8 +137,8 @@ class RecordingFolder:
             self._close_files()
             reason = error.strerror if isinstance(error, OSError) else error
             self._warn(
-                f'A motion is not recorded, or not to its end: {reason} '
-                f'({self._directory}); see to record_directory.'
+                f'The recording of a motion failed: {reason} ({self._directory}); check '
+                'record_directory.'
             )
 
     def _write_metadata(self) -> None:
@@ -159,7 +159,7 @@ def _new(path: Path) -> Path:
         with suppress(FileExistsError):
             found.mkdir()
             return found
-    raise FileExistsError(f'there are many recordings of the name {path.stem} already')
+    raise FileExistsError(f'there are too many recordings named {path.stem} already')
 
 
 # ---- what is there already ------------------------------------------------------------------

@@ -111,7 +111,7 @@ class ProgramSockets:
         :raises OSError: a port is taken; the text names the parameter to change.
         """
         if host != self._host:
-            self.drop(f'our address is {host} now')
+            self.drop(f'the address of the driver is {host} now')
             for port in (*self._program_ports, self._sender):
                 port.close()
             self._host = host
@@ -223,7 +223,7 @@ class ProgramSockets:
     def _on_open(self, connection: TcpConnection) -> None:
         if self.connected:
             self.connected = False
-            self._listener.lost('another robot program calls')
+            self._listener.lost('another robot program connects')
         called = [port.connection for port in self._program_ports].index(connection)
         for port in self._program_ports[called + 1 :]:
             port.disconnect()  # a stranger, or a program that died while it connected
@@ -260,8 +260,8 @@ class ProgramSockets:
             return
         if not self.text:
             self._sender.warn_limited(
-                'the robot asks for a robot program, but wire_dialect says that it has an older '
-                'one of its own; leave wire_dialect out to have ours run'
+                'the robot requests a robot program, but wire_dialect says that it has an older '
+                'one; remove wire_dialect to run the program of this driver'
             )
             return
         for _ in range(wanted):

@@ -76,7 +76,7 @@ class RtdeConnection:
                 await self._answered.wait()
         except TimeoutError:
             raise OSError(
-                f'{host} port {port} does not answer as an RTDE server; it may be no robot'
+                f'{host} port {port} does not answer as an RTDE server; is it a robot?'
             ) from None
         if self._version is None:
             raise OSError(f'{host} port {port} (RTDE): {self._closed.result()}')

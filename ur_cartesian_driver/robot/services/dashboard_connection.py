@@ -39,11 +39,11 @@ REPLACEMENTS: Mapping[str, str] = MappingProxyType(
             ('power on', 'brake release', 'unlock protective stop'),
             'call recover, or do it on the pendant',
         ),
-        'robotmode': 'the topic robot_mode tells it',
-        **dict.fromkeys(('safetymode', 'safetystatus'), 'the topic safety_mode tells it'),
-        **dict.fromkeys(('running', 'programState'), 'the diagnostics tell it'),
+        'robotmode': 'see the topic robot_mode',
+        **dict.fromkeys(('safetymode', 'safetystatus'), 'see the topic safety_mode'),
+        **dict.fromkeys(('running', 'programState'), 'see the diagnostics'),
         **dict.fromkeys(
-            ('PolyscopeVersion', 'version', 'get robot model'), 'the topic status tells it'
+            ('PolyscopeVersion', 'version', 'get robot model'), 'see the topic status'
         ),
     }
 )
@@ -170,9 +170,9 @@ def _reason(
     if answer.startswith('No program loaded'):
         return 'Load one with load_program, or on the pendant.'
     if 'File not found' in answer:
-        return 'The name counts from the folder of programs on the robot.'
+        return 'The name is relative to the folder of programs on the robot.'
     if robot is None:
-        return 'Its state is not known, as there is no RTDE connection.'
+        return 'Its state is unknown: there is no RTDE connection.'
     if robot.safety_mode not in (SafetyMode.NORMAL, SafetyMode.REDUCED):
         return f'The safety system is in mode {robot.safety_mode.name}: clear that first.'
     if command == 'play' and robot.robot_mode is not RobotMode.RUNNING:

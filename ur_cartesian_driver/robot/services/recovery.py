@@ -87,7 +87,7 @@ class RecoveryRunner:
     async def run(self) -> ServiceAnswer:
         """Go it to its end, or to where a person has to act; the text tells what was done."""
         if self._is_running:
-            return failed('A recovery is under way already.')
+            return failed('A recovery is running already.')
         self._is_running = True
         try:
             return await self._step_by_step()
@@ -114,7 +114,7 @@ class RecoveryRunner:
                 continue
             if STEP_NAMES[upcoming.step] in done:
                 return failed(
-                    _report(done, f'The robot needs a person: {describe_modes(self._link)}')
+                    _report(done, f'An operator has to act: {describe_modes(self._link)}')
                 )
             try:
                 answer = await self._do(upcoming.step)
@@ -175,7 +175,7 @@ class RecoveryRunner:
             )
         ):
             return failed(
-                'it plays, but has not come to its External Control node within '
+                'it plays, but did not reach its External Control node within '
                 f'{EFFECT_TIMEOUT:g} s.'
             )
         return answer

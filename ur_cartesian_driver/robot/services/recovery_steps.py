@@ -54,7 +54,7 @@ STEP_NAMES: Mapping[RecoveryStep, str] = MappingProxyType(
 
 _GUARD = 'The safeguard stop is active: close the safeguard and reset it.'
 _BUTTON = 'The emergency stop is pressed: see that nobody is in danger, then release the button.'
-_ENABLE = 'An enabling device is in use: let go of it, or choose the automatic mode.'
+_ENABLE = 'An enabling device is in use: release it, or choose automatic mode.'
 
 #: What the safety system needs; a sentence = a person has to act, None = nothing.
 SAFETY_STEPS: Mapping[SafetyMode, RecoveryStep | str | None] = MappingProxyType(
@@ -68,15 +68,17 @@ SAFETY_STEPS: Mapping[SafetyMode, RecoveryStep | str | None] = MappingProxyType(
         SafetyMode.ROBOT_EMERGENCY_STOP: _BUTTON,
         SafetyMode.VIOLATION: RecoveryStep.RESTART_SAFETY,
         SafetyMode.FAULT: RecoveryStep.RESTART_SAFETY,
-        SafetyMode.VALIDATE_JOINT_ID: 'A joint has to be identified: follow the pendant.',
-        SafetyMode.UNDEFINED_SAFETY_MODE: 'The safety mode is not known: look at the pendant.',
+        SafetyMode.VALIDATE_JOINT_ID: (
+            'A joint has to be identified: follow the instructions on the pendant.'
+        ),
+        SafetyMode.UNDEFINED_SAFETY_MODE: 'The safety mode is unknown: check the pendant.',
         SafetyMode.AUTOMATIC_MODE_SAFEGUARD_STOP: _GUARD,
         SafetyMode.SYSTEM_THREE_POSITION_ENABLING_STOP: _ENABLE,
         SafetyMode.TP_THREE_POSITION_ENABLING_STOP: _ENABLE,
         SafetyMode.IMMI_EMERGENCY_STOP: _BUTTON,
         SafetyMode.IMMI_SAFEGUARD_STOP: _GUARD,
         SafetyMode.PROFISAFE_WAITING_FOR_PARAMETERS: (
-            'The safety system waits for the PROFIsafe controller: start that.'
+            'The safety system waits for the PROFIsafe controller: start it.'
         ),
         SafetyMode.PROFISAFE_AUTOMATIC_MODE_SAFEGUARD_STOP: _GUARD,
         SafetyMode.PROFISAFE_SAFEGUARD_STOP: _GUARD,
@@ -88,8 +90,8 @@ SAFETY_STEPS: Mapping[SafetyMode, RecoveryStep | str | None] = MappingProxyType(
 #: What power and brakes need, as above.
 POWER_STEPS: Mapping[RobotMode, RecoveryStep | str | None] = MappingProxyType(
     {
-        RobotMode.NO_CONTROLLER: 'The controller does not run: look at the pendant.',
-        RobotMode.DISCONNECTED: 'The arm is not connected to its controller: look at the pendant.',
+        RobotMode.NO_CONTROLLER: 'The controller does not run: check the pendant.',
+        RobotMode.DISCONNECTED: 'The arm is not connected to its controller: check the pendant.',
         RobotMode.CONFIRM_SAFETY: 'The safety configuration has to be confirmed on the pendant.',
         RobotMode.BOOTING: RecoveryStep.WAIT,
         RobotMode.POWER_OFF: RecoveryStep.POWER_ON,
@@ -151,9 +153,9 @@ def _during_a_goal(situation: RecoverySituation) -> NextStep:
     robot = situation.robot
     if robot is not None and robot.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED):
         return NextStep(
-            RecoveryStep.OPERATOR, 'A goal is running and paused: play it on, or cancel it.'
+            RecoveryStep.OPERATOR, 'A goal is paused: resume it on the pendant, or cancel it.'
         )
-    return NextStep(RecoveryStep.DONE, 'A goal is running; nothing has to be recovered.')
+    return NextStep(RecoveryStep.DONE, 'A goal is running; there is nothing to recover.')
 
 
 def _of_robot(situation: RecoverySituation, robot: RobotState) -> NextStep:
@@ -177,8 +179,8 @@ def _of_program(situation: RecoverySituation, runtime: RuntimeState) -> NextStep
         case RuntimeState.PLAYING:
             return NextStep(
                 RecoveryStep.OPERATOR,
-                'Another program runs on the robot: stop it, or let it come '
-                'to its External Control node.',
+                'Another program runs on the robot: stop it, or let it reach '
+                'its External Control node.',
             )
         case RuntimeState.STOPPED:
             return NextStep(RecoveryStep.SEND_PROGRAM if situation.headless else RecoveryStep.PLAY)

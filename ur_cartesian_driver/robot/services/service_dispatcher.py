@@ -102,7 +102,7 @@ class ServiceDispatcher:
             async with asyncio.timeout(bound):
                 return self._refusal(call) or await self._execute(call)
         except TimeoutError:
-            return failed(f'The robot has not done it within {bound:g} s.')
+            return failed(f'The robot did not complete the call within {bound:g} s.')
         except (OSError, DriverError) as error:
             return failed(f'{str(error).rstrip(".")}.')
 
@@ -139,8 +139,7 @@ class ServiceDispatcher:
             return failed(status.message)
         if isinstance(call, SetTcpCall) and self._link.tcp_restore_pending:
             return failed(
-                'The TCP that a goal has lent is being put back; try again when the status '
-                'is READY.'
+                'The TCP of the last goal is being restored; try again when the status is READY.'
             )
         if status.state is ConnectionState.EXECUTING and (
             isinstance(call, SetTcpCall | SetPayloadCall | SendProgramCall)
@@ -159,12 +158,12 @@ class ServiceDispatcher:
         robot = self._link.robot
         if robot is not None and robot.runtime_state is not RuntimeState.PLAYING:
             return failed(
-                f'The robot program does not read commands now, it is '
-                f'{robot.runtime_state.name}. {self._link.status.message}'.rstrip()
+                f'The robot program is {robot.runtime_state.name} and does not read commands. '
+                f'{self._link.status.message}'.rstrip()
             )
         if not self._link.program.send_command(script_command.encode(command)):
             return failed(
-                'The robot program does not run, and it is what does this. '
+                'This needs the robot program, which does not run. '
                 f'{self._link.status.message}'.rstrip()
             )
         return None
@@ -173,11 +172,11 @@ class ServiceDispatcher:
         version = self._link.version
         if version is not None and version.major < E_SERIES:
             return failed(
-                f'A CB3 robot (software {version}) has no force sensor to be zeroed: '
-                'it works forces out from the currents of its joints.'
+                f'A CB3 robot (software {version}) has no force sensor to zero: it estimates '
+                'forces from the currents of its joints.'
             )
         return self._command(script_command.ZeroFtSensorCommand()) or succeeded(
-            'The robot program was told to zero the force sensor.'
+            'The command to zero the force sensor was sent.'
         )
 
     async def _set(self, call: SetTcpCall | SetPayloadCall) -> ServiceAnswer:
@@ -209,8 +208,8 @@ class ServiceDispatcher:
             return succeeded('The TCP is set.')
         return failed(
             f'The robot does not report the new TCP within {SETTING_TIMEOUT:g} s: its '
-            'program may not know that command, or its software not report TCPs; set it on '
-            'the pendant.'
+            'program may not know the command, or its software may not report the TCP; set it '
+            'on the pendant.'
         )
 
     async def _set_payload(self, call: SetPayloadCall) -> ServiceAnswer:
@@ -220,17 +219,20 @@ class ServiceDispatcher:
         signals, rate = self._link.signals, self._settings.io_publish_rate
         if signals is None:
             return succeeded(
-                'The payload was sent; nothing reports it while inputs and outputs are not '
-                'reported (io_publish_rate).'
+                'The payload was sent, but cannot be confirmed: the robot does not report inputs '
+                'and outputs (io_publish_rate).'
             )
         if isnan(signals.payload):
-            return succeeded('The payload was sent; the software of the robot does not report it.')
+            return succeeded(
+                'The payload was sent, but cannot be confirmed: the software of the robot does '
+                'not report it.'
+            )
         within = SETTING_TIMEOUT + 1.0 / rate
         if await wait_for_state(self._link, lambda _: self._has_payload(call), within):
             return succeeded('The payload is set.')
         return failed(
             f'The robot does not report the new payload within {within:g} s: its program '
-            'may not know that command; set it on the pendant.'
+            'may not know the command; set it on the pendant.'
         )
 
     def _has_payload(self, call: SetPayloadCall) -> bool:
@@ -265,7 +267,7 @@ class ServiceDispatcher:
         if await self._dashboard.remote_control() is False:
             needed = 'The robot is in local control: switch it to remote control, then try again.'
         return failed(
-            f'The robot program has not called within {EFFECT_TIMEOUT:g} s. {needed}'.rstrip()
+            f'The robot program did not connect within {EFFECT_TIMEOUT:g} s. {needed}'.rstrip()
         )
 
     # ---- RTDE inputs --------------------------------------------------------------------------
@@ -278,7 +280,7 @@ class ServiceDispatcher:
         ):
             return succeeded(success)
         return failed(
-            'The robot took the value, but does not report it within '
-            f'{rtde_input_writer.EFFECT_TIMEOUT:g} s; is it in local control, or does something '
-            'else set the same?'
+            'The robot accepted the value, but did not report it within '
+            f'{rtde_input_writer.EFFECT_TIMEOUT:g} s; is it in local control, or does another '
+            'client set the same?'
         )
