@@ -242,7 +242,7 @@ def test_a_tcp_that_is_changed_between_goals_is_the_one_that_moves(tooled, ur_si
     # A plan for a TCP that is gone would go somewhere else.
     outcome = tooled.start(plan).result(9.0)
     assert outcome.code is ErrorCode.ROBOT_NOT_READY
-    assert 'TCP of the robot was changed' in outcome.text
+    assert 'TCP of the robot changed' in outcome.text
 
 
 def moving(driver, turn=QUARTER):

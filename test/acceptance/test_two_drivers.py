@@ -19,7 +19,7 @@ def test_the_second_driver_is_told_and_takes_nothing_away(driver, make_driver, h
     motion = driver.start(driver.plan(Goal(waypoints=(Waypoint(pose=home(y=0.1), time=2.0),))))
     second = make_driver()
     wait_for(lambda: second.status.state is ConnectionState.CONNECTED)
-    wait_for(lambda: 'belongs to another driver' in second.status.message)
+    wait_for(lambda: 'maybe that of another driver' in second.status.message)
     second.resend_robot_program()
     answer = second.recover()
     assert not answer.ok
