@@ -103,8 +103,8 @@ class Driver(RobotServices, InteractiveMotions):
         """
         Prepare a driver; nothing is connected before :meth:`open`.
 
-        :param auto_heartbeat: tell the robot loop that the owner lives for as long as this
-            process does; an owner that can hang (a ROS executor) calls :meth:`heartbeat` itself.
+        :param auto_heartbeat: send heartbeats from a thread; an owner that can hang (a ROS
+            executor) calls :meth:`heartbeat` itself.
         :raises ValueError: ``ur_type`` is unknown.
         """
         self.config = config
@@ -151,7 +151,7 @@ class Driver(RobotServices, InteractiveMotions):
     # ---- life ---------------------------------------------------------------------------------
 
     def open(self) -> None:
-        """Start the robot loop and return; it connects, and connects again, by itself."""
+        """Start the robot loop and return; it connects and reconnects by itself."""
         self._loop.open()
 
     def close(self) -> None:
@@ -163,7 +163,7 @@ class Driver(RobotServices, InteractiveMotions):
         self._abort_all('The driver was closed.')
 
     def heartbeat(self) -> None:
-        """Say that the owner is alive; see ``node_timeout``."""
+        """Tell the robot loop that the owner is alive; see ``node_timeout``."""
         self._send(OwnerHeartbeat())
 
     # ---- what is known ------------------------------------------------------------------------
@@ -212,21 +212,21 @@ class Driver(RobotServices, InteractiveMotions):
 
     @property
     def gaps(self) -> LinkGaps:
-        """How steady the connection was lately."""
+        """The longest pauses of the connection lately."""
         return self._gaps
 
     @property
     def arm(self) -> Arm:
-        """The arm's kinematics: the robot's own once it has told them, else the model's."""
+        """The arm's kinematics: calibrated once the robot has reported them, else nominal."""
         return self._arm
 
     def add_status_listener(self, callback: Callable[[DriverStatus], None]) -> None:
-        """Call back with each new status, and with the present one now."""
+        """Call back with each new status, and now with the present one."""
         self._status_listeners.append(callback)
         callback(self._status)
 
     def add_servo_listener(self, callback: Callable[[ServoReport], None]) -> None:
-        """Call back with what the robot loop tells of set-points that are streamed."""
+        """Call back with each report of the servo."""
         self._servo_listeners.append(callback)
 
     def wait_ready(self, timeout: float) -> None:
@@ -298,7 +298,7 @@ class Driver(RobotServices, InteractiveMotions):
         freedrive: bool = False,
         part: AppendPlan | None = None,
     ) -> MotionHandle:
-        """Have the robot loop begin a motion, if nothing else moves."""
+        """Have the robot loop start a motion, if no other runs."""
         with self._lock:
             if self._active_motions:
                 raise RobotNotReady('A motion is running; wait for its end or cancel it.')
@@ -362,9 +362,8 @@ class Driver(RobotServices, InteractiveMotions):
         """
         Stop the running motion for another one; it ends PREEMPTED. Wait until its end.
 
-        :returns: whether there was one: what was planned while it ran has to be planned again.
-        :raises RobotNotReady: it cannot be stopped now so that another one could follow, and goes
-            on; or its end did not come.
+        :returns: whether one ran: plans made while it ran have to be made again.
+        :raises RobotNotReady: it cannot be preempted now and goes on, or it did not end.
         """
         with self._lock:
             motions = [active.motion for active in self._active_motions.values()]
@@ -380,10 +379,10 @@ class Driver(RobotServices, InteractiveMotions):
 
     def check_can_preempt(self) -> None:
         """
-        See that a motion that runs can be stopped for another one.
+        Check that a running motion can be preempted.
 
-        :raises RobotNotReady: a person guides the arm; or the robot program is held: it would
-            read neither the stop nor the next motion.
+        :raises RobotNotReady: a person guides the arm; or the robot program is paused or stopped
+            and would read neither the stop nor the next motion.
         """
         state = self._required(self.state)
         if self.is_freedrive_active:
@@ -408,7 +407,7 @@ class Driver(RobotServices, InteractiveMotions):
         :param preempt: if a motion runs stop it for this goal, once the goal has passed all checks
             from where the arm would come to rest; else the goal is refused while one runs.
         :raises TimeoutError: no outcome within ``timeout`` [s]; the motion was cancelled, and the
-            arm stands.
+            arm is at rest.
         """
         try:
             planned = self.plan(goal)
@@ -431,11 +430,11 @@ class Driver(RobotServices, InteractiveMotions):
             active.motion.cancel()
 
     def resend_robot_program(self) -> None:
-        """Upload the robot program again; the way on after somebody stopped it."""
+        """Upload the robot program again, for instance after a person stopped it."""
         self._send(ResendProgram())
 
     def call(self, call: ServiceCall) -> Future[ServiceAnswer]:
-        """Ask the robot for something and return at once; the answer comes in any case."""
+        """Start a call and return at once; the answer always comes."""
         future: Future[ServiceAnswer] = Future()
         future.set_running_or_notify_cancel()
         with self._lock:
@@ -530,7 +529,7 @@ class Driver(RobotServices, InteractiveMotions):
             run_callback(listener, status)
 
     def _abort_all(self, text: str) -> None:
-        """End all motions and calls of a robot loop that cannot tell their ends any more."""
+        """End all motions and calls of a robot loop that is gone."""
         self._abort_calls(text)
         with self._lock:
             active_motions, self._active_motions = self._active_motions, {}

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Calls of somebody else's code from a thread of the driver."""
+"""Calls user code from a thread of the driver."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ T = TypeVar('T')
 
 
 def run_callback(callback: Callable[[T], None], argument: T) -> None:
-    """Call somebody else's code; what it raises must not end the thread that serves all."""
+    """Call user code; what it raises must not end the thread of the driver."""
     try:
         callback(argument)
     except Exception as error:

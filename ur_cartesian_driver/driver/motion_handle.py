@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A running motion from its two sides: what its owner can do, and what the driver says of it."""
+"""A running motion: the handle for its user, and the driver's side of it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ OnProgress = Callable[[Progress], None]
 
 
 class MotionHandle:
-    """A running motion; its outcome comes whatever happens to the robot."""
+    """A running motion; it always ends with an outcome, whatever happens to the robot."""
 
     def __init__(
         self, number: int, outcome: Future[Outcome], send: Callable[[Request], None]
@@ -29,20 +29,20 @@ class MotionHandle:
         """Be made by :meth:`~.api.Driver.start`."""
         self.number = number
         self._outcome, self._send = outcome, send
-        #: How it is continued; None = it is as long as it is. Set by the driver.
+        #: Appends points; None = the goal was sent without keep_open. Set by the driver.
         self.appender: Appender | None = None
         #: The newest report, None before the first.
         self.progress: Progress | None = None
 
     def cancel(self) -> None:
-        """Ask the arm to stop; the outcome follows when it stands. May be called twice."""
+        """Stop the arm; the outcome follows when it is at rest. May be called twice."""
         self._send(CancelMotion(motion=self.number))
 
     def preempt(self, by: str = 'a newer motion') -> None:
         """
-        Ask the arm to stop, as :meth:`cancel` does, because another motion is to follow.
+        Stop the arm, as :meth:`cancel` does, because another motion follows.
 
-        :param by: which one, as part of the outcome's sentence.
+        :param by: the other motion, as part of the sentence of the outcome.
         """
         self._send(CancelMotion(motion=self.number, preempted_by=by))
 
@@ -55,15 +55,15 @@ class MotionHandle:
         last: bool = False,
     ) -> AppendResult:
         """
-        Let points follow while the goal runs; it was started with ``keep_open``.
+        Append points to a running goal with ``keep_open``.
 
-        They are checked and planned here, so this takes a while; do not call it from callbacks.
+        Checks and plans them here, which takes a while: do not call it from callbacks.
 
         :param waypoints: with times from the start of the goal, in its frame.
         :param segments: none, or one for each point.
         :param io_commands: their waypoints are numbered from the start of the goal.
-        :param last: nothing follows; without points: the goal ends where it is known to end.
-        :raises GoalRefused: nothing was taken, and the goal is as it was; the text says why.
+        :param last: nothing follows; without points: the goal ends at its last point.
+        :raises GoalRefused: none of the points was taken, and the goal goes on; the text says why.
         """
         if self.appender is None:
             raise RobotNotReady('The goal was sent without keep_open: nothing can be appended.')
@@ -94,7 +94,7 @@ class MotionHandle:
 
 
 class ActiveMotion:
-    """The driver's side of a motion: its progress, and its only end."""
+    """The driver's side of a motion: its progress and its end."""
 
     def __init__(
         self,
@@ -106,7 +106,7 @@ class ActiveMotion:
         """
         Prepare.
 
-        :param send: takes what the owner of the motion asks for.
+        :param send: sends requests to the robot loop.
         """
         self._outcome: Future[Outcome] = Future()
         self._on_progress = on_progress

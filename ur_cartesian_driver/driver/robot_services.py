@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a driver can ask its robot for beside motions, as methods; also of the node."""
+"""The service calls of a driver as methods: dashboard, TCP, payload, outputs, recovery."""
 
 from __future__ import annotations
 
@@ -27,22 +27,22 @@ from ur_cartesian_driver.robot.services.service_calls import (
 
 class RobotServices(ABC):
     """
-    Each method waits for its answer, which comes within 40 s, that of a recovery within 120 s.
+    Each method waits for its answer: at most 40 s, for a recovery 120 s.
 
-    A refusal is an answer too. A value that nobody could send raises
+    A refusal is an answer too. A value that cannot be sent raises
     :class:`~ur_cartesian_driver.motion.errors.LocalProtocolError`.
     """
 
     @abstractmethod
     def call(self, call: ServiceCall) -> Future[ServiceAnswer]:
-        """Ask the robot for something and return at once; the answer comes in any case."""
+        """Start a call and return at once; the answer always comes."""
 
     def dashboard(self, command: str, argument: str = '') -> ServiceAnswer:
         """Give a command to the dashboard: ``power on``, ``load`` with the name of a file ..."""
         return self.call(DashboardCall(command=command, argument=argument)).result()
 
     def dashboard_line(self, line: str) -> ServiceAnswer:
-        """Send any line to the dashboard and fetch the line that it answers."""
+        """Send any line to the dashboard, and return its answer."""
         return self.call(DashboardLineCall(line=line)).result()
 
     def set_tcp(self, T_flange_tcp: Pose) -> ServiceAnswer:
@@ -72,5 +72,5 @@ class RobotServices(ABC):
         return self.call(SetSpeedSliderCall(fraction=fraction)).result()
 
     def recover(self) -> ServiceAnswer:
-        """Bring a stopped robot back to where it takes goals, as far as software may."""
+        """Bring a stopped robot back to READY, as far as software may."""
         return self.call(RecoverCall()).result()

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What can happen while a goal runs, and what is told about it."""
+"""Events of a running goal, its progress and its outcome."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ur_cartesian_driver.motion.vectors import Vector6, ZERO6
 
 
 class TrajectoryResult(IntEnum):
-    """How the robot program says that a trajectory ended; the numbers on the wire."""
+    """How the robot program reports the end of a trajectory; the numbers on the wire."""
 
     SUCCESS = 0
     CANCELED = 1
@@ -40,16 +40,16 @@ class TrajectoryEnded:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CancelRequested:
-    """Somebody wants the motion to stop; the reason is a clause for the outcome's text."""
+    """The motion has to stop; the reason is a clause for the text of the outcome."""
 
     reason: str = 'the client cancelled the goal'
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PreemptRequested:
-    """Another motion is to take the place of this one, which has to stop for it."""
+    """The motion has to stop because another one preempts it."""
 
-    #: Who takes its place, as part of a sentence.
+    #: The other motion, as part of a sentence.
     by: str = 'a newer motion'
 
 
@@ -63,12 +63,12 @@ class LinkLost:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tick:
-    """Time passed; sent at least every 20 ms so that bounds hold when nothing else happens."""
+    """Time passed; sent every 20 ms, so that timeouts end when nothing else happens."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoReceived:
-    """The robot reported how it gets on with streamed set-points."""
+    """The robot reported its servo feedback."""
 
     feedback: ServoFeedback
 
@@ -87,14 +87,14 @@ Event: TypeAlias = (
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
     """
-    Where a running motion is.
+    How far a running motion is.
 
     Poses, twists and accelerations are those of the controlled frame, in the robot's base.
     """
 
-    #: Index of the waypoint the tool is on its way to.
+    #: Index of the waypoint that the tool moves to.
     waypoint: int
-    #: Part of the planned time that is done, 0 to 1.
+    #: Fraction of the planned time that has passed, 0 to 1.
     fraction: float
     desired_pose: Pose
     desired_twist: Vector6 = ZERO6
@@ -110,19 +110,19 @@ class Progress:
     time_remaining: float = 0.0
     speed_scaling: float = 1.0
     points_received: int = 0
-    #: Motion time of the points on the robot's side that are not begun yet [s].
+    #: Motion time of the points that the robot holds and has not begun [s].
     buffered: float = 0.0
     #: SERVO: how far the arm is behind the newest set-point, as nominal time [s].
     lag: float = nan
     #: The controller's clock [s].
     timestamp: float = 0.0
-    #: Whether the arm rests and the goal waits for more points (keep_open).
+    #: Whether the arm is at rest and the goal waits for more points (keep_open).
     awaiting_points: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """How a goal ended: one code, one sentence, and what was done."""
+    """How a goal ended: a code, a sentence, and the report."""
 
     code: ErrorCode
     text: str

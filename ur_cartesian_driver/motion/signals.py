@@ -12,7 +12,7 @@ from ur_cartesian_driver.motion.vectors import Vector3
 
 
 class AnalogDomain(IntEnum):
-    """What an analog channel carries: current [A] or voltage [V]."""
+    """Unit of an analog channel: current [A] or voltage [V]."""
 
     CURRENT = 0
     VOLTAGE = 1
@@ -36,14 +36,14 @@ class DigitalChannels:
 
     @classmethod
     def from_bits(cls, bits: int) -> DigitalChannels:
-        """Return the channels of RTDE's number: standard from bit 0, then the others."""
+        """Return the channels in the bits of an RTDE value: standard, configurable, tool."""
         flags = tuple(bool(bits >> i & 1) for i in range(18))
         return cls(standard=flags[:8], configurable=flags[8:16], tool=flags[16:])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Signals:
-    """All of them at one moment."""
+    """All inputs, outputs and the tool connector at one time."""
 
     inputs: DigitalChannels
     outputs: DigitalChannels
@@ -55,7 +55,7 @@ class Signals:
     tool_current: float = 0.0
     #: [degrees Celsius].
     tool_temperature: float = 0.0
-    #: As the controller counts it.
+    #: Number of the controller.
     tool_mode: int = 0
     #: Mass [kg] and centre of gravity in the flange [m]; NaN = not reported.
     payload: float = nan

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the robot reports: a snapshot of its state, and the names of its modes."""
+"""The state that the robot reports, and the names of its modes."""
 
 from __future__ import annotations
 
@@ -103,8 +103,8 @@ class Rtde:
     monitored: bool = True
 
 
-# Never changed, but not frozen: a frozen one takes four times as long to make, and one is made for
-# each packet, between its arrival and what has to be done about it.
+# Never changed, but not frozen: that takes four times as long to make, and one is made for each
+# packet, before the reaction to it.
 @dataclass(slots=True)
 class RobotState:
     """
@@ -128,7 +128,7 @@ class RobotState:
     target_tcp_twist: Annotated[Vector6, Rtde('target_TCP_speed')] = ZERO6
     #: Force [N] and torque [Nm] at the TCP in base axes.
     actual_tcp_wrench: Annotated[Vector6, Rtde('actual_TCP_force', monitored=False)] = ZERO6
-    #: What the controller really runs at, and the pendant's slider, both 0 to 1.
+    #: The actual speed scaling, and the speed slider, both 0 to 1.
     speed_scaling: Annotated[float, Rtde('speed_scaling')] = 1.0
     target_speed_fraction: Annotated[float, Rtde('target_speed_fraction')] = 1.0
     robot_mode: Annotated[RobotMode, Rtde('robot_mode')] = RobotMode.RUNNING

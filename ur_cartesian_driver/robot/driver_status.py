@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a driver tells about its connection, and the sentences that say what is needed."""
+"""The status of a driver, and the sentences that say what is needed before a goal can run."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ class DriverStatus:
     state: ConnectionState = ConnectionState.DISCONNECTED
     #: What is needed, in a sentence; empty when nothing is.
     message: str = ''
-    #: The last thing that went wrong, its time before it and what led to it behind it.
+    #: The last error: its time, what happened, and the events that led to it.
     last_error: str = ''
-    #: What the robot says it is; empty until it has said so.
+    #: As the robot reports them; empty until it has.
     robot_model: str = ''
     polyscope_version: str = ''
     serial_number: str = ''
     #: Our program runs on the robot and is connected to us.
     program_running: bool = False
     calibration_known: bool = False
-    #: The ports that we really listen on, by the name of the parameter.
+    #: The ports that are open, by the name of the parameter.
     ports: Mapping[str, int] = field(default_factory=dict)
 
     def not_ready(self) -> str:
@@ -48,10 +48,10 @@ class DriverStatus:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkGaps:
     """
-    The longest pauses lately [s].
+    The longest pauses since the last report [s].
 
-    :param reports: between two reports of the robot.
-    :param keepalives: between two signs of life for the robot program.
+    :param reports: between two states of the robot.
+    :param keepalives: between two keepalives for the robot program.
     """
 
     reports: float = nan
@@ -60,9 +60,9 @@ class LinkGaps:
 
 def timestamped(text: str, before: str = '') -> str:
     """
-    Return a text behind the present time; the same text keeps the time that it has.
+    Return a text after the present time; an unchanged text keeps its time.
 
-    :param before: the stamped text that would be replaced.
+    :param before: the timestamped text that is replaced.
     """
     if before.endswith(f' UTC: {text}'):
         return before
@@ -75,7 +75,7 @@ def is_stopped(robot: RobotState) -> bool:
 
 
 def is_paused(robot: RobotState) -> bool:
-    """Tell whether the program reads nothing until somebody plays it on."""
+    """Tell whether the program is paused: it reads nothing until it is resumed."""
     return robot.runtime_state in (RuntimeState.PAUSING, RuntimeState.PAUSED)
 
 
@@ -98,9 +98,9 @@ def required_action(
     Return the sentence that says what is needed before a goal can run; empty when nothing is.
 
     :param robot: what the robot reported last; None = nothing yet.
-    :param tcp_restore_pending: the TCP that a goal had set is still to be put back.
-    :param program_is_ending: our program was told to end, and is still connected.
-    :param foreign_program: a program runs on the robot that has not called us.
+    :param tcp_restore_pending: the TCP of the last goal has to be restored.
+    :param program_is_ending: our program was told to end but is still connected.
+    :param foreign_program: a program runs on the robot that has not connected to us.
     """
     if state is ConnectionState.CONNECTING or robot is None:
         return (

@@ -1,18 +1,18 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The connection to the robot as a table: where it is, and what brings it further.
+The connection to the robot as a table of states and events.
 
-* **DISCONNECTED**: the robot does not answer; dialled again by itself.
-* **CONNECTING**: RTDE answers; the primary interface and the robot's report of itself are missing.
-* **CONNECTED**: the robot reports its state and is the one that was configured; the robot program
-  is not connected to us, or has ended, or is paused: then it would run a goal that it is sent now
-  at some later time; or the TCP that a goal had set is still to be put back.
+* **DISCONNECTED**: the robot does not answer; the link keeps trying.
+* **CONNECTING**: RTDE answers; the configuration of the robot (primary interface) is missing.
+* **CONNECTED**: the robot reports its state and is the configured model, but takes no goal: the
+  robot program is not connected, has ended or is paused (it would run the goal at some later
+  time), or the TCP of the last goal has to be restored.
 * **READY**: the robot program is connected and takes goals.
 * **EXECUTING**: a goal runs; it may be paused and resumed.
 * **STOPPED**: a person, another client or the safety system stopped the robot. Nothing starts by
-  itself from here; the way out is a program that connects again.
-* **REFUSED**: this driver must not move this robot, until somebody changes its parameters.
+  itself from here; a robot program that connects again leads out.
+* **REFUSED**: this driver must not move this robot, until its parameters are changed.
 
 Pure: no socket, no clock.
 """
@@ -25,7 +25,7 @@ from types import MappingProxyType
 
 
 class ConnectionState(IntEnum):
-    """Where the connection is; the numbers of ``DriverStatus.state``."""
+    """State of the connection; the numbers of ``DriverStatus.state``."""
 
     DISCONNECTED = 0
     CONNECTING = 1
@@ -37,7 +37,7 @@ class ConnectionState(IntEnum):
 
 
 class ConnectionEvent(Enum):
-    """What happened to the connection."""
+    """What changes the state of the connection."""
 
     ROBOT_ANSWERED = auto()
     ROBOT_ACCEPTED = auto()
@@ -55,7 +55,7 @@ class ConnectionEvent(Enum):
 
 S, E = ConnectionState, ConnectionEvent
 
-#: A change that a state does not name leaves it as it is.
+#: An event that a state does not name leaves it unchanged.
 TRANSITIONS: Mapping[ConnectionState, Mapping[ConnectionEvent, ConnectionState]] = (
     MappingProxyType(
         {
@@ -96,5 +96,5 @@ TRANSITIONS: Mapping[ConnectionState, Mapping[ConnectionEvent, ConnectionState]]
 
 
 def next_state(state: ConnectionState, event: ConnectionEvent) -> ConnectionState:
-    """Return the state after a change."""
+    """Return the state after an event."""
     return TRANSITIONS[state].get(event, state)

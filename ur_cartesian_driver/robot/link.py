@@ -1,19 +1,17 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The link to one robot: its interfaces joined into one connection that keeps itself up.
+The link to one robot: joins its interfaces into one connection that reconnects by itself.
 
-Order of things: RTDE is dialled first (it tells the software's version and streams the state),
-then we listen on our own ports, then the primary interface is dialled (it tells model, geometry
-and errors, and takes the robot program), then the robot program calls us. What was dialled is
-dialled again when it breaks.
+The link connects to RTDE first (which reports the version of the software and streams the state),
+opens its own ports, connects to the primary interface (which reports model, geometry and errors,
+and takes the robot program), and then waits for the robot program to connect.
 
-Power, brakes and programs are never started again by ourselves, on the first connection only
-(:mod:`~.auto_start`).
+It starts power, brakes and programs on the first connection only (:mod:`~.program.auto_start`).
 
 Events (:mod:`~ur_cartesian_driver.motion.events`) go to one callback, in the order in which they
-happened, on the event loop; a status that follows from an event is told before it, so that nobody
-who hears that a goal has ended takes a lost robot for a ready one.
+happened, on the event loop. A status that follows from an event is reported before it, so that
+the end of a goal never arrives while a lost robot still seems ready.
 """
 
 from __future__ import annotations
@@ -78,9 +76,9 @@ class RobotLink:
         Prepare; :meth:`run` connects.
 
         :param on_state: the robot's newest state, before any status or event that follows from
-            it: who hears that the robot is ready can read where it stands.
+            it: at READY the state is known.
         :param on_status: the status changed.
-        :param on_geometry: the robot told its calibrated geometry.
+        :param on_geometry: the robot reported its calibrated geometry.
         :param on_log: a line for the log, with its level.
         :param on_signals: inputs, outputs or tool changed.
         :param may_upload: whether the first connection to the robot is the owner's first.
@@ -142,7 +140,7 @@ class RobotLink:
         return self._status.current
 
     def explain(self, text: str) -> None:
-        """Take something that has ended, and why, for the last error of the status."""
+        """Set the last error of the status: what has ended, and the events that led to it."""
         if self._explain_timer is not None:
             self._explain_timer.cancel()
             self._explain_timer = None
@@ -151,7 +149,7 @@ class RobotLink:
         )
 
     def set_serial_number(self, serial_number: str) -> None:
-        """Take note of the serial number of the robot."""
+        """Set the serial number of the robot."""
         self._status.update(serial_number=serial_number)
 
     # ---- commands -----------------------------------------------------------------------------
@@ -172,7 +170,7 @@ class RobotLink:
         return self._primary.send(primary.encode_command(command))
 
     def set_executing(self, busy: bool) -> None:
-        """Say whether a goal runs: its keepalives are another message."""
+        """Set whether a goal runs: its keepalives are another message."""
         self.program.is_executing = busy
         if busy:
             self._status.apply(ConnectionEvent.GOAL_STARTED)
@@ -188,12 +186,12 @@ class RobotLink:
         self._tcp_setter.set_temporary(T_flange_tcp)
 
     def restore_tcp(self, T_flange_tcp: Pose) -> None:
-        """Have the TCP put back to what it was before a goal, where the robot is connected."""
+        """Restore the TCP from before a goal, if the robot is connected."""
         if self.robot is not None:
             self._tcp_setter.restore(T_flange_tcp, self.robot)
 
     def set_tcp_restore_pending(self, pending: bool) -> None:
-        """Say whether the TCP is still to be put back: until it is, no goal is taken."""
+        """Set whether the TCP has to be restored: until it is, no goal starts."""
         if pending == self.tcp_restore_pending:
             return
         self.tcp_restore_pending = pending
@@ -203,7 +201,7 @@ class RobotLink:
             self._review_state()
 
     def stop_program(self, reason: str) -> None:
-        """End the robot program, so that nothing of it can resume."""
+        """End the robot program, so that its motion cannot resume."""
         self._warn(f'the robot program is stopped: {reason}')
         self.event_log.note('the driver ended the robot program')
         self._tracker.is_ending = self.program.connected
@@ -211,7 +209,7 @@ class RobotLink:
         self.program.send_stop()
 
     def upload_program(self) -> None:
-        """Upload the robot program, in the place of ours, never of somebody else's."""
+        """Upload the robot program; it replaces ours, never a foreign one."""
         if refusal := self._upload_refusal():
             self._warn(f'the robot program is not sent: {refusal}')
         elif not self._primary.send(primary.encode_program(wrap_in_program(self.program.text))):
@@ -315,7 +313,7 @@ class RobotLink:
         before, self.robot = self.robot, robot
         self._state_callback(robot)
         if before is not None and _modes(before) == _modes(robot):
-            # No status follows from it, and what the event leads to, a CANCEL maybe, goes first.
+            # The status stays as it is, so the reaction to the event, maybe a CANCEL, goes first.
             self._on_event(StateReceived(state=robot))
             self.event_log.note_report(robot)
             self._tracker.observe(robot)
@@ -332,7 +330,7 @@ class RobotLink:
         self._signals_callback(signals)
 
     def _on_configuration(self, configuration: ConfigurationData) -> None:
-        """Take the robot's report of itself: accept the robot, or refuse it."""
+        """Accept the robot, or refuse it if it is another model."""
         if self._status.state is not ConnectionState.CONNECTING:
             return
         assert self.version is not None
@@ -378,7 +376,12 @@ class RobotLink:
         self._on_event(LinkLost(link='program', reason=reason))
 
     def _on_robot_lost(self, reason: str, status_text: str) -> None:
-        """Take note that the robot is gone, or never was there; people are told by whom."""
+        """
+        Handle the loss of the robot, or a failed attempt to connect.
+
+        :param reason: of the loss, for the running goal.
+        :param status_text: the same for the status, with the interface.
+        """
         self.event_log.note(status_text)
         changes = (
             timestamped(status_text, self.status.last_error)
@@ -386,7 +389,7 @@ class RobotLink:
             else timestamped(f'The robot is gone. {"; ".join(self.event_log.event_chain())}.')
         )
         before, self.robot, self.signals = self.robot, None, None
-        self.program.is_paused = False  # nobody knows; too many messages are better than none
+        self.program.is_paused = False  # unknown; too many keepalives are better than none
         self._status.apply(
             ConnectionEvent.ROBOT_LOST,
             calibration_known=False,
@@ -399,7 +402,7 @@ class RobotLink:
     # ---- status -------------------------------------------------------------------------------
 
     def _review_state(self) -> None:
-        """Bring the connection's state in line with what robot and program are now."""
+        """Bring the state of the connection in line with robot and program."""
         robot = self.robot
         if robot is None:
             return
@@ -427,12 +430,12 @@ class RobotLink:
         )
 
     def _robot_error(self, text: str) -> None:
-        """Take what the robot says is wrong."""
+        """Log an error that the robot reports."""
         self.event_log.note(text, is_robot_error=True)
         self._status.error(text)
 
     def _robot_text(self, text: str) -> None:
-        """Take a line of the robot's log; what our program says may be why something ends."""
+        """Log a line of the robot's log; lines of our program may explain an end."""
         self._on_log(logging.INFO, f'robot: {text}')
         program, _, said = text.partition(': ')
         if program == PROGRAM_NAME and said:

@@ -9,13 +9,13 @@ import ipaddress
 
 from ur_cartesian_driver.protocol.program.wire_dialects import Dialect, DIALECTS, NEWEST_DIALECT
 
-#: A robot that reports less often cannot be watched, nor told from one that is lost [Hz].
+#: A robot that reports less often cannot be monitored, nor be told from a lost one [Hz].
 MIN_RTDE_FREQUENCY = 10.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinkSettings:
-    """How to reach the robot; the defaults are those of a real one."""
+    """How to reach the robot; the defaults fit a real one."""
 
     robot_ip: str = '127.0.0.1'
     #: Model that is expected, for example ``ur5e``; a robot that reports another is refused.
@@ -31,14 +31,14 @@ class LinkSettings:
     bind_address: str = ''
     #: Address that the robot program dials; empty = the one we listen on.
     reverse_ip: str = ''
-    #: Addresses that may call; empty = robot_ip only.
+    #: Addresses that may connect; empty = robot_ip only.
     allowed_peers: tuple[str, ...] = ()
     #: Upload the robot program ourselves; else a program on the robot asks for it.
     headless_mode: bool = False
     #: Which messages the robot program understands, by the version of the library that it came
     #: with; other than the newest for a program that was saved on the robot.
     wire_dialect: str = NEWEST_DIALECT.name
-    #: The program stops the arm and ends when we are silent for that long [s].
+    #: Without a keepalive for that long [s] the robot program stops the arm and ends.
     robot_receive_timeout: float = 0.2
     #: Switch the arm on and release its brakes on the first connection (headless mode only).
     auto_power: bool = False
@@ -56,7 +56,7 @@ class LinkSettings:
     servoj_gain: float = 2000.0
     servoj_lookahead_time: float = 0.03
     servo_buffer_depth: int = 250
-    #: Whether people may push the arm in the teach mode of the servo.
+    #: Whether a person may guide the arm by hand (freedrive).
     allow_freedrive: bool = False
 
     def __post_init__(self) -> None:
@@ -117,7 +117,7 @@ class LinkSettings:
 
 def _require_address(name: str, text: str) -> None:
     """
-    Refuse a name or a network: it is compared with the addresses of those who call.
+    Refuse a host name or a network: it is compared with the addresses of clients.
 
     :raises ValueError: names the field and the text.
     """
@@ -125,6 +125,5 @@ def _require_address(name: str, text: str) -> None:
         ipaddress.ip_address(text)
     except ValueError:
         raise ValueError(
-            f'{name} has {text!r}, which is no address; write it in numbers, such as '
-            '192.168.56.101.'
+            f'{name} has {text!r}, which is no IP address; use one such as 192.168.56.101.'
         ) from None

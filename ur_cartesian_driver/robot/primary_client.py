@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The primary interface: the robot tells who it is and what goes wrong, and takes programs.
+The primary interface: the robot reports its model and errors, and takes programs.
 
-It may come and go while the robot moves; only what has to be sent on it waits for it.
+A goal goes on while this connection is lost and made again.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from ur_cartesian_driver.robot.transport import Backoff, dial, TcpConnection
 
 #: How long the robot may take to report its configuration [s].
 REPORT_TIMEOUT = 5.0
-#: A robot reports its state ten times a second; a connection that is silent for so long is dead
-#: [s], and what would be sent on it (stop program) would be lost.
+#: The robot reports its state ten times a second. A connection that is silent for so long [s] is
+#: dead, and a command to stop the program would be lost on it.
 SILENCE_TIMEOUT = 1.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PrimaryCallbacks:
-    """Who is told what; all of it on the event loop."""
+    """Called on the event loop."""
 
     #: The robot's configuration, at least once for each connection.
     configuration: Callable[[ConfigurationData], None]
     #: Its calibrated geometry, as often as it is reported.
     geometry: Callable[[DhTable], None]
-    #: The robot says that something is wrong, with it or its program.
+    #: The robot reports an error of its own or of its program.
     error: Callable[[str], None]
-    #: Something is wrong with this connection.
+    #: This connection failed, and why.
     connection_error: Callable[[str], None]
     #: A text that the robot program wrote.
     text: Callable[[str], None]
@@ -106,10 +106,10 @@ class PrimaryClient:
 
     def _check_alive(self, where: str, age: float) -> None:
         """
-        Look at a connection once in a while.
+        Check that the connection is alive.
 
         :param age: how long it has been there [s].
-        :raises OSError: it is dead, or not one to a robot.
+        :raises OSError: it is dead, or the other side is no robot.
         """
         if not self._has_configuration and age > REPORT_TIMEOUT:
             raise OSError(f'{where}: the robot does not report its configuration')

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-TCP endpoints: one that dials, one that listens for the robot program.
+TCP endpoints: one that connects, one that listens for the robot program.
 
-Both call back on the event loop and never block it. Why a connection ended is always told as a
-clause that fits into a sentence ("the robot closed the connection", ...): a user who reads that a
-goal ended wants to know who hung up.
+Both call back on the event loop and never block it. The reason of an end is a clause for a
+sentence ("the other side closed the connection", ...): a user who reads that a goal ended wants
+to know which side closed the connection.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ OnClosed = Callable[[str], None]
 BACKOFF_PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0)
 CONNECT_TIMEOUT = 2.0
 
-#: How much may wait for a side that does not read [bytes]; more than a window of points has, and
-#: it bounds the memory.
+#: How much may wait for a side that does not read [bytes]; more than a window of points, and a
+#: bound on the memory.
 MAX_UNSENT = 1 << 20
 #: How much is read at once [bytes].
 MAX_READ = 1 << 16
-#: How long a connection may take to get rid of what is unsent, once it is closed [s].
+#: How long a closed connection may take to send the rest [s].
 LINGER_TIMEOUT = 1.0
-#: So many callers that are turned away get a line in the log, each time [s].
+#: So many rejected clients are logged in each period [s].
 MAX_LINES, WARNING_PERIOD = 3, 60.0
 
-#: What helps where a port cannot be opened.
+#: What to do when a port cannot be opened.
 REMEDIES = {
     errno.EADDRINUSE: 'another driver may use it; set {name} to a free port or to 0',
     errno.EACCES: 'set {name} to a port above 1023 or to 0',
@@ -69,7 +69,7 @@ class TcpConnection(asyncio.BufferedProtocol):
         self._reason = ''
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Switch off Nagle's delay: every message is one small segment that should go now."""
+        """Switch off Nagle's algorithm: every message is one small segment to be sent at once."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         sock = transport.get_extra_info('socket')
@@ -87,20 +87,20 @@ class TcpConnection(asyncio.BufferedProtocol):
 
     def eof_received(self) -> bool:
         """
-        Let the transport close: nobody here speaks on half a connection.
+        Let the transport close: half-open connections are not used.
 
-        The end is told now and not when the transport is gone, because a robot program that is
-        started again calls at the same moment, and must find its predecessor gone.
+        The end is reported now and not when the transport is gone: a robot program that is
+        started again connects at the same moment, and must find its predecessor gone.
         """
         self._end('the other side closed the connection')
         return False
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Tell why."""
+        """Report why."""
         self._end(f'{exc}' if exc is not None else 'we closed the connection')
 
     def _end(self, reason: str) -> None:
-        """Tell once that the connection is gone."""
+        """Report once that the connection is gone."""
         if self._transport is not None:
             self._transport = None
             self._on_closed(self._reason or reason)
@@ -124,7 +124,7 @@ class TcpConnection(asyncio.BufferedProtocol):
         return str(peer[0]) if peer else ''
 
     def send(self, data: bytes) -> bool:
-        """Send bytes; False when the connection is gone, or gets lost by that."""
+        """Send bytes; False if the connection is gone, or fails now."""
         if self._transport is None or self._transport.is_closing():
             return False
         if self._transport.get_write_buffer_size() > MAX_UNSENT:
@@ -137,7 +137,7 @@ class TcpConnection(asyncio.BufferedProtocol):
         """
         Close after what was sent has gone out, if it does within :data:`LINGER_TIMEOUT`.
 
-        :param reason: what ``on_closed`` is told.
+        :param reason: passed to ``on_closed``.
         """
         self._reason = self._reason or reason
         if self._transport is not None:
@@ -156,10 +156,10 @@ async def dial(connection: TcpConnection, host: str, port: int) -> None:
     """
     Connect once.
 
-    The connection is made by the caller, who so has it before the first bytes come in: some
-    servers speak first.
+    The caller makes the connection object, so that it has it before the first bytes arrive: some
+    servers send first.
 
-    :raises OSError: nobody answers, with a text that names host and port.
+    :raises OSError: no answer; the text names host and port.
     """
     loop = asyncio.get_running_loop()
     try:
@@ -196,16 +196,16 @@ class Backoff:
 
 
 class WarningLimiter:
-    """Lines for the log about callers, so few that a flood of calls is none of lines."""
+    """Limits the log lines about clients: a flood of connections must not flood the log."""
 
-    def __init__(self, tell: Callable[[str], None]) -> None:
-        """Tell nothing yet."""
-        self._warn = tell
+    def __init__(self, warn: Callable[[str], None]) -> None:
+        """Begin with no lines."""
+        self._warn = warn
         self._begin = -inf
         self._count = 0
 
     def add(self, text: str, now: float) -> None:
-        """Tell it, or only count it."""
+        """Log a line, or only count it."""
         if now - self._begin >= WARNING_PERIOD:
             suppressed = self._count - MAX_LINES
             self._begin, self._count = now, 0
@@ -218,11 +218,11 @@ class WarningLimiter:
 
 class TcpListener:
     """
-    A TCP port on which the robot program calls; one caller at a time.
+    A TCP port for the robot program; one client at a time.
 
-    A caller that is not allowed never gets through. While the port is taken, by a program that is
-    fully connected, callers are turned away; else the newest one counts: whoever called before
-    may have died without hanging up, or be no robot program at all.
+    Clients with other addresses are rejected, and so are all while a program is fully connected.
+    Else the newest client counts: the one before may have died without closing its connection, or
+    be no robot program at all.
     """
 
     def __init__(
@@ -239,8 +239,8 @@ class TcpListener:
         Describe the port.
 
         :param name: what the parameter of the port is called, for texts.
-        :param on_refused: a caller was turned away, and why.
-        :param is_taken: tells whether the caller who is there must not be replaced.
+        :param on_refused: a client was rejected, and why.
+        :param is_taken: tells whether the connected client must not be replaced.
         """
         self.name = name
         self.port = 0
@@ -261,7 +261,7 @@ class TcpListener:
         Listen.
 
         :param port: 0 = any free one; :attr:`port` tells which.
-        :param allowed: addresses that may call; empty = all.
+        :param allowed: addresses that may connect; empty = all.
         :raises OSError: the port is taken; the text names the parameter to change.
         """
         self._allowed = frozenset(map(plain_address, allowed))
@@ -288,7 +288,7 @@ class TcpListener:
         self.disconnect()
 
     def disconnect(self) -> None:
-        """Close the connection, if there is one; nobody is told, and the next may call."""
+        """Close the connection, if any, without a callback; the next client may connect."""
         connection, self.connection = self.connection, None
         if connection is not None:
             connection.close()
@@ -301,8 +301,8 @@ class TcpListener:
 
     def _opened(self, connection: TcpConnection) -> None:
         peer = plain_address(connection.peer_address)
-        if not self.is_open or not peer:  # closed, or hung up, between the call and here
-            connection.abort('nobody is left on one side')
+        if not self.is_open or not peer:  # closed by either side meanwhile
+            connection.abort('closed by one side')
         elif self._allowed and peer not in self._allowed:
             self._reject(
                 connection, f'{peer} may not connect; add it to allowed_peers if it is the robot'
@@ -317,7 +317,7 @@ class TcpListener:
             self._on_open(connection)
 
     def warn_limited(self, text: str) -> None:
-        """Tell what is wrong with a caller, unless too much of that was told already."""
+        """Log what is wrong with a client, within the limit of lines."""
         self._warnings.add(f'{self.name}: {text}', asyncio.get_running_loop().time())
 
     def _reject(self, connection: TcpConnection, text: str) -> None:
@@ -325,13 +325,13 @@ class TcpListener:
         self.warn_limited(text)
 
     def _ended(self, connection: TcpConnection, reason: str) -> None:
-        if connection is self.connection:  # not one that was turned away or hung up on
+        if connection is self.connection:  # not one that was rejected or closed
             self.connection = None
             self._on_closed(reason)
 
 
 def plain_address(text: str) -> str:
-    """Return an address in one way of writing it: an IPv4 peer of an IPv6 port has two."""
+    """Return an address in its plain form: an IPv4 peer of an IPv6 port has two forms."""
     try:
         address = ipaddress.ip_address(text)
     except ValueError:

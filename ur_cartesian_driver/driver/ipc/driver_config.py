@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the owner of a driver sets."""
+"""Configuration of a driver."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ class DriverConfig(LinkSettings):
 
     #: Port of the dashboard on the robot; PolyScope X has none.
     dashboard_port: int = 29999
-    #: How far the controller's own target may be from the plan, corners apart [m], [rad]; 0 = any.
+    #: How far the controller's target may be from the plan, except in blends [m], [rad]; 0 = any.
     max_plan_deviation: float = MAX_PLAN_DEVIATION[0]
     max_plan_deviation_angle: float = MAX_PLAN_DEVIATION[1]
-    #: A robot whose calibration moves the flange by more is warned of [m]; 0 = never.
+    #: Warn if the calibration moves the flange by more than this [m]; 0 = never.
     max_calibration_difference: float = 0.01
     #: What becomes of a goal when the robot makes a protective or safeguard stop: ``abort``, or
     #: ``continue`` when somebody has unlocked the robot and plays its program.
@@ -30,17 +30,17 @@ class DriverConfig(LinkSettings):
     keep_open_margin: float = 0.2
     #: ... and how long the goal then waits for more points until it ends [s]; 0 = without end.
     keep_open_timeout: float = 30.0
-    #: SERVO: motion time that is under way to the arm, so how long nothing may come through [s].
+    #: SERVO: motion time in flight, and so the longest gap in the connection [s].
     servo_target_lag: float = 0.04
     #: SERVO: the robot program stops the arm when a joint is farther from its set-point [rad].
     servo_max_divergence: float = 0.3
     #: Progress reports per second.
     feedback_rate: float = 25.0
-    #: The arm is stopped when the owner of the driver is silent for that long [s].
+    #: Without a heartbeat of the owner for that long [s] the arm is stopped.
     node_timeout: float = 5.0
     #: Where each motion is recorded, a file each (doc/recordings.md); empty = nowhere.
     record_directory: str = ''
-    #: What recordings may take together [MB]; the oldest ones are removed.
+    #: Size of all recordings together [MB]; the oldest ones are removed.
     record_max_size: float = 2000.0
     #: ``process`` (robust) or ``thread`` (light: tests and scripts).
     robot_loop: str = 'process'

@@ -38,8 +38,8 @@ class ProgramAutoStart:
         """
         Prepare; nothing happens before :meth:`review`.
 
-        :param pending: whether it is still to come.
-        :param power_up: switches the arm on and releases its brakes; False = it cannot be told to.
+        :param pending: whether the upload is still to come.
+        :param power_up: switches the arm on and releases its brakes; False = it is not connected.
         :param upload: sends the robot program.
         :param warn: a line for the log.
         """
@@ -49,7 +49,7 @@ class ProgramAutoStart:
         self._powering_up = False
 
     def review(self, robot: RobotState, status: DriverStatus, *, program_connected: bool) -> None:
-        """Start the program, or say why not, once the robot is known."""
+        """Start the program, or log why not, once the robot is known."""
         if not self._pending or status.state not in (
             ConnectionState.CONNECTED,
             ConnectionState.STOPPED,
@@ -71,7 +71,7 @@ class ProgramAutoStart:
             self._upload()
 
     def _is_waiting_for_power(self, robot: RobotState, status: DriverStatus) -> bool:
-        """Switch the arm on, where that is wanted; tell whether the program has to wait for it."""
+        """Switch the arm on if auto_power asks for it; tell whether the program has to wait."""
         s = self._settings
         if (
             not (s.auto_power and s.headless_mode)
@@ -86,7 +86,7 @@ class ProgramAutoStart:
         return True
 
     def _give_up_power(self) -> None:
-        """Start nothing by itself any more, if the arm did not come up."""
+        """Give up the start, if the arm did not come up."""
         if self._pending:
             self._pending = False
             self._warn(

@@ -1,15 +1,13 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The ports on which the robot calls us: three sockets of the robot program, and the script sender.
+The ports for the robot: three sockets of the robot program, and the script sender.
 
-The robot program dials the trajectory port, the script command port and the reverse port, in this
-order, and is connected when it holds all three. They live and die together: a program that lost
-one of them has ended or is about to, so the others are closed, and a program that calls again
-finds all ports free.
+The robot program connects to the trajectory port, the script command port and the reverse port,
+in this order, and is connected when it holds all three. A program that lost one of them has ended
+or is about to. So the others are closed, and a program that connects again finds all ports free.
 
-The script sender is apart from that: there a program with the External Control node asks for the
-text of ours.
+The script sender is separate: an External Control node requests the robot program there.
 """
 
 from __future__ import annotations
@@ -34,41 +32,41 @@ from ur_cartesian_driver.robot.transport import TcpConnection, TcpListener
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProgramCallbacks:
-    """Who is told what; all of it on the event loop."""
+    """Called on the event loop."""
 
     #: A robot program holds all its sockets.
     connected: Callable[[], None]
-    #: It does not any more, and why.
+    #: It lost them, and why.
     lost: Callable[[str], None]
     #: It reported the end of a trajectory.
     result: Callable[[TrajectoryResult], None]
-    #: Somebody was turned away, and why.
+    #: A client was rejected, and why.
     warning: Callable[[str], None]
 
 
 class ProgramSockets:
-    """The robot program as seen from here."""
+    """The connections of the robot program; sends its messages and keepalives."""
 
     def __init__(self, settings: LinkSettings, listener: ProgramCallbacks) -> None:
         """Prepare; :meth:`open` listens."""
         self._settings = settings
         self._listener = listener
-        #: What the script sender hands out; empty = nothing, the robot has its own program.
+        #: The robot program, for the script sender; empty = the robot has one of its own.
         self.text = ''
         #: A goal runs: its keepalives are another message.
         self.is_executing = False
-        #: It goes through the buffered servo, whose keepalives are yet another one.
+        #: It uses the buffered servo, whose keepalives are a third message.
         self.servo = False
-        #: The program is paused and reads nothing: it is not sent more than it can read at once,
-        #: because a START must not stand behind the keepalives of an hour.
+        #: The program is paused and reads nothing. Keepalives pause too: a START must not queue
+        #: behind those of an hour.
         self.is_paused = False
-        #: The robot reports that no program runs: who holds the sockets has gone without a word,
-        #: as behind a cable that was cut, and whoever calls may have them.
+        #: The robot reports that no program runs: the client that holds the sockets is dead, for
+        #: instance behind a cut cable, and another one may replace it.
         self.ended = False
         self.connected = False
-        #: The longest pause between two keepalives since somebody reset it [s].
+        #: The longest pause between two keepalives since it was reset [s].
         self.max_keepalive_gap = 0.0
-        #: When the last keepalive was sent to the program that is there, or was last [s].
+        #: When the last keepalive was sent to a connected program [s].
         self.last_keepalive = -inf
         #: Where the ports are open.
         self._host = ''
@@ -106,8 +104,8 @@ class ProgramSockets:
         """
         Listen on all ports that are not open yet.
 
-        :param host: our address; where it is another one than before, all ports move there.
-        :param allowed: addresses that may call.
+        :param host: our address; if it has changed, all ports move there.
+        :param allowed: addresses that may connect.
         :raises OSError: a port is taken; the text names the parameter to change.
         """
         if host != self._host:
@@ -162,7 +160,7 @@ class ProgramSockets:
             self._trajectory.connection.send(data)
 
     def send_command(self, data: bytes) -> bool:
-        """Send a single command; False where no robot program would read it."""
+        """Send a single command; False if no robot program is connected."""
         return (
             self.connected
             and self._commands.connection is not None
@@ -170,7 +168,7 @@ class ProgramSockets:
         )
 
     def drop(self, reason: str) -> None:
-        """Hang up on a program, and say that it is lost."""
+        """Close the sockets of a program, and report it lost."""
         for port in self._program_ports:
             port.disconnect()
         if self.connected:
@@ -182,7 +180,7 @@ class ProgramSockets:
         self._send(reverse.stop())
 
     async def keep_alive(self) -> NoReturn:
-        """Send the message that keeps the robot program running at a steady pace."""
+        """Send keepalives at a steady rate."""
         loop = asyncio.get_running_loop()
         due = last = loop.time()
         was_paused = False
@@ -196,7 +194,7 @@ class ProgramSockets:
             await asyncio.sleep(due - loop.time())
 
     def send_servo(self, on: bool) -> None:
-        """Have the program enter the buffered servo, or leave it and stand."""
+        """Have the program enter the buffered servo, or leave it and stop the arm."""
         self.servo = on
         self._send(
             reverse.buffered_servo(self._read_timeout)
@@ -234,7 +232,7 @@ class ProgramSockets:
             self._listener.connected()
 
     def _on_closed(self, name: str, reason: str) -> None:
-        """Take the loss of one of the program's sockets as the loss of all of them."""
+        """Treat the loss of one socket as the loss of the program."""
         self.drop(f'{name}: {reason}')
 
     def _on_results(self, data: bytes) -> None:

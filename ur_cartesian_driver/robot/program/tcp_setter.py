@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Who sets the TCP of a goal, and who puts it back.
+Sets the temporary TCP of a goal, and restores the one before.
 
-When it is due, and for how long, is decided elsewhere (:mod:`~ur_cartesian_driver.execution`).
+When that is due is decided elsewhere (:mod:`~ur_cartesian_driver.execution`).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _RUNNING_STATES = frozenset({RuntimeState.PLAYING, RuntimeState.PAUSING, Runtime
 
 
 class TemporaryTcpSetter:
-    """The two ways to set a TCP: by the robot program, or by a program of its own."""
+    """Sets a TCP by the robot program, or by a program of its own."""
 
     def __init__(
         self, program: ProgramSockets, primary_client: PrimaryClient, *, headless_mode: bool
@@ -35,7 +35,7 @@ class TemporaryTcpSetter:
         """
         self._program, self._primary = program, primary_client
         self._headless_mode = headless_mode
-        #: The robot program that is connected is the one that has set it.
+        #: The connected robot program has set it, and remembers the one before.
         self._program_remembers = False
 
     def set_temporary(self, T_flange_tcp: Pose) -> None:
@@ -45,11 +45,11 @@ class TemporaryTcpSetter:
 
     def restore(self, T_flange_tcp: Pose, robot: RobotState) -> None:
         """
-        Have the TCP put back to what it was before a goal.
+        Restore the TCP from before a goal.
 
-        The robot program does it where it is there, not paused, and remembers that TCP to the last
-        digit. Else a program of its own does, where we may send one, but never beside a program of
-        somebody else; and where we may not, the robot program by the digits of the wire.
+        The robot program does it if it is connected, not paused, and remembers that TCP exactly.
+        Else a program of its own does, if we may send one and no foreign program runs. If we may
+        not, the robot program does, with the digits of the wire.
         """
         listens = self._program.connected and not is_paused(robot)
         if listens and (self._program_remembers or not self._headless_mode):
@@ -58,7 +58,7 @@ class TemporaryTcpSetter:
             self._primary.send(primary.encode_program(tcp_program(T_flange_tcp.rotation_vector())))
 
     def program_lost(self) -> None:
-        """Take note that the robot program is gone, and with it what it remembers."""
+        """Forget what the robot program remembered: it is gone."""
         self._program_remembers = False
 
     def _send(self, T_flange_tcp: Pose, persistence: TcpPersistence) -> None:

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One look at a robot: dial RTDE, take one packet, hang up. Nothing is written or started."""
+"""Reads the state of a robot once by RTDE; writes and starts nothing."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One RTDE connection: agree on what is streamed and written, then values both ways."""
+"""One RTDE connection: agrees on recipes, then passes values both ways."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ class RtdeConnection:
 
     @property
     def local_address(self) -> str:
-        """Return the address at which the robot sees us."""
+        """Return our address on the connection to the robot."""
         return self._connection.local_address
 
     @property
     def peer_address(self) -> str:
-        """Return the robot's address as a number, where it was dialled by name."""
+        """Return the robot's IP address, also if a host name was given."""
         return self._connection.peer_address
 
     async def open(self, host: str, port: int) -> ControllerVersion:
@@ -97,7 +97,7 @@ class RtdeConnection:
         return f'the robot sent nothing for {self._silence:g} s'
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._connection.close()
 
     def _on_data(self, data: bytes) -> None:

@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The RTDE connection of streamed set-points: opened for a goal, closed behind it.
+The RTDE connection for streamed set-points, open during one goal.
 
-Inputs belong to the client that asked for them, so they are held no longer than they are needed.
-Whoever had them last, a goal of ours maybe, gives them back when the controller finds its
-connection closed; until then they are asked for again and again, for a short while.
+Inputs belong to the client that requested them, so they are held only while they are needed. The
+controller frees the inputs of a client (maybe of the goal before) when it finds the connection
+closed; until then the request is repeated for a short while.
 
-What the robot program reports of the set-points comes on the same connection, so the packets that
-every other goal waits for stay as they are.
+The feedback of the servo arrives on the same connection, so the packets of other goals stay as
+they are.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_recipe import RtdeValues
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 
 SERVO_FIELDS = ('timestamp', 'speed_scaling', 'runtime_state', *SERVO_OUTPUTS)
-#: For so long is it tried to get the inputs, and so long is the pause between two attempts [s].
+#: How long to try to get the inputs, and the pause between two attempts [s].
 OPEN_TIMEOUT, RETRY_PERIOD = 0.2, 0.02
 
 
@@ -46,7 +46,7 @@ class ServoConnection:
         """
         Open it, and serve until it ends or is closed.
 
-        :param on_end: it could not be opened, or was lost, and why; not after
+        :param on_end: it could not be opened, or was lost, and why; never after
             :meth:`close`.
         """
         loop = asyncio.get_running_loop()
@@ -67,7 +67,7 @@ class ServoConnection:
             self._attempt.write_row(values)
 
     def close(self) -> None:
-        """Hang up, behind what was written."""
+        """Close, after what was written is sent."""
         self._is_open = False
         if self._attempt is not None:
             self._attempt.close()
@@ -78,7 +78,7 @@ class ServoConnection:
 
 
 class _Attempt(RtdeConnection):
-    """One connection to the robot, which may not give the inputs."""
+    """One connection to the robot, which may refuse the inputs."""
 
     def __init__(self, on_values: Callable[[Sequence[str], RtdeValues], None]) -> None:
         super().__init__(RtdeClientCodec(outputs=SERVO_FIELDS, inputs=SERVO_INPUTS), on_values)
@@ -106,7 +106,7 @@ class _Attempt(RtdeConnection):
             self._connection.send(self._inputs[0].pack(values))
 
     def close(self) -> None:
-        """Hang up, behind what was written."""
+        """Close, after what was written is sent."""
         self._is_wanted = False
         super().close()
 

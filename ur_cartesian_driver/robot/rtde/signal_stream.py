@@ -3,8 +3,7 @@
 """
 Inputs, outputs and tool of the robot, through a slow RTDE connection of their own.
 
-They do not belong into the packets of 500 Hz: nobody needs them at that rate, and there they
-would cost most of all.
+At 500 Hz, in the packets of the robot state, they would cost most of the time for no benefit.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ OPTIONAL_FIELDS = (
 
 
 class SignalStream:
-    """Keeps a connection of its own while the robot is there."""
+    """Keeps a connection of its own while the robot is connected."""
 
     def __init__(
         self, on_signals: Callable[[Signals], None], on_warning: Callable[[str], None]

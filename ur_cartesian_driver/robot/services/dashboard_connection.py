@@ -3,9 +3,9 @@
 """
 The dashboard of a robot: one line out, one line in, then the connection is closed again.
 
-A new connection for each request costs a millisecond, and there is nothing that a late answer to
-the request before could be mistaken for. What a refusal means is said in our own words, as the
-dashboard often only says that it failed.
+A new connection for each request costs a millisecond, and a late answer cannot be mistaken for
+that of the next request. Refusals are explained in our own words: the dashboard often says only
+that a command failed.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ur_cartesian_driver.robot.transport import dial, TcpConnection
 ANSWER_TIMEOUT = 5.0
 #: The first software without a dashboard.
 POLYSCOPE_X = 10
-#: What serves instead there; a command that is not named is for a person at the pendant.
+#: What to use there instead; other commands are done on the pendant.
 REPLACEMENTS: Mapping[str, str] = MappingProxyType(
     {
         **dict.fromkeys(
@@ -53,7 +53,7 @@ TOO_EARLY = 'Cannot unlock protective stop'
 
 
 class DashboardConnection:
-    """Asks the dashboard, from one event loop; several requests at once are fine."""
+    """Sends requests to the dashboard, from one event loop; several at a time."""
 
     def __init__(self, host: str, port: int) -> None:
         """Prepare; every request connects by itself."""

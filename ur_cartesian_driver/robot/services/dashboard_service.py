@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Commands of the dashboard as calls: possible, done, and seen to be done."""
+"""Dashboard commands as calls: checked, sent, and confirmed by the robot state."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ EFFECT_TIMEOUT = 5.0
 
 @dataclass(frozen=True, slots=True)
 class ExpectedEffect:
-    """How it is seen that the robot has done something."""
+    """The robot state that confirms a command."""
 
     is_reached: Callable[[RobotState], bool]
     timeout: float
-    #: What it shall be, for the sentence that says that it is not.
+    #: Names that state in an error.
     target_mode: str
 
 
-#: Dashboard commands that take a while, by what they lead to.
+#: The effects of dashboard commands that take a while.
 EXPECTED_EFFECTS: Mapping[str, ExpectedEffect] = {
     'power on': ExpectedEffect(
         lambda r: r.robot_mode in (RobotMode.IDLE, RobotMode.RUNNING), POWER_TIMEOUT, 'IDLE'
@@ -74,7 +74,7 @@ EXPECTED_EFFECTS: Mapping[str, ExpectedEffect] = {
 
 
 class DashboardService:
-    """The dashboard of a robot, from one event loop; several calls at a time."""
+    """Calls the dashboard, from one event loop; several calls at a time."""
 
     def __init__(self, host: str, port: int, link: RobotLink) -> None:
         """Prepare; every call connects by itself."""

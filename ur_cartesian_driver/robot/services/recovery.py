@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Goes the way of a stopped robot back, one step of the tables of recovery after the other."""
+"""Brings a stopped robot back to READY, step by step by the tables of recovery."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ from ur_cartesian_driver.robot.services.service_calls import (
     succeeded,
 )
 
-#: How long a robot may be on its way without another step [s].
+#: How long a robot may take until the next step is due [s].
 STEP_TIMEOUT = 35.0
-#: The same for a robot that is not connected, and never was meanwhile [s].
+#: The same for a robot that is not connected [s].
 DISCONNECTED_TIMEOUT = 2.0
 #: How long the reports of a robot may contradict each other after a change [s].
 SETTLING_TIMEOUT = 0.3
-#: How often an unlock that came too early is repeated [s].
+#: Pause before an unlock that came too early is repeated [s].
 UNLOCK_RETRY_PERIOD = 0.5
 
 #: Dashboard commands of the steps of a recovery; the last one does it.
@@ -64,7 +64,7 @@ PRIMARY_COMMANDS: Mapping[RecoveryStep, primary.PrimaryCommand] = {
 
 
 class RecoveryRunner:
-    """One at a time."""
+    """Runs one recovery at a time."""
 
     def __init__(
         self,
@@ -77,15 +77,15 @@ class RecoveryRunner:
         """
         Prepare.
 
-        :param send_program: uploads the robot program and waits until it has called.
-        :param headless: that is how the program comes; else a program on the robot asks for it.
+        :param send_program: uploads the robot program and waits until it has connected.
+        :param headless: we upload the program; else a program on the robot requests it.
         """
         self._link, self._dashboard = link, dashboard
         self._send_program, self._headless = send_program, headless
         self._is_running = False
 
     async def run(self) -> ServiceAnswer:
-        """Go it to its end, or to where a person has to act; the text tells what was done."""
+        """Recover until READY, or until a person has to act; the text says what was done."""
         if self._is_running:
             return failed('A recovery is running already.')
         self._is_running = True
@@ -106,7 +106,7 @@ class RecoveryRunner:
             if upcoming.step is RecoveryStep.OPERATOR:
                 return failed(_report(done, upcoming.text))
             if upcoming.step is RecoveryStep.WAIT:
-                # A robot that was never there will not come by waiting.
+                # A robot that was never connected will not appear by waiting.
                 lost = self._link.robot is None and not done
                 if loop.time() - last_step_time > (DISCONNECTED_TIMEOUT if lost else STEP_TIMEOUT):
                     return failed(_report(done, upcoming.text or describe_modes(self._link)))
@@ -129,10 +129,10 @@ class RecoveryRunner:
 
     async def _settled_step(self, remote: bool | None) -> NextStep:
         """
-        Return the next step; one for a person only when it stays so.
+        Return the next step; one for a person only if it lasts.
 
-        Sockets and reports of the robot tell of a change one after the other, and a program that
-        has just been started has not called yet.
+        Sockets and robot state show a change at different times, and a program that has just been
+        started has not connected yet.
         """
         loop = asyncio.get_running_loop()
         upcoming = next_step(self._situation(remote))
@@ -154,7 +154,7 @@ class RecoveryRunner:
         )
 
     async def _do(self, step: RecoveryStep) -> ServiceAnswer:
-        """Do one step and wait until it is done."""
+        """Do one step and wait for its effect."""
         if step is RecoveryStep.SEND_PROGRAM:
             return await self._send_program()
         version = self._link.version
@@ -192,5 +192,5 @@ class RecoveryRunner:
 
 
 def _report(done: list[str], text: str) -> str:
-    """Return a sentence with what was done before."""
+    """Return a sentence, followed by the steps that were done."""
     return f'{text} Done: {", ".join(done)}.' if done else text

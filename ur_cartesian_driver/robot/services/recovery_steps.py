@@ -1,12 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The way of a stopped robot back to where it takes goals, as tables: what is, to what is next.
+The recovery of a stopped robot as tables: from the modes of the robot to the next step.
 
-First the safety system, then power and brakes, then the program. Each step is looked up anew from
-what the robot reports, so a step that a person does meanwhile is not done twice. Where a person
-has to act, because the cause is on the robot or only they may judge it, the way ends with a
-sentence that says what.
+First the safety system, then power and brakes, then the program. Each step follows from the
+newest state of the robot, so a step that a person does meanwhile is not done twice. Where a person
+has to act, the recovery ends with a sentence that says what to do.
 
 Pure: no socket, no clock.
 """
@@ -23,10 +22,10 @@ from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 
 class RecoveryStep(Enum):
-    """What is next."""
+    """The next step."""
 
     DONE = auto()
-    #: The robot is on its way to another state by itself.
+    #: The robot changes its state by itself.
     WAIT = auto()
     UNLOCK = auto()
     RESTART_SAFETY = auto()
@@ -39,7 +38,7 @@ class RecoveryStep(Enum):
     OPERATOR = auto()
 
 
-#: What a step is called in a sentence: an imperative.
+#: The step in a sentence, as an imperative.
 STEP_NAMES: Mapping[RecoveryStep, str] = MappingProxyType(
     {
         RecoveryStep.UNLOCK: 'unlock the protective stop',
@@ -56,7 +55,7 @@ _GUARD = 'The safeguard stop is active: close the safeguard and reset it.'
 _BUTTON = 'The emergency stop is pressed: see that nobody is in danger, then release the button.'
 _ENABLE = 'An enabling device is in use: release it, or choose automatic mode.'
 
-#: What the safety system needs; a sentence = a person has to act, None = nothing.
+#: The step for each safety mode; a sentence = a person has to act, None = no step.
 SAFETY_STEPS: Mapping[SafetyMode, RecoveryStep | str | None] = MappingProxyType(
     {
         SafetyMode.NORMAL: None,
@@ -87,7 +86,7 @@ SAFETY_STEPS: Mapping[SafetyMode, RecoveryStep | str | None] = MappingProxyType(
     }
 )
 
-#: What power and brakes need, as above.
+#: The same for power and brakes.
 POWER_STEPS: Mapping[RobotMode, RecoveryStep | str | None] = MappingProxyType(
     {
         RobotMode.NO_CONTROLLER: 'The controller does not run: check the pendant.',
@@ -107,12 +106,12 @@ POWER_STEPS: Mapping[RobotMode, RecoveryStep | str | None] = MappingProxyType(
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecoverySituation:
     """
-    What the next step depends on.
+    Input of :func:`next_step`.
 
-    :param message: what the connection says is needed.
+    :param message: of the status: what is needed.
     :param robot: what the robot reported last; None = nothing.
     :param program_connected: our program holds its sockets.
-    :param headless: we send the program, else a program on the robot asks for it.
+    :param headless: we upload the program; else a program on the robot requests it.
     :param remote_control: whether clients may control the robot; None = it cannot be known.
     """
 
@@ -126,7 +125,7 @@ class RecoverySituation:
 
 @dataclass(frozen=True, slots=True)
 class NextStep:
-    """A step, with a sentence where it ends the way."""
+    """A step, with a sentence if it ends the recovery."""
 
     step: RecoveryStep
     text: str = ''
@@ -172,7 +171,7 @@ def _of_program(situation: RecoverySituation, runtime: RuntimeState) -> NextStep
         case RuntimeState.STOPPING | RuntimeState.RESUMING:
             return NextStep(RecoveryStep.WAIT)
         case RuntimeState.PAUSING | RuntimeState.PAUSED:
-            # Played on, it could go on with an old motion.
+            # Resumed, it could go on with an old motion.
             return NextStep(RecoveryStep.STOP_PROGRAM)
         case RuntimeState.PLAYING if situation.program_connected:
             return NextStep(RecoveryStep.WAIT)
@@ -187,7 +186,7 @@ def _of_program(situation: RecoverySituation, runtime: RuntimeState) -> NextStep
 
 
 def _unless_local(wanted: NextStep, situation: RecoverySituation) -> NextStep:
-    """Leave to a person what the robot does for nobody else in local control."""
+    """Leave a step to a person if the robot is in local control."""
     if situation.remote_control is False and wanted.step in STEP_NAMES:
         at_hand = (
             ''

@@ -1,11 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Write to the RTDE inputs of a robot, once, and see that it has taken effect.
+Write RTDE inputs of a robot once, and wait for the effect.
 
-Each time through a connection of its own: inputs belong to the client that asked for them, until
-it hangs up, and fieldbuses and other programs shall have them back at once. What was written stays
-as it is.
+Each write uses a connection of its own: inputs belong to the client that requested them until it
+disconnects, and fieldbuses and other programs need them back at once. What was written stays set.
 """
 
 from __future__ import annotations
@@ -41,11 +40,11 @@ RANGES: Mapping[AnalogDomain, tuple[float, float]] = {
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InputWrite:
     """
-    What is written, and how its effect is seen.
+    What is written, and how its effect is recognised.
 
     :param inputs: values by the names of RTDE inputs.
     :param outputs: names of the RTDE outputs that show the effect.
-    :param done: tells from these whether it is there.
+    :param done: tells from these whether the effect is there.
     """
 
     inputs: Mapping[str, RtdeValue]
@@ -100,7 +99,7 @@ def _analog(call: SetOutputCall) -> InputWrite:
 
 async def write_inputs(host: str, port: int, input_write: InputWrite) -> bool:
     """
-    Write, and tell whether the effect was seen.
+    Write, and return whether the robot reported the effect.
 
     :raises OSError: there is no connection, or another client has the inputs.
     """

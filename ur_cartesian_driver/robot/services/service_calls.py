@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What a robot can be asked for beside motions: each call with its values, and the one answer.
+Service calls: requests to the robot beside motions, and their answer.
 
-Values are checked when a call is made, so that one which exists can be sent.
+A call checks its values when it is made, so every call that exists can be sent.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class ServiceAnswer:
     """
     How a call ended.
 
-    :param ok: the robot has done it, and reports so where it reports such things.
-    :param text: a sentence, or the value that was asked for.
+    :param ok: the robot has done it, and has reported the effect if it reports such effects.
+    :param text: a sentence, or the requested value.
     """
 
     ok: bool
@@ -56,14 +56,14 @@ class DashboardCall:
     argument: str = ''
 
     def __post_init__(self) -> None:
-        """Check that there is such a command, and that it fits into a line."""
+        """Check that the command exists and fits into a line."""
         DashboardRequest(name=self.command, argument=self.argument)
         _check_length(self.argument)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DashboardLineCall:
-    """Send a line to the dashboard, whatever it does there, and fetch the line that comes back."""
+    """Send any line to the dashboard, and return its answer."""
 
     line: str
 
@@ -83,7 +83,7 @@ class SetTcpCall:
     T_flange_tcp: Pose
 
     def __post_init__(self) -> None:
-        """Check that it is a pose, and not one in millimetres."""
+        """Check that it is a pose, in metres."""
         position, quaternion = self.T_flange_tcp.position, self.T_flange_tcp.quaternion
         if not all(abs(value) <= MAX_TOOL_OFFSET for value in position):  # NaN neither
             raise LocalProtocolError(
@@ -105,7 +105,7 @@ class SetPayloadCall:
     cog: Vector3 = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Check that the mass can be one."""
+        """Check mass and centre of gravity."""
         if not 0.0 <= self.mass <= MAX_PAYLOAD_MASS or not all(
             abs(value) <= MAX_TOOL_OFFSET for value in self.cog
         ):  # NaN neither
@@ -171,7 +171,7 @@ class SetSpeedSliderCall:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SendProgramCall:
-    """Upload the robot program (again), and wait until it has called."""
+    """Upload the robot program (again), and wait until it has connected."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,12 +180,12 @@ class RecoverCall:
 
 
 def succeeded(text: str) -> ServiceAnswer:
-    """Return that it is done, or what was asked for."""
+    """Return the answer of a call that succeeded."""
     return ServiceAnswer(ok=True, text=text)
 
 
 def failed(text: str) -> ServiceAnswer:
-    """Return why it is not done."""
+    """Return the answer of a call that failed, with the reason."""
     return ServiceAnswer(ok=False, text=text)
 
 

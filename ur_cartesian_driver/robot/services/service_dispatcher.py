@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Carries out what the owner of a driver asks a robot for beside motions.
+Carries out the service calls of a driver's owner.
 
-Each call goes the way that the robot has for it: the dashboard, a single command to the robot
-program, or RTDE inputs. It is done when the robot reports that it is, and ends within
-:data:`CALL_TIMEOUT` whatever the robot does, or within :data:`RECOVERY_TIMEOUT`.
+A call uses the dashboard, a single command to the robot program, or RTDE inputs. It succeeds when
+the robot reports the effect, and ends within :data:`CALL_TIMEOUT` in any case, a recovery within
+:data:`RECOVERY_TIMEOUT`.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ from ur_cartesian_driver.robot.services.service_calls import (
     ZeroFtSensorCall,
 )
 
-#: No call takes longer [s], but Recover, which takes several steps.
+#: Bounds of a call, and of a recovery with its several steps [s].
 CALL_TIMEOUT = 40.0
 RECOVERY_TIMEOUT = 120.0
-#: How long a setting may take to be reported [s].
+#: How long the robot may take to report a setting [s].
 SETTING_TIMEOUT = 1.0
 #: How far a TCP may be from the one that was set [m], [rad]: it goes through 32-bit integers.
 TCP_TOLERANCE = 1e-5
@@ -53,7 +53,7 @@ PAYLOAD_TOLERANCE = 1e-4
 #: The first software of robots with a force sensor.
 E_SERIES = 5
 
-#: Dashboard commands that only ask: also a robot that must not be moved answers them.
+#: Dashboard commands that only query: also allowed with a robot that must not be moved.
 QUERY_COMMANDS = frozenset(
     {
         'running',
@@ -73,12 +73,12 @@ QUERY_COMMANDS = frozenset(
     }
 )
 
-#: Dashboard commands that change how the arm moves, or where it is thought to be.
+#: Dashboard commands that disturb a running goal.
 INTERFERING_COMMANDS = frozenset({'load', 'load installation', 'restart safety'})
 
 
 class ServiceDispatcher:
-    """Answers calls, from one event loop; several at a time, but one recovery."""
+    """Answers calls on one event loop: several at a time, but only one recovery."""
 
     def __init__(self, settings: LinkSettings, dashboard_port: int, link: RobotLink) -> None:
         """Prepare; nothing is sent before the first call."""
@@ -92,11 +92,11 @@ class ServiceDispatcher:
 
     @property
     def is_changing_settings(self) -> bool:
-        """Tell whether something that a goal counts on is being set right now."""
+        """Tell whether TCP or payload is being set."""
         return self._pending_settings > 0
 
     async def dispatch(self, call: ServiceCall) -> ServiceAnswer:
-        """Carry out a call; what goes wrong is an answer too."""
+        """Carry out a call; an error is an answer too."""
         bound = RECOVERY_TIMEOUT if isinstance(call, RecoverCall) else CALL_TIMEOUT
         try:
             async with asyncio.timeout(bound):
@@ -131,7 +131,7 @@ class ServiceDispatcher:
                 return await self._recovery.run()
 
     def _refusal(self, call: ServiceCall) -> ServiceAnswer | None:
-        """Refuse what must not be done now."""
+        """Refuse a call that is not allowed now."""
         status = self._link.status
         if isinstance(call, DashboardCall) and call.command in QUERY_COMMANDS:
             return None
@@ -154,7 +154,7 @@ class ServiceDispatcher:
     # ---- robot program ------------------------------------------------------------------------
 
     def _command(self, command: script_command.AnyScriptCommand) -> ServiceAnswer | None:
-        """Send a command to the robot program; an answer only if it cannot be sent."""
+        """Send a command to the robot program; return an answer only if it cannot be sent."""
         robot = self._link.robot
         if robot is not None and robot.runtime_state is not RuntimeState.PLAYING:
             return failed(
@@ -180,7 +180,7 @@ class ServiceDispatcher:
         )
 
     async def _set(self, call: SetTcpCall | SetPayloadCall) -> ServiceAnswer:
-        """Set something; no goal begins meanwhile."""
+        """Set TCP or payload; no goal starts meanwhile."""
         self._pending_settings += 1
         try:
             return await (
@@ -253,7 +253,7 @@ class ServiceDispatcher:
             return failed(self._link.status.message)
         replaces = self._link.program.connected
         self._link.upload_program()
-        if replaces:  # its predecessor hangs up first
+        if replaces:  # its predecessor disconnects first
             await wait_for_state(
                 self._link, lambda _: not self._link.program.connected, SETTING_TIMEOUT
             )
