@@ -63,16 +63,29 @@ def _monitored(*types: DataType) -> tuple[int, ...]:
     )
 
 
-_CONVERSIONS = tuple(
-    (i, convert)
-    for i, row in enumerate(STATE_TABLE)
-    if (convert := _converter(row.type)) is not None
-)
 #: What stands for an output that the robot does not have.
 _ABSENT = {
     row.rtde.name: row.default.rotation_vector() if row.type is Pose else row.default
     for row in STATE_TABLE
 }
+
+
+def _compile() -> Callable[..., RobotState]:
+    """Return a function from the values of a packet to the state; as source, for its speed."""
+    known: dict[str, Any] = {'RobotState': RobotState}
+    arguments = []
+    for row in STATE_TABLE:
+        convert = _converter(row.type)
+        known[f'convert_{row.name}'] = convert
+        arguments.append(row.name if convert is None else f'convert_{row.name}({row.name})')
+    names = ', '.join(row.name for row in STATE_TABLE)
+    function: Callable[..., RobotState] = eval(
+        f'lambda {names}: RobotState({", ".join(arguments)})', known
+    )
+    return function
+
+
+_state = _compile()
 _vectors = itemgetter(*_monitored(DataType.VECTOR6D))
 _numbers = itemgetter(*_monitored(DataType.DOUBLE))
 
@@ -94,10 +107,7 @@ def robot_state_from_rtde(values: Sequence[Any]) -> RobotState:
     """
     if not isfinite(sum(map(sum, _vectors(values))) + sum(_numbers(values))):
         raise RemoteProtocolError(_not_finite(values))
-    fields = list(values)
-    for i, convert in _CONVERSIONS:
-        fields[i] = convert(fields[i])
-    return RobotState(*fields)
+    return _state(*values)
 
 
 def _not_finite(values: Sequence[Any]) -> str:
