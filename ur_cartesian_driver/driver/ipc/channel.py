@@ -3,9 +3,9 @@
 """
 The pipe between the owner of a driver and the robot loop.
 
-Each message is one of the dataclasses below, pickled, behind its length. Both ends are this
-package and the pipe is a pair of sockets that nobody else can reach, which is what makes pickle
-the right choice here, and it moves the arrays of a large plan as they are.
+A message is its length, then one of the dataclasses below, pickled. Both ends are this package and
+no other process can open the pipe, a pair of sockets; so pickle is safe here, and it moves the
+arrays of a large plan as they are.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LENGTH = struct.Struct('>I')
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TemporaryTcpSet:
-    """The robot's TCP is set for a goal."""
+    """A goal has set a temporary TCP."""
 
     T_flange_original: Pose
     T_flange_temporary: Pose
@@ -41,7 +41,7 @@ class TemporaryTcpSet:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TemporaryTcpRestored:
-    """It is what it was before, or somebody has set another one."""
+    """The temporary TCP is no longer active: restored, or another one was set."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,19 +49,19 @@ class Configure:
     """The first message: how to reach the robot."""
 
     config: DriverConfig
-    #: Whether the robot program may be sent on the first connection; not where an earlier loop of
-    #: the same owner has seen somebody stop it.
+    #: Whether the robot program may be uploaded on the first connection; not if an earlier loop of
+    #: the same owner has seen it stopped.
     may_upload: bool = True
-    #: A TCP that an earlier loop of the same owner had set for a goal, and may not have put back.
+    #: A temporary TCP that an earlier loop of the same owner may not have restored.
     temporary_tcp: TemporaryTcpSet | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveSetup:
-    """What it takes to follow live targets, beside the order of a motion that stands."""
+    """What a live session needs beside its job."""
 
     settings: LiveSettings
-    #: The arm, as the owner knows it.
+    #: The arm, with its calibration if known.
     ur_type: str
     geometry: DhTable
     #: Where the arm stands [rad].
@@ -75,17 +75,17 @@ class StartMotion:
     motion: int
     job: MotionJob
     points: bytes
-    #: What the recording is to say of the plan, as JSON; empty = nothing.
+    #: Metadata of the plan for the recording, as JSON; empty = none.
     plan_metadata: str = ''
     #: A session of live targets; None = a goal.
     live: LiveSetup | None = None
-    #: Whether the arm is to be guided by hand; else it is a goal, or a session.
+    #: Whether a person guides the arm by hand.
     freedrive: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetLiveTarget:
-    """A session of live targets has another target."""
+    """Give a live session another target."""
 
     motion: int
     T_base_tcp: Pose
@@ -95,7 +95,7 @@ class SetLiveTarget:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class AppendToMotion:
-    """Let records follow (84 bytes each) in a motion with an open end; answered in any case."""
+    """Append records (84 bytes each) to a motion with keep_open; always answered."""
 
     motion: int
     append_job: AppendJob
@@ -107,7 +107,7 @@ class CancelMotion:
     """Stop the motion, if it is the one that runs."""
 
     motion: int
-    #: Who is to take its place, as part of a sentence; empty: nobody, it is cancelled.
+    #: The motion that preempts it, as part of a sentence; empty = it is cancelled.
     preempted_by: str = ''
 
 
@@ -118,7 +118,7 @@ class ResendProgram:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CallRobot:
-    """Ask the robot for something beside motions."""
+    """Make a service call."""
 
     number: int
     call: ServiceCall
@@ -136,21 +136,21 @@ class Shutdown:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatusChanged:
-    """The connection changed."""
+    """The status changed."""
 
     status: DriverStatus
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GeometryReceived:
-    """The robot told its calibrated geometry."""
+    """The robot reported its calibrated geometry."""
 
     geometry: DhTable
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionProgress:
-    """Where a motion is."""
+    """Progress of a motion."""
 
     motion: int
     progress: Progress
@@ -158,7 +158,7 @@ class MotionProgress:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AppendAnswered:
-    """Whether a motion has taken what was to follow."""
+    """Whether a motion has taken appended records."""
 
     motion: int
     answer: AnswerAppend
@@ -166,7 +166,7 @@ class AppendAnswered:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoProgress:
-    """How the streaming of a motion's set-points is going."""
+    """Progress of a motion's streamed set-points."""
 
     motion: int
     report: ServoReport
@@ -197,14 +197,14 @@ class SignalsChanged:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopHeartbeat:
-    """The robot loop is alive; how steady it was since the last time."""
+    """The robot loop is alive; with the longest pauses since the last heartbeat."""
 
     gaps: LinkGaps = field(default_factory=LinkGaps)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogMessage:
-    """Something worth a line in the owner's log; the levels are those of ``logging``."""
+    """A line for the owner's log; the levels are those of ``logging``."""
 
     level: int
     text: str
@@ -253,7 +253,7 @@ def receive(pipe: socket.socket) -> Request | Notification | None:
     """
     Wait for the next message.
 
-    :param pipe: a blocking socket; its timeout is the longest silence that is borne.
+    :param pipe: a blocking socket; its timeout is the longest silence allowed.
     :returns: None at the end of the pipe, and after a silence.
     """
     head = _read(pipe, LENGTH.size)

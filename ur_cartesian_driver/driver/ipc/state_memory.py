@@ -3,10 +3,9 @@
 """
 The newest robot state in memory that two processes share.
 
-The robot loop writes at the rate of RTDE, anybody reads whenever it wants and never waits: a
-counter before and after the data is odd while a write is going on, and a reader that sees it odd
-or changed reads again. The memory belongs to a file without a name, so nothing of it is left
-behind, however the processes end.
+The robot loop writes at the rate of RTDE; readers read at any time and never wait. A counter is
+odd during a write, and a reader that sees it odd or changed reads again. The memory belongs to a
+file without a name, so nothing is left behind, however the processes end.
 """
 
 from __future__ import annotations
@@ -98,7 +97,7 @@ class StateMemory:
         self._memory.close()
 
     def clear(self) -> None:
-        """Say that there is no state (any more)."""
+        """Publish that there is no state."""
         self._write(bytes(_DATA.size))
 
     def write(self, state: RobotState) -> None:
@@ -115,7 +114,7 @@ class StateMemory:
                 return _state(_DATA.unpack(data)) if before else None
 
     def _write(self, data: bytes) -> None:
-        if self._memory.closed:  # sockets that close behind the loop still report
+        if self._memory.closed:  # sockets that close after the loop still report
             return
         self._count += 1
         _COUNTER.pack_into(self._memory, 0, 2 * self._count - 1)

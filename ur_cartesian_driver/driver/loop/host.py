@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Where the robot loop runs: in a process of its own, or in a thread. Nothing else knows which.
+Runs the robot loop in a process of its own, or in a thread. Nothing else knows which.
 
-The process is started afresh (not forked: the owner may be a ROS node full of threads) and gets
-two open descriptors, the pipe and the shared memory. When it dies its sockets close and the robot
-program stops the arm; when the owner dies the pipe ends and it stops the arm itself.
+The process is not forked, because the owner may be a ROS node with many threads. It gets two open
+descriptors, the pipe and the shared memory. When it dies its sockets close and the robot program
+stops the arm; when the owner dies the pipe ends and the loop stops the arm.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from ur_cartesian_driver.driver.loop.robot_loop import serve
 
 #: The module that the process runs.
 MODULE = 'ur_cartesian_driver.driver'
-#: A robot loop that says nothing for that long hangs [s]; it says something every 0.5 s.
+#: A robot loop without a message for that long hangs [s]; it sends a heartbeat every 0.5 s.
 SILENCE_TIMEOUT = 5.0
-#: How long the robot loop may need to stop the arm and end, before it is ended [s].
+#: How long the robot loop may take to stop the arm and end, before it is killed [s].
 JOIN_TIMEOUT = 2.0
 
 
@@ -39,7 +39,7 @@ class LoopHost(Protocol):
     memory: state_memory.StateMemory
 
     def join(self) -> None:
-        """End the loop, if need be by force, and release everything."""
+        """End the loop, by force if it hangs, and release everything."""
 
 
 def start(robot_loop: str) -> LoopHost:
@@ -61,7 +61,7 @@ class ProcessHost:
                 pass_fds=(loop_end.fileno(), descriptor),
                 env=_environment(),
                 stdin=subprocess.DEVNULL,
-                # Ctrl-C is for the owner, which then ends us in order.
+                # Ctrl-C goes to the owner, which then shuts the loop down.
                 start_new_session=True,
             )
             self.memory = state_memory.StateMemory(descriptor)
@@ -107,21 +107,21 @@ class ThreadHost:
             os.close(descriptor)
 
     def join(self) -> None:
-        """End the thread; one that hangs ends when it comes to itself, as the pipe is closed."""
+        """End the thread; one that hangs ends later, because the pipe is closed."""
         self.pipe.close()
         self._thread.join(JOIN_TIMEOUT)
         self.memory.close()
 
 
 def _environment() -> dict[str, str]:
-    """Return an environment in which the process finds this very package."""
+    """Return an environment in which the process imports this package."""
     path = os.pathsep.join(entry for entry in sys.path if entry)
     return {**os.environ, 'PYTHONPATH': path}
 
 
 def main() -> None:
     """Run the loop in this process; the arguments are the two descriptors."""
-    gc.freeze()  # what the imports made stays: the collector would look at it in mid-motion
+    gc.freeze()  # imported objects stay: the collector would scan them in mid-motion
     pipe, descriptor = (int(argument) for argument in sys.argv[1:])
     with socket.socket(fileno=pipe) as connection:
         asyncio.run(serve(connection, descriptor))

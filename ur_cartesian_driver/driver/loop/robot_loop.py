@@ -3,13 +3,13 @@
 """
 The robot loop: one asyncio loop that owns the sockets and the machine of the running goal.
 
-It never imports ROS. It runs in a process of its own, where nothing that the owner does (receiving
-a goal of 100,000 points holds Python's interpreter lock for seconds) can delay a message that the
-robot waits for, or in a thread; either way it is joined to its owner by one pipe for messages and
-by shared memory for the newest robot state, see :mod:`~ur_cartesian_driver.driver.loop.host`.
+It never imports ROS. In a process of its own the owner cannot delay a message that the robot
+waits for: receiving a goal of 100,000 points holds Python's interpreter lock for seconds. It can
+also run in a thread. One pipe for messages and shared memory for the newest robot state join it
+to its owner, see :mod:`~ur_cartesian_driver.driver.loop.host`.
 
-When the pipe ends or the owner falls silent the arm is stopped: our sockets close, and the robot
-program brakes and ends when they do.
+When the pipe ends the loop closes its sockets, and the robot program stops the arm and ends. When
+the owner is silent the loop stops the arm.
 """
 
 from __future__ import annotations
@@ -238,9 +238,9 @@ async def serve(pipe: socket.socket, descriptor: int) -> None:
         if not writer.is_closing():
             await writer.drain()
     except (asyncio.IncompleteReadError, ConnectionError):
-        pass  # the owner is gone, and with it everybody who could be told
+        pass  # the owner is gone: no notification can be sent
     finally:
         writer.close()
         memory.close()
-        # Calls that came in at the last moment are taken, and hung up on.
+        # Accept and close connections that arrived at the last moment.
         await asyncio.sleep(0.01)

@@ -3,11 +3,11 @@
 """
 Records every motion: a file each, written while it runs.
 
-Between two packets there are 2 ms, and disks take longer than that whenever they like. So a packet
-is put into memory that is there already (a few microseconds), and a thread of its own writes what
-is full. There is a fixed number of such pieces: a disk that is too slow loses rows, which the
-recording says, and neither time of the motion nor memory. A recording that cannot be written ends
-with one sentence, and the motion goes on.
+Packets are 2 ms apart, and a disk may take longer than that at any time. So a packet is copied
+into a preallocated buffer (a few microseconds), and a thread of its own writes full buffers.
+Their number is fixed: a disk that is too slow costs rows, which the recording counts, but no time
+of the motion and no memory. A recording that cannot be written ends with a warning; the motion
+goes on.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ from ur_cartesian_driver.motion.signals import Signals
 from ur_cartesian_driver.motion.state import RobotState
 from ur_cartesian_driver.planning import PlanningOptions
 
-#: Rows of a piece of memory, how many there are, and the longest time until one is written [s]:
-#: what a killed process loses.
+#: Rows of a buffer, number of buffers, and the longest time until one is written [s]: a killed
+#: process loses as much.
 BUFFER_ROWS, BUFFER_COUNT, FLUSH_PERIOD = 256, 8, 0.5
-#: So much may wait for the disk; notes and pieces of the plan beyond are left out.
+#: So many jobs may wait for the disk; more events and pieces of the plan are dropped.
 MAX_PENDING_JOBS = 1000
-#: How long whoever makes a file pauses behind each small part of it [s]: a thread that wants the
-#: interpreter from one that never pauses waits 5 ms and more for it.
+#: Pause of the finisher after each small part of a file [s]: other threads wait 5 ms and more for
+#: the interpreter of a thread that never pauses.
 YIELD_PAUSE = 0.0002
 #: Lines of a plan's report that are kept.
 MAX_REPORT_LINES = 1000
@@ -49,7 +49,7 @@ MEGABYTE = 1_000_000
 
 
 def plan_metadata(plan: Plan, options: PlanningOptions) -> str:
-    """Return what only the owner of the plan knows of it, as JSON: its report, the options."""
+    """Return metadata that only the owner of the plan has, as JSON: report and options."""
     lines = plan.report
     if len(lines) > MAX_REPORT_LINES:
         lines = (*lines[:MAX_REPORT_LINES], f'... and {len(lines) - MAX_REPORT_LINES} more lines')
@@ -77,8 +77,8 @@ def motion_metadata(
 
     :param robot: what is known of the robot.
     :param parameters: those of the driver, a dataclass.
-    :param plan_metadata_json: what :func:`plan_metadata` has said.
-    :param mode: what leads the arm, where that is no plan.
+    :param plan_metadata_json: the result of :func:`plan_metadata`.
+    :param mode: the kind of a motion without a plan.
     """
     known = json.loads(plan_metadata_json) if plan_metadata_json else {}
     planning = known.pop('planning', {})
@@ -105,7 +105,7 @@ def motion_metadata(
 
 
 class Recorder:
-    """Takes what happens, from one thread; writes it in another."""
+    """Takes states and events on one thread, and writes them on another."""
 
     def __init__(self, directory: str, max_size: float, warn: Callable[[str], None]) -> None:
         """
@@ -117,20 +117,20 @@ class Recorder:
         """
         self._directory, self._max_size, self._warn = directory, max_size * MEGABYTE, warn
         self._last_warning = ''
-        #: Who writes while a motion runs, and who makes a file of it afterwards, slowly.
+        #: One writes while a motion runs, the other makes a file of it afterwards, slowly.
         self._writer: _Worker | None = None
         self._finisher: _Worker | None = None
         self._is_closing = False
         #: The motion that runs: its folder, belonging to the writer but for ``left_out``.
         self._folder: RecordingFolder | None = None
-        # Memory for rows: the piece that is being filled, how far, and those that are free.
+        # Buffers for rows: the one that is being filled, how far, and the free ones.
         self._buffer, self._used = bytearray(), 0
         self._free_buffers: SimpleQueue[bytearray] = SimpleQueue()
-        #: Of the motion: when it began by the controller's clock, the newest packet from then on,
-        #: and when the piece is handed over at the latest [s].
+        #: Start of the motion by the controller's clock, time of the newest packet since then, and
+        #: when the buffer has to be written [s].
         self._start_time = self._time = self._flush_due = 0.0
         self._digital, self._analog = -1, (nan, nan)
-        #: The count of the goal before, as long as the robot reports it.
+        #: The points begun of the goal before, as long as the robot reports them.
         self._stale_points_begun: int | None = None
 
     @property
@@ -138,7 +138,7 @@ class Recorder:
         """Tell whether a motion is being recorded."""
         return self._folder is not None
 
-    # ---- what happens -------------------------------------------------------------------------
+    # ---- states and events ---------------------------------------------------------------------
 
     def start(self, job: MotionJob, metadata: dict[str, Any], state: RobotState) -> None:
         """
@@ -172,9 +172,9 @@ class Recorder:
 
     def add_plan(self, reference: ReferencePath, since: float) -> None:
         """
-        Take the planned path, or a piece that takes the place of its end.
+        Take the planned path, or a piece that replaces its end.
 
-        :param since: from when on [s].
+        :param since: start of the piece [s].
         """
         if (folder := self._folder) is None:
             return
@@ -189,9 +189,9 @@ class Recorder:
         """
         Take a packet.
 
-        :param waypoint: the goal's point that the arm is on its way to.
-        :param buffered: motion that it has before it [s].
-        :param lag: of the arm behind what it is sent [s]; NaN = unknown.
+        :param waypoint: the point of the goal that the arm moves to.
+        :param buffered: motion that the robot holds and has not begun [s].
+        :param lag: of the arm behind the set-points sent [s]; NaN = unknown.
         """
         if (folder := self._folder) is None:
             return
@@ -264,7 +264,7 @@ class Recorder:
             )
 
     def close(self, timeout: float) -> None:
-        """Wait until everything is written, so long [s]; what has not ended stays a folder."""
+        """Wait up to ``timeout`` [s] for the writer; an unfinished recording stays a folder."""
         if (folder := self._folder) is not None:
             self._flush(folder)
             self._folder = None
@@ -278,7 +278,7 @@ class Recorder:
     # ---- inside -------------------------------------------------------------------------------
 
     def _flush(self, folder: RecordingFolder) -> None:
-        """Have the rows written, and go on in another piece of memory."""
+        """Have the rows written, and go on in another buffer."""
         buffer, used = self._buffer, self._used
         self._used, self._flush_due = 0, self._time + FLUSH_PERIOD
         try:
@@ -292,12 +292,12 @@ class Recorder:
             self._free_buffers.put(buffer)
 
         if self._writer is not None:
-            self._writer.submit(write)  # of these there are no more than pieces
+            self._writer.submit(write)  # at most as many as buffers
 
     def _submit(
         self, folder: RecordingFolder, work: Callable[[], None], is_last: bool = False
     ) -> None:
-        """Have something done by the writer, unless too much waits already."""
+        """Have the writer do something, unless too many jobs wait."""
         writer = self._writer
         if writer is not None and (is_last or writer.jobs.qsize() < MAX_PENDING_JOBS):
             writer.submit(lambda: folder.run_guarded(work))
@@ -311,19 +311,19 @@ class Recorder:
         self._writer, self._finisher = _Worker('recorder'), _Worker('recorder, finishing')
 
     def _yield_cpu(self) -> None:
-        """Let the robot loop have the interpreter at once, should it want it."""
+        """Let the robot loop have the interpreter, if it waits for it."""
         if not self._is_closing:
             sleep(YIELD_PAUSE)
 
     def _warn_once(self, sentence: str) -> None:
-        """Say what is wrong; once, not with each motion."""
+        """Warn once, not with each motion."""
         if sentence != self._last_warning:
             self._last_warning = sentence
             self._warn(sentence)
 
 
 class _Worker:
-    """A thread that does one thing after the other; it does not keep the process alive."""
+    """A thread that does one job after the other; it does not keep the process alive."""
 
     def __init__(self, name: str) -> None:
         self.jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
@@ -335,7 +335,7 @@ class _Worker:
         self.jobs.put(job)
 
     def end(self, timeout: float) -> None:
-        """Wait until all is done, so long [s]."""
+        """Wait until all is done, at most for ``timeout`` [s]."""
         self.jobs.put(None)
         self._thread.join(timeout)
 

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What was recorded of a motion, for looking at it.
+A recorded motion, for analysis.
 
 ``numpy.load`` opens the same files without this package; here the arrays have names and types, a
 recording that was cut off by the end of its process can be read too, and the executed path is
@@ -32,7 +32,7 @@ Integers: TypeAlias = NDArray[np.int32]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RecordedDeviation:
-    """How far the tool was from the planned path; n rows, as the recording has."""
+    """Distance of the tool from the planned path; n rows, as the recording has."""
 
     #: (n,) of the measured pose, [m] and [rad].
     position: Floats
@@ -55,7 +55,7 @@ class Recording:
     linear [m/s] and angular [rad/s] in base axes.
     """
 
-    #: What was asked for and how it ended; see doc/recordings.md.
+    #: Goal, parameters and outcome; see doc/recordings.md.
     metadata: Mapping[str, Any]
     events: list[Event] = field(repr=False)
     #: (n,) controller's clock from the start of the motion [s].
@@ -71,7 +71,7 @@ class Recording:
     target_q: Floats = field(repr=False)
     actual_qd: Floats = field(repr=False)
     target_qd: Floats = field(repr=False)
-    #: (n,) [s] how far the arm is behind what it is sent, and what the robot holds; NaN = unknown.
+    #: (n,) [s] lag behind the set-points sent, and motion that the robot holds; NaN = unknown.
     lag: Floats = field(repr=False)
     buffered: Floats = field(repr=False)
     #: (n,) 0 to 1: what the controller runs at, and the slider.

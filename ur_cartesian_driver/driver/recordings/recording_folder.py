@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The folder into which a running motion is recorded, and the room that recordings take.
+The folder into which a running motion is recorded, and the quota of all recordings.
 
-All of it may take as long as the disk likes, so nothing of it is called by the robot loop itself.
+All of this may wait for the disk, so the robot loop itself calls none of it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.driver.recordings import recording_format as disk
 
-#: Names of recordings; other files in the directory are nobody's business.
+#: Names of recordings; other files in the directory are left alone.
 _RECORDING_NAME = re.compile(r'\d{8}-\d{6}-\d{3}_[a-z_]+_\d+_points(_\d+)?\.(npz|part)')
 
 #: Times nearer to each other than this are one [s].
@@ -39,7 +39,7 @@ def recording_name(metadata: dict[str, Any]) -> str:
 
 
 class RecordingFolder:
-    """One motion on its way to the disk; once something failed it only forgets what it is told."""
+    """Writes one motion; after a failure it ignores the rest."""
 
     def __init__(
         self,
@@ -71,14 +71,14 @@ class RecordingFolder:
         self._directory.mkdir(parents=True, exist_ok=True)
         self._path = _new(self._directory / f'{recording_name(self._metadata)}{disk.PART_SUFFIX}')
         self._rows = disk.GrowingArray(self._path / disk.EXECUTED_FILE, disk.EXECUTED_DTYPE)
-        # Says that we live; it goes with the process, however that ends.
+        # The lock shows that this process writes; it ends with the process.
         fcntl.flock(self._rows.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._plan = disk.GrowingArray(self._path / disk.PLANNED_FILE, disk.PLANNED_DTYPE)
         self._events = open(self._path / disk.EVENTS_FILE, 'xb', buffering=0)  # noqa: SIM115  # open until close()
         self._write_metadata()
 
     def write_rows(self, rows: memoryview) -> None:
-        """Append packets, until there is no room for more."""
+        """Append packets, up to half of the quota."""
         if self._metadata['trouble']:
             return
         if (self._rows.count + 1) * disk.EXECUTED_STRUCT.size > self._max_size / 2.0:
@@ -103,31 +103,31 @@ class RecordingFolder:
         self._last_times = rows['time']
 
     def write_event(self, event: disk.Event) -> None:
-        """Append a note."""
+        """Append an event."""
         time, kind, text = event
         self._events.write(json.dumps([time, kind, text[: disk.MAX_EVENT_TEXT]]).encode() + b'\n')
 
     def close(self, outcome: dict[str, Any]) -> None:
-        """Write what is only known at the end."""
+        """Write the outcome."""
         self._metadata.update(outcome=outcome, rows_left_out=self.lost_rows)
         self._write_metadata()
 
     def finish(self, yield_cpu: Callable[[], None]) -> None:
         """
-        Make one file out of all this, and room for the next.
+        Make one file of the folder, and remove the oldest recordings.
 
         :param yield_cpu: called often, to let others work.
         """
         disk.finish(self._path, yield_cpu)
-        self._close_files()  # not before: till then it is ours
+        self._close_files()  # last: the lock marks the folder as ours
         enforce_quota(self._directory, self._max_size, yield_cpu)
 
     def abandon(self) -> None:
-        """Leave it as it is."""
+        """Leave the folder as it is."""
         self._close_files()
 
     def run_guarded(self, work: Callable[[], None]) -> None:
-        """Do one of the above, and say so if it fails."""
+        """Do one of the above, and warn if it fails."""
         if self._is_broken:
             return
         try:
@@ -169,7 +169,7 @@ def enforce_quota(
     directory: Path, max_size: float, yield_cpu: Callable[[], None] = lambda: None
 ) -> None:
     """
-    Finish what a process that was killed has left, then remove the oldest recordings.
+    Finish the folders of killed processes, then remove the oldest recordings.
 
     :param max_size: what they may take together [bytes].
     :param yield_cpu: called often, to let others work.
@@ -191,7 +191,7 @@ def enforce_quota(
 
 
 def _is_written(folder: Path) -> bool:
-    """Tell whether somebody is writing it, or nobody can tell."""
+    """Tell whether a process writes the folder; also if that cannot be known."""
     try:
         with open(folder / disk.EXECUTED_FILE, 'rb') as rows:
             fcntl.flock(rows, fcntl.LOCK_SH | fcntl.LOCK_NB)

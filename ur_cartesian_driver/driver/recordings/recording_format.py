@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How an execution lies on disk: what a row of it holds, and the files.
+The format of a recording on disk: columns and files.
 
 While a motion runs there is a folder ``NAME.part``, whose files are complete at every moment: rows
-in ``.npy`` files that grow, notes in JSON lines. So what is there when the process is killed can
-be read by anybody. When the motion has ended the folder becomes one file ``NAME.npz``, with an
-array for each column. Neither needs more memory than a part of it, however long the motion was.
+in ``.npy`` files that grow, events in JSON lines. So they can be read after the process was
+killed. When the motion has ended the folder becomes one file ``NAME.npz``, with an array for each
+column. Memory does not grow with the length of the motion.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ur_cartesian_driver.motion.state import RobotMode, RuntimeState, SafetyMode
 
-#: Of the members of a file; counts up when one of them changes its meaning.
+#: Version of the format; counts up when a member of the file changes its meaning.
 FORMAT = 1
 
 #: One packet of the robot: names, shapes and order of the columns. Units and frames:
@@ -73,10 +73,10 @@ METADATA_FILE, EXECUTED_FILE, PLANNED_FILE, EVENTS_FILE = (
     'planned.npy',
     'events.jsonl',
 )
-#: So many rows are looked at together: for as long nobody else has the interpreter, 0.1 ms.
+#: Rows that are processed together, which holds the interpreter for 0.1 ms.
 CHUNK = 512
-#: So many events are kept. A path of a million points begins a million of them; the column
-#: ``waypoint`` has them all.
+#: Events that are kept; a path of a million points has a million. The column ``waypoint`` has
+#: them all.
 MAX_EVENTS = 10_000
 #: Longest text of an event; whole sentences are in the metadata.
 MAX_EVENT_TEXT = 120
@@ -149,7 +149,7 @@ def detect_events(
     rows: NDArray[np.void], yield_cpu: Callable[[], None] = lambda: None
 ) -> list[Event]:
     """
-    Return what changed from packet to packet: points begun, outputs, slider, program, modes.
+    Return the changes from packet to packet: points begun, outputs, slider, program, modes.
 
     :param rows: of the type :data:`EXECUTED_DTYPE`, may be a file in memory.
     :param yield_cpu: called often, to let others work.
@@ -185,7 +185,7 @@ def _changes(part: NDArray[np.void]) -> Iterator[Event]:
 
 
 def _outputs(before: int, now: int) -> Iterator[tuple[str, str]]:
-    if before < 0 or now < 0:  # nobody knew
+    if before < 0 or now < 0:  # not known
         return
     for bit, name in enumerate(OUTPUT_NAMES):
         if (before ^ now) >> bit & 1:
@@ -211,7 +211,7 @@ _EVENT_TEXTS: Mapping[str, Any] = {
 
 
 def read_events(folder: Path) -> list[Event]:
-    """Return the notes of a folder; a last line that was not finished does not count."""
+    """Return the events of a folder, without an unfinished last line."""
     events = []
     for line in (folder / EVENTS_FILE).read_text(encoding='utf-8').split('\n')[:-1]:
         time, kind, text = json.loads(line)
@@ -222,7 +222,7 @@ def read_events(folder: Path) -> list[Event]:
 def merge_events(
     events: Iterable[Event], rows: NDArray[np.void], yield_cpu: Callable[[], None] = lambda: None
 ) -> list[Event]:
-    """Return notes and changes in the order of time."""
+    """Return events and detected changes in the order of time."""
     return sorted([*events, *detect_events(rows, yield_cpu)], key=lambda event: event[0])
 
 
@@ -245,7 +245,7 @@ def finish(folder: Path, yield_cpu: Callable[[], None] = lambda: None) -> Path:
     """
     file = folder.with_suffix('.npz')
     unfinished = folder / file.name
-    # Plain arrays: those of a file make an object of their own for each look at a part of them.
+    # Plain arrays: slices of a memmap are memmaps again, which are slow to make.
     rows, plan = (
         np.asarray(np.load(folder / name, mmap_mode='r')) for name in (EXECUTED_FILE, PLANNED_FILE)
     )
@@ -272,7 +272,7 @@ def finish(folder: Path, yield_cpu: Callable[[], None] = lambda: None) -> Path:
 def _write_column(
     archive: zipfile.ZipFile, name: str, column: NDArray[Any], yield_cpu: Callable[[], None]
 ) -> None:
-    """Write a column of a table, a part after the other."""
+    """Write a column of a table, part by part."""
 
     def parts() -> Iterator[NDArray[Any]]:
         for first in range(0, len(column), CHUNK):
