@@ -21,8 +21,8 @@ class DriverConfig(LinkSettings):
     max_plan_deviation_angle: float = MAX_PLAN_DEVIATION[1]
     #: Warn if the calibration moves the flange by more than this [m]; 0 = never.
     max_calibration_difference: float = 0.01
-    #: What becomes of a goal when the robot makes a protective or safeguard stop: ``abort``, or
-    #: ``continue`` when somebody has unlocked the robot and plays its program.
+    #: What a protective or safeguard stop does to a goal: ``abort``, or ``continue`` it when a
+    #: person has unlocked the robot and plays its program.
     on_robot_stop: str = 'abort'
     #: Of goals with keep_open: planned time of the motion that the robot is given ahead [s]; ...
     keep_open_horizon: float = 1.0
