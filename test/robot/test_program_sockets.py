@@ -216,7 +216,7 @@ def test_an_address_is_the_same_in_each_way_of_writing_it(written, plain):
 
 @pytest.mark.parametrize('peer', ['', 'robot.local', '192.0.2.0/24', '192.0.2'])
 def test_a_peer_that_is_no_address_is_refused(peer):
-    with pytest.raises(ValueError, match=r'allowed_peers has .* which is no address'):
+    with pytest.raises(ValueError, match=r'allowed_peers has .* which is no IP address'):
         LinkSettings(allowed_peers=(peer,))
 
 
