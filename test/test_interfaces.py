@@ -41,6 +41,8 @@ from ur_cartesian_driver.srv import (
     SetTCP,
 )
 
+pytestmark = pytest.mark.installation
+
 # Section 4.2 of the proposal (FZI, 2020-09-17), with the ROS 2 names of its types.
 FZI = {
     CartesianPosture: {

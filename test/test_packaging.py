@@ -16,6 +16,7 @@ from ur_cartesian_driver.resources import share_path
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 NAME = 'ur_cartesian_driver'
+pytestmark = pytest.mark.installation
 needs_checkout = pytest.mark.skipif(
     not (CHECKOUT / 'CMakeLists.txt').is_file(), reason='only a checkout has this file'
 )
