@@ -59,18 +59,18 @@ def closed_form(
     """
     o1, o2, o3, o4, o5, o6 = ideal.offsets
     slack = root_slack(ideal, misfit_factor)
-    return [
-        (
-            wrap(wrist.theta1 - o1),
-            wrap(theta2 - o2),
-            wrap(theta3 - o3),
-            wrap(wrist.theta234 - theta2 - theta3 - o4),
-            wrap(wrist.theta5 - o5),
-            wrap(wrist.theta6 - o6),
-        )
-        for wrist in wrist_solutions(ideal, T_base_flange, wrist_3 + o6, slack)
-        for theta2, theta3 in _elbow_angles(ideal, wrist.outward, wrist.up, slack)
-    ]
+    found = []
+    for theta1, theta5, theta6, theta234, outward, up in wrist_solutions(
+        ideal, T_base_flange, wrist_3 + o6, slack
+    ):
+        elbows = _elbow_angles(ideal, outward, up, slack)
+        if not elbows:
+            continue
+        q1, q5, q6 = wrap(theta1 - o1), wrap(theta5 - o5), wrap(theta6 - o6)
+        for theta2, theta3 in elbows:
+            q4 = wrap(theta234 - theta2 - theta3 - o4)
+            found.append((q1, wrap(theta2 - o2), wrap(theta3 - o3), q4, q5, q6))
+    return found
 
 
 def root_slack(ideal: IdealArm, misfit_factor: float) -> float:
@@ -117,35 +117,38 @@ def wrist_solutions(
 
 def _wrist_angles(
     ideal: IdealArm, along_x: float, along_y: float, c5: float, theta6_if_singular: float
-) -> Iterator[tuple[float, float]]:
+) -> list[tuple[float, float]]:
     """Solve the wrist, from the flange's axes along axis 2: theta5, theta6."""
     s5 = hypot(along_x, along_y)
     theta5, theta6 = atan2(s5, c5), atan2(-along_y, along_x)
     if s5 < WRIST_SINGULAR:
-        yield theta5, theta6_if_singular
-        return
-    yield theta5, theta6
-    yield -theta5, theta6 + pi
+        return [(theta5, theta6_if_singular)]
+    angles = [(theta5, theta6), (-theta5, theta6 + pi)]
     if s5 * ideal.d5 < _MAX_WRIST_MISFIT * ideal.misfit:  # then theta6 may be anything
-        yield theta5, theta6 + 0.5 * pi
-        yield theta5, theta6 - 0.5 * pi
+        angles += [(theta5, theta6 + 0.5 * pi), (theta5, theta6 - 0.5 * pi)]
+    return angles
 
 
 def _elbow_angles(
     ideal: IdealArm, outward: float, up: float, slack: float
-) -> Iterator[tuple[float, float]]:
+) -> list[tuple[float, float]]:
     """Solve the triangle of upper arm, forearm and the way to wrist 1: theta2, theta3."""
     a2, a3 = ideal.a2, ideal.a3
     square = outward * outward + up * up
-    direction = atan2(up, outward)
     # The law of cosines for half the angle, tan(theta3 / 2)^2 = (1 - cos) / (1 + cos): what the
     # square lacks to the stretched arm's over what it exceeds the folded arm's by.
-    for folded in _roots(square - (a2 - a3) ** 2, slack)[:1]:
-        for stretched in _roots((a2 + a3) ** 2 - square, slack):
-            theta3 = 2.0 * atan2(stretched, folded)
-            yield direction - atan2(a3 * sin(theta3), a2 + a3 * cos(theta3)), theta3
-            if folded == 0.0:  # pi and -pi are one elbow
-                break
+    folds = _roots(square - (a2 - a3) ** 2, slack)
+    if not folds:
+        return []
+    folded, direction = folds[0], atan2(up, outward)
+    elbows = []
+    for stretched in _roots((a2 + a3) ** 2 - square, slack):
+        theta3 = 2.0 * atan2(stretched, folded)
+        theta2 = direction - atan2(a3 * sin(theta3), a2 + a3 * cos(theta3))
+        elbows.append((theta2, theta3))
+        if folded == 0.0:  # pi and -pi are one elbow
+            break
+    return elbows
 
 
 def _roots(square: float, slack: float) -> tuple[float, ...]:

@@ -295,7 +295,15 @@ def _same(a: Joints, b: Joints) -> bool:
 
 def _distance_by_turns(a: Joints, b: Joints) -> float:
     """Return the Euclidean distance when full turns do not count [rad]."""
-    return hypot(*[remainder(x - y, tau) for x, y in zip(a, b, strict=True)])
+    (a1, a2, a3, a4, a5, a6), (b1, b2, b3, b4, b5, b6) = a, b
+    return hypot(
+        remainder(a1 - b1, tau),
+        remainder(a2 - b2, tau),
+        remainder(a3 - b3, tau),
+        remainder(a4 - b4, tau),
+        remainder(a5 - b5, tau),
+        remainder(a6 - b6, tau),
+    )
 
 
 def _closest(candidates: Sequence[Joints | None], q_near: Joints) -> Joints | None:
@@ -328,6 +336,8 @@ def _nearest_turns(
 def _nearest_turn(angle: float, target: float, low: float, high: float) -> float | None:
     """Return the angle plus the full turns that bring it nearest to the target, or None."""
     turned = angle + tau * round((target - angle) / tau)
+    if low <= turned <= high:
+        return turned
     if turned > high + _LIMIT_ROUNDING:
         turned -= tau * ceil((turned - high - _LIMIT_ROUNDING) / tau)
         if turned < low - _LIMIT_ROUNDING:

@@ -279,9 +279,17 @@ class ScriptProgram(SyntaxNode):
 
 def children(node: SyntaxNode) -> Iterator[SyntaxNode]:
     """Yield the nodes directly below `node`, in the order of the text."""
-    for field in fields(node):
-        value = getattr(node, field.name)
+    kind = type(node)
+    if kind not in _FIELDS:
+        own = {field.name for field in fields(SyntaxNode)}
+        _FIELDS[kind] = tuple(f.name for f in fields(node) if f.name not in own)
+    for name in _FIELDS[kind]:
+        value = getattr(node, name)
         if isinstance(value, SyntaxNode):
             yield value
         elif isinstance(value, tuple):
             yield from value
+
+
+#: What a kind of node has beside its place; asked for by each walk through a tree.
+_FIELDS: dict[type[SyntaxNode], tuple[str, ...]] = {}
