@@ -3,6 +3,7 @@
 """What holds for all tests."""
 
 import gc
+import os
 
 from hypothesis import settings
 import pytest
@@ -30,6 +31,28 @@ def pytest_addoption(parser):
         action='store_true',
         help='count what is skipped as failed: `make test` runs where all is installed',
     )
+    parser.addoption(
+        '--overlap',
+        action='store_true',
+        help='let every other worker of -n run tests that compute while the others wait',
+    )
+
+
+def pytest_configure(config):
+    if config.getoption('--overlap') and hasattr(config, 'workerinput'):
+        from overlap import is_for_computing, LOW_PRIORITY
+
+        if is_for_computing(config.workerinput['workerid']):
+            os.nice(LOW_PRIORITY)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    if not config.getoption('--overlap'):
+        return None
+    from overlap import Overlap
+
+    return Overlap(config, log)
 
 
 @pytest.hookimpl(wrapper=True)

@@ -1,0 +1,71 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Tests that compute fill the time in which others wait for a clock.
+
+``--overlap`` makes every other worker of pytest-xdist one for tests that only compute. It runs at
+a low priority, so that a test with sockets and deadlines has a processor when it needs one; the
+other workers help when no such test is left.
+"""
+
+from bisect import bisect_left
+
+from xdist.scheduler import LoadScheduling
+
+#: Tests that read no clock, by the rules for their packages or in virtual time; long ones first.
+COMPUTING = (
+    'test/acceptance/test_pre_flight.py',
+    'test/faults/',
+    'test/sim/motion/',
+    'test/planning/',
+    'test/program/',
+    'test/execution/',
+    'test/kinematics/',
+    'test/motion/',
+    'test/protocol/',
+    'test/urscript/',
+)
+LOW_PRIORITY = 10
+#: A worker knows so many tests in advance: it runs one when it knows the next.
+AHEAD = 4
+
+
+def is_for_computing(worker: str) -> bool:
+    """Tell whether a worker, by its name, is one for tests that compute."""
+    return int(worker.removeprefix('gw')) % 2 == 1
+
+
+class Overlap(LoadScheduling):
+    """Gives each worker tests of its kind."""
+
+    def schedule(self):
+        """Begin, or go on after the number of workers has changed."""
+        if self.collection is None:
+            if not self._check_nodes_have_same_collection():
+                return
+            self.collection = next(iter(self.node2collection.values()))
+            self.pending[:] = sorted(range(len(self.collection)), key=self._rank)
+        for node in self.nodes:
+            self.check_schedule(node)
+
+    def check_schedule(self, node, duration=0.0):
+        """Give a worker more to do, or send it home if nothing is left for it."""
+        if node.shutting_down:
+            return
+        first = 0
+        if is_for_computing(node.gateway.id):
+            first = bisect_left(self.pending, 0, key=self._rank)
+        if first == len(self.pending):
+            node.shutdown()
+            return
+        last = first + AHEAD - len(self.node2pending[node])
+        tests = self.pending[first:last]
+        if tests:
+            del self.pending[first:last]
+            self.node2pending[node].extend(tests)
+            node.send_runtest_some(tests)
+
+    def _rank(self, test):
+        """Return the place of a test's folder among those that compute; -1: it waits."""
+        name = self.collection[test]
+        return next((i for i, path in enumerate(COMPUTING) if name.startswith(path)), -1)
