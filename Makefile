@@ -1,7 +1,7 @@
 # Everything from a fresh clone: `make demo`, `make test` and `make bench` set up what they need.
 
 VENV ?= .venv
-PYTEST_ARGS ?= -n 2
+PYTEST_ARGS ?= -n 4 --overlap
 bin := $(VENV)/bin
 stamp := $(VENV)/.installed
 
