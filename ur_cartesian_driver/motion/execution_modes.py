@@ -3,9 +3,10 @@
 """
 The registry of execution modes: how a goal can be executed, and what each mode can do.
 
-A new mode is a member of :class:`ExecutionMode`, its row in :data:`EXECUTION_MODES` and one module
-with its planner or feeder; everything else asks the row. Planners and feeders belong to higher
-layers, so the table names them and they are looked up when they are needed.
+A new mode is a member of :class:`ExecutionMode` (the action names its number, ``EXECUTION_...``),
+its row in :data:`EXECUTION_MODES`, and one module with its planner or feeder;
+everything else asks the row. Planners and feeders belong to higher layers, so the table names them
+and they are looked up when they are needed.
 """
 
 from __future__ import annotations

@@ -7,8 +7,10 @@ from __future__ import annotations
 from math import isfinite
 
 from ur_cartesian_driver.motion.errors import InvalidGoal, NotAvailable
+from ur_cartesian_driver.motion.execution_modes import EXECUTION_MODES
 from ur_cartesian_driver.motion.goal import Goal, IOCommand, OutputKind
 from ur_cartesian_driver.planning.options import PlanningOptions
+from ur_cartesian_driver.planning.request.goal_fields import resolve_execution_mode
 
 #: Maximum time after a point [s].
 MAX_OUTPUT_OFFSET = 60.0
@@ -25,8 +27,16 @@ def check_outputs(goal: Goal, options: PlanningOptions) -> None:
     Check the commands of a goal.
 
     :raises InvalidGoal: names field, value and bound.
-    :raises NotAvailable: the robot program is not ours.
+    :raises NotAvailable: the execution mode, or a robot program that is not ours, cannot do it.
     """
+    mode = resolve_execution_mode(goal)
+    if goal.io_commands and not mode.traits.switches_outputs:
+        able = [other.name for other, traits in EXECUTION_MODES.items() if traits.switches_outputs]
+        raise NotAvailable(
+            'io_commands',
+            f'is not empty, but {mode.name} switches no outputs',
+            f'set execution to {" or ".join(able)}',
+        )
     if goal.io_commands and not options.dialect.supports_outputs:
         raise NotAvailable(
             'io_commands',

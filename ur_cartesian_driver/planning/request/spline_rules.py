@@ -92,12 +92,6 @@ def _check_support(goal: Goal, name: str, options: PlanningOptions) -> None:
                 f'{options.dialect.name} do not support',
                 remedy,
             )
-        if goal.io_commands and not traits.switches_outputs:
-            raise NotAvailable(
-                'io_commands',
-                f'is not empty, but {name} switches no outputs',
-                'set execution to SPLINE or PRIMITIVES',
-            )
     elif options.dialect.is_coarse:
         raise NotAvailable(
             'execution',

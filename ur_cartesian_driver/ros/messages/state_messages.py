@@ -88,7 +88,8 @@ def status_message(
     """
     Return the state of the connection and the modes of the robot.
 
-    Each field has the value of the same name of the driver's or of the robot's state.
+    Each field has the value of the same name of the driver's or of the robot's state. The topic is
+    published when the connection or a mode changes, and at least once a second.
     """
     message = DriverStatus()
     for name in message.get_fields_and_field_types():
