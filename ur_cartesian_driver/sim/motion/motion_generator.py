@@ -3,13 +3,13 @@
 """
 From motion calls to one target per control cycle.
 
-A call (``movel`` ...) says what to do and returns a :class:`Move` at once; ``step`` does one cycle
-of it. The caller polls ``Move.returned`` and may make its next call in the same frame, then the
-motion goes on without an idle cycle.
+A call (``movel`` ...) returns a :class:`Move` at once; ``step`` does one cycle of it. The caller
+polls ``Move.returned`` and may make its next call in the same frame; then the motion goes on
+without an idle cycle.
 
-Speed scaling and the limits of the arm dilate time and never change the path. Tool motions are
-solved by inverse kinematics each cycle, from the solution before; where there is none the arm
-creeps up to the place and stops there with a fault.
+Speed scaling and the limits of the arm stretch the time and never change the path. Tool motions
+are solved by inverse kinematics each cycle, from the solution before; where there is none the arm
+creeps up to the last solution and stops there with a fault.
 """
 
 from __future__ import annotations
@@ -141,20 +141,20 @@ class MotionGenerator:
     def movej(
         self, q: Vector6, a: float = 1.4, v: float = 1.05, t: float = 0.0, r: float = 0.0
     ) -> Move:
-        """Go straight in joint space; a, v of the leading axis [rad/s^2, rad/s], r [m]."""
+        """Move straight in joint space; a, v of the leading axis [rad/s^2, rad/s], r [m]."""
         parameters = ProfileParameters(acceleration=a, speed=v, time=t)
         return self._start_path('movej', self._joint_path(q), parameters, r)
 
     def movel(
         self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, t: float = 0.0, r: float = 0.0
     ) -> Move:
-        """Go straight with the tool; a, v [m/s^2, m/s; for rotations rad], t [s], r [m]."""
+        """Move straight with the tool; a, v [m/s^2, m/s; for rotations rad], t [s], r [m]."""
         parameters = ProfileParameters(acceleration=a, speed=v, time=t)
         return self._start_path('movel', _linear_path(T_base_tcp), parameters, r)
 
     def movep(self, T_base_tcp: Pose, a: float = 1.2, v: float = 0.25, r: float = 0.0) -> Move:
         """
-        Go straight at constant tool speed, through circular fillets.
+        Move straight at constant tool speed, through circular fillets.
 
         The speed holds until the fillet: if no other motion follows, the arm brakes within it,
         harder than ``a`` where it has to.
@@ -167,7 +167,7 @@ class MotionGenerator:
         self, via: Pose, to: Pose, a: float = 1.2, v: float = 0.25, r: float = 0.0, mode: int = 0
     ) -> Move:
         """
-        Go on a circle; mode 1 keeps the orientation fixed to the tangent.
+        Move on a circle; mode 1 keeps the orientation fixed to the tangent.
 
         :raises MotionError: the three points do not lie on a circle.
         """
@@ -224,7 +224,7 @@ class MotionGenerator:
     def servoj(
         self, q: Vector6, t: float, lookahead_time: float = 0.1, gain: float = 300.0
     ) -> Move:
-        """Be drawn to ``q`` for ``t`` scaled seconds."""
+        """Follow ``q`` for ``t`` scaled seconds."""
         qd = self._active.nominal_joint_speed()
         return self._replace(
             ServoMotion(self.q, qd, q, t, lookahead_time, gain, MAX_JOINT_ACCELERATION)

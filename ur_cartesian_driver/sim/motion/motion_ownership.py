@@ -27,7 +27,7 @@ HARD_STOP = 15.0
 
 
 class FreedriveState(Enum):
-    """Who moves the arm instead of the program's moves."""
+    """Whether a person guides the arm by hand."""
 
     OFF = ''
     FREEDRIVE = 'freedrive'
@@ -95,7 +95,7 @@ class MotionOwnership:
             self._owner = None
 
     def end_of_frame(self) -> None:
-        """Brake if nobody continued what has been left moving."""
+        """Brake if no thread has continued a motion that was left alone."""
         if self._calls == 0 and self._abandoned:
             self.brake()
 

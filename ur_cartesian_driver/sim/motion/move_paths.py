@@ -225,7 +225,7 @@ class ToolBlendPath:
     The same for poses: positions add, rotations are composed.
 
     p = p1 + p2 - p_waypoint, R = R1 R_waypoint^-1 R2. Between straight lines the position runs on
-    the parabola with the waypoint as its control point, inside the corner.
+    the parabola with the waypoint as its control point.
     """
 
     def __init__(self, before: MovePath, tail: float, after: MovePath, head: float) -> None:

@@ -158,12 +158,8 @@ def start_from_rest(
     """Return the motion along one path, from rest to rest."""
     profile = parameters.profile(move_path.length)
     section = PathSection(move_path, profile, 0.0, profile.duration)
-    return PathMotion(
-        (section,),
-        LastMove(
-            move_path, parameters, radius, _blend_entry_time(section, move_path, radius), call
-        ),
-    )
+    entry = _blend_entry_time(section, move_path, radius)
+    return PathMotion((section,), LastMove(move_path, parameters, radius, entry, call))
 
 
 def append_move_path(
@@ -182,22 +178,12 @@ def append_move_path(
     not leave the blend radius: then the arm stops at the waypoint. (Both moves share the speed
     through the blend, and a short one would be driven at that of the other.)
     """
-    last, last_move, ahead = (
-        path_motion.sections[-1],
-        path_motion.last_move,
-        path_motion.sections[path_motion.index : -1],
-    )
+    last, last_move = path_motion.sections[-1], path_motion.last_move
+    ahead = path_motion.sections[path_motion.index : -1]
     now = path_motion.time if path_motion.index + 1 == len(path_motion.sections) else 0.0
     leave = max(now, last_move.entry)
     tail = last_move.move_path.length - last.offset - last.profile.at(leave)
-    speed = last.profile.speed(leave)
-    head = None
-    if speed > _MIN_SPEED and tail > _MIN_SPEED:
-        blend_distance = distance(
-            last_move.move_path.pose(last_move.move_path.length - tail).position,
-            last_move.move_path.pose(inf).position,
-        )
-        head = start_within_radius(move_path, min(blend_distance, last_move.radius))
+    head = _blend_head(last_move, tail, last.profile.speed(leave), move_path)
     if head is None:
         rest = start_from_rest(move_path, parameters, radius, call)
         sections = (*ahead, replace(last, halt=True), *rest.sections)
@@ -205,24 +191,33 @@ def append_move_path(
     blend = make_blend(last_move.move_path, tail, move_path, head, circular)
     through, after = _blend_profiles(
         (blend.entry_rate, blend.exit_rate),
-        speed,
+        last.profile.speed(leave),
         last.profile.duration - leave,
-        last_move.parameters,
-        parameters,
+        (last_move.parameters, parameters),
         head,
         move_path.length - head,
     )
     end = PathSection(move_path, after, head, after.duration)
-    sections = (
-        *ahead,
-        replace(last, stop=leave),
-        PathSection(blend, through, 0.0, through.duration),
-        end,
-    )
-    new_last_move = LastMove(
-        move_path, parameters, radius, _blend_entry_time(end, move_path, radius), call
-    )
+    blended = PathSection(blend, through, 0.0, through.duration)
+    sections = (*ahead, replace(last, stop=leave), blended, end)
+    entry = _blend_entry_time(end, move_path, radius)
+    new_last_move = LastMove(move_path, parameters, radius, entry, call)
     return PathMotion(sections, new_last_move, 0, path_motion.time), True
+
+
+def _blend_head(
+    last_move: LastMove, tail: float, speed: float, move_path: MovePath
+) -> float | None:
+    """
+    Return how much of the new path the blend covers; None = no blend.
+
+    :param tail: what is left of the last path at the entry; ``speed``: there.
+    """
+    if speed <= _MIN_SPEED or tail <= _MIN_SPEED:
+        return None
+    path = last_move.move_path
+    entry, waypoint = path.pose(path.length - tail).position, path.pose(inf).position
+    return start_within_radius(move_path, min(distance(entry, waypoint), last_move.radius))
 
 
 def _blend_entry_time(section: PathSection, move_path: MovePath, radius: float) -> float:
@@ -239,8 +234,7 @@ def _blend_profiles(
     rates: tuple[float, float],
     speed: float,
     remaining: float,
-    before: ProfileParameters,
-    after: ProfileParameters,
+    parameters: tuple[ProfileParameters, ProfileParameters],
     head: float,
     rest: float,
 ) -> tuple[MotionProfile, MotionProfile]:
@@ -257,9 +251,10 @@ def _blend_profiles(
 
     :param rates: path units per unit of the blend's parameter, at entry and exit.
     :param speed: at the entry; ``remaining`` [s]: until rest at the waypoint.
+    :param parameters: of the move before and of the new one.
     :param head: length of the new path within the blend; ``rest``: behind it.
     """
-    entry_rate, exit_rate = rates
+    (entry_rate, exit_rate), (before, after) = rates, parameters
     u0 = speed / entry_rate
     time = after.time + remaining
     whole = head + rest
