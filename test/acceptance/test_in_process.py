@@ -20,7 +20,7 @@ pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 Result = FollowCartesianTrajectory.Result
 #: How long anything may take that is not a motion [s].
-PATIENCE = 10.0
+TIMEOUT = 10.0
 
 
 class Client:
@@ -39,13 +39,13 @@ class Client:
         executor.add_node(self.node)
         assert self.spin_until(self._actions.server_is_ready)
 
-    def spin_until(self, condition, timeout=PATIENCE):
+    def spin_until(self, condition, timeout=TIMEOUT):
         end = monotonic() + timeout
         while not condition() and monotonic() < end:
             self.executor.spin_once(timeout_sec=0.05)
         return condition()
 
-    def wait(self, future, timeout=PATIENCE):
+    def wait(self, future, timeout=TIMEOUT):
         assert self.spin_until(future.done, timeout)
         return future.result()
 
@@ -58,7 +58,7 @@ class Client:
         assert handle.accepted
         return handle
 
-    def result(self, handle, timeout=PATIENCE):
+    def result(self, handle, timeout=TIMEOUT):
         response = self.wait(handle.get_result_async(), timeout)
         return response.status, response.result
 

@@ -149,7 +149,7 @@ def test_a_goal_ends_once_whatever_happens(events, lends):
     assert len(sent) <= POINTS
 
 
-def extension(number, records_before, begin, count, last):
+def append_of(number, records_before, begin, count, last):
     """Points that go on along the line from a place on it; all but the last one are firm."""
     x = 0.1 * (begin + np.arange(count))
     poses = np.stack([x, *np.tile([[0.0], [0.2], [0.0], [0.0], [0.0], [1.0]], count)], axis=1)
@@ -171,7 +171,7 @@ def extension(number, records_before, begin, count, last):
 
 
 EXTENSIONS = st.builds(
-    extension,
+    append_of,
     number=st.integers(1, 9),
     records_before=st.integers(0, 8),
     begin=st.integers(1, 8),

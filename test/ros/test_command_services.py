@@ -44,7 +44,7 @@ def sim():
         yield robot
 
 
-class Desk:
+class ServiceClient:
     """Calls services of a cell."""
 
     def __init__(self, cell):
@@ -78,7 +78,7 @@ class Desk:
 
 
 def test_every_service_does_what_it_says(cell):
-    call, sim = Desk(cell), cell.sim
+    call, sim = ServiceClient(cell), cell.sim
     assert call(
         'set_tcp', SetTCP.Request(tcp=Pose(position=Point(z=0.1), orientation=UNIT))
     ).success
@@ -110,7 +110,7 @@ def test_every_service_does_what_it_says(cell):
 
 
 def test_a_service_that_takes_its_time_holds_up_nobody(cell):
-    call = Desk(cell)
+    call = ServiceClient(cell)
     assert call('dashboard/power_off').success
     slow = call.send('dashboard/power_on')
     assert call('dashboard/get_robot_mode').message in ('POWER_OFF', 'POWER_ON')
@@ -120,7 +120,7 @@ def test_a_service_that_takes_its_time_holds_up_nobody(cell):
 
 
 def test_recover_says_what_it_did_or_what_a_person_must_do(single_cell):
-    cell, call = single_cell, Desk(single_cell)
+    cell, call = single_cell, ServiceClient(single_cell)
     cell.sim.protective_stop()
     cell.spin_until(lambda: cell.node.driver.status.state is ConnectionState.STOPPED)
     answer = call('recover')
@@ -169,7 +169,7 @@ def test_nonsense_is_refused_by_a_sentence(name, request_, sentence):
 
 
 def test_a_goal_that_waits_for_its_time_keeps_its_tcp(single_cell):
-    cell, call = single_cell, Desk(single_cell)
+    cell, call = single_cell, ServiceClient(single_cell)
     goal = cell.goal((0.4, 0.0, 0.01, 0.0))
     later = cell.client_node.get_clock().now().nanoseconds + 30_000_000_000
     goal.trajectory.header.stamp.sec, goal.trajectory.header.stamp.nanosec = divmod(
@@ -186,7 +186,7 @@ def test_a_goal_that_waits_for_its_time_keeps_its_tcp(single_cell):
 
 def test_services_of_a_driver_without_a_robot_answer(no_thread_left, sim, make_cell):
     cell = make_cell(sim, rtde_port=1, primary_port=1, dashboard_port=1)
-    call = Desk(cell)
+    call = ServiceClient(cell)
     for name in ('dashboard/power_on', 'zero_ftsensor', 'resend_robot_program', 'recover'):
         answer = call(name)
         assert not answer.success
@@ -198,7 +198,7 @@ def test_a_node_that_is_destroyed_answers_nobody_and_does_not_hang(
 ):
     cell = make_cell(sim, executor)
     cell.wait_ready()
-    call = Desk(cell)
+    call = ServiceClient(cell)
     assert call('dashboard/power_off').success
     call.send('dashboard/power_on')
     for _ in range(5):

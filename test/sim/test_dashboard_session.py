@@ -58,7 +58,7 @@ TABLE = [
 PROGRAM = 'def a():\n  while True:\n    sync()\n  end\nend\n'
 
 
-class Desk:
+class DashboardUser:
     """A session without sockets; a program is loaded."""
 
     def __init__(self, major: int, minor: int, **settings: object) -> None:
@@ -96,14 +96,14 @@ def minors(column):
     [*[(3, *row) for row in minors(2)], *[(5, *row) for row in minors(3)]],
 )
 def test_a_command_is_answered_from_its_version_on(major, command, answer, minor):
-    desk = Desk(major, minor)
+    user = DashboardUser(major, minor)
     if command == 'pause':
-        desk.ask('play')
-        desk.wait(0.1)
-    assert re.fullmatch(answer, desk.ask(command))
+        user.ask('play')
+        user.wait(0.1)
+    assert re.fullmatch(answer, user.ask(command))
     if minor:
         # An older one may take `load installation` for the name of a program.
-        before = Desk(major, minor - 1).ask(command)
+        before = DashboardUser(major, minor - 1).ask(command)
         assert before.startswith(('could not understand: ', 'File not found: installation '))
 
 
@@ -115,7 +115,7 @@ def test_a_command_is_answered_from_its_version_on(major, command, answer, minor
     ],
 )
 def test_a_series_that_never_had_a_command_does_not_understand_it(major, command):
-    assert 'could not understand' in Desk(major, 15).ask(command)
+    assert 'could not understand' in DashboardUser(major, 15).ask(command)
 
 
 def test_the_table_is_complete():
@@ -137,60 +137,60 @@ def test_the_table_is_complete():
     ],
 )
 def test_what_cannot_be_done_is_said(command, answer):
-    assert Desk(5, 21).ask(command) == answer
+    assert DashboardUser(5, 21).ask(command) == answer
 
 
 @pytest.mark.parametrize('command', ['power on', 'brake release', 'play'])
 def test_an_arm_in_emergency_stop_refuses(command):
-    desk = Desk(5, 21)
-    desk.controller.safety_event(SafetyEvent.EMERGENCY_STOP)
-    desk.wait(0.1)
-    assert desk.ask(command) == f'Failed to execute: {command}'
-    assert desk.ask('safetystatus') == 'Safetystatus: ROBOT_EMERGENCY_STOP'
+    user = DashboardUser(5, 21)
+    user.controller.safety_event(SafetyEvent.EMERGENCY_STOP)
+    user.wait(0.1)
+    assert user.ask(command) == f'Failed to execute: {command}'
+    assert user.ask('safetystatus') == 'Safetystatus: ROBOT_EMERGENCY_STOP'
 
 
 def test_what_clients_poll_for_comes_true():
-    desk = Desk(5, 21, power='off')
-    desk.ask('power on')
-    desk.wait(1.0)
-    assert desk.ask('robotmode') == 'Robotmode: IDLE'
-    assert desk.ask('power on') == 'Powering on'
-    desk.ask('brake release')
-    desk.wait(1.0)
-    assert desk.ask('robotmode') == 'Robotmode: RUNNING'
+    user = DashboardUser(5, 21, power='off')
+    user.ask('power on')
+    user.wait(1.0)
+    assert user.ask('robotmode') == 'Robotmode: IDLE'
+    assert user.ask('power on') == 'Powering on'
+    user.ask('brake release')
+    user.wait(1.0)
+    assert user.ask('robotmode') == 'Robotmode: RUNNING'
     for command, state in [
         ('play', 'PLAYING'),
         ('pause', 'PAUSED'),
         ('play', 'PLAYING'),
         ('stop', 'STOPPED'),
     ]:
-        desk.ask(command)
-        desk.wait(0.1)
-        assert desk.ask('programState') == f'{state} a.urp'
-        assert desk.ask('running') == f'Program running: {str(state != "STOPPED").lower()}'
-    desk.ask('power off')
-    assert desk.ask('robotmode') == 'Robotmode: POWER_OFF'
+        user.ask(command)
+        user.wait(0.1)
+        assert user.ask('programState') == f'{state} a.urp'
+        assert user.ask('running') == f'Program running: {str(state != "STOPPED").lower()}'
+    user.ask('power off')
+    assert user.ask('robotmode') == 'Robotmode: POWER_OFF'
 
 
 def test_a_protective_stop_is_unlocked_after_five_seconds_and_leaves_the_program_paused():
-    desk = Desk(5, 21)
-    desk.ask('play')
-    desk.wait(0.1)
-    desk.controller.safety_event(SafetyEvent.PROTECTIVE_STOP)
-    desk.wait(4.0)
-    assert desk.ask('unlock protective stop').startswith('Cannot unlock protective stop until 5s')
-    assert desk.ask('safetymode') == 'Safetymode: PROTECTIVE_STOP'
-    desk.wait(1.5)
-    assert desk.ask('unlock protective stop') == 'Protective stop releasing'
-    assert desk.ask('safetymode') == 'Safetymode: NORMAL'
-    assert desk.ask('robotmode') == 'Robotmode: RUNNING'
-    assert desk.controller.programs.state is RuntimeState.PAUSED
+    user = DashboardUser(5, 21)
+    user.ask('play')
+    user.wait(0.1)
+    user.controller.safety_event(SafetyEvent.PROTECTIVE_STOP)
+    user.wait(4.0)
+    assert user.ask('unlock protective stop').startswith('Cannot unlock protective stop until 5s')
+    assert user.ask('safetymode') == 'Safetymode: PROTECTIVE_STOP'
+    user.wait(1.5)
+    assert user.ask('unlock protective stop') == 'Protective stop releasing'
+    assert user.ask('safetymode') == 'Safetymode: NORMAL'
+    assert user.ask('robotmode') == 'Robotmode: RUNNING'
+    assert user.controller.programs.state is RuntimeState.PAUSED
 
 
 def test_a_violation_is_left_by_restarting_safety_without_power():
-    desk = Desk(5, 21)
-    desk.controller.safety_event(SafetyEvent.VIOLATION)
-    assert desk.ask('safetystatus') == 'Safetystatus: VIOLATION'
-    assert desk.ask('restart safety') == 'Restarting safety'
-    assert desk.ask('safetystatus') == 'Safetystatus: NORMAL'
-    assert desk.ask('robotmode') == 'Robotmode: POWER_OFF'
+    user = DashboardUser(5, 21)
+    user.controller.safety_event(SafetyEvent.VIOLATION)
+    assert user.ask('safetystatus') == 'Safetystatus: VIOLATION'
+    assert user.ask('restart safety') == 'Restarting safety'
+    assert user.ask('safetystatus') == 'Safetystatus: NORMAL'
+    assert user.ask('robotmode') == 'Robotmode: POWER_OFF'

@@ -379,8 +379,8 @@ def half_circle_to_append(start):
 @lru_cache
 def rest_of_half_circle(start, *, from_rest):
     """Return the last point of a half circle, planned behind what was sent before."""
-    part, addition = half_circle_to_append(start)
-    return plan_append(part.next_goal, addition, ARM, OPTIONS, from_rest=from_rest)
+    part, appended = half_circle_to_append(start)
+    return plan_append(part.next_goal, appended, ARM, OPTIONS, from_rest=from_rest)
 
 
 class AppendGoal(SplineGoal):
