@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 from figures import Figure, seconds
@@ -35,7 +36,7 @@ def run(quick: bool) -> Iterator[Figure]:
         poses = arm.forward_rows(joints)
         solve_path(arm, poses[:1], START)  # the fit of the ideal arm is made once for each arm
         yield from _path_figure(name, arm, poses, joints)
-        taken = seconds(lambda arm=arm, poses=poses: all_solutions(arm, poses))
+        taken = seconds(partial(all_solutions, arm, poses))
         yield Figure(benchmark=NAME, name=f'{name}, all branches', value=rows / taken, unit='1/s')
 
 

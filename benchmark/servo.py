@@ -88,7 +88,7 @@ def run(quick: bool) -> Iterator[Figure]:
             unit='ms',
             value=round(percentile(ours.jitter, percent), 3),
             than=OTHER,
-            baseline=other and round(percentile(other.jitter, percent), 3),
+            baseline=round(percentile(other.jitter, percent), 3) if other else None,
         )
     for text, low, high in (
         ('cycles without a new set-point', -1.0, 0.5),
@@ -100,14 +100,14 @@ def run(quick: bool) -> Iterator[Figure]:
             unit='%',
             value=ours.share(low, high),
             than=OTHER,
-            baseline=other and other.share(low, high),
+            baseline=other.share(low, high) if other else None,
         )
     yield Figure(
         benchmark=NAME,
         name='arm behind what was sent last',
         unit='ms',
         value=1e3 * ours.lag,
-        baseline=other and 1e3 * other.lag,
+        baseline=1e3 * other.lag if other else None,
         than=OTHER,
         note=f'of it {1e3 * LOOKAHEAD:g} ms the lookahead of servoj; ours keeps 40 ms in '
         'the buffer',
@@ -128,7 +128,8 @@ def count_servoj(robot: SimulatedRobot) -> Mapping[str, Callable[..., Any]]:
         received.clear()
         return taken
 
-    motion.servoj = servoj  # type: ignore[method-assign]  # what is measured
+    patched: Any = motion
+    patched.servoj = servoj  # what is measured
     return {'servoj_calls': take}
 
 
@@ -152,7 +153,9 @@ def _servo(robot: Child, seconds: float) -> tuple[SetpointStream, JointSpline]:
 
     with Driver(config) as driver:
         driver.wait_ready(20.0)
-        plan = driver.plan(_goal(driver.state.actual_tcp_pose, seconds))
+        state = driver.state
+        assert state is not None
+        plan = driver.plan(_goal(state.actual_tcp_pose, seconds))
         robot.call('servoj_calls')
         outcome = driver.start(plan, on_progress=note).result(seconds + 20.0)
         if not outcome.succeeded:
@@ -212,7 +215,8 @@ def _path_time(spline: JointSpline, q: NDArray[np.float64]) -> NDArray[np.float6
     rows = spline.rows(times)[0]
     joint = int(np.argmax(np.abs(rows[-1] - rows[0])))
     sign = 1.0 if rows[-1, joint] > rows[0, joint] else -1.0
-    return np.interp(sign * q[:, joint], sign * rows[:, joint], times)
+    times_at: NDArray[np.float64] = np.interp(sign * q[:, joint], sign * rows[:, joint], times)
+    return times_at
 
 
 def _stream_with_ur_rtde(rows: NDArray[np.float64]) -> NDArray[np.float64]:

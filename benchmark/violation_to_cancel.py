@@ -91,7 +91,9 @@ def run(quick: bool) -> Iterator[Figure]:
         ) as driver,
     ):
         driver.wait_ready(TIMEOUT)
-        home = driver.state.actual_tcp_pose
+        state = driver.state
+        assert state is not None
+        home = state.actual_tcp_pose
         _violate(driver, robot, home, 0)  # nothing is measured cold
         for trial in range(1, 1 + 3 * (3 if quick else TRIALS)):
             kind = cancels if trial % 3 == 0 else echoes
@@ -196,9 +198,10 @@ def _note_packets(robot: SimulatedRobot) -> Mapping[str, Callable[[], object]]:
                 making[robot.controller.time] = 1e-6 * (time.monotonic_ns() - began)
             yield package
 
-    patched: Any = robot.controller
-    patched.step = noted_step
-    RtdeSession.packages = noted_packages  # type: ignore[method-assign]  # what is measured
+    controller: Any = robot.controller
+    controller.step = noted_step
+    session: Any = RtdeSession
+    session.packages = noted_packages  # what is measured
     return {'making': lambda: making}
 
 
@@ -206,7 +209,7 @@ def _note_packets(robot: SimulatedRobot) -> Mapping[str, Callable[[], object]]:
 
 
 @contextmanager
-def _relay(robot: Child) -> Iterator[tuple[Child, dict[str, object]]]:
+def _relay(robot: Child) -> Iterator[tuple[Child, dict[str, Any]]]:
     """Run the relay; yield it (calls: ``marks``, ``await_push``, ...) and the parameters."""
     ports = robot.call('ports')
     with child(_run_relay, ports.rtde) as relay:
@@ -337,5 +340,5 @@ def cycle_of(data: bytes) -> float:
 
 def is_pushed(data: bytes) -> bool:
     """Tell whether the tool is pushed aside in a packet."""
-    values = RECIPE.unpack(data[3:])
-    return abs(values[ACTUAL][0] - values[TARGET][0]) > BOUND
+    values: Any = RECIPE.unpack(data[3:])
+    return bool(abs(values[ACTUAL][0] - values[TARGET][0]) > BOUND)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 import sys
 import tempfile
@@ -83,18 +84,15 @@ async def a_late_producer(cell: Any) -> Any:
         cell,
         Goal(waypoints=tuple(circle(home, 1, 10)), keep_open=True, execution=ExecutionMode.SPLINE),
     )
+
+    def is_time_to_append(late: bool) -> bool:
+        if not motion.motion.progress:
+            return False
+        return motion.progress.awaiting_points if late else motion.progress.time_remaining < 0.5
+
     while motion.points < 80:
         late = motion.points == 40
-        await motion.until(
-            lambda late=late: (
-                motion.motion.progress
-                and (
-                    motion.progress.awaiting_points
-                    if late
-                    else motion.progress.time_remaining < 0.5
-                )
-            )
-        )
+        await motion.until(partial(is_time_to_append, late))
         if late:
             await cell.sleep(0.6)
         points = circle(home, motion.points + 1, 10)

@@ -118,7 +118,13 @@ def test_all_that_can_be_needed_is_on_the_page():
             foreign_program=foreign,
         )
         for state, robot, connected, headless, owed, ending, foreign in product(
-            ConnectionState, [None, *ROBOTS], *[(False, True)] * 5
+            ConnectionState,
+            [None, *ROBOTS],
+            (False, True),
+            (False, True),
+            (False, True),
+            (False, True),
+            (False, True),
         )
     } - {''}
     assert len(said) > 10
@@ -155,7 +161,7 @@ def texts(tree):
             yield re.sub(r'%\.?\d*[a-z]', '\0', node.value)
         elif isinstance(node, ast.JoinedStr):
             yield ''.join(
-                part.value if isinstance(part, ast.Constant) else '\0' for part in node.values
+                str(part.value) if isinstance(part, ast.Constant) else '\0' for part in node.values
             )
 
 

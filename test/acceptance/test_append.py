@@ -4,8 +4,10 @@
 
 import asyncio
 from dataclasses import replace
+from functools import partial
 import gc
 import sys
+from typing import Any
 
 from append_goals import (
     AppendMotion,
@@ -63,15 +65,13 @@ KINDS = {
 def goal(kind, home, count, **changes):
     execution, make, _ = KINDS[kind]
     waypoints, segments = make(home, 1, count, not changes.get('keep_open', True))
-    return Goal(
-        **{
-            'waypoints': tuple(waypoints),
-            'segments': tuple(segments),
-            'execution': execution,
-            'keep_open': True,
-        }
-        | changes
-    )
+    fields: dict[str, Any] = {
+        'waypoints': tuple(waypoints),
+        'segments': tuple(segments),
+        'execution': execution,
+        'keep_open': True,
+    }
+    return Goal(**fields | changes)
 
 
 class Speeds:
@@ -145,7 +145,7 @@ def test_a_producer_that_is_late_by_less_than_the_margin_is_not_noticed(kind):
     total = 9
     known = run_cell(lambda cell: at_once(cell, kind, total))
     for lead in HORIZON, MARGIN + KINDS[kind][2] + REACTION:
-        motion, speeds = run_cell(lambda cell, lead=lead: produced(cell, kind, total, 3, lead))
+        motion, speeds = run_cell(partial(produced, kind=kind, total=total, chunk=3, lead=lead))
         assert motion.outcome.report == ()
         assert len(speeds) == len(known)
         assert (speeds == known).all()

@@ -73,7 +73,9 @@ class Witness:
                 return
             for event in self._client.feed(data):
                 if isinstance(event, DataReceived):
-                    self._take(max(map(abs, event.values[0])))
+                    (speeds,) = event.values
+                    assert isinstance(speeds, tuple)
+                    self._take(max(map(abs, speeds)))
             self._connection.sendall(self._client.data_to_send())
 
     def _take(self, speed):

@@ -328,8 +328,12 @@ def test_a_tcp_that_somebody_else_sets_after_a_stop_is_theirs(driver, ur_sim):
     wait_for(lambda: driver.state.T_flange_tcp.distance_to(TCP) < 1e-9)
     theirs = Pose((0.0, 0.0, 0.3))
     motion = moving(driver)
-    # In one cycle, so that nobody comes in between.
-    ur_sim.call(lambda c: (c.programs.stop(), setattr(c.motion, 'T_flange_tcp', theirs)))
+
+    def stop_and_set_tcp(controller):  # in one cycle, so that nobody comes in between
+        controller.programs.stop()
+        controller.motion.T_flange_tcp = theirs
+
+    ur_sim.call(stop_and_set_tcp)
     assert motion.result(4.0).code is ErrorCode.PROGRAM_STOPPED
     driver.resend_robot_program()
     driver.wait_ready(5.0)

@@ -9,7 +9,7 @@ from time import monotonic
 
 from action_msgs.msg import GoalStatus
 import pytest
-from rclpy.action import ActionClient
+from rclpy.action.client import ActionClient
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 

@@ -6,10 +6,11 @@ from math import hypot
 from pathlib import Path
 import re
 from time import monotonic
+from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 import pytest
-from rclpy.action import ActionClient
+from rclpy.action.client import ActionClient
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_srvs.srv import SetBool
@@ -119,7 +120,7 @@ def test_the_example_of_the_page_leads_the_tool_on_its_circle(ur_sim, cell_with)
         )
         if 'class Circle' in body
     )
-    names = {'__name__': 'example'}
+    names: dict[str, Any] = {'__name__': 'example'}
     exec(code, names)
     _, y0, z0 = ur_sim.state().T_base_tcp.position
     cell = cell_with(names['Circle']())

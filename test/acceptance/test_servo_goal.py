@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import robot_cell
 from robot_cell import run_cell
+from virtual_network import HOST
 
 from ur_cartesian_driver.driver.ipc.channel import MotionProgress, ServoProgress
 from ur_cartesian_driver.kinematics.chain import Arm
@@ -171,7 +172,7 @@ def test_feedback_and_reports_tell_the_lag_and_the_inputs_are_given_back():
         other = RtdeConnection(
             RtdeClientCodec(['timestamp'], registers.SERVO_INPUTS), lambda *_: None
         )
-        await other.open(robot_cell.HOST, robot_cell.RTDE)
+        await other.open(HOST, robot_cell.RTDE)
         # And while it has them no goal moves anything.
         refused = Run(cell, straight(way=-0.05))
         q = cell.q

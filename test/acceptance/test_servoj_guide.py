@@ -12,6 +12,7 @@ cycle, so that the tests need no real time and always see the same; the last one
 from math import pi, sin
 from pathlib import Path
 from socket import create_connection
+from typing import Any
 
 import pytest
 
@@ -66,7 +67,7 @@ class ExternalController:
         self._inputs = self._connect(self._session, self._client)
         self._slider_session = RtdeSession(self.controller, set())
         self._slider_inputs = self._connect(self._slider_session, self._slider)
-        self.values = dict.fromkeys(self._inputs.names, 0)
+        self.values: dict[str, float] = dict.fromkeys(self._inputs.names, 0)
         self.values |= dict.fromkeys(THRESHOLDS, THRESHOLD)
         self.counting = True
         self.packets = []
@@ -328,9 +329,12 @@ def test_program_follows_a_client_over_tcp_in_real_time(ur_sim):
     client = RtdeClientCodec(
         OUTPUTS, [MODE, SEQUENCE, ERROR, SYNC, *JOINTS, *THRESHOLDS, STATE_TIME]
     )
-    values = dict.fromkeys([MODE, SEQUENCE, ERROR, SYNC, *JOINTS, *THRESHOLDS, STATE_TIME], 0)
+    values: dict[str, float] = dict.fromkeys(
+        [MODE, SEQUENCE, ERROR, SYNC, *JOINTS, *THRESHOLDS, STATE_TIME], 0
+    )
     values |= dict.fromkeys(THRESHOLDS, THRESHOLD) | {MODE: SERVO, SYNC: EXTERNAL_TO_ROBOT}
-    inputs, path, time, q = None, None, 0.0, ()
+    q: Any = None
+    inputs, path, time = None, None, 0.0
     with (
         create_connection(('127.0.0.1', ur_sim.ports.rtde), 5.0) as rtde,
         create_connection(('127.0.0.1', ur_sim.ports.primary), 5.0) as primary,

@@ -22,6 +22,7 @@ import time
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 import pytest
 
 for module in ('rtde_control', 'rtde_receive', 'rtde_io', 'dashboard_client'):
@@ -333,9 +334,9 @@ def positions(reading: dict[str, Any]) -> np.ndarray:
     return np.array(reading['poses'])[:, :3]
 
 
-def from_line(points: np.ndarray, start: list[float], end: list[float]) -> np.ndarray:
+def from_line(points: np.ndarray, start: ArrayLike, end: ArrayLike) -> np.ndarray:
     """Return the distances of points from a straight line [m]."""
-    origin, along = np.array(start[:3]), np.subtract(end, start)[:3]
+    origin, along = np.array(start)[:3], np.subtract(end, start)[:3]
     along = along / np.linalg.norm(along)
     return np.linalg.norm(np.cross(points - origin, along), axis=1)
 
@@ -373,7 +374,7 @@ def test_its_moves_end_where_they_should_on_the_paths_that_were_asked_for():
         np.linalg.norm(path - over[:3], axis=1) > 0.0301
     )
     nearest = np.min(
-        [from_line(path[away], *ends) for ends in ((near, up), (up, over), (over, end))], axis=0
+        [from_line(path[away], a, b) for a, b in ((near, up), (up, over), (over, end))], axis=0
     )
     assert nearest.max() < 1e-4
     assert seen['blended']['pose'] == pytest.approx(list(end), abs=1e-4)

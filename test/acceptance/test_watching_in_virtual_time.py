@@ -8,6 +8,7 @@ What the machine decides is tested without sockets; here it is what stands on th
 
 import asyncio
 from random import Random
+from typing import Any
 
 import pytest
 from robot_cell import REVERSE, RTDE, run_cell
@@ -28,17 +29,19 @@ from ur_cartesian_driver.robot.rtde.state_recipe import OPTIONAL_FIELDS, REQUIRE
 from ur_cartesian_driver.sim.faults.fault_values import (
     AfterDistance,
     AfterTime,
+    DEVIATION_AXES,
     DeviationFault,
+    DeviationQuantity,
     EventFault,
+    Fault,
     FaultEvent,
     SpeedSliderFault,
 )
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
-DEVIATION_AXES = ('x', 'y', 'z', 'rx', 'ry', 'rz')
 #: Quantity of a fault: what texts call its two halves, how far each is pushed, and its limit.
-PUSHES = {
+PUSHES: dict[DeviationQuantity, Any] = {
     'pose': (('position', 'orientation'), (0.02, 0.2), (0.005, 0.05)),
     'twist': (('linear velocity', 'angular velocity'), (0.5, 0.5), (0.1, 0.1)),
     'acceleration': (('linear acceleration', 'angular acceleration'), (3.0, 3.0), (1.0, 1.0)),
@@ -103,7 +106,7 @@ def times_of_pushed(notes, quantity, axis, limit):
     frames = RtdeFrameBuffer()
     for time, data in notes:
         for frame in frames.feed(data):
-            values = RECIPE.unpack(frame[3:])
+            values: Any = RECIPE.unpack(frame[3:])
             if quantity == 'pose' and axis >= 3:
                 a, b = (Pose.from_rotation_vector(values[k]) for k in (actual, target))
                 error = a.angle_to(b)
@@ -227,7 +230,7 @@ RUNS, BATCHES = 100, 10
 #: As a user of a process with a tool would set them.
 TIGHT = Tolerance(position=(5e-4,) * 3, orientation=(5e-3,) * 3, twist=(0.02,) * 3 + (0.1,) * 3)
 #: What sensors add [m, rad], [m/s, rad/s]: standard deviations.
-NOISE = (('pose', 2e-5), ('twist', 1e-4))
+NOISE: tuple[tuple[DeviationQuantity, float], ...] = (('pose', 2e-5), ('twist', 1e-4))
 #: What no other time may be missed by: the slider and pauses stop the clock of the goal too [s].
 ON_TIME = 0.1
 KINDS = (SegmentType.LINEAR, SegmentType.JOINT, SegmentType.LINEAR)
@@ -258,7 +261,7 @@ def random_goal(cell, random, share):
 def troubles(random, slider, duration):
     """What people do while it moves: the slider, up to two times, and a pause in half the runs."""
     instants = sorted(random.uniform(0.0, duration) for _ in range(3))
-    faults = [
+    faults: list[Fault] = [
         SpeedSliderFault(fraction=slider),
         *(
             SpeedSliderFault(

@@ -8,14 +8,17 @@ nothing with the driver's program or codecs. Everything runs in virtual time.
 """
 
 import asyncio
+from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import replace
 from math import hypot
+from typing import TypeVar, TypeVarTuple
 
 import pytest
-from robot_cell import CellMotion, HOST, PENDANT_PROGRAM, RobotCell
+from robot_cell import CellMotion, PENDANT_PROGRAM, RobotCell
 from saved_program import DIALECTS as NAMES
 from saved_program import saved_program
-from virtual_network import VirtualLoop
+from virtual_network import HOST, VirtualLoop
 
 from ur_cartesian_driver.driver.ipc.channel import StartMotion
 from ur_cartesian_driver.execution import job_from_plan
@@ -30,6 +33,8 @@ from ur_cartesian_driver.protocol.program.wire_dialects import DIALECTS
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
+T = TypeVar('T')
+Ts = TypeVarTuple('Ts')
 JOINT, LINEAR, CIRCULAR = SegmentType.JOINT, SegmentType.LINEAR, SegmentType.CIRCULAR
 
 
@@ -99,10 +104,12 @@ class SavedCell(RobotCell):
 class OneThreadLoop(VirtualLoop):
     """Does at once what would be done in another thread, whose time is not virtual."""
 
-    def run_in_executor(self, executor, function, *arguments):
+    def run_in_executor(
+        self, executor: Executor | None, func: Callable[[*Ts], T], *args: *Ts
+    ) -> asyncio.Future[T]:
         del executor
         future = self.create_future()
-        future.set_result(function(*arguments))
+        future.set_result(func(*args))
         return future
 
 

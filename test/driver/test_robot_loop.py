@@ -30,7 +30,7 @@ def test_an_owner_that_does_not_read_costs_no_memory_and_misses_no_end():
         assert writer.transport.get_write_buffer_size() < MAX_UNREAD + 20_000
         loop._pipe.send(ended)
         ours.settimeout(5.0)
-        told = [line]
+        told: list[object] = [line]
         while told[-1] == line:
             told.append(await asyncio.to_thread(channel.receive, ours))
         assert told[-1] == ended

@@ -3,6 +3,7 @@
 """One goal through the trajectory machine: the table, and what it sends."""
 
 from dataclasses import replace
+from typing import Any
 
 from goal_machines import append_machine, point_machine
 import numpy as np
@@ -64,20 +65,15 @@ def job(points=1, **changes):
 
 def robot(part=0.0, timestamp=0.0, qd=MOVING, **changes):
     position = tuple(a + part * (b - a) for a, b in zip(START, END, strict=True))
+    fields: dict[str, Any] = {
+        'actual_tcp_pose': Pose(position),
+        'target_tcp_pose': Pose(position),
+        'actual_tcp_twist': MOVING,
+        'target_tcp_twist': MOVING,
+        'runtime_state': RuntimeState.PLAYING,
+    }
     return StateReceived(
-        state=RobotState(
-            timestamp=timestamp,
-            actual_q=REST,
-            actual_qd=qd,
-            **{
-                'actual_tcp_pose': Pose(position),
-                'target_tcp_pose': Pose(position),
-                'actual_tcp_twist': MOVING,
-                'target_tcp_twist': MOVING,
-                'runtime_state': RuntimeState.PLAYING,
-            }
-            | changes,
-        )
+        state=RobotState(timestamp=timestamp, actual_q=REST, actual_qd=qd, **fields | changes)
     )
 
 

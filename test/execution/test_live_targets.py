@@ -3,6 +3,7 @@
 """Targets that come late, twice, in the wrong order, or no more."""
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -144,5 +145,6 @@ def test_no_time_gives_no_step(session):
 
 @pytest.mark.parametrize('field', ['max_age', 'timeout'])
 def test_times_are_positive(field):
+    zero: dict[str, Any] = {field: 0.0}
     with pytest.raises(ValueError, match=field):
-        replace(SETTINGS, **{field: 0.0})
+        replace(SETTINGS, **zero)

@@ -5,6 +5,7 @@
 from dataclasses import replace
 from math import dist, hypot, pi
 import re
+from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -125,7 +126,8 @@ TURNS = st.tuples(*[st.floats(-0.5, 0.5)] * 3)
 def test_wherever_targets_jump_it_stays_within_bounds_and_arrives_at_the_last(jumps):
     flight = Flight()
     for offset, turn, seconds in jumps:
-        flight.go(flight.beside(*offset, turn=turn), seconds)
+        x, y, z = offset
+        flight.go(flight.beside(x, y, z, turn=turn), seconds)
     flight.run(1.6)
     assert flight.generator.arrived or flight.generator.blocked
     flight.check_bounds()
@@ -294,5 +296,6 @@ def test_an_arm_that_begins_too_near_may_leave():
     'field', ['linear_velocity', 'linear_acceleration', 'angular_velocity', 'angular_acceleration']
 )
 def test_bounds_are_positive(field):
+    zero: dict[str, Any] = {field: 0.0}
     with pytest.raises(ValueError, match=field):
-        replace(LIMITS, **{field: 0.0})
+        replace(LIMITS, **zero)

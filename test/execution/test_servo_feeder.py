@@ -404,6 +404,10 @@ def test_a_target_that_trails_by_many_dense_points_is_on_the_path():
     )
 
     class Trailing(Cell):
+        def __init__(self, goal):
+            self.led = [0.0]
+            super().__init__(goal)
+
         def event(self, event):
             if isinstance(event, StateReceived):
                 self.led.append(event.state.target_q[0])
@@ -414,6 +418,5 @@ def test_a_target_that_trails_by_many_dense_points_is_on_the_path():
             super().event(event)
 
     cell = Trailing(goal)
-    cell.led = [0.0]
     cell.until(GoalState.ENDED)
     assert cell.outcome.code is ErrorCode.SUCCESSFUL, cell.outcome

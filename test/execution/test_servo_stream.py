@@ -57,7 +57,7 @@ class Robot:
     def __init__(self, step=STEP):
         self.step, self.cycles, self.scale, self.playing = step, 0, 1.0, True
         self.inputs, self.mode, self.sequence = None, 0, 7
-        self.state_time, self.newest, self.rows = 0.0, REST, []
+        self.state_time, self.newest, self.rows = 0.0, np.array(REST), []
         self.done, self.most, self.empty, self.credit, self.skipped = [], 0, 0, 0.0, 0
 
     def cycle(self, slider=1.0):

@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 from math import inf
+from typing import Any
 
 from goal_machines import point_machine
 import numpy as np
@@ -98,7 +99,9 @@ def test_what_is_not_in_its_tolerance_in_time_is_named_and_what_has_none_is_not(
     assert end.code is ErrorCode.GOAL_TOLERANCE_VIOLATED
     assert end.text.startswith(f'{text.capitalize()} is off by 0.02')
     for values in (0.0, -1.0):
-        unlimited = {name: (values,) * len(limits) for name, limits in tolerance.items()}
+        unlimited: dict[str, Any] = {
+            name: (values,) * len(limits) for name, limits in tolerance.items()
+        }
         machine, _ = arrived(goal_tolerance=Tolerance(**unlimited), goal_time_tolerance=0.5)
         assert outcome(machine.step(packet, DUE + 0.1)).succeeded
 

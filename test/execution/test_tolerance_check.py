@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 from math import nan, pi
+from typing import Any
 
 import pytest
 
@@ -49,7 +50,7 @@ AXES = [(name, axis) for name in FIELDS for axis in range(3)]
 
 def limit(name, values, others=-1.0):
     """A tolerance of one quantity; of all others it is `others`."""
-    limits = {
+    limits: dict[str, Any] = {
         'position': [others] * 3,
         'orientation': [others] * 3,
         'twist': [others] * 6,
@@ -75,7 +76,8 @@ def disturbed(name, axis, error, frame=IDENTITY):
     values = list(getattr(ON_TIME, f'actual_tcp_{field}'))
     for k in range(3):
         values[first + k] -= v[k]
-    return replace(ON_TIME, **{f'actual_tcp_{field}': tuple(values)})
+    change: dict[str, Any] = {f'actual_tcp_{field}': tuple(values)}
+    return replace(ON_TIME, **change)
 
 
 def test_the_table_has_all_quantities():

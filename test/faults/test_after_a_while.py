@@ -12,6 +12,7 @@ from ur_cartesian_driver.execution.goal.monitor import STALL_TIMEOUT
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import IOCommand, OutputKind
 from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.protocol.program.reverse import MESSAGE_SIZE
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.primary_client import SILENCE_TIMEOUT
 
@@ -21,7 +22,7 @@ pytestmark = pytest.mark.slow
 def unread(cell):
     """What the robot program has not read of what the driver says on the reverse socket."""
     (end,) = cell.loop.open_ends(robot_cell.REVERSE)
-    return len(end.protocol.incoming) // robot_cell.MESSAGE_SIZE
+    return len(end.protocol.incoming) // MESSAGE_SIZE
 
 
 def test_a_pause_leaves_no_queue_behind_which_a_goal_would_wait():

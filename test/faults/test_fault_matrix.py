@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every fault in every phase of a goal: the matrix of doc/faults.md, in virtual time."""
 
+from typing import Any
+
 from fault_cell import scenario
 from fault_goals import BlendGoal, GOALS
 from fault_modes import MODES
@@ -14,7 +16,8 @@ import ur_cartesian_driver.sim.faults.fault_values as faults
 pytestmark = pytest.mark.slow
 
 
-CONTINUE = {'on_robot_stop': 'continue'}
+CONTINUE: dict[str, Any] = {'on_robot_stop': 'continue'}
+LOCAL_CONTROL: dict[str, Any] = {'headless': False}
 CASES = [
     pytest.param(kind, phases, row, settings | more, id=prefix + where + row.fault)
     for kind, prefix, phases, tables, more in [
@@ -33,7 +36,7 @@ CASES = [
     for rows, where, settings in zip(
         tables,
         ('', 'in local control: ', 'continued: '),
-        ({}, {'headless': False}, CONTINUE),
+        ({}, LOCAL_CONTROL, CONTINUE),
         strict=True,
     )
     for row in rows

@@ -95,11 +95,19 @@ def test_cylinders_and_capsules_contain_the_meshes(name, all_meshes):
         points = points @ T[:3, :3].T + T[:3, 3]
         mine = [k for k, of in enumerate(bodies.links) if of == link]
         outside = np.min(
-            [beyond_cylinder(points, *cylinders[k], bodies.radii[k]) for k in mine], axis=0
+            [
+                beyond_cylinder(points, a, b, r)
+                for (a, b), r in zip(cylinders[mine], bodies.radii[mine], strict=True)
+            ],
+            axis=0,
         )
         assert outside.max() < 0.003 if link == Link.BASE else outside.max() < 1e-4, Link(link)
         outside = np.min(
-            [beyond_capsule(points, *capsules[k], bodies.capsule_radii[k]) for k in mine], axis=0
+            [
+                beyond_capsule(points, a, b, r)
+                for (a, b), r in zip(capsules[mine], bodies.capsule_radii[mine], strict=True)
+            ],
+            axis=0,
         )
         assert outside.max() < (0.003 if link == Link.BASE else 0.0), Link(link)
 

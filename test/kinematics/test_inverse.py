@@ -3,6 +3,7 @@
 """The inverse kinematics finds every solution, and the one that was meant."""
 
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise, product
 from math import acos, cos, dist, pi, remainder, tau
 import re
@@ -188,8 +189,8 @@ def test_the_nearest_is_the_nearest_of_every_branch_and_every_turn():
     T_base_flange = UR5E.forward(READY)
     everything = [q for found in solutions(UR5E, T_base_flange) for q in all_turns(found)]
     for q_near in rng.uniform(-tau, tau, (5, 6)).tolist():
-        expected = min(everything, key=lambda q, near=q_near: dist(q, near))
-        assert dist(nearest(UR5E, T_base_flange, tuple(q_near)), expected) < 1e-9
+        expected = min(everything, key=partial(dist, q_near))
+        assert dist(nearest(UR5E, T_base_flange, q_near), expected) < 1e-9
 
 
 @settings(max_examples=50)
@@ -216,7 +217,7 @@ def test_the_nearest_of_a_calibrated_arm_is_the_nearest_of_its_solutions(calibra
     T_base_flange = arm.forward(READY)
     everything = [q for found in solutions(arm, T_base_flange) for q in all_turns(found)]
     for q_near in random_joints(5, seed=6):
-        expected = min(everything, key=lambda q, near=q_near: dist(q, near))
+        expected = min(everything, key=partial(dist, q_near))
         assert dist(nearest(arm, T_base_flange, q_near), expected) < 1e-6
 
 

@@ -5,6 +5,7 @@
 import json
 from math import pi
 from pathlib import Path
+from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -59,7 +60,7 @@ def sum_of(a, b):
 
 # --- References ----------------------------------------------------------------------------------
 
-REFERENCES = {
+REFERENCES: dict[str, Any] = {
     'pose_trans': lambda a, b: pose(a) @ pose(b),
     'pose_inv': lambda a: pose(a).inverse(),
     'pose_add': lambda a, b: sum_of(pose(a), pose(b)),

@@ -126,7 +126,8 @@ def test_the_orientation_of_a_via_does_not_move_the_arc(cell):
         )
         for pose in (via, Pose(via.position, start.quaternion))
     ]
-    assert np.allclose(*(m.reference.poses for m in made), atol=1e-9)
+    one, other = (m.reference.poses for m in made)
+    assert np.allclose(one, other, atol=1e-9)
 
 
 @pytest.mark.parametrize('kind', [SegmentType.AUTO, SegmentType.PROCESS, SegmentType.CIRCULAR])

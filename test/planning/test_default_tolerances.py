@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Zeros become the parameter of their quantity, and nothing else changes."""
 
+from typing import Any
+
 import pytest
 
 from ur_cartesian_driver.motion.goal import Goal, Tolerance
@@ -23,7 +25,8 @@ GOAL = Goal(waypoints=())
 @pytest.mark.parametrize('kind', ['path_tolerance', 'goal_tolerance'])
 @pytest.mark.parametrize(('quantity', 'field', 'axes'), WHERE)
 def test_a_parameter_is_the_limit_of_its_quantity_and_of_no_other(kind, quantity, field, axes):
-    filled = apply_default_tolerances(GOAL, PlanningOptions(**{f'{kind}_{quantity}': 0.5}))
+    option: dict[str, Any] = {f'{kind}_{quantity}': 0.5}
+    filled = apply_default_tolerances(GOAL, PlanningOptions(**option))
     for name in ('path_tolerance', 'goal_tolerance'):
         for which in ('position', 'orientation', 'twist', 'acceleration'):
             values = getattr(getattr(filled, name), which)

@@ -27,12 +27,17 @@ from ur_cartesian_driver.motion.errors import (
     TooFast,
     Unreachable,
 )
-from ur_cartesian_driver.motion.goal import Goal, Posture, Segment, SegmentType, Waypoint
+from ur_cartesian_driver.motion.goal import ArcMode, Goal, Posture, Segment, SegmentType, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.primitive import MoveJ, MoveL
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.blend import BlendInput, blends
-from ur_cartesian_driver.planning.geometry.curves import ArcCurve, JointLineCurve, LineCurve
+from ur_cartesian_driver.planning.geometry.curves import (
+    ArcCurve,
+    JointLineCurve,
+    LineCurve,
+    SegmentCurve,
+)
 from ur_cartesian_driver.planning.geometry.samples import (
     CurvePiece,
     sample_poses,
@@ -383,9 +388,11 @@ def test_places_are_dense_and_on_their_curves(cell, a, b, radius, fillet):
 @given(a=spots, b=spots)
 def test_the_joints_of_many_places_are_those_of_each_after_the_other(cell, a, b):
     middle, end = (cell.pose(*spot[:3], turn=spot[3:]) for spot in (a, b))
-    paths = [LineCurve.between(cell.home, middle)]
+    paths: list[SegmentCurve] = [LineCurve.between(cell.home, middle)]
     try:
-        paths.append(ArcCurve.through(middle, cell.pose(0.05, 0.02, 0.11).position, end, 0))
+        paths.append(
+            ArcCurve.through(middle, cell.pose(0.05, 0.02, 0.11).position, end, ArcMode(0))
+        )
     except ValueError:
         paths.append(LineCurve.between(middle, end))
     pieces = [CurvePiece.part(k, path, 0.0, 1.0) for k, path in enumerate(paths)]

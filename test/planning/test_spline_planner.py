@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import nan, pi
+from typing import Any
 
 from hypothesis import given, HealthCheck, settings
 from hypothesis import strategies as st
@@ -530,7 +531,8 @@ def test_slow_stretches_all_times_and_keeps_the_way(cell):
 def test_accelerations_are_slowed_to_their_limit_and_no_further(cell, linear):
     goal, limit = goal_of(cell, 13), 0.1 if linear else 0.3
     name = 'max_linear_acceleration' if linear else 'max_joint_acceleration'
-    made = plan(goal, cell.state, cell.arm, replace(OPTIONS, on_too_fast='slow', **{name: limit}))
+    bounds: dict[str, Any] = {name: limit}
+    made = plan(goal, cell.state, cell.arm, replace(OPTIONS, on_too_fast='slow', **bounds))
     assert any(f'because of {name}' in line for line in made.report)
     # Beside the points, where the acceleration of a cubic jumps.
     ends = np.cumsum([segment.duration for segment in made.segments])

@@ -48,6 +48,10 @@ TIMED = Goal(waypoints=(at(0.1, time=1.0), at(0.2, time=2.0), at(0.3, time=3.0))
 SPLINE = replace(TIMED, execution=ExecutionMode.SPLINE)
 
 
+def with_fields(goal, **fields):
+    return replace(goal, **fields)
+
+
 def with_point(goal, index, **fields):
     points = list(goal.waypoints)
     points[index] = replace(points[index], **fields)
@@ -93,7 +97,7 @@ REFUSALS = [
         'segments has 2 entries for 3 points',
     ),
     # unknown numbers
-    (replace(PLAIN, execution=7), InvalidGoal, 'execution is 7; allowed are AUTO = 0'),
+    (with_fields(PLAIN, execution=7), InvalidGoal, 'execution is 7; allowed are AUTO = 0'),
     (with_segment(PLAIN, 1, type=9), InvalidGoal, 'segments[1].type is 9'),
     (with_segment(PLAIN, 1, **ARC, arc_mode=2), InvalidGoal, 'segments[1].arc_mode is 2'),
     # not finite

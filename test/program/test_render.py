@@ -3,6 +3,7 @@
 """The robot program's text: complete, loadable, and with each number from one place only."""
 
 import re
+from typing import Any
 
 import pytest
 
@@ -25,7 +26,7 @@ from ur_cartesian_driver.protocol.program.reverse import ControlMode, Trajectory
 from ur_cartesian_driver.protocol.program.script_command import ScriptCommand, TcpPersistence
 from ur_cartesian_driver.urscript import parse
 
-SETTINGS = {
+SETTINGS: dict[str, Any] = {
     'host': '192.168.56.1',
     'reverse_port': 50001,
     'trajectory_port': 50003,

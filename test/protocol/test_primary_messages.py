@@ -6,6 +6,7 @@ from contextlib import suppress
 import json
 from pathlib import Path
 import struct
+from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -185,7 +186,7 @@ def test_a_float_datum_is_big_endian_although_the_library_swaps_it():
 )
 def test_encoded_frames_equal_the_received_ones(frame):
     data = bytes.fromhex(frame['hex'])
-    content = decode_frame(data)
+    content: Any = decode_frame(data)
     written = (
         encode_state(content.packages)
         if isinstance(content, RobotStateFrame)
@@ -223,12 +224,13 @@ def test_the_immi_interface_is_read():
 def test_configuration_of_newer_software_is_longer(name, reserved):
     (frame,) = [f for f in FRAMES if f['name'] == name]
     (configuration,) = decode_frame(bytes.fromhex(frame['hex'])).packages
+    assert isinstance(configuration, ConfigurationData)
     assert len(configuration.reserved) == reserved
     words = [frame['decoded'][0][f'reserved_{i + 1}'] for i in range(reserved)]
     assert list(configuration.reserved) == words
 
 
-CLASSES = {
+CLASSES: dict[int, Any] = {
     1: JointData,
     2: ToolData,
     4: CartesianInfo,

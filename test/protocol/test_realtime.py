@@ -4,6 +4,7 @@
 
 from dataclasses import fields, replace
 import struct
+from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -66,7 +67,8 @@ VECTORS = {
 
 def numbered() -> RealtimeData:
     """Return a packet in which no two numbers are the same."""
-    values, number = {}, 0
+    values: dict[str, Any] = {}
+    number = 0
     for field in fields(RealtimeData):
         old = getattr(RealtimeData(time=0.0), field.name)
         count = len(old) if isinstance(old, tuple) else 1
@@ -80,7 +82,8 @@ def numbered() -> RealtimeData:
 def test_each_field_is_where_the_tables_say(name):
     count = VECTORS.get(name, 1)
     values = tuple(float(-1 - i) for i in range(count))
-    data = replace(RealtimeData(time=0.0), **{name: values if name in VECTORS else values[0]})
+    changes: dict[str, Any] = {name: values if name in VECTORS else values[0]}
+    data = replace(RealtimeData(time=0.0), **changes)
     packet = data.encode(1220)
     assert struct.unpack_from(f'>{count}d', packet, PLACES[name]) == values
     assert packet.count(b'\xbf\xf0' + bytes(6)) == 1  # -1.0, once

@@ -6,6 +6,7 @@ from contextlib import suppress
 import json
 from pathlib import Path
 import struct
+from typing import Any
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -40,7 +41,7 @@ from ur_cartesian_driver.protocol.program.script_command import (
 GOLDEN = json.loads((Path(__file__).parent / 'golden' / 'script_commands.json').read_text())
 SENT = [case for case in GOLDEN['cases'] if not case['refused']]
 REFUSED = [case for case in GOLDEN['cases'] if case['refused']]
-CLASSES = {
+CLASSES: dict[str, Any] = {
     'zero_ftsensor': ZeroFtSensorCommand,
     'set_payload': SetPayloadCommand,
     'set_tool_voltage': SetToolVoltageCommand,
@@ -109,7 +110,13 @@ def test_all_commands_are_covered():
 
 
 SIX = (0.0,) * 6
-FORCE = {'task_frame': SIX, 'selection': (False,) * 6, 'wrench': SIX, 'type': 2, 'limits': SIX}
+FORCE: dict[str, Any] = {
+    'task_frame': SIX,
+    'selection': (False,) * 6,
+    'wrench': SIX,
+    'type': 2,
+    'limits': SIX,
+}
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,12 @@ from ur_cartesian_driver.robot.services.dashboard_connection import (
 )
 
 
+class RecordedConnection(DashboardConnection):
+    def __init__(self, port, asked):
+        super().__init__('127.0.0.1', port)
+        self.asked = asked
+
+
 @contextlib.asynccontextmanager
 async def dashboard(*chunks, greeting=b'Connected\n', hang_up=False):
     """Serve a dashboard that answers a line with chunks of bytes; yields its client."""
@@ -39,9 +45,7 @@ async def dashboard(*chunks, greeting=b'Connected\n', hang_up=False):
 
     server = await asyncio.start_server(serve, '127.0.0.1', 0)
     async with server:
-        client = DashboardConnection('127.0.0.1', server.sockets[0].getsockname()[1])
-        client.asked = asked
-        yield client
+        yield RecordedConnection(server.sockets[0].getsockname()[1], asked)
 
 
 def run(test):

@@ -5,6 +5,7 @@
 import asyncio
 import contextlib
 import itertools
+from unittest.mock import Mock
 
 import pytest
 
@@ -380,7 +381,7 @@ def test_a_port_that_is_taken_is_named_with_its_parameter():
                     script_command_port=0,
                     script_sender_port=0,
                 ),
-                ProgramCallbacks(connected=list, lost=list, result=list, warning=list),
+                ProgramCallbacks(connected=Mock(), lost=Mock(), result=Mock(), warning=Mock()),
             )
             with pytest.raises(OSError, match='set reverse_port to a free port or to 0'):
                 await other.open(HOST, frozenset())

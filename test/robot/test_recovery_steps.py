@@ -171,7 +171,7 @@ def test_a_robot_that_is_away_is_waited_for(connection):
 )
 def test_a_robot_that_obeys_gets_there(start):
     """What each step leads to; the way is no longer than the list of all steps."""
-    effects = {
+    effects: dict[RecoveryStep, dict[str, object]] = {
         RecoveryStep.UNLOCK: {'safety': SafetyMode.NORMAL},
         RecoveryStep.RESTART_SAFETY: {'safety': SafetyMode.NORMAL},
         RecoveryStep.POWER_ON: {'power': RobotMode.IDLE},

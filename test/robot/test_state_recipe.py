@@ -1,6 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 from math import inf, nan
+from typing import Any
 
 import pytest
 
@@ -18,7 +19,7 @@ VECTORS = REQUIRED_FIELDS[1:9]
 
 
 def values(**mode_changes):
-    found = {name: (0.0,) * 6 for name in REQUIRED_FIELDS[1:10]}
+    found: dict[str, Any] = {name: (0.0,) * 6 for name in REQUIRED_FIELDS[1:10]}
     found |= dict.fromkeys(('timestamp', 'speed_scaling', 'target_speed_fraction'), 1.0)
     found |= {name: 7 for name in REQUIRED_FIELDS if name not in found}
     found |= mode_changes

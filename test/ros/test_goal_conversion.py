@@ -32,6 +32,7 @@ from ur_cartesian_driver.ros.messages.goal_conversion import (
     resolve_frames,
 )
 from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
+from ur_cartesian_driver.ros.tf.tf_lookup import TransformLookup
 
 NOW = 1_800_000_000_123_456_789
 
@@ -207,8 +208,13 @@ def test_a_goal_on_the_arm_goes_with_it_until_it_is_planned():
     ('sec', 'asked'), [(0, 0), (1_799_999_999, 1_799_999_999 * 10**9), (1_800_000_009, 0)]
 )
 def test_frames_of_tf_are_looked_up_at_the_stamp_once_it_has_come(sec, asked):
-    class Recorder:
-        def T_target_source(self, field, target, source, at):
+    class Recorder(TransformLookup):
+        at = -1
+
+        def __init__(self):
+            pass  # no buffer
+
+        def T_target_source(self, field, target, source, at=0):
             self.at = at
             return IDENTITY
 

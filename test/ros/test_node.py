@@ -203,10 +203,13 @@ def test_a_signal_ends_the_goal_with_a_result_and_the_command_with_0(
         try:
             with GoalClient() as client:
                 goal = load_goal(share_path() / 'config' / 'examples' / 'square.yaml')
-                signals = iter([signal.SIGINT])  # a second one would not wait for the result
-                result = run_when_ready(
-                    client, goal, lambda feedback: [node.send_signal(number) for number in signals]
-                )
+                signals = [signal.SIGINT]  # a second one would not wait for the result
+
+                def interrupt(_feedback):
+                    if signals:
+                        node.send_signal(signals.pop())
+
+                result = run_when_ready(client, goal, interrupt)
             assert result.error_code == ErrorCode.CANCELLED, result.error_string
             assert result.error_string.startswith('The driver node is shutting down')
             assert node.wait(10.0) == 0

@@ -4,11 +4,12 @@
 
 from contextlib import ExitStack
 from time import monotonic
+from typing import Any
 
 from action_msgs.msg import GoalStatus
 import pytest
 import rclpy
-from rclpy.action import ActionClient
+from rclpy.action.client import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
@@ -184,7 +185,7 @@ def check_names(cell):
 
 @pytest.mark.slow
 def test_a_second_driver_of_the_same_name_is_told(no_thread_left, capfd):
-    nowhere = {'rtde_port': 1, 'robot_loop': 'thread'}
+    nowhere: dict[str, Any] = {'rtde_port': 1, 'robot_loop': 'thread'}
     context = Context()
     rclpy.init(args=[], context=context)
     executor = SingleThreadedExecutor(context=context)

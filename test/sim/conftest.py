@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from robot_ports import FREE
@@ -18,9 +19,8 @@ from ur_cartesian_driver.sim.simulator_config import SimulatorConfig
 class Bench:
     """A controller and the ways in which tests let its time pass."""
 
-    def __init__(self, **settings: object) -> None:
-        # The fields have types of their own; SimulatorConfig checks the values that tests give.
-        self.controller, self.faults = assemble(SimulatorConfig(**settings))  # type: ignore[arg-type]
+    def __init__(self, **settings: Any) -> None:
+        self.controller, self.faults = assemble(SimulatorConfig(**settings))
         self.programs = self.controller.programs
 
     @property

@@ -11,6 +11,7 @@ import socket
 import time
 
 import pytest
+from robot_ports import FREE
 
 from ur_cartesian_driver.motion.state import RobotMode, RuntimeState
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
@@ -22,7 +23,6 @@ from ur_cartesian_driver.protocol.client_interfaces.realtime import RealtimeData
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 from ur_cartesian_driver.sim.simulator_config import HOME
 
-FREE = {'rtde_port': 0, 'primary_port': 0, 'dashboard_port': 0}
 INTERFACES = ('primary', 'secondary', 'realtime')
 
 

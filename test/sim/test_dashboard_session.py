@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import pytest
 
@@ -61,8 +62,7 @@ PROGRAM = 'def a():\n  while True:\n    sync()\n  end\nend\n'
 class DashboardUser:
     """A session without sockets; a program is loaded."""
 
-    def __init__(self, major: int, minor: int, **settings: object) -> None:
-        # The fields have types of their own; SimulatorConfig checks the values that tests give.
+    def __init__(self, major: int, minor: int, **settings: Any) -> None:
         self.controller = assemble(
             SimulatorConfig(
                 model='ur5' if major < 5 else 'ur5e',
@@ -70,7 +70,7 @@ class DashboardUser:
                 programs={'a.urp': PROGRAM},
                 **settings,
             )
-        ).controller  # type: ignore[arg-type]
+        ).controller
         self.session = DashboardSession(self.controller)
         self.ask('load a.urp')
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from random import Random
 import socket
 import struct
+from typing import Any
 
 import pytest
 
@@ -26,7 +27,9 @@ from ur_cartesian_driver.sim.robot import Ports
 
 HOST = '127.0.0.1'
 PORTS = [field.name for field in fields(Ports)]
-FREE = {field.name: 0 for field in fields(SimulatorConfig) if field.name.endswith('_port')}
+FREE: dict[str, Any] = {
+    field.name: 0 for field in fields(SimulatorConfig) if field.name.endswith('_port')
+}
 HERE = Path(__file__).parent
 SEEDS = range(40)
 #: No cycle may come so late [s]; a busy machine alone makes some late.

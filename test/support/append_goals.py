@@ -2,12 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Goals with an open end in a cell in virtual time, and producers of their points."""
 
+from collections.abc import Callable, Iterable
 from math import cos, pi, sin
+from typing import Any
+
+from robot_cell import RobotCell
 
 from ur_cartesian_driver.driver.appender import Appender, encode_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
-from ur_cartesian_driver.motion.goal import Segment, Waypoint
+from ur_cartesian_driver.motion.events import Outcome, Progress
+from ur_cartesian_driver.motion.goal import Goal, IOCommand, Segment, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_first_part
@@ -17,12 +22,12 @@ from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 BLEND = Segment(blend_radius=0.01, velocity=0.2, acceleration=1.0)
 
 
-def moved(pose, *offset):
+def moved(pose: Pose, *offset: float) -> Pose:
     """A pose moved along base axes [m]."""
     return Pose(tuple(a + b for a, b in zip(pose.position, offset, strict=True)), pose.quaternion)
 
 
-def corners(home, first, count):
+def corners(home: Pose, first: int, count: int) -> list[Waypoint]:
     """Points on the corners of a square of 40 mm beside the tool, round and round."""
     return [
         Waypoint(pose=moved(home, 0.04 * (k // 2 % 2), 0.04 * ((k + 1) // 2 % 2), 0.0))
@@ -30,7 +35,15 @@ def corners(home, first, count):
     ]
 
 
-def circle(home, first, count, *, step=0.1, radius=0.05, round_in=4.0):
+def circle(
+    home: Pose,
+    first: int,
+    count: int,
+    *,
+    step: float = 0.1,
+    radius: float = 0.05,
+    round_in: float = 4.0,
+) -> list[Waypoint]:
     """Points with times and twists on a circle that begins at the tool, at rest and faster."""
     rate = 2.0 * pi / round_in
     points = []
@@ -58,7 +71,7 @@ def circle(home, first, count, *, step=0.1, radius=0.05, round_in=4.0):
 class AppendMotion:
     """A goal with an open end on its way, and who appends to it."""
 
-    def __init__(self, cell, goal, **options):
+    def __init__(self, cell: RobotCell, goal: Goal, **options: Any) -> None:
         self._cell, self._owner = cell, cell.owner
         self._arm = Arm(robot_model(cell.robot.config.model))
         self._options = PlanningOptions(**{'max_tool_speed': 1.0, 'max_points': 5000} | options)
@@ -77,27 +90,34 @@ class AppendMotion:
         points, job = encode_plan(part, NEWEST_DIALECT)
         self.motion = self._owner.run(points, job)
 
-    def _newest(self):
+    def _newest(self) -> Progress | None:
         return self.motion.progress[-1] if self.motion.progress else None
 
     @property
-    def points(self):
+    def points(self) -> int:
         return self.appender.points
 
     @property
-    def outcome(self):
+    def outcome(self) -> Outcome | None:
         return self.motion.outcome
 
     @property
-    def progress(self):
+    def progress(self) -> Progress:
         return self.motion.progress[-1]
 
     @property
-    def ahead(self):
+    def ahead(self) -> int:
         """How many points the arm has not come to."""
         return self.points - (self.progress.waypoint if self.motion.progress else 0)
 
-    async def append(self, waypoints=(), segments=(), io_commands=(), *, last=False):
+    async def append(
+        self,
+        waypoints: Iterable[Waypoint] = (),
+        segments: Iterable[Segment] = (),
+        io_commands: Iterable[IOCommand] = (),
+        *,
+        last: bool = False,
+    ) -> Any:
         """Append as the Python API does, but wait as a coroutine."""
         offers = self.appender.offers(
             AppendedPoints(
@@ -116,24 +136,24 @@ class AppendMotion:
         except StopIteration as end:
             return end.value
 
-    async def until(self, condition, bound=30.0):
+    async def until(self, condition: Callable[[], object], bound: float = 30.0) -> bool:
         """Wait for a condition, or the end of the goal; return whether it has come."""
         await self._cell.until(lambda: condition() or self.outcome, bound)
         return self.outcome is None
 
-    async def ended(self, bound=60.0):
+    async def ended(self, bound: float = 60.0) -> Outcome:
         await self._cell.until(lambda: self.outcome is not None, bound)
         return self.outcome
 
 
-def clear_network_log(cell):
+def clear_network_log(cell: RobotCell) -> None:
     """Let the network in memory forget what was sent on it, which tests can look at."""
     for end in cell.loop.ends:
         end.received.clear()
         end.peer.received.clear()
 
 
-def retained_sizes(cell):
+def retained_sizes(cell: RobotCell) -> dict[str, int]:
     """Return what the robot loop keeps of the goal that runs: records, rows of path, messages."""
     loop = cell.loop_task.get_coro().cr_frame.f_locals['self']
     motion = loop._motion

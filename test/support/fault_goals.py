@@ -13,7 +13,7 @@ from math import atan2, cos, pi, sin
 
 from fault_table import BEFORE
 import robot_cell
-from robot_cell import CYCLE, RobotCell
+from robot_cell import CellMotion, CYCLE, RobotCell
 
 from ur_cartesian_driver.driver.appender import encode_plan
 from ur_cartesian_driver.driver.live_session import stationary_job, stationary_plan
@@ -77,11 +77,7 @@ class StartingPoint:
 
 class FaultGoal:
     """
-    A goal to which something happens; its way of execution is that of a subclass.
-
-    That has ``plan_from(start)``, which returns the plan (made once, as the arm begins at the same
-    place each time), and ``is_in(phase)``, which tells whether the goal is in a phase that is
-    reached by waiting.
+    A goal to which something happens, with the execution mode of a subclass.
     """
 
     def __init__(self, cell: RobotCell):
@@ -91,11 +87,19 @@ class FaultGoal:
         self._messages_before = len(cell.control_messages())
         (end,) = cell.loop.open_ends(robot_cell.TRAJECTORY)
         self._results, self._results_before = end.peer.received, len(end.peer.received)
-        self.motion = None
+        self.motion: CellMotion | None = None
 
     def send(self):
         """Send it to the robot loop."""
         self.motion = self.cell.owner.start(self.plan)
+
+    def plan_from(self, start: StartingPoint):
+        """Return the plan, which is made once: the arm begins at the same pose each time."""
+        raise NotImplementedError
+
+    def is_in(self, phase: str) -> bool:
+        """Tell whether the goal is in a phase that it reaches by itself."""
+        raise NotImplementedError
 
     async def reach(self, phase: str):
         """Bring it to its phase; before it is sent there is nothing to do."""

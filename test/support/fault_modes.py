@@ -10,6 +10,7 @@ happens to interfaces that none of them uses, is not run again.
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from fault_table import CONTINUED, HEADLESS, LOCAL, Row
 
@@ -32,7 +33,7 @@ class Mode:
     local: tuple[Row, ...]
     continued: tuple[Row, ...]
     #: Of the driver, beyond those of all.
-    settings: dict[str, object] = field(default_factory=dict)
+    settings: dict[str, Any] = field(default_factory=dict)
     #: What of the goal takes as long as without the fault [s], where that does not disturb it.
     undisturbed: float
 
@@ -86,7 +87,7 @@ def select_rows(
     names: Iterable[str],
     phases: Iterable[str],
     undisturbed: float,
-    changes: dict[str, dict[str, dict[str, object]]],
+    changes: dict[str, dict[str, dict[str, Any]]],
 ) -> tuple[Row, ...]:
     """
     Return rows of a table for the phases of a way of execution.
@@ -103,7 +104,7 @@ def select_rows(
 
 
 def _adapt_row(
-    row: Row, phases: tuple[str, ...], undisturbed: float, changes: dict[str, dict[str, object]]
+    row: Row, phases: tuple[str, ...], undisturbed: float, changes: dict[str, dict[str, Any]]
 ) -> Row:
     """Return a row whose differences are those of other phases, and the changes."""
     differs = {
@@ -128,7 +129,7 @@ def _long_enough(row: Row, undisturbed: float) -> Row:
     return replace(row, **_times(row, undisturbed, {}))
 
 
-def _times(row: Row, undisturbed: float, differing: dict[str, object]) -> dict[str, object]:
+def _times(row: Row, undisturbed: float, differing: dict[str, Any]) -> dict[str, Any]:
     """Return differences with the time of a goal that is not disturbed."""
     if row.code is not E.SUCCESSFUL or row.waits:
         return differing
@@ -140,14 +141,14 @@ def _mode(
     about: str,
     phases: dict[str, str],
     undisturbed: float,
-    changes: dict[str, dict[str, dict[str, object]]],
+    changes: dict[str, dict[str, dict[str, Any]]],
     *,
     faults: Iterable[str] = FAULTS,
     pendant: Iterable[str] = ON_THE_PENDANT,
     continued: Iterable[str] = CONTINUES,
     once: tuple[str, Iterable[str]] = ('', ()),
     more: tuple[Row, ...] = (),
-    changes_there: dict[str, dict[str, dict[str, object]]] | None = None,
+    changes_there: dict[str, dict[str, dict[str, Any]]] | None = None,
 ) -> Mode:
     """
     Return a way of execution.

@@ -8,6 +8,7 @@ made from it by ``scripts/make_faults.py``. Times are [s].
 """
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
@@ -59,14 +60,14 @@ class Row:
     #: The only phases in which it is looked at; empty = all.
     phases: tuple[str, ...] = ()
     #: What is different in some phases: name -> value.
-    differs: dict[str, dict[str, object]] = field(default_factory=dict)
+    differs: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def at(self, phase: str) -> 'Row':
         """Return what is expected in a phase."""
         return replace(self, differs={}, **self.differs.get(phase, {}))
 
 
-def _in(phases: tuple[str, ...], **changes: object) -> dict[str, dict[str, object]]:
+def _in(phases: tuple[str, ...], **changes: Any) -> dict[str, dict[str, Any]]:
     return dict.fromkeys(phases, changes)
 
 
@@ -74,7 +75,7 @@ def _in(phases: tuple[str, ...], **changes: object) -> dict[str, dict[str, objec
 REFUSED = _in(BEFORE, code=E.ROBOT_NOT_READY)
 CANCELLED = _in(('cancelling',), code=E.CANCELLED)
 #: Time for a goal and its end, where the fault does not disturb it.
-UNDISTURBED = {'bound': 1.2, 'rest': 1.2}
+UNDISTURBED: dict[str, Any] = {'bound': 1.2, 'rest': 1.2}
 POWER_UP = ('power on', 'release the brakes')
 
 

@@ -11,8 +11,10 @@ the speeds.
 from dataclasses import dataclass, replace
 from math import inf
 import re
+from typing import Any
 
 import numpy as np
+from robot_in_memory import ProgramRun
 
 from ur_cartesian_driver.kinematics.inverse import nearest, nearest_to_posture
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES
@@ -24,6 +26,7 @@ from ur_cartesian_driver.motion.errors import (
     Unreachable,
 )
 from ur_cartesian_driver.motion.goal import SegmentType
+from ur_cartesian_driver.motion.plan import Plan
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ, OptimoveL
 from ur_cartesian_driver.planning import plan, PlanningOptions
@@ -68,8 +71,8 @@ class Verdict:
     trouble: str
     #: The point that is refused, or the last one.
     point: int
-    run: object = None
-    plan: object = None
+    run: ProgramRun | None = None
+    plan: Plan | None = None
 
     @property
     def passes(self):
@@ -214,7 +217,10 @@ def blind(case, point, q, arm):
     """Return the primitive of a point as somebody would send it who does not look ahead."""
     goal = case.goal
     segment, waypoint = goal.segments[point], goal.waypoints[point]
-    speeds = {'velocity': segment.velocity or 0.5, 'acceleration': segment.acceleration or 4.0}
+    speeds: dict[str, Any] = {
+        'velocity': segment.velocity or 0.5,
+        'acceleration': segment.acceleration or 4.0,
+    }
     time = waypoint.time - (goal.waypoints[point - 1].time if point else 0.0)
     # What a posture means is no question of looking ahead.
     near = (

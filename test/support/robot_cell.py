@@ -8,10 +8,14 @@ The robot loop is the one of the driver with all its sockets, the controller the
 as those of a CB3 robot, because the tests pay for each.
 """
 
+from __future__ import annotations
+
 import asyncio
+from collections.abc import Callable, Coroutine
 import contextlib
 from dataclasses import replace
 import os
+from typing import Any, TypeVar
 
 from virtual_network import HOST, LoopClock, ProgramNetwork, VirtualLoop
 
@@ -41,6 +45,8 @@ from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 from ur_cartesian_driver.robot.driver_status import DriverStatus
 from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
+
+T = TypeVar('T')
 
 CYCLE = 0.008
 #: How long the owner may be silent [s]; the real one is 5 s.
@@ -284,7 +290,12 @@ class RobotCell:
         self.owner.send(ResendProgram())
 
 
-def run_cell(scenario, *, headless=True, **settings):
+def run_cell(
+    scenario: Callable[[RobotCell], Coroutine[Any, Any, T]],
+    *,
+    headless: bool = True,
+    **settings: Any,
+) -> T:
     """Run ``scenario(cell)`` in a cell that is ready for goals; return its result."""
     loop = VirtualLoop()
     with asyncio.Runner(loop_factory=lambda: loop) as runner:

@@ -6,10 +6,12 @@ from __future__ import annotations
 
 import socket
 import struct
+from typing import Any, Self
 
 from ur_cartesian_driver.protocol.client_interfaces.primary_messages import PrimaryDecoder
 
-FREE = {'rtde_port': 0, 'primary_port': 0, 'dashboard_port': 0}
+#: Settings of a simulated robot, each of a type of its own.
+FREE: dict[str, Any] = {'rtde_port': 0, 'primary_port': 0, 'dashboard_port': 0}
 HOST = '127.0.0.1'
 
 
@@ -19,7 +21,7 @@ class Wire:
     def __init__(self, port: int) -> None:
         self.socket = socket.create_connection((HOST, port), timeout=5.0)
 
-    def __enter__(self) -> Wire:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -62,12 +64,12 @@ class Primary(Wire):
         self._decoder = PrimaryDecoder()
         self._waiting: list[object] = []
 
-    def next(self) -> object:
+    def next(self) -> Any:
         while not self._waiting:
             self._waiting += self._decoder.feed(self._more(65536))
         return self._waiting.pop(0)
 
-    def await_(self, kind: type, **fields: object) -> object:
+    def await_(self, kind: type, **fields: object) -> Any:
         while True:
             frame = self.next()
             if isinstance(frame, kind) and all(

@@ -12,6 +12,7 @@ slider. ``doc/servo_experiments.png`` is drawn from the same numbers by
 from dataclasses import dataclass
 from functools import lru_cache
 from math import pi, sin
+from typing import Any
 
 import numpy as np
 from servo_cell import CYCLE, GUIDE, GuideCell, OpenLoopStream
@@ -99,7 +100,8 @@ class Experiment:
                 self._told.append(q)
             return carry_out(q, *settings)
 
-        motion.servoj = servoj  # to hear what the program says, not to change it
+        patched: Any = motion
+        patched.servoj = servoj  # records the set-points of the program, changes nothing
 
     def run(self, take, seconds, late):
         """
@@ -129,7 +131,7 @@ class Experiment:
         )
 
 
-def unbuffered(slider, seconds, late=0):
+def unbuffered(slider: float, seconds: float, late: int = 0) -> Result:
     """Write a set-point for each packet, whatever the robot makes of it."""
     experiment = Experiment(UNBUFFERED)
     experiment.cell.controller.set_slider(slider)
@@ -153,7 +155,7 @@ def unbuffered(slider, seconds, late=0):
     return experiment.result()
 
 
-def buffered(slider, seconds, late=0, *, closed_loop=True):
+def buffered(slider: float, seconds: float, late: int = 0, *, closed_loop: bool = True) -> Result:
     """Let our side stream to the guide's sample program."""
     experiment = Experiment(GUIDE)
     source = UpAndDown(experiment.rows)

@@ -27,7 +27,7 @@ _FIRST_CLIENT_PORT = 60_001
 class _SkippingSelector(selectors.DefaultSelector):
     """Waits for nobody: what it was to wait for passes at once."""
 
-    loop = None
+    loop: 'VirtualLoop'
 
     def select(self, timeout=None):
         ready = super().select(0.0)
@@ -217,7 +217,7 @@ def hand_over(protocol, data):
         protocol.data_received(data)
         return
     while data:
-        buffer = protocol.get_buffer(len(data))
+        buffer = memoryview(protocol.get_buffer(len(data)))
         size = min(len(buffer), len(data))
         buffer[:size] = data[:size]
         protocol.buffer_updated(size)

@@ -26,7 +26,7 @@ from rclpy.action.client import ActionClient
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rosidl_parser.definition import (  # type: ignore[import-untyped]
+from rosidl_parser.definition import (
     AbstractSequence,
     AbstractString,
     Array,
