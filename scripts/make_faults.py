@@ -23,52 +23,52 @@ if TYPE_CHECKING:
     from fault_modes import Mode
     from fault_table import Row
 
-HEAD = """# What goes wrong, and what becomes of the goal
+HEAD = """# Faults, and how goals end
 
 Made by `scripts/make_faults.py` from the table that `test/faults` runs against the simulated
 controller: every fault in every phase of a goal. Do not edit.
 
 Whatever happens, the goal ends with its [code and sentence](errors.md), the arm comes to rest, and
-what was interrupted does not go on by itself: not when somebody unlocks the robot, not when
+an interrupted motion never resumes by itself: not when somebody unlocks the robot, not when
 somebody plays the program. Then `~/status` says what is needed, and after the steps of the last
 column the next goal works.
 
-Times count from the fault, or from the goal if it is sent later; "as without" is a goal that takes
-no notice. They hold for the parameters as they are by default, but for `node_timeout`, which is
-0.4 s instead of 5 s, and for goals with a `goal_time_tolerance` of 1.4 s and a `path_tolerance`
-of 4 mm. The sockets of the robot program are called as the parameters of their ports. "Half-open":
-the connection seems to be there, and nothing comes through.
+Times count from the fault, or from the goal if it is sent later; "as without": the fault does not
+disturb the goal. They hold for the default parameters, except `node_timeout` (0.4 s instead of
+5 s), and for goals with a `goal_time_tolerance` of 1.4 s and a `path_tolerance` of 4 mm. The
+sockets of the robot program are named after the parameters of their ports. "Half-open": the
+connection looks open, and no data comes through.
 
 """
 
 HEADLESS_HEAD = """## Headless operation
 
 The driver sends the robot program, and stops it after a stop of the robot. So no joint moves
-between the fault and the next goal, also when a third client unlocks the arm and plays.
+between the fault and the next goal, even if another client unlocks the arm and plays.
 
 """
 
 LOCAL_HEAD = """## Local control
 
-The program stands on the pendant, and the robot takes no commands from the network. A program that
-is only paused goes on with the play, until it reads in its next cycles the message that ends it.
-By then a joint has moved by {travel:g} rad at most (the simulated ones do not move at all, real
-ones begin slowly); after that it has to be played again.
+The program is on the pendant, and the robot takes no commands from the network. A paused program
+resumes when it is played, until it reads, within its next cycles, the message that ends it. By
+then no joint has moved by more than {travel:g} rad (simulated joints do not move at all, real ones
+start slowly); then the program has to be played again.
 
 """
 
 CONTINUED_HEAD = """## With `on_robot_stop: continue`
 
-Then a protective or safeguard stop holds the goal as a pause does. Everything else is as above.
+A protective or safeguard stop then holds the goal like a pause. Everything else is as above.
 
 """
 
-MODES_HEAD = """## The other ways of execution
+MODES_HEAD = """## The other execution modes
 
-All above is about goals that are executed as PRIMITIVES. The following goals go through the same
-faults while they move, wait or end. What happens before a goal is on its way, and to interfaces
-that no goal uses, does not depend on its execution and stands above. A phase in brackets behind a
-fault is the only one in which that is looked at.
+The tables above are about goals with execution PRIMITIVES. The following goals meet the same faults
+while they move, wait or end. Faults before the motion, and faults of interfaces that no goal uses,
+do not depend on the execution mode; they are above. A phase in brackets after a fault is the only
+one that is tested.
 
 """
 
@@ -76,9 +76,9 @@ TITLES = (
     'fault',
     'the goal ends',
     'result within',
-    'arm stands within',
-    'then the driver is',
-    'what to do',
+    'arm at rest within',
+    'driver state',
+    'recovery',
 )
 
 
@@ -110,7 +110,7 @@ def page() -> str:
 
 
 def _mode(mode: Mode) -> str:
-    """Return the section of a way of execution."""
+    """Return the section of a execution mode."""
     return ''.join(
         (
             f'### {mode.name}\n\n{mode.about}\n\n',
@@ -152,12 +152,12 @@ def _disturbs(row: Row) -> bool:
 
 
 def _needed(steps: Sequence[str]) -> list[str]:
-    """Return the steps without the vain play of a third client."""
+    """Return the steps without the play of another client that has no effect."""
     return [step for i, step in enumerate(steps) if tuple(steps[i : i + 2]) != ('play', 'resend')]
 
 
 def _by_phase(row: Row, phases: Sequence[str], tell: Callable[[Row], str]) -> str:
-    """Return what is told of a row, and the phases in which something else is."""
+    """Return the usual text of a row, and the phases with another one."""
     usual = tell(row)
     phases_of: dict[str, list[str]] = {}
     for phase in phases:

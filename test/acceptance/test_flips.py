@@ -13,7 +13,7 @@ from math import hypot, pi
 import re
 
 import numpy as np
-from planner_verdict import blind, OPTIONS
+from planner_verdict import OPTIONS, unchecked_primitive
 import pytest
 from random_goals import Case
 from robot_in_memory import RobotInMemory
@@ -107,14 +107,14 @@ def test_a_flip_is_named_fails_as_a_line_and_passes_as_a_joint_move(robot_of, mo
         plan(goal, state, arm, OPTIONS)
 
     case = Case(family=flip, q=q, T_flange_tcp=IDENTITY, goal=goal)
-    run = robot.run([blind(case, 0, q, arm)])
-    assert run.trouble or np.abs(np.subtract(run.q, behind)).max() > 0.01
+    run = robot.run([unchecked_primitive(case, 0, q, arm)])
+    assert run.failure or np.abs(np.subtract(run.q, behind)).max() > 0.01
 
     state = robot.place(q, IDENTITY)
     made = plan(goal, state, arm, replace(MARGINS, on_posture_change='movej'))
     assert isinstance(made.segments[0].primitive, MoveJ)
     run = robot.run([made.segments[0].primitive])
-    assert not run.trouble
+    assert not run.failure
     assert run.q == pytest.approx(behind, abs=1e-3)
 
 

@@ -125,7 +125,7 @@ def distances(count, slider=1.0):
     robot.controller.set_slider(slider)
     records = list(made.instructions)
     run = robot.run(records, on_cycle=watched)
-    assert not run.trouble
+    assert not run.failure
     assert [change[1:] for change in watched.changes] == [
         (wanted.pin, bool(wanted.value)) for wanted in goal.io_commands
     ]
@@ -181,7 +181,7 @@ def test_along_a_spline_at_points_and_after_them():
     made = plan(goal, state, ARM, PlanningOptions(max_tool_speed=1.0))
     watched = Watched(robot.controller)
     run = robot.run(list(made.instructions), on_cycle=watched)
-    assert not run.trouble
+    assert not run.failure
     assert [change[1] for change in watched.changes] == [k % 8 for k in range(11)]
     for (cycle, *_), wanted in zip(watched.changes, goal.io_commands, strict=True):
         time = waypoints[wanted.waypoint].time + wanted.offset

@@ -18,7 +18,7 @@ import os
 
 from forward_model import dh_forward, pose_matrix
 import numpy as np
-from planner_verdict import at_the_border, judge, TOO_LONG
+from planner_verdict import compare, is_borderline, MAX_RUN_DURATION
 import pytest
 from random_goals import random_case
 from robot_in_memory import RobotInMemory
@@ -29,9 +29,9 @@ from ur_cartesian_driver.motion.goal import SegmentType
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 GOALS = int(os.environ.get('PRE_FLIGHT_GOALS', '200'))
-LONGEST = inf if GOALS >= 1000 else TOO_LONG
+MAX_DURATION = inf if GOALS >= 1000 else MAX_RUN_DURATION
 #: What part of the goals has to be of a kind, so that not only easy ones are drawn, and may be.
-LEAST = {'passes': 0.3, 'reach': 0.04, 'limit': 0.015, 'branch': 0.06}
+MIN_SHARES = {'passes': 0.3, 'reach': 0.04, 'limit': 0.015, 'branch': 0.06}
 MOST = {'other': 0.05, 'long': 0.15, 'border': 0.05}
 #: Of the executed paths, compared with the other kinematics; 14 models make 210.
 POSES_OF_A_MODEL = 15
@@ -53,22 +53,24 @@ def test_what_passes_arrives_and_what_is_refused_fails(model, robot_of, record_p
     robot, counts, wrong = robot_of(model), Counter(), []
     for number in range(GOALS):
         case = random_case(robot.controller.arm, number)
-        verdict = judge(robot, case, longest=LONGEST)
+        verdict = compare(robot, case, max_duration=MAX_DURATION)
         counts[verdict.planner] += 1
         if verdict.agreed:
             continue
-        if at_the_border(robot, case):
+        if is_borderline(robot, case):
             counts['border'] += 1
         else:
             wrong.append(
                 f'{model} {number} ({case.family}): the planner says '
-                f'{verdict.refusal or "yes"!r}, the robot {verdict.trouble or "yes"!r}'
+                f'{verdict.refusal or "yes"!r}, the robot {verdict.failure or "yes"!r}'
             )
-    line = f'{GOALS} goals: ' + ', '.join(f'{counts[kind]} {kind}' for kind in (*LEAST, *MOST))
+    line = f'{GOALS} goals: ' + ', '.join(
+        f'{counts[kind]} {kind}' for kind in (*MIN_SHARES, *MOST)
+    )
     print(f'{model}: {line}')
     record_property('pre_flight', line)
     assert not wrong, '\n'.join([line, *wrong])
-    assert all(counts[kind] >= int(part * GOALS) for kind, part in LEAST.items()), line
+    assert all(counts[kind] >= int(part * GOALS) for kind, part in MIN_SHARES.items()), line
     assert all(counts[kind] <= part * GOALS for kind, part in MOST.items()), line
 
 
@@ -81,8 +83,8 @@ def test_paths_fit_a_kinematics_that_owes_nothing_to_ours(model, robot_of):
         case, number = random_case(robot.controller.arm, number), number + 1
         if not all(is_straight(segment) for segment in case.goal.segments):
             continue
-        verdict = judge(robot, case, longest=TOO_LONG)
-        if verdict.planner != 'passes' or verdict.trouble:
+        verdict = compare(robot, case, max_duration=MAX_RUN_DURATION)
+        if verdict.planner != 'passes' or verdict.failure:
             continue
         tool, run = pose_matrix(case.T_flange_tcp), verdict.run
         corners = [

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from robot_cell import REVERSE, RTDE, run_cell
-from virtual_network import hand_over
+from virtual_network import deliver
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
@@ -90,7 +90,7 @@ class Tapped(asyncio.Protocol):
 
     def data_received(self, data):
         self.notes.append((self._loop.time(), data))
-        hand_over(self._reader, data)
+        deliver(self._reader, data)
 
     def eof_received(self):
         return self._reader.eof_received()

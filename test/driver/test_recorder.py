@@ -16,10 +16,9 @@ import numpy as np
 import pytest
 from synthetic_recording import (
     DONE,
-    keep_pace,
+    JOB,
     METADATA,
     only_file,
-    ORDER,
     outputs,
     packet,
     path,
@@ -27,6 +26,7 @@ from synthetic_recording import (
     record,
     SPEED,
     START,
+    wait_for_writer,
     Warnings,
 )
 
@@ -173,11 +173,11 @@ def test_nothing_is_recorded_without_a_directory(tmp_path, monkeypatch):
 def test_an_endless_motion_takes_no_memory(tmp_path):
     count, packets = 8_000, [packet(i) for i in range(100)]
     recorder = Recorder(str(tmp_path), 100.0, Warnings())
-    recorder.start(ORDER, dict(METADATA), packet(0))
+    recorder.start(JOB, dict(METADATA), packet(0))
     tracemalloc.start()
     try:
         for i in range(1, count):
-            keep_pace(recorder)
+            wait_for_writer(recorder)
             recorder.add_state(packets[i % len(packets)])
         recorder.end(DONE)
         recorder.close(30.0)
@@ -193,7 +193,7 @@ def test_an_endless_motion_takes_no_memory(tmp_path):
 def test_a_disk_that_is_too_slow_costs_rows_and_not_memory(tmp_path):
     """Nobody writes while the packets come: what there is no memory for is counted."""
     recorder = Recorder(str(tmp_path), 100.0, Warnings())
-    recorder.start(ORDER, dict(METADATA), packet(0))
+    recorder.start(JOB, dict(METADATA), packet(0))
     held = [recorder._free_buffers.get() for _ in range(BUFFER_COUNT - 1)]
     count = 3 * BUFFER_ROWS
     for i in range(1, count):
@@ -238,7 +238,7 @@ def test_a_directory_that_cannot_be_written_is_said_once_not_with_each_motion(tm
     warnings = Warnings()
     recorder = Recorder(str(blocked / 'below'), 100.0, warnings)
     for _ in range(3):
-        recorder.start(ORDER, dict(METADATA), packet(0))
+        recorder.start(JOB, dict(METADATA), packet(0))
         for i in range(3 * BUFFER_ROWS * BUFFER_COUNT):
             recorder.add_state(packet(i))
         recorder.end(DONE)
@@ -288,7 +288,7 @@ def test_what_a_killed_process_has_written_can_be_read_and_becomes_a_file_later(
     scene, tmp_path = tmp_path / 'scene', tmp_path / 'recordings'
     scene.write_bytes(
         pickle.dumps(
-            (ORDER, METADATA, [packet(i, runtime_state=RuntimeState.PLAYING) for i in range(1000)])
+            (JOB, METADATA, [packet(i, runtime_state=RuntimeState.PLAYING) for i in range(1000)])
         )
     )
     ended = subprocess.run([sys.executable, '-c', KILLED, str(tmp_path), str(scene)], check=False)
@@ -312,7 +312,7 @@ def test_what_a_killed_process_has_written_can_be_read_and_becomes_a_file_later(
 
 def test_a_motion_that_runs_can_be_looked_at_and_is_not_taken_for_a_dead_one(tmp_path):
     recorder = Recorder(str(tmp_path), 100.0, Warnings())
-    recorder.start(ORDER, dict(METADATA), packet(0))
+    recorder.start(JOB, dict(METADATA), packet(0))
     for i in range(1, BUFFER_ROWS):
         recorder.add_state(packet(i))
     while recorder._free_buffers.qsize() < BUFFER_COUNT - 1:
@@ -337,7 +337,7 @@ def test_what_is_no_recording_is_refused(tmp_path, data):
 
 
 def test_a_session_that_nothing_was_planned_for_has_no_plan(tmp_path):
-    metadata = motion_metadata(ORDER, robot={}, parameters=DriverConfig(), mode='LIVE_TARGETS')
+    metadata = motion_metadata(JOB, robot={}, parameters=DriverConfig(), mode='LIVE_TARGETS')
     record(tmp_path, [packet(i) for i in range(10)], metadata=metadata)
     file = only_file(tmp_path)
     assert file.stem.endswith('_live_targets_0_points')

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What faults leave behind when they last: queues, dead connections, and who notices."""
 
-from fault_cell import do, let_happen
+from fault_cell import inject_cause, perform
 from fault_goals import BlendGoal, planned
 import pytest
 import robot_cell
@@ -30,7 +30,7 @@ def test_a_pause_leaves_no_queue_behind_which_a_goal_would_wait():
         cell.robot.pause_program()
         await cell.sleep(5.0)
         assert 1 <= unread(cell) <= 3, 'one for the read that is under way, and no more'
-        await do(cell, 'play')
+        await perform(cell, 'play')
         await cell.until(cell.is_ready)
         goal = BlendGoal(cell)
         goal.send()
@@ -46,10 +46,10 @@ def test_a_stop_is_followed_up_also_when_the_primary_interface_was_dead(fault):
     """Nothing else can end a program that is paused by a protective stop."""
 
     async def scenario(cell):
-        await let_happen(cell, fault)
+        await inject_cause(cell, fault)
         await cell.sleep(2.0 * SILENCE_TIMEOUT + 0.5)
         goal = BlendGoal(cell)
-        await goal.reach('mid-segment')
+        await goal.bring_to('mid-segment')
         cell.robot.protective_stop()
         await cell.until(lambda: goal.motion.outcome, 0.2)
         await cell.until(lambda: cell.robot.state().runtime_state is RuntimeState.STOPPED, 0.5)
@@ -62,7 +62,7 @@ def test_who_pulls_the_cable_for_a_moment_is_not_taken_for_ready():
     """The sockets of a program that has ended behind a cut cable look as if it was there."""
 
     async def scenario(cell):
-        await let_happen(cell, 'freeze all')
+        await inject_cause(cell, 'freeze all')
         await cell.until(lambda: cell.status.state is ConnectionState.DISCONNECTED)
         statuses = len(cell.owner.statuses)
         await cell.sleep(1.5)
@@ -77,7 +77,7 @@ def test_who_pulls_the_cable_for_a_moment_is_not_taken_for_ready():
 
 def test_an_owner_that_hangs_up_stops_the_arm_and_the_program():
     async def scenario(cell):
-        await BlendGoal(cell).reach('mid-segment')
+        await BlendGoal(cell).bring_to('mid-segment')
         cell.owner.hang_up()
         assert await cell.until(cell.at_rest, 0.5) > 0.0
         await cell.until(lambda: cell.robot.state().runtime_state is RuntimeState.STOPPED, 0.5)
@@ -88,7 +88,7 @@ def test_an_owner_that_hangs_up_stops_the_arm_and_the_program():
 def test_sending_the_program_does_not_take_it_away_from_a_goal():
     async def scenario(cell):
         goal = BlendGoal(cell)
-        await goal.reach('mid-segment')
+        await goal.bring_to('mid-segment')
         cell.resend()
         await cell.until(lambda: goal.motion.outcome)
         assert goal.motion.outcome.succeeded, goal.motion.outcome
@@ -122,7 +122,7 @@ def test_an_output_long_after_the_end_is_waited_for():
 def test_a_cancel_and_a_protective_stop_at_the_same_time_end_in_the_stop(moment):
     async def scenario(cell):
         goal = BlendGoal(cell)
-        await goal.reach('mid-segment')
+        await goal.bring_to('mid-segment')
         if moment == 'before':
             cell.owner.cancel()
         cell.robot.protective_stop()

@@ -4,7 +4,7 @@
 
 from typing import Any
 
-from fault_cell import scenario
+from fault_cell import run_scenario
 from fault_goals import BlendGoal, GOALS
 from fault_modes import MODES
 from fault_table import CONTINUED, HEADLESS, LOCAL, PHASES
@@ -48,7 +48,7 @@ CASES = [
 def test_a_goal_ends_as_the_table_says_and_the_next_one_works(kind, phases, row, settings):
     async def all_phases(cell):
         for phase in row.phases or phases:
-            await scenario(cell, row.at(phase), phase, kind)
+            await run_scenario(cell, row.at(phase), phase, kind)
 
     run_cell(all_phases, **settings)
 

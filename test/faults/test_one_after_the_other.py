@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each way of execution takes the place of each other one, at once, and runs to its end."""
 
-from fault_cell import go_home
+from fault_cell import return_home
 from fault_goals import AppendGoal, BlendGoal, FreedriveGoal, GOALS
 from joint_trace import JointTrace
 import pytest
@@ -18,9 +18,9 @@ MIDDLE = {
     'PRIMITIVES': 'mid-segment',
     'SPLINE': 'between points',
     'SERVO': 'between points',
-    'Open goals': 'moving',
-    'Outputs': 'before the place',
-    'Guided by hand': 'guided',
+    'Appendable goals': 'moving',
+    'Outputs': 'before the trigger pose',
+    'Freedrive': 'freedrive',
 }
 #: No joint sees more [rad/s^2], whatever takes the place of what.
 STRONGEST = 12.0
@@ -38,7 +38,7 @@ async def preempt_motion(cell, trace, first, second):
     following.send()
     if isinstance(following, AppendGoal):
         await trace.until(lambda: following.is_in('moving'), 2.0)
-        following.follow_up('moving')
+        following.send_remaining_points('moving')
     await trace.until(lambda: following.motion.outcome, 4.0)
     outcome = following.motion.outcome
     assert outcome.succeeded, f'{second} after {first}: {outcome}'
@@ -55,6 +55,6 @@ def test_any_way_of_execution_takes_the_place_of_any_other(first):
             trace = JointTrace(cell)
             await preempt_motion(cell, trace, first, second)
             assert trace.max_speed_and_acceleration()[1] < STRONGEST, (first, second)
-            await go_home(cell, home, f'{second} after {first}')
+            await return_home(cell, home, f'{second} after {first}')
 
     run_cell(scenario, allow_freedrive=True)

@@ -43,7 +43,7 @@ async def preempted(cell, phase):
     first = len(cell.control_messages())
     home = cell.robot.controller.motion.T_base_tcp.position
     goal = BlendGoal(cell)
-    await goal.reach(phase)
+    await goal.bring_to(phase)
     predicted = predict_stop(cell.memory.read(), ARM, STOP_DECELERATION)
     trace = JointTrace(cell)
     cell.owner.send(CancelMotion(motion=len(cell.owner.motions), preempted_by='goal 7'))

@@ -33,16 +33,16 @@ BOUNDS = {
     'PRIMITIVES': (0.005, 12.0),
     'SPLINE': (0.0002, 12.0),
     'SERVO': (0.0005, 15.0),
-    'Open goals': (0.0002, 12.0),
+    'Appendable goals': (0.0002, 12.0),
 }
 #: A paused program calls no speedj or servoj any more, and the simulated controller then brakes as
 #: hard as the last one was allowed to.
-PAUSED = {'SPLINE': 41.0, 'SERVO': 16.0, 'Open goals': 41.0}
+PAUSED = {'SPLINE': 41.0, 'SERVO': 16.0, 'Appendable goals': 41.0}
 MIDDLE = {
     'PRIMITIVES': 'mid-segment',
     'SPLINE': 'between points',
     'SERVO': 'between points',
-    'Open goals': 'moving',
+    'Appendable goals': 'moving',
 }
 
 
@@ -54,7 +54,7 @@ def test_a_tool_that_is_slowed_stays_on_its_path(kind, what):
         goal, trace = KINDS[kind](cell), JointTrace(cell)
         goal.send()
         await trace.until(lambda: goal.is_in(MIDDLE[kind]), 2.0)
-        goal.follow_up(MIDDLE[kind])
+        goal.send_remaining_points(MIDDLE[kind])
         for fault, seconds in DONE[what]:
             cell.robot.inject(fault)
             over = cell.loop.time() + seconds

@@ -94,7 +94,7 @@ def test_outputs_without_trigger_pose_switch_at_once_and_in_order(robot):
         ],
         on_cycle=watched,
     )
-    assert not run.trouble
+    assert not run.failure
     # Two of them changed the same output in one cycle.
     assert [change[:2] for change in watched.changes] == [(3, True), (7, True)]
     for change in watched.changes:
@@ -118,7 +118,7 @@ def test_an_output_switches_at_its_trigger_pose_on_a_line(robot):
         ],
         on_cycle=watched,
     )
-    assert not run.trouble
+    assert not run.failure
     assert [change[0] for change in watched.changes] == [0, 1, 2, 3, 4, 5, 6, 7, 0]
     for change, place in zip(watched.changes, places, strict=True):
         assert apart(change[2], place.position) < 0.6 * SPEED * STEP
@@ -136,7 +136,7 @@ def test_an_output_switches_in_the_middle_of_a_blend_without_stopping(robot):
         ],
         on_cycle=watched,
     )
-    assert not run.trouble
+    assert not run.failure
     ((_, _, position, _),) = watched.changes
     middle = min((pose.position for pose in run.poses), key=lambda p: apart(p, corner.position))
     assert 0.001 < apart(middle, corner.position) < 0.02
@@ -157,14 +157,14 @@ def test_an_output_that_starts_beyond_its_plane_waits_for_the_next_crossing(robo
     early = robot.run(
         [*moves, switch(0, trigger_pose=place, trigger_direction=way), arc], on_cycle=watched
     )
-    assert not early.trouble
+    assert not early.failure
     assert apart(watched.changes[0][2], place.position) > 0.03
     watched = Watched(robot)
     run = robot.run(
         [*moves, switch(0, trigger_pose=place, trigger_direction=way, starts_beyond=True), arc],
         on_cycle=watched,
     )
-    assert not run.trouble
+    assert not run.failure
     assert apart(watched.changes[0][2], place.position) < 0.1 * STEP
 
 
@@ -188,7 +188,7 @@ def test_a_rotation_in_place_has_a_trigger_direction(robot):
         ],
         on_cycle=look,
     )
-    assert not run.trouble
+    assert not run.failure
     assert seen[watched.changes[0][3] - 1] < 0.5 * STEP
 
 
@@ -215,7 +215,7 @@ def test_an_output_switches_between_two_pieces_of_a_spline(robot):
         ],
         on_cycle=watched,
     )
-    assert not run.trouble
+    assert not run.failure
     # The first one of a trajectory also wakes the thread that looks for it.
     assert apart(watched.changes[0][2], place.position) < 1.2 * hypot(*way) / 0.001 * STEP
     assert watched.changes[0][3] * STEP == pytest.approx(0.7, abs=3 * STEP)
@@ -233,7 +233,7 @@ def test_an_output_is_switched_although_the_tool_never_reaches_its_trigger_pose(
         ],
         on_cycle=watched,
     )
-    assert not run.trouble
+    assert not run.failure
     assert apart(watched.changes[0][2], watched.at(x=0.04).position) < 1e-4
 
 
@@ -248,7 +248,7 @@ def test_delays_count_from_the_end_of_the_motion_and_success_waits_for_them(robo
         ],
         on_cycle=watched,
     )
-    assert not run.trouble
+    assert not run.failure
     moving = sum(a != b for a, b in zip(run.poses, run.poses[1:], strict=False))
     assert [change[0] for change in watched.changes] == [0, 1, 2]
     for change, delay in zip(watched.changes, (0.1, 0.1, 0.25), strict=True):
@@ -299,7 +299,7 @@ def test_each_output_switches_the_right_pin(robot, output, first, pins):
         [line(watched.at(x=0.01)), *(switch(pin, output=output) for pin in range(pins))],
         on_cycle=watched,
     )
-    assert not run.trouble
+    assert not run.failure
     assert sorted(change[:2] for change in watched.changes) == [
         (first + pin, True) for pin in range(pins)
     ]
@@ -315,7 +315,7 @@ def test_analog_outputs_in_both_domains(robot, domain, expected):
         [line(watched.at(x=0.01)), switch(1, 0.3, OutputKind.STANDARD_ANALOG, domain=domain)],
         on_cycle=watched,
     )
-    assert not run.trouble
+    assert not run.failure
     assert robot.controller.io.analog_out[1] == pytest.approx(expected)
     assert robot.controller.io.analog_out_voltage[1] == (domain is AnalogDomain.VOLTAGE)
 
@@ -331,7 +331,7 @@ def test_too_many_pending_outputs_are_a_failure(robot):
     run = robot.run(moves, on_cycle=watched)
     assert run.result is TrajectoryResult.FAILURE
     assert watched.changes == []
-    assert not robot.run([*moves[:-2], moves[-1]]).trouble
+    assert not robot.run([*moves[:-2], moves[-1]]).failure
 
 
 def test_the_end_of_a_trajectory_discards_pending_outputs(robot):
@@ -343,5 +343,5 @@ def test_the_end_of_a_trajectory_discards_pending_outputs(robot):
     assert run.result is TrajectoryResult.CANCELED
     assert not robot.run(
         [line(watched.at(x=0.03)), line(watched.at(x=0.1))], on_cycle=watched
-    ).trouble
+    ).failure
     assert watched.changes == []

@@ -101,7 +101,7 @@ ODD = 0.0606
 def test_the_arm_is_on_the_polynomial_in_every_cycle(robot, splines):
     robot.place(HOME, IDENTITY)
     run = robot.run(splines)
-    assert not run.trouble
+    assert not run.failure
     times = STEP * (np.arange(len(run.joints)) + 1)
     assert np.abs(run.joints - polynomial(splines, times)).max() < 4e-5
     assert run.q == pytest.approx(splines[-1].target, abs=1e-6)
@@ -131,7 +131,7 @@ def test_in_scaled_time_path_and_time_are_the_same(robot, slider):
         controller.set_slider(next(law))
 
     run = robot.run(splines, on_cycle=slide)
-    assert not run.trouble
+    assert not run.failure
     fine = np.arange(0.0, sum(piece.duration for piece in splines), 5e-5)
     path = polynomial(splines, fine)
     for now, q in list(zip(scaled, run.joints, strict=True))[:: len(scaled) // 60]:
@@ -161,7 +161,7 @@ def test_splines_do_not_drift_within_minutes(robot):
     slow = robot.slow
     slow.place(HOME, IDENTITY)
     run = slow.run(splines)
-    assert not run.trouble
+    assert not run.failure
     step = slow.controller.cycle
     times = step * (np.arange(len(run.joints)) + 1)
     late = np.abs(run.joints - polynomial(splines, times)).max(axis=1)
@@ -204,7 +204,7 @@ def test_an_unknown_spline_kind_is_a_failure(robot):
     robot.place(HOME, IDENTITY)
     data = bytearray(encode_points([spline(0.1, 0.5)]))
     data[19 * 4 : 20 * 4] = (3).to_bytes(4, 'big')
-    run = robot.run([], data=bytes(data), announced=1)
+    run = robot.run([], data=bytes(data), announced_count=1)
     assert run.result is TrajectoryResult.FAILURE
     assert run.q == pytest.approx(START)
 
@@ -214,7 +214,7 @@ def test_another_motion_discards_speed_and_acceleration(robot):
     robot.place(HOME, IDENTITY)
     moves = [spline(0.1, 0.5, qd=0.4), MoveJ(target=tuple(START + 0.3)), spline(0.4, 1.0)]
     run = robot.run(moves)
-    assert not run.trouble
+    assert not run.failure
     last = run.joints[-500:]
     assert (np.diff(last[:, 0]) > -1e-6).all()
     assert last[250, 0] == pytest.approx(START[0] + 0.35, abs=0.005)
@@ -240,22 +240,22 @@ def test_a_cubic_piece_discards_the_acceleration(robot):
 def test_a_blend_into_a_spline_becomes_a_stop(robot):
     robot.place(HOME, IDENTITY)
     run = robot.run([MoveJ(target=tuple(START + 0.3), blend_radius=0.05), spline(0.4, 1.0)])
-    assert not run.trouble
+    assert not run.failure
     assert run.q == pytest.approx(START + 0.4, abs=1e-6)
     changes = np.diff(np.diff(run.joints, axis=0), axis=0) / STEP**2
     assert np.abs(changes).max() < 30.0
 
 
 @pytest.mark.parametrize('announced', [2, 9], ids=['at its end', 'in the middle'])
-def test_the_last_point_ends_at_rest_whatever_it_says(robot, announced):
+def test_the_last_point_ends_at_rest_whatever_it_says(robot, announced_count):
     """Braked on the way where it is the last, by stopj where the points run dry."""
     robot.place(HOME, IDENTITY)
     points = [spline(0.2, 0.5, qd=0.6), spline(0.5, 0.5, qd=0.6)]
-    run = robot.run(points, announced=announced)
+    run = robot.run(points, announced_count=announced_count)
     changes = np.diff(np.diff(run.joints, axis=0), axis=0) / STEP**2
     assert np.abs(run.joints[-1] - run.joints[-2]).max() < 1e-9
     assert np.abs(changes).max() < 45.0
-    if announced == 2:
+    if announced_count == 2:
         assert run.result is TrajectoryResult.SUCCESS
         assert run.q == pytest.approx(points[-1].target, abs=1e-4)
         assert run.duration < 1.1
@@ -275,7 +275,7 @@ def test_a_spline_waits_during_a_pause_as_moves_do(robot):
             robot.feed([second])
         late.append(controller.time)
 
-    run = robot.run([first], announced=2, on_cycle=send_later)
+    run = robot.run([first], announced_count=2, on_cycle=send_later)
     assert run.result is TrajectoryResult.SUCCESS
     assert run.q == pytest.approx(second.target, abs=1e-6)
 

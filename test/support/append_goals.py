@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Goals with an open end in a cell in virtual time, and producers of their points."""
+"""Appendable goals in a cell in virtual time, and producers of their points."""
 
 from collections.abc import Callable, Iterable
 from math import cos, pi, sin
@@ -28,7 +28,7 @@ def moved(pose: Pose, *offset: float) -> Pose:
 
 
 def corners(home: Pose, first: int, count: int) -> list[Waypoint]:
-    """Points on the corners of a square of 40 mm beside the tool, round and round."""
+    """Points on the corners of a square of 40 mm beside the tool, in endless rounds."""
     return [
         Waypoint(pose=moved(home, 0.04 * (k // 2 % 2), 0.04 * ((k + 1) // 2 % 2), 0.0))
         for k in range(first, first + count)
@@ -69,7 +69,7 @@ def circle(
 
 
 class AppendMotion:
-    """A goal with an open end on its way, and who appends to it."""
+    """An appendable goal that runs, and the client that appends to it."""
 
     def __init__(self, cell: RobotCell, goal: Goal, **options: Any) -> None:
         self._cell, self._owner = cell, cell.owner
@@ -107,7 +107,7 @@ class AppendMotion:
 
     @property
     def ahead(self) -> int:
-        """How many points the arm has not come to."""
+        """Number of points that the arm has not reached."""
         return self.points - (self.progress.waypoint if self.motion.progress else 0)
 
     async def append(
@@ -147,14 +147,14 @@ class AppendMotion:
 
 
 def clear_network_log(cell: RobotCell) -> None:
-    """Let the network in memory forget what was sent on it, which tests can look at."""
+    """Clear what the network in memory keeps for tests."""
     for end in cell.loop.ends:
         end.received.clear()
         end.peer.received.clear()
 
 
 def retained_sizes(cell: RobotCell) -> dict[str, int]:
-    """Return what the robot loop keeps of the goal that runs: records, rows of path, messages."""
+    """Return the sizes of what the robot loop keeps for the running goal."""
     loop = cell.loop_task.get_coro().cr_frame.f_locals['self']
     motion = loop._motion
     monitor = motion._machine.feeder.monitor

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One cell of the fault matrix: a goal is brought to its phase, it goes wrong, people act."""
+"""Run one cell of the fault matrix: bring a goal to a phase, inject the fault, recover."""
 
 from fault_goals import BlendGoal, planned
 from fault_table import BEFORE, Row
@@ -16,15 +16,15 @@ from ur_cartesian_driver.robot.lifecycle import ConnectionState
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
 from ur_cartesian_driver.sim.state.power_and_safety import OPERATIONAL
 
-#: How long the arm is watched after somebody has unlocked or played, and a goal that waits [s].
-WATCHED = 0.2
-#: How long an arm that is inside all tolerances may still creep [s].
-STANDING = 0.05
-#: How long the next goal may take [s].
-NEXT_BOUND = 2.0
+#: Time for which the arm is watched after an unlock or a play, and while a goal waits [s].
+WATCH_TIME = 0.2
+#: Time for which an arm inside all tolerances may still creep [s].
+CREEP_TIME = 0.05
+#: Time that the next goal may take [s].
+NEXT_GOAL_TIMEOUT = 2.0
 
-#: Of a program that can be played.
-STANDSTILL = (RuntimeState.PAUSED, RuntimeState.STOPPED)
+#: States in which a program can be played.
+PLAYABLE_STATES = (RuntimeState.PAUSED, RuntimeState.STOPPED)
 
 PORTS = {
     'reverse': robot_cell.REVERSE,
@@ -33,15 +33,15 @@ PORTS = {
 }
 
 
-async def let_happen(cell: RobotCell, cause: str):
-    """Let a fault happen: one of the simulator's, or one of what is around it."""
+async def inject_cause(cell: RobotCell, cause: str):
+    """Inject a fault: one of the simulator's, or one of its network, clients and owner."""
     kind, _, what = cause.partition(' ')
     if cause == 'crash':
         await cell.crash_robot()
     elif cause == 'silent owner':
         cell.owner.silent = True
     elif cause == 'freeze all':
-        cell.guests += [end.peer for end in setpoint_connections(cell)]
+        cell.other_clients += [end.peer for end in setpoint_connections(cell)]
         for port in set(cell.loop.servers) - {robot_cell.OWNER_PORT}:
             cell.loop.freeze(port)
     elif what == 'set-points':
@@ -50,9 +50,9 @@ async def let_happen(cell: RobotCell, cause: str):
             end.peer.abort()
         else:
             end.frozen = end.peer.frozen = True
-            cell.guests.append(end.peer)
+            cell.other_clients.append(end.peer)
     elif cause == 'take the inputs':
-        cell.guests.append(await take_inputs())
+        cell.other_clients.append(await take_inputs())
     elif kind == 'freeze':
         cell.loop.freeze(PORTS[what])
     elif kind == 'cut':
@@ -62,7 +62,7 @@ async def let_happen(cell: RobotCell, cause: str):
 
 
 def setpoint_connections(cell: RobotCell):
-    """Return the connections on which set-points are written, the ends that dialled."""
+    """Return the client ends of the connections on which set-points are written."""
     return [
         end
         for end in cell.loop.open_ends(robot_cell.RTDE)
@@ -71,7 +71,7 @@ def setpoint_connections(cell: RobotCell):
 
 
 async def take_inputs():
-    """Be another client that wants to write the inputs which set-points need."""
+    """Connect another client that writes the inputs which set-points need."""
     guest = RtdeConnection(
         RtdeClientCodec(outputs=('timestamp',), inputs=SERVO_INPUTS), lambda *_: None
     )
@@ -79,17 +79,17 @@ async def take_inputs():
     return guest
 
 
-async def let_pass(cell: RobotCell):
-    """End the faults that last; also the robot finds out about dead connections that bind it."""
+async def end_faults(cell: RobotCell):
+    """End the faults that last, and close dead connections that still block the robot."""
     cell.robot.clear_faults()
-    while cell.guests:
-        cell.guests.pop().close()
+    while cell.other_clients:
+        cell.other_clients.pop().close()
     cell.owner.silent = False
     await cell.sleep(2.0 * CYCLE)
 
 
-async def do(cell: RobotCell, step: str):
-    """Do what somebody has to do, as another client or at the pendant, until it has happened."""
+async def perform(cell: RobotCell, step: str):
+    """Do one recovery step, as another client or at the pendant, and wait for its effect."""
     controller = cell.robot.controller
     match step:
         case 'unlock':
@@ -110,7 +110,7 @@ async def do(cell: RobotCell, step: str):
             await cell.dashboard('brake release')
             await cell.until(lambda: controller.power.mode.name == 'RUNNING')
         case 'play':
-            await cell.until(lambda: controller.programs.state in STANDSTILL)
+            await cell.until(lambda: controller.programs.state in PLAYABLE_STATES)
             await cell.dashboard('play')
         case 'resend':
             cell.resend()
@@ -124,84 +124,84 @@ async def do(cell: RobotCell, step: str):
         case 'wait for the robot':
             await cell.until(lambda: cell.status.state is ConnectionState.CONNECTED, 5.0)
         case 'wait until it is over':
-            await let_pass(cell)
+            await end_faults(cell)
             await cell.until(lambda: cell.loop.open_ends(robot_cell.PRIMARY))
         case _:
-            raise AssertionError(f'nobody knows how to {step}')
+            raise AssertionError(f'unknown step: {step}')
 
 
 async def recover(cell: RobotCell, steps):
-    """Do all steps; return how far a joint was from its place at the beginning [rad]."""
-    q, farthest = cell.q, 0.0
+    """Do all steps; return the largest joint travel meanwhile [rad]."""
+    q, max_travel = cell.q, 0.0
     for step in steps:
-        await do(cell, step)
-        watched_until = cell.loop.time() + (WATCHED if step in ('unlock', 'play') else 0.0)
+        await perform(cell, step)
+        watched_until = cell.loop.time() + (WATCH_TIME if step in ('unlock', 'play') else 0.0)
         while True:
-            farthest = max(farthest, *(abs(a - b) for a, b in zip(cell.q, q, strict=True)))
+            max_travel = max(max_travel, *(abs(a - b) for a, b in zip(cell.q, q, strict=True)))
             if cell.loop.time() >= watched_until:
                 break
             await cell.sleep(CYCLE)
-    return farthest
+    return max_travel
 
 
-async def scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
+async def run_scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
     """
     Run one cell of the matrix; the robot cell is ready before and afterwards.
 
-    :param kind: the goal that gets into trouble.
+    :param kind: class of the goal that the fault hits.
     """
-    here = f'{row.fault}, {phase}'
+    context = f'{row.fault}, {phase}'
     home = cell.robot.controller.motion.T_base_tcp.position
     goal = kind(cell)
-    await goal.reach(phase)
+    await goal.bring_to(phase)
     for cause in row.cause:
-        await let_happen(cell, cause)
+        await inject_cause(cell, cause)
     begin = cell.loop.time()
     if phase in BEFORE:
         await cell.sleep(0.1 if phase == 'idle' else CYCLE)
         goal.send()
     if not cell.owner.silent:
-        goal.follow_up(phase)
+        goal.send_remaining_points(phase)
     if row.waits:
-        await wait_on(cell, goal, row, here)
+        await check_waiting_goal(cell, goal, row, context)
     elif phase == 'settling' and row.code is ErrorCode.SUCCESSFUL:
-        await let_pass(cell)  # what kept it from settling
-    await cell.until(lambda: goal.motion.outcome, row.bound if not row.waits else 2.0, here)
+        await end_faults(cell)  # what kept it from settling
+    await cell.until(lambda: goal.motion.outcome, row.bound if not row.waits else 2.0, context)
     outcome = goal.motion.outcome
-    assert outcome.code is row.code, f'{here}: {outcome}'
-    assert outcome.text, here
+    assert outcome.code is row.code, f'{context}: {outcome}'
+    assert outcome.text, context
     await cell.until(
         lambda: cell.at_rest() and goal.is_over(),
-        max(STANDING, begin + row.rest - cell.loop.time()),
-        here,
+        max(CREEP_TIME, begin + row.rest - cell.loop.time()),
+        context,
     )
-    goal.note_end()
+    goal.record_end()
     if not row.waits:
-        await cell.until(lambda: cell.status.state is row.then, row.then_within, here)
-        assert cell.is_ready() or cell.status.message, here
+        await cell.until(lambda: cell.status.state is row.then, row.then_within, context)
+        assert cell.is_ready() or cell.status.message, context
         if phase == 'settling':
-            await let_pass(cell)
+            await end_faults(cell)
         travel = await recover(cell, row.steps)
-        assert travel <= row.travel, f'{here}: a joint has moved by {travel} rad'
-    await cell.until(cell.is_ready, row.back, here)
-    await go_home(cell, home, here)
-    goal.judge(row, phase)
+        assert travel <= row.travel, f'{context}: a joint has moved by {travel} rad'
+    await cell.until(cell.is_ready, row.back, context)
+    await return_home(cell, home, context)
+    goal.check_result(row, phase)
     return goal.motion.ended_at - begin
 
 
-async def wait_on(cell, goal, row, here):
-    """See that a goal waits for somebody, and goes on when they have done their part."""
-    await cell.until(cell.at_rest, row.rest, here)
-    await cell.sleep(WATCHED)
-    assert goal.motion.outcome is None, here
-    assert cell.at_rest(), here
+async def check_waiting_goal(cell, goal, row, context):
+    """Check that a goal waits for an operator, then do the steps after which it goes on."""
+    await cell.until(cell.at_rest, row.rest, context)
+    await cell.sleep(WATCH_TIME)
+    assert goal.motion.outcome is None, context
+    assert cell.at_rest(), context
     cell.robot.clear_faults()
     for step in row.steps:
-        await do(cell, step)
+        await perform(cell, step)
 
 
-async def go_home(cell, home, here):
-    """Run the next goal, back to where the arm was."""
+async def return_home(cell, home, context):
+    """Run the next goal, back to where the arm was before."""
     x, y, z = (
         a - b for a, b in zip(home, cell.memory.read().actual_tcp_pose.position, strict=True)
     )
@@ -213,5 +213,5 @@ async def go_home(cell, home, here):
             8.0,
         )
     )
-    await cell.until(lambda: following.outcome, NEXT_BOUND, here)
-    assert following.outcome.code is ErrorCode.SUCCESSFUL, f'after {here}: {following.outcome}'
+    await cell.until(lambda: following.outcome, NEXT_GOAL_TIMEOUT, context)
+    assert following.outcome.code is ErrorCode.SUCCESSFUL, f'after {context}: {following.outcome}'

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The goals to which something goes wrong, and how each is brought to a phase.
+The goals of the fault matrix, and how each is brought to a phase.
 
-Phases are found by looking, at the messages on the wire, at the points that the robot program has
-begun and at where the tool is; never by the time that it should take.
+A phase is recognised by messages on the wire, by the points that the robot program has begun and
+by the position of the tool; never by the time that it should take.
 """
 
 from dataclasses import replace
@@ -39,10 +39,10 @@ from ur_cartesian_driver.protocol.program.reverse import ControlMode, Trajectory
 from ur_cartesian_driver.protocol.program.wire_dialects import NEWEST_DIALECT
 from ur_cartesian_driver.sim.motion.motion_ownership import FreedriveState
 
-#: Side of the way around two corners, and size of the blends there [m].
+#: Side of the square, and radius of the blends at its corners [m].
 SIDE, BLEND = 0.05, 0.015
-#: What the actual pose may be off, along the path (corners included) and at its end [m]; what the
-#: twist may be off [m/s]; how long the arm may take to settle [s].
+#: Tolerance of the position along the path (blends included) and at the goal [m], of the twist
+#: [m/s], and time for settling [s].
 PATH_TOLERANCE, GOAL_TOLERANCE, TWIST_TOLERANCE, SETTLING = 0.004, 0.001, 0.3, 1.4
 
 ARM = Arm(robot_model('ur5e'))
@@ -50,7 +50,7 @@ OPTIONS = PlanningOptions(max_tool_speed=1.0)
 
 
 def planned(state, offsets, velocity, acceleration, **goal):
-    """Return a plan through points beside where the tool stands, with blends between them."""
+    """Return a plan through points at offsets from the tool, with blends between them."""
     (x, y, z), turned = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
     points = tuple(Waypoint(pose=Pose((x + dx, y + dy, z + dz), turned)) for dx, dy, dz in offsets)
     blends = [BLEND] * (len(points) - 1) + [0.0]
@@ -61,8 +61,8 @@ def planned(state, offsets, velocity, acceleration, **goal):
     return plan(Goal(waypoints=points, segments=segments, **goal), state, ARM, OPTIONS)
 
 
-class StartingPoint:
-    """Where the arm stands: the same, whatever is left of the last way home [rad]."""
+class StartState:
+    """State at the start of a goal; equal after every return home, up to 1e-4 rad."""
 
     def __init__(self, state):
         self.state = state
@@ -76,14 +76,12 @@ class StartingPoint:
 
 
 class FaultGoal:
-    """
-    A goal to which something happens, with the execution mode of a subclass.
-    """
+    """A goal that a fault hits; subclasses give it an execution mode."""
 
     def __init__(self, cell: RobotCell):
         self.cell = cell
         self.start = cell.robot.controller.motion.T_base_tcp.position
-        self.plan = self.plan_from(StartingPoint(cell.memory.read()))
+        self.plan = self.plan_from(StartState(cell.memory.read()))
         self._messages_before = len(cell.control_messages())
         (end,) = cell.loop.open_ends(robot_cell.TRAJECTORY)
         self._results, self._results_before = end.peer.received, len(end.peer.received)
@@ -93,16 +91,16 @@ class FaultGoal:
         """Send it to the robot loop."""
         self.motion = self.cell.owner.start(self.plan)
 
-    def plan_from(self, start: StartingPoint):
-        """Return the plan, which is made once: the arm begins at the same pose each time."""
+    def plan_from(self, start: StartState):
+        """Return the plan, cached: the arm begins at the same pose each time."""
         raise NotImplementedError
 
     def is_in(self, phase: str) -> bool:
-        """Tell whether the goal is in a phase that it reaches by itself."""
+        """Tell whether the goal has reached a phase."""
         raise NotImplementedError
 
-    async def reach(self, phase: str):
-        """Bring it to its phase; before it is sent there is nothing to do."""
+    async def bring_to(self, phase: str):
+        """Bring the goal to a phase; phases before it is sent need nothing."""
         if phase in BEFORE:
             return
         if phase == 'settling':
@@ -114,46 +112,46 @@ class FaultGoal:
         assert self.motion.outcome is None, self.motion.outcome
 
     async def cancel(self):
-        """Cancel it, and return when the robot program is about to hear of it."""
+        """Cancel the goal, and return when CANCEL is on the wire."""
         self.cell.owner.cancel()
         await self.cell.until(lambda: self.was_action_sent(TrajectoryAction.CANCEL))
         assert not self.cell.at_rest()
 
     def paths(self):
-        """Return the planned paths, one behind the other."""
+        """Return the planned paths, in order."""
         return [self.plan.reference]
 
-    def follow_up(self, phase):
-        """Send what belongs to the goal and is still missing when the fault is there."""
+    def send_remaining_points(self, phase):
+        """Send the points of the goal that come after the fault."""
 
     def is_over(self):
-        """Tell whether the robot does nothing more of it, beside that the arm stands."""
+        """Tell whether the robot has nothing more to do for it, besides being at rest."""
         return True
 
-    def note_end(self):
-        """Look at what is there when the goal has ended, and the arm stands."""
+    def record_end(self):
+        """Record what later checks compare, when the goal has ended and the arm is at rest."""
 
-    def judge(self, row, phase):
-        """Look, when everything is over, at what this way of execution has to leave behind."""
+    def check_result(self, row, phase):
+        """Check, after the recovery, what this execution mode leaves behind."""
 
-    def begun(self):
-        """Return how many motions the robot program has begun."""
+    def points_begun(self):
+        """Return the number of points that the robot program has begun."""
         return self.cell.memory.read().points_begun
 
-    def moved(self):
-        """Return how far the tool has come along x and y [m]."""
-        here = self.cell.robot.controller.motion.T_base_tcp.position
-        return here[0] - self.start[0], here[1] - self.start[1]
+    def tool_offset(self):
+        """Return the displacement of the tool since the start, along x and y [m]."""
+        x, y, _ = self.cell.robot.controller.motion.T_base_tcp.position
+        return x - self.start[0], y - self.start[1]
 
     def was_action_sent(self, action):
-        """Tell whether an action of this goal was sent."""
+        """Tell whether a trajectory action was sent for this goal."""
         return any(
             message.mode is ControlMode.FORWARD and message.payload[0] == action
             for message in self.cell.control_messages(self._messages_before)
         )
 
     def was_mode_sent(self, mode):
-        """Tell whether a control mode was asked for by this goal."""
+        """Tell whether a control mode was requested for this goal."""
         return any(
             message.mode is mode for message in self.cell.control_messages(self._messages_before)
         )
@@ -163,7 +161,7 @@ class FaultGoal:
         return len(self._results) > self._results_before
 
 
-def around_square(state, **goal):
+def square_plan(state, **goal):
     """Return a plan around three sides of a square."""
     return planned(
         state,
@@ -180,45 +178,45 @@ def around_square(state, **goal):
 
 
 @lru_cache
-def around_corners(start):
-    """Return the plan of the goals without anything special."""
-    return around_square(start.state)
+def blend_plan(start):
+    """Return the plan of a goal with two blends and no outputs."""
+    return square_plan(start.state)
 
 
 class BlendGoal(FaultGoal):
-    """Three sides of a square, as motions of the robot."""
+    """Three sides of a square, as motion primitives."""
 
     def plan_from(self, start):
-        return around_corners(start)
+        return blend_plan(start)
 
     def is_in(self, phase):
-        x, y = self.moved()
+        x, y = self.tool_offset()
         match phase:
             case 'arming':
-                return self.was_action_sent(TrajectoryAction.START) and self.begun() == 0
+                return self.was_action_sent(TrajectoryAction.START) and self.points_begun() == 0
             case 'first point':
-                return self.begun() == 1 and y > 0.2 * SIDE
+                return self.points_begun() == 1 and y > 0.2 * SIDE
             case 'in a blend':
                 return x > 0.1 * BLEND and y < SIDE - 0.1 * BLEND
             case 'mid-segment' | 'cancelling':
-                return self.begun() == 2 and x > 0.4 * SIDE
+                return self.points_begun() == 2 and x > 0.4 * SIDE
             case 'last point':
-                return self.begun() == 3 and y < 0.5 * SIDE
+                return self.points_begun() == 3 and y < 0.5 * SIDE
             case 'settling':
                 return self.has_result()
         raise AssertionError(phase)
 
 
-#: Radius of a half circle [m], the time that it takes [s], and when its points are passed.
+#: Radius [m] and duration [s] of the half circle, and the fractions of it at which points lie.
 RADIUS, HALF_CIRCLE = 0.04, 1.0
-PASSED = (0.3, 0.5, 0.7, 1.0)
+POINT_FRACTIONS = (0.3, 0.5, 0.7, 1.0)
 
 
-def on_half_circle(time):
+def half_circle_state(time):
     """
-    Return place, velocity and acceleration (x, y) beside the start: from rest to rest.
+    Return position, velocity and acceleration (x, y) relative to the start, from rest to rest.
 
-    The angle grows as pi (10 s^3 - 15 s^4 + 6 s^5), s being the part of the time that is over.
+    The angle is pi (10 s^3 - 15 s^4 + 6 s^5), s the fraction of the time that has passed.
     """
     s = time / HALF_CIRCLE
     angle = pi * s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
@@ -234,11 +232,11 @@ def on_half_circle(time):
 
 
 def half_circle_goal(state, execution):
-    """Return the half circle as a goal whose points have twist and acceleration."""
+    """Return the half circle as a goal with twist and acceleration at its points."""
     (x, y, z), turned = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
     waypoints = []
-    for time in PASSED:
-        (dx, dy), (vx, vy), (ax, ay) = on_half_circle(time * HALF_CIRCLE)
+    for time in POINT_FRACTIONS:
+        (dx, dy), (vx, vy), (ax, ay) = half_circle_state(time * HALF_CIRCLE)
         waypoints.append(
             Waypoint(
                 time=time * HALF_CIRCLE,
@@ -258,7 +256,7 @@ def half_circle_goal(state, execution):
 
 @lru_cache
 def half_circle(start, execution):
-    """Return the plan of a half circle."""
+    """Return the plan of the half circle."""
     return plan(half_circle_goal(start.state, execution), start.state, ARM, OPTIONS)
 
 
@@ -271,8 +269,8 @@ class SplineGoal(FaultGoal):
         return half_circle(start, self.execution)
 
     def fraction(self):
-        """Return which part of the half circle the tool has gone."""
-        x, y = self.moved()
+        """Return the fraction of the half circle that the tool has covered."""
+        x, y = self.tool_offset()
         return atan2(x, RADIUS - y) / pi
 
     def is_in(self, phase):
@@ -300,15 +298,16 @@ class ServoGoal(SplineGoal):
         assert not self.cell.at_rest()
 
 
-#: The output that is switched at the second corner, and the one after the end [s].
+#: Pins of the outputs switched at the second corner and after the end, and the delay of the
+#: latter [s].
 AT_CORNER, AFTER_END, DELAY = 2, 3, 0.6
-#: Where a goal ends within this time [s], the robot program was stopped at once.
-AT_ONCE = 0.3
+#: A goal that ends within this time ended because the robot program stopped at once [s].
+IMMEDIATE_END = 0.3
 
 
 @lru_cache
-def around_corners_with_outputs(start, values):
-    """Return the plan around three sides of a square, with two outputs that are switched."""
+def output_plan(start, values):
+    """Return the plan around the square with two outputs."""
     commands = tuple(
         IOCommand(
             waypoint=waypoint,
@@ -321,49 +320,46 @@ def around_corners_with_outputs(start, values):
             (1, 2), (0.0, DELAY), (AT_CORNER, AFTER_END), values, strict=True
         )
     )
-    return around_square(start.state, io_commands=commands)
+    return square_plan(start.state, io_commands=commands)
 
 
 class OutputGoal(BlendGoal):
-    """Three sides of a square, and outputs that wait to be switched."""
+    """Three sides of a square, with outputs that switch on the path and after it."""
 
     def __init__(self, cell):
         self._before = self._outputs(cell)
         super().__init__(cell)
 
     def plan_from(self, start):
-        return around_corners_with_outputs(start, tuple(not value for value in self._before))
+        return output_plan(start, tuple(not value for value in self._before))
 
     def is_in(self, phase):
         match phase:
-            case 'before the place' | 'cancelling':
+            case 'before the trigger pose' | 'cancelling':
                 return super().is_in('mid-segment')
             case 'before the time':
-                return self.begun() == 3 and self.moved()[1] < 1e-4 and self.cell.at_rest()
+                return (
+                    self.points_begun() == 3
+                    and self.tool_offset()[1] < 1e-4
+                    and self.cell.at_rest()
+                )
         raise AssertionError(phase)
 
-    def paths(self):
-        """Return the planned paths, one behind the other."""
-        return [self.plan.reference]
-
-    def follow_up(self, phase):
-        """Send what belongs to the goal and is still missing when the fault is there."""
-
-    async def reach(self, phase):
-        await super().reach(phase)
+    async def bring_to(self, phase):
+        await super().bring_to(phase)
         self._at_fault = self._outputs(self.cell)
 
-    def note_end(self):
+    def record_end(self):
         self._at_end = self._outputs(self.cell)
 
-    def judge(self, row, phase):
-        """See that all is switched in the end, or nothing any more when the goal has ended."""
+    def check_result(self, row, phase):
+        """Check that all outputs switched, or that none switched after the end of the goal."""
         now, here = self._outputs(self.cell), (row.fault, phase)
         if row.code is ErrorCode.SUCCESSFUL:
             assert now == [not value for value in self._before], here
         else:
             assert now == self._at_end, here
-            assert row.bound > AT_ONCE or now == self._at_fault, here
+            assert row.bound > IMMEDIATE_END or now == self._at_fault, here
 
     @staticmethod
     def _outputs(cell):
@@ -373,7 +369,7 @@ class OutputGoal(BlendGoal):
 
 @lru_cache
 def half_circle_to_append(start):
-    """Return the first three points of a half circle, and the last one as what is appended."""
+    """Return the plan of the first three points of a half circle, and the last one to append."""
     whole = half_circle_goal(start.state, ExecutionMode.SPLINE)
     goal = replace(whole, waypoints=whole.waypoints[:-1], keep_open=True)
     part = plan_first_part(plan(goal, start.state, ARM, OPTIONS), ARM, OPTIONS)
@@ -382,13 +378,13 @@ def half_circle_to_append(start):
 
 @lru_cache
 def rest_of_half_circle(start, *, from_rest):
-    """Return the last point of a half circle, planned behind what was sent before."""
+    """Return the append plan of the last point of a half circle."""
     part, appended = half_circle_to_append(start)
     return plan_append(part.next_goal, appended, ARM, OPTIONS, from_rest=from_rest)
 
 
 class AppendGoal(SplineGoal):
-    """The half circle as an open goal, whose last point is appended when the fault is there."""
+    """The half circle with keep_open; its last point is appended after the fault."""
 
     def plan_from(self, start):
         self._beginning = start
@@ -402,9 +398,9 @@ class AppendGoal(SplineGoal):
         match phase:
             case 'moving' | 'cancelling':
                 return 0.1 < self.fraction() < 0.4
-            case 'closing':
+            case 'running out':
                 return self.was_action_sent(TrajectoryAction.STREAM_END) and self.fraction() > 0.7
-            case 'waiting':
+            case 'awaiting points':
                 return self.motion.progress and self.motion.progress[-1].awaiting_points
         return super().is_in(phase)
 
@@ -412,16 +408,18 @@ class AppendGoal(SplineGoal):
         rest = rest_of_half_circle(self._beginning, from_rest=False)
         return [self.plan.reference, rest.plan.reference]
 
-    def follow_up(self, phase):
-        part = rest_of_half_circle(self._beginning, from_rest=phase in ('closing', 'waiting'))
+    def send_remaining_points(self, phase):
+        part = rest_of_half_circle(
+            self._beginning, from_rest=phase in ('running out', 'awaiting points')
+        )
         points, job = encode_plan(part, NEWEST_DIALECT)
-        self.cell.owner.extend(
+        self.cell.owner.append(
             points, AppendJob(number=1, records_before=part.records_before, job=job)
         )
 
 
 class FreedriveGoal(FaultGoal):
-    """No goal but the same machinery: a person may push the arm, until that is cancelled."""
+    """Freedrive until it is cancelled: no goal, but it ends through the same machine."""
 
     def plan_from(self, start):
         return stationary_plan(start.state)
@@ -437,18 +435,18 @@ class FreedriveGoal(FaultGoal):
         paused = self.cell.robot.controller.programs.state is RuntimeState.PAUSED
         return paused or not self._is_freedrive_active()
 
-    def judge(self, row, phase):
+    def check_result(self, row, phase):
         assert not self._is_freedrive_active(), (row.fault, phase)
 
     def _is_freedrive_active(self):
         return self.cell.robot.controller.freedrive is FreedriveState.TEACH
 
 
-#: The goals of the ways of execution.
+#: The goals by the name of their mode in the matrix.
 GOALS = {
     'SPLINE': SplineGoal,
     'SERVO': ServoGoal,
-    'Open goals': AppendGoal,
+    'Appendable goals': AppendGoal,
     'Outputs': OutputGoal,
-    'Guided by hand': FreedriveGoal,
+    'Freedrive': FreedriveGoal,
 }

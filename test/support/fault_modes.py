@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The fault matrix of the other ways of execution: their phases, and the faults that may differ.
+The fault matrix of the other execution modes: their phases, and the faults that may differ.
 
-Each fault is a row of :mod:`fault_table`, with what this way of execution changes about it. What
-cannot differ, because it is decided before a way of execution matters (idle, planning), or
+Each fault is a row of :mod:`fault_table`, with what this execution mode changes about it. What
+cannot differ, because it is decided before the execution mode matters (idle, planning), or
 happens to interfaces that none of them uses, is not run again.
 """
 
@@ -22,23 +22,23 @@ E, S = ErrorCode, ConnectionState
 
 @dataclass(frozen=True, kw_only=True)
 class Mode:
-    """A way of execution under faults."""
+    """A execution mode under faults."""
 
-    #: What goals of it are called in tests and in the page.
+    #: Name of its goals in tests and on the page.
     name: str
-    #: What the page says of it.
+    #: Description on the page.
     about: str
     phases: dict[str, str]
     headless: tuple[Row, ...]
     local: tuple[Row, ...]
     continued: tuple[Row, ...]
-    #: Of the driver, beyond those of all.
+    #: Settings of the driver beyond the usual ones.
     settings: dict[str, Any] = field(default_factory=dict)
-    #: What of the goal takes as long as without the fault [s], where that does not disturb it.
+    #: Times of a goal that the fault does not disturb [s].
     undisturbed: float
 
 
-#: Faults that meet what every way of execution has of its own: program, points, packets, stops.
+#: Faults that meet what every execution mode has of its own: program, points, packets, stops.
 FAULTS = (
     'protective stop',
     'emergency stop',
@@ -58,7 +58,7 @@ FAULTS = (
     'the pose is measured 6 mm off',
     'the node is silent',
 )
-#: Where set-points come through RTDE, what else happens to that.
+#: Further faults of RTDE, for a mode with set-points.
 FAULTS_OF_RTDE = (
     'safeguard stop',
     'somebody switches the arm off',
@@ -70,7 +70,7 @@ FAULTS_OF_RTDE = (
     'the reverse socket is cut',
     'the trajectory socket is cut',
 )
-#: Where the program stands on the pendant.
+#: Faults for a program on the pendant.
 ON_THE_PENDANT = (
     'protective stop',
     'protective stop that the driver does not see',
@@ -90,11 +90,11 @@ def select_rows(
     changes: dict[str, dict[str, dict[str, Any]]],
 ) -> tuple[Row, ...]:
     """
-    Return rows of a table for the phases of a way of execution.
+    Return rows of a table for the phases of a execution mode.
 
-    :param names: which faults, in this order.
-    :param undisturbed: what replaces the time of a goal that takes no notice [s].
-    :param changes: fault -> phase, or '' for all of them -> what is different.
+    :param names: faults, in this order.
+    :param undisturbed: time of a goal that a fault does not disturb [s].
+    :param changes: fault -> phase, or '' for all -> fields that differ.
     """
     by_name = {row.fault: row for row in rows}
     return tuple(
@@ -106,14 +106,14 @@ def select_rows(
 def _adapt_row(
     row: Row, phases: tuple[str, ...], undisturbed: float, changes: dict[str, dict[str, Any]]
 ) -> Row:
-    """Return a row whose differences are those of other phases, and the changes."""
+    """Return a row for other phases, with its changes."""
     differs = {
         phase: row.differs.get(phase, {}) | changes.get(phase, {})
         for phase in phases
         if phase in row.differs or phase in changes
     }
     usual = replace(row, **changes.get('', {}), differs={})
-    return _long_enough(
+    return _with_times(
         replace(
             usual,
             differs={
@@ -125,12 +125,12 @@ def _adapt_row(
     )
 
 
-def _long_enough(row: Row, undisturbed: float) -> Row:
+def _with_times(row: Row, undisturbed: float) -> Row:
     return replace(row, **_times(row, undisturbed, {}))
 
 
 def _times(row: Row, undisturbed: float, differing: dict[str, Any]) -> dict[str, Any]:
-    """Return differences with the time of a goal that is not disturbed."""
+    """Return the differences with the times of a goal that is not disturbed."""
     if row.code is not E.SUCCESSFUL or row.waits:
         return differing
     return differing | {'bound': undisturbed, 'rest': undisturbed}
@@ -148,13 +148,13 @@ def _mode(
     continued: Iterable[str] = CONTINUES,
     once: tuple[str, Iterable[str]] = ('', ()),
     more: tuple[Row, ...] = (),
-    changes_there: dict[str, dict[str, dict[str, Any]]] | None = None,
+    pendant_changes: dict[str, dict[str, dict[str, Any]]] | None = None,
 ) -> Mode:
     """
-    Return a way of execution.
+    Return a execution mode.
 
-    :param once: further faults, and the only phase in which they are looked at.
-    :param changes_there: those of the rows of the pendant, where they are others.
+    :param once: a phase, and further faults that are tested in this phase only.
+    :param pendant_changes: changes of the rows of the pendant, if they differ.
     """
     return Mode(
         name=name,
@@ -174,7 +174,7 @@ def _mode(
             pendant,
             phases,
             undisturbed,
-            changes if changes_there is None else changes_there,
+            changes if pendant_changes is None else pendant_changes,
         ),
         continued=select_rows(CONTINUED, continued, phases, undisturbed, changes),
     )
@@ -195,7 +195,7 @@ SPLINE = _mode(
     },
 )
 
-#: What is a matter of the set-points' own connection.
+#: Faults of the connection of the set-points.
 SETPOINTS = (
     Row(
         fault='the connection of the set-points is cut',
@@ -237,13 +237,13 @@ SETPOINTS = (
     ),
 )
 
-#: Nothing has moved yet, and the goal ends because the robot does not answer.
+#: Nothing has moved, and the goal ends because the robot does not answer.
 _NOT_ENTERED = {'entering': {'code': E.ROBOT_NOT_READY}}
-#: The program has read that it is to leave, and the arm stands: it is over.
+#: The program has read the cancellation and the arm is at rest: the goal has ended.
 _STAYS_PAUSED = {'cancelling': {'bound': 0.7, 'steps': ('play',)}}
-#: Set-points stay away, so the robot program brakes and ends; then the driver finds that the
+#: No set-points arrive, so the robot program brakes and ends; then the driver notices that the
 #: robot is silent.
-_DEAF = {
+_SILENT = {
     '': {
         'code': E.PROGRAM_STOPPED,
         'bound': 0.7,
@@ -259,7 +259,7 @@ SERVO = _mode(
     'SERVO',
     'The same half circle as set-points, which the robot program buffers.',
     {
-        'entering': 'the robot program is told to take set-points, nothing has moved',
+        'entering': 'the robot program was asked to take set-points, nothing has moved',
         'between points': 'on the way from the second point to the third',
         'slowing down': 'on the way to the last point, a tenth of a second before it',
         'cancelling': 'the driver has left the mode of set-points, the arm still moves',
@@ -271,9 +271,9 @@ SERVO = _mode(
         | {'': {'steps': ('wait until it is over', 'resend')}},
         'protective stop that the driver does not see': _NOT_ENTERED,
         'RTDE is cut': _NOT_ENTERED,
-        'RTDE is half-open': _DEAF,
-        'RTDE is silent for 1.5 s': _DEAF,
-        'garbage on RTDE': _DEAF,
+        'RTDE is half-open': _SILENT,
+        'RTDE is silent for 1.5 s': _SILENT,
+        'garbage on RTDE': _SILENT,
         "the program's answers are lost": {
             '': {'code': E.SUCCESSFUL, 'then': S.READY, 'steps': ('wait until it is over',)}
         },
@@ -287,7 +287,7 @@ SERVO = _mode(
     ),
     once=('between points', FAULTS_OF_RTDE),
     more=SETPOINTS,
-    changes_there={
+    pendant_changes={
         'somebody pauses the program': _STAYS_PAUSED,
         'the network cable is cut': _NOT_ENTERED
         | {'': {'steps': ('wait until it is over', 'play')}},
@@ -297,12 +297,11 @@ SERVO = _mode(
 
 OUTPUTS = _mode(
     'Outputs',
-    'PRIMITIVES around two corners; one output is switched in the second corner, '
-    'another one 0.6 s after the end. What still waits when a goal does not succeed is not '
-    'switched any more.',
+    'PRIMITIVES with two blends; one output switches in the second blend, another one 0.6 s '
+    'after the end. When a goal does not succeed, pending outputs do not switch.',
     {
-        'before the place': 'on the way to the corner',
-        'before the time': 'the arm stands at the last point, the last output is not yet switched',
+        'before the trigger pose': 'before the output at the second blend',
+        'before the time': 'the arm is at rest at the last point, the last output has not switched',
         'cancelling': 'CANCEL is on the wire, the arm still moves',
     },
     2.0,
@@ -320,13 +319,13 @@ OUTPUTS = _mode(
 )
 
 APPEND = _mode(
-    'Open goals',
-    'A goal that is continued while it runs (`keep_open`); the last points are '
-    'appended when the fault is there.',
+    'Appendable goals',
+    'A goal that is appended to while it runs (`keep_open`); the last points are appended '
+    'after the fault.',
     {
-        'moving': 'on the way, more points are expected',
-        'closing': 'none came in time, the arm is being brought to rest behind the last one',
-        'waiting': 'the arm is at rest, and waits for more points',
+        'moving': 'on the path, more points are expected',
+        'running out': 'no points came in time, the arm decelerates after the last one',
+        'awaiting points': 'the arm is at rest, the goal waits for more points',
         'cancelling': 'CANCEL is on the wire, the arm still moves',
     },
     2.5,
@@ -346,10 +345,10 @@ APPEND = _mode(
 
 FREEDRIVE = replace(
     _mode(
-        'Guided by hand',
-        'No goal, but ended by the same things: `~/freedrive_mode` lets a person push '
-        'the arm. When it "stands" it cannot be pushed any more.',
-        {'guided': 'a person may push the arm'},
+        'Freedrive',
+        'No goal, but the same faults end it: `~/freedrive_mode` lets a person guide the arm. '
+        '"At rest": the arm cannot be moved by hand any more.',
+        {'freedrive': 'a person may guide the arm'},
         0.0,
         {},
         faults=(

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What becomes of a goal when something goes wrong: the table of the fault matrix.
+How goals end when a fault hits them: the table of the fault matrix.
 
 One row for each fault. The tests run each row in each phase of a goal, and ``doc/faults.md`` is
 made from it by ``scripts/make_faults.py``. Times are [s].
@@ -15,16 +15,16 @@ from ur_cartesian_driver.robot.lifecycle import ConnectionState
 
 E, S = ErrorCode, ConnectionState
 
-#: When in the life of a goal the fault happens, and what that means.
+#: Phases of a goal in which the fault happens.
 PHASES = {
-    'idle': 'no goal runs; one is sent when the fault is 0.1 s old',
-    'planning': 'the goal is planned already; it is sent to the robot one cycle after the fault',
+    'idle': 'no goal runs; one is sent 0.1 s after the fault',
+    'planning': 'the goal is planned; it is sent to the robot one cycle after the fault',
     'arming': 'START is on the wire, the robot program has not begun the first point',
     'first point': 'on the way to the first of three points',
     'mid-segment': 'on the straight part of the second segment',
-    'in a blend': 'in the corner at the first point',
+    'in a blend': 'in the blend at the first point',
     'last point': 'on the second half of the way to the last point',
-    'settling': 'the robot program has reported the end, the arm is not yet inside the tolerance',
+    'settling': 'the robot program has reported the end, the arm is still outside the goal tolerance',
     'cancelling': 'CANCEL is on the wire, the arm still moves',
 }
 BEFORE = ('idle', 'planning')
@@ -33,33 +33,33 @@ MOVING = ('arming', 'first point', 'mid-segment', 'in a blend', 'last point')
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One fault and what is expected of robot and driver."""
+    """One fault, and how goal, robot and driver have to behave."""
 
-    #: What happens, for people.
+    #: Name of the fault on the page and in tests.
     fault: str
-    #: The same for the test: texts of the simulator's faults, or names of faults of its own.
+    #: Faults to inject: texts for the simulator, or names that fault_cell knows.
     cause: tuple[str, ...]
-    #: How the goal ends.
+    #: Result of the goal.
     code: ErrorCode
-    #: From the fault, or from sending the goal if that is later, to the result.
+    #: Longest time from the fault, or from sending the goal if later, to the result.
     bound: float = 0.3
-    #: From the fault until the arm stands.
+    #: Longest time from the fault until the arm is at rest.
     rest: float = 0.5
-    #: The goal goes on when the steps are done.
+    #: Whether the goal waits, and goes on after the steps.
     waits: bool = False
-    #: Where the connection is when the goal has ended, before anybody does anything.
+    #: State of the connection after the end of the goal, before the steps.
     then: ConnectionState = S.READY
-    #: How long it may take to get there.
+    #: Longest time until that state.
     then_within: float = 0.3
-    #: What somebody has to do until the next goal can run.
+    #: Steps of an operator until the next goal can run.
     steps: tuple[str, ...] = ()
-    #: From there until the driver is ready.
+    #: Longest time from the last step until the driver is ready.
     back: float = 1.5
-    #: Joint travel from the stand after the fault to the end of the steps [rad].
+    #: Largest joint travel during the steps [rad].
     travel: float = 0.0
-    #: The only phases in which it is looked at; empty = all.
+    #: The only phases that are tested; empty = all.
     phases: tuple[str, ...] = ()
-    #: What is different in some phases: name -> value.
+    #: Fields that differ in some phases: phase -> field -> value.
     differs: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def at(self, phase: str) -> 'Row':
@@ -74,13 +74,13 @@ def _in(phases: tuple[str, ...], **changes: Any) -> dict[str, dict[str, Any]]:
 #: The robot is known not to take a goal.
 REFUSED = _in(BEFORE, code=E.ROBOT_NOT_READY)
 CANCELLED = _in(('cancelling',), code=E.CANCELLED)
-#: Time for a goal and its end, where the fault does not disturb it.
+#: Times of a goal that the fault does not disturb.
 UNDISTURBED: dict[str, Any] = {'bound': 1.2, 'rest': 1.2}
 POWER_UP = ('power on', 'release the brakes')
 
 
 def _safety(fault: str, cause: str, code: ErrorCode, *steps: str, play: bool = True) -> Row:
-    """Return the row of a stop by the safety system; ``play``: the program is only paused."""
+    """Return the row of a stop by the safety system; ``play``: it pauses the program."""
     before = {'code': E.ROBOT_NOT_READY} | ({'steps': (*steps, 'play')} if play else {})
     return Row(
         fault=fault,
@@ -114,7 +114,7 @@ def _hangs_up(fault: str, cause: str) -> Row:
     )
 
 
-#: The messages that the program finds when it goes on tell it that its goal is over.
+#: When the program resumes it reads that its goal has ended.
 UNSEEN_STOP = Row(
     fault='protective stop that the driver does not see',
     cause=('drop rtde for 0.3 s', 'protective_stop'),
@@ -125,7 +125,7 @@ UNSEEN_STOP = Row(
     differs=REFUSED,
 )
 
-#: The stopped program never runs again by itself, whoever unlocks or plays.
+#: A stopped program never runs again by itself, whoever unlocks or plays.
 HEADLESS = (
     _safety('protective stop', 'protective_stop', E.PROTECTIVE_STOP, 'unlock'),
     _safety('safeguard stop', 'safeguard_stop', E.PROTECTIVE_STOP, 'reset the safeguard'),

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A forward kinematics that owes nothing to the package: the matrices of the textbook."""
+"""Forward kinematics independent of the package: the matrices of the textbook."""
 
 from math import cos, sin
 

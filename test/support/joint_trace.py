@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The joints in every cycle, and what a way of the arm is judged by."""
+"""Joint positions of every cycle, and measures of the motion that they record."""
 
 from itertools import pairwise
 
@@ -12,13 +12,13 @@ from ur_cartesian_driver.motion.pose import pose_from_row
 
 
 class JointTrace:
-    """The joints in every cycle."""
+    """Joint positions of every cycle [rad]."""
 
     def __init__(self, cell):
         self.cell, self.rows = cell, []
 
     async def until(self, condition, bound):
-        """Watch until a condition holds, which it has to within a bound [s]."""
+        """Record until a condition holds; fail when it does not within a bound [s]."""
         end = self.cell.loop.time() + bound
         while not condition():
             assert self.cell.loop.time() < end, self.cell.owner.log

@@ -1,11 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What the planner says of a goal, and what the robot makes of it when it is sent all the same.
+Compare the planner's verdict on a goal with what the robot does when it gets the goal anyway.
 
-A refused goal has no primitives. So those of the points before are planned, and that of the point
-which is refused is written down as any driver would that does not look ahead: the type, the pose,
-the speeds.
+A refused goal has no primitives. So the points before the refused one are planned, and the refused
+one is sent as a driver without a pre-flight check would send it: type, pose, speeds.
 """
 
 from dataclasses import dataclass, replace
@@ -31,7 +30,7 @@ from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vecto
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP, OptimoveJ, OptimoveL
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
-#: What bounds speeds and distances is off, and what is left, geometry, has no margin.
+#: Checks of speeds and distances are off; geometry is checked without a margin.
 OPTIONS = PlanningOptions(
     max_approach_distance=0.0,
     max_tool_speed=0.0,
@@ -42,7 +41,7 @@ OPTIONS = PlanningOptions(
     singularity_margin_shoulder=0.0,
 )
 
-#: Refusals by what of the arm they are about.
+#: Refusals by the property of the arm that they are about.
 KINDS = {
     Unreachable: 'reach',
     JointLimitExceeded: 'limit',
@@ -50,72 +49,73 @@ KINDS = {
     InvalidPosture: 'branch',
 }
 
-#: Motions that take longer are run in longer cycles [s], and those that take this long are not.
-LONG, TOO_LONG = 2.5, 10.0
-#: So near to the border both may be right [m], [rad].
-BORDER = 1e-4
-#: Arrived is who is this near [rad]: the wire rounds to a millionth, and that turns the joints of
-#: a nearly singular arm by a hundred times as much.
-ARRIVED = 1e-3
+#: Motions that take longer run in longer cycles [s]; those that take longer than the second bound
+#: do not run at all [s].
+SLOW_CYCLE_DURATION, MAX_RUN_DURATION = 2.5, 10.0
+#: This near to the border both may be right [m], [rad].
+BORDER_SHIFT = 1e-4
+#: The arm has arrived when every joint is this near [rad]: the wire rounds to a millionth, which
+#: turns the joints of a nearly singular arm by a hundred times as much.
+ARRIVAL_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """What one side, or both, make of a goal."""
+    """Verdict of the planner on a goal, and of the robot if it ran."""
 
-    #: ``passes``, ``reach``, ``limit``, ``branch``; ``other`` for what has nothing to do with the
-    #: arm, ``long`` for what passes and would take too long to be run.
+    #: ``passes``, ``reach``, ``limit``, ``branch``; ``other`` = not about the arm; ``long`` =
+    #: passes, and would take too long to run.
     planner: str
     refusal: str
-    #: Empty if the robot ran it to the end and arrived as it should.
-    trouble: str
-    #: The point that is refused, or the last one.
+    #: Why the robot failed; empty = it ran to the end and arrived where planned.
+    failure: str
+    #: Index of the refused point, or of the last one.
     point: int
     run: ProgramRun | None = None
     plan: Plan | None = None
 
     @property
     def passes(self):
-        """Whether the planner lets it pass."""
+        """Whether the planner accepts the goal."""
         return self.planner in ('passes', 'long')
 
     @property
     def agreed(self):
-        """Whether both say the same, or one of them was not asked."""
-        return self.planner in ('other', 'long') or (self.passes == (not self.trouble))
+        """Whether planner and robot agree, or only the planner was asked."""
+        return self.planner in ('other', 'long') or (self.passes == (not self.failure))
 
 
-def judge(robot, case, options=OPTIONS, longest=inf) -> Verdict:
+def compare(robot, case, options=OPTIONS, max_duration=inf) -> Verdict:
     """
-    Plan a goal, and run it whatever the plan says.
+    Plan a goal, and run it whether the planner accepts it or not.
 
     :param longest: plans of motions that take longer are not run [s].
     """
     arm = robot.controller.arm
     state = robot.place(case.q, case.T_flange_tcp)
-    made, refusal = _planned(case.goal, state, arm, options)
+    planned, refusal = _try_plan(case.goal, state, arm, options)
     if refusal is None:
-        if made.duration > longest:
-            return Verdict(planner='long', refusal='', trouble='', point=-1, plan=made)
-        primitives = [segment.primitive for segment in made.segments]
-        # What only longer cycles bring about (the way of one is longer than a blend) is none.
-        for runner in (robot.slow, robot) if made.duration > LONG else (robot,):
+        if planned.duration > max_duration:
+            return Verdict(planner='long', refusal='', failure='', point=-1, plan=planned)
+        primitives = [segment.primitive for segment in planned.segments]
+        # A failure that only longer cycles cause (one moves farther than a blend) does not count.
+        for runner in (robot.slow, robot) if planned.duration > SLOW_CYCLE_DURATION else (robot,):
             runner.place(case.q, case.T_flange_tcp)
             run = runner.run(primitives)
-            trouble = run.trouble or _astray(made, run)
-            if not trouble:
+            failure = run.failure or _configuration_error(planned, run)
+            if not failure:
                 break
         return Verdict(
             planner='passes',
             refusal='',
-            trouble=trouble,
+            failure=failure,
             point=len(case.goal.waypoints) - 1,
             run=run,
-            plan=made,
+            plan=planned,
         )
     kind = KINDS.get(type(refusal), 'other')
     if kind == 'other':
-        return Verdict(planner=kind, refusal=str(refusal), trouble='', point=-1)
+        return Verdict(planner=kind, refusal=str(refusal), failure='', point=-1)
     point, before = _refused_point(case.goal, state, arm, options)
     primitives = [] if before is None else [segment.primitive for segment in before.segments]
     q = case.q if before is None else before.segments[-1].joints
@@ -123,47 +123,49 @@ def judge(robot, case, options=OPTIONS, longest=inf) -> Verdict:
         primitives[-1] = replace(
             primitives[-1], blend_radius=case.goal.segments[point - 1].blend_radius
         )
-    run = robot.run([*primitives, blind(case, point, q, arm)])
-    trouble = run.trouble or _missed(case, point, q, arm, run)
-    _check_place(refusal, case.goal.segments, point)
+    run = robot.run([*primitives, unchecked_primitive(case, point, q, arm)])
+    failure = run.failure or _posture_error(case, point, q, arm, run)
+    _check_named_point(refusal, case.goal.segments, point)
     return Verdict(
         planner=kind,
         refusal=f'{type(refusal).__name__}: {refusal}',
-        trouble=trouble,
+        failure=failure,
         point=point,
         run=run,
     )
 
 
-def _check_place(refusal, segments, point) -> None:
-    """Check that a refusal names the point, or that before it where a blend joins the two."""
+def _check_named_point(refusal, segments, point) -> None:
+    """Check that a refusal names the point, or the one before if a blend joins them."""
     place = re.match(r'(trajectory\.points|segments)\[(\d+)\]', str(refusal))
     assert place is not None, f'which point? {refusal}'
     joined = point > 0 and segments[point - 1].blend_radius > 0.0
     assert point - joined <= int(place[2]) <= point, f'it is point {point}: {refusal}'
 
 
-def at_the_border(robot, case, options=OPTIONS, longest=TOO_LONG) -> bool:
+def is_borderline(robot, case, options=OPTIONS, max_duration=MAX_RUN_DURATION) -> bool:
     """
-    Tell whether somebody says something else of a goal that is hardly another one.
+    Tell whether the verdict of planner or robot changes when the goal is shifted a little.
 
-    The whole of it is shifted and turned along and about each axis, then each point at random.
+    The whole goal is shifted along and turned about each axis, then each point at random.
     """
-    was = judge(robot, case, options)
+    was = compare(robot, case, options)
     rng = np.random.default_rng(1)
-    neighbours = (_moved(robot.controller.arm, case, change, rng) for change in _changes(rng))
-    verdicts = (judge(robot, moved, options, longest) for moved in neighbours if moved is not None)
+    neighbours = (_shifted(robot.controller.arm, case, change, rng) for change in _shifts(rng))
+    verdicts = (
+        compare(robot, moved, options, max_duration) for moved in neighbours if moved is not None
+    )
     return any(
         verdict.passes != was.passes
-        or (verdict.planner != 'long' and bool(verdict.trouble) != bool(was.trouble))
+        or (verdict.planner != 'long' and bool(verdict.failure) != bool(was.failure))
         for verdict in verdicts
         if verdict.planner != 'other'
     )
 
 
-def _changes(rng):
+def _shifts(rng):
     for axis in (3, 4, 5, 0, 1, 2):  # turns first: most borders are straight wrists
-        for sign in (-BORDER, BORDER):
+        for sign in (-BORDER_SHIFT, BORDER_SHIFT):
             step = np.zeros(6)
             step[axis] = sign
             yield step
@@ -171,11 +173,15 @@ def _changes(rng):
         yield None
 
 
-def _moved(arm, case, step, rng):
-    """Return the case with all poses moved by a step, or each by its own; None: nowhere."""
+def _shifted(arm, case, step, rng):
+    """Return the case with all poses shifted by a step, or each at random; None = out of reach."""
 
     def by(pose):
-        change = step if step is not None else rng.uniform(-BORDER, BORDER, 6) / np.sqrt(3.0)
+        change = (
+            step
+            if step is not None
+            else rng.uniform(-BORDER_SHIFT, BORDER_SHIFT, 6) / np.sqrt(3.0)
+        )
         turn = Pose((0.0, 0.0, 0.0), quaternion_from_rotation_vector(tuple(change[3:])))
         turned = turn @ Pose((0.0, 0.0, 0.0), pose.quaternion)
         return Pose(tuple(np.array(pose.position) + change[:3]), turned.quaternion)
@@ -194,7 +200,7 @@ def _moved(arm, case, step, rng):
     return replace(case, q=q, goal=goal)
 
 
-def _planned(goal, state, arm, options):
+def _try_plan(goal, state, arm, options):
     try:
         return plan(goal, state, arm, options), None
     except GoalRefused as refusal:
@@ -206,15 +212,15 @@ def _refused_point(goal, state, arm, options):
     before = None
     for count in range(1, len(goal.waypoints) + 1):
         part = replace(goal, waypoints=goal.waypoints[:count], segments=goal.segments[:count])
-        made, refusal = _planned(part, state, arm, options)
+        planned, refusal = _try_plan(part, state, arm, options)
         if refusal is not None:
             return count - 1, before
-        before = made
+        before = planned
     raise AssertionError('every part of the goal passes, and the whole does not')
 
 
-def blind(case, point, q, arm):
-    """Return the primitive of a point as somebody would send it who does not look ahead."""
+def unchecked_primitive(case, point, q, arm):
+    """Return the primitive of a point as a driver without a pre-flight check would send it."""
     goal = case.goal
     segment, waypoint = goal.segments[point], goal.waypoints[point]
     speeds: dict[str, Any] = {
@@ -222,7 +228,7 @@ def blind(case, point, q, arm):
         'acceleration': segment.acceleration or 4.0,
     }
     time = waypoint.time - (goal.waypoints[point - 1].time if point else 0.0)
-    # What a posture means is no question of looking ahead.
+    # A posture is resolved without a pre-flight check too.
     near = (
         waypoint.posture
         and nearest_to_posture(
@@ -251,14 +257,18 @@ def _named(waypoint):
     }
 
 
-def _astray(made, run) -> str:
-    """Say how the arm arrived in another configuration than planned."""
-    off = max(abs(a - b) for a, b in zip(run.q, made.segments[-1].joints, strict=True))
-    return '' if off <= ARRIVED else f'arrives {off:.6f} rad beside the configuration planned'
+def _configuration_error(planned, run) -> str:
+    """Describe how far the arm ends beside the planned configuration."""
+    off = max(abs(a - b) for a, b in zip(run.q, planned.segments[-1].joints, strict=True))
+    return (
+        ''
+        if off <= ARRIVAL_TOLERANCE
+        else f'arrives {off:.6f} rad beside the configuration planned'
+    )
 
 
-def _missed(case, point, q, arm, run) -> str:
-    """Say which joint of a posture the blind motion did not bring to where it should."""
+def _posture_error(case, point, q, arm, run) -> str:
+    """Name the joint of a posture that the unchecked motion left somewhere else."""
     named = _named(case.goal.waypoints[point])
     if not named:
         return ''

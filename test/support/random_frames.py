@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What either side of an RTDE connection may get: packages of any kind, and nonsense."""
+"""Random input of an RTDE connection: packages of any kind, and garbage."""
 
 from hypothesis import strategies as st
 

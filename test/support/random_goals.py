@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Goals at random where goals go wrong: at the border of what an arm can do, on both sides of it.
+Random goals on both sides of the limits of an arm.
 
-Points that are drawn evenly are nearly all easy or absurd. So each family of goals here is drawn
-around one border (the reach, the range of a joint, a singularity, the column over the base ...)
-and about half of its goals cross it. A goal follows from model, number and nothing else.
+Uniformly drawn points are nearly all easy or absurd. So each family of goals is drawn around one
+limit (reach, joint range, a singularity, the column over the base ...), and about half of its
+goals cross it. A goal depends on model and number only.
 """
 
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ STRAIGHT = (LINEAR, LINEAR, LINEAR, PROCESS, SegmentType.OPTIMIZED_LINEAR)
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A goal, and where the arm stands when it comes."""
+    """A goal, and the state of the arm at its start."""
 
     family: str
     q: tuple
@@ -56,7 +56,7 @@ def random_case(arm: Arm, number: int) -> Case:
 
 
 class _Draw:
-    """A goal that is being drawn: points are added to the end."""
+    """A goal under construction: points are added to the end."""
 
     def __init__(self, arm: Arm, rng: np.random.Generator) -> None:
         self.arm, self.rng = arm, rng
@@ -86,7 +86,7 @@ class _Draw:
         self.q = self.last = tuple(float(x) for x in q)
 
     def place_arm_at(self, T_base_tcp: Pose, q) -> None:
-        """Let it stand where the tool is there, near to a configuration; anywhere if nowhere."""
+        """Start with the tool at a pose, near a configuration; anywhere if it is unreachable."""
         near = tuple(float(x) for x in q)
         found = nearest(self.arm, T_base_tcp @ self.tool.inverse(), near)
         self.place_arm(self.anywhere() if found is None else found)
@@ -170,8 +170,8 @@ class _Draw:
         if timed:
             time, before = 0.0, self.at(self.q)
             for i, point in enumerate(self.waypoints):
-                way = before.distance_to(point.pose) + 0.3 * before.angle_to(point.pose)
-                time += 0.1 + 2.0 * way
+                extent = before.distance_to(point.pose) + 0.3 * before.angle_to(point.pose)
+                time += 0.1 + 2.0 * extent
                 before = point.pose
                 self.waypoints[i] = Waypoint(pose=point.pose, posture=point.posture, time=time)
                 self.segments[i] = Segment(
@@ -185,8 +185,8 @@ class _Draw:
     def _blend(self) -> None:
         poses = [self.at(self.q), *(point.pose for point in self.waypoints)]
         for i in range(len(self.segments) - 1):
-            room = min(poses[i].distance_to(poses[i + 1]), poses[i + 1].distance_to(poses[i + 2]))
-            radius = self.rng.uniform(0.1, 0.45) * room
+            gap = min(poses[i].distance_to(poses[i + 1]), poses[i + 1].distance_to(poses[i + 2]))
+            radius = self.rng.uniform(0.1, 0.45) * gap
             if self.rng.random() < 0.6 and radius > 0.015:
                 fields = {
                     name: getattr(self.segments[i], name)
@@ -225,10 +225,10 @@ def _reach(draw: _Draw) -> None:
         draw.add(draw.shifted(0.05 * draw.size), LINEAR)
     x, y, z = draw.pose.position
     out = np.array((x, y, z - draw.arm.geometry.d[0]))
-    way = draw.rng.uniform(-0.02, 0.12) * draw.size * out / np.linalg.norm(out)
+    step = draw.rng.uniform(-0.02, 0.12) * draw.size * out / np.linalg.norm(out)
     side = 0.1 * draw.size * draw.direction()
     draw.add(
-        Pose(tuple(np.array((x, y, z)) + way + side), draw.turn(0.2, draw.pose.quaternion)),
+        Pose(tuple(np.array((x, y, z)) + step + side), draw.turn(0.2, draw.pose.quaternion)),
         (*STRAIGHT, JOINT)[draw.rng.integers(6)],
     )
     if draw.rng.random() < 0.3:
@@ -279,9 +279,9 @@ def _through_the_wrist(draw: _Draw) -> None:
         tuple(draw.direction() * 10.0 ** draw.rng.uniform(-5.0, -1.0))
     )
     tilted = multiply(tilt, middle.quaternion)
-    way = draw.rng.uniform(0.04, 0.15) * draw.size * draw.direction()
-    draw.place_arm_at(Pose(tuple(np.array(middle.position) - way), tilted), q)
-    draw.add(Pose(tuple(np.array(middle.position) + way), tilted))
+    step = draw.rng.uniform(0.04, 0.15) * draw.size * draw.direction()
+    draw.place_arm_at(Pose(tuple(np.array(middle.position) - step), tilted), q)
+    draw.add(Pose(tuple(np.array(middle.position) + step), tilted))
 
 
 def _column(draw: _Draw) -> None:

@@ -5,7 +5,7 @@ A cell in virtual time: simulated controller, robot loop, and its owner, in one 
 
 The robot loop is the one of the driver with all its sockets, the controller the one behind
 ``ur-cartesian sim``; only time and network are those of :mod:`virtual_network`. Cycles take 8 ms,
-as those of a CB3 robot, because the tests pay for each.
+as those of a CB3 robot, because each costs computing time.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ NODE_TIMEOUT = 0.4
 OWNER_PORT = 1
 REVERSE, SENDER, TRAJECTORY, COMMANDS = 50001, 50002, 50003, 50004
 RTDE, PRIMARY, DASHBOARD = 30004, 30001, 29999
-#: What the pendant shows where somebody has installed the External Control node.
+#: Program on the pendant that contains the External Control node.
 PENDANT_PROGRAM = 'external_control.urp'
 
 
 class CellMotion:
-    """A goal on its way, as its owner sees it."""
+    """A goal that was started, as its owner sees it."""
 
     def __init__(self):
         self.outcome = None
@@ -74,7 +74,7 @@ class Owner:
         self.status = DriverStatus()
         self.statuses = []
         self.motions = {}
-        #: To points that were appended.
+        #: Answers to appended points.
         self.answers = []
         self.log = []
         self.silent = False
@@ -82,17 +82,17 @@ class Owner:
 
     async def serve(self, reader, writer):
         self._writer = writer
-        beat = asyncio.ensure_future(self._beat())
+        heartbeat = asyncio.ensure_future(self._send_heartbeats())
         try:
             while True:
                 (size,) = LENGTH.unpack(await reader.readexactly(LENGTH.size))
-                self._take(unpack(await reader.readexactly(size)))
+                self._handle(unpack(await reader.readexactly(size)))
         except asyncio.IncompleteReadError:
             pass  # the loop has ended
         finally:
-            beat.cancel()
+            heartbeat.cancel()
 
-    async def _beat(self):
+    async def _send_heartbeats(self):
         while True:
             if not self.silent:
                 self.send(OwnerHeartbeat())
@@ -110,7 +110,7 @@ class Owner:
         self.send(StartMotion(motion=number, job=job, points=points, **more))
         return motion
 
-    def extend(self, points, append_job):
+    def append(self, points, append_job):
         self.send(AppendToMotion(motion=len(self.motions), points=points, append_job=append_job))
 
     def cancel(self):
@@ -119,7 +119,7 @@ class Owner:
     def hang_up(self):
         self._writer.close()
 
-    def _take(self, notification):
+    def _handle(self, notification):
         match notification:
             case StatusChanged(status=status):
                 self.status = status
@@ -137,7 +137,7 @@ class Owner:
 
 
 class RobotCell:
-    """Everything, between two looks at it; used inside :func:`run_cell`."""
+    """Simulated controller, robot loop and owner; used inside :func:`run_cell`."""
 
     def __init__(self, loop, *, headless, settings):
         self.loop, self.headless = loop, headless
@@ -146,7 +146,7 @@ class RobotCell:
         self.robot = self.robot_task = self.loop_task = self.memory = self._pipe = None
         self.config = None
         #: Connections of other clients.
-        self.guests = []
+        self.other_clients = []
 
     # ---- life ---------------------------------------------------------------------------------
 
@@ -197,7 +197,7 @@ class RobotCell:
         await asyncio.sleep(0)
 
     async def crash_robot(self):
-        """Let the controller die with all its sockets; the arm stands where it is then."""
+        """Crash the controller with all its sockets; the arm stays where it is."""
         self.robot.controller.power_off()  # brakes hold what no controller moves
         self.robot_task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
@@ -247,7 +247,7 @@ class RobotCell:
 
     async def until(self, condition, bound=2.0, purpose=''):
         """
-        Wait for a condition, which is looked at twice in each cycle; return the time it took [s].
+        Wait for a condition, checked twice in each cycle; return the time it took [s].
 
         :raises AssertionError: it does not hold within the bound [s].
         """
@@ -261,7 +261,7 @@ class RobotCell:
         return self.loop.time() - begin
 
     def control_messages(self, first=0):
-        """Return what the driver has said on the reverse socket, beginning with a message."""
+        """Return the messages that the driver sent on the reverse socket, from an index on."""
         (end,) = self.loop.open_ends(REVERSE)
         data = end.received
         return [

@@ -5,7 +5,7 @@ A simulated robot that runs our program, without network and without time.
 
 The bytes are those that the driver sends, the program is the one that it uploads, and the
 controller is the one behind ``ur-cartesian sim``; only the sockets are lists, and a cycle passes
-when somebody asks for it. So a motion costs what its cycles cost, and nothing else.
+when a test steps it. So a motion costs the computing time of its cycles, and nothing else.
 """
 
 from dataclasses import dataclass
@@ -28,8 +28,8 @@ from ur_cartesian_driver.sim.sockets.script_sockets import MemorySockets
 from ur_cartesian_driver.sim.state.power_and_safety import OPERATIONAL, SafetyEvent
 
 REVERSE, TRAJECTORY, COMMAND = 1, 2, 3
-#: What the controller may say while all is well: that a movep is slower than asked for.
-HARMLESS = 'C196A0:'
+#: Message that is no failure: a movep is slower than requested.
+IGNORED_MESSAGE = 'C196A0:'
 #: No motion of a test takes longer [s].
 MAX_MOTION_TIME = 5000.0
 
@@ -38,17 +38,17 @@ MAX_MOTION_TIME = 5000.0
 class ProgramRun:
     """How a trajectory ended."""
 
-    #: What the controller said when it stopped; empty if the trajectory was run to its end.
-    trouble: str
-    #: What the robot program said at the end, if it came to that.
+    #: Messages of the controller when it stopped; empty = it ran to the end.
+    failure: str
+    #: Result that the robot program reported, if any.
     result: TrajectoryResult | None
-    #: Where the arm stands then [rad], and where the controller says that its TCP is.
+    #: Joint positions at the end [rad], and the TCP pose that the controller reports.
     q: tuple
     pose: Pose
-    #: Every target on the way: joint positions (n, 6) [rad], and the pose of the TCP to each.
+    #: Targets of all cycles: joint positions (n, 6) [rad], and TCP poses.
     joints: np.ndarray
     poses: list
-    #: Time that it took [s].
+    #: Duration [s].
     duration: float
 
 
@@ -102,7 +102,9 @@ class RobotInMemory:
             target_tcp_pose=motion.T_base_tcp,
         )
 
-    def run(self, primitives, *, data=None, announced=None, on_cycle=lambda controller: None):
+    def run(
+        self, primitives, *, data=None, announced_count=None, on_cycle=lambda controller: None
+    ):
         """
         Send the primitives as the driver does, and wait for the end of the motion.
 
@@ -113,7 +115,7 @@ class RobotInMemory:
         self._command(
             trajectory(
                 TrajectoryAction.START,
-                len(primitives) if announced is None else announced,
+                len(primitives) if announced_count is None else announced_count,
                 read_timeout=0,
             )
         )
@@ -131,10 +133,12 @@ class RobotInMemory:
             if ended or motion.fault is not None or not self.controller.programs.running:
                 break
             assert self.controller.time - begun < MAX_MOTION_TIME, f'{primitives} do not end'
-        log = [line for line in self.controller.messages.log if not line.startswith(HARMLESS)]
+        log = [
+            line for line in self.controller.messages.log if not line.startswith(IGNORED_MESSAGE)
+        ]
         failed = ended != [TrajectoryResult.SUCCESS] or log
         return ProgramRun(
-            trouble='; '.join(log) or str(ended) if failed else '',
+            failure='; '.join(log) or str(ended) if failed else '',
             q=motion.q,
             result=ended[0] if ended else None,
             pose=motion.T_base_tcp,

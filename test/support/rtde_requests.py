@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Requests of an RTDE client, written by hand: the codec is not its own witness."""
+"""Requests of an RTDE client, written by hand so that the codec does not test itself."""
 
 import struct
 

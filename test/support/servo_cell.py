@@ -90,7 +90,7 @@ class GuideCell:
         self.joints.append(self.q)
         for event in self._client.feed(b''.join(self._session.packages())):
             if isinstance(event, DataReceived):
-                self._inbox.append(feedback_of(event.values))
+                self._inbox.append(servo_feedback(event.values))
         while len(self._inbox) > delay:
             feedback = self._inbox.popleft()
             row = take(feedback)
@@ -102,7 +102,7 @@ class GuideCell:
         return self.controller.time
 
 
-def feedback_of(values):
+def servo_feedback(values):
     """Return a packet of :data:`OUTPUTS` as what it means."""
     timestamp, scaling, state, mode, sequence, lag, done, repeats, skipped, size, over = values
     return ServoFeedback(

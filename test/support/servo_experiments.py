@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The two experiments of the servoj guide, and what becomes of the lag.
+The two experiments of the servoj guide: set-points without and with a buffer.
 
 The tool goes up and down along the vertical axis, again and again, with the set-points at the rate
 of the packets or as our loop makes them, on the simulated controller at two positions of the speed
@@ -27,7 +27,7 @@ from ur_cartesian_driver.protocol.program.registers import ServoMode, SyncState
 UNBUFFERED = GUIDE.with_name('servoj_unbuffered.script')
 #: How far up the tool goes [m], and how long there and back takes [s].
 HEIGHT, PERIOD = 0.1, 2.0
-#: So many other set-points servoj may be told before the next one of ours.
+#: Number of other set-points that servoj may get before the next one of ours.
 AHEAD = 200
 #: Set-points of one period are computed once.
 ROWS = round(PERIOD / CYCLE)
@@ -47,7 +47,7 @@ def up_and_down(home):
 
 
 class UpAndDown:
-    """Set-points of as many periods as one likes, or without end."""
+    """Set-points of a number of periods, or without end."""
 
     def __init__(self, rows, periods=np.inf):
         self._rows, self._end, self._step = rows, periods * len(rows), 0.0
@@ -67,7 +67,7 @@ class UpAndDown:
 
 @dataclass
 class Result:
-    """What was seen in each cycle: time [s], wanted and real joints (n, 6) [rad], lag [s]."""
+    """Measurements of each cycle: time [s], wanted and actual joints (n, 6) [rad], lag [s]."""
 
     times: np.ndarray
     wanted: np.ndarray
@@ -85,20 +85,20 @@ class Result:
 
 
 class Experiment:
-    """A robot with one of the programs, and what servoj is told there."""
+    """A robot with one of the programs, and the set-points that its servoj gets."""
 
     def __init__(self, program):
         self.cell = GuideCell(program)
         self.rows = up_and_down(self.cell.q)
         self.now, self.in_flight = self.cell.q, lambda: 0.0
-        self.wanted, self.lag, self.written, self._told = [], [], [], []
+        self.wanted, self.lag, self.written, self._received = [], [], [], []
         motion = self.cell.controller.motion
-        carry_out = motion.servoj
+        original = motion.servoj
 
         def servoj(q, *settings):
-            if not self._told or self._told[-1] != q:
-                self._told.append(q)
-            return carry_out(q, *settings)
+            if not self._received or self._received[-1] != q:
+                self._received.append(q)
+            return original(q, *settings)
 
         patched: Any = motion
         patched.servoj = servoj  # records the set-points of the program, changes nothing
@@ -117,9 +117,9 @@ class Experiment:
     def result(self):
         actual = np.array(self.cell.joints)
         skipped, at = 0, 0
-        for row in map(tuple, self.written):  # what servoj was told is in this order too
-            found = row in self._told[at : at + AHEAD]
-            at += self._told[at : at + AHEAD].index(row) + 1 if found else 0
+        for row in map(tuple, self.written):  # servoj got them in this order too
+            found = row in self._received[at : at + AHEAD]
+            at += self._received[at : at + AHEAD].index(row) + 1 if found else 0
             skipped += not found
         return Result(
             CYCLE * np.arange(len(actual)),
@@ -132,7 +132,7 @@ class Experiment:
 
 
 def unbuffered(slider: float, seconds: float, late: int = 0) -> Result:
-    """Write a set-point for each packet, whatever the robot makes of it."""
+    """Write a set-point for each packet without feedback from the robot."""
     experiment = Experiment(UNBUFFERED)
     experiment.cell.controller.set_slider(slider)
 
@@ -156,7 +156,7 @@ def unbuffered(slider: float, seconds: float, late: int = 0) -> Result:
 
 
 def buffered(slider: float, seconds: float, late: int = 0, *, closed_loop: bool = True) -> Result:
-    """Let our side stream to the guide's sample program."""
+    """Stream set-points to the guide's sample program with our servo."""
     experiment = Experiment(GUIDE)
     source = UpAndDown(experiment.rows)
     stream = (
@@ -177,7 +177,7 @@ def buffered(slider: float, seconds: float, late: int = 0, *, closed_loop: bool 
 
     experiment.in_flight = lambda: stream.in_flight
     experiment.run(take, seconds, late)
-    # What is still under way is not skipped.
+    # Set-points still in flight are not skipped.
     left = round(stream.in_flight / CYCLE) + 2
     experiment.written = source.given[:-left]
     return experiment.result()

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings of a motion that nobody made: two points on a line, and the arm 1 mm beside it."""
+"""Synthetic recordings: a motion along two points on a line, the arm 1 mm beside it."""
 
 import json
 import os
@@ -39,7 +39,7 @@ def path(first, last, point):
     )
 
 
-ORDER = MotionJob(
+JOB = MotionJob(
     points=2,
     duration=4.0,
     reference=ReferencePath(
@@ -52,7 +52,7 @@ ORDER = MotionJob(
     ),
 )
 METADATA = motion_metadata(
-    ORDER,
+    JOB,
     robot={'model': 'ur5e'},
     parameters=DriverConfig(),
     plan_metadata_json=json.dumps({'report': ['point 0: there'], 'planning': {'x': 1}}),
@@ -93,7 +93,7 @@ class Warnings(list):
         self.append(text)
 
 
-def keep_pace(recorder):
+def wait_for_writer(recorder):
     """Wait for the writer: packets come much faster here than from a robot."""
     while recorder._directory and recorder._free_buffers.empty():
         os.sched_yield()
@@ -114,9 +114,9 @@ def record(
     recorder = Recorder(str(directory), max_size, warnings)
     for i, state in enumerate(packets):
         if i == 0:
-            recorder.start(ORDER, dict(metadata), state)
+            recorder.start(JOB, dict(metadata), state)
         else:
-            keep_pace(recorder)
+            wait_for_writer(recorder)
             recorder.add_state(state, *where(i))
         between(recorder, i)
     if outcome is not None:

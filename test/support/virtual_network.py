@@ -3,12 +3,12 @@
 """
 An event loop on a clock of its own, with a network in memory.
 
-When nothing is ready its time jumps to the next timer, so a test of minutes takes what its
-computations take, and takes the same way each time. What the code under test asks its loop for,
-timers, connections and listening ports, it gets here; it does not know the difference.
+When nothing is ready, time jumps to the next timer: a test of minutes takes only its computing
+time and runs the same each time. The code under test gets its timers, connections and listening
+ports from this loop and does not notice the difference.
 
-Faults of single connections are made here, between the two ends: :meth:`VirtualLoop.cut`,
-:meth:`~VirtualLoop.freeze` and :meth:`~VirtualLoop.say`.
+Faults of single connections: :meth:`VirtualLoop.cut`, :meth:`~VirtualLoop.freeze` and
+:meth:`~VirtualLoop.inject_data`.
 """
 
 import asyncio
@@ -25,7 +25,7 @@ _FIRST_CLIENT_PORT = 60_001
 
 
 class _SkippingSelector(selectors.DefaultSelector):
-    """Waits for nobody: what it was to wait for passes at once."""
+    """Does not wait: adds the timeout to the virtual time instead."""
 
     loop: 'VirtualLoop'
 
@@ -47,7 +47,7 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         super().__init__(selector)
         selector.loop = self
         self.servers = {}
-        #: Connections that were made: the end that dialled of each.
+        #: Client ends of all connections that were made.
         self.ends = []
 
     def time(self):
@@ -90,27 +90,27 @@ class VirtualLoop(asyncio.SelectorEventLoop):
     # ---- what a test does to a connection ----------------------------------------------------
 
     def open_ends(self, port):
-        """Return the open connections to a port, the end that dialled of each."""
+        """Return the client ends of the open connections to a port."""
         return [end for end in self.ends if end.address[1] == port and not end.is_closing()]
 
     def cut(self, port):
-        """Cut all connections to a port; both sides are told."""
+        """Cut all connections to a port; both sides notice."""
         for end in self.open_ends(port):
             end.abort()
 
     def freeze(self, port):
-        """Deliver nothing any more on the connections to a port, not even their end."""
+        """Deliver nothing more on the connections to a port, not even that they close."""
         for end in self.open_ends(port):
             end.frozen = end.peer.frozen = True
 
     def inject_data(self, port, data):
-        """Let whoever dialled a port say something that he did not say."""
+        """Send data to a port as if its client had sent it."""
         for end in self.open_ends(port):
             end.write(data)
 
 
 class _Server:
-    """A listening port; what asyncio.Server is needed for."""
+    """A listening port, in place of asyncio.Server."""
 
     def __init__(self, loop, factory, port):
         self._loop, self.factory, self._port = loop, factory, port
@@ -128,7 +128,7 @@ class _Server:
 
 
 class _Socket:
-    """As much of a socket as is asked of one."""
+    """The part of a socket's interface that is used."""
 
     def __init__(self, name):
         self._name = name
@@ -148,7 +148,7 @@ class _End(asyncio.Transport):
         self.loop, self.protocol, self.address = loop, protocol, address
         self.peer = None
         self.frozen = False
-        #: All that has arrived here, for a test to look at.
+        #: All bytes that have arrived here, for tests.
         self.received = bytearray()
         self._closing = self._paused = self._is_due = False
         self._inbox = deque()
@@ -164,7 +164,7 @@ class _End(asyncio.Transport):
 
     def write(self, data):
         if not self._closing and data:
-            self.peer._take(bytes(data))
+            self.peer._receive(bytes(data))
 
     def get_write_buffer_size(self):
         return sum(map(len, self.peer._inbox)) if self.peer._paused else 0
@@ -175,7 +175,7 @@ class _End(asyncio.Transport):
     def resume_reading(self):
         if self._paused:
             self._paused = False
-            self._arrange()
+            self._schedule()
 
     def is_reading(self):
         return not self._paused and not self._closing
@@ -184,18 +184,18 @@ class _End(asyncio.Transport):
         if not self._closing:
             self._closing = True
             self.loop.call_soon(self.protocol.connection_lost, None)
-            self.peer._take(b'')
+            self.peer._receive(b'')
 
     abort = close
 
-    def _take(self, data):
-        """Take what the peer has written; no bytes are its end."""
+    def _receive(self, data):
+        """Queue what the peer has written; no bytes mean that it has closed."""
         if self.frozen or self._closing:
             return
         self._inbox.append(data)
-        self._arrange()
+        self._schedule()
 
-    def _arrange(self):
+    def _schedule(self):
         if self._inbox and not self._is_due and not self._paused:
             self._is_due = True
             self.loop.call_soon(self._deliver)
@@ -206,13 +206,13 @@ class _End(asyncio.Transport):
             data = self._inbox.popleft()
             if data:
                 self.received += data
-                hand_over(self.protocol, data)
+                deliver(self.protocol, data)
             elif not self.protocol.eof_received():
                 self.close()
 
 
-def hand_over(protocol, data):
-    """Give a protocol what has arrived, in the way in which it takes it."""
+def deliver(protocol, data):
+    """Deliver data to a protocol, buffered or not."""
     if not isinstance(protocol, asyncio.BufferedProtocol):
         protocol.data_received(data)
         return
@@ -225,7 +225,7 @@ def hand_over(protocol, data):
 
 
 class _ProgramSocket(asyncio.Protocol):
-    """A socket of a robot program; what has arrived waits until the program reads it."""
+    """A socket of a robot program; data waits until the program reads it."""
 
     def __init__(self):
         self.incoming = bytearray()
