@@ -65,10 +65,10 @@ A protective or safeguard stop then holds the goal like a pause. Everything else
 
 MODES_HEAD = """## The other execution modes
 
-The tables above are about goals with execution PRIMITIVES. The following goals meet the same faults
-while they move, wait or end. Faults before the motion, and faults of interfaces that no goal uses,
-do not depend on the execution mode; they are above. A phase in brackets after a fault is the only
-one that is tested.
+The tables above are about goals with execution PRIMITIVES. The following goals meet the same
+faults while they move, wait or end. Faults before the motion, and faults of interfaces that no
+goal uses, do not depend on the execution mode; they are above. A phase in brackets after a fault
+is the only one that is tested.
 
 """
 
@@ -140,9 +140,9 @@ def _cells(row: Row, phases: Sequence[str]) -> Sequence[str]:
     return (
         row.fault + where,
         tell(lambda at: ('goes on, ' if at.waits else '') + at.code.name),
-        tell(lambda at: f'{at.bound:g} s' if _disturbs(at) else 'as without'),
-        tell(lambda at: f'{at.rest:g} s' if _disturbs(at) or at.waits else 'as without'),
-        tell(lambda at: at.then.name),
+        tell(lambda at: f'{at.result_within:g} s' if _disturbs(at) else 'as without'),
+        tell(lambda at: f'{at.rest_within:g} s' if _disturbs(at) or at.waits else 'as without'),
+        tell(lambda at: at.state_after.name),
         tell(lambda at: ', '.join(_needed(at.steps)) or 'nothing'),
     )
 

@@ -166,24 +166,26 @@ async def run_scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
         await check_waiting_goal(cell, goal, row, context)
     elif phase == 'settling' and row.code is ErrorCode.SUCCESSFUL:
         await end_faults(cell)  # what kept it from settling
-    await cell.until(lambda: goal.motion.outcome, row.bound if not row.waits else 2.0, context)
+    await cell.until(
+        lambda: goal.motion.outcome, row.result_within if not row.waits else 2.0, context
+    )
     outcome = goal.motion.outcome
     assert outcome.code is row.code, f'{context}: {outcome}'
     assert outcome.text, context
     await cell.until(
         lambda: cell.at_rest() and goal.is_over(),
-        max(CREEP_TIME, begin + row.rest - cell.loop.time()),
+        max(CREEP_TIME, begin + row.rest_within - cell.loop.time()),
         context,
     )
     goal.record_end()
     if not row.waits:
-        await cell.until(lambda: cell.status.state is row.then, row.then_within, context)
+        await cell.until(lambda: cell.status.state is row.state_after, row.state_within, context)
         assert cell.is_ready() or cell.status.message, context
         if phase == 'settling':
             await end_faults(cell)
         travel = await recover(cell, row.steps)
         assert travel <= row.travel, f'{context}: a joint has moved by {travel} rad'
-    await cell.until(cell.is_ready, row.back, context)
+    await cell.until(cell.is_ready, row.ready_within, context)
     await return_home(cell, home, context)
     goal.check_result(row, phase)
     return goal.motion.ended_at - begin
@@ -191,7 +193,7 @@ async def run_scenario(cell: RobotCell, row: Row, phase: str, kind=BlendGoal):
 
 async def check_waiting_goal(cell, goal, row, context):
     """Check that a goal waits for an operator, then do the steps after which it goes on."""
-    await cell.until(cell.at_rest, row.rest, context)
+    await cell.until(cell.at_rest, row.rest_within, context)
     await cell.sleep(WATCH_TIME)
     assert goal.motion.outcome is None, context
     assert cell.at_rest(), context

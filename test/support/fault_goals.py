@@ -359,7 +359,7 @@ class OutputGoal(BlendGoal):
             assert now == [not value for value in self._before], here
         else:
             assert now == self._at_end, here
-            assert row.bound > IMMEDIATE_END or now == self._at_fault, here
+            assert row.result_within > IMMEDIATE_END or now == self._at_fault, here
 
     @staticmethod
     def _outputs(cell):

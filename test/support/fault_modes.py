@@ -133,7 +133,7 @@ def _times(row: Row, undisturbed: float, differing: dict[str, Any]) -> dict[str,
     """Return the differences with the times of a goal that is not disturbed."""
     if row.code is not E.SUCCESSFUL or row.waits:
         return differing
-    return differing | {'bound': undisturbed, 'rest': undisturbed}
+    return differing | {'result_within': undisturbed, 'rest_within': undisturbed}
 
 
 def _mode(
@@ -207,14 +207,14 @@ SETPOINTS = (
         fault='the connection of the set-points is half-open',
         cause=('freeze set-points',),
         code=E.PROGRAM_STOPPED,
-        bound=0.7,
-        rest=0.7,
-        then=S.CONNECTED,
+        result_within=0.7,
+        rest_within=0.7,
+        state_after=S.CONNECTED,
         steps=('wait until it is over', 'resend'),
         differs={
             'cancelling': {
                 'code': E.CANCELLED,
-                'then': S.READY,
+                'state_after': S.READY,
                 'steps': ('wait until it is over',),
             }
         },
@@ -223,10 +223,10 @@ SETPOINTS = (
         fault='RTDE is 0.05 s late',
         cause=('delay rtde 0.05 s',),
         code=E.SUCCESSFUL,
-        bound=4.0,
-        rest=4.0,
+        result_within=4.0,
+        rest_within=4.0,
         steps=('wait until it is over',),
-        differs={'cancelling': {'code': E.CANCELLED, 'bound': 0.7, 'rest': 0.7}},
+        differs={'cancelling': {'code': E.CANCELLED, 'result_within': 0.7, 'rest_within': 0.7}},
     ),
     Row(
         fault='another client has taken the inputs that set-points need',
@@ -240,18 +240,18 @@ SETPOINTS = (
 #: Nothing has moved, and the goal ends because the robot does not answer.
 _NOT_ENTERED = {'entering': {'code': E.ROBOT_NOT_READY}}
 #: The program has read the cancellation and the arm is at rest: the goal has ended.
-_STAYS_PAUSED = {'cancelling': {'bound': 0.7, 'steps': ('play',)}}
+_STAYS_PAUSED = {'cancelling': {'result_within': 0.7, 'steps': ('play',)}}
 #: No set-points arrive, so the robot program brakes and ends; then the driver notices that the
 #: robot is silent.
 _SILENT = {
     '': {
         'code': E.PROGRAM_STOPPED,
-        'bound': 0.7,
-        'rest': 0.7,
-        'then': S.DISCONNECTED,
-        'then_within': 1.5,
+        'result_within': 0.7,
+        'rest_within': 0.7,
+        'state_after': S.DISCONNECTED,
+        'state_within': 1.5,
         'steps': ('wait for the robot', 'resend'),
-        'back': 3.0,
+        'ready_within': 3.0,
     }
 }
 
@@ -275,7 +275,7 @@ SERVO = _mode(
         'RTDE is silent for 1.5 s': _SILENT,
         'garbage on RTDE': _SILENT,
         "the program's answers are lost": {
-            '': {'code': E.SUCCESSFUL, 'then': S.READY, 'steps': ('wait until it is over',)}
+            '': {'code': E.SUCCESSFUL, 'state_after': S.READY, 'steps': ('wait until it is over',)}
         },
         'the reverse socket is half-open': {'slowing down': {'code': E.SUCCESSFUL}},
         'the node is silent': {'slowing down': {'code': E.SUCCESSFUL}},
@@ -301,7 +301,7 @@ OUTPUTS = _mode(
     'after the end. When a goal does not succeed, pending outputs do not switch.',
     {
         'before the trigger pose': 'before the output at the second blend',
-        'before the time': 'the arm is at rest at the last point, the last output has not switched',
+        'before the time': 'the arm is at rest at the last point, an output is pending',
         'cancelling': 'CANCEL is on the wire, the arm still moves',
     },
     2.0,

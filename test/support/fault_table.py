@@ -24,7 +24,7 @@ PHASES = {
     'mid-segment': 'on the straight part of the second segment',
     'in a blend': 'in the blend at the first point',
     'last point': 'on the second half of the way to the last point',
-    'settling': 'the robot program has reported the end, the arm is still outside the goal tolerance',
+    'settling': 'the robot program has reported the end, the arm is outside the goal tolerance',
     'cancelling': 'CANCEL is on the wire, the arm still moves',
 }
 BEFORE = ('idle', 'planning')
@@ -42,19 +42,19 @@ class Row:
     #: Result of the goal.
     code: ErrorCode
     #: Longest time from the fault, or from sending the goal if later, to the result.
-    bound: float = 0.3
+    result_within: float = 0.3
     #: Longest time from the fault until the arm is at rest.
-    rest: float = 0.5
+    rest_within: float = 0.5
     #: Whether the goal waits, and goes on after the steps.
     waits: bool = False
     #: State of the connection after the end of the goal, before the steps.
-    then: ConnectionState = S.READY
+    state_after: ConnectionState = S.READY
     #: Longest time until that state.
-    then_within: float = 0.3
+    state_within: float = 0.3
     #: Steps of an operator until the next goal can run.
     steps: tuple[str, ...] = ()
     #: Longest time from the last step until the driver is ready.
-    back: float = 1.5
+    ready_within: float = 1.5
     #: Largest joint travel during the steps [rad].
     travel: float = 0.0
     #: The only phases that are tested; empty = all.
@@ -75,7 +75,7 @@ def _in(phases: tuple[str, ...], **changes: Any) -> dict[str, dict[str, Any]]:
 REFUSED = _in(BEFORE, code=E.ROBOT_NOT_READY)
 CANCELLED = _in(('cancelling',), code=E.CANCELLED)
 #: Times of a goal that the fault does not disturb.
-UNDISTURBED: dict[str, Any] = {'bound': 1.2, 'rest': 1.2}
+UNDISTURBED: dict[str, Any] = {'result_within': 1.2, 'rest_within': 1.2}
 POWER_UP = ('power on', 'release the brakes')
 
 
@@ -86,7 +86,7 @@ def _safety(fault: str, cause: str, code: ErrorCode, *steps: str, play: bool = T
         fault=fault,
         cause=(cause,),
         code=code,
-        then=S.STOPPED,
+        state_after=S.STOPPED,
         steps=(*steps, 'play', 'resend'),
         differs=_in(BEFORE, **before),
     )
@@ -99,7 +99,7 @@ def _harmless(fault: str, *cause: str, steps: tuple[str, ...] = ()) -> Row:
         code=E.SUCCESSFUL,
         **UNDISTURBED,
         steps=steps,
-        differs=_in(('cancelling',), code=E.CANCELLED, bound=0.7, rest=0.7),
+        differs=_in(('cancelling',), code=E.CANCELLED, result_within=0.7, rest_within=0.7),
     )
 
 
@@ -108,7 +108,7 @@ def _hangs_up(fault: str, cause: str) -> Row:
         fault=fault,
         cause=(cause,),
         code=E.PROGRAM_STOPPED,
-        then=S.CONNECTED,
+        state_after=S.CONNECTED,
         steps=('resend',),
         differs=REFUSED,
     )
@@ -119,8 +119,8 @@ UNSEEN_STOP = Row(
     fault='protective stop that the driver does not see',
     cause=('drop rtde for 0.3 s', 'protective_stop'),
     code=E.CONNECTION_LOST,
-    then=S.STOPPED,
-    then_within=1.5,
+    state_after=S.STOPPED,
+    state_within=1.5,
     steps=('unlock', 'play'),
     differs=REFUSED,
 )
@@ -150,7 +150,7 @@ HEADLESS = (
         fault='somebody stops the program',
         cause=('stop',),
         code=E.PROGRAM_STOPPED,
-        then=S.CONNECTED,
+        state_after=S.CONNECTED,
         steps=('play', 'resend'),
         differs=REFUSED,
     ),
@@ -158,7 +158,7 @@ HEADLESS = (
         fault='somebody switches the arm off',
         cause=('power_off',),
         code=E.PROGRAM_STOPPED,
-        then=S.CONNECTED,
+        state_after=S.CONNECTED,
         steps=(*POWER_UP, 'play', 'resend'),
         differs=REFUSED,
     ),
@@ -166,8 +166,8 @@ HEADLESS = (
         fault="another client's program replaces ours",
         cause=('foreign_motion z 0.02',),
         code=E.PROGRAM_STOPPED,
-        then=S.CONNECTED,
-        rest=2.0,
+        state_after=S.CONNECTED,
+        rest_within=2.0,
         steps=('resend',),
         differs=REFUSED,
     ),
@@ -177,13 +177,13 @@ HEADLESS = (
         code=E.SUCCESSFUL,
         waits=True,
         steps=('play',),
-        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False, then=S.CONNECTED)
+        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False, state_after=S.CONNECTED)
         | {
             'cancelling': {
                 'code': E.CANCELLED,
                 'waits': False,
-                'bound': 3.3,
-                'then': S.CONNECTED,
+                'result_within': 3.3,
+                'state_after': S.CONNECTED,
                 'steps': ('play', 'resend'),
             }
         },
@@ -207,7 +207,7 @@ HEADLESS = (
         fault='the controller crashes',
         cause=('crash',),
         code=E.CONNECTION_LOST,
-        then=S.DISCONNECTED,
+        state_after=S.DISCONNECTED,
         steps=('start the controller', *POWER_UP, 'resend'),
         differs=REFUSED,
     ),
@@ -215,9 +215,9 @@ HEADLESS = (
         fault='the network cable is cut',
         cause=('freeze all',),
         code=E.CONNECTION_LOST,
-        bound=1.3,
-        rest=0.7,
-        then=S.CONNECTED,
+        result_within=1.3,
+        rest_within=0.7,
+        state_after=S.CONNECTED,
         steps=('resend',),
     ),
     *(
@@ -225,8 +225,8 @@ HEADLESS = (
             fault=f'all connections are cut for 0.1 s, {first} first',
             cause=tuple(f'drop {name} for 0.1 s' for name in order),
             code=E.CONNECTION_LOST,
-            then=S.CONNECTED,
-            then_within=1.0,
+            state_after=S.CONNECTED,
+            state_within=1.0,
             steps=('resend',),
             differs=REFUSED,
         )
@@ -240,7 +240,7 @@ HEADLESS = (
         fault='protective stop while the primary interface is down',
         cause=('drop primary for 0.5 s', 'protective_stop'),
         code=E.PROTECTIVE_STOP,
-        then=S.STOPPED,
+        state_after=S.STOPPED,
         steps=('unlock', 'play', 'wait until it is over', 'resend'),
         differs=_in(BEFORE, code=E.ROBOT_NOT_READY, steps=('unlock', 'play')),
     ),
@@ -249,17 +249,17 @@ HEADLESS = (
         fault='RTDE is half-open',
         cause=('half_open rtde',),
         code=E.CONNECTION_LOST,
-        bound=1.3,
-        rest=1.7,
+        result_within=1.3,
+        rest_within=1.7,
     ),
     Row(
         fault='RTDE is silent for 1.5 s',
         cause=('silence rtde for 1.5 s',),
         code=E.CONNECTION_LOST,
-        bound=1.3,
-        rest=1.7,
-        then=S.DISCONNECTED,
-        back=4.0,
+        result_within=1.3,
+        rest_within=1.7,
+        state_after=S.DISCONNECTED,
+        ready_within=4.0,
     ),
     _harmless('RTDE is 0.1 s late', 'delay rtde 0.1 s', steps=('wait until it is over',)),
     _harmless(
@@ -269,18 +269,18 @@ HEADLESS = (
         fault='RTDE carries next to nothing',
         cause=('throttle rtde 300',),
         code=E.CONNECTION_LOST,
-        bound=2.3,
-        rest=2.7,
-        then=S.DISCONNECTED,
+        result_within=2.3,
+        rest_within=2.7,
+        state_after=S.DISCONNECTED,
         steps=('wait until it is over',),
-        back=4.0,
+        ready_within=4.0,
     ),
     Row(
         fault='garbage on RTDE',
         cause=('garbage rtde 64',),
         code=E.CONNECTION_LOST,
-        bound=2.0,
-        rest=2.0,
+        result_within=2.0,
+        rest_within=2.0,
     ),
     _harmless('the primary interface is cut', 'drop primary'),
     _harmless('the primary interface is half-open', 'half_open primary'),
@@ -306,23 +306,23 @@ HEADLESS = (
         fault="the program's sockets are half-open",
         cause=('half_open sockets',),
         code=E.PROGRAM_STOPPED,
-        bound=0.7,
-        rest=0.7,
-        then=S.CONNECTED,
+        result_within=0.7,
+        rest_within=0.7,
+        state_after=S.CONNECTED,
         steps=('resend',),
     ),
     Row(
         fault="the program's answers are lost",
         cause=('silence sockets',),
         code=E.EXECUTION_FAILED,
-        bound=3.5,
-        rest=1.2,
-        then=S.CONNECTED,
+        result_within=3.5,
+        rest_within=1.2,
+        state_after=S.CONNECTED,
         steps=('wait until it is over', 'resend'),
         differs={
             'settling': {
                 'code': E.SUCCESSFUL,
-                'then': S.READY,
+                'state_after': S.READY,
                 'steps': ('wait until it is over',),
             },
             'cancelling': {'code': E.CANCELLED},
@@ -347,9 +347,9 @@ HEADLESS = (
         fault='the reverse socket is half-open',
         cause=('freeze reverse',),
         code=E.PROGRAM_STOPPED,
-        bound=0.7,
-        rest=0.7,
-        then=S.CONNECTED,
+        result_within=0.7,
+        rest_within=0.7,
+        state_after=S.CONNECTED,
         steps=('resend',),
         differs=CANCELLED | {'last point': {'code': E.SUCCESSFUL}},
     ),
@@ -357,12 +357,12 @@ HEADLESS = (
         fault='the trajectory socket is half-open',
         cause=('freeze trajectory',),
         code=E.EXECUTION_FAILED,
-        bound=3.5,
-        rest=1.2,
-        then=S.CONNECTED,
+        result_within=3.5,
+        rest_within=1.2,
+        state_after=S.CONNECTED,
         steps=('resend',),
         differs={
-            'settling': {'code': E.SUCCESSFUL, 'then': S.READY},
+            'settling': {'code': E.SUCCESSFUL, 'state_after': S.READY},
             'cancelling': {'code': E.CANCELLED},
         },
     ),
@@ -371,18 +371,20 @@ HEADLESS = (
         fault='the pose is measured 6 mm off',
         cause=('offset pose z 0.006',),
         code=E.PATH_TOLERANCE_VIOLATED,
-        bound=0.7,
+        result_within=0.7,
         steps=('wait until it is over',),
-        differs=CANCELLED | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'bound': 1.7}},
+        differs=CANCELLED
+        | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'result_within': 1.7}},
     ),
     Row(
         fault='the measured pose drifts off',
         cause=('ramp pose z 0.1',),
         code=E.PATH_TOLERANCE_VIOLATED,
-        bound=0.7,
-        rest=0.7,
+        result_within=0.7,
+        rest_within=0.7,
         steps=('wait until it is over',),
-        differs=CANCELLED | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'bound': 1.7}},
+        differs=CANCELLED
+        | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'result_within': 1.7}},
     ),
     _harmless(
         'the pose is measured with noise of 0.1 mm',
@@ -393,15 +395,16 @@ HEADLESS = (
         fault='the twist is measured 0.5 m/s off for 0.3 s',
         cause=('offset twist z 0.5 for 0.3 s',),
         code=E.PATH_TOLERANCE_VIOLATED,
-        bound=0.7,
-        differs=CANCELLED | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'bound': 1.7}},
+        result_within=0.7,
+        differs=CANCELLED
+        | {'settling': {'code': E.GOAL_TOLERANCE_VIOLATED, 'result_within': 1.7}},
     ),
     Row(
         fault='the node is silent',
         cause=('silent owner',),
         code=E.CANCELLED,
-        bound=0.9,
-        rest=1.0,
+        result_within=0.9,
+        rest_within=1.0,
         steps=('wait until it is over',),
         differs={'last point': {'code': E.SUCCESSFUL}},
     ),
@@ -416,13 +419,13 @@ CONTINUED = tuple(
         code=E.SUCCESSFUL,
         waits=True,
         steps=(step, 'play'),
-        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False, then=S.STOPPED)
+        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False, state_after=S.STOPPED)
         | {
             'cancelling': {
                 'code': E.CANCELLED,
                 'waits': False,
-                'bound': 3.3,
-                'then': S.STOPPED,
+                'result_within': 3.3,
+                'state_after': S.STOPPED,
                 'steps': (step, 'play', 'resend'),
             }
         },
@@ -445,7 +448,7 @@ def _paused_by(fault: str, cause: str, code: ErrorCode, *steps: str) -> Row:
         fault=fault,
         cause=(cause,),
         code=code,
-        then=S.STOPPED,
+        state_after=S.STOPPED,
         travel=0.001,
         steps=(*steps, 'play', 'play'),
         differs=_in(BEFORE, code=E.ROBOT_NOT_READY, steps=(*steps, 'play'), travel=0.0)
@@ -464,7 +467,7 @@ LOCAL = (
         fault='somebody stops the program',
         cause=('stop',),
         code=E.PROGRAM_STOPPED,
-        then=S.CONNECTED,
+        state_after=S.CONNECTED,
         steps=('play',),
         differs=REFUSED,
     ),
@@ -474,14 +477,14 @@ LOCAL = (
         code=E.SUCCESSFUL,
         waits=True,
         steps=('play',),
-        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False, then=S.CONNECTED)
+        differs=_in(BEFORE, code=E.ROBOT_NOT_READY, waits=False, state_after=S.CONNECTED)
         | {
             'cancelling': {
                 'code': E.CANCELLED,
                 'waits': False,
-                'bound': 3.3,
+                'result_within': 3.3,
                 'travel': 0.001,
-                'then': S.CONNECTED,
+                'state_after': S.CONNECTED,
                 'steps': ('play', 'play'),
             }
         },
@@ -490,16 +493,16 @@ LOCAL = (
         fault='the network cable is cut',
         cause=('freeze all',),
         code=E.CONNECTION_LOST,
-        bound=1.3,
-        rest=0.7,
-        then=S.CONNECTED,
+        result_within=1.3,
+        rest_within=0.7,
+        state_after=S.CONNECTED,
         steps=('play',),
     ),
     Row(
         fault="the program's sockets are cut",
         cause=('drop sockets',),
         code=E.PROGRAM_STOPPED,
-        then=S.CONNECTED,
+        state_after=S.CONNECTED,
         steps=('play',),
         differs=REFUSED,
     ),
