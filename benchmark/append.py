@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A goal that is continued for as long as one likes: points sustained, memory, starvation.
+An appendable goal of any length: points per second, memory, starvation.
 
 Producer, planner, robot loop, robot program and simulated controller run in one process on a clock
-that jumps, so the figure is what all of them together cost, and nobody has to wait for the arm.
+that jumps, so the figure is the computing time of all of them, without waiting for the arm.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
 
-#: From point to point, a cycle of the controller [s]; one request has so many, and is made when
-#: less than so many seconds are left.
+#: Time between points, a cycle of the controller [s]; points of one request; time left at which
+#: the next one is sent [s].
 STEP, CHUNK, LEAD_TIME = 0.008, 500, 2.5
-#: The circle: radius [m], time once round [s], and how long it gets faster at its begin [s].
+#: The circle: radius [m], time for one round [s], time of acceleration at its start [s].
 RADIUS, ROUND_TIME, RAMP = 0.05, 4.0, 1.0
-#: How often memory is looked at, in requests.
+#: Requests between two samples of the memory.
 SAMPLE_PERIOD = 20
 
 
@@ -59,7 +59,7 @@ def resident() -> float:
 
 
 async def run_goal(cell: Any, points: int) -> dict[str, Any]:
-    """Run an open goal of so many points; return what was seen."""
+    """Run an appendable goal with a number of points; return the measurements."""
     from append_goals import (  # beside robot_cell, see run()
         AppendMotion,
         clear_network_log,
@@ -116,7 +116,7 @@ async def run_goal(cell: Any, points: int) -> dict[str, Any]:
 
 
 def run(quick: bool, points: int = 50_000) -> Iterator[Figure]:
-    """Carry out an open goal, a piece of a spline in each cycle."""
+    """Run an appendable goal with a spline piece in each cycle."""
     sys.path.insert(0, str(Path(__file__).resolve().parents[1] / 'test' / 'support'))
     from robot_cell import run_cell
 

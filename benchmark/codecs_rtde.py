@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What an RTDE package costs on its way from the controller's values to a robot state."""
+"""Time to pack and unpack an RTDE package, and to make a robot state of it."""
 
 from __future__ import annotations
 

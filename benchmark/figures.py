@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a benchmark reports, how it is printed, and how a function's time is taken."""
+"""Figures of benchmarks: their layout, percentiles, and timing of functions."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from time import perf_counter, strftime
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Figure:
-    """One measured value, beside a baseline of the same run where there is one."""
+    """One measured value, with a baseline of the same run if there is one."""
 
     benchmark: str
     name: str
@@ -77,7 +77,7 @@ def _or_none(value: object) -> object:
 
 
 def machine() -> dict[str, object]:
-    """Return what the figures depend on."""
+    """Return the properties of the machine that the figures depend on."""
     return {
         'date': strftime('%Y-%m-%d'),
         'python': platform.python_version(),

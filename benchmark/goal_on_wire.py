@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How fast the driver reacts: goal to first byte on the wire, cancel request to CANCEL on the wire.
+Reaction times of the driver: from goal to first byte, from cancel request to CANCEL on the wire.
 
 Simulator, relay and driver node are processes of their own, the client is here.
 """
@@ -36,7 +36,7 @@ TIMEOUT = 10.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Times:
-    """When things happened to one goal [ns]."""
+    """Times of the events of one goal [ns]."""
 
     sent: int
     accepted: int
@@ -55,7 +55,7 @@ def run(quick: bool) -> Iterator[Figure]:
     ):
         message = goal_message(POINTS)
         goals = [_one_goal(client, tap, message) for _ in range(4 if quick else 12)]
-    # The first goal finds everything cold (imports, caches): said apart.
+    # The first goal finds everything cold (imports, caches): reported separately.
     yield from _goal_figures(goals)
     yield from _breakdown([_ms(g.accepted, g.first_point) for g in goals[1:]])
     yield from _cancel_figures(goals)

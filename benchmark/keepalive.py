@@ -1,12 +1,12 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Whether the robot hears from the driver while the node is busy with a huge goal.
+Gaps between keepalive messages while the node is busy with a huge goal.
 
 The robot program halts when it has waited for longer than ``robot_receive_timeout`` (200 ms). The
 gaps between messages on the reverse socket are taken from the call that sends the goal until it
 has moved for a while: receiving, conversion and planning hold the node's interpreter, and the
-plan is handed over to the very loop that sends the messages.
+plan goes to the same loop that sends the messages.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def run(quick: bool) -> Iterator[Figure]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Busy:
-    """What happened around the huge goal; times in [ns]."""
+    """Times of the events around the huge goal [ns]."""
 
     sent: int
     accepted: int

@@ -18,9 +18,9 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import Vector6
 
-#: How far each seed is from the solution, in each joint [rad].
+#: Distance of each seed from the solution, in each joint [rad].
 OFF = 0.1
-#: Of pinocchio's iteration: accepted error [m, rad], damping, most steps.
+#: Of pinocchio's iteration: accepted error [m, rad], damping, maximum of steps.
 ACCEPTED, DAMPING, STEPS = 1e-8, 1e-12, 100
 NAME = 'kinematics, per pose'
 
@@ -147,6 +147,6 @@ def _drawn(draw: random.Random, bound: float) -> Vector6:
 
 
 def _moved(q: Vector6, draw: random.Random) -> Vector6:
-    """Return joints that are off by the same amount each, to either side."""
+    """Return joints that are shifted by the same amount each, to either side."""
     a, b, c, d, e, f = (angle + draw.choice((-OFF, OFF)) for angle in q)
     return (a, b, c, d, e, f)

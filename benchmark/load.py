@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What driver and simulator cost at 500 Hz, and how punctual the simulator is.
+Processor time of driver and simulator at 500 Hz, and lateness of the simulator.
 
-An empty loop at 500 Hz, measured first and alone, tells what this machine can do at best.
+An empty loop at 500 Hz, measured first and alone, shows the best that this machine can do.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ POINTS = 1_000
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """Some seconds of a situation."""
+    """Measurements of some seconds in one situation."""
 
     #: By process: part of one core.
     cpu: Mapping[str, float]
@@ -56,7 +56,7 @@ def run(quick: bool) -> Iterator[Figure]:
 
 
 def _sample(cycles: Child, pids: Mapping[str, int], duration: float) -> Sample:
-    """Watch processes for a while; ``cycles`` is the one whose cycles are asked for."""
+    """Measure processes for some time; ``cycles`` is the one whose cycles count."""
     cycles.call('begin')
     begin = time.monotonic()
     used = {name: -cpu_seconds(pid) for name, pid in pids.items()}

@@ -18,14 +18,14 @@ from ur_cartesian_driver.motion.vectors import Vector6
 from ur_cartesian_driver.sim.simulator_config import HOME
 
 MODEL = 'ur5e'
-#: Distance of two points [m]; a block of so many along x and along y.
+#: Distance of two points [m]; points of a block along x and along y.
 STEP = 0.005
 ALONG = 41
 
 
 def meander(points: int) -> Iterator[Pose]:
     """
-    Yield poses that are 5 mm apart: to and fro in x, row by row in y, layer by layer in z.
+    Yield poses that are 5 mm apart: back and forth in x, row by row in y, layer by layer in z.
 
     100,000 of them fill a block of 0.2 m x 0.2 m x 0.3 m around the home position.
     """
@@ -64,7 +64,7 @@ def at_home(arm: Arm) -> RobotState:
 
 
 def calibrated_arm() -> Arm:
-    """Return an arm that is off its model by about a millimetre in every length, and a mrad."""
+    """Return an arm whose DH parameters are off by about a millimetre and a milliradian."""
     model = robot_model(MODEL)
     draw = np.random.default_rng(1)
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""How long checking and planning a goal takes, from our own terms to the plan."""
+"""Time to check and plan a goal, from a `Goal` to the plan."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
-#: Of the corners that are blended [m]; two of them fit between points that are 5 mm apart.
+#: Blend radius [m]; two blends fit between points that are 5 mm apart.
 RADIUS = 0.002
-#: From timed point to point, and to the first one [s].
+#: Time between timed points, and to the first one [s].
 PERIOD = 0.1
 LEAD = 3.0
 

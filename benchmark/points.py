@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How many points the driver encodes, and sends, in a second.
+Points that the driver encodes and sends per second.
 
 Sending is measured through all of the driver (pipe, robot loop, window of points in flight, TCP)
-to a reader that stands for a robot program which runs every point at once: it calls the driver's
-ports, reads, and reports how many points it has begun through the register of the simulated robot.
+to a reader in place of a robot program that runs every point at once: it connects to the driver's
+ports, reads, and reports the points begun through the register of the simulated robot.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ from ur_cartesian_driver.protocol.program.trajectory_points import (
 from ur_cartesian_driver.sim import SimulatedRobot, SimulatorConfig
 
 NAME = 'points a second'
-#: The driver sends at most 500 points that the robot has not begun, and learns of that with each
-#: of 500 RTDE packages a second.
+#: The driver sends at most 500 points that the robot has not begun; each of 500 RTDE packages a
+#: second reports the points begun.
 MAX_RATE = 500 * 500
-#: Runs as long as the reader stands in for it.
+#: Runs while the reader replaces the robot program.
 IDLE_PROGRAM = 'def stand_in():\n  while True:\n    sync()\n  end\nend\n'
 
 
@@ -142,17 +142,17 @@ def _read(connection: Connection) -> None:
 
 
 class FakeRobotProgram:
-    """Stands for the robot program."""
+    """Reads points in place of the robot program."""
 
     def __init__(self, robot: SimulatedRobot, sockets: ExitStack) -> None:
-        """Take the robot in whose name it reports."""
+        """Take the robot for which it reports."""
         self._robot = robot
         self._sockets = sockets
         self._arrived = 0
         self._first = self._last = 0.0
 
     def join(self, ports: dict[str, int]) -> None:
-        """Call the ports in the order of the robot program, and read in the background."""
+        """Connect to the ports in the order of the robot program, and read in the background."""
         self._arrived = 0
         for name in ('trajectory_port', 'script_command_port', 'reverse_port'):
             if name in ports:
@@ -163,7 +163,7 @@ class FakeRobotProgram:
                 ).start()
 
     def times(self, points: int) -> tuple[float, float]:
-        """Return when the first and the last of so many points came."""
+        """Return the arrival times of the first and the last of a number of points."""
         deadline = time.monotonic() + 20.0
         while self._arrived < points * POINT_SIZE and time.monotonic() < deadline:
             time.sleep(0.005)

@@ -3,7 +3,7 @@
 """
 The processes of a measurement: simulated robot, wire tap, empty loop, driver node.
 
-They are children of ours, speak over loopback only, and are gone when their block is left. All of
+They are children of ours, use loopback only, and end with their block. All of
 them read the same clock (``time.monotonic_ns`` is one clock for the whole machine), so times from
 different processes can be subtracted.
 """
@@ -35,7 +35,7 @@ _SPAWN = get_context('spawn')
 
 
 class Child:
-    """A process that answers calls: ``child.call('name', ...)`` returns what it returns there."""
+    """A process that answers calls: ``child.call('name', ...)`` calls a function there."""
 
     def __init__(self, connection: Connection, pid: int) -> None:
         """Take the connection and the process's id."""
@@ -59,7 +59,7 @@ class Child:
 
 
 def answer_calls(connection: Connection, functions: Mapping[str, Callable[..., Any]]) -> None:
-    """Be the other side of :meth:`Child.call`, until it hangs up."""
+    """Serve :meth:`Child.call` until the connection closes."""
     while True:
         try:
             name, arguments = connection.recv()
@@ -70,7 +70,7 @@ def answer_calls(connection: Connection, functions: Mapping[str, Callable[..., A
 
 @contextmanager
 def child(target: Callable[..., None], *arguments: Any) -> Iterator[Child]:
-    """Run ``target(connection, *arguments)`` in a fresh process; it ends when we hang up."""
+    """Run ``target(connection, *arguments)`` in a fresh process until the block is left."""
     ours, theirs = _SPAWN.Pipe()
     process = _SPAWN.Process(target=target, args=(theirs, *arguments), daemon=True)
     process.start()
@@ -89,7 +89,7 @@ def child(target: Callable[..., None], *arguments: Any) -> Iterator[Child]:
 # ---- simulated robot --------------------------------------------------------------------------
 
 
-#: Calls that a simulated robot answers beside the usual ones.
+#: Additional calls of a simulated robot.
 Calls: TypeAlias = Callable[[SimulatedRobot], Mapping[str, Callable[..., Any]]]
 
 
@@ -103,7 +103,7 @@ def simulator(calls: Calls = no_calls, **settings: Any) -> Iterator[Child]:
     """
     Run a simulated robot; calls: ``ports``, ``state``, ``inject``, ``begin``, ...
 
-    :param calls: a function of a module, which adds others.
+    :param calls: a function of a module that adds calls.
     :param settings: fields of its configuration.
     """
     with child(_simulate, calls, settings) as robot:

@@ -3,14 +3,14 @@
 """
 The driver's robot loop with an echo in it, for :mod:`violation_to_cancel`.
 
-It is run in the place of ``ur_cartesian_driver.driver``, with the same arguments, and does the
-same. On the same event loop, in the same thread, it answers one more connection, of the same class
-as the driver's own, in two ways by turns:
+It replaces ``ur_cartesian_driver.driver``, takes the same arguments, and does the same. On the
+same event loop, in the same thread, it serves one more connection, of the same class as the
+driver's own, and answers alternately:
 
-* with as many zeros as CANCEL has bytes: what the interpreter, asyncio and the system take from a
-  packet to an answer, in this very process, if nothing is done in between;
-* with a CANCEL that is encoded, after the packet was read into a ``RobotState``: what any answer
-  takes that depends on what is in the packet, whatever is decided.
+* with as many zeros as CANCEL has bytes: the time of interpreter, asyncio and system from a packet
+  to an answer, in this process, without work in between;
+* with an encoded CANCEL, after reading the packet into a ``RobotState``: the time of any answer
+  that depends on the content of the packet.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ur_cartesian_driver.protocol.rtde.rtde_recipe import Recipe
 from ur_cartesian_driver.robot.rtde.state_recipe import robot_state_from_rtde, STATE_FIELDS
 from ur_cartesian_driver.robot.transport import dial, TcpConnection
 
-#: The variable of the environment that names the port to dial.
+#: Environment variable with the port to connect to.
 PORT = 'BENCHMARK_ECHO_PORT'
 
 
@@ -47,7 +47,7 @@ class Echo:
         self._reads = False
 
     async def open(self) -> None:
-        """Connect to who sends the packets."""
+        """Connect to the sender of the packets."""
         await dial(self._connection, HOST, int(os.environ[PORT]))
 
     def _answer(self, data: bytes) -> None:
@@ -56,7 +56,7 @@ class Echo:
 
 
 def _read(data: bytes) -> bytes:
-    """Return a CANCEL, for a robot that reports anything."""
+    """Return CANCEL, whatever the robot reports."""
     values = RECIPE.unpack_frame(data)
     assert values is not None
     robot_state_from_rtde(values)

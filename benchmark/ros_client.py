@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A client of the action that looks at its clock at every step."""
+"""A client of the action that records the time of every step."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class TimedClient:
         rclpy.shutdown(context=self._context)
 
     def wait(self, future: Any, timeout: float = 60.0) -> tuple[Any, int]:
-        """Return what a future brings, and when it came [ns]."""
+        """Return the result of a future, and the time at which it came [ns]."""
         deadline = time.monotonic() + timeout
         while not future.done():
             self._executor.spin_once(timeout_sec=0.5)
@@ -74,7 +74,7 @@ class TimedClient:
         """
         Cancel a goal and wait for its end; return when the request was made [ns].
 
-        :raises RuntimeError: it ended in another way.
+        :raises RuntimeError: it ended otherwise.
         """
         now = time.monotonic_ns()
         request = handle.cancel_goal_async()
@@ -86,7 +86,7 @@ class TimedClient:
 
 
 def goal_message(points: int) -> FollowCartesianTrajectory.Goal:
-    """Return a goal in plain form: poses, nothing else."""
+    """Return a goal message with poses only."""
     goal = FollowCartesianTrajectory.Goal()
     goal.trajectory.points = [
         CartesianTrajectoryPoint(pose=_message(pose)) for pose in paths.meander(points)

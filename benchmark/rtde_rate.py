@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What an RTDE client gets in real time: every cycle once, at the right rate, how late.
+Packages of an RTDE client in real time: completeness, rate and lateness.
 
-The arm moves all the time. An empty loop at 500 Hz runs beside the simulator, so that what the
-machine does to both can be told from what the simulator does.
+The arm moves all the time. An empty loop at 500 Hz runs in parallel, which separates delays of the
+machine from those of the simulator.
 """
 
 from __future__ import annotations
@@ -46,20 +46,20 @@ end
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """The packages of a while: the controller's clock in them, ours at their arrival [s]."""
+    """Received packages: controller time and arrival time of each [s]."""
 
     stamps: list[float]
     arrivals: list[float]
 
 
 def run(quick: bool, seconds: float) -> Iterator[Figure]:
-    """Listen for a time [s] to a simulator in motion."""
+    """Receive from a simulator in motion for a time [s]."""
     duration = QUICK_SECONDS if quick else seconds
     with empty_loop() as loop, simulator() as robot:
         robot.call('run_script', _MOVING)
         with socket.create_connection((HOST, robot.call('ports').rtde), timeout=5.0) as wire:
             packages = _packages(wire)
-            for _ in range(250):  # until all that is slow only once has happened
+            for _ in range(250):  # until everything that is slow only once is over
                 next(packages)
             for process in (loop, robot):
                 process.call('begin')
@@ -79,7 +79,7 @@ def run(quick: bool, seconds: float) -> Iterator[Figure]:
 
 
 def _packages(wire: socket.socket) -> Iterator[tuple[float, float]]:
-    """Yield the clock of each package and when it came; those that come in one piece together."""
+    """Yield controller time and arrival time of each package."""
     client = RtdeClientCodec(_OUTPUTS)
     wire.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     wire.sendall(client.start())
@@ -132,7 +132,7 @@ def _rate(received: Received) -> Iterator[Figure]:
 
 
 def _drift(received: Received) -> float:
-    """Return how much later [s] the last tenth comes than the first, at their earliest."""
+    """Return the drift [s]: earliest lateness of the last tenth, minus that of the first."""
     behind = [b - a for a, b in zip(received.stamps, received.arrivals, strict=True)]
     tenth = max(1, len(behind) // 10)
     return min(behind[-tenth:]) - min(behind[:tenth])

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Measure, and print a table; README.md says what each figure means.
+Run the benchmarks and print a table; README.md explains the figures.
 
 ::
 
@@ -22,9 +22,9 @@ import time
 
 from figures import as_json, Figure, machine, table
 
-#: Those that are told how much to measure; soak and open goal are no part of a usual run.
+#: Benchmarks whose size is an option; soak and append are no part of a usual run.
 RTDE_RATE, SOAK, APPEND = 'rtde_rate', 'soak', 'append'
-#: In the order of the table: what is measured with many processes first.
+#: In the order of the table: those with many processes first.
 MODULES = (
     'goal_on_wire',
     'violation_to_cancel',
@@ -42,10 +42,10 @@ MODULES = (
 
 
 def main() -> int:
-    """Run the benchmarks; 1 when one of them could not be carried out."""
+    """Run the benchmarks; return 1 when one of them failed to run."""
     arguments = _parser().parse_args()
     _keep_to_ourselves()
-    # A run that is told to end has to end its processes, as after Ctrl-C.
+    # SIGTERM has to end the child processes too, like Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     begin = time.monotonic()
     print(', '.join(f'{name} {value}' for name, value in machine().items()), flush=True)
@@ -111,7 +111,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _keep_to_ourselves() -> None:
-    """Let no other ROS program on this network, or computer, take part."""
+    """Isolate the run from other ROS programs on this computer and network."""
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 100))
 

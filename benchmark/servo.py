@@ -4,9 +4,8 @@
 Set-points at 500 Hz: SERVO beside the servoJ loop of ``ur-rtde``, on one simulated controller.
 
 Both stream the same joint path, with the same gain and lookahead, one after the other in one run;
-what counts is what ``servoj`` is told there in each cycle. Of each set-point the time on the path
-is known, so it is seen how evenly they follow each other, which were left out, and how far the arm
-is behind what was sent last.
+the set-points that ``servoj`` gets in each cycle are compared. Each has a known time on the path,
+which gives the jitter, the skipped set-points and the lag of the arm behind the newest one.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ from ur_cartesian_driver.motion.primitive import Spline
 from ur_cartesian_driver.sim import SimulatedRobot
 
 NAME = 'set-points at 500 Hz'
-#: ``ur-rtde`` knows only the ports of a real robot, so the simulator has an address of its own.
+#: ``ur-rtde`` uses only the ports of a real robot, so the simulator has an address of its own.
 ROBOT, HERE = '127.0.19.1', '127.0.0.1'
 PORTS = {
     'primary_port': 30001,
@@ -57,7 +56,7 @@ PERCENTILES = (('p50', 50.0), ('p99', 99.0), ('most', 100.0))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetpointStream:
-    """What servoj was told: in which cycle, and where on the path that is [s]; the lags [s]."""
+    """Set-points of servoj: cycle and time on the path of each [s]; lags of the arm [s]."""
 
     cycles: NDArray[np.float64]
     path_times: NDArray[np.float64]
@@ -65,18 +64,18 @@ class SetpointStream:
 
     @property
     def jitter(self) -> list[float]:
-        """How far each set-point is from where an even stream would have it [ms]."""
+        """Deviation of each set-point from an even stream [ms]."""
         off = self.path_times - STEP * self.cycles
         return list(1e3 * np.abs(off - np.median(off)))
 
     def share(self, low: float, high: float) -> float:
-        """Return the share of cycles whose set-point is so many steps after the one before [%]."""
+        """Return the share of cycles with a step between two bounds [%]."""
         steps = np.diff(self.path_times) / (STEP * np.diff(self.cycles))
         return float(100.0 * np.mean((steps > low) & (steps <= high)))
 
 
 def run(quick: bool) -> Iterator[Figure]:
-    """Stream the same path in both ways."""
+    """Stream the same path with both clients."""
     seconds = 3.0 if quick else 10.0
     with simulator(count_servoj, host=ROBOT, **PORTS) as robot:
         ours, spline = _servo(robot, seconds)
@@ -115,7 +114,7 @@ def run(quick: bool) -> Iterator[Figure]:
 
 
 def count_servoj(robot: SimulatedRobot) -> Mapping[str, Callable[..., Any]]:
-    """Return a call that tells what servoj was told, and forgets it."""
+    """Return a call that returns the set-points of servoj since the call before."""
     motion, received = robot.controller.motion, list[tuple[int, tuple[float, ...]]]()
     carry_out = motion.servoj
 
@@ -179,7 +178,7 @@ def spline_of(plan: Plan) -> JointSpline:
 
 
 def _ur_rtde(robot: Child, spline: JointSpline) -> SetpointStream:
-    """Let a process with the other library stream the path."""
+    """Stream the path in a process with the other library."""
     rows = spline.rows(np.arange(0.0, spline.duration + STEP, STEP))[0]
     robot.call('servoj_calls')
     with tempfile.TemporaryDirectory() as folder:
@@ -200,7 +199,7 @@ def _ur_rtde(robot: Child, spline: JointSpline) -> SetpointStream:
 def _measured_stream(robot: Child, spline: JointSpline, lag: float) -> SetpointStream:
     received = robot.call('servoj_calls')
     path_times = _path_time(spline, np.array([q for _, q in received]))
-    # While the arm goes there; it is led back to the start by another program.
+    # Another program moves the arm back to the start meanwhile.
     inner = (path_times > FIRST * spline.duration) & (path_times < LAST * spline.duration)
     return SetpointStream(
         cycles=np.array([float(cycle) for cycle, _ in received])[inner],
@@ -210,7 +209,7 @@ def _measured_stream(robot: Child, spline: JointSpline, lag: float) -> SetpointS
 
 
 def _path_time(spline: JointSpline, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return when the path is at joints, by the joint that moves farthest and never turns."""
+    """Return the times of joints on the path, by the joint that moves most and monotonically."""
     times = np.arange(0.0, spline.duration, 0.5 * STEP)
     rows = spline.rows(times)[0]
     joint = int(np.argmax(np.abs(rows[-1] - rows[0])))
@@ -220,7 +219,7 @@ def _path_time(spline: JointSpline, q: NDArray[np.float64]) -> NDArray[np.float6
 
 
 def _stream_with_ur_rtde(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Be the other client; return joints sent and measured, (2, n, 6)."""
+    """Stream with ur-rtde; return joints sent and measured, (2, n, 6)."""
     from rtde_control import RTDEControlInterface
     from rtde_receive import RTDEReceiveInterface
 

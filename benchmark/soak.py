@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Short goals without end, while somebody cancels, stops the robot and cuts connections.
+Endless short goals with random cancels, stops of the robot and cut connections.
 
 Every goal has to end with a result, and node and robot process must not grow once they are warm.
-The server keeps a goal for 60 s after its end, for clients that ask late, so warm means later than
-that. Same seed, same goals.
+The server keeps a goal for 60 s after its end, for late clients, so warm means later than that.
+The same seed gives the same goals.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
 
 NAME = 'soak'
-#: How long after its end a goal is forgotten [s], and a little more.
+#: Time after which an ended goal is forgotten, and a little more [s].
 WARM = 70.0
-#: No result may take longer [s]: the goal itself, a slider at 0 for a while, a stop, a lost link.
+#: Longest time to a result [s]: the goal, a slider at 0 for a while, a stop, a lost connection.
 RESULT_TIMEOUT = 30.0
 RECOVERY_TIMEOUT = 60.0
 SAMPLE_PERIOD = 2.0
 NOT_READY = ErrorCode.ROBOT_NOT_READY.name
-#: What happens during one in so many goals, as a fault of the simulator; empty = nothing.
+#: Faults of the simulator, and the number of goals per fault; empty = none.
 EVENTS: tuple[tuple[str, int], ...] = (
     ('', 60),
     ('cancel', 15),
@@ -56,7 +56,7 @@ EVENTS: tuple[tuple[str, int], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """What a process holds."""
+    """Memory, threads and descriptors of a process."""
 
     memory: float
     threads: float
@@ -65,7 +65,7 @@ class Footprint:
 
     @classmethod
     def of(cls, pid: int) -> Footprint:
-        """Look at a process (proc(5)); memory [MB]: what is resident."""
+        """Read the footprint of a process (proc(5)); resident memory [MB]."""
         root = Path(f'/proc/{pid}')
         pages = int((root / 'statm').read_text().split()[1])
         mapped = (root / 'maps').read_text()
@@ -96,7 +96,7 @@ class Soak:
         """
         Prepare; :meth:`run` does it.
 
-        :param undisturbed: nothing happens during the goals, and they are as short as can be.
+        :param undisturbed: no faults, and goals as short as possible.
         """
         self._robot, self._client, self._pids = robot, client, pids
         self._undisturbed = undisturbed
@@ -111,7 +111,7 @@ class Soak:
         self._due = 0.0
 
     def run(self, seconds: float, goals: int) -> None:
-        """Send goals for so long, or so many."""
+        """Send goals for a time, or a number of them."""
         begin = time.monotonic()
         while time.monotonic() - begin < seconds and self.outcomes.total() < goals:
             self._sample(time.monotonic() - begin)
@@ -124,7 +124,7 @@ class Soak:
                 self.samples[name].append((now, Footprint.of(pid)))
 
     def _goal(self) -> None:
-        """Run one goal to its end, and see to it that the next one can run."""
+        """Run one goal to its end, and recover so that the next one can run."""
         (event,) = (
             ['']
             if self._undisturbed
@@ -230,7 +230,7 @@ def run(
 
 
 def _growth(name: str, samples: list[tuple[float, Footprint]]) -> Iterator[Figure]:
-    """Compare the last fifth of the time with the first fifth of that in which all was warm."""
+    """Compare the last fifth of the warm time with the first fifth."""
     end = samples[-1][0]
     warm = min(WARM, end / 2.0)
     fifth = (end - warm) / 5.0

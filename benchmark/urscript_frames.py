@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a frame of a URScript program, and a cycle of the simulated controller around it, cost."""
+"""Time of a frame of a URScript program, and of a cycle of the simulated controller."""
 
 from __future__ import annotations
 

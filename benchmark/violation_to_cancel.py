@@ -1,22 +1,21 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-How long a violated tolerance takes to CANCEL, beside an echo of the same process.
+Time from a violated tolerance to CANCEL, compared with an echo of the same process.
 
 Simulator, relay and robot loop are processes of their own. All packets of the robot's state pass
-through the relay, which notes when the first one with a violation in it leaves for the robot loop,
-and when CANCEL comes back. In two of three trials it holds that packet back and sends it over
+through the relay, which records when the first one with a violation leaves for the robot loop, and
+when CANCEL comes back. In two of three trials it holds that packet back and sends it over
 another connection first, to an echo that lives in the robot loop's process, on its event loop
-(:mod:`robot_loop_with_echo`), and answers with as many bytes as CANCEL has: by turns at once, and
-after it has read the packet. So all times are taken between the same two processes, of the same
-packets, at the same moment of a motion: what they differ by is what the driver does with a packet,
-or decides.
+(:mod:`robot_loop_with_echo`), and answers with as many bytes as CANCEL has: alternately at once,
+and after reading the packet. So all times are between the same two processes, of the same packets,
+at the same moment of a motion: they differ by the work of the driver.
 
 That is the driver's part. A violation begins on the other side, in the cycle of the controller in
-which the arm is out of its tolerance, and nobody can answer it before that cycle is computed and
-its packet made. So the simulator notes how long that took, for each cycle, and both times are also
-given from the beginning of the cycle: what the robot waits for an answer. The way from simulator
-to relay counts in neither; it is not there where a robot sends to the driver itself.
+which the arm is out of its tolerance, and no answer is possible before that cycle is computed and
+its packet made. So the simulator records this time for each cycle, and both times are also given
+from the beginning of the cycle: the time that the robot waits for an answer. Neither contains the
+transfer from simulator to relay, which does not exist with a real robot.
 """
 
 from __future__ import annotations
@@ -53,9 +52,9 @@ from ur_cartesian_driver.sim import SimulatedRobot
 from ur_cartesian_driver.sim.interfaces.rtde_session import RtdeSession
 
 NAME = 'violated tolerance'
-#: So far the tool is pushed aside, and so far it may be [m].
+#: Push of the tool, and its tolerance [m].
 PUSH, BOUND = 0.004, 0.002
-#: So many violations of each kind.
+#: Number of violations of each kind.
 TRIALS = 100
 TIMEOUT = 10.0
 #: The robot loop's own.
@@ -67,7 +66,7 @@ ACTUAL, TARGET = STATE_FIELDS.index('actual_TCP_pose'), STATE_FIELDS.index('targ
 
 @dataclass(frozen=True, slots=True)
 class Reaction:
-    """An answer to a packet with a violation in it."""
+    """Answer to a packet with a violation."""
 
     #: The controller's clock in the cycle of the packet [s].
     cycle: float
@@ -78,7 +77,7 @@ class Reaction:
 
 
 def run(quick: bool) -> Iterator[Figure]:
-    """Push the arm off its path again and again."""
+    """Push the arm off its path many times."""
     cancels: list[Reaction] = []
     echoes: list[Reaction] = []
     with (
@@ -112,7 +111,7 @@ def _compare(
     echoes: Sequence[Reaction],
     making: Mapping[float, float],
 ) -> Iterator[Figure]:
-    """Yield the times of both, first without, then with the making of the packet."""
+    """Yield the times of driver and echo, first without, then with making the packet."""
     note = f'{len(cancels)} violations, {len(echoes)} echoes'
     for name, begun in (
         ('packet -> CANCEL on the wire', lambda _: 0.0),
@@ -141,15 +140,15 @@ def _compare(
 
 
 def _in_time(times: Sequence[float]) -> float:
-    """Return how many times are shorter than a cycle [%]."""
+    """Return the share of times shorter than a cycle [%]."""
     return 100.0 * sum(1e-3 * time < PERIOD for time in times) / len(times)
 
 
 def _violate(driver: Driver, robot: Child, home: Pose, trial: int) -> None:
     """
-    Run a goal to and fro until a push ends it.
+    Run a goal back and forth until a push ends it.
 
-    :raises RuntimeError: it ended in another way.
+    :raises RuntimeError: it ended otherwise.
     """
     x, y, z = home.position
     there = Pose((x, y + (0.1 if trial % 2 == 0 else -0.1), z), home.quaternion)
@@ -168,7 +167,7 @@ def _violate(driver: Driver, robot: Child, home: Pose, trial: int) -> None:
 
 
 def _cancelled(relay: Child) -> Reaction:
-    """Return how the first packet with the push in it was answered by CANCEL."""
+    """Return the reaction of the driver to the first packet with the push."""
     cycle, pushed = relay.call('pushed')
     cancel = next(
         m.time
@@ -182,7 +181,7 @@ def _cancelled(relay: Child) -> Reaction:
 
 
 def _note_packets(robot: SimulatedRobot) -> Mapping[str, Callable[[], object]]:
-    """Have the time noted that each packet took from the beginning of its cycle (``making``)."""
+    """Record the time from the beginning of the cycle to each packet (call: ``making``)."""
     making: dict[float, float] = {}
     began = 0
     step, packages = robot.controller.step, RtdeSession.packages
@@ -244,7 +243,7 @@ def _run_relay(connection: Connection, rtde_port: int) -> None:
 
 @contextmanager
 def _echo(relay: Child) -> Iterator[None]:
-    """Have drivers that are made meanwhile run their robot loop with an echo in it."""
+    """Let drivers that start meanwhile run a robot loop with an echo."""
     module, host.MODULE = host.MODULE, robot_loop_with_echo.__name__
     os.environ[robot_loop_with_echo.PORT] = str(relay.call('echo_port'))
     try:
@@ -254,7 +253,7 @@ def _echo(relay: Child) -> Iterator[None]:
 
 
 class RelayWithEcho(Relay):
-    """Passes on the robot's packets too, and tries a violation on the echo first."""
+    """Forwards the robot's packets too; sends a violation to the echo first."""
 
     def __init__(self, rtde_port: int) -> None:
         """
@@ -281,7 +280,7 @@ class RelayWithEcho(Relay):
         self._asks_echo, self.echoed, self.pushed = asks_echo, None, None
 
     def directions(self, name: str) -> tuple[int, str, str]:
-        """Let the robot be called for who calls its port; the echo has called before."""
+        """Connect to the robot for each client of its port; the echo has connected before."""
         if name != 'rtde_port':
             return super().directions(name)
         if self._echo is None:
@@ -290,9 +289,9 @@ class RelayWithEcho(Relay):
         return self._rtde_port, '', name
 
     def forward(self, source: socket.socket, direction: RelayDirection) -> None:
-        """Treat the robot's packets and the echo's answers apart."""
+        """Handle the robot's packets and the echo's answers separately."""
         if direction.port_name == 'rtde_port':
-            with suppress(OSError):  # it has hung up, which its own way tells
+            with suppress(OSError):  # it has hung up; its own direction handles that
                 self._forward_state(source, direction)
         elif direction.port_name == 'echo':
             self._echoed(source)
@@ -303,8 +302,8 @@ class RelayWithEcho(Relay):
         packets, rest = divmod(len(source.recv(65536, socket.MSG_PEEK)), FRAME_SIZE)
         if rest or not packets:
             super().forward(source, direction)  # the handshake, or the end
-        for _ in range(0 if rest else packets):  # several where we were kept from looking
-            self._release()  # the echo is late: the robot loop shall not wait for it
+        for _ in range(0 if rest else packets):  # several when the relay was late
+            self._release()  # the echo is late: do not let the robot loop wait for it
             self._forward_packet(source.recv(FRAME_SIZE), direction)
 
     def _forward_packet(self, data: bytes, direction: RelayDirection) -> None:

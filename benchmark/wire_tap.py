@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A relay between robot program and driver that notes when bytes come from the driver.
+A relay between robot program and driver that records when bytes come from the driver.
 
-The driver listens on 127.0.0.1 and tells the robot program to call 127.0.0.2 (``reverse_ip``, as
-one does behind an address translation); there the relay listens on the same ports and passes
-everything on. It is a process of its own, so that nothing else keeps it from looking at its clock.
+The driver listens on 127.0.0.1, and the robot program connects to 127.0.0.2 (``reverse_ip``, as
+behind a NAT); there the relay listens on the same ports and forwards everything. It is a process
+of its own, so that no other work delays its clock.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ PORTS = ('reverse_port', 'trajectory_port', 'script_command_port')
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """Something came from the driver."""
+    """Bytes that came from the driver."""
 
     #: Of ``time.monotonic_ns``.
     time: int
@@ -83,7 +83,7 @@ def _tap(connection: Connection) -> None:
 
 
 class Relay:
-    """Passes bytes on, both ways, in one thread."""
+    """Forwards bytes in both directions, in one thread."""
 
     def __init__(self) -> None:
         """Listen on free ports."""
@@ -95,13 +95,13 @@ class Relay:
             self.listen(TAP_HOST, name)
 
     def listen(self, host: str, name: str) -> None:
-        """Listen on a free port that is called so."""
+        """Listen on a free port with a name."""
         listener = socket.create_server((host, 0))
         self.ports[name] = listener.getsockname()[1]
         self._selector.register(listener, selectors.EVENT_READ, name)
 
     def directions(self, name: str) -> tuple[int, str, str]:
-        """Return the port that is called for a caller there, and what its and our bytes are."""
+        """Return the port to connect to for a client, and the names of both directions."""
         return self.ports[name], '', name
 
     def take(self) -> list[Mark]:
@@ -110,7 +110,7 @@ class Relay:
         return marks
 
     def run(self) -> None:
-        """Serve for ever."""
+        """Serve forever."""
         while True:
             for key, _ in self._selector.select():
                 sock = key.fileobj
@@ -128,12 +128,12 @@ class Relay:
         self.add_direction(called, caller, answered)
 
     def add_direction(self, source: socket.socket, target: socket.socket, port_name: str) -> None:
-        """Pass on what comes from one socket to the other."""
+        """Forward bytes from one socket to the other."""
         source.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._selector.register(source, selectors.EVENT_READ, RelayDirection(target, port_name))
 
     def forward(self, source: socket.socket, direction: RelayDirection) -> None:
-        """Pass on what has come, or that it was the last."""
+        """Forward received bytes, or the end of the connection."""
         try:
             data = source.recv(65536)
             now = time.monotonic_ns()
@@ -153,7 +153,7 @@ class RelayDirection:
     """One direction of one connection."""
 
     def __init__(self, target: socket.socket, port_name: str) -> None:
-        """Begin with nothing; ``port_name`` is the port's name where it comes from the driver."""
+        """Take the sockets; ``port_name`` is the port's name if the bytes come from the driver."""
         self.target = target
         self.port_name = port_name
         self._messages = ReverseDecoder()

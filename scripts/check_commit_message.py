@@ -30,7 +30,7 @@ def message_lines(text: str) -> list[str]:
 
 
 def problems(text: str) -> list[str]:
-    """Return what is wrong with a commit message, one sentence each."""
+    """Return the errors of a commit message, one sentence each."""
     lines = message_lines(text)
     if not lines:
         return []  # git refuses an empty message itself

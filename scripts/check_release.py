@@ -22,7 +22,7 @@ PLACEHOLDER = re.compile(r'<\w+>|TO BE SET|@(\S+\.)?example\.|\.invalid\b', re.I
 
 
 def problems(root: Path) -> list[str]:
-    """Return what stands in the way of a release of the checkout, one sentence each."""
+    """Return what prevents a release of the checkout, one sentence each."""
     package = ElementTree.parse(root / 'package.xml').getroot()
     return [
         *maintainer_problems(package),
@@ -33,7 +33,7 @@ def problems(root: Path) -> list[str]:
 
 
 def maintainer_problems(package: ElementTree.Element) -> list[str]:
-    """Return a sentence for each maintainer of package.xml that nobody can write to."""
+    """Return a sentence for each maintainer of package.xml that is a placeholder."""
     maintainers = [
         f'{(element.text or "").strip()} <{element.get("email", "")}>'
         for element in package.iter('maintainer')
@@ -46,7 +46,7 @@ def maintainer_problems(package: ElementTree.Element) -> list[str]:
 
 
 def repository_problems(package: ElementTree.Element, root: Path) -> list[str]:
-    """Return what is wrong with the repository's URL, and where documents name another one."""
+    """Return errors of the repository's URL, and documents that name another one."""
     name = package.findtext('name', '')
     url = package.findtext('url[@type="repository"]', '').strip()
     if not url:
@@ -70,7 +70,7 @@ def repository_problems(package: ElementTree.Element, root: Path) -> list[str]:
 
 
 def version_problems(package: ElementTree.Element, root: Path) -> list[str]:
-    """Return where another version is named than in package.xml."""
+    """Return the files whose version differs from package.xml."""
     version = package.findtext('version', '')
     cmake = re.search(r'^project\(\w+ VERSION (\S+)\)', text_of(root / 'CMakeLists.txt'), re.M)
     setup = re.search(r'^ +version=(.+),$', text_of(root / 'setup.py'), re.M)
@@ -89,7 +89,7 @@ def version_problems(package: ElementTree.Element, root: Path) -> list[str]:
 
 
 def changelog_problems(package: ElementTree.Element, root: Path) -> list[str]:
-    """Return what is wrong with CHANGELOG.rst for a release of the version of package.xml."""
+    """Return the errors of CHANGELOG.rst for the version of package.xml."""
     version = package.findtext('version', '')
     _, *parts = re.split(r'^(\S.*)\n-+$', text_of(root / 'CHANGELOG.rst'), flags=re.M)
     sections = dict(zip(parts[::2], parts[1::2], strict=True))

@@ -29,7 +29,7 @@ JOINTS = {1: 'shoulder lift', 2: 'elbow', 3: 'wrist 1'}
 
 
 def main(path: Path) -> None:
-    """Carry out all experiments and draw them."""
+    """Run all experiments and draw them."""
     runs: list[tuple[str, Result]] = []
     for slider in (1.0, 0.5):
         runs.append((f'no buffer, slider {slider:.0%}', unbuffered(slider, SECONDS)))

@@ -22,7 +22,7 @@ from ur_cartesian_driver.robot import lifecycle
 
 DIAGRAMS = Path(__file__).resolve().parents[1] / 'doc' / 'diagrams'
 
-#: What happens in a state, by name: the next state, and a remark.
+#: Transitions by state and event: the next state, and a remark.
 Table: TypeAlias = Mapping[str, Mapping[str, tuple[str, str]]]
 
 
@@ -77,7 +77,7 @@ def servo() -> Table:
 
 
 def page(title: str, source: str, table: Table, events: Sequence[str]) -> str:
-    """Return a page: the diagram, and the whole table with what leaves a state as it is."""
+    """Return a page: the diagram, and the whole table with events that keep the state."""
     return (
         f'# {title}\n\n'
         f'Made by `scripts/make_diagrams.py` from `TRANSITIONS` of\n'

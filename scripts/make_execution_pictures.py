@@ -22,13 +22,13 @@ from typing import Any
 CHECKOUT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(CHECKOUT / 'test' / 'support'))
 
-#: So many colours are enough for lines, and make a picture a quarter as large.
+#: Number of colours: enough for lines, and the file is a quarter as large.
 COLOURS = 64
 
 
 @dataclass(frozen=True, kw_only=True)
 class Picture:
-    """What happens, in a cell in virtual time, and what the picture of it is called."""
+    """A scenario for a cell in virtual time, and the name of its picture."""
 
     title: str
     happens: Callable[[Any], Coroutine[None, None, Any]]
@@ -72,7 +72,7 @@ def a_goal(
 
 
 async def a_late_producer(cell: Any) -> Any:
-    """Go round and round on points that come when half a second is left, but for once."""
+    """Run a circle whose points are appended half a second ahead, once too late."""
     from append_goals import AppendMotion, circle
 
     from ur_cartesian_driver.motion.execution_modes import ExecutionMode
@@ -130,7 +130,7 @@ PICTURES = {
 
 
 def record(picture: Picture, directory: Path) -> Path:
-    """Let it happen and return the recording."""
+    """Run the scenario and return the recording."""
     from robot_cell import run_cell
 
     outcome = run_cell(picture.happens, record_directory=str(directory), io_publish_rate=125.0)
