@@ -8,13 +8,14 @@ the link matrices of a textbook; nothing of the package computes it.
 """
 
 import contextlib
-from math import cos, pi, sin
+from math import pi
 import os
 import signal
-import socket
 
+from forward_model import dh_forward
 import numpy as np
 import pytest
+from robot_ports import fetch_program
 from waiting import wait_for
 
 from ur_cartesian_driver.driver import ConnectionState
@@ -34,29 +35,9 @@ FLANGE = Pose((0.0, 0.0, 0.0), (-0.5, -0.5, -0.5, 0.5))
 QUARTER = pi / 2.0
 
 
-def link_matrix(theta, d, a, alpha):
-    ct, st, ca, sa = cos(theta), sin(theta), cos(alpha), sin(alpha)
-    return np.array(
-        [
-            [ct, -st * ca, st * sa, a * ct],
-            [st, ct * ca, -ct * sa, a * st],
-            [0.0, sa, ca, d],
-            [0.0, 0.0, 0.0, 1.0],
-        ]
-    )
-
-
 def places(geometry, joints, T_flange_frame):
-    """Return where a frame behind the flange was, as matrices (n, 4, 4)."""
-    matrices = []
-    for q in joints:
-        T = np.eye(4)
-        for row in zip(
-            np.add(geometry.theta, q), geometry.d, geometry.a, geometry.alpha, strict=True
-        ):
-            T = T @ link_matrix(*row)
-        matrices.append(T @ T_flange_frame.matrix())
-    return np.array(matrices)
+    """Return the poses of a frame that is fixed to the flange, as matrices (n, 4, 4)."""
+    return np.array([dh_forward(geometry, q) @ T_flange_frame.matrix() for q in joints])
 
 
 def tcp_of(ur_sim):
@@ -297,7 +278,7 @@ def test_without_headless_mode_the_next_program_puts_the_tcp_back_before_a_goal(
     set_tcp(ur_sim, TCP)
     driver = make_driver(headless_mode=False)
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
-    text = served_program(driver)
+    text = wrap_in_program(fetch_program(driver))
     ur_sim.run_script(text)
     driver.wait_ready(5.0)
     motion = moving(driver)
@@ -308,18 +289,6 @@ def test_without_headless_mode_the_next_program_puts_the_tcp_back_before_a_goal(
     driver.wait_ready(5.0)
     assert has_own_tcp(ur_sim, 1e-6)
     assert driver.state.T_flange_tcp.distance_to(TCP) < 1e-6
-
-
-def served_program(driver):
-    """Fetch the robot program as the External Control node does."""
-    end = '# NODE_CONTROL_LOOP_ENDS'
-    with socket.create_connection(('127.0.0.1', driver.status.ports['script_sender_port'])) as s:
-        s.settimeout(5.0)
-        s.sendall(b'request_program\n')
-        text = ''
-        while end not in text:
-            text += s.recv(65536).decode()
-    return wrap_in_program(text)
 
 
 @pytest.mark.ur_sim(frequency=125.0)
@@ -381,7 +350,7 @@ def test_nothing_moves_on_a_robot_that_does_not_take_the_tcp(
     set_tcp(ur_sim, TCP)
     driver = make_driver(headless_mode=False)
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
-    program = served_program(driver)
+    program = wrap_in_program(fetch_program(driver))
     line = 'apply_tcp(pose_at(command, 2), command[8])'
     assert line in program
     ur_sim.run_script(program.replace(line, 'textmsg("no TCP")'))

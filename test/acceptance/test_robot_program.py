@@ -11,6 +11,7 @@ import re
 import socket
 
 import pytest
+from robot_ports import fetch_program
 from waiting import wait_for
 
 from ur_cartesian_driver.motion.errors import ErrorCode
@@ -32,13 +33,7 @@ def served(make_driver):
     """A driver that waits for a program, and the text that it serves."""
     driver = make_driver(headless_mode=False)
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
-    with socket.create_connection(('127.0.0.1', driver.status.ports['script_sender_port'])) as s:
-        s.settimeout(5.0)
-        s.sendall(b'request_program\n')
-        text = ''
-        while END not in text:
-            text += s.recv(65536).decode()
-    return driver, text
+    return driver, fetch_program(driver)
 
 
 def upload(ur_sim, text):

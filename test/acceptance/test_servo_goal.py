@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 
+from example_goals import example_goal, stretch_times
 import numpy as np
 import pytest
 import robot_cell
@@ -23,16 +24,11 @@ from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 from ur_cartesian_driver.planning.spline.spline_points import tool_points
 from ur_cartesian_driver.protocol.program import registers
 from ur_cartesian_driver.protocol.rtde.rtde_client import RtdeClientCodec
-from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.robot.rtde.rtde_connection import RtdeConnection
-from ur_cartesian_driver.ros.client import load_goal
-from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
-from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 ARM = Arm(robot_model('ur5e'))
-FOLDER = share_path() / 'config' / 'examples'
 
 
 class Run:
@@ -47,7 +43,7 @@ class Run:
             ARM,
             PlanningOptions(),
         )
-        take = cell.owner._take
+        take = cell.owner._handle
 
         def tell(notice):
             if isinstance(notice, ServoProgress):
@@ -56,7 +52,7 @@ class Run:
                 self.progress.append(notice.progress)
             take(notice)
 
-        cell.owner._take = tell
+        cell.owner._handle = tell
         self.motion = cell.owner.start(self.made)
 
     def looked(self):
@@ -87,27 +83,6 @@ def straight(seconds=1.0, way=0.1):
     return goal
 
 
-def example(name, factor):
-    def goal(snapshot):
-        made = goal_from_message(
-            load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0, snapshot=ArmSnapshot.of(snapshot)
-        )
-        return replace(
-            made,
-            waypoints=tuple(
-                replace(
-                    point,
-                    time=factor * point.time,
-                    twist=tuple(v / factor for v in point.twist),
-                    acceleration=tuple(a / factor**2 for a in point.acceleration),
-                )
-                for point in made.waypoints
-            ),
-        )
-
-    return goal
-
-
 @pytest.mark.parametrize(
     ('name', 'factor'),
     [
@@ -119,7 +94,7 @@ def test_every_point_is_passed_within_the_lag_that_is_reported(name, factor, mon
     monkeypatch.setattr(robot_cell, 'CYCLE', 0.002)  # of an e-Series
 
     async def scenario(cell):
-        run = Run(cell, example(name, factor))
+        run = Run(cell, lambda state: stretch_times(example_goal(name, state), factor))
         await run.end()
         return run
 

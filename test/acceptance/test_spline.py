@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
+from example_goals import example_goal, stretch_times
 import numpy as np
 import pytest
 import robot_cell
@@ -26,15 +27,10 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.geometry.tool_spline import ToolSpline
 from ur_cartesian_driver.planning.spline.spline_planner import SplineState
 from ur_cartesian_driver.planning.spline.spline_points import tool_points
-from ur_cartesian_driver.resources import share_path
-from ur_cartesian_driver.ros.client import load_goal
-from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
-from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 ARM = Arm(robot_model('ur5e'))
-FOLDER = share_path() / 'config' / 'examples'
 
 
 @dataclass
@@ -66,7 +62,7 @@ class Run:
         return at, np.array([np.interp(at, self.times, v) for v in self.twists.T])
 
 
-def carried_out(goal_from):
+def run_goal(goal_from):
     """Run a goal that is made from where the arm stands."""
 
     async def scenario(cell):
@@ -103,28 +99,6 @@ def run_of(made, outcome, packets):
     )
 
 
-def times_as_long(goal, factor):
-    """Return a goal that goes the same way in so many times the time."""
-    return replace(
-        goal,
-        waypoints=tuple(
-            replace(
-                point,
-                time=factor * point.time,
-                twist=tuple(v / factor for v in point.twist),
-                acceleration=tuple(a / factor**2 for a in point.acceleration),
-            )
-            for point in goal.waypoints
-        ),
-    )
-
-
-def example(name, snapshot):
-    return goal_from_message(
-        load_goal(FOLDER / f'{name}.yaml'), Frames(), now=0, snapshot=ArmSnapshot.of(snapshot)
-    )
-
-
 @pytest.mark.parametrize(
     ('name', 'factor'),
     [
@@ -139,7 +113,7 @@ def test_every_point_is_passed_in_time_with_its_twist_and_the_tool_keeps_to_the_
     name, factor, monkeypatch
 ):
     monkeypatch.setattr(robot_cell, 'CYCLE', 0.002)  # of an e-Series
-    run = carried_out(lambda snapshot: times_as_long(example(name, snapshot), factor))
+    run = run_goal(lambda state: stretch_times(example_goal(name, state), factor))
     assert run.outcome.code is ErrorCode.SUCCESSFUL, run.outcome.text
     curve = run.curve()
     points = run.made.goal.waypoints
@@ -173,7 +147,7 @@ def test_an_arm_that_waits_at_a_point_for_long_is_not_stuck():
             )
         )
 
-    run = carried_out(goal)
+    run = run_goal(goal)
     assert run.outcome.code is ErrorCode.SUCCESSFUL, run.outcome.text
     waits = (run.times > 0.55) & (run.times < 3.95)
     assert np.abs(run.twists[waits]).max() < 1e-4

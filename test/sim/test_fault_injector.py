@@ -337,10 +337,11 @@ ECHO = """
 def talk(bench):
     """A program that talks to us, in memory: the bench and our end of the connection."""
     memory = MemorySockets()
-    controller, bench.faults = assemble(SimulatorConfig(), ImpairedSockets(memory))
+    sockets = ImpairedSockets(memory)
+    controller, bench.faults = assemble(SimulatorConfig(), sockets)
     bench.controller = controller
     bench.programs = controller.programs
-    bench.faults.interfaces['sockets'] = controller.sockets
+    bench.faults.interfaces['sockets'] = sockets
     accepted = memory.listen(50001)
     bench.start(ECHO)
     bench.until(lambda: bool(accepted))

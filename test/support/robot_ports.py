@@ -84,3 +84,14 @@ def setup_inputs(*names: str) -> bytes:
 
 
 PAUSE = struct.pack('>HB', 3, ord('P'))
+
+
+def fetch_program(driver: Any) -> str:
+    """Fetch the robot program from a driver as the External Control node does."""
+    with socket.create_connection((HOST, driver.status.ports['script_sender_port'])) as sender:
+        sender.settimeout(5.0)
+        sender.sendall(b'request_program\n')
+        text = ''
+        while '# NODE_CONTROL_LOOP_ENDS' not in text:
+            text += sender.recv(65536).decode()
+    return text

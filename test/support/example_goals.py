@@ -1,0 +1,40 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""The goals of config/examples, for tests of whole goals."""
+
+from dataclasses import replace
+
+from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.pose import Vector6
+from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.resources import share_path
+from ur_cartesian_driver.ros.client import load_goal
+from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
+from ur_cartesian_driver.ros.tf.known_frames import ArmSnapshot, Frames
+
+
+def example_goal(name: str, state: RobotState) -> Goal:
+    """Return an example for an arm in a state."""
+    message = load_goal(share_path() / 'config' / 'examples' / f'{name}.yaml')
+    return goal_from_message(message, Frames(), now=0, snapshot=ArmSnapshot.of(state))
+
+
+def stretch_times(goal: Goal, factor: float) -> Goal:
+    """Return a goal on the same path in a multiple of the time."""
+    return replace(
+        goal,
+        waypoints=tuple(
+            replace(
+                point,
+                time=factor * point.time,
+                twist=divide(point.twist, factor),
+                acceleration=divide(point.acceleration, factor**2),
+            )
+            for point in goal.waypoints
+        ),
+    )
+
+
+def divide(vector: Vector6, divisor: float) -> Vector6:
+    a, b, c, d, e, f = vector
+    return (a / divisor, b / divisor, c / divisor, d / divisor, e / divisor, f / divisor)
