@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Goals of any number of points, all well within the reach of a UR5e that stands at home."""
+"""Goals of any number of points, all well within the reach of a UR5e in its home position."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def goal(points: int, blend_radius: float = 0.0) -> Goal:
 
 
 def at_home(arm: Arm) -> RobotState:
-    """Return the state of an arm that stands at home."""
+    """Return the state of an arm in its home position."""
     pose = arm.forward(HOME)
     return RobotState(
         timestamp=0.0, actual_q=HOME, target_q=HOME, actual_tcp_pose=pose, target_tcp_pose=pose

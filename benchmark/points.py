@@ -79,7 +79,7 @@ def _sending(points: int) -> Iterator[Figure]:
             trajectory_port=0,
             script_command_port=0,
             robot_loop='process',
-            # The reader claims progress while the arm stands.
+            # The reader reports progress while the arm is at rest.
             max_plan_deviation=0.0,
             max_plan_deviation_angle=0.0,
         )

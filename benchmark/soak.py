@@ -164,9 +164,9 @@ class Soak:
         """Return a goal of a few points near home."""
         x, y, z = self._home.position
         points = []
-        most, way, step = (1, 0.0005, 0.03) if self._undisturbed else (3, 0.006, 0.15)
+        most, spread, step = (1, 0.0005, 0.03) if self._undisturbed else (3, 0.006, 0.15)
         for i in range(self._random.randint(1, most)):
-            offset = [self._random.uniform(-way, way) for _ in range(3)]
+            offset = [self._random.uniform(-spread, spread) for _ in range(3)]
             position = (x + offset[0], y + offset[1], z + offset[2])
             points.append(
                 CartesianTrajectoryPoint(

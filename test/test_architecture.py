@@ -96,7 +96,7 @@ def test_no_module_is_named_for_having_no_concept():
     assert [part for part in parts if part.rstrip('s') in NAMES_WITHOUT_A_CONCEPT] == []
 
 
-def test_a_package_that_may_be_anywhere_is_imported_by_its_full_name():
+def test_the_package_has_no_relative_imports():
     relative = [
         name
         for name, path in modules().items()

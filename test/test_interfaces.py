@@ -163,7 +163,7 @@ def test_error_codes_are_distinct_and_without_gaps():
         (ServoState, '', range(5)),
     ],
 )
-def test_constants_of_a_choice_count_up(message, pattern, values):
+def test_constants_of_an_enumeration_count_up(message, pattern, values):
     assert sorted(constants(message, pattern).values()) == list(values)
 
 
@@ -193,7 +193,7 @@ def test_our_own_types_use_the_numbers_of_the_messages(enum, message, prefix, on
     assert numbers == {member.name: member.value for member in enum} | only_in_the_message
 
 
-def test_a_message_left_alone_asks_for_the_usual():
+def test_a_default_message_asks_for_the_defaults():
     goal, segment = FollowCartesianTrajectory.Goal(), MotionSegment()
     assert goal.execution == goal.EXECUTION_AUTO
     assert not goal.segments
@@ -203,7 +203,7 @@ def test_a_message_left_alone_asks_for_the_usual():
     assert segment.via.orientation.w == 1.0  # a pose that was not touched is a valid one
 
 
-def test_a_goal_survives_the_way_over_the_wire():
+def test_a_goal_survives_serialization():
     goal = FollowCartesianTrajectory.Goal(goal_time_tolerance=Duration(sec=-1), keep_open=True)
     goal.trajectory.header.frame_id = 'base'
     goal.trajectory.controlled_frame = 'tool0'
@@ -224,7 +224,7 @@ def test_a_goal_survives_the_way_over_the_wire():
 
 
 @pytest.mark.parametrize('message', ALL, ids=lambda m: m.__name__)
-def test_an_empty_message_survives_the_way_over_the_wire(message):
+def test_an_empty_message_survives_serialization(message):
     assert deserialize_message(serialize_message(message()), message) == message()
 
 

@@ -161,7 +161,7 @@ def test_plain_goal_passes_planning_from_home():
     assert plan(goal, stationary_state(arm, HOME), arm, PlanningOptions()).duration == 2.0
 
 
-def test_what_where_prints_is_a_point_of_a_goal():
+def test_the_output_of_where_is_a_point_of_a_goal():
     from ur_cartesian_driver.cli.commands import point_as_yaml
     from ur_cartesian_driver.cli.validate_command import stationary_state
     from ur_cartesian_driver.kinematics.chain import Arm

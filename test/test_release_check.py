@@ -99,7 +99,7 @@ def test_a_placeholder_of_the_repository_is_refused(problems):
     assert len(clones) == 2  # they name another repository now
 
 
-def test_this_checkout_lacks_nothing_but_what_a_release_sets(check_release):
+def test_this_checkout_lacks_only_what_a_release_sets(check_release):
     lacking = check_release.problems(CHECKOUT)
     assert [
         problem

@@ -106,7 +106,7 @@ def test_every_state_is_in_the_table_with_its_number():
 # ---- what the driver says is on the page --------------------------------------------------------
 
 
-def test_all_that_can_be_needed_is_on_the_page():
+def test_every_required_action_is_on_the_page():
     said = {
         required_action(
             state,
@@ -131,7 +131,7 @@ def test_all_that_can_be_needed_is_on_the_page():
     assert [text for text in sorted(said) if not is_on_page(text)] == []
 
 
-def test_all_that_a_recovery_leaves_to_a_person_is_on_the_page():
+def test_every_step_that_recovery_leaves_to_an_operator_is_on_the_page():
     steps = [
         next_step(
             RecoverySituation(
@@ -215,6 +215,6 @@ def test_each_quoted_sentence_is_written_in_the_source(written):
     assert [text for text in sorted(left) if not can_say(written, text)] == []
 
 
-def test_a_sentence_that_nobody_says_would_be_found(written):
+def test_a_sentence_that_the_source_does_not_contain_is_found(written):
     assert not can_say(written, 'The robot is tired; let it sleep.')
     assert not can_say(written, 'The arm is in mode ...; switch it off.')

@@ -19,7 +19,7 @@ READY = 10.0
 
 
 class Recording:
-    """What RTDE said: time stamps [s], TCP positions [m], joints [rad] and speeds [rad/s]."""
+    """Recorded by RTDE: time stamps [s], TCP positions [m], joints [rad] and speeds [rad/s]."""
 
     def __init__(self):
         self.rows = []
@@ -160,7 +160,7 @@ def driver(make_driver):
 
 @pytest.fixture
 def home(driver):
-    """Where the tool stands at first."""
+    """The pose of the tool at the start."""
     pose = driver.state.actual_tcp_pose
 
     def offset(x=0.0, y=0.0, z=0.0, turned=None):

@@ -160,22 +160,22 @@ async def closed(cell, kind, count=6, **changes):
 
 
 @pytest.mark.parametrize('kind', KINDS)
-def test_a_producer_that_stops_is_closed_gracefully_and_may_go_on(kind):
+def test_when_a_producer_stops_the_arm_decelerates_and_the_producer_may_continue(kind):
     async def scenario(cell):
         motion, home, speeds = await closed(cell, kind)
         step = np.abs(np.diff(speeds, axis=0)).max() / CYCLE
-        assert step < 5.0, 'decelerated, not stopped the hard way [rad/s^2]'
+        assert step < 5.0, 'decelerated, not stopped hard [rad/s^2]'
         assert motion.progress.time_remaining == motion.progress.buffered == 0.0
         assert motion.progress.points_received == 6
         assert cell.at_rest()
         points, segments = KINDS[kind][1](home, 7, 5, False)
-        said = await motion.append(points, segments)
-        assert 'had come to rest before them' in said.text
-        assert ('later than their times say' in said.text) == (kind == 'spline')
+        answer = await motion.append(points, segments)
+        assert 'had come to rest before them' in answer.text
+        assert ('later than their times say' in answer.text) == (kind == 'spline')
         assert await motion.until(lambda: not motion.progress.awaiting_points)
         points, segments = KINDS[kind][1](home, 12, 5, True)
-        said = await motion.append(points, segments, last=True)
-        assert said.text.startswith('5 points appended, the goal has 16, these are the last.')
+        answer = await motion.append(points, segments, last=True)
+        assert answer.text.startswith('5 points appended, the goal has 16, these are the last.')
         end = await motion.ended()
         assert end.succeeded, end.text
         assert end.text.startswith('All 16 points were')
@@ -186,12 +186,12 @@ def test_a_producer_that_stops_is_closed_gracefully_and_may_go_on(kind):
     run_cell(scenario)
 
 
-def test_the_word_that_nothing_follows_ends_a_goal_where_it_is_known_to_end():
+def test_last_without_points_ends_a_goal_at_its_last_point():
     async def scenario(cell):
         home = cell.memory.read().actual_tcp_pose
         moving = AppendMotion(cell, goal('spline', home, 6))
-        said = await moving.append(last=True)
-        assert said.text == 'The goal ends with the 6 points that it has.'
+        answer = await moving.append(last=True)
+        assert answer.text == 'The goal ends with the 6 points that it has.'
         with pytest.raises(GoalRefused, match=r'closed by an earlier request with last: true\.$'):
             await moving.append(circle(home, 7, 1))
         assert (await moving.ended()).succeeded
@@ -202,7 +202,7 @@ def test_the_word_that_nothing_follows_ends_a_goal_where_it_is_known_to_end():
     run_cell(scenario)
 
 
-def test_nobody_waits_for_ever():
+def test_a_goal_ends_when_points_stay_away_longer_than_the_timeout():
     async def scenario(cell):
         motion, *_ = await closed(cell, 'lines')
         end = await motion.ended()

@@ -26,7 +26,7 @@ def long_goal(home):
 
 
 def moving(driver, goal):
-    """Start a goal and return its motion when the arm is under way."""
+    """Start a goal and return its motion when the arm moves."""
     motion = driver.start(driver.plan(goal))
     wait_for(lambda: max(map(abs, driver.state.actual_qd)) > 0.02)
     return motion
@@ -179,7 +179,7 @@ def test_a_robot_that_does_not_answer_is_named():
         assert driver.state is None
 
 
-def test_something_else_than_a_robot_is_not_waited_for_without_end(make_driver):
+def test_waiting_for_something_that_is_no_robot_ends(make_driver):
     with socket.create_server(('127.0.0.1', 0)) as server:
         port = server.getsockname()[1]
         driver = make_driver(rtde_port=port)
@@ -191,7 +191,7 @@ def test_something_else_than_a_robot_is_not_waited_for_without_end(make_driver):
 
 
 @pytest.mark.parametrize(('number', 'bound'), [(signal.SIGKILL, 3.0), (signal.SIGSTOP, 8.0)])
-def test_the_robot_loop_s_process_can_die_or_hang(
+def test_a_robot_loop_that_dies_or_hangs_ends_the_goal(
     make_driver, long_goal, ur_sim, driver, number, bound
 ):
     driver.close()
@@ -272,7 +272,7 @@ def test_closing_a_driver_stops_the_arm_and_ends_the_program(driver, long_goal, 
 
 
 class Relay:
-    """A way to a port of the robot that can be cut, as if RTDE alone broke."""
+    """A relay to a port of the robot that can be cut, as if RTDE alone broke."""
 
     def __init__(self, port):
         self._target = port
@@ -331,8 +331,8 @@ def test_a_program_that_outlives_rtde_is_taken_up_again(make_driver, ur_sim):
 
 
 @pytest.mark.ur_sim(power='off', power_on_time=0.1, brake_release_time=0.1)
-def test_an_arm_that_a_person_switches_on_waits_for_a_word(make_driver, ur_sim):
-    """Power comes from somebody who stands there; the program does not follow by itself."""
+def test_an_arm_that_a_person_switches_on_waits_for_resend_robot_program(make_driver, ur_sim):
+    """An operator switches the power on; the program does not start by itself."""
     driver = make_driver()
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
     ur_sim.call(lambda controller: controller.power_on())

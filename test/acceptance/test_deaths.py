@@ -167,7 +167,7 @@ class Cell:
             )
             if not ended.done():
                 return ended
-            # Result and status go different ways: READY may be that of the process before.
+            # Result and status take different paths: READY may be that of the process before.
             _, outcome, now = ended.result()
             assert outcome.error_code == ErrorCode.ROBOT_NOT_READY, outcome.error_string
             assert now < deadline, outcome.error_string
@@ -183,7 +183,7 @@ class Cell:
         return begin
 
     def rest(self, begin, bound):
-        """Wait until the arm stands, braked after the bound at the latest; return the time [s]."""
+        """Wait until the arm is at rest, braked before the bound; return the time [s]."""
         bound += BRAKING + SLACK
         self.witness.until(lambda: self.witness.speed < AT_REST, bound)
         return self.witness.rest_since - begin
@@ -210,7 +210,7 @@ def cell(private_ros_graph):
         yield Cell(stack)
 
 
-def test_whoever_dies_or_hangs_the_arm_stands_and_the_client_hears_of_it(cell):
+def test_whichever_process_dies_or_hangs_the_arm_stops_and_the_client_gets_a_result(cell):
     cell.start_node()
     with GoalClient() as client:
         ended = cell.moving(client)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The door of a driver: where it listens, who gets in, and what those are told who do not."""
+"""Access to a driver: where it listens, who may connect, and how others are refused."""
 
 import logging
 import socket
@@ -29,7 +29,7 @@ def knock(port, host='127.0.0.1'):
 
 
 @pytest.mark.ur_sim(frequency=125.0)
-def test_only_the_robot_gets_in_and_only_where_it_is_looked_for(driver, caplog):
+def test_only_the_robot_may_connect_and_only_from_its_address(driver, caplog):
     caplog.set_level(logging.WARNING, 'ur_cartesian_driver')
     for name, port in driver.status.ports.items():
         with pytest.raises(ConnectionRefusedError):
@@ -45,7 +45,7 @@ def test_only_the_robot_gets_in_and_only_where_it_is_looked_for(driver, caplog):
 
 
 @pytest.mark.ur_sim(frequency=125.0)
-def test_others_get_in_where_they_are_named(make_driver):
+def test_other_addresses_may_connect_where_a_parameter_allows_them(make_driver):
     driver = make_driver(
         allowed_peers=('127.0.0.1', OTHER), bind_address='0.0.0.0', reverse_ip='127.0.0.1'
     )

@@ -34,7 +34,7 @@ from ur_cartesian_driver.planning import plan, PlanningOptions
 
 pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
-#: As shipped, but for bounds that are not about the shape of the way.
+#: The defaults, except for bounds that are not about the shape of the path.
 MARGINS = PlanningOptions(max_approach_distance=0.0, max_tool_speed=0.0, self_collision='off')
 
 
@@ -64,10 +64,10 @@ def past_the_column(arm):
 
 
 def line(arm, middle, direction, half):
-    """Return where an arm stands at the beginning of a line, and the end of the line."""
-    way = half * arm.model.max_reach * np.array(direction)
+    """Return the joints of an arm at the beginning of a line, and the end of the line."""
+    half_line = half * arm.model.max_reach * np.array(direction)
     ends = [
-        Pose(tuple((np.array(middle.position) + side * way).tolist()), middle.quaternion)
+        Pose(tuple((np.array(middle.position) + side * half_line).tolist()), middle.quaternion)
         for side in (-1.0, 1.0)
     ]
     q = nearest(arm, ends[0], (0.5, -1.2, 1.6, -2.0, -1.2, 0.3))

@@ -3,8 +3,8 @@
 """
 Goals about another frame than the robot's TCP: the named frame keeps to its line or arc.
 
-Where it was follows from the joints that an RTDE connection of the test reports, by the product of
-the link matrices of a textbook; nothing of the package computes it.
+Its pose follows from the joints that an RTDE connection of the test reports, by the product of the
+link matrices of a textbook; nothing of the package computes it.
 """
 
 import contextlib
@@ -188,7 +188,7 @@ def test_the_named_frame_keeps_to_line_and_arcs_while_it_turns(
 
 
 @pytest.mark.ur_sim(frequency=125.0)
-def test_the_tcp_by_another_name_is_not_set(tooled, ur_sim):
+def test_a_frame_at_the_active_tcp_sets_no_tcp(tooled, ur_sim):
     start = tooled.state.actual_tcp_pose
     near = TCP @ Pose((1e-6, 0.0, 0.0))
     outcome = tooled.execute(goal_of([(0.3, moved(start, y=0.01))], BASE_LINK, near), timeout=9.0)
@@ -197,7 +197,7 @@ def test_the_tcp_by_another_name_is_not_set(tooled, ur_sim):
 
 
 @pytest.mark.ur_sim(frequency=125.0)
-def test_the_next_goal_finds_the_tcp_of_before(tooled, ur_sim):
+def test_the_next_goal_finds_the_original_tcp(tooled, ur_sim):
     for k in range(4):
         nozzle = k % 2 == 0
         start = stand(tooled, NOZZLE if nozzle else TCP)
@@ -227,7 +227,7 @@ def test_a_tcp_that_is_changed_between_goals_is_the_one_that_moves(tooled, ur_si
 
 
 def moving(driver, turn=QUARTER):
-    """Start a long goal of the nozzle and return its motion when the arm is under way."""
+    """Start a long goal of the nozzle and return its motion when the arm moves."""
     start = stand(driver, NOZZLE)
     motion = driver.start(
         driver.plan(goal_of([(5.0, moved(start, y=0.2, turn=turn))], IDENTITY, NOZZLE))
@@ -238,7 +238,7 @@ def moving(driver, turn=QUARTER):
 
 
 @pytest.mark.ur_sim(frequency=125.0)
-def test_a_cancel_puts_the_tcp_back_before_its_result(tooled, ur_sim):
+def test_a_cancel_restores_the_tcp_before_its_result(tooled, ur_sim):
     motion = moving(tooled)
     motion.cancel()
     assert motion.result(4.0).code is ErrorCode.CANCELLED
@@ -248,7 +248,7 @@ def test_a_cancel_puts_the_tcp_back_before_its_result(tooled, ur_sim):
 
 @pytest.mark.ur_sim(frequency=125.0, unlock_delay=0.1)
 @pytest.mark.parametrize('stop', ['protective_stop', 'emergency_stop', 'stop_program'])
-def test_a_robot_that_stops_gets_its_tcp_back(tooled, ur_sim, stop):
+def test_a_stop_of_the_robot_restores_the_tcp(tooled, ur_sim, stop):
     motion = moving(tooled)
     getattr(ur_sim, stop)()
     outcome = motion.result(4.0)
@@ -272,7 +272,7 @@ def unlocked(ur_sim):
 
 
 @pytest.mark.ur_sim(frequency=125.0, unlock_delay=0.1)
-def test_without_headless_mode_the_next_program_puts_the_tcp_back_before_a_goal(
+def test_without_headless_mode_the_next_program_restores_the_tcp_before_a_goal(
     make_driver, ur_sim
 ):
     set_tcp(ur_sim, TCP)
@@ -292,7 +292,7 @@ def test_without_headless_mode_the_next_program_puts_the_tcp_back_before_a_goal(
 
 
 @pytest.mark.ur_sim(frequency=125.0)
-def test_a_tcp_that_somebody_else_sets_after_a_stop_is_theirs(driver, ur_sim):
+def test_a_tcp_set_by_another_client_after_a_stop_is_kept(driver, ur_sim):
     set_tcp(ur_sim, TCP)
     wait_for(lambda: driver.state.T_flange_tcp.distance_to(TCP) < 1e-9)
     theirs = Pose((0.0, 0.0, 0.3))
@@ -310,7 +310,7 @@ def test_a_tcp_that_somebody_else_sets_after_a_stop_is_theirs(driver, ur_sim):
 
 
 @pytest.mark.ur_sim(frequency=125.0)
-def test_the_robot_program_puts_the_tcp_back_when_the_driver_dies(make_driver, ur_sim):
+def test_the_robot_program_restores_the_tcp_when_the_driver_dies(make_driver, ur_sim):
     set_tcp(ur_sim, TCP)
     driver = make_driver(robot_loop='process')
     driver.wait_ready(10.0)
@@ -325,7 +325,7 @@ def test_the_robot_program_puts_the_tcp_back_when_the_driver_dies(make_driver, u
     ('interface', 'code'),
     [('rtde', ErrorCode.CONNECTION_LOST), ('reverse', ErrorCode.PROGRAM_STOPPED)],
 )
-def test_a_wire_that_breaks_leaves_the_tcp_as_it_was(tooled, ur_sim, interface, code):
+def test_a_broken_connection_restores_the_tcp(tooled, ur_sim, interface, code):
     motion = moving(tooled)
     if interface == 'rtde':
         ur_sim.inject('drop rtde')
@@ -344,9 +344,7 @@ def test_a_wire_that_breaks_leaves_the_tcp_as_it_was(tooled, ur_sim, interface, 
         ('protective_stop', ErrorCode.PROTECTIVE_STOP, 'before anything moved'),
     ],
 )
-def test_nothing_moves_on_a_robot_that_does_not_take_the_tcp(
-    make_driver, ur_sim, stop, code, text
-):
+def test_nothing_moves_when_the_robot_does_not_set_the_tcp(make_driver, ur_sim, stop, code, text):
     set_tcp(ur_sim, TCP)
     driver = make_driver(headless_mode=False)
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
@@ -373,7 +371,7 @@ def test_nothing_moves_on_a_robot_that_does_not_take_the_tcp(
 
 
 @pytest.mark.ur_sim(frequency=125.0)
-def test_a_robot_loop_that_follows_a_dead_one_pays_its_debts(make_driver, ur_sim):
+def test_a_robot_loop_restores_the_tcp_that_a_dead_one_left(make_driver, ur_sim):
     """Program and robot loop die at once, so that nobody is left who could do it."""
     set_tcp(ur_sim, TCP)
     driver = make_driver(robot_loop='process')
@@ -388,7 +386,7 @@ def test_a_robot_loop_that_follows_a_dead_one_pays_its_debts(make_driver, ur_sim
 
 
 @pytest.mark.ur_sim(frequency=125.0)
-def test_a_driver_that_is_closed_during_a_goal_leaves_the_tcp_as_it_was(make_driver, ur_sim):
+def test_closing_the_driver_during_a_goal_restores_the_tcp(make_driver, ur_sim):
     set_tcp(ur_sim, TCP)
     driver = make_driver()
     driver.wait_ready(10.0)
@@ -398,7 +396,7 @@ def test_a_driver_that_is_closed_during_a_goal_leaves_the_tcp_as_it_was(make_dri
 
 
 @pytest.mark.ur_sim(frequency=125.0)
-def test_a_goal_that_must_not_change_the_tcp_is_carried_over(make_driver, ur_sim, record):
+def test_a_goal_that_must_not_change_the_tcp_is_retargeted(make_driver, ur_sim, record):
     set_tcp(ur_sim, TCP)
     driver = make_driver(options={'allow_tcp_change': False})
     driver.wait_ready(10.0)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""One day of a CB3 arm and of one with PolyScope X: goals, settings, a stop and the way back."""
+"""A CB3 arm and one with PolyScope X: goals, settings, a stop and the recovery."""
 
 import pytest
 from waiting import wait_for
@@ -21,8 +21,8 @@ def there_and_back(driver, height):
     turned = driver.state.actual_tcp_pose.quaternion
     return Goal(
         waypoints=tuple(
-            Waypoint(pose=Pose((x, y, z + way), turned), time=time)
-            for way, time in ((height, 0.4), (0.0, 0.8))
+            Waypoint(pose=Pose((x, y, z + dz), turned), time=time)
+            for dz, time in ((height, 0.4), (0.0, 0.8))
         )
     )
 

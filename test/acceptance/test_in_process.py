@@ -79,7 +79,7 @@ def client(request, cartesian_driver):
 
 
 def goal_at(driver, *offsets, seconds=0.5):
-    """A goal of points beside where the tool stands, `seconds` apart."""
+    """A goal of points beside the tool, `seconds` apart."""
     pose = driver.driver.state.actual_tcp_pose
     goal = FollowCartesianTrajectory.Goal()
     for i, (x, y, z) in enumerate(offsets):

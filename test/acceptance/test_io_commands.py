@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Outputs that are switched on the way: where the tool is then, in which order, what a stop leaves.
+Outputs that switch on the path: where the tool is then, in which order, and after a stop.
 
 Where the tool was comes from the controller, cycle by cycle, and the middle of a corner from the
 same: it is where that path is nearest to the point. The plan has no say in it.
@@ -42,13 +42,13 @@ BOUND = 0.002
 
 
 def wandering(count, seed=1):
-    """Return points [m] of a way with corners of 8 to 150 degrees, in a square of 20 cm."""
-    random, points, x, y, way = Random(seed), [], 0.0, 0.0, 0.0
+    """Return points [m] of a path with corners of 8 to 150 degrees, in a square of 20 cm."""
+    random, points, x, y, heading = Random(seed), [], 0.0, 0.0, 0.0
     while len(points) < count:
-        turn = way + radians(random.choice((-1, 1)) * random.uniform(8.0, 150.0))
+        turn = heading + radians(random.choice((-1, 1)) * random.uniform(8.0, 150.0))
         far = random.uniform(0.03, 0.05)
         if max(abs(x + far * cos(turn)), abs(y + far * sin(turn))) < 0.1:
-            way, x, y = turn, x + far * cos(turn), y + far * sin(turn)
+            heading, x, y = turn, x + far * cos(turn), y + far * sin(turn)
             points.append((x, y, 0.02 * sin(len(points))))
     return points
 
@@ -107,15 +107,15 @@ def middles(path, points, cycles):
     found = []
     for point, cycle in zip(points, cycles, strict=True):
         a = path[max(cycle - 60, 0) : cycle + 60]
-        way = np.diff(a, axis=0)
-        along = ((point - a[:-1]) * way).sum(axis=1) / np.maximum((way * way).sum(axis=1), 1e-300)
-        feet = a[:-1] + np.clip(along, 0.0, 1.0)[:, None] * way
+        step = np.diff(a, axis=0)
+        along = ((point - a[:-1]) * step).sum(axis=1) / np.maximum((step**2).sum(axis=1), 1e-300)
+        feet = a[:-1] + np.clip(along, 0.0, 1.0)[:, None] * step
         found.append(feet[np.argmin(np.linalg.norm(feet - point, axis=1))])
     return np.array(found)
 
 
 def distances(count, slider=1.0):
-    """Run a way with so many corners; return how far from their middles it switched [m]."""
+    """Run a path with corners; return how far from their middles the output switched [m]."""
     robot = RobotInMemory('ur5e')
     state = robot.place(HOME, TOOL)
     goal = blended(state.actual_tcp_pose, wandering(count + 1))
@@ -157,7 +157,7 @@ def test_a_thousand_corners():
     assert apart.max() < BOUND
 
 
-def test_along_a_spline_at_points_and_after_them():
+def test_outputs_along_a_spline_switch_at_points_and_after_them():
     robot = RobotInMemory('ur5e')
     state = robot.place(HOME, TOOL)
     home, speed = state.actual_tcp_pose, 0.2
@@ -197,7 +197,7 @@ def standing(cell):
     return [value for value in cell.robot.controller.io.digital_out.standard]
 
 
-def test_the_whole_driver_switches_them_and_waits_for_the_last():
+def test_the_driver_switches_outputs_and_waits_for_the_last():
     """With sockets, and the robot loop: what comes after the end belongs to the goal."""
 
     async def scenario(cell):
@@ -226,7 +226,7 @@ def test_the_whole_driver_switches_them_and_waits_for_the_last():
 
 
 @pytest.mark.parametrize('when', ['on the way', 'after the end'])
-def test_a_cancel_leaves_what_was_not_yet_due_and_forgets_it(when):
+def test_a_cancel_drops_outputs_that_were_not_yet_due(when):
     async def scenario(cell):
         state = cell.memory.read()
         home = state.actual_tcp_pose

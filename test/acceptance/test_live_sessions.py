@@ -56,10 +56,10 @@ class Session:
             SetLiveTarget(motion=self.number, T_base_tcp=self.beside(x, y, z), age=age)
         )
 
-    async def lead(self, seconds, way):
-        """Tell targets for some time: ``way(t)`` is beside the start."""
+    async def lead(self, seconds, offset_at):
+        """Send targets for some time, at ``offset_at(t)`` from the start."""
         for i in range(round(seconds / PERIOD)):
-            self.aim(*way(i * PERIOD))
+            self.aim(*offset_at(i * PERIOD))
             await asyncio.sleep(PERIOD)
 
     @property
@@ -77,18 +77,18 @@ class Session:
         return self.outcome
 
 
-def test_a_circle_is_followed_and_the_session_ends_when_nobody_tells_targets():
+def test_a_circle_is_followed_and_the_session_ends_without_targets():
     async def scenario(cell):
         session = Session(cell)
         off = []
 
-        def way(t):
+        def offset_at(t):
             if t > 0.4:
                 y, z = session.tool[1:]
                 off.append(abs(hypot(y, z - 0.03) - 0.03))
             return (0.0, 0.03 * sin(4.0 * t), 0.03 * (1.0 - cos(4.0 * t)))
 
-        await session.lead(1.6, way)
+        await session.lead(1.6, offset_at)
         # Behind by its braking distance, the tool cuts the circle by some of it.
         assert max(off) < 0.006, max(off)
         assert not cell.at_rest()
@@ -103,7 +103,7 @@ def test_a_circle_is_followed_and_the_session_ends_when_nobody_tells_targets():
     run_cell(scenario)
 
 
-def test_old_targets_stop_the_arm_smoothly_and_fresh_ones_go_on():
+def test_stale_targets_stop_the_arm_smoothly_and_new_ones_resume():
     async def scenario(cell):
         session = Session(cell, live_target_timeout=5.0)
         await session.lead(0.5, lambda t: (0.0, 0.3, 0.0))
@@ -118,7 +118,7 @@ def test_old_targets_stop_the_arm_smoothly_and_fresh_ones_go_on():
     run_cell(scenario)
 
 
-def test_it_stops_before_a_plane_and_says_why():
+def test_the_arm_stops_before_a_plane_and_the_session_says_why():
     async def scenario(cell):
         session = Session(cell, workspace_planes=('wall 0 -0.3 0 0 1 0 0.01',))
         await session.lead(1.4, lambda t: (0.0, -0.3, 0.0))
@@ -174,7 +174,7 @@ def is_taught(cell):
     return cell.robot.controller.freedrive is FreedriveState.TEACH
 
 
-def test_a_person_may_guide_the_arm_until_that_is_ended():
+def test_a_person_may_guide_the_arm_until_freedrive_ends():
     async def scenario(cell):
         motion = cell.owner.motions[1] = CellMotion()
         plan = stationary_plan(cell.memory.read())

@@ -74,7 +74,7 @@ def cell_with(cartesian_driver):
 
 
 class Sender(Node):
-    """Sends what it is told, and hears how the streaming goes."""
+    """Sends targets, and listens to the state of the session."""
 
     def __init__(self):
         super().__init__('sender')
@@ -112,7 +112,7 @@ class Sender(Node):
 
 
 @pytest.mark.skipif(not PAGE.is_file(), reason='only a checkout has the documents')
-def test_the_example_of_the_page_leads_the_tool_on_its_circle(ur_sim, cell_with):
+def test_the_example_of_the_page_moves_the_tool_on_its_circle(ur_sim, cell_with):
     code = next(
         body
         for body in re.findall(
@@ -136,7 +136,7 @@ def test_the_example_of_the_page_leads_the_tool_on_its_circle(ur_sim, cell_with)
     assert not cell.driver.live_targets.idle
 
 
-def test_a_goal_takes_its_place_and_people_may_guide_the_arm(ur_sim, cell_with):
+def test_a_goal_preempts_a_session_and_freedrive_works(ur_sim, cell_with):
     """One cell for several claims, as a cell costs seconds."""
     sender = Sender()
     cell = cell_with(sender)

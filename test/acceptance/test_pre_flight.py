@@ -32,7 +32,7 @@ GOALS = int(os.environ.get('PRE_FLIGHT_GOALS', '200'))
 MAX_DURATION = inf if GOALS >= 1000 else MAX_RUN_DURATION
 #: What part of the goals has to be of a kind, so that not only easy ones are drawn, and may be.
 MIN_SHARES = {'passes': 0.3, 'reach': 0.04, 'limit': 0.015, 'branch': 0.06}
-MOST = {'other': 0.05, 'long': 0.15, 'border': 0.05}
+MAX_SHARES = {'other': 0.05, 'long': 0.15, 'border': 0.05}
 #: Of the executed paths, compared with the other kinematics; 14 models make 210.
 POSES_OF_A_MODEL = 15
 #: What rounding on the wire may add up to [m] + [rad].
@@ -49,7 +49,7 @@ def robot_of():
 @pytest.mark.exhaustive
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize('model', MODELS)
-def test_what_passes_arrives_and_what_is_refused_fails(model, robot_of, record_property):
+def test_accepted_goals_arrive_and_refused_ones_fail(model, robot_of, record_property):
     robot, counts, wrong = robot_of(model), Counter(), []
     for number in range(GOALS):
         case = random_case(robot.controller.arm, number)
@@ -65,17 +65,17 @@ def test_what_passes_arrives_and_what_is_refused_fails(model, robot_of, record_p
                 f'{verdict.refusal or "yes"!r}, the robot {verdict.failure or "yes"!r}'
             )
     line = f'{GOALS} goals: ' + ', '.join(
-        f'{counts[kind]} {kind}' for kind in (*MIN_SHARES, *MOST)
+        f'{counts[kind]} {kind}' for kind in (*MIN_SHARES, *MAX_SHARES)
     )
     print(f'{model}: {line}')
     record_property('pre_flight', line)
     assert not wrong, '\n'.join([line, *wrong])
     assert all(counts[kind] >= int(part * GOALS) for kind, part in MIN_SHARES.items()), line
-    assert all(counts[kind] <= part * GOALS for kind, part in MOST.items()), line
+    assert all(counts[kind] <= part * GOALS for kind, part in MAX_SHARES.items()), line
 
 
 @pytest.mark.parametrize('model', MODELS)
-def test_paths_fit_a_kinematics_that_owes_nothing_to_ours(model, robot_of):
+def test_paths_agree_with_an_independent_kinematics(model, robot_of):
     """Straight lines are straight and lead where the goal says, by the textbook's matrices."""
     robot, rng, checked, number = robot_of(model), np.random.default_rng(4), 0, 0
     geometry = MODELS[model].geometry
@@ -114,5 +114,5 @@ def distances(a, b):
 
 
 def beside(pose, start, end):
-    """How much longer the way from start to end is by way of the pose [m] + [rad]."""
+    """Return how much longer the path from start to end is via the pose [m] + [rad]."""
     return distances(start, pose) + distances(pose, end) - distances(start, end)

@@ -45,7 +45,7 @@ def test_after_a_timeout_the_arm_is_free_for_the_next_goal(driver, home, short_g
     assert driver.execute(short_goal, timeout=5.0).succeeded
 
 
-def test_a_newer_goal_takes_the_place_of_a_running_one(driver, home):
+def test_a_newer_goal_preempts_a_running_one(driver, home):
     motion = driver.start(driver.plan(Goal(waypoints=(Waypoint(pose=home(y=0.2), time=4.0),))))
     wait_for(lambda: max(map(abs, driver.state.target_qd)) > 0.05)
     beyond = Goal(waypoints=(Waypoint(pose=home(z=-5.0), time=60.0),))
@@ -64,15 +64,15 @@ def test_a_newer_goal_takes_the_place_of_a_running_one(driver, home):
     assert driver.rest_state.actual_q == driver.state.actual_q
 
 
-def test_the_way_there_and_the_way_back_keep_a_tight_path_tolerance(driver, home):
+def test_a_line_back_and_forth_keeps_a_tight_path_tolerance(driver, home):
     """The count of points of the goal before is still in the register when the next one starts."""
     tolerance = Tolerance(position=(0.002,) * 3)
     there = [0.002 * (i + 1) for i in range(10)]
-    for ways in (there, there[-2::-1], there, there[-2::-1]):
+    for positions in (there, there[-2::-1], there, there[-2::-1]):
         goal = Goal(
             path_tolerance=tolerance,
             waypoints=tuple(
-                Waypoint(pose=home(y=y), time=0.05 * (i + 1)) for i, y in enumerate(ways)
+                Waypoint(pose=home(y=y), time=0.05 * (i + 1)) for i, y in enumerate(positions)
             ),
         )
         outcome = driver.execute(goal, timeout=10.0)

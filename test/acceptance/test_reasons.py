@@ -17,7 +17,7 @@ pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 
 def ended_by(fault, execution=ExecutionMode.PRIMITIVES, time=2.0, **settings):
-    """Run a goal that something ends half-way; return outcome and the last status."""
+    """Run a goal that something ends halfway; return outcome and the last status."""
 
     async def scene(cell):
         state = cell.memory.read()
@@ -126,7 +126,7 @@ async def nothing(cell):
     """Wait for what happens by itself."""
 
 
-def test_an_arm_that_cannot_follow_its_set_points_is_told_as_that():
+def test_an_arm_that_cannot_follow_its_set_points_is_named_as_the_cause():
     outcome, _ = ended_by(nothing, ExecutionMode.SERVO, 1.0, servo_max_divergence=0.01)
     assert outcome.code is ErrorCode.PROGRAM_STOPPED
     assert any(

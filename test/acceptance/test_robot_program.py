@@ -74,7 +74,7 @@ def test_a_program_with_other_names_does_the_same(served, ur_sim):
     assert driver.execute(short_goal(driver), timeout=10.0).succeeded
 
 
-def test_a_line_that_is_added_is_carried_out(served, ur_sim):
+def test_an_added_line_is_executed(served, ur_sim):
     driver, text = served
     text = text.replace(
         '  local kind = point[POINT_TYPE]',
@@ -87,7 +87,7 @@ def test_a_line_that_is_added_is_carried_out(served, ur_sim):
 
 
 def test_a_changed_constant_changes_the_motion(served, ur_sim, record):
-    """Half the length of a metre: the arm goes half the way, in the program's own scale."""
+    """Halve the scale of the program: the arm covers half the distance."""
     driver, text = served
     text = text.replace('MULT_TIME = 1000000', 'MULT_TIME = 500000')
     upload(ur_sim, wrap_in_program(text))

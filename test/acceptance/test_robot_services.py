@@ -7,6 +7,7 @@ import signal
 import socket
 
 import pytest
+from robot_ports import fetch_program
 from waiting import wait_for
 
 from ur_cartesian_driver.driver import ConnectionState
@@ -124,7 +125,7 @@ def test_a_setting_needs_the_robot_program(driver, ur_sim):
     assert driver.set_speed_slider(0.5).ok
 
 
-def test_of_a_goal_and_a_new_tcp_at_the_same_time_one_is_refused(driver, home):
+def test_a_goal_and_a_new_tcp_at_the_same_time_exclude_each_other(driver, home):
     plan = driver.plan(Goal(waypoints=(Waypoint(time=0.5, pose=home(z=0.02)),)))
     pending = driver.call(SetTcpCall(T_flange_tcp=NOZZLE))
     outcome, answer = driver.start(plan).result(5.0), pending.result(5.0)
@@ -216,7 +217,7 @@ def test_a_program_that_is_sent_in_local_control_is_refused_with_the_reason(
 
 
 @QUICK
-def test_a_recovery_after_a_goal_does_not_go_on_with_it(driver, ur_sim, home):
+def test_a_recovery_does_not_resume_the_goal(driver, ur_sim, home):
     motion = driver.start(driver.plan(Goal(waypoints=(Waypoint(time=4.0, pose=home(z=0.1)),))))
     wait_for(lambda: max(map(abs, ur_sim.state().qd)) > 0.01)
     ur_sim.protective_stop()
@@ -227,25 +228,14 @@ def test_a_recovery_after_a_goal_does_not_go_on_with_it(driver, ur_sim, home):
     assert ur_sim.state().q == q
 
 
-def served_program(driver):
-    """Fetch the robot program as the External Control node does."""
-    with socket.create_connection(('127.0.0.1', driver.status.ports['script_sender_port'])) as s:
-        s.settimeout(5.0)
-        s.sendall(b'request_program\n')
-        text = ''
-        while '# NODE_CONTROL_LOOP_ENDS' not in text:
-            text += s.recv(65536).decode()
-    return wrap_in_program(text)
-
-
 @QUICK
-def test_recover_plays_the_program_of_the_pendant_where_that_is_how_it_comes(make_driver, ur_sim):
+def test_recover_plays_the_program_of_the_pendant_without_headless_mode(make_driver, ur_sim):
     driver = make_driver(headless_mode=False)
     wait_for(lambda: driver.status.state is ConnectionState.CONNECTED)
     answer = driver.recover()
     assert not answer.ok
     assert 'load_program' in answer.text
-    program = served_program(driver)
+    program = wrap_in_program(fetch_program(driver))
     assert ur_sim.call(lambda c: c.programs.load('pendant.urp', program)) == ''
     assert driver.recover().ok
     assert driver.status.state is ConnectionState.READY
@@ -267,7 +257,7 @@ def test_recover_leaves_another_program_alone(driver, ur_sim):
 
 
 @pytest.mark.ur_sim(model='ur3')
-def test_a_robot_without_force_sensor_says_that_there_is_nothing_to_zero(make_driver):
+def test_a_robot_without_force_sensor_refuses_to_zero_it(make_driver):
     driver = make_driver()
     driver.wait_ready(READY)
     answer = driver.zero_ftsensor()
@@ -348,7 +338,7 @@ def test_calls_are_answered_when_the_robot_loop_dies_or_the_driver_closes(make_d
     )
 
 
-def test_a_defect_of_ours_is_an_answer_too(driver):
+def test_an_internal_error_is_answered_too(driver):
     broken = SetPayloadCall(mass=1.0)
     object.__setattr__(broken, 'mass', 'heavy')
     answer = driver.call(broken).result(5.0)

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Robot programs of other ages: each dialect with its own program, and with the wrong ones.
+Saved robot programs: each wire dialect with its own program, and with the wrong ones.
 
-The programs are played on the simulated controller, dial the driver by themselves, and share
+The programs are played on the simulated controller, connect to the driver by themselves, and share
 nothing with the driver's program or codecs. Everything runs in virtual time.
 """
 
@@ -56,7 +56,7 @@ class SavedCell(RobotCell):
         assert not self.robot.controller.programs.load(PENDANT_PROGRAM, self._program)
 
     def pose(self, x=0.0, y=0.0, z=0.0):
-        """A pose beside where the tool stands."""
+        """A pose beside the tool."""
         pose = self.memory.read().actual_tcp_pose
         a, b, c = pose.position
         return type(pose)((a + x, b + y, c + z), pose.quaternion)
@@ -180,7 +180,7 @@ def test_each_dialect_cancels_and_goes_on(name):
         await cell.until(lambda: motion.outcome is not None)
         assert motion.outcome.code is ErrorCode.CANCELLED
         assert cell.at_rest()
-        # All that was on its way to the old goal has been read.
+        # All messages of the old goal have been read.
         _, outcome = await cell.run_goal((Waypoint(pose=cell.pose(x=0.02)), Segment()))
         assert outcome.code is ErrorCode.SUCCESSFUL, outcome.text
 
@@ -262,7 +262,7 @@ def test_a_wrong_program_makes_no_wild_move(kind, driver, program, turned):
             assert outcome.code is ErrorCode.SUCCESSFUL, outcome.text
             assert cell.robot.controller.motion.T_base_tcp.distance_to(target) < 1e-4
         elif outcome.code is ErrorCode.SUCCESSFUL:
-            # Its acceleration was the speed: on so short a way it does not become too fast.
+            # Its acceleration was the speed: on so short a path it does not become too fast.
             assert (kind, turned > 0.0) == ('line', True)
         elif outcome.code is ErrorCode.EXECUTION_FAILED:
             assert 'wire_dialect' in outcome.text

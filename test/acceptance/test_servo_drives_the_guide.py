@@ -116,11 +116,11 @@ def drive(slider=1.0, cancel_after=None):
 
 
 @pytest.mark.parametrize('slider', [1.0, pytest.param(0.5, marks=pytest.mark.exhaustive)])
-def test_a_goal_arrives_with_the_lag_that_is_said(slider):
+def test_a_goal_arrives_with_the_reported_lag(slider):
     seen = drive(slider)
     assert seen.outcome.code is ErrorCode.SUCCESSFUL, seen.outcome
     assert seen.q[-1] == pytest.approx([a + 0.2 for a in seen.home], abs=1e-3)
-    # Behind what it was told last the arm is by the sample's lookahead, in the robot's own time.
+    # The arm lags the last set-point by the sample's lookahead, in the robot's own time.
     motion, q = np.array(seen.motion), np.array(seen.q)
     moving = (motion > 0.1) & (motion < DURATION - 0.01)
     expected = seen.spline.rows(motion[moving] - 0.06)[0]
@@ -129,7 +129,7 @@ def test_a_goal_arrives_with_the_lag_that_is_said(slider):
     assert 'Buffer overflow' not in seen.cell.log
 
 
-def test_a_cancel_stops_the_sample_program_on_the_way_and_leaves_it_running():
+def test_a_cancel_stops_the_arm_and_leaves_the_sample_program_running():
     seen = drive(cancel_after=0.3)
     assert seen.outcome.code is ErrorCode.CANCELLED
     for _ in range(400):  # the sample waits until the arm has been at rest for a while

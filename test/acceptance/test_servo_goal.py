@@ -74,10 +74,10 @@ class Run:
         )
 
 
-def straight(seconds=1.0, way=0.1):
+def straight(seconds=1.0, distance=0.1):
     def goal(snapshot):
         x, y, z = snapshot.actual_tcp_pose.position
-        there = replace(snapshot.actual_tcp_pose, position=(x, y + way, z))
+        there = replace(snapshot.actual_tcp_pose, position=(x, y + distance, z))
         return Goal(waypoints=(Waypoint(pose=there, time=seconds),))
 
     return goal
@@ -111,8 +111,8 @@ def test_every_point_is_passed_within_the_lag_that_is_reported(name, factor, mon
     for point in (point for point in goal.waypoints if any(point.twist)):
         asked = curve.at(np.array([point.time]))
         fine = np.arange(point.time - 0.06, point.time + 0.2, 1e-4)
-        way = np.stack([np.interp(fine, times, x) for x in places.T], axis=1)
-        at = fine[np.argmin(np.linalg.norm(way - asked.poses[0, :3], axis=1))]
+        polyline = np.stack([np.interp(fine, times, x) for x in places.T], axis=1)
+        at = fine[np.argmin(np.linalg.norm(polyline - asked.poses[0, :3], axis=1))]
         late.append(at - point.time)
         twist = np.array([np.interp(at, times, v) for v in twists.T])
         off = np.linalg.norm(twist[:3] - asked.twists[0][:3])
@@ -132,7 +132,7 @@ def test_every_point_is_passed_within_the_lag_that_is_reported(name, factor, mon
 
 def test_feedback_and_reports_tell_the_lag_and_the_inputs_are_given_back():
     async def scenario(cell):
-        run = Run(cell, straight(0.5, way=0.05))
+        run = Run(cell, straight(0.5, distance=0.05))
         outcome = await run.end()
         assert outcome.code is ErrorCode.SUCCESSFUL, outcome
         lags = [progress.lag for progress in run.progress]
@@ -149,7 +149,7 @@ def test_feedback_and_reports_tell_the_lag_and_the_inputs_are_given_back():
         )
         await other.open(HOST, robot_cell.RTDE)
         # And while it has them no goal moves anything.
-        refused = Run(cell, straight(way=-0.05))
+        refused = Run(cell, straight(distance=-0.05))
         q = cell.q
         outcome = await refused.end()
         assert outcome.code is ErrorCode.ROBOT_NOT_READY
@@ -157,7 +157,7 @@ def test_feedback_and_reports_tell_the_lag_and_the_inputs_are_given_back():
         assert cell.q == pytest.approx(q, abs=1e-7)  # what is left of the goal before dies out
         # But for a moment it waits for somebody who is about to hang up.
         await cell.until(cell.is_ready)
-        again = Run(cell, straight(0.4, way=-0.02))
+        again = Run(cell, straight(0.4, distance=-0.02))
         await cell.sleep(0.1)
         other.close()
         assert (await again.end()).code is ErrorCode.SUCCESSFUL
@@ -171,13 +171,13 @@ def test_slider_and_pause_hold_the_arm_and_no_more():
         run = Run(cell, straight(0.8))
         await cell.sleep(0.6)
         cell.robot.set_speed_slider(0.0)
-        await cell.sleep(2.5)  # longer than an arm may stand for no reason
+        await cell.sleep(2.5)  # longer than an arm may be at rest without a reason
         cell.robot.set_speed_slider(1.0)
         outcome = await run.end()
         assert outcome.code is ErrorCode.SUCCESSFUL, outcome
         assert run.reports[-1].underruns == 0
 
-        run = Run(cell, straight(0.8, way=-0.1))
+        run = Run(cell, straight(0.8, distance=-0.1))
         await cell.sleep(0.5)
         cell.robot.controller.programs.pause()
         await cell.sleep(0.5)
@@ -213,7 +213,7 @@ def test_inputs_that_are_lost_on_the_way_brake_the_arm_and_the_program_stays():
         assert 'RTDE inputs' in outcome.text
         await cell.until(cell.at_rest, 0.5)
         await cell.until(cell.is_ready)
-        again = Run(cell, straight(0.3, way=0.02))
+        again = Run(cell, straight(0.3, distance=0.02))
         assert (await again.end()).code is ErrorCode.SUCCESSFUL
 
     run_cell(scenario)

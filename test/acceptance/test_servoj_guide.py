@@ -4,7 +4,7 @@
 The manufacturer's sample program for buffered servoj runs, and an RTDE client drives it.
 
 ``programs/servoj_guide.script`` is the sample of Universal Robots' guide "Trajectory improvements
-for servoj()", word for word. Its indentation was lost on the way and has not been restored, which
+for servoj()", word for word. Its indentation was lost and has not been restored, which
 a controller does not mind. The client is our RTDE codec; it and the controller take turns cycle by
 cycle, so that the tests need no real time and always see the same; the last one meets it over TCP.
 """
@@ -165,7 +165,7 @@ def client():
 
 @pytest.fixture
 def servo(client):
-    """A client in mode SERVO that holds the arm where it stands."""
+    """A client in mode SERVO that holds the arm in place."""
     client.values |= {MODE: SERVO, SYNC: EXTERNAL_TO_ROBOT}
     client.until(lambda: client.mode == SERVO)
     client.wait(0.1)
@@ -176,8 +176,8 @@ def swing(home, amplitude=0.2, period=2.0):
     """Return a smooth motion of two joints, there and back."""
 
     def path(time):
-        way = amplitude * sin(pi * time / period) ** 2
-        return (home[0] + way, home[1] - 0.5 * way, *home[2:])
+        displacement = amplitude * sin(pi * time / period) ** 2
+        return (home[0] + displacement, home[1] - 0.5 * displacement, *home[2:])
 
     return path
 
@@ -248,10 +248,10 @@ def test_waypoints_are_buffered_while_the_arm_is_slowed_down_and_none_is_lost(se
     servo.wait(0.5)
     assert held != pytest.approx(path(1.0), abs=1e-2)
     assert servo.q == pytest.approx(path(1.0), abs=1e-4)
-    # The path is the same, only later: the second joint is always half the first one's way.
+    # The path is the same, only later: joint 2 is always displaced by half as much as joint 1.
     for packet in servo.packets[start:]:
-        ways = [b - a for a, b in zip(home, packet[1], strict=True)]
-        assert ways[1] == pytest.approx(-0.5 * ways[0], abs=1e-6)
+        displacements = [b - a for a, b in zip(home, packet[1], strict=True)]
+        assert displacements[1] == pytest.approx(-0.5 * displacements[0], abs=1e-6)
 
 
 def test_client_that_heeds_the_lag_time_keeps_the_buffer_short(servo):
@@ -351,7 +351,7 @@ def test_program_follows_a_client_over_tcp_in_real_time(ur_sim):
                     if mode == SERVO:
                         assert state == RuntimeState.PLAYING
                         time += CYCLE
-                    # There and half back, then stand.
+                    # There and half back, then at rest.
                     values |= zip(JOINTS, path(min(time, 1.2)), strict=True)
                     values |= {SEQUENCE: values[SEQUENCE] + 1, STATE_TIME: time}
                     rtde.sendall(inputs.pack(list(values.values())))

@@ -3,7 +3,7 @@
 """
 SPLINE, from the goal to the simulated arm: every point in time, with its twist, on the curve.
 
-What is looked at are the targets that the controller reports, packet by packet, in virtual time.
+The tests compare the targets that the controller reports, packet by packet, in virtual time.
 """
 
 from __future__ import annotations
@@ -57,13 +57,13 @@ class Run:
         """Return when the tool is nearest to where the curve is at a time, and its twist then."""
         place = self.curve().at(np.array([time])).poses[0, :3]
         fine = np.arange(time - 0.06, time + 0.06, 1e-4)
-        way = np.stack([np.interp(fine, self.times, x) for x in self.places.T], axis=1)
-        at = fine[np.argmin(np.linalg.norm(way - place, axis=1))]
+        polyline = np.stack([np.interp(fine, self.times, x) for x in self.places.T], axis=1)
+        at = fine[np.argmin(np.linalg.norm(polyline - place, axis=1))]
         return at, np.array([np.interp(at, self.times, v) for v in self.twists.T])
 
 
 def run_goal(goal_from):
-    """Run a goal that is made from where the arm stands."""
+    """Run a goal that is made from the state of the arm."""
 
     async def scenario(cell):
         snapshot = cell.memory.read()
@@ -136,7 +136,7 @@ def test_every_point_is_passed_in_time_with_its_twist_and_the_tool_keeps_to_the_
     assert np.linalg.norm(run.twists[between, :3], axis=1).min() > 0.005  # no stop
 
 
-def test_an_arm_that_waits_at_a_point_for_long_is_not_stuck():
+def test_a_long_wait_at_a_point_is_no_stall():
     def goal(snapshot):
         x, y, z = snapshot.actual_tcp_pose.position
         there = replace(snapshot.actual_tcp_pose, position=(x, y + 0.02, z))

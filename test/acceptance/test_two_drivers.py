@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Two drivers for one robot: the first one keeps it, the second one is told."""
+"""Two drivers for one robot: the first one keeps it, the second one is refused."""
 
 import socket
 
@@ -15,7 +15,7 @@ pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 
 @pytest.mark.ur_sim(frequency=125.0)
-def test_the_second_driver_is_told_and_takes_nothing_away(driver, make_driver, home, ur_sim):
+def test_a_second_driver_is_refused_and_the_first_goes_on(driver, make_driver, home, ur_sim):
     motion = driver.start(driver.plan(Goal(waypoints=(Waypoint(pose=home(y=0.1), time=2.0),))))
     second = make_driver()
     wait_for(lambda: second.status.state is ConnectionState.CONNECTED)

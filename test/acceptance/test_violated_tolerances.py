@@ -62,7 +62,7 @@ def test_a_push_stops_the_arm_and_is_named(ur_sim, driver, home, fault, toleranc
     assert driver.state.actual_tcp_pose.distance_to(home()) < 0.09
 
 
-def test_a_slider_that_moves_fails_nothing(ur_sim, driver, home):
+def test_a_moving_slider_violates_no_tolerance(ur_sim, driver, home):
     motion = driver.start(
         driver.plan(
             Goal(

@@ -3,7 +3,7 @@
 """
 Watching, packet by packet: robot loop and robot over sockets, in time that waits for both.
 
-What the machine decides is tested without sockets; here it is what stands on the wire, and when.
+Decisions of the machine are tested without sockets; here the bytes on the wire and their times.
 """
 
 import asyncio
@@ -258,7 +258,7 @@ def random_goal(cell, random, share):
     )
 
 
-def troubles(random, slider, duration):
+def random_faults(random, slider, duration):
     """What people do while it moves: the slider, up to two times, and a pause in half the runs."""
     instants = sorted(random.uniform(0.0, duration) for _ in range(3))
     faults: list[Fault] = [
@@ -299,7 +299,7 @@ def test_no_slider_and_no_pause_ever_fails_a_goal(batch):
             random = Random(f'{batch} {number}')
             slider = 0.01 * (1 + (BATCHES * number + batch) % 100)  # each of 1 to 100 %, once
             goal = random_goal(cell, random, slider)
-            faults, pause = troubles(random, slider, goal.waypoints[-1].time)
+            faults, pause = random_faults(random, slider, goal.waypoints[-1].time)
             begin = controller.time
             motion, made = await executed(cell, goal, *faults)
             assert motion.outcome.succeeded, (number, slider, faults[1:], motion.outcome.text)

@@ -29,7 +29,7 @@ def test_a_pause_leaves_no_queue_behind_which_a_goal_would_wait():
     async def scenario(cell):
         cell.robot.pause_program()
         await cell.sleep(5.0)
-        assert 1 <= unread(cell) <= 3, 'one for the read that is under way, and no more'
+        assert 1 <= unread(cell) <= 3, 'one for the pending read, and no more'
         await perform(cell, 'play')
         await cell.until(cell.is_ready)
         goal = BlendGoal(cell)
@@ -58,7 +58,7 @@ def test_a_stop_is_followed_up_also_when_the_primary_interface_was_dead(fault):
     run_cell(scenario)
 
 
-def test_who_pulls_the_cable_for_a_moment_is_not_taken_for_ready():
+def test_a_robot_is_not_ready_right_after_its_cable_was_unplugged():
     """The sockets of a program that has ended behind a cut cable look as if it was there."""
 
     async def scenario(cell):
@@ -85,7 +85,7 @@ def test_an_owner_that_hangs_up_stops_the_arm_and_the_program():
     run_cell(scenario)
 
 
-def test_sending_the_program_does_not_take_it_away_from_a_goal():
+def test_resend_during_a_goal_is_refused_and_the_goal_goes_on():
     async def scenario(cell):
         goal = BlendGoal(cell)
         await goal.bring_to('mid-segment')
@@ -98,7 +98,7 @@ def test_sending_the_program_does_not_take_it_away_from_a_goal():
 
 
 def test_an_output_long_after_the_end_is_waited_for():
-    """The arm stands until then, and no message was lost."""
+    """The arm is at rest until then, and no message was lost."""
 
     async def scenario(cell):
         late = IOCommand(

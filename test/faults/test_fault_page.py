@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What users are told about faults is what is tested."""
+"""The page about faults is generated from the tested table."""
 
 import importlib.util
 from pathlib import Path

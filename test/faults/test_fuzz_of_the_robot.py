@@ -33,7 +33,7 @@ pytestmark = [pytest.mark.acceptance, pytest.mark.slow]
 
 #: Bytes of the size field that begins a frame of a dialled interface.
 WIDTHS = {RTDE: 2, PRIMARY: 4}
-WAY, TIME = 0.05, 0.5
+DISTANCE, TIME = 0.05, 0.5
 
 attacks = st.tuples(
     st.sampled_from([RTDE, PRIMARY, REVERSE, TRAJECTORY, COMMANDS]),
@@ -80,13 +80,14 @@ def say(cell, port, what):
         robot.write(data)
 
 
-def goal(cell, way, execution=ExecutionMode.PRIMITIVES):
+def goal(cell, distance, execution=ExecutionMode.PRIMITIVES):
     """Return a plan to and fro along y."""
     state = cell.memory.read()
     (x, y, z), turn = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
     return plan(
         Goal(
-            waypoints=(Waypoint(pose=Pose((x, y + way, z), turn), time=TIME),), execution=execution
+            waypoints=(Waypoint(pose=Pose((x, y + distance, z), turn), time=TIME),),
+            execution=execution,
         ),
         state,
         Arm(robot_model('ur5e')),
@@ -107,7 +108,7 @@ async def back(cell):
     raise AssertionError(f'it does not come back: {cell.status}; {cell.owner.log}')
 
 
-async def under_attack(cell, attack, way):
+async def under_attack(cell, attack, distance):
     port, what, in_motion, execution = attack
     await back(cell)
     q = cell.q
@@ -117,24 +118,24 @@ async def under_attack(cell, attack, way):
         assert cell.q == q, 'nobody asked for a motion'
         return
     (x, y, z) = cell.robot.controller.motion.T_base_tcp.position
-    motion = cell.owner.start(goal(cell, way, execution))
+    motion = cell.owner.start(goal(cell, distance, execution))
     await cell.until(lambda: not cell.at_rest() or motion.outcome is not None)
     say(cell, port, what)
     await cell.until(lambda: motion.outcome is not None, 10.0)
     await cell.until(cell.at_rest, 1.0)
     await asyncio.sleep(0.3)
     u, v, w = cell.robot.controller.motion.T_base_tcp.position
-    assert max(abs(u - x), abs(w - z)) < 1e-3, 'off the way'
-    assert min(0.0, way) - 1e-3 < v - y < max(0.0, way) + 1e-3, 'beyond the way'
+    assert max(abs(u - x), abs(w - z)) < 1e-3, 'off the path'
+    assert min(0.0, distance) - 1e-3 < v - y < max(0.0, distance) + 1e-3, 'beyond the path'
     if motion.outcome.succeeded:
-        assert abs(v - y - way) < 1e-3, 'a success at another place'
+        assert abs(v - y - distance) < 1e-3, 'a success at another place'
     assert motion.outcome.text
 
 
-async def undisturbed(cell, way):
-    """Run a goal. What was said before may end it still: half a result, or a size made up."""
+async def undisturbed(cell, distance):
+    """Run a goal. An attack before may still end it: half a result, or a wrong size."""
     await back(cell)
-    motion = cell.owner.start(goal(cell, way))
+    motion = cell.owner.start(goal(cell, distance))
     await cell.until(lambda: motion.outcome is not None, 5.0)
     await asyncio.sleep(1.5)
     return motion.outcome
@@ -148,16 +149,16 @@ async def undisturbed(cell, way):
     phases=[Phase.generate],
 )  # an example takes seconds: no shrinking
 @given(st.lists(attacks, min_size=8, max_size=8))
-def test_a_robot_may_say_anything(said):
+def test_a_robot_may_say_anything(attacks):
     tripped = []
 
     async def scene(cell):
         cell.loop.set_exception_handler(lambda _, context: tripped.append(context))
-        for i, attack in enumerate(said):
-            await under_attack(cell, attack, WAY if i % 2 else -WAY)
+        for i, attack in enumerate(attacks):
+            await under_attack(cell, attack, DISTANCE if i % 2 else -DISTANCE)
             assert not tripped, (attack, tripped)
             assert not cell.loop_task.done()
-        outcomes = [await undisturbed(cell, way) for way in (WAY, -WAY)]
+        outcomes = [await undisturbed(cell, distance) for distance in (DISTANCE, -DISTANCE)]
         assert outcomes[-1].succeeded, outcomes
 
     run_cell(scene)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Each way of execution takes the place of each other one, at once, and runs to its end."""
+"""Each execution mode preempts each other one, at once, and runs to its end."""
 
 from fault_cell import return_home
 from fault_goals import AppendGoal, BlendGoal, FreedriveGoal, GOALS
@@ -27,7 +27,7 @@ STRONGEST = 12.0
 
 
 async def preempt_motion(cell, trace, first, second):
-    """Preempt a goal in the middle of its way, and run the next one."""
+    """Preempt a goal in the middle of its path, and run the next one."""
     goal = KINDS[first](cell)
     goal.send()
     await trace.until(lambda: goal.is_in(MIDDLE[first]), 2.0)
@@ -46,7 +46,7 @@ async def preempt_motion(cell, trace, first, second):
 
 @pytest.mark.exhaustive
 @pytest.mark.parametrize('first', KINDS)
-def test_any_way_of_execution_takes_the_place_of_any_other(first):
+def test_any_execution_mode_preempts_any_other(first):
     async def scenario(cell):
         home = cell.robot.controller.motion.T_base_tcp.position
         for second in KINDS:

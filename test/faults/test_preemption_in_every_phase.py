@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A motion makes way for the next one in every phase: messages, brakes, place of rest."""
+"""A motion is preempted in every phase: messages, braking, pose at rest."""
 
 from fault_goals import ARM, BlendGoal, planned
 from joint_trace import JointTrace
@@ -78,7 +78,7 @@ async def preempted(cell, phase):
     assert change < STRONGEST, phase
 
 
-def test_a_motion_makes_way_in_every_phase_and_the_next_one_begins_at_rest():
+def test_a_motion_is_preempted_in_every_phase_and_the_next_one_begins_at_rest():
     async def scenario(cell):
         for phase in PHASES:
             await preempted(cell, phase)

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What slider and pause do to the way of the tool: they take time, and change nothing else.
+What slider and pause do to the path of the tool: they take time, and change nothing else.
 
 Slowed, held and let go again the tool stays on its path, no joint is thrown, and a cancel while it
 is slowed brakes as any other.
@@ -27,7 +27,7 @@ DONE = {
     'to zero and up again': [('slider 0', 0.3), ('slider 1', 0.2)],
     'pause and play': [('pause', 0.3), ('play', 0.2)],
 }
-#: By way of execution: how far the tool may be off its path [m], and which accelerations a joint
+#: By execution mode: how far the tool may be off its path [m], and which accelerations a joint
 #: may see [rad/s^2]. A program that pauses as the arm comes to a corner does not begin the blend.
 BOUNDS = {
     'PRIMITIVES': (0.005, 12.0),
