@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What holds for all tests."""
+"""Settings for all tests."""
 
 import gc
 import os

@@ -1,9 +1,9 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Rules of the house that the linters cannot see.
+Rules that the linters cannot check.
 
-import-linter holds the order of the layers; it does not see generated modules, which are not in
+import-linter enforces the order of the layers; it does not see generated modules, which are not in
 the source tree.
 """
 

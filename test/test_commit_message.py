@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The commit-msg hook holds the layout that CONTRIBUTING asks for."""
+"""The commit-msg hook enforces the layout of CONTRIBUTING."""
 
 from pathlib import Path
 import runpy
@@ -16,7 +16,7 @@ LONG = 'Bound '.ljust(73, 'x')
 
 
 def complaint(message, tmp_path, monkeypatch):
-    """Run the hook on a message and return what it prints before it refuses, or None."""
+    """Run the hook on a message; return its refusal, or None."""
     file = tmp_path / 'COMMIT_EDITMSG'
     file.write_text(message, encoding='utf-8')
     monkeypatch.setattr(sys, 'argv', [str(SCRIPT), str(file)])

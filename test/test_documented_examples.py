@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The documents show commands and what comes out of them: here they are run, and both are compared.
+The commands in the documents print what the documents show.
 
-A block begins with its commands, each after ``$``. What follows is compared word by word, however
-its lines are broken; ``...`` stands for anything. ``validate`` runs as it is; ``sim`` and ``send``
+A block begins with its commands, each after ``$``. The output is compared word by word, without
+line breaks; ``...`` stands for anything. ``validate`` runs as it is; ``sim`` and ``send``
 run as one cell in virtual time, where only the end of the goal is compared.
 """
 
@@ -67,7 +67,7 @@ def all_examples(*names):
 
 
 def assert_shows(shown, came):
-    """Compare words; ``...`` in what is shown stands for any."""
+    """Compare words; ``...`` in the document stands for any."""
     parts = (re.escape(part.strip()) for part in ' '.join(shown.split()).split('...'))
     assert re.fullmatch(' ?.*? ?'.join(parts), ' '.join(came.split())), came
 
@@ -96,7 +96,7 @@ def sent(cell, words):
 
 
 def ended(sim, send, cancel_after):
-    """Return how a goal ends while the faults of a ``sim`` happen."""
+    """Return the outcome of a goal with the faults of a ``sim`` command."""
 
     async def scenario(cell):
         cell.robot.inject(*sim.faults)
@@ -111,7 +111,7 @@ def ended(sim, send, cancel_after):
 
 
 def by_a_robot_that_is_not_ready(sim, send):
-    """Return how a goal ends for a robot that cannot take it."""
+    """Return the outcome of a goal for a robot that cannot take it."""
     with (
         SimulatedRobot(simulator_config(sim)) as robot,
         Driver(

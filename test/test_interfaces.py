@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The interfaces keep what FZI proposed, can be sent, and document themselves."""
+"""The interfaces contain FZI's proposal unchanged, can be sent, and document themselves."""
 
 import math
 import re
@@ -237,7 +237,7 @@ def interface_files():
 
 
 def documented_fields(text: str) -> dict[str, str]:
-    """Return each field with the comments that speak of it: before its block, and behind it."""
+    """Return each field with its comments: before its block, and after it."""
     fields: dict[str, str] = {}
     comment, in_block = '', False
     for line in text.splitlines():

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What is installed is complete, and the files that describe it agree with each other."""
+"""The installation is complete, and the files that describe it agree with each other."""
 
 import ast
 import importlib

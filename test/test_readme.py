@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What the documents promise: their goals plan, their snippets run, their links lead somewhere."""
+"""The documents are true: goals can be planned, snippets run, links and names exist."""
 
 from __future__ import annotations
 

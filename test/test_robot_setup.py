@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The page about real robots knows every state and every sentence that says what is needed.
+The page about real robots has every state and every sentence about a required action.
 
-Both ways: what the tables of the connection and of the way back can say is on the page, and what
-the page quotes is written in the source, as a whole or with values in it.
+Both directions: the page has all sentences of the tables of connection and recovery, and the
+source contains what the page quotes, as a whole or with values in it.
 """
 
 import ast
@@ -60,7 +60,7 @@ ROBOTS = [
 
 
 def table(first_column):
-    """Return the rows of all tables of the page whose first column is called so."""
+    """Return the rows of all tables of the page whose first column has a title."""
     text = PAGE.read_text(encoding='utf-8')
     found = re.findall(rf'^\| {first_column} \|.*\n\|[ -|]*\n((?:\|.*\n)+)', text, re.MULTILINE)
     assert found
@@ -72,7 +72,7 @@ def table(first_column):
 
 
 def quoted(cell):
-    """Return the sentence of a cell, or none where the cell has other words only."""
+    """Return the quoted sentence of a cell, or an empty one."""
     match = re.match(r'`([^`]+)`', cell)
     return match[1] if match else ''
 
@@ -86,7 +86,7 @@ def sentences():
 
 
 def pattern(text, placeholder='...'):
-    """Return what fits a text in which a placeholder stands for anything."""
+    """Return the pattern of a text in which a placeholder stands for anything."""
     return re.compile('.*'.join(map(re.escape, text.split(placeholder))), re.DOTALL)
 
 
@@ -167,7 +167,7 @@ def texts(tree):
 
 @pytest.fixture(scope='module')
 def written():
-    """Everything that the sources can say, each text as a pattern with its literal length."""
+    """All texts of the sources, each as a pattern with its literal length."""
     found = {text for path in SOURCES for text in texts(ast.parse(path.read_text()))}
     # A line in the log of a robot ends in a value.
     found |= {f'{text}\0' for text in re.findall(r'"([^"\n]+)"', ROBOT_PROGRAM.read_text())}
@@ -175,7 +175,7 @@ def written():
 
 
 async def refusals_of_the_system():
-    """Return what is said of a port that nobody listens on, of one that is taken and of a wire."""
+    """Return the messages about a port without listener, a port in use and a lost connection."""
     said = []
     with socket.create_server(('127.0.0.1', 0)) as taken:
         port = taken.getsockname()[1]
@@ -193,7 +193,7 @@ async def refusals_of_the_system():
 
 
 def can_say(written, said):
-    """Tell whether a text says something, at least half of it in its own words."""
+    """Tell whether a text produces a sentence, at least half of it literally."""
     return any(
         length >= 0.5 * len(said.replace('...', '')) and fits.fullmatch(said)
         for fits, length in written

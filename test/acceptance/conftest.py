@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""A driver on a simulated robot, and witnesses of their own: RTDE packets and socket bytes."""
+"""A driver on a simulated robot, and independent records: RTDE packets and socket bytes."""
 
 from contextlib import contextmanager
 import socket

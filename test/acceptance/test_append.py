@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Goals that are continued while they run: producer, robot loop and robot, in virtual time."""
+"""Appending to goals while they run: producer, robot loop and robot, in virtual time."""
 
 import asyncio
 from dataclasses import replace
@@ -98,7 +98,7 @@ class Speeds:
 
 
 async def produced(cell, kind, total, chunk, lead):
-    """Run an open goal whose producer appends when less is left than that [s]."""
+    """Run an appendable goal whose producer appends when less than a lead time is left [s]."""
     home, speeds = cell.memory.read().actual_tcp_pose, Speeds(cell)
     motion = AppendMotion(cell, goal(kind, home, chunk))
     while motion.points < total:
@@ -120,7 +120,7 @@ async def produced(cell, kind, total, chunk, lead):
 
 
 async def at_once(cell, kind, total):
-    """Run the same as a goal whose points are all known."""
+    """Run the same goal with all points known at the start."""
     home, speeds = cell.memory.read().actual_tcp_pose, Speeds(cell)
     motion = cell.owner.start(
         plan(
@@ -140,7 +140,7 @@ def test_a_producer_that_is_late_by_less_than_the_margin_is_not_noticed(kind):
     """
     Cycle by cycle, the arm moves as if all points had been known at the start.
 
-    The late one appends when the motion is going to be closed within its own reaction time.
+    The late producer appends when the arm is about to decelerate, within its own reaction time.
     """
     total = 9
     known = run_cell(lambda cell: at_once(cell, kind, total))
@@ -152,7 +152,7 @@ def test_a_producer_that_is_late_by_less_than_the_margin_is_not_noticed(kind):
 
 
 async def closed(cell, kind, count=6, **changes):
-    """Run an open goal whose producer stops until it rests; return it, home, and its speeds."""
+    """Run an appendable goal whose producer stops until the arm rests; return it, home, speeds."""
     home, speeds = cell.memory.read().actual_tcp_pose, Speeds(cell)
     motion = AppendMotion(cell, goal(kind, home, count, **changes))
     assert await motion.until(lambda: motion.motion.progress and motion.progress.awaiting_points)
@@ -300,7 +300,7 @@ def test_outputs_are_switched_as_if_all_points_had_been_known(kind):
 
 
 def test_memory_stays_the_same_however_long_a_goal_goes_on():
-    """Hundreds of pieces of a spline, a cycle each: no starvation, and nothing that grows."""
+    """Hundreds of spline pieces, a cycle each: no starvation, and no growth."""
 
     async def scenario(cell):
         home, sizes, blocks = cell.memory.read().actual_tcp_pose, [], []

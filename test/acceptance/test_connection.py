@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Robots that are missing, wrong, stopped or lost: what the driver says, and what it does."""
+"""Robots that are missing, wrong, stopped or lost: messages and behaviour of the driver."""
 
 import contextlib
 import os
@@ -57,7 +57,7 @@ def test_cancel_brings_the_arm_to_rest_and_the_next_goal_runs(driver, long_goal,
 
 
 def test_cancel_in_the_middle_of_many_points(driver, home):
-    """The points that were sent and not run are thrown away, not run with the next goal."""
+    """The robot discards points that it did not run; they do not run with the next goal."""
     points = tuple(
         Waypoint(pose=home(y=0.0002 * (i + 1)), time=0.01 * (i + 1)) for i in range(900)
     )

@@ -1,11 +1,11 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Wrist flip, elbow flip and shoulder crossing: what no straight line does, and a joint move does.
+Wrist flip, elbow flip and shoulder crossing: impossible on a straight line, possible in joints.
 
-The lines are built around a configuration in which the arm is nearly singular, to an end whose
-posture is the one behind the flip. The planner has to say which flip it is and where; sent all the
-same, the line does not bring the arm into that posture.
+Each line passes a nearly singular configuration and ends in a posture beyond the flip. The planner
+has to name the flip and its position; when it is sent anyway, the line does not bring the arm into
+that posture.
 """
 
 from dataclasses import replace
@@ -47,7 +47,7 @@ def past_a_straight_wrist(arm):
 
 
 def outwards(arm):
-    """To an arm that is nearly stretched: the other elbow is near, but behind the stretch."""
+    """To a nearly stretched arm: the other elbow is near, but beyond the stretch."""
     q = (0.4, -0.6, 0.9, -0.8, -1.2, 0.3)
     end = arm.forward((0.4, -0.35, 0.3, -0.45, -1.2, 0.3))
     return q, end
@@ -119,7 +119,7 @@ def test_a_flip_is_named_fails_as_a_line_and_passes_as_a_joint_move(robot_of, mo
 
 
 def came_to(arm, q, end):
-    """Return the configuration in which a line arrives, come to in steps of 0.1 mm."""
+    """Return the configuration at the end of a line, solved in steps of 0.1 mm."""
     start = arm.forward(q)
     for share in np.linspace(0.0, 1.0, int(start.distance_to(end) / 1e-4) + 2)[1:]:
         q = nearest(arm, start.interpolate(end, float(share)), q)

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Goals about another frame than the robot's TCP: the named frame keeps to its line or arc.
+Goals about another frame than the robot's TCP: the named frame stays on its line or arc.
 
 Its pose follows from the joints that an RTDE connection of the test reports, by the product of the
 link matrices of a textbook; nothing of the package computes it.
@@ -45,7 +45,7 @@ def tcp_of(ur_sim):
 
 
 def set_tcp(ur_sim, pose):
-    """Set the TCP as somebody else does."""
+    """Set the TCP as another client does."""
     numbers = ', '.join(f'{v!r}' for v in pose.rotation_vector())
     ur_sim.run_script(f'sec theirs():\n  set_tcp(p[{numbers}])\nend\n')
     wait_for(lambda: tcp_of(ur_sim).distance_to(pose) < 1e-12)
@@ -66,7 +66,7 @@ def tooled(driver, ur_sim):
 
 
 def stand(driver, T_flange_frame):
-    """Return where a frame behind the flange is, by the robot's own report."""
+    """Return the pose of a frame fixed to the flange, by the robot's own report."""
     state = driver.state
     return state.actual_tcp_pose @ state.T_flange_tcp.inverse() @ T_flange_frame
 
@@ -372,7 +372,7 @@ def test_nothing_moves_when_the_robot_does_not_set_the_tcp(make_driver, ur_sim, 
 
 @pytest.mark.ur_sim(frequency=125.0)
 def test_a_robot_loop_restores_the_tcp_that_a_dead_one_left(make_driver, ur_sim):
-    """Program and robot loop die at once, so that nobody is left who could do it."""
+    """Program and robot loop die at once, so neither can restore it."""
     set_tcp(ur_sim, TCP)
     driver = make_driver(robot_loop='process')
     driver.wait_ready(10.0)

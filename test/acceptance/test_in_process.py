@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Simulator, node and client in one process, as the tests of our users have them."""
+"""Simulator, node and client in one process, as in the tests of our users."""
 
 import os
 from pathlib import Path
@@ -183,6 +183,6 @@ def test_nothing_is_left_behind(request, round_):
 
 
 def listening_ports():
-    """The TCP ports on which somebody of this machine listens."""
+    """The TCP ports with a listener on this machine."""
     rows = Path('/proc/net/tcp').read_text('ascii').splitlines()[1:]
     return {int(row.split()[1].split(':')[1], 16) for row in rows if row.split()[3] == '0A'}

@@ -3,8 +3,8 @@
 """
 Outputs that switch on the path: where the tool is then, in which order, and after a stop.
 
-Where the tool was comes from the controller, cycle by cycle, and the middle of a corner from the
-same: it is where that path is nearest to the point. The plan has no say in it.
+The position of the tool comes from the controller, cycle by cycle, and so does the middle of a
+blend: the point of that path nearest to the waypoint. Nothing is taken from the plan.
 """
 
 from math import cos, hypot, radians, sin
@@ -86,7 +86,7 @@ def blended(home, points, **changes):
 
 
 class Watched:
-    """In which cycle which output changed, and all places of the tool."""
+    """Records the cycle of each change of an output, and all positions of the tool."""
 
     def __init__(self, controller):
         self._outputs = controller.io.digital_out.standard
@@ -103,7 +103,7 @@ class Watched:
 
 
 def middles(path, points, cycles):
-    """Return where the path is nearest to each point, near a cycle (n, 3) [m]."""
+    """Return the positions on the path nearest to each point, near a cycle (n, 3) [m]."""
     found = []
     for point, cycle in zip(points, cycles, strict=True):
         a = path[max(cycle - 60, 0) : cycle + 60]

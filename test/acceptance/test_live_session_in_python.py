@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Live targets from Python: a calibrated arm, and what callers may do wrong."""
+"""Live targets from Python: a calibrated arm, and wrong calls."""
 
 from time import sleep
 

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""Live targets through ROS: simulator, node and somebody who sends poses, in one process."""
+"""Live targets through ROS: simulator, node and a sender of poses, in one process."""
 
 from math import hypot
 from pathlib import Path

@@ -1,14 +1,14 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-What the pre-flight says of a goal is what the robot does.
+The verdict of the pre-flight check on a goal is what the robot does.
 
-Goals are drawn at the borders of what each arm can do. What passes is sent and has to arrive as
-planned; what is refused for reach, range or branch is sent all the same and has to fail. Both
-sides share the kinematics, so that the paths are also compared with one that owes nothing to it.
+Random goals at the limits of each arm: accepted ones have to arrive as planned; those refused for
+reach, range or branch are sent anyway and have to fail. Both sides share the kinematics, so the
+paths are also compared with an independent one.
 
-``PRE_FLIGHT_GOALS`` is the number of goals of each model. From 1000 on also those are run that
-take minutes.
+``PRE_FLIGHT_GOALS`` is the number of goals of each model. From 1000 on, goals that take minutes
+run too.
 """
 
 from collections import Counter

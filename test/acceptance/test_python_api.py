@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The driver as a library: what its users' code may do wrong without harm."""
+"""The driver as a library: mistakes of its users' code do no harm."""
 
 from dataclasses import replace
 import os

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The robot program as text: what is sent is what runs, word for word.
+The robot program as text: the program that is sent is the one that runs.
 
 The test plays the External Control URCap: it fetches the program from the driver's script sender,
 edits it, and uploads it to the controller, which knows nothing of it but that text.

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What a robot is asked for beside motions: done, refused in a sentence, or explained."""
+"""Service calls of a robot: done, refused with a sentence, or explained."""
 
 import os
 import signal

@@ -188,7 +188,7 @@ def test_each_dialect_cancels_and_goes_on(name):
 
 
 def test_two_thousand_points_reach_a_program_that_tells_no_progress():
-    """More than four windows of points: they move on with the place on the path."""
+    """More than four send windows of points: they advance with the position on the path."""
 
     async def scenario(cell):
         home = cell.pose()

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""The sample program of the servoj guide carries out goals of ours: the contract is the same."""
+"""The sample program of the servoj guide executes our goals: the contract is the same."""
 
 from types import SimpleNamespace
 
@@ -63,7 +63,7 @@ def job(home):
 
 
 def state_of(controller):
-    """Return what RTDE would report; the machine's other packet."""
+    """Return the robot state of RTDE, the machine's other packet."""
     motion = controller.motion
     return RobotState(
         timestamp=controller.time,
@@ -81,7 +81,7 @@ def state_of(controller):
 
 
 def drive(slider=1.0, cancel_after=None):
-    """Run a goal on the sample program; return what was seen of it."""
+    """Run a goal on the sample program; return the measurements."""
     cell = GuideCell()
     goal = servo_machine(job(cell.q), ServoSettings(lookahead_time=0.06))
     seen = SimpleNamespace(

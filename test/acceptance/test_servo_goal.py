@@ -32,7 +32,7 @@ ARM = Arm(robot_model('ur5e'))
 
 
 class Run:
-    """A goal that is carried out, as its owner and the robot's clock see it."""
+    """A goal that is executed, as its owner and the robot's clock see it."""
 
     def __init__(self, cell, goal):
         self.cell, self.packets, self.reports, self.progress = cell, [], [], []

@@ -6,7 +6,7 @@ The manufacturer's sample program for buffered servoj runs, and an RTDE client d
 ``programs/servoj_guide.script`` is the sample of Universal Robots' guide "Trajectory improvements
 for servoj()", word for word. Its indentation was lost and has not been restored, which
 a controller does not mind. The client is our RTDE codec; it and the controller take turns cycle by
-cycle, so that the tests need no real time and always see the same; the last one meets it over TCP.
+cycle, so the tests need no real time and are deterministic; the last one uses TCP.
 """
 
 from math import pi, sin
@@ -90,7 +90,7 @@ class ExternalController:
         return ready[0].inputs[0]
 
     def __getattr__(self, name):
-        """Return what the newest packet says."""
+        """Return a field of the newest packet."""
         fields = {
             'q': 1,
             'qd': 2,

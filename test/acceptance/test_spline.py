@@ -35,7 +35,7 @@ ARM = Arm(robot_model('ur5e'))
 
 @dataclass
 class Run:
-    """A goal that was carried out, and the targets of all packets."""
+    """A goal that was executed, and the targets of all packets."""
 
     made: Plan
     outcome: object
@@ -54,7 +54,7 @@ class Run:
         return ToolSpline.through(tool_points(goal, begin.tool(ARM, self.made.T_flange_active)))
 
     def passing(self, time):
-        """Return when the tool is nearest to where the curve is at a time, and its twist then."""
+        """Return when the tool is nearest to a position of the curve, and its twist then."""
         place = self.curve().at(np.array([time])).poses[0, :3]
         fine = np.arange(time - 0.06, time + 0.06, 1e-4)
         polyline = np.stack([np.interp(fine, self.times, x) for x in self.places.T], axis=1)

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-The simulated controller under a client that nobody here wrote: the ``ur-rtde`` package of PyPI.
+The simulated controller with an independent client: the ``ur-rtde`` package of PyPI.
 
 It uploads its own control program, moves the arm through RTDE registers, and knows only the ports
 of a real robot; so each simulator has a loopback address of its own. The client runs as a process:
@@ -82,7 +82,7 @@ class Client:
         self.note(name, poses=poses, joints=joints)
 
     def until(self, happened: Any) -> bool:
-        """Wait for something that the robot needs a moment for."""
+        """Wait until a condition holds."""
         give_up = time.monotonic() + 5.0
         while not happened() and time.monotonic() < give_up:
             time.sleep(0.01)

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-A robot that says anything at all on its five connections, at rest and under a goal.
+A robot that sends anything on its five connections, at rest and during a goal.
 
-Whatever comes, nothing trips, nothing moves that was not asked to, every goal ends, and the driver
-finds back to a state in which the next one runs.
+Whatever comes, nothing crashes, no unrequested motion happens, every goal ends, and the driver
+recovers to a state in which the next one runs.
 """
 
 import asyncio
@@ -69,7 +69,7 @@ def changed(frame, places):
 
 
 def say(cell, port, what):
-    """Let the robot say something on all its connections of a kind."""
+    """Send data from the robot on all its connections of a kind."""
     for end in cell.loop.open_ends(port):
         dialled = port in WIDTHS  # by the driver, so the robot is at the far end
         robot = end.peer if dialled else end
@@ -81,7 +81,7 @@ def say(cell, port, what):
 
 
 def goal(cell, distance, execution=ExecutionMode.PRIMITIVES):
-    """Return a plan to and fro along y."""
+    """Return a plan along y."""
     state = cell.memory.read()
     (x, y, z), turn = state.actual_tcp_pose.position, state.actual_tcp_pose.quaternion
     return plan(
@@ -96,7 +96,7 @@ def goal(cell, distance, execution=ExecutionMode.PRIMITIVES):
 
 
 async def back(cell):
-    """Bring the robot back by what the status asks for."""
+    """Recover the robot by the action that the status requires."""
     for _ in range(10):
         if cell.status.state is ConnectionState.CONNECTED:
             cell.resend()

@@ -3,8 +3,8 @@
 """
 What slider and pause do to the path of the tool: they take time, and change nothing else.
 
-Slowed, held and let go again the tool stays on its path, no joint is thrown, and a cancel while it
-is slowed brakes as any other.
+Slowed, paused and resumed, the tool stays on its path, no joint jumps, and a cancel while it is
+slowed brakes as any other.
 """
 
 from fault_goals import BlendGoal, GOALS

@@ -1,10 +1,10 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Processes that die or hang under a goal, in real time: standstill and result against their bounds.
+Processes that die or hang during a goal, in real time: bounds of standstill and result.
 
-Simulator and node are processes, the client and a witness (an RTDE connection of its own) are
-here. ``doc/architecture.md`` has the bounds; printed are the times that were measured.
+Simulator and node are processes; client and witness (an RTDE connection of its own) are in this
+one. ``doc/architecture.md`` has the bounds; the tests print the measured times.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -48,7 +48,7 @@ AT_REST, MOVING = 1e-4, 0.08
 
 
 class Witness:
-    """What RTDE says: who moves, and since when the arm has been at rest."""
+    """Watches through RTDE whether the arm moves, and since when it has been at rest."""
 
     def __init__(self, port):
         self._connection = socket.create_connection(('127.0.0.1', port))
@@ -157,7 +157,7 @@ class Cell:
         return int(child)
 
     def moving(self, client):
-        """Send the goal; return what becomes of it, when the arm moves."""
+        """Send the goal; return its future result when the arm moves."""
         deadline = monotonic() + 15.0
         while True:
             client.wait_ready(10.0)

@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""What faults leave behind when they last: queues, dead connections, and who notices."""
+"""Effects of faults that last: queues, dead connections, and their detection."""
 
 from fault_cell import inject_cause, perform
 from fault_goals import BlendGoal, planned
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 
 
 def unread(cell):
-    """What the robot program has not read of what the driver says on the reverse socket."""
+    """Number of messages on the reverse socket that the robot program has not read."""
     (end,) = cell.loop.open_ends(robot_cell.REVERSE)
     return len(end.protocol.incoming) // MESSAGE_SIZE
 

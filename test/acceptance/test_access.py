@@ -17,7 +17,7 @@ OTHER = '127.0.0.2'
 
 
 def knock(port, host='127.0.0.1'):
-    """Call from the other address; return whether the door stays open."""
+    """Connect from the other address; return whether the connection stays open."""
     with socket.create_connection((host, port), timeout=5.0, source_address=(OTHER, 0)) as call:
         call.settimeout(0.3)
         try:

@@ -1,7 +1,7 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
 """
-Watching, packet by packet: robot loop and robot over sockets, in time that waits for both.
+Tolerance checks packet by packet: robot loop and robot over sockets, in virtual time.
 
 Decisions of the machine are tested without sockets; here the bytes on the wire and their times.
 """
@@ -80,7 +80,7 @@ async def executed(cell, goal, *faults):
 
 
 class Tapped(asyncio.Protocol):
-    """Between a connection and who reads it: notes what comes, and when."""
+    """Sits between a connection and its reader, and records all data with their times."""
 
     def __init__(self, cell, port):
         end = cell.loop.open_ends(port)[0]  # the first of RTDE's is that of the robot's state
@@ -100,7 +100,7 @@ class Tapped(asyncio.Protocol):
 
 
 def times_of_pushed(notes, quantity, axis, limit):
-    """When packets came in which the actual value is off its target on an axis."""
+    """Yield the times of packets whose actual value is off its target on an axis."""
     field = {'pose': 'TCP_pose', 'twist': 'TCP_speed', 'acceleration': 'TCP_acceleration'}
     actual, target = (NAMES.index(f'{kind}_{field[quantity]}') for kind in ('actual', 'target'))
     frames = RtdeFrameBuffer()
@@ -237,7 +237,7 @@ KINDS = (SegmentType.LINEAR, SegmentType.JOINT, SegmentType.LINEAR)
 
 
 def random_goal(cell, random, share):
-    """Two or three motions; the slower the slider, the shorter, for each cycle has its price."""
+    """Two or three motions; the slower the slider, the shorter, to save computing time."""
     here = cell.memory.read().target_tcp_pose
     time, waypoints, segments = 0.0, [], []
     for _ in range(random.randint(2, 3)):
@@ -259,7 +259,7 @@ def random_goal(cell, random, share):
 
 
 def random_faults(random, slider, duration):
-    """What people do while it moves: the slider, up to two times, and a pause in half the runs."""
+    """Return faults by operators: slider moves, up to two, and a pause in half the runs."""
     instants = sorted(random.uniform(0.0, duration) for _ in range(3))
     faults: list[Fault] = [
         SpeedSliderFault(fraction=slider),

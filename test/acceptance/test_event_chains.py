@@ -1,6 +1,6 @@
 # Copyright 2026 the ur_cartesian_driver contributors
 # SPDX-License-Identifier: Apache-2.0
-"""When something ended, the result and the status say what led to it."""
+"""Result and status name the events that led to the end of a goal."""
 
 import pytest
 from robot_cell import REVERSE, run_cell, TRAJECTORY
@@ -123,7 +123,7 @@ def test_the_chain_says_who_did_what_and_when(fault, code, links):
 
 
 async def nothing(cell):
-    """Wait for what happens by itself."""
+    """Do nothing: the fault happens by itself."""
 
 
 def test_an_arm_that_cannot_follow_its_set_points_is_named_as_the_cause():
