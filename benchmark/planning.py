@@ -17,6 +17,7 @@ from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode
 from ur_cartesian_driver.motion.goal import Goal
+from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning import plan, PlanningOptions
 
 #: Blend radius [m]; two blends fit between points that are 5 mm apart.
@@ -88,7 +89,7 @@ def _timed(goal: Goal) -> Goal:
         goal,
         execution=ExecutionMode.SPLINE,
         waypoints=tuple(
-            replace(point, time=LEAD + PERIOD * k, twist=tuple(speed))
+            replace(point, time=LEAD + PERIOD * k, twist=vector6(speed))
             for k, (point, speed) in enumerate(zip(goal.waypoints, speeds.tolist(), strict=True))
         ),
     )

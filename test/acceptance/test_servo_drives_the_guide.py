@@ -3,6 +3,7 @@
 """The sample program of the servoj guide executes our goals: the contract is the same."""
 
 from types import SimpleNamespace
+from typing import Any
 
 from goal_machines import servo_machine
 import numpy as np
@@ -83,7 +84,7 @@ def state_of(controller):
 def drive(slider=1.0, cancel_after=None):
     """Run a goal on the sample program; return the measurements."""
     cell = GuideCell()
-    goal = servo_machine(job(cell.q), ServoSettings(lookahead_time=0.06))
+    goal: Any = servo_machine(job(cell.q), ServoSettings(lookahead_time=0.06))
     seen = SimpleNamespace(
         commands=goal.start(state_of(cell.controller)),
         home=cell.q,

@@ -20,6 +20,7 @@ from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Goal, Segment, SegmentType, Tolerance, Waypoint
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.state import RuntimeState
+from ur_cartesian_driver.motion.vectors import vector3, vector6
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.protocol.program.reverse import ReverseDecoder, TrajectoryAction
 from ur_cartesian_driver.protocol.rtde.rtde_fields import OUTPUT_TYPES
@@ -128,10 +129,10 @@ def tolerance_of_one(quantity, axis, limit, others=-1.0):
     limits = {name: [others] * 6 for name in PUSHES}
     limits[quantity][axis] = limit
     return Tolerance(
-        position=tuple(limits['pose'][:3]),
-        orientation=tuple(limits['pose'][3:]),
-        twist=tuple(limits['twist']),
-        acceleration=tuple(limits['acceleration']),
+        position=vector3(limits['pose'][:3]),
+        orientation=vector3(limits['pose'][3:]),
+        twist=vector6(limits['twist']),
+        acceleration=vector6(limits['acceleration']),
     )
 
 
@@ -217,10 +218,10 @@ def tolerance_without(quantity, axis, limit):
     if quantity == 'acceleration':  # what accelerates becomes fast
         narrow['twist'][axis] = limit
     return Tolerance(
-        position=tuple(narrow['pose'][:3]),
-        orientation=tuple(narrow['pose'][3:]),
-        twist=tuple(narrow['twist']),
-        acceleration=tuple(narrow['acceleration']),
+        position=vector3(narrow['pose'][:3]),
+        orientation=vector3(narrow['pose'][3:]),
+        twist=vector6(narrow['twist']),
+        acceleration=vector6(narrow['acceleration']),
     )
 
 

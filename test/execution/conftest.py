@@ -18,7 +18,7 @@ from ur_cartesian_driver.motion.goal import Goal, Waypoint
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, MoveP
 from ur_cartesian_driver.motion.state import RobotState, RuntimeState
-from ur_cartesian_driver.motion.vectors import ZERO6
+from ur_cartesian_driver.motion.vectors import scale6, subtract6, ZERO6
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
@@ -80,7 +80,7 @@ class Cell:
         def state():
             nonlocal twists
             before, twists = twists, robot.tcp_twist
-            rate = tuple((b - a) / CYCLE for a, b in zip(before, twists, strict=True))
+            rate = scale6(subtract6(twists, before), 1.0 / CYCLE)
             return disturb(
                 time,
                 RobotState(
@@ -125,6 +125,7 @@ class Cell:
         a, v, r = move.acceleration, move.velocity, move.blend_radius
         match move:
             case MoveJ():
+                assert isinstance(move.target, Pose)
                 q = nearest(self.arm, move.target @ self.T_flange_tcp.inverse(), move.q_near)
                 return robot.movej(q, a, v, move.duration, r)
             case MoveL():

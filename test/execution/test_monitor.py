@@ -18,6 +18,7 @@ from ur_cartesian_driver.execution.goal.states import GoalState
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.goal import Segment, SegmentType, Tolerance
 from ur_cartesian_driver.motion.pose import multiply, Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.vectors import vector3, vector6
 from ur_cartesian_driver.protocol.program.reverse import TrajectoryAction
 
 TYPE = SegmentType
@@ -141,10 +142,10 @@ def test_a_disturbance_trips_its_axis_in_the_cycle_it_comes_in(cell, name, axis,
     limits = [-1.0] * 18
     limits[3 * NAMES.index(name) + axis] = bound
     tolerance = Tolerance(
-        position=tuple(limits[:3]),
-        orientation=tuple(limits[3:6]),
-        twist=tuple(limits[6:12]),
-        acceleration=tuple(limits[12:]),
+        position=vector3(limits[:3]),
+        orientation=vector3(limits[3:6]),
+        twist=vector6(limits[6:12]),
+        acceleration=vector6(limits[12:]),
     )
     made = cell.plan([cell.pose(x=0.02, y=0.02)], path_tolerance=tolerance)
     packets = []

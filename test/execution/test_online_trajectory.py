@@ -22,15 +22,16 @@ from ur_cartesian_driver.kinematics.collision_bodies import CollisionBodies, Lin
 from ur_cartesian_driver.kinematics.inverse_incremental import singularity_distances
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
 from ur_cartesian_driver.motion.pose import Pose, quaternion_from_rotation_vector
+from ur_cartesian_driver.motion.vectors import vector6
 
 UR5E = robot_model('ur5e')
 NOMINAL = Arm(UR5E)
 CALIBRATED = Arm(
     UR5E,
     DhTable(
-        a=tuple(v + 4e-4 for v in UR5E.geometry.a),
-        d=tuple(v - 3e-4 for v in UR5E.geometry.d),
-        alpha=tuple(v + 1e-3 for v in UR5E.geometry.alpha),
+        a=vector6(v + 4e-4 for v in UR5E.geometry.a),
+        d=vector6(v - 3e-4 for v in UR5E.geometry.d),
+        alpha=vector6(v + 1e-3 for v in UR5E.geometry.alpha),
         theta=(1e-3, -8e-4, 5e-4, 0.0, 1e-3, 0.0),
     ),
 )

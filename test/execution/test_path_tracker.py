@@ -116,7 +116,8 @@ def test_the_nearest_place_of_a_circle_is_on_its_radius(offset, part):
 
 
 def test_quaternions_of_either_sign_are_the_same_orientation():
-    flipped = tuple(-v for v in DOWN)
+    x, y, z, w = DOWN
+    flipped = (-x, -y, -z, -w)
     tracker = PathTracker(path(*SQUARE, quaternions=[DOWN, flipped, DOWN, flipped, DOWN]))
     tracker.update(Pose((0.5, 0.0, 0.2), flipped), 0.2)
     assert tracker.time() == pytest.approx(0.5)

@@ -18,7 +18,7 @@ from ur_cartesian_driver.motion.pose import (
     rotate,
 )
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.motion.vectors import ZERO6
+from ur_cartesian_driver.motion.vectors import subtract, vector3, ZERO6
 
 DOWN = quaternion_from_rotation_vector((pi, 0.0, 0.0))
 WANTED = Pose((0.4, -0.2, 0.3), DOWN)
@@ -63,15 +63,14 @@ def limit(name, values, others=-1.0):
 
 def disturbed(name, axis, error, frame=IDENTITY):
     """A packet in which desired - actual is `error` on an axis of the goal's frame."""
-    v = [0.0] * 3
-    v[axis] = error
+    errors = [0.0] * 3
+    errors[axis] = error
     if name == 'orientation':  # in the tool: q_desired = q_actual * error
-        actual = multiply(DOWN, quaternion_from_rotation_vector([-e for e in v]))
+        actual = multiply(DOWN, quaternion_from_rotation_vector([-e for e in errors]))
         return replace(ON_TIME, actual_tcp_pose=Pose(WANTED.position, actual))
-    v = rotate(frame.quaternion, tuple(v))
+    v = rotate(frame.quaternion, vector3(errors))
     if name == 'position':
-        where = tuple(p - e for p, e in zip(WANTED.position, v, strict=True))
-        return replace(ON_TIME, actual_tcp_pose=Pose(where, DOWN))
+        return replace(ON_TIME, actual_tcp_pose=Pose(subtract(WANTED.position, v), DOWN))
     field, first = FIELDS[name]
     values = list(getattr(ON_TIME, f'actual_tcp_{field}'))
     for k in range(3):
@@ -146,6 +145,7 @@ def test_what_is_no_number_is_outside():
 
 
 def test_opposite_signs_of_a_quaternion_are_no_error():
-    flipped = Pose(WANTED.position, tuple(-v for v in DOWN))
+    x, y, z, w = DOWN
+    flipped = Pose(WANTED.position, (-x, -y, -z, -w))
     watched = ToleranceCheck(limit('orientation', [1e-6] * 3), IDENTITY)
     assert watched.violation(flipped, ON_TIME) is None

@@ -22,6 +22,7 @@ import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import DhTable, MODELS
+from ur_cartesian_driver.motion.vectors import vector6
 
 GOLDEN = Path(__file__).parent / 'golden'
 
@@ -93,7 +94,7 @@ def table_of(lines):
         origin, x, z = origin + d * z + a * normal, normal, next_z
     flange_x, flange = lines.flange[:3, 0], lines.flange[:3, 3]
     rows.append((angle_about(z, x, flange_x), z @ (flange - origin), 0.0, 0.0))
-    theta, d, a, alpha = (tuple(float(v) for v in column) for column in zip(*rows, strict=True))
+    theta, d, a, alpha = (vector6(float(v) for v in column) for column in zip(*rows, strict=True))
     return DhTable(theta=theta, d=d, a=a, alpha=alpha)
 
 

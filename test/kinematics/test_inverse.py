@@ -24,6 +24,7 @@ from ur_cartesian_driver.kinematics.inverse import (
 from ur_cartesian_driver.kinematics.inverse_rows import branch_measures
 from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.vectors import vector6
 
 UR5E = Arm(MODELS['ur5e'])
 JOINTS = st.tuples(*[st.floats(-pi, pi)] * 6)
@@ -321,7 +322,7 @@ def test_of_twins_the_nearest_is_the_nearer(singularity, calibrated_arm):
         T_base_flange = arm.forward(q)
         found = solutions(arm, T_base_flange, seed=q)
         for solution in found:
-            q_near = tuple(angle + 0.02 for angle in solution)
+            q_near = vector6(angle + 0.02 for angle in solution)
             least = min(
                 dist(q_near, turned)
                 for other in found

@@ -12,6 +12,7 @@ from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.inverse_incremental import singularity_distances, track_pose
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.planning.preflight.margins import singularity_distance_rows
 
 UR5E = robot_model('ur5e')
@@ -22,7 +23,7 @@ def calibrated(seed=3):
     """A UR5e as one comes from the factory: half a millimetre and a milliradian off everywhere."""
     random = np.random.default_rng(seed)
     columns = {
-        name: tuple(
+        name: vector6(
             float(v + random.normal(0.0, 1e-3 if name in 'alpha theta' else 5e-4)) for v in column
         )
         for name, column in UR5E.geometry.columns().items()

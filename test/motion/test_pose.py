@@ -21,6 +21,7 @@ from ur_cartesian_driver.motion.pose import (
     Pose,
     pose_from_row,
     pose_rows,
+    Quaternion,
     quaternion_from_rotation,
     quaternion_from_rotation_vector,
     rotate,
@@ -59,6 +60,13 @@ def sum_of(a, b):
 
 
 # --- References ----------------------------------------------------------------------------------
+
+
+def negated(q: Quaternion) -> Quaternion:
+    """Return the other quaternion of the same rotation."""
+    x, y, z, w = q
+    return (-x, -y, -z, -w)
+
 
 REFERENCES: dict[str, Any] = {
     'pose_trans': lambda a, b: pose(a) @ pose(b),
@@ -186,7 +194,7 @@ def test_a_rotation_matrix_is_orthogonal_and_does_not_mirror(vector):
 @given(vector=VECTORS)
 def test_both_quaternions_of_a_rotation_mean_the_same(vector):
     a = quaternion_from_rotation_vector(vector)
-    b = tuple(-v for v in a)
+    b = negated(a)
     assert angle_between(a, b) < 1e-14
     assert rotation_vector_from_quaternion(a) == rotation_vector_from_quaternion(b)
     assert rotation_from_quaternion(a) == rotation_from_quaternion(b)
@@ -236,7 +244,7 @@ def test_interpolation_is_the_same_backwards(a, b, fraction):
 
 def test_slerp_takes_the_short_way():
     a = quaternion_from_rotation_vector((0.0, 0.0, 0.1))
-    b = tuple(-v for v in quaternion_from_rotation_vector((0.0, 0.0, 0.3)))
+    b = negated(quaternion_from_rotation_vector((0.0, 0.0, 0.3)))
     middle = slerp(a, b, 0.5)
     assert angle_between(middle, quaternion_from_rotation_vector((0.0, 0.0, 0.2))) < 1e-15
 

@@ -19,6 +19,7 @@ from ur_cartesian_driver.motion.goal import OutputKind
 from ur_cartesian_driver.motion.pose import IDENTITY, Pose
 from ur_cartesian_driver.motion.primitive import MoveC, MoveJ, MoveL, Spline, SwitchOutput
 from ur_cartesian_driver.motion.signals import AnalogDomain
+from ur_cartesian_driver.motion.vectors import add6, scale6, subtract6
 from ur_cartesian_driver.program import wrap_in_program
 from ur_cartesian_driver.protocol.program.trajectory_points import MAX_PENDING_OUTPUTS
 
@@ -195,9 +196,9 @@ def test_a_rotation_in_place_has_a_trigger_direction(robot):
 def test_an_output_switches_between_two_pieces_of_a_spline(robot):
     watched = Watched(robot)
     arm = Arm(robot_model('ur5e'))
-    middle = tuple(a + b for a, b in zip(HOME, (0.1, 0.05, 0, 0, 0, 0), strict=True))
-    end = tuple(a + b for a, b in zip(HOME, (0.2, 0.1, 0, 0, 0, 0), strict=True))
-    speed = tuple(2.0 * (b - a) for a, b in zip(HOME, middle, strict=True))
+    middle = add6(HOME, (0.1, 0.05, 0, 0, 0, 0))
+    end = add6(HOME, (0.2, 0.1, 0, 0, 0, 0))
+    speed = scale6(subtract6(middle, HOME), 2.0)
     place, beyond = (
         arm.forward(middle),
         arm.forward(tuple(a + 0.001 * v for a, v in zip(middle, speed, strict=True))),

@@ -16,6 +16,7 @@ from robot_in_memory import RobotInMemory
 from ur_cartesian_driver.motion.events import TrajectoryResult
 from ur_cartesian_driver.motion.pose import IDENTITY
 from ur_cartesian_driver.motion.primitive import MoveJ, Spline
+from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.program import wrap_in_program
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points
 
@@ -50,7 +51,7 @@ def pieces(durations, quintic=True):
     times = np.cumsum(durations)
     result = []
     for time, duration in zip(times, durations, strict=True):
-        q, qd, qdd = (tuple(map(float, row)) for row in state(time, times[-1]))
+        q, qd, qdd = (vector6(map(float, row)) for row in state(time, times[-1]))
         result.append(
             Spline(
                 target=q, velocities=qd, accelerations=qdd if quintic else None, duration=duration

@@ -42,11 +42,16 @@ def freedrive(action, read_timeout, step_time):
     )
 
 
+def fixed_six(values):
+    a, b, c, d, e, f = (to_fixed(value, f'value {i}') for i, value in enumerate(values, 1))
+    return a, b, c, d, e, f
+
+
 def setpoint(mode, values, read_timeout=20, step_time=DEFAULT_STEP_TIME):
     return ReverseMessage(
         read_timeout=read_timeout_for(mode, read_timeout, step_time),
         mode=mode,
-        payload=tuple(to_fixed(value, f'value {i}') for i, value in enumerate(values, 1)),
+        payload=fixed_six(values),
     )
 
 
@@ -82,7 +87,7 @@ def message_of(case):
     return ReverseMessage(
         read_timeout=read_timeout_for(mode, timeout, step),
         mode=mode,
-        payload=tuple(to_fixed(value, 'value') for value in case['values'] or (0.0,) * 6),
+        payload=fixed_six(case['values'] or (0.0,) * 6),
     )
 
 

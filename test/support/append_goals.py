@@ -14,6 +14,7 @@ from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.goal import Goal, IOCommand, Segment, Waypoint
 from ur_cartesian_driver.motion.pose import Pose
+from ur_cartesian_driver.motion.vectors import add, vector3
 from ur_cartesian_driver.planning import plan, PlanningOptions
 from ur_cartesian_driver.planning.append.append_planner import plan_first_part
 from ur_cartesian_driver.planning.append.appendable_goal import AppendedPoints
@@ -24,7 +25,7 @@ BLEND = Segment(blend_radius=0.01, velocity=0.2, acceleration=1.0)
 
 def moved(pose: Pose, *offset: float) -> Pose:
     """A pose moved along base axes [m]."""
-    return Pose(tuple(a + b for a, b in zip(pose.position, offset, strict=True)), pose.quaternion)
+    return Pose(add(pose.position, vector3(offset)), pose.quaternion)
 
 
 def corners(home: Pose, first: int, count: int) -> list[Waypoint]:

@@ -5,8 +5,8 @@
 from dataclasses import replace
 
 from ur_cartesian_driver.motion.goal import Goal
-from ur_cartesian_driver.motion.pose import Vector6
 from ur_cartesian_driver.motion.state import RobotState
+from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.resources import share_path
 from ur_cartesian_driver.ros.client import load_goal
 from ur_cartesian_driver.ros.messages.goal_conversion import goal_from_message
@@ -27,14 +27,9 @@ def stretch_times(goal: Goal, factor: float) -> Goal:
             replace(
                 point,
                 time=factor * point.time,
-                twist=divide(point.twist, factor),
-                acceleration=divide(point.acceleration, factor**2),
+                twist=vector6(v / factor for v in point.twist),
+                acceleration=vector6(a / factor**2 for a in point.acceleration),
             )
             for point in goal.waypoints
         ),
     )
-
-
-def divide(vector: Vector6, divisor: float) -> Vector6:
-    a, b, c, d, e, f = vector
-    return (a / divisor, b / divisor, c / divisor, d / divisor, e / divisor, f / divisor)

@@ -23,6 +23,7 @@ from ur_cartesian_driver.motion.pose import (
     Pose,
     quaternion_from_rotation_vector,
 )
+from ur_cartesian_driver.motion.vectors import vector6
 
 LINEAR, JOINT, CIRCULAR, PROCESS = (
     SegmentType.LINEAR,
@@ -87,7 +88,7 @@ class _Draw:
 
     def place_arm_at(self, T_base_tcp: Pose, q) -> None:
         """Start with the tool at a pose, near a configuration; anywhere if it is unreachable."""
-        near = tuple(float(x) for x in q)
+        near = vector6(float(x) for x in q)
         found = nearest(self.arm, T_base_tcp @ self.tool.inverse(), near)
         self.place_arm(self.anywhere() if found is None else found)
 
