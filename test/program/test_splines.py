@@ -247,7 +247,7 @@ def test_a_blend_into_a_spline_becomes_a_stop(robot):
     assert np.abs(changes).max() < 30.0
 
 
-@pytest.mark.parametrize('announced', [2, 9], ids=['at its end', 'in the middle'])
+@pytest.mark.parametrize('announced_count', [2, 9], ids=['at its end', 'in the middle'])
 def test_the_last_point_ends_at_rest_whatever_it_says(robot, announced_count):
     """Braked on the way where it is the last, by stopj where the points run dry."""
     robot.place(HOME, IDENTITY)

@@ -20,7 +20,6 @@ from math import inf
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.pose import Pose
 from ur_cartesian_driver.motion.vectors import Vector6
-from ur_cartesian_driver.sim.motion.active_motion import ActiveMotion
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.cycle_stepper import CycleStepper, Motion
 from ur_cartesian_driver.sim.motion.joint_kinematics import MAX_JOINT_ACCELERATION, MAX_TOOL_SPEED
@@ -42,6 +41,7 @@ from ur_cartesian_driver.sim.motion.move_paths import (
 from ur_cartesian_driver.sim.motion.moves import MotionError, MotionFault, MotionWarning, Move
 from ur_cartesian_driver.sim.motion.path_motion import PathMotion, ProfileParameters
 from ur_cartesian_driver.sim.motion.path_queue import PathQueue
+from ur_cartesian_driver.sim.motion.running_motion import RunningMotion
 from ur_cartesian_driver.sim.motion.servo_motions import (
     JointSpeedMotion,
     JointStopMotion,
@@ -70,7 +70,7 @@ class MotionGenerator:
         self.cycle = cycle
         self.max_tool_speed = MAX_TOOL_SPEED
         self._target = ArmTarget(arm, cycle, q)
-        self._active = ActiveMotion(self._target)
+        self._active = RunningMotion(self._target)
         self._reports = MotionReports()
         self._paths = PathQueue(self._target, self._active, self._reports)
         self._stepper = CycleStepper(self._target)

@@ -12,7 +12,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.sim.motion.active_motion import ActiveMotion, UNATTENDED_DECELERATION
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.cycle_stepper import ROUNDING
 from ur_cartesian_driver.sim.motion.joint_kinematics import (
@@ -29,6 +28,7 @@ from ur_cartesian_driver.sim.motion.path_motion import (
     PathMotion,
     start_from_rest,
 )
+from ur_cartesian_driver.sim.motion.running_motion import RunningMotion, UNATTENDED_DECELERATION
 
 # Blends that touch do not overlap [m].
 _TOUCHING = 1e-9
@@ -45,7 +45,7 @@ class _Overlap(NamedTuple):
 class PathQueue:
     """The path moves of one arm: the running one and the one that waits for rest."""
 
-    def __init__(self, target: ArmTarget, active: ActiveMotion, reports: MotionReports) -> None:
+    def __init__(self, target: ArmTarget, active: RunningMotion, reports: MotionReports) -> None:
         """Begin with none."""
         self._target, self._active, self._reports = target, active, reports
         #: What waits until the arm stands.

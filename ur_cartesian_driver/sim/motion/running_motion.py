@@ -23,7 +23,7 @@ from ur_cartesian_driver.sim.motion.servo_motions import (
 UNATTENDED_DECELERATION = 15.0
 
 
-class ActiveMotion:
+class RunningMotion:
     """
     The running motion, its call, and the speeds at which another one takes over.
 
