@@ -38,6 +38,8 @@ def is_for_computing(worker: str) -> bool:
 class Overlap(LoadScheduling):
     """Gives each worker tests of its kind."""
 
+    collection: list[str] | None
+
     def schedule(self):
         """Begin, or go on after the number of workers has changed."""
         if self.collection is None:
