@@ -19,7 +19,6 @@ from ur_cartesian_driver.protocol.dashboard import (
     encode_line,
     not_understood,
     parse_reply,
-    parse_request,
     success,
 )
 
@@ -103,12 +102,14 @@ def test_the_two_ends_understand_each_other(name):
 
 
 def test_the_longer_of_two_matching_commands_is_parsed():
-    assert parse_request('load installation a') == DashboardRequest(
-        name='load installation', argument='a'
-    )
-    assert parse_request('load installations') == DashboardRequest(
-        name='load', argument='installations'
-    )
+    assert DashboardServerCodec().feed(b'load installation a\nload installations\n') == [
+        DashboardRequest(name='load installation', argument='a'),
+        DashboardRequest(name='load', argument='installations'),
+    ]
+
+
+def test_software_that_lacks_a_command_does_not_parse_it():
+    assert DashboardServerCodec((5, 3)).feed(b'safetystatus\n') == ['safetystatus']
 
 
 @pytest.mark.parametrize('line', ['brake_release', 'play it', 'load', '', 'Play'])

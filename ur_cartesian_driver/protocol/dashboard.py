@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 import re
 from types import MappingProxyType
@@ -127,8 +128,6 @@ _VALUE_PATTERNS: Mapping[str, re.Pattern[str]] = MappingProxyType(
         'get robot model': re.compile('UR.*'),
     }
 )
-#: Longest first, so that ``load installation`` is not taken for ``load``.
-_NAMES = sorted(COMMAND_SPECS, key=len, reverse=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -247,9 +246,23 @@ class DashboardClientCodec:
 class DashboardServerCodec:
     """The server: decodes commands; reply with :func:`success` or any text."""
 
-    def __init__(self) -> None:
-        """Start empty."""
+    def __init__(self, version: tuple[int, int] | None = None) -> None:
+        """
+        Start empty.
+
+        :param version: the software, which has not all commands; None = has them all.
+        """
         self._lines = LineBuffer(MAX_LINE_LENGTH)
+        # Longest first, so that ``load installation`` is not taken for ``load``.
+        self._names = sorted(
+            (
+                name
+                for name, spec in COMMAND_SPECS.items()
+                if version is None or spec.is_available(version)
+            ),
+            key=len,
+            reverse=True,
+        )
 
     def feed(self, data: bytes) -> list[DashboardRequest | str]:
         """
@@ -260,18 +273,14 @@ class DashboardServerCodec:
 
         :raises RemoteProtocolError: a line is too long, or the stream ended inside one.
         """
-        return [parse_request(line.strip()) for line in self._lines.feed(data)]
+        return [self._request(line.strip()) for line in self._lines.feed(data)]
 
-
-def parse_request(line: str) -> DashboardRequest | str:
-    """Return the command of a line, or the line if it is not a command."""
-    for name in _NAMES:
-        if line == name or line.startswith(name + ' '):
-            try:
-                return DashboardRequest(name=name, argument=line[len(name) :].strip())
-            except LocalProtocolError:
-                return line
-    return line
+    def _request(self, line: str) -> DashboardRequest | str:
+        for name in self._names:
+            if line == name or line.startswith(name + ' '):
+                with suppress(LocalProtocolError):
+                    return DashboardRequest(name=name, argument=line[len(name) :].strip())
+        return line
 
 
 def encode_line(text: str) -> bytes:
@@ -294,4 +303,4 @@ def success(request: DashboardRequest, value: str | None = None) -> bytes:
 
 def not_understood(line: str) -> bytes:
     """Return the reply to a line that is not a command."""
-    return encode_line(f"could not understand: '{line}'")
+    return encode_line(f'could not understand: "{line}"')
