@@ -29,7 +29,6 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_messages import (
     RobotStateFrame,
     RuntimeExceptionMessage,
     SafetyModeMessage,
-    ScriptUploadDecoder,
     TextMessage,
     VersionMessage,
 )
@@ -45,7 +44,6 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
     MasterboardData,
     RawSubPackage,
     RobotModeData,
-    RobotType,
     SAFETY_DATA,
     ToolCommunication,
     ToolData,
@@ -57,6 +55,9 @@ FRAMES = GOLDEN['frames']
 RECORDED = FRAMES[0]
 ORDER = [0, 1, 4, 5, 9, 3, 2, 6, 7, 8, 10, 11, 12]
 SIZES = [47, 251, 101, 225, 53, 75, 37, 445, 61, 9, 43, 26, 8]
+
+#: ``ConfigurationData.robot_type`` of the recorded robot.
+UR5 = 1
 
 KINDS = {
     'robot_mode_data': RobotModeData,
@@ -259,7 +260,7 @@ def test_the_recorded_ur5e_is_read_and_written_to_the_byte():
         (-0.14397, -0.43562, 0.20203), abs=1e-4
     )
     assert found[ToolCommunication].baud_rate == 115200
-    assert found[ConfigurationData].robot_type == RobotType.UR5
+    assert found[ConfigurationData].robot_type == UR5
 
 
 def full_state():
@@ -280,7 +281,7 @@ def full_state():
             d=six,
             alpha=six,
             theta=six,
-            robot_type=RobotType.UR5,
+            robot_type=UR5,
         ),
         ForceModeData(),
         AdditionalInfo(),
@@ -461,73 +462,6 @@ def test_random_bytes_raise_nothing_but_a_remote_error(chunks):
             decoder.feed(chunk)
 
 
-PROGRAM = """def f():
-  # def g():
-  global x = 1
-  thread t():
-    while (True):
-      if x > 0:
-        x = 2
-      elif x < 0:
-        x = 3
-      else:
-        ending = 4
-      end
-      sync()
-    end
-  end
-  textmsg("end")
-end
-"""
-FLAT = 'def f():\nif True:\nend\nend\n'
-
-
-@pytest.mark.parametrize('in_pieces', [False, True])
-@pytest.mark.parametrize('end', [b'\n', b'\r\n'])
-def test_commands_and_programs_are_distinguished(end, in_pieces):
-    stream = (
-        encode_command(PrimaryCommand.STOP_PROGRAM)
-        + encode_program(PROGRAM)
-        + b'movej([0,0,0,0,0,0])\n'
-        + encode_program(FLAT)
-        + encode_program('sec s():\n  set_digital_out(1, True)\nend')
-    )
-    stream = stream.replace(b'\n', end)
-    decoder = ScriptUploadDecoder()
-    pieces = [stream[i : i + 1] for i in range(len(stream))] if in_pieces else [stream]
-    assert [text for piece in pieces for text in decoder.feed(piece)] == [
-        'stop program',
-        PROGRAM,
-        'movej([0,0,0,0,0,0])',
-        FLAT,
-        'sec s():\n  set_digital_out(1, True)\nend\n',
-    ]
-    assert decoder.feed(b'') == []
-
-
-def test_a_command_without_line_feed_is_complete_at_the_end():
-    decoder = ScriptUploadDecoder()
-    assert decoder.feed(b'power on') == []
-    assert decoder.feed(b'') == ['power on']
-
-
-def test_a_truncated_program_is_returned_at_the_end():
-    decoder = ScriptUploadDecoder()
-    assert decoder.feed(b'def f():\n  x = ') == []
-    assert decoder.feed(b'') == ['def f():\n  x = \n']
-
-
-def test_a_program_without_end_is_refused():
-    decoder = ScriptUploadDecoder()
-    lines = (b'#' * 1023 + b'\n') * 1024
-    decoder.feed(b'def f():\n' + 3 * lines)
-    with pytest.raises(RemoteProtocolError, match='longer than'):
-        decoder.feed(lines)
-
-
-@given(st.lists(st.binary(min_size=1, max_size=60)))
-def test_random_bytes_to_the_controller_raise_nothing_but_a_remote_error(chunks):
-    decoder = ScriptUploadDecoder()
-    with suppress(RemoteProtocolError):
-        for chunk in [*chunks, b'']:
-            decoder.feed(chunk)
+def test_commands_and_programs_end_with_a_line_feed():
+    assert encode_command(PrimaryCommand.STOP_PROGRAM) == b'stop program\n'
+    assert encode_program('def f():\nend') == b'def f():\nend\n'

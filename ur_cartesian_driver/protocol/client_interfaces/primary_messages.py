@@ -24,7 +24,8 @@ From the controller: frames, big-endian. ``int32`` size of the whole frame, ``ui
 * every other type becomes a :class:`RawFrame`.
 
 To the controller: text. A line is a command; ``def`` or ``sec`` begins a program, which replaces
-the running one (``sec``: runs beside it) when its ``end`` has arrived.
+the running one (``sec``: runs beside it) when its ``end`` has arrived. The simulator's
+`script_upload` decodes it.
 
 Obligations of a controller towards the manufacturer's library: send the version message first on
 each connection; send a frame in one piece of at most 4091 bytes (checked here); never send a
@@ -36,11 +37,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum, IntEnum
-import re
 import struct
 from typing import ClassVar, get_args, TypeAlias
 
-from ur_cartesian_driver.motion.errors import LocalProtocolError, RemoteProtocolError
+from ur_cartesian_driver.motion.errors import LocalProtocolError
 from ur_cartesian_driver.protocol.client_interfaces.body_layout import (
     Body,
     BodyLayout,
@@ -52,7 +52,7 @@ from ur_cartesian_driver.protocol.client_interfaces.primary_state import (
     encode_sub_package,
     SubPackage,
 )
-from ur_cartesian_driver.protocol.framing import decode_text, FrameBuffer, hex_text
+from ur_cartesian_driver.protocol.framing import FrameBuffer
 
 
 class FrameType(IntEnum):
@@ -336,60 +336,3 @@ def encode_command(line: PrimaryCommand) -> bytes:
 def encode_program(program_text: str) -> bytes:
     """Return the bytes that make the controller run a program."""
     return program_text.encode() + b'\n'
-
-
-#: Longest program that is accepted [bytes]; it bounds the memory.
-MAX_PROGRAM_SIZE = 4 << 20
-
-_FIRST_WORD = re.compile(r'\s*(\w+)')
-_PROGRAM_WORDS = frozenset({'def', 'sec'})
-_BLOCK_WORDS = frozenset({'def', 'sec', 'thread', 'if', 'while', 'for', 'switch'})
-
-
-class ScriptUploadDecoder:
-    """
-    Decodes what a client sends to the controller: commands and whole programs.
-
-    A program ends with the ``end`` that closes its ``def`` or ``sec``, at any indentation. If the
-    stream ends inside a program, the received part is returned; it will not compile.
-    """
-
-    def __init__(self) -> None:
-        """Start empty."""
-        self._rest = b''
-        self._program: list[str] = []
-        self._size = 0
-        self._depth = 0
-
-    def feed(self, data: bytes) -> list[str]:
-        """
-        Take bytes from a client (none at all = its end) and return commands and programs.
-
-        :raises RemoteProtocolError: a program or line is too long.
-        """
-        *lines, self._rest = (self._rest + (data or b'\n')).split(b'\n')
-        texts = [text for line in lines if (text := self._line(line)) is not None]
-        if self._size + len(self._rest) > MAX_PROGRAM_SIZE:
-            raise RemoteProtocolError(
-                f'A program is longer than {MAX_PROGRAM_SIZE} bytes: {hex_text(self._rest)}.'
-            )
-        if not data and self._program:
-            texts.append(self._take())
-        return texts
-
-    def _line(self, data: bytes) -> str | None:
-        """Return the command or program that a line completes."""
-        line = decode_text(data.removesuffix(b'\r'))
-        match = _FIRST_WORD.match(line)
-        word = match.group(1) if match else ''
-        if not self._program and word not in _PROGRAM_WORDS:
-            return line.strip() or None
-        self._program.append(line)
-        self._size += len(data) + 1
-        self._depth += (word in _BLOCK_WORDS) - (word == 'end')
-        return None if self._depth else self._take()
-
-    def _take(self) -> str:
-        text = '\n'.join(self._program) + '\n'
-        self._program, self._size, self._depth = [], 0, 0
-        return text

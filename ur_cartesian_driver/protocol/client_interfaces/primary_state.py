@@ -38,7 +38,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from enum import IntEnum
 import struct
 from typing import cast, ClassVar, TypeAlias
 
@@ -65,20 +64,6 @@ _JOINT = struct.Struct('>3d4fB')
 _CONFIGURATION = BodyLayout('12d 12d d d d d d 6d 6d 6d 6d i i i i', 'configuration data')
 _BOARD_HEAD = BodyLayout('I I 2B 2d 2b 2d f f f f B ? ?', 'masterboard data')
 _BOARD_TAIL = BodyLayout('I B ? B', 'masterboard data')
-
-
-class RobotType(IntEnum):
-    """``ConfigurationData.robot_type``; UR7e counts as UR5, UR12e as UR10."""
-
-    UR5 = 1
-    UR10 = 2
-    UR3 = 3
-    UR16 = 4
-    UR18 = 5
-    UR8LONG = 6
-    UR20 = 7
-    UR30 = 8
-    UR15 = 9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -279,7 +264,8 @@ class ConfigurationData:
     theta: Vector6
     masterboard_version: int = 6
     controller_box_type: int = 4
-    #: A :class:`RobotType` or a newer number.
+    #: 1 = UR5 (UR7e, too), 2 = UR10 (UR12e, too), 3 = UR3, 4 = UR16, 5 = UR18, 6 = UR8 Long,
+    #: 7 = UR20, 8 = UR30, 9 = UR15.
     robot_type: int
     robot_sub_type: int = 0
     reserved: tuple[int, ...] = ()
