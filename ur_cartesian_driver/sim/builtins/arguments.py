@@ -7,7 +7,7 @@ from __future__ import annotations
 from math import isfinite
 
 from ur_cartesian_driver.motion.pose import Pose
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.vectors import Vector3, vector3, Vector6, vector6
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import (
     INT_MAX,
@@ -89,16 +89,14 @@ def six(value: Value, name: str) -> Vector6:
     """Return the six numbers of a list, or of a pose."""
     if not isinstance(value, list | ScriptPose) or len(value) != 6:
         raise RuntimeException(f'Type error: {name} must be a list of 6 numbers')
-    a, b, c, d, e, f = (number(item, f'{name}[{i}]') for i, item in enumerate(value))
-    return a, b, c, d, e, f
+    return vector6(number(item, f'{name}[{i}]') for i, item in enumerate(value))
 
 
-def three(value: Value, name: str) -> tuple[float, float, float]:
+def three(value: Value, name: str) -> Vector3:
     """Return the three numbers of a list."""
     if not isinstance(value, list) or len(value) != 3:
         raise RuntimeException(f'Type error: {name} must be a list of 3 numbers')
-    a, b, c = (number(item, f'{name}[{i}]') for i, item in enumerate(value))
-    return a, b, c
+    return vector3(number(item, f'{name}[{i}]') for i, item in enumerate(value))
 
 
 def pose(value: Value, name: str) -> Pose:

@@ -211,9 +211,7 @@ class ModeBuiltins(BuiltinGroup):
         """Let the arm be moved by hand."""
         self._controller.freedrive = FreedriveState.TEACH
 
-    def end_teach_mode(self) -> None:
-        """End it; harmless when there is none."""
-        self._controller.freedrive = FreedriveState.OFF
+    end_teach_mode = end_freedrive_mode
 
     def force_mode(
         self, task_frame: Value, selection_vector: Value, wrench: Value, type: Value, limits: Value

@@ -15,6 +15,7 @@ from ur_cartesian_driver.motion.pose import (
     rotation_from_quaternion,
     rotation_vector_from_quaternion,
 )
+from ur_cartesian_driver.motion.vectors import add, subtract
 from ur_cartesian_driver.sim.builtins.arguments import (
     is_pose,
     number,
@@ -48,14 +49,14 @@ class PoseBuiltins(BuiltinGroup):
     def pose_add(self, p_1: Value, p_2: Value) -> ScriptPose:
         """Return the sum of the positions with the rotation R1 R2."""
         a, b = pose(p_1, 'p_1'), pose(p_2, 'p_2')
-        x, y, z = (i + j for i, j in zip(a.position, b.position, strict=True))
-        return script_pose(Pose((x, y, z), multiply(a.quaternion, b.quaternion)))
+        rotation = multiply(a.quaternion, b.quaternion)
+        return script_pose(Pose(add(a.position, b.position), rotation))
 
     def pose_sub(self, p_to: Value, p_from: Value) -> ScriptPose:
         """Return the difference of the positions with the rotation R_to R_from^-1."""
         to, start = pose(p_to, 'p_to'), pose(p_from, 'p_from')
-        x, y, z = (i - j for i, j in zip(to.position, start.position, strict=True))
-        return script_pose(Pose((x, y, z), multiply(to.quaternion, conjugate(start.quaternion))))
+        rotation = multiply(to.quaternion, conjugate(start.quaternion))
+        return script_pose(Pose(subtract(to.position, start.position), rotation))
 
     def pose_dist(self, pose_from: Value, pose_to: Value) -> float:
         """Return the length of `pose_sub` as six numbers."""

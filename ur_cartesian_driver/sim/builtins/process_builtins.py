@@ -10,7 +10,7 @@ applied; it ends with the program.
 
 from __future__ import annotations
 
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.vectors import Vector6, vector6
 from ur_cartesian_driver.sim.builtins.arguments import (
     not_negative,
     number,
@@ -56,13 +56,10 @@ class PathOffsetBuiltins(BuiltinGroup):
 
     def _limited(self, offset: Vector6) -> Vector6:
         state = self._state
-        x, y, z = (
-            max(-state.max_translation, min(state.max_translation, item)) for item in offset[:3]
+        bounds = (state.max_translation,) * 3 + (state.max_rotation,) * 3
+        return vector6(
+            max(-bound, min(bound, item)) for item, bound in zip(offset, bounds, strict=True)
         )
-        rx, ry, rz = (
-            max(-state.max_rotation, min(state.max_rotation, item)) for item in offset[3:]
-        )
-        return x, y, z, rx, ry, rz
 
     def path_offset_get(self, type: Value) -> ScriptPose:
         """Return the offset in a frame."""

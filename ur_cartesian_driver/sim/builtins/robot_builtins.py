@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from math import isinf, pi
 
 from ur_cartesian_driver.sim.builtins.arguments import (
@@ -18,12 +18,11 @@ from ur_cartesian_driver.sim.builtins.arguments import (
 )
 from ur_cartesian_driver.sim.builtins.builtin_group import BuiltinGroup
 from ur_cartesian_driver.sim.controller import Controller
+from ur_cartesian_driver.sim.motion.motion_ownership import Steps
 from ur_cartesian_driver.sim.state.controller_state import Payload, Popup
 from ur_cartesian_driver.sim.state.power_and_safety import SafetyEvent
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 from ur_cartesian_driver.urscript.script_values import Struct, to_text, truth, Value
-
-Steps = Generator[None, None, None]
 
 
 class TimeBuiltins(BuiltinGroup):

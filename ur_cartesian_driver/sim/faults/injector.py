@@ -16,13 +16,14 @@ from math import hypot, inf
 from random import Random
 from types import MappingProxyType
 
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.vectors import vector6
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.faults.fault_values import (
     AfterDistance,
     AfterTime,
     DelayFault,
     DEVIATION_AXES,
+    DEVIATION_QUANTITIES,
     DeviationFault,
     DeviationQuantity,
     DropFault,
@@ -48,21 +49,12 @@ _log = logging.getLogger(__name__)
 _ROUNDING = 1e-9
 
 
-def _safety(event: SafetyEvent) -> Callable[[Controller], str]:
+def _safety(event: SafetyEvent) -> Callable[[Controller], object]:
     return lambda controller: controller.safety_event(event)
 
 
-def _stop(controller: Controller) -> str:
-    controller.programs.stop()
-    return ''
-
-
-def _power_off(controller: Controller) -> str:
-    controller.power_off()
-    return ''
-
-
-_ACTIONS: Mapping[FaultEvent, Callable[[Controller], str]] = MappingProxyType(
+#: They return why they are refused, if they are.
+_ACTIONS: Mapping[FaultEvent, Callable[[Controller], object]] = MappingProxyType(
     {
         FaultEvent.PROTECTIVE_STOP: _safety(SafetyEvent.PROTECTIVE_STOP),
         FaultEvent.EMERGENCY_STOP: _safety(SafetyEvent.EMERGENCY_STOP),
@@ -72,10 +64,10 @@ _ACTIONS: Mapping[FaultEvent, Callable[[Controller], str]] = MappingProxyType(
         FaultEvent.VIOLATION: _safety(SafetyEvent.VIOLATION),
         FaultEvent.FAULT: _safety(SafetyEvent.FAULT),
         FaultEvent.UNLOCK: _safety(SafetyEvent.UNLOCK),
-        FaultEvent.STOP: _stop,
+        FaultEvent.STOP: lambda controller: controller.programs.stop(),
         FaultEvent.PAUSE: lambda controller: controller.programs.pause(),
         FaultEvent.PLAY: lambda controller: controller.programs.play(),
-        FaultEvent.POWER_OFF: _power_off,
+        FaultEvent.POWER_OFF: Controller.power_off,
     }
 )
 
@@ -224,9 +216,10 @@ class FaultInjector:
                     now - running.since, running.random
                 )
         self._controller.actual.deviate(
-            pose=_vector6(sums.get('pose')),
-            twist=_vector6(sums.get('twist')),
-            acceleration=_vector6(sums.get('acceleration')),
+            **{
+                quantity: vector6(sums[quantity]) if quantity in sums else None
+                for quantity in DEVIATION_QUANTITIES
+            }
         )
 
     def _impairments(self) -> dict[str, Impairment]:
@@ -243,10 +236,3 @@ class FaultInjector:
                     rate=min(before.rate, fault.rate if isinstance(fault, ThrottleFault) else inf),
                 )
         return found
-
-
-def _vector6(values: list[float] | None) -> Vector6 | None:
-    if values is None:
-        return None
-    x, y, z, rx, ry, rz = values
-    return x, y, z, rx, ry, rz

@@ -17,10 +17,9 @@ from typing import Any
 
 from ur_cartesian_driver.motion.pose import IDENTITY
 from ur_cartesian_driver.motion.state import RobotMode
-from ur_cartesian_driver.motion.vectors import add, Vector3, Vector6
+from ur_cartesian_driver.motion.vectors import add, add6, dot, scale, Vector3, Vector6, ZERO6
 from ur_cartesian_driver.sim.controller import Controller
 from ur_cartesian_driver.sim.motion.point_motion import (
-    dot,
     flange_point,
     moments_for,
     point_motion,
@@ -35,8 +34,6 @@ from ur_cartesian_driver.sim.state.controller_io import (
 
 Getter = Callable[['Controller'], Any]
 
-_ZERO6: Vector6 = (0.0,) * 6
-_NO_FORCE: Vector6 = (0.0,) * 6
 #: Values of ``joint_mode`` and ``tool_mode``.
 _RUNNING, _IDLE, _POWER_OFF = 253, 255, 239
 #: Supply voltage of the arm [V], and its current at rest [A].
@@ -59,7 +56,7 @@ def _tcp_acceleration(controller: Controller) -> Vector6:
     """Return linear and angular acceleration of the TCP [m/s^2, rad/s^2]."""
     motion = controller.motion
     if not any(motion.qd) and not any(motion.qdd):
-        return _ZERO6  # most arms stand most of the time
+        return ZERO6  # most arms stand most of the time
     frames = controller.arm.frames(motion.q)
     tcp = point_motion(
         frames, motion.qd, motion.qdd, flange_point(frames, motion.T_flange_tcp.position)
@@ -72,8 +69,8 @@ def _accelerometer(controller: Controller) -> Vector3:
     motion = controller.motion
     frames = controller.arm.frames(motion.q)
     acceleration = point_motion(frames, motion.qd, motion.qdd, frames.position).acceleration
-    ex, ey, ez, _, _, _ = controller.actual.acceleration_error
-    specific_force = add(add(acceleration, (ex, ey, ez)), controller.gravity)
+    error = controller.actual.acceleration_error[:3]
+    specific_force = add(add(acceleration, error), controller.gravity)
     return (
         dot(specific_force, frames.x),
         dot(specific_force, frames.y),
@@ -85,12 +82,11 @@ def _payload_moments(controller: Controller) -> Vector6:
     """Return the joint moments that carry and accelerate the payload, a point mass [Nm]."""
     mass, motion = controller.payload.mass, controller.motion
     if mass == 0.0 or controller.power.mode is not RobotMode.RUNNING:
-        return _ZERO6
+        return ZERO6
     frames = controller.arm.frames(motion.q)
     centre = flange_point(frames, controller.payload.cog)
     acceleration = point_motion(frames, motion.qd, motion.qdd, centre).acceleration
-    x, y, z = add(acceleration, controller.gravity)
-    return moments_for(frames, centre, (mass * x, mass * y, mass * z))
+    return moments_for(frames, centre, scale(add(acceleration, controller.gravity), mass))
 
 
 def _powered(controller: Controller) -> bool:
@@ -109,13 +105,7 @@ def _joint_mode(controller: Controller) -> int:
 
 
 def _actual_acceleration(controller: Controller) -> Vector6:
-    x, y, z, rx, ry, rz = (
-        target + error
-        for target, error in zip(
-            _tcp_acceleration(controller), controller.actual.acceleration_error, strict=True
-        )
-    )
-    return x, y, z, rx, ry, rz
+    return add6(_tcp_acceleration(controller), controller.actual.acceleration_error)
 
 
 def _tcp(controller: Controller) -> Vector6:
@@ -141,9 +131,7 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType(
         'target_TCP_speed': lambda c: c.motion.tcp_twist,
         'actual_TCP_speed': lambda c: c.actual.tcp_twist,
         'tcp_offset': lambda c: (
-            _ZERO6
-            if c.motion.T_flange_tcp is IDENTITY
-            else c.motion.T_flange_tcp.rotation_vector()
+            ZERO6 if c.motion.T_flange_tcp is IDENTITY else c.motion.T_flange_tcp.rotation_vector()
         ),
         'speed_scaling': lambda c: c.motion.scaling,
         'target_speed_fraction': lambda c: c.speed_slider,
@@ -169,8 +157,8 @@ COMPUTED: Mapping[str, Getter] = MappingProxyType(
         'payload_cog': lambda c: c.payload.cog,
         'payload_inertia': lambda c: c.payload.inertia,
         'target_gravity': lambda c: c.gravity,
-        'actual_TCP_force': lambda c: c.io.external_force if c.external_ft else _NO_FORCE,
-        'ft_raw_wrench': lambda c: c.io.external_force if c.external_ft else _NO_FORCE,
+        'actual_TCP_force': lambda c: c.io.external_force if c.external_ft else ZERO6,
+        'ft_raw_wrench': lambda c: c.io.external_force if c.external_ft else ZERO6,
         'tcp_force_scalar': lambda c: hypot(*c.io.external_force[:3]) if c.external_ft else 0.0,
         'actual_digital_input_bits': lambda c: c.io.digital_in.packed(),
         'actual_digital_output_bits': lambda c: c.io.digital_out.packed(),

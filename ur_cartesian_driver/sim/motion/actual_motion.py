@@ -22,10 +22,9 @@ from ur_cartesian_driver.motion.pose import (
     Pose,
     quaternion_from_rotation_vector,
 )
-from ur_cartesian_driver.motion.vectors import add6, scale6, Vector6, vector6
+from ur_cartesian_driver.motion.vectors import add, add6, scale6, Vector6, vector6, ZERO6
 from ur_cartesian_driver.sim.motion import MotionGenerator
 
-_ZERO: Vector6 = (0.0,) * 6
 # A solution farther than this from the target is another branch [rad].
 _BRANCH_JUMP = 0.5
 
@@ -39,9 +38,9 @@ class ActualMotion:
         self._pose: Vector6 | None = None
         self._twist: Vector6 | None = None
         #: Deviation of the measured acceleration of the TCP [m/s^2, rad/s^2].
-        self.acceleration_error: Vector6 = _ZERO
+        self.acceleration_error: Vector6 = ZERO6
         #: The integral of the deviation of the acceleration.
-        self._drift: Vector6 = _ZERO
+        self._drift: Vector6 = ZERO6
         self._solved: tuple[object, object, Vector6] | None = None
 
     def deviate(
@@ -49,9 +48,9 @@ class ActualMotion:
     ) -> None:
         """Set the deviations of this cycle, in base axes; None = none."""
         self._pose = pose
-        self.acceleration_error = acceleration or _ZERO
+        self.acceleration_error = acceleration or ZERO6
         if acceleration is None:
-            self._drift, self._twist = _ZERO, twist
+            self._drift, self._twist = ZERO6, twist
         else:
             self._drift = add6(self._drift, scale6(acceleration, self._motion.cycle))
             self._twist = self._drift if twist is None else add6(self._drift, twist)
@@ -63,9 +62,8 @@ class ActualMotion:
         if self._pose is None:
             return target
         x, y, z, rx, ry, rz = self._pose
-        px, py, pz = target.position
         return Pose(
-            (px + x, py + y, pz + z),
+            add(target.position, (x, y, z)),
             multiply(quaternion_from_rotation_vector((rx, ry, rz)), target.quaternion),
         )
 

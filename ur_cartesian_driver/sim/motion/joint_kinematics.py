@@ -14,7 +14,7 @@ from ur_cartesian_driver.motion.pose import (
     Pose,
     rotation_vector_from_quaternion,
 )
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.vectors import scale, scale6, subtract, subtract6, Vector6, ZERO6
 from ur_cartesian_driver.sim.motion.move_paths import MovePath
 from ur_cartesian_driver.sim.motion.moves import MotionFault
 from ur_cartesian_driver.sim.motion.path_motion import ProfileParameters
@@ -31,7 +31,7 @@ LIMIT_DECELERATION = 10.0
 SINGULAR_RATE = 1000.0
 
 #: The speed of an arm at rest.
-STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+STILL = ZERO6
 #: Joint changes below this are rounding [rad].
 NO_CHANGE = 1e-9
 # A joint this near to its limit is the reason why there is no solution [rad].
@@ -176,32 +176,17 @@ def is_singular(q_before: Vector6, q: Vector6, before: Pose, pose: Pose) -> bool
 
 def max_joint_difference(a: Vector6, b: Vector6) -> float:
     """Return the largest difference of a joint."""
-    return max(
-        abs(a[0] - b[0]),
-        abs(a[1] - b[1]),
-        abs(a[2] - b[2]),
-        abs(a[3] - b[3]),
-        abs(a[4] - b[4]),
-        abs(a[5] - b[5]),
-    )
+    return max(map(abs, subtract6(a, b)))
 
 
 def difference_rate(after: Vector6, before: Vector6, rate: float) -> Vector6:
     """Return the difference times the rate [1/s]."""
-    return (
-        (after[0] - before[0]) * rate,
-        (after[1] - before[1]) * rate,
-        (after[2] - before[2]) * rate,
-        (after[3] - before[3]) * rate,
-        (after[4] - before[4]) * rate,
-        (after[5] - before[5]) * rate,
-    )
+    return scale6(subtract6(after, before), rate)
 
 
 def twist_between(before: Pose, after: Pose, rate: float) -> Vector6:
     """Return the mean twist between two poses, base axes."""
-    (ax, ay, az), (bx, by, bz) = before.position, after.position
-    wx, wy, wz = rotation_vector_from_quaternion(
+    rotation = rotation_vector_from_quaternion(
         multiply(after.quaternion, conjugate(before.quaternion))
     )
-    return ((bx - ax) * rate, (by - ay) * rate, (bz - az) * rate, wx * rate, wy * rate, wz * rate)
+    return (*scale(subtract(after.position, before.position), rate), *scale(rotation, rate))

@@ -19,6 +19,7 @@ from ur_cartesian_driver.sim.motion.motion_generator import MotionGenerator
 from ur_cartesian_driver.sim.motion.moves import MotionError, Move
 from ur_cartesian_driver.urscript.script_errors import RuntimeException
 
+#: What a function of a program is that takes time: it yields once per cycle.
 Steps = Generator[None, None, None]
 
 #: How the controller brakes when a program ends or a stream dries up [rad/s^2]. The real value is

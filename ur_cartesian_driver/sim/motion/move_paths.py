@@ -24,11 +24,14 @@ from ur_cartesian_driver.motion.pose import (
 )
 from ur_cartesian_driver.motion.vectors import (
     add,
+    add6,
+    add_scaled6,
     cross,
     dot,
     norm,
     scale,
     subtract,
+    subtract6,
     unit,
     Vector3,
     Vector6,
@@ -85,24 +88,15 @@ class JointMovePath:
     def __init__(self, start: Vector6, end: Vector6, forward: Callable[[Vector6], Pose]) -> None:
         """Find the leading axis: the one with the longest travel."""
         self.start, self.end, self._forward = start, end, forward
-        self._travel = tuple(b - a for a, b in zip(start, end, strict=True))
-        length = max(abs(travel) for travel in self._travel)
+        self._travel = subtract6(end, start)
+        length = max(map(abs, self._travel))
         self.length = length if length > _MIN_LENGTH else 0.0
 
     def at(self, s: float) -> Vector6:
         """Return the joint positions [rad]."""
         if s >= self.length:
             return self.end
-        f = s / self.length
-        a, w = self.start, self._travel
-        return (
-            a[0] + f * w[0],
-            a[1] + f * w[1],
-            a[2] + f * w[2],
-            a[3] + f * w[3],
-            a[4] + f * w[4],
-            a[5] + f * w[5],
-        )
+        return add_scaled6(self.start, self._travel, s / self.length)
 
     def pose(self, s: float) -> Pose:
         """Return T_base_tcp."""
@@ -174,13 +168,7 @@ class CircularMovePath:
         return atan2(dot(r, self._y), dot(r, self._x)) % (2.0 * pi)
 
     def _setpoint(self, angle: float) -> Pose:
-        position = add(
-            self.centre,
-            add(
-                scale(self._x, self.radius * cos(angle)),
-                scale(self._y, self.radius * sin(angle)),
-            ),
-        )
+        position = _on_circle(self.centre, self._x, self._y, self.radius, angle)
         if self._fixed:
             turn = quaternion_from_rotation_vector(scale(self.normal, angle))
             return Pose(position, multiply(turn, self.start.quaternion))
@@ -209,15 +197,7 @@ class JointBlendPath:
             return self._after.at(self._head)
         a = self._before.at(self._before.length - self._tail * (1.0 - u) ** 2)
         b = self._after.at(self._head * u * u)
-        w = self._before.end
-        return (
-            a[0] + b[0] - w[0],
-            a[1] + b[1] - w[1],
-            a[2] + b[2] - w[2],
-            a[3] + b[3] - w[3],
-            a[4] + b[4] - w[4],
-            a[5] + b[5] - w[5],
-        )
+        return subtract6(add6(a, b), self._before.end)
 
 
 class ToolBlendPath:
@@ -278,17 +258,8 @@ class FilletBlendPath:
         turned = self._turn.at(u)
         if u >= 1.0:
             return turned
-        phi = self.angle * u
-        return Pose(
-            add(
-                self.centre,
-                add(
-                    scale(self._x, self.radius * cos(phi)),
-                    scale(self._y, self.radius * sin(phi)),
-                ),
-            ),
-            turned.quaternion,
-        )
+        position = _on_circle(self.centre, self._x, self._y, self.radius, self.angle * u)
+        return Pose(position, turned.quaternion)
 
 
 BlendPath: TypeAlias = JointBlendPath | ToolBlendPath | FilletBlendPath
@@ -365,6 +336,12 @@ def _exit_parameter(pose: Callable[[float], Pose], radius: float, length: float)
             high, f_high = middle, f
             f_low, side = (0.5 * f_low if side > 0 else f_low), 1
     return 0.5 * (low + high)
+
+
+def _on_circle(centre: Vector3, x: Vector3, y: Vector3, radius: float, angle: float) -> Vector3:
+    """Return a point of a circle; the angle counts from x towards y."""
+    offset = add(scale(x, radius * cos(angle)), scale(y, radius * sin(angle)))
+    return add(centre, offset)
 
 
 def _check_circle(a: Vector3, b: Vector3, n: Vector3) -> None:

@@ -12,9 +12,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ur_cartesian_driver.kinematics.chain import ChainFrames
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6
-
-_ZERO: Vector3 = (0.0, 0.0, 0.0)
+from ur_cartesian_driver.motion.vectors import (
+    add,
+    cross,
+    dot,
+    scale,
+    subtract,
+    Vector3,
+    Vector6,
+    vector6,
+    ZERO3,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,19 +47,19 @@ def point_motion(
     :param point: its position [m].
     :param joints: number of joints between the base and the link.
     """
-    omega = alpha = velocity = acceleration = _ZERO
+    omega = alpha = velocity = acceleration = ZERO3
     here = frames.origins[0]
     for i in range(joints):
         axis, origin = frames.axes[i], frames.origins[i]
         velocity, acceleration = _shifted_motion(
-            velocity, acceleration, omega, alpha, _minus(origin, here)
+            velocity, acceleration, omega, alpha, subtract(origin, here)
         )
-        turning = _times(qd[i], axis)
-        alpha = _plus(alpha, _times(qdd[i], axis), cross(omega, turning))
-        omega = _plus(omega, turning)
+        turning = scale(axis, qd[i])
+        alpha = add(add(alpha, scale(axis, qdd[i])), cross(omega, turning))
+        omega = add(omega, turning)
         here = origin
     velocity, acceleration = _shifted_motion(
-        velocity, acceleration, omega, alpha, _minus(point, here)
+        velocity, acceleration, omega, alpha, subtract(point, here)
     )
     return PointMotion(
         velocity=velocity,
@@ -67,9 +75,8 @@ def moments_for(frames: ChainFrames, point: Vector3, force: Vector3) -> Vector6:
 
     The principle of virtual work: moment times speed of the joints is force times velocity.
     """
-    # Six joints have six axes; mypy does not count what a generator yields.
-    return tuple(  # type: ignore[return-value]
-        dot(axis, cross(_minus(point, origin), force))
+    return vector6(
+        dot(axis, cross(subtract(point, origin), force))
         for origin, axis in zip(frames.origins, frames.axes, strict=True)
     )
 
@@ -77,7 +84,8 @@ def moments_for(frames: ChainFrames, point: Vector3, force: Vector3) -> Vector6:
 def flange_point(frames: ChainFrames, offset: Vector3) -> Vector3:
     """Return the position of a point given in flange coordinates [m]."""
     x, y, z = offset
-    return _plus(frames.position, _times(x, frames.x), _times(y, frames.y), _times(z, frames.z))
+    in_plane = add(add(frames.position, scale(frames.x, x)), scale(frames.y, y))
+    return add(in_plane, scale(frames.z, z))
 
 
 def _shifted_motion(
@@ -86,31 +94,6 @@ def _shifted_motion(
     """Return velocity and acceleration of another point of the link, a lever arm farther out."""
     round_ = cross(omega, lever_arm)
     return (
-        _plus(velocity, round_),
-        _plus(acceleration, cross(alpha, lever_arm), cross(omega, round_)),
+        add(velocity, round_),
+        add(add(acceleration, cross(alpha, lever_arm)), cross(omega, round_)),
     )
-
-
-def dot(a: Vector3, b: Vector3) -> float:
-    """Return the scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def cross(a: Vector3, b: Vector3) -> Vector3:
-    """Return the vector product."""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-def _plus(*vectors: Vector3) -> Vector3:
-    x = y = z = 0.0
-    for vector in vectors:
-        x, y, z = x + vector[0], y + vector[1], z + vector[2]
-    return x, y, z
-
-
-def _minus(a: Vector3, b: Vector3) -> Vector3:
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def _times(factor: float, vector: Vector3) -> Vector3:
-    return factor * vector[0], factor * vector[1], factor * vector[2]

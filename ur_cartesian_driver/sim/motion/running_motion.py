@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.vectors import scale6, Vector6
 from ur_cartesian_driver.sim.motion.arm_target import ArmTarget
 from ur_cartesian_driver.sim.motion.cycle_stepper import Motion
-from ur_cartesian_driver.sim.motion.joint_kinematics import difference_rate, STILL
+from ur_cartesian_driver.sim.motion.joint_kinematics import STILL
 from ur_cartesian_driver.sim.motion.moves import Move
 from ur_cartesian_driver.sim.motion.servo_motions import (
     JointSpeedMotion,
@@ -103,7 +103,7 @@ class RunningMotion:
         if motion is None or isinstance(motion, JointStopMotion):
             return STILL if motion is None else motion.qd
         if isinstance(motion, JointSpeedMotion | ServoMotion):
-            return difference_rate(motion.qd, STILL, self.rate)
+            return scale6(motion.qd, self.rate)
         return self._target.qd
 
     def _twist(self) -> Vector6:
@@ -112,10 +112,10 @@ class RunningMotion:
         if motion is None or isinstance(motion, ToolStopMotion):
             return STILL if motion is None else motion.twist
         if isinstance(motion, ToolSpeedMotion):
-            return difference_rate(motion.twist, STILL, self.rate)
+            return scale6(motion.twist, self.rate)
         return self._target.tcp_twist
 
     def _unscaled(self, speed: Vector6) -> Vector6:
         if self.motion is None or self.scale <= 0.0:
             return STILL
-        return difference_rate(speed, STILL, 1.0 / self.scale)
+        return scale6(speed, 1.0 / self.scale)

@@ -10,7 +10,6 @@ in real time, whatever the speed scaling is, so that they always end; the others
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import hypot
 from typing import Any, TypeAlias
 
 from ur_cartesian_driver.motion.pose import (
@@ -18,8 +17,18 @@ from ur_cartesian_driver.motion.pose import (
     Pose,
     quaternion_from_rotation_vector,
 )
-from ur_cartesian_driver.motion.vectors import Vector3, Vector6
-from ur_cartesian_driver.sim.motion.joint_kinematics import difference_rate, STILL
+from ur_cartesian_driver.motion.vectors import (
+    add,
+    add_scaled6,
+    norm,
+    scale,
+    subtract,
+    subtract6,
+    Vector3,
+    Vector6,
+    vector6,
+)
+from ur_cartesian_driver.sim.motion.joint_kinematics import STILL
 from ur_cartesian_driver.sim.motion.move_paths import Setpoint
 
 _JointState: TypeAlias = tuple[Vector6, Vector6, float]
@@ -70,14 +79,15 @@ class JointSpeedMotion(_JointMotion):
 
     def preview(self, h: float) -> tuple[Setpoint, _JointState]:
         """Return set-point and state after ``h`` seconds; the mean speed carries."""
-        change = difference_rate(self.target, self.qd, 1.0)
+        change = subtract6(self.target, self.qd)
         size = max(map(abs, change))
         full = h if size <= _MIN_SPEED else min(h, size / self.acceleration)
         step = self.acceleration * h
         part = step / size if size > step else 1.0
-        qd = self.target if part >= 1.0 else _add(self.qd, change, part)
+        qd = self.target if part >= 1.0 else add_scaled6(self.qd, change, part)
         # The change takes ``full`` seconds at the mean of both speeds, the rest is even.
-        q = _add(_add(_add(self.q, self.qd, 0.5 * full), qd, 0.5 * full), qd, h - full)
+        q = add_scaled6(add_scaled6(self.q, self.qd, 0.5 * full), qd, 0.5 * full)
+        q = add_scaled6(q, qd, h - full)
         return q, (q, qd, self.elapsed + h)
 
     @property
@@ -106,12 +116,11 @@ class ServoMotion(_JointMotion):
     def preview(self, h: float) -> tuple[Setpoint, _JointState]:
         """Return set-point and state after ``h`` seconds (semi-implicit Euler)."""
         bound = self.max_acceleration
-        a, b, c, d, e, f = [
+        qd = vector6(
             v + h * min(max(self.gain * (wanted - (q + self.lookahead * v)), -bound), bound)
             for q, v, wanted in zip(self.q, self.qd, self.target, strict=True)
-        ]
-        qd = a, b, c, d, e, f
-        q = _add(self.q, qd, h)
+        )
+        q = add_scaled6(self.q, qd, h)
         return q, (q, qd, self.elapsed + h)
 
     @property
@@ -131,11 +140,11 @@ class JointStopMotion(_JointMotion):
         """Return set-point and state after ``h`` seconds."""
         time = max(map(abs, self.qd)) / self.acceleration
         if time <= h:
-            q = _add(self.q, self.qd, 0.5 * time)
+            q = add_scaled6(self.q, self.qd, 0.5 * time)
             return q, (q, STILL, 0.0)
         part = 1.0 - h / time
-        q = _add(self.q, self.qd, 0.5 * h * (1.0 + part))
-        return q, (q, _add(STILL, self.qd, part), 0.0)
+        q = add_scaled6(self.q, self.qd, 0.5 * h * (1.0 + part))
+        return q, (q, add_scaled6(STILL, self.qd, part), 0.0)
 
     @property
     def is_over(self) -> bool:
@@ -212,29 +221,14 @@ def _approach_twist(twist: Vector6, target: Vector6, step: float, step_rot: floa
 
 def _approach(now: Vector3, target: Vector3, step: float) -> Vector3:
     """Return the vector a step nearer to the target, or the target."""
-    x, y, z = (b - a for a, b in zip(now, target, strict=True))
-    size = hypot(x, y, z)
-    if size <= step:
-        return target
-    f = step / size
-    return (now[0] + f * x, now[1] + f * y, now[2] + f * z)
+    change = subtract(target, now)
+    size = norm(change)
+    return target if size <= step else add(now, scale(change, step / size))
 
 
 def _integrated_pose(pose: Pose, before: Vector6, after: Vector6, h: float) -> Pose:
     """Move a pose for ``h`` seconds at the mean of two twists."""
     half = 0.5 * h
     vx, vy, vz, wx, wy, wz = (half * (a + b) for a, b in zip(before, after, strict=True))
-    x, y, z = pose.position
     turn = quaternion_from_rotation_vector((wx, wy, wz))
-    return Pose((x + vx, y + vy, z + vz), multiply(turn, pose.quaternion))
-
-
-def _add(a: Vector6, b: Vector6, f: float) -> Vector6:
-    return (
-        a[0] + f * b[0],
-        a[1] + f * b[1],
-        a[2] + f * b[2],
-        a[3] + f * b[3],
-        a[4] + f * b[4],
-        a[5] + f * b[5],
-    )
+    return Pose(add(pose.position, (vx, vy, vz)), multiply(turn, pose.quaternion))

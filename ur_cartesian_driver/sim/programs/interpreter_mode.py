@@ -16,9 +16,9 @@ and `skipbuffer` are acknowledged with the number of the last statement.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 
-from ur_cartesian_driver.sim.motion.motion_ownership import MotionOwnership
+from ur_cartesian_driver.sim.motion.motion_ownership import MotionOwnership, Steps
 from ur_cartesian_driver.sim.programs.program_runner import ProgramRunner
 from ur_cartesian_driver.urscript import (
     CompiledLine,
@@ -33,7 +33,6 @@ MAX_QUEUED_STATEMENTS = 500
 _CLOSING = frozenset({'clear_interpreter', 'end_interpreter'})
 
 AnswerCallback = Callable[[str], None]
-ModeSteps = Generator[None, None, None]
 
 
 class InterpreterMode:
@@ -120,7 +119,7 @@ class InterpreterMode:
 
     # What programs call
 
-    def run(self, clear_queue: bool, clear_on_end: bool) -> ModeSteps:
+    def run(self, clear_queue: bool, clear_on_end: bool) -> Steps:
         """
         Execute statements until one, or another thread, ends the mode.
 
