@@ -19,7 +19,7 @@ from ros_client import goal_message, TimedClient
 from wire_tap import marks_until_first_point, wire_tap
 
 from ur_cartesian_driver.driver.ipc import channel
-from ur_cartesian_driver.execution import job_from_plan
+from ur_cartesian_driver.execution.goal.motion_job import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.planning import plan, PlanningOptions

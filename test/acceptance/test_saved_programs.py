@@ -21,7 +21,7 @@ from saved_program import saved_program
 from virtual_network import HOST, VirtualLoop
 
 from ur_cartesian_driver.driver.ipc.channel import StartMotion
-from ur_cartesian_driver.execution import job_from_plan
+from ur_cartesian_driver.execution.goal.motion_job import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import JOINT_NAMES, robot_model

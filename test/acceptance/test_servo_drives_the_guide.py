@@ -10,13 +10,9 @@ import numpy as np
 import pytest
 from servo_cell import GuideCell
 
-from ur_cartesian_driver.execution import (
-    EnterServo,
-    Finish,
-    MotionJob,
-    ServoSettings,
-    WriteServo,
-)
+from ur_cartesian_driver.execution.goal.goal_commands import EnterServo, Finish, WriteServo
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
+from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode

@@ -9,7 +9,7 @@ import queue
 import pytest
 
 from ur_cartesian_driver.driver.appender import Appender
-from ur_cartesian_driver.execution import AnswerAppend
+from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import RobotNotReady

@@ -10,7 +10,8 @@ import pytest
 
 from ur_cartesian_driver.driver import DriverConfig, DriverStatus
 from ur_cartesian_driver.driver.ipc import channel
-from ur_cartesian_driver.execution import AnswerAppend, MotionJob
+from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.plan import ReferencePath

@@ -41,7 +41,7 @@ from ur_cartesian_driver.driver.recordings.recorder import (
 )
 from ur_cartesian_driver.driver.recordings.recording import Recording
 from ur_cartesian_driver.driver.recordings.recording_folder import enforce_quota, recording_name
-from ur_cartesian_driver.execution import job_from_plan
+from ur_cartesian_driver.execution.goal.motion_job import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.goal import Goal, Waypoint

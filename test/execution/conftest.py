@@ -9,7 +9,7 @@ from math import pi
 from goal_machines import point_machine
 import pytest
 
-from ur_cartesian_driver.execution import job_from_plan
+from ur_cartesian_driver.execution.goal.motion_job import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.inverse import nearest
 from ur_cartesian_driver.kinematics.robot_models import robot_model

@@ -7,17 +7,19 @@ from dataclasses import replace
 from goal_machines import append_machine
 import numpy as np
 
-from ur_cartesian_driver.execution import (
-    AnswerAppend,
-    AppendJob,
+from ur_cartesian_driver.execution.goal.append_feeder import (
     AppendSettings,
+    CLOSED_BY_CLIENT,
+    FIRST_POINTS_TIMEOUT,
+)
+from ur_cartesian_driver.execution.goal.goal_commands import (
+    AnswerAppend,
     Finish,
-    MotionJob,
     SendControl,
     SendPoints,
     SetTemporaryTcp,
 )
-from ur_cartesian_driver.execution.goal.append_feeder import CLOSED_BY_CLIENT, FIRST_POINTS_TIMEOUT
+from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
 from ur_cartesian_driver.execution.goal.states import GoalState
 from ur_cartesian_driver.execution.goal.wire_records import WireRecords
 from ur_cartesian_driver.motion.events import StateReceived, TrajectoryEnded, TrajectoryResult

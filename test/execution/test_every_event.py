@@ -10,14 +10,13 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution import (
+from ur_cartesian_driver.execution.goal.goal_commands import (
     AnswerAppend,
-    AppendJob,
     Finish,
-    MotionJob,
     SendControl,
     SendPoints,
 )
+from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
 from ur_cartesian_driver.execution.goal.states import GoalState, TRANSITIONS
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (

@@ -9,9 +9,9 @@ from goal_machines import append_machine, point_machine
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution import (
+from ur_cartesian_driver.execution.goal.append_feeder import FIRST_POINTS_TIMEOUT
+from ur_cartesian_driver.execution.goal.goal_commands import (
     Finish,
-    MotionJob,
     ReportProgress,
     RestoreTcp,
     SendControl,
@@ -19,8 +19,8 @@ from ur_cartesian_driver.execution import (
     SetTemporaryTcp,
     StopProgram,
 )
-from ur_cartesian_driver.execution.goal.append_feeder import FIRST_POINTS_TIMEOUT
 from ur_cartesian_driver.execution.goal.monitor import STALL_TIMEOUT
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.goal.states import (
     GoalSignal,
     GoalState,

@@ -6,7 +6,7 @@ from math import pi
 
 import pytest
 
-from ur_cartesian_driver.execution import job_from_plan
+from ur_cartesian_driver.execution.goal.motion_job import job_from_plan
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.execution_modes import ExecutionMode

@@ -8,17 +8,17 @@ from hypothesis import strategies as st
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution import (
+from ur_cartesian_driver.execution.goal.goal_commands import (
     EnterServo,
     Finish,
     LeaveServo,
-    MotionJob,
     OpenServo,
-    SERVO_LINK,
     SetTemporaryTcp,
     WriteServo,
 )
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.goal.states import GoalState
+from ur_cartesian_driver.execution.servo.servo_feeder import SERVO_LINK
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,

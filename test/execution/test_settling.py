@@ -10,7 +10,8 @@ from goal_machines import point_machine
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution import Finish, MotionJob
+from ur_cartesian_driver.execution.goal.goal_commands import Finish
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     StateReceived,

@@ -6,7 +6,8 @@ from goal_machines import point_machine
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution import Finish, MotionJob, SendControl
+from ur_cartesian_driver.execution.goal.goal_commands import Finish, SendControl
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.monitoring.speed_check import (
     MAX_SLOWDOWN,
     MAX_START_DELAY,

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ur_cartesian_driver.execution import Finish, job_from_plan, MotionJob, ReportProgress
+from ur_cartesian_driver.execution.goal.goal_commands import Finish, ReportProgress
+from ur_cartesian_driver.execution.goal.motion_job import job_from_plan, MotionJob
 from ur_cartesian_driver.execution.goal.wire_records import WireRecords
 from ur_cartesian_driver.motion.goal import Goal, OutputKind, Segment, Waypoint
 from ur_cartesian_driver.motion.plan import ReferencePath

@@ -17,7 +17,7 @@ from robot_cell import CellMotion, CYCLE, RobotCell
 
 from ur_cartesian_driver.driver.appender import encode_plan
 from ur_cartesian_driver.driver.live_session import stationary_job, stationary_plan
-from ur_cartesian_driver.execution import AppendJob
+from ur_cartesian_driver.execution.goal.motion_job import AppendJob
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.errors import ErrorCode

@@ -6,19 +6,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ur_cartesian_driver.execution import (
-    AppendFeeder,
-    AppendSettings,
-    GoalMachine,
-    GoalMonitor,
-    MotionJob,
-    PointFeeder,
-    ServoFeeder,
-    ServoSettings,
-    ServoStream,
-    SplineSetpoints,
-)
-from ur_cartesian_driver.execution.goal.monitor import MAX_PLAN_DEVIATION
+from ur_cartesian_driver.execution.goal.append_feeder import AppendFeeder, AppendSettings
+from ur_cartesian_driver.execution.goal.goal_machine import GoalMachine
+from ur_cartesian_driver.execution.goal.monitor import GoalMonitor, MAX_PLAN_DEVIATION
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
+from ur_cartesian_driver.execution.goal.point_feeder import PointFeeder
+from ur_cartesian_driver.execution.servo.servo_feeder import ServoFeeder
+from ur_cartesian_driver.execution.servo.servo_stream import ServoSettings, ServoStream
+from ur_cartesian_driver.execution.servo.setpoint_source import SplineSetpoints
 
 
 def point_machine(

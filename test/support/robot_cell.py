@@ -38,7 +38,7 @@ from ur_cartesian_driver.driver.ipc.channel import (
 )
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.loop.robot_loop import RobotLoop
-from ur_cartesian_driver.execution import job_from_plan
+from ur_cartesian_driver.execution.goal.motion_job import job_from_plan
 from ur_cartesian_driver.protocol.program.reverse import MESSAGE_SIZE, ReverseMessage
 from ur_cartesian_driver.protocol.program.script_sender import REQUEST
 from ur_cartesian_driver.protocol.program.trajectory_points import encode_points

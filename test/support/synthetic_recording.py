@@ -9,7 +9,7 @@ import numpy as np
 
 from ur_cartesian_driver.driver import DriverConfig
 from ur_cartesian_driver.driver.recordings.recorder import motion_metadata, Recorder
-from ur_cartesian_driver.execution import MotionJob
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.plan import ReferencePath

@@ -47,7 +47,9 @@ from ur_cartesian_driver.driver.loop_connection import LoopConnection
 from ur_cartesian_driver.driver.motion_handle import ActiveMotion, MotionHandle, OnProgress
 from ur_cartesian_driver.driver.recordings.recorder import plan_metadata
 from ur_cartesian_driver.driver.robot_services import RobotServices
-from ur_cartesian_driver.execution import AnswerAppend, job_from_plan, MotionJob, same_tcp
+from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
+from ur_cartesian_driver.execution.goal.motion_job import job_from_plan, MotionJob
+from ur_cartesian_driver.execution.goal.temporary_tcp import same_tcp
 from ur_cartesian_driver.execution.goal.timeouts import STOP_TIMEOUT
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.kinematics.robot_models import DhTable, robot_model

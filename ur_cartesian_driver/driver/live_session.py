@@ -18,7 +18,7 @@ import numpy as np
 from ur_cartesian_driver.driver.ipc.channel import LiveSetup
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.motion_handle import MotionHandle, OnProgress
-from ur_cartesian_driver.execution import MotionJob
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.execution.live.live_targets import LiveSettings
 from ur_cartesian_driver.execution.live.online_trajectory import LiveLimits
 from ur_cartesian_driver.execution.live.workspace_guard import KeepOutPlane, LiveWorkspace

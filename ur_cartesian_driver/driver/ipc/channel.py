@@ -17,7 +17,8 @@ import struct
 from typing import TypeAlias
 
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
-from ur_cartesian_driver.execution import AnswerAppend, AppendJob, MotionJob
+from ur_cartesian_driver.execution.goal.goal_commands import AnswerAppend
+from ur_cartesian_driver.execution.goal.motion_job import AppendJob, MotionJob
 from ur_cartesian_driver.execution.live.live_targets import LiveSettings
 from ur_cartesian_driver.kinematics.robot_models import DhTable
 from ur_cartesian_driver.motion.events import Outcome, Progress

@@ -31,27 +31,27 @@ from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
 from ur_cartesian_driver.driver.loop.point_buffer import PointBuffer
 from ur_cartesian_driver.driver.loop.tcp_restorer import TcpRestorer
 from ur_cartesian_driver.driver.recordings.recorder import motion_metadata, Recorder
-from ur_cartesian_driver.execution import (
+from ur_cartesian_driver.execution.goal.goal_commands import (
     AnswerAppend,
     EnterServo,
     Finish,
     GoalCommand,
-    GoalMachine,
     LeaveServo,
     LogWarning,
-    MotionJob,
     OpenServo,
     ReportProgress,
     ReportServo,
     RestoreTcp,
-    same_tcp,
     SendControl,
     SendPoints,
-    SERVO_LINK,
     SetTemporaryTcp,
     StopProgram,
     WriteServo,
 )
+from ur_cartesian_driver.execution.goal.goal_machine import GoalMachine
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
+from ur_cartesian_driver.execution.goal.temporary_tcp import same_tcp
+from ur_cartesian_driver.execution.servo.servo_feeder import SERVO_LINK
 from ur_cartesian_driver.motion.errors import ErrorCode
 from ur_cartesian_driver.motion.events import (
     CancelRequested,

@@ -44,7 +44,7 @@ from ur_cartesian_driver.driver.loop.motion_runner import MotionRunner, run_in_t
 from ur_cartesian_driver.driver.loop.newest_state import NewestState
 from ur_cartesian_driver.driver.loop.owner_pipe import OwnerPipe
 from ur_cartesian_driver.driver.loop.tcp_restorer import TcpRestorer
-from ur_cartesian_driver.execution import TemporaryTcp
+from ur_cartesian_driver.execution.goal.temporary_tcp import TemporaryTcp
 from ur_cartesian_driver.kinematics.robot_models import DhTable
 from ur_cartesian_driver.motion.events import CancelRequested, Tick
 from ur_cartesian_driver.motion.signals import Signals

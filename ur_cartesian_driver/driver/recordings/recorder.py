@@ -28,7 +28,7 @@ import numpy as np
 from ur_cartesian_driver.driver.ipc.driver_config import DriverConfig
 from ur_cartesian_driver.driver.recordings import recording_format as disk
 from ur_cartesian_driver.driver.recordings.recording_folder import RecordingFolder
-from ur_cartesian_driver.execution import MotionJob
+from ur_cartesian_driver.execution.goal.motion_job import MotionJob
 from ur_cartesian_driver.motion.events import Outcome
 from ur_cartesian_driver.motion.plan import Plan, ReferencePath
 from ur_cartesian_driver.motion.signals import Signals
