@@ -13,6 +13,7 @@ import os
 import signal
 
 from forward_model import dh_forward
+from matrices import pose_from_matrix
 import numpy as np
 import pytest
 from robot_ports import fetch_program
@@ -180,7 +181,7 @@ def test_the_named_frame_keeps_to_line_and_arcs_while_it_turns(
     assert off.max() < 1e-4
     for place in (a, b, c, d, via_1, via_2):
         assert np.linalg.norm(points - place, axis=1).min() < 0.003
-    turned = np.array([Pose.from_matrix(T).angle_to(start) for T in where])
+    turned = np.array([pose_from_matrix(T).angle_to(start) for T in where])
     assert turned.max() > QUARTER - 1e-3
     # What is reported is the named frame, not the TCP.
     reported = np.array([progress.actual_pose.position for progress in seen])

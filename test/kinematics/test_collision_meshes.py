@@ -5,6 +5,7 @@
 from math import pi
 import sys
 
+from collision_shapes import capsules, cylinders, T_base_meshes
 import numpy as np
 import pytest
 
@@ -65,7 +66,7 @@ def test_meshes_are_where_the_robot_description_moves_them(name, all_meshes, pin
             arm.forward(q).matrix(), (T_base_world * T_world['tool0']).homogeneous, atol=1e-10
         )
         # In these descriptions every mesh has the frame of its link.
-        for T, frame in zip(all_meshes[name].T_base_meshes(q), FRAMES, strict=True):
+        for T, frame in zip(T_base_meshes(all_meshes[name], q), FRAMES, strict=True):
             np.testing.assert_allclose(
                 T, (T_base_world * T_world[frame]).homogeneous, atol=1e-10, err_msg=frame
             )
@@ -74,11 +75,11 @@ def test_meshes_are_where_the_robot_description_moves_them(name, all_meshes, pin
 def test_on_a_calibrated_arm_the_meshes_go_with_the_real_axes(calibrated_arm, pinocchio):
     arm = calibrated_arm('ur5')
     real, nominal = CollisionMeshes(arm), CollisionMeshes(Arm(MODELS['ur5']))
-    at_zero = np.linalg.inv(arm.forward((0,) * 6).matrix()) @ real.T_base_meshes(np.zeros(6))[6]
+    at_zero = np.linalg.inv(arm.forward((0,) * 6).matrix()) @ T_base_meshes(real, np.zeros(6))[6]
     for q in random_joints(5):
-        T = real.T_base_meshes(q)
+        T = T_base_meshes(real, q)
         np.testing.assert_allclose(arm.forward(q).matrix() @ at_zero, T[6], atol=1e-9)
-        assert 1e-5 < np.abs(T[:, :3, 3] - nominal.T_base_meshes(q)[:, :3, 3]).max() < 0.015
+        assert 1e-5 < np.abs(T[:, :3, 3] - T_base_meshes(nominal, q)[:, :3, 3]).max() < 0.015
 
 
 @pytest.mark.slow
@@ -86,8 +87,8 @@ def test_on_a_calibrated_arm_the_meshes_go_with_the_real_axes(calibrated_arm, pi
 def test_cylinders_and_capsules_contain_the_meshes(name, all_meshes):
     """All vertices; the base without the plug of its cable, which sticks out of it."""
     bodies, q = CollisionBodies(Arm(MODELS[name])), random_joints(1)
-    cylinders, capsules = bodies.cylinders(q)[0], bodies.capsules(q)[0]
-    for link, T in enumerate(all_meshes[name].T_base_meshes(q[0])):
+    cylinder_ends, capsule_ends = cylinders(bodies, q)[0], capsules(bodies, q)[0]
+    for link, T in enumerate(T_base_meshes(all_meshes[name], q[0])):
         points = np.unique(vertices(all_meshes[name], link), axis=0)
         if link == Link.BASE:
             points = points[np.hypot(points[:, 0], points[:, 1]) < bodies.radii[0] + 0.003]
@@ -97,7 +98,7 @@ def test_cylinders_and_capsules_contain_the_meshes(name, all_meshes):
         outside = np.min(
             [
                 beyond_cylinder(points, a, b, r)
-                for (a, b), r in zip(cylinders[mine], bodies.radii[mine], strict=True)
+                for (a, b), r in zip(cylinder_ends[mine], bodies.radii[mine], strict=True)
             ],
             axis=0,
         )
@@ -105,7 +106,7 @@ def test_cylinders_and_capsules_contain_the_meshes(name, all_meshes):
         outside = np.min(
             [
                 beyond_capsule(points, a, b, r)
-                for (a, b), r in zip(capsules[mine], bodies.capsule_radii[mine], strict=True)
+                for (a, b), r in zip(capsule_ends[mine], bodies.capsule_radii[mine], strict=True)
             ],
             axis=0,
         )

@@ -31,7 +31,6 @@ def test_sums_and_products_of_six_are_those_of_numpy() -> None:
     assert vectors.subtract6(A6, B6) == tuple(a - b)
     assert vectors.scale6(A6, 3.0) == tuple(3.0 * a)
     assert vectors.add_scaled6(A6, B6, 0.5) == tuple(a + 0.5 * b)
-    assert vectors.interpolate6(A6, B6, 0.25) == tuple(a + 0.25 * (b - a))
 
 
 def test_a_vector_has_its_number_of_values_and_no_other() -> None:

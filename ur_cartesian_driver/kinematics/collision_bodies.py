@@ -272,17 +272,6 @@ class CollisionBodies:
         self.pairs = tuple(pair for pair in PAIRS if Link.TOOL not in pair or self._has_tool)
         self._first, self._second, self._begins = _pair_indices(self.links, self.pairs)
 
-    def cylinders(self, q: Floats) -> Floats:
-        """Return both ends of every cylinder (n, k, 2, 3) in base [m], at joints (n, 6)."""
-        ends: Floats = self._ends(self.arm.frames_rows(q)).transpose(3, 2, 0, 1)
-        return ends
-
-    def capsules(self, q: Floats) -> Floats:
-        """Return the ends (n, k, 2, 3) [m] of capsules that contain the cylinders."""
-        start, vector = self._capsules(self._ends(self.arm.frames_rows(q)))
-        ends: Floats = np.stack([start, start + vector]).transpose(3, 2, 0, 1)
-        return ends
-
     def distances(self, q: Floats) -> Floats:
         """
         Return how far the links of each of :attr:`pairs` are apart at least.

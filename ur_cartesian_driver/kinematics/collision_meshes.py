@@ -125,11 +125,6 @@ class CollisionMeshes:
             )
         return near, lower_bounds
 
-    def T_base_meshes(self, q: Floats) -> Floats:
-        """Return where the meshes of all links are at joints (6,) [rad]: matrices (7, 4, 4)."""
-        self._update_placement(q)
-        return np.array([T.homogeneous for T in self._placement.oMg])
-
     def _update_placement(self, q: Floats) -> None:
         self._pinocchio.updateGeometryPlacements(
             self._model, self._data, self._geometry, self._placement, q

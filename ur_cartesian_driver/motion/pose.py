@@ -46,14 +46,6 @@ class Pose:
         x, y, z, rx, ry, rz = values
         return cls((x, y, z), quaternion_from_rotation_vector((rx, ry, rz)))
 
-    @classmethod
-    def from_matrix(cls, matrix: NDArray[np.float64] | Sequence[Sequence[float]]) -> Pose:
-        """Return the pose of a homogeneous (4, 4) or (3, 4) matrix with a proper rotation."""
-        (a, b, c, x), (d, e, f, y), (g, h, i, z) = (
-            (float(v) for v in row) for row in list(matrix)[:3]
-        )
-        return cls((x, y, z), quaternion_from_rotation((a, b, c, d, e, f, g, h, i)))
-
     def rotation_vector(self) -> Vector6:
         """Return ``x y z rx ry rz`` [m, rad], the angle within [0, pi]."""
         return (*self.position, *rotation_vector_from_quaternion(self.quaternion))
@@ -231,26 +223,6 @@ def rotation_from_quaternion(q: Quaternion) -> tuple[float, ...]:
         2.0 * (y * z + x * w),
         1.0 - 2.0 * (x * x + y * y),
     )
-
-
-def quaternion_from_rotation(r: Sequence[float]) -> Quaternion:
-    """
-    Return the unit quaternion of a rotation matrix given row by row, w >= 0.
-
-    Of the four formulas (Shepperd) the one that divides by the largest component.
-    """
-    a, b, c, d, e, f, g, h, i = r
-    trace = a + e + i
-    if trace >= max(a, e, i):
-        q = (h - f, c - g, d - b, 1.0 + trace)
-    elif a >= max(e, i):
-        q = (1.0 + a - e - i, b + d, c + g, h - f)
-    elif e >= i:
-        q = (b + d, 1.0 - a + e - i, f + h, c - g)
-    else:
-        q = (c + g, f + h, 1.0 - a - e + i, d - b)
-    x, y, z, w = normalize(q)
-    return (-x, -y, -z, -w) if w < 0.0 else (x, y, z, w)
 
 
 def pose_rows(poses: Iterable[Pose]) -> NDArray[np.float64]:

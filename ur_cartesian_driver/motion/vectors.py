@@ -98,8 +98,3 @@ def scale6(a: Vector6, factor: float) -> Vector6:
 def add_scaled6(a: Vector6, b: Vector6, factor: float) -> Vector6:
     """Return a + factor b: positions after some time at a velocity, for example."""
     return vector6(x + factor * y for x, y in zip(a, b, strict=True))
-
-
-def interpolate6(a: Vector6, b: Vector6, fraction: float) -> Vector6:
-    """Return a + fraction (b - a)."""
-    return vector6(x + fraction * (y - x) for x, y in zip(a, b, strict=True))

@@ -136,11 +136,6 @@ class LiveTargetSubscriber:
             callback_group=MutuallyExclusiveCallbackGroup(),
         )
 
-    @property
-    def idle(self) -> bool:
-        """Tell whether no session runs."""
-        return self._session is None
-
     def close(self) -> None:
         """Stop the arm, and wait until it stands; the subscription goes with the node."""
         with self._condition:

@@ -1,0 +1,38 @@
+# Copyright 2026 the ur_cartesian_driver contributors
+# SPDX-License-Identifier: Apache-2.0
+"""Poses from homogeneous matrices."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ur_cartesian_driver.motion.pose import normalize, Pose, Quaternion
+
+
+def pose_from_matrix(matrix: NDArray[np.float64] | Sequence[Sequence[float]]) -> Pose:
+    """The pose of a homogeneous (4, 4) or (3, 4) matrix with a proper rotation."""
+    (a, b, c, x), (d, e, f, y), (g, h, i, z) = (
+        (float(v) for v in row) for row in list(matrix)[:3]
+    )
+    return Pose((x, y, z), quaternion_from_rotation((a, b, c, d, e, f, g, h, i)))
+
+
+def quaternion_from_rotation(r: Sequence[float]) -> Quaternion:
+    """
+    The unit quaternion of a rotation matrix given row by row, w >= 0.
+
+    Of the four formulas (Shepperd) the one that divides by the largest component.
+    """
+    a, b, c, d, e, f, g, h, i = r
+    trace = a + e + i
+    if trace >= max(a, e, i):
+        q = (h - f, c - g, d - b, 1.0 + trace)
+    elif a >= max(e, i):
+        q = (1.0 + a - e - i, b + d, c + g, h - f)
+    elif e >= i:
+        q = (b + d, 1.0 - a + e - i, f + h, c - g)
+    else:
+        q = (c + g, f + h, 1.0 - a - e + i, d - b)
+    x, y, z, w = normalize(q)
+    return (-x, -y, -z, -w) if w < 0.0 else (x, y, z, w)
