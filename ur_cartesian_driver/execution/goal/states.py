@@ -158,8 +158,14 @@ def _ignore(state: GoalState, *signals: GoalSignal) -> dict[GoalSignal, Transiti
     return {signal: Transition(state) for signal in signals}
 
 
+#: Results of the robot program.
+_RESULTS = (GoalSignal.SUCCESS, GoalSignal.CANCELED, GoalSignal.FAILURE)
 #: Requests of users; the first of them decides how the goal ends.
 _USER_STOPS = (GoalSignal.CANCEL, GoalSignal.PREEMPT)
+_ON_USER_STOP = {
+    GoalSignal.CANCEL: _decide(ErrorCode.CANCELLED),
+    GoalSignal.PREEMPT: _decide(ErrorCode.PREEMPTED),
+}
 
 #: How a trajectory that runs is stopped, or ends by itself.
 _WHILE_RUNNING: Mapping[GoalSignal, Transition] = MappingProxyType(
@@ -182,12 +188,9 @@ TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = MappingProxyT
         GoalState.ARMING: {
             **_ON_STOP,
             # Of a goal before this one.
-            **_ignore(
-                GoalState.ARMING, GoalSignal.SUCCESS, GoalSignal.CANCELED, GoalSignal.FAILURE
-            ),
+            **_ignore(GoalState.ARMING, *_RESULTS),
             GoalSignal.ARMED: Transition(GoalState.MOVING),
-            GoalSignal.CANCEL: _decide(ErrorCode.CANCELLED),
-            GoalSignal.PREEMPT: _decide(ErrorCode.PREEMPTED),
+            **_ON_USER_STOP,
             GoalSignal.TIMEOUT: _decide(ErrorCode.ROBOT_NOT_READY),
         },
         GoalState.MOVING: {
@@ -201,26 +204,17 @@ TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = MappingProxyT
         },
         GoalState.AWAITING_POINTS: {
             **_ON_STOP,
-            **_ignore(
-                GoalState.AWAITING_POINTS,
-                GoalSignal.SUCCESS,
-                GoalSignal.CANCELED,
-                GoalSignal.FAILURE,
-            ),
+            **_ignore(GoalState.AWAITING_POINTS, *_RESULTS),
             GoalSignal.APPENDED: Transition(GoalState.MOVING),
             GoalSignal.NO_MORE_POINTS: Transition(GoalState.SETTLING),
-            GoalSignal.CANCEL: _decide(ErrorCode.CANCELLED),
-            GoalSignal.PREEMPT: _decide(ErrorCode.PREEMPTED),
+            **_ON_USER_STOP,
             GoalSignal.DEVIATION: _decide(ErrorCode.EXECUTION_FAILED),
             GoalSignal.TIMEOUT: _decide(ErrorCode.CANCELLED),
         },
         GoalState.SETTLING: {
             **_ON_STOP,
-            **_ignore(
-                GoalState.SETTLING, GoalSignal.SUCCESS, GoalSignal.CANCELED, GoalSignal.FAILURE
-            ),
-            GoalSignal.CANCEL: _decide(ErrorCode.CANCELLED),
-            GoalSignal.PREEMPT: _decide(ErrorCode.PREEMPTED),
+            **_ignore(GoalState.SETTLING, *_RESULTS),
+            **_ON_USER_STOP,
             GoalSignal.DEVIATION: _decide(ErrorCode.EXECUTION_FAILED),
             GoalSignal.SETTLED: _decide(ErrorCode.SUCCESSFUL),
             GoalSignal.TIMEOUT: _decide(ErrorCode.GOAL_TOLERANCE_VIOLATED),
@@ -234,38 +228,19 @@ TRANSITIONS: Mapping[GoalState, Mapping[GoalSignal, Transition]] = MappingProxyT
         },
         GoalState.COMING_TO_REST: {
             **_ON_STOP,
-            **_ignore(
-                GoalState.COMING_TO_REST,
-                GoalSignal.SUCCESS,
-                GoalSignal.CANCELED,
-                GoalSignal.FAILURE,
-                *_USER_STOPS,
-            ),
+            **_ignore(GoalState.COMING_TO_REST, *_RESULTS, *_USER_STOPS),
             GoalSignal.AT_REST: Transition(GoalState.RESTORING),
             GoalSignal.TIMEOUT: _end(ErrorCode.EXECUTION_FAILED),
         },
         GoalState.RESTORING: {
             **{signal: Transition(GoalState.ENDED) for signal in STOP_SIGNALS},
-            **_ignore(
-                GoalState.RESTORING,
-                GoalSignal.SUCCESS,
-                GoalSignal.CANCELED,
-                GoalSignal.FAILURE,
-                *_USER_STOPS,
-            ),
+            **_ignore(GoalState.RESTORING, *_RESULTS, *_USER_STOPS),
             GoalSignal.RESTORED: Transition(GoalState.ENDED),
             GoalSignal.TIMEOUT: Transition(GoalState.ENDED),
         },
         GoalState.PROGRAM_LOST: {
             **_ON_STOP,
-            **_ignore(
-                GoalState.PROGRAM_LOST,
-                GoalSignal.SUCCESS,
-                GoalSignal.CANCELED,
-                GoalSignal.FAILURE,
-                *_USER_STOPS,
-                GoalSignal.PROGRAM_STOPPED,
-            ),
+            **_ignore(GoalState.PROGRAM_LOST, *_RESULTS, *_USER_STOPS, GoalSignal.PROGRAM_STOPPED),
             GoalSignal.TIMEOUT: Transition(GoalState.ENDED),
         },
         GoalState.ENDED: {},
