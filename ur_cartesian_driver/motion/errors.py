@@ -35,7 +35,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import IntEnum
 from types import MappingProxyType
-from typing import ClassVar
+from typing import ClassVar, TypeVar
+
+_Error = TypeVar('_Error', bound='DriverError')
 
 
 class ErrorCode(IntEnum):
@@ -77,6 +79,10 @@ class DriverError(Exception):
 
 class GoalRefused(DriverError):
     """A goal was refused before anything moved."""
+
+    def reworded(self, sentence: str) -> GoalRefused:
+        """Return the same refusal in another sentence."""
+        return _restore(type(self), sentence)
 
 
 class InvalidGoal(GoalRefused):
@@ -250,7 +256,7 @@ def error_of_outcome(code: ErrorCode, text: str, report: tuple[str, ...] = ()) -
     return error
 
 
-def _restore(cls: type[DriverError], sentence: str) -> DriverError:
+def _restore(cls: type[_Error], sentence: str) -> _Error:
     error = cls.__new__(cls)
     Exception.__init__(error, sentence)
     return error

@@ -16,7 +16,7 @@ a piece that brakes after the last point (:func:`~.spline_planner.plan_stop`).
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 import re
 
@@ -95,13 +95,6 @@ def plan_first_part(plan: Plan, arm: Arm, options: PlanningOptions) -> AppendPla
         ),
         T_flange_active=plan.T_flange_active,
         T_flange_tcp=plan.T_flange_tcp,
-        points=0,
-        records=0,
-        committed_records=0,
-        time=0.0,
-        rest_time=0.0,
-        time_offset=0.0,
-        last_client_time=0.0,
         q_rest=plan.start,
     )
     appended = AppendedPoints(
@@ -175,7 +168,7 @@ def _append_moves(
     try:
         new_plan = plan_goal(goal, _state_at_rest(appendable, q_start, arm), arm, options)
     except GoalRefused as refusal:
-        raise _renumbered(refusal, first) from None
+        raise refusal.reworded(_renumber_text(str(refusal), first)) from None
     return _moves_append_plan(
         appendable,
         appended,
@@ -212,8 +205,7 @@ def _renumber_plan(new_plan: Plan, first: int, waypoint: int, start_time: float)
     left_out = [s for s in new_plan.segments if s.waypoint + first < waypoint]
     begin = sum(segment.duration for segment in left_out)
     path = new_plan.reference
-    time = path.time + (start_time - begin)
-    row = max(int(np.searchsorted(time, start_time + 5e-7, side='right')) - 1, 0)
+    path = replace(path, time=path.time + (start_time - begin), point=path.point + first)
     return replace(
         new_plan,
         segments=tuple(
@@ -222,12 +214,7 @@ def _renumber_plan(new_plan: Plan, first: int, waypoint: int, start_time: float)
             )
             for s in new_plan.segments[len(left_out) :]
         ),
-        reference=ReferencePath(
-            poses=path.poses[row:].copy(),
-            time=time[row:].copy(),
-            point=(path.point[row:] + first).astype(np.int32),
-            blend_tolerance=path.blend_tolerance[row:].copy(),
-        ),
+        reference=_path_from(path, start_time, 0.5 * SAME_TIME),
     )
 
 
@@ -304,10 +291,7 @@ def _commands_of_ending(
     Records before the last motion are committed, even if they are due after the motion before it.
     Of commands for the same output the earlier ones have the earlier records.
     """
-    ends, now = {}, start_time
-    for segment in new_plan.segments:
-        now += segment.duration
-        ends[segment.waypoint] = now
+    ends = _end_times(new_plan.segments, start_time)
     commands = [
         *(
             (ends[c.waypoint] + c.offset if c.waypoint in ends else end_time, c)
@@ -344,29 +328,20 @@ def _append_spline(
 ) -> AppendPlan:
     """Return the part after the end of a spline; from rest as soon as the limits allow."""
     assert appendable.state is not None
-    if not from_rest:
-        return _append_spline_from(
-            appendable,
-            appended,
-            appendable.state,
-            appendable.committed_records,
-            appendable.time_offset,
-            arm,
-            options,
-        )
-    start = SplineState(time=appendable.rest_time, q=appendable.q_rest)
-    appendable = replace(appendable, replanned_piece=None, outputs=())
+    start, records_before = appendable.state, appendable.committed_records
+    time_offsets = [appendable.time_offset]
+    if from_rest:
+        start = SplineState(time=appendable.rest_time, q=appendable.q_rest)
+        records_before = appendable.records
+        time_offsets = [
+            appendable.rest_time + delay - appendable.last_client_time for delay in START_DELAYS
+        ]
+        appendable = replace(appendable, replanned_piece=None, outputs=())
     refusals = []
-    for delay in START_DELAYS:
+    for time_offset in time_offsets:
         try:
             return _append_spline_from(
-                appendable,
-                appended,
-                start,
-                appendable.records,
-                appendable.rest_time + delay - appendable.last_client_time,
-                arm,
-                options,
+                appendable, appended, start, records_before, time_offset, arm, options
             )
         except GoalRefused as refusal:
             refusals.append(refusal)
@@ -406,7 +381,7 @@ def _append_spline_from(
             ),
         )
     except GoalRefused as refusal:
-        raise _renumbered(refusal, appendable.points) from None
+        raise refusal.reworded(_renumber_text(str(refusal), appendable.points)) from None
     found = plan_spline(
         start,
         later,
@@ -510,16 +485,13 @@ def _place_outputs(
     appendable: AppendableGoal, appended: AppendedPoints, new_plan: Plan, start_time: float
 ) -> tuple[Plan, list[tuple[float, IOCommand]]]:
     """Return a plan of pieces with its outputs, and when each command is due [s]."""
-    ends, now = {}, start_time
     # A stopping piece leads to no point: what is due on it is due after the last one.
     last = new_plan.segments[-1]
     closes = not last.report_line and last.length == 0.0
     segments = [replace(segment, outputs=()) for segment in new_plan.segments]
     if closes:
         segments[-1] = replace(segments[-1], waypoint=last.waypoint + 1)
-    for segment in segments:
-        now += segment.duration
-        ends[segment.waypoint] = now
+    ends = _end_times(segments, start_time)
     first = segments[0].waypoint
     due_commands = [
         *appendable.outputs,
@@ -547,9 +519,11 @@ def _place_outputs(
     ), due_commands
 
 
-def _path_from(path: ReferencePath, start_time: float) -> ReferencePath:
-    """Return the rows of a path from a time on [s]."""
-    row = max(int(np.searchsorted(path.time, start_time + SAME_TIME, side='right')) - 1, 0)
+def _path_from(
+    path: ReferencePath, start_time: float, tolerance: float = SAME_TIME
+) -> ReferencePath:
+    """Return the rows of a path from a time on [s]; copies, so that the others can go."""
+    row = max(int(np.searchsorted(path.time, start_time + tolerance, side='right')) - 1, 0)
     return ReferencePath(
         poses=path.poses[row:].copy(),
         time=path.time[row:].copy(),
@@ -625,6 +599,15 @@ def _state_at_rest(appendable: AppendableGoal, q: Joints, arm: Arm) -> RobotStat
     )
 
 
+def _end_times(segments: Iterable[PlannedSegment], start_time: float) -> dict[int, float]:
+    """Return when the motion to each waypoint ends [s]."""
+    ends, now = {}, start_time
+    for segment in segments:
+        now += segment.duration
+        ends[segment.waypoint] = now
+    return ends
+
+
 def _output_delay(last: PlannedSegment) -> float:
     """Return how long the robot program waits after a motion for its outputs [s]."""
     return max((output.delay for output in last.outputs), default=0.0)
@@ -634,14 +617,8 @@ def _record_count(segments: Sequence[PlannedSegment]) -> int:
     return sum(1 + len(segment.outputs) for segment in segments)
 
 
-def _renumbered(refusal: GoalRefused, first: int) -> GoalRefused:
-    """Return a refusal whose points are numbered from the start of the goal."""
-    error = type(refusal).__new__(type(refusal))
-    Exception.__init__(error, _renumber_text(str(refusal), first))
-    return error
-
-
 def _renumber_text(text: str, first: int) -> str:
+    """Return a text whose points are numbered from the start of the goal."""
     return _NUMBER.sub(lambda found: f'{found[1]}{int(found[2]) + first}', text)
 
 

@@ -49,17 +49,17 @@ class AppendableGoal:
     goal: Goal
     T_flange_active: Pose
     T_flange_tcp: Pose | None
-    points: int
+    points: int = 0
     #: Records on the wire, and how many of them are committed (not part of the ending).
-    records: int
-    committed_records: int
+    records: int = 0
+    committed_records: int = 0
     #: When the committed ones end, and when all of them do; motion time [s].
-    time: float
-    rest_time: float
+    time: float = 0.0
+    rest_time: float = 0.0
     #: Client time + offset = motion time [s].
-    time_offset: float
+    time_offset: float = 0.0
     #: Time of the last point, as the client gave it [s].
-    last_client_time: float
+    last_client_time: float = 0.0
     #: Where the arm rests after the ending [rad].
     q_rest: Joints
     replannable: tuple[ReplannablePoint, ...] = ()

@@ -202,6 +202,12 @@ def _rests_at_ends(geometry: SegmentGeometry) -> tuple[bool, bool]:
     return geometry.blend_before is None, geometry.blend_after is None
 
 
+def _profile_between_blends(geometry: SegmentGeometry, length: float, time: float) -> SpeedProfile:
+    """Return the profile of the unblended part of a segment that takes a time as a whole [s]."""
+    fraction = geometry.unblended_fraction
+    return profile_for_time(length * fraction, time * fraction, *_rests_at_ends(geometry))
+
+
 def _stop_distance(geometry: SegmentGeometry, length: float) -> float:
     """Return how far behind the start of its blend the robot plans to stop, see trapezoid."""
     if geometry.blend_after is not None and geometry.kind == SegmentType.PROCESS:
@@ -332,11 +338,7 @@ def _turning_line(
         min_duration(geometry.curve.length, velocity, acceleration),
         min_duration(angle, options.angular_velocity, options.angular_acceleration),
     )
-    profile = profile_for_time(
-        angle * geometry.unblended_fraction,
-        time * geometry.unblended_fraction,
-        *_rests_at_ends(geometry),
-    )
+    profile = _profile_between_blends(geometry, angle, time)
     wire_time = time
     if not _takes_time(geometry.kind, options):
         velocity, wire_time = profile.cruise, 0.0
@@ -369,11 +371,7 @@ def _by_time(
     time, remark = geometry.time, ''
     if time < min_time * (1.0 - 1e-9):
         time, remark = _slow_or_refuse(geometry, length, unit, min_time, limits, options)
-    profile = profile_for_time(
-        length * geometry.unblended_fraction,
-        time * geometry.unblended_fraction,
-        *_rests_at_ends(geometry),
-    )
+    profile = _profile_between_blends(geometry, length, time)
     # The robot ignores speed and acceleration when it has a time; these are what it will need.
     velocity, acceleration = peak_speed_and_acceleration(length, time)
     return SegmentTiming(

@@ -187,9 +187,8 @@ def _check_path(
 def _with_spline_advice(refusal: GoalRefused) -> GoalRefused:
     """Return a refusal with advice for splines, which have no JOINT segments."""
     if isinstance(refusal, NearSingularity | JointLimitExceeded):
-        text = str(refusal)
-        return type(refusal)(
-            text.replace('use a JOINT segment', 'use PRIMITIVES with a JOINT segment')
+        return refusal.reworded(
+            str(refusal).replace('use a JOINT segment', 'use PRIMITIVES with a JOINT segment')
         )
     return refusal
 
