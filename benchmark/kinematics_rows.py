@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from typing import Any
 
 from figures import Figure, seconds
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 import paths
 
 from ur_cartesian_driver.kinematics.chain import Arm
-from ur_cartesian_driver.kinematics.inverse_rows import all_solutions, solve_path
+from ur_cartesian_driver.kinematics.inverse_rows import solve_path
 from ur_cartesian_driver.kinematics.robot_models import robot_model
 from ur_cartesian_driver.motion.pose import pose_from_row
 from ur_cartesian_driver.motion.vectors import Vector6
@@ -36,8 +35,6 @@ def run(quick: bool) -> Iterator[Figure]:
         poses = arm.forward_rows(joints)
         solve_path(arm, poses[:1], START)  # the fit of the ideal arm is made once for each arm
         yield from _path_figure(name, arm, poses, joints)
-        taken = seconds(partial(all_solutions, arm, poses))
-        yield Figure(benchmark=NAME, name=f'{name}, all branches', value=rows / taken, unit='1/s')
 
 
 def _path_figure(name: str, arm: Arm, poses: Rows, joints: Rows) -> Iterator[Figure]:

@@ -12,14 +12,10 @@ import pytest
 
 from ur_cartesian_driver.kinematics.chain import Arm, jacobian_at
 from ur_cartesian_driver.kinematics.closed_form import wrist_centre
+from ur_cartesian_driver.kinematics.closed_form_rows import branch_rows, BRANCHES, TargetPoses
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.kinematics.inverse import nearest, solutions
-from ur_cartesian_driver.kinematics.inverse_rows import (
-    all_solutions,
-    branch_measures,
-    nearest_rows,
-    solve_path,
-)
+from ur_cartesian_driver.kinematics.inverse_rows import branch_measures, nearest_rows, solve_path
 from ur_cartesian_driver.kinematics.robot_models import MODELS
 from ur_cartesian_driver.motion.pose import Pose, pose_from_row, pose_rows
 
@@ -50,12 +46,21 @@ def miss(a, b):
     return np.abs(difference - tau * np.rint(difference / tau)).max(axis=-1)
 
 
-def assert_lead_to(forward, found, poses, within=1e-9):
-    """By a forward kinematics that gives matrices."""
-    for row, place in np.argwhere(found.exists):
-        np.testing.assert_allclose(
-            forward(found.q[row, place]), pose_from_row(poses[row]).matrix(), atol=within
-        )
+def all_branches(arm, poses):
+    """Angles (n, 8, 6) of a nominal arm by branch, and which of them there are (n, 8)."""
+    targets = TargetPoses.of(poses)
+    found = [branch_rows(ideal_arm_of(arm), targets, signs) for signs in BRANCHES]
+    q = np.stack([branch.q.T for branch in found], axis=1)
+    return q, np.stack([branch.exists for branch in found], axis=1)
+
+
+def distinct(rows, within=1e-6):
+    """The rows without those that are the same as one before: branches that meet."""
+    kept = []
+    for row in rows:
+        if not kept or miss(kept, row).min() > within:
+            kept.append(row)
+    return np.array(kept)
 
 
 # --- All branches ------------------------------------------------------------------------------
@@ -67,23 +72,23 @@ def test_the_reference_is_among_the_branches_and_all_lead_to_it(
 ):
     arm, cases = Arm(MODELS[name]), golden_poses[name]['cases']
     poses = np.array([case['position'] + case['quaternion_xyzw'] for case in cases])
-    found = all_solutions(arm, poses)
-    assert_lead_to(lambda q: matrix_product(arm.geometry, q), found, poses)
-    for case, q, exists, pose in zip(cases, found.q, found.exists, poses, strict=True):
-        single = solutions(arm, pose_from_row(pose))
-        assert len(single) == exists.sum()
+    found = all_branches(arm, poses)
+    for case, q, exists, pose in zip(cases, *found, poses, strict=True):
+        for joints in q[exists]:
+            np.testing.assert_allclose(
+                matrix_product(arm.geometry, joints), pose_from_row(pose).matrix(), atol=1e-9
+            )
+        assert len(solutions(arm, pose_from_row(pose))) == len(distinct(q[exists]))
         wrist_3_counts = abs(np.sin(case['q'][4])) > 1e-6
         if wrist_3_counts:
             assert miss(q[exists], case['q']).min() < 1e-6, case['q']
 
 
 @pytest.mark.parametrize('name', MODELS)
-def test_nominal_branches_are_the_solutions_of_each_pose(name):
+def test_the_branches_are_the_solutions_of_each_pose(name):
     arm = Arm(MODELS[name])
     poses = arm.forward_rows(random_rows(60))
-    found = all_solutions(arm, poses)
-    assert found.q.shape == (60, 8, 6)
-    for q, exists, pose in zip(found.q, found.exists, poses, strict=True):
+    for q, exists, pose in zip(*all_branches(arm, poses), poses, strict=True):
         single = solutions(arm, pose_from_row(pose))
         assert len(single) == exists.sum()
         for solution in single:
@@ -91,66 +96,48 @@ def test_nominal_branches_are_the_solutions_of_each_pose(name):
 
 
 @pytest.mark.parametrize('name', MODELS)
-def test_calibrated_branches_lead_to_the_pose_by_the_measured_axes(
-    name, calibrated_arm_with_lines
-):
-    arm, lines = calibrated_arm_with_lines(name, 1)
-    source = random_rows(60, seed=5)
-    source = source[np.abs(np.sin(source[:, 4])) > 0.25][:25]
-    poses = arm.forward_rows(source)
-    found = all_solutions(arm, poses)
-    assert_lead_to(lines.forward, found, poses)
-    missed = sum(
-        miss(q[exists], joints).min() > 1e-6
-        for q, exists, joints in zip(found.q, found.exists, source, strict=True)
-    )
-    assert missed == 0
-
-
-def test_calibrated_branches_are_the_solutions_of_each_pose(calibrated_arm):
-    arm = calibrated_arm('ur10e')
-    poses = arm.forward_rows(random_rows(40, seed=8))
-    found = all_solutions(arm, poses)
-    for q, exists, pose in zip(found.q, found.exists, poses, strict=True):
-        single = solutions(arm, pose_from_row(pose))
-        assert len(single) == exists.sum()
-        for solution in single:
-            assert miss(q[exists], solution).min() < 1e-6
+def test_singular_and_stretched_poses_have_branches(name, singular_postures):
+    arm = Arm(MODELS[name])
+    poses = arm.forward_rows(np.array([*singular_postures.values(), above_the_shoulder(arm)]))
+    for q, exists, pose in zip(*all_branches(arm, poses), poses, strict=True):
+        assert exists.any()
+        for joints in q[exists]:
+            np.testing.assert_allclose(
+                arm.forward(joints).matrix(), pose_from_row(pose).matrix(), atol=1e-9
+            )
 
 
 @pytest.mark.parametrize('name', MODELS)
-@pytest.mark.parametrize('is_calibrated', [False, True])
-def test_singular_and_stretched_poses_have_branches(
-    name, is_calibrated, singular_postures, calibrated_arm
+def test_a_calibrated_arm_comes_back_to_singular_and_stretched_postures(
+    name, singular_postures, calibrated_arm
 ):
-    arm = calibrated_arm(name) if is_calibrated else Arm(MODELS[name])
+    arm = calibrated_arm(name)
     source = np.array([*singular_postures.values(), above_the_shoulder(Arm(MODELS[name]))])
     poses = arm.forward_rows(source)
-    found = all_solutions(arm, poses)
-    assert found.exists.any(axis=1).all()
-    assert_lead_to(lambda q: arm.forward(q).matrix(), found, poses)
+    for q, pose in zip(nearest_rows(arm, poses, source), poses, strict=True):
+        np.testing.assert_allclose(
+            arm.forward(q).matrix(), pose_from_row(pose).matrix(), atol=1e-9
+        )
 
 
-def test_the_second_index_of_the_branches_is_their_number(calibrated_arm):
-    for arm in UR5E, calibrated_arm('ur5e'):
-        found = all_solutions(arm, arm.forward_rows(walk(20, READY, 0.01)))
-        assert found.exists.all()
-        for place in range(8):
-            assert (branch_measures(arm, found.q[:, place]).branch == place).all()
+def test_the_index_of_a_branch_is_its_number():
+    q, exists = all_branches(UR5E, UR5E.forward_rows(walk(20, READY, 0.01)))
+    assert exists.all()
+    for place in range(8):
+        assert (branch_measures(UR5E, q[:, place]).branch == place).all()
 
 
-def test_where_there_is_no_branch_there_are_no_numbers(calibrated_arm):
-    for arm in UR5E, calibrated_arm('ur5e'):
-        found = all_solutions(arm, pose_rows([Pose((2.0, 0.0, 0.3)), Pose((0.0, 0.0, 0.5))]))
-        assert not found.exists.any()
-        assert np.isnan(found.q).all()
+def test_poses_out_of_reach_have_no_branch():
+    _, exists = all_branches(UR5E, pose_rows([Pose((2.0, 0.0, 0.3)), Pose((0.0, 0.0, 0.5))]))
+    assert not exists.any()
 
 
-def test_with_a_straight_wrist_wrist_3_is_what_was_asked_for(singular_postures):
+def test_with_a_straight_wrist_wrist_3_is_zero(singular_postures):
     poses = pose_rows([UR5E.forward(singular_postures['wrist straight'])])
-    found = all_solutions(UR5E, poses, wrist_3=-2.5)
-    straight = found.q[0][np.abs(found.q[0, :, 4]) < 1e-9]
-    assert straight[:, 5] == pytest.approx([-2.5] * 2)
+    q = all_branches(UR5E, poses)[0][0]
+    straight = q[np.abs(q[:, 4]) < 1e-9]
+    assert len(straight)
+    assert straight[:, 5] == pytest.approx(0.0)
 
 
 # --- Along a path ------------------------------------------------------------------------------
@@ -264,7 +251,6 @@ def test_a_line_beside_the_axis_of_a_straight_wrist_takes_large_steps():
 def test_no_rows_are_followed_to_no_rows(calibrated_arm):
     for arm in UR5E, calibrated_arm('ur5e'):
         assert solve_path(arm, np.empty((0, 7)), READY).q.shape == (0, 6)
-        assert all_solutions(arm, np.empty((0, 7))).q.shape == (0, 8, 6)
 
 
 # --- Measures ----------------------------------------------------------------------------------
@@ -335,10 +321,10 @@ def test_ten_thousand_poses_come_back(name):
     arm = Arm(MODELS[name])
     source = random_rows(10_000, seed=11)
     poses = arm.forward_rows(source)
-    found = all_solutions(arm, poses)
-    row, place = np.nonzero(found.exists)
-    back = arm.forward_rows(found.q[row, place])
+    joints, exists = all_branches(arm, poses)
+    row, place = np.nonzero(exists)
+    back = arm.forward_rows(joints[row, place])
     assert np.abs(back[:, :3] - poses[row, :3]).max() < 1e-9
     assert (1.0 - np.abs(np.einsum('ij,ij->i', back[:, 3:], poses[row, 3:]))).max() < 1e-12
-    off = np.where(found.exists, miss(found.q, source[:, None]), np.inf)
+    off = np.where(exists, miss(joints, source[:, None]), np.inf)
     assert off.min(axis=1).max() < 1e-6

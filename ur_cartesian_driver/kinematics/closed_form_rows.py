@@ -11,9 +11,8 @@ The same three quantities whose signs are the choices vanish where the arm is si
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from math import pi, tau
+from math import tau
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,8 +96,6 @@ class BranchSolution:
     q: Floats
     #: (n,) whether the pose has this branch; of two that meet it has both.
     exists: Flags
-    #: (n,) whether it is the same as the branch of the other sign, which comes first.
-    is_duplicate: Flags
     #: (n,) no other branch is nearer than this [rad], full turns not counted.
     separation: Floats
 
@@ -119,23 +116,17 @@ def ideal_branch_measures(ideal: IdealArm, q: Floats) -> BranchMeasures:
 
 
 def branch_rows(
-    ideal: IdealArm,
-    targets: TargetPoses,
-    signs: tuple[int, int, int],
-    wrist_3: float = 0.0,
-    slack: float = 0.0,
+    ideal: IdealArm, targets: TargetPoses, signs: tuple[int, int, int]
 ) -> BranchSolution:
     """
-    Solve all poses for one branch.
+    Solve all poses for one branch; wrist 3 shows 0 where the axes 4 and 6 are one line.
 
     :param signs: of shoulder, elbow and wrist.
-    :param wrist_3: what wrist 3 is to show where the axes 4 and 6 are one line [rad].
-    :param slack: as of the roots in :mod:`~.closed_form` [m^2].
     """
     shoulder, elbow, wrist = signs
-    pan = _pan(ideal, targets, shoulder, slack)
-    flip = _flip(ideal, targets, pan, wrist, wrist_3)
-    lift = _lift(ideal, flip, elbow, slack)
+    pan = _pan(ideal, targets, shoulder)
+    flip = _flip(ideal, targets, pan, wrist)
+    lift = _lift(ideal, flip, elbow)
     theta = np.stack(
         [
             pan.theta1,
@@ -150,20 +141,9 @@ def branch_rows(
     return BranchSolution(
         theta - np.array(ideal.offsets)[:, None],
         pan.exists & lift.exists,
-        _is_second_root(shoulder, pan.outward)
-        | _is_second_root(elbow, lift.smaller)
-        | flip.is_duplicate,
         # The twin of the wrist has theta6 + pi, whatever its elbow and if its shoulder is this.
         np.minimum(np.minimum(elbow_separation, tau - elbow_separation), pan.separation),
     )
-
-
-def all_branch_rows(
-    ideal: IdealArm, targets: TargetPoses, wrist_3: float = 0.0, slack: float = 0.0
-) -> Iterator[BranchSolution]:
-    """Solve for the eight branches in the order of :data:`BRANCHES`."""
-    for signs in BRANCHES:
-        yield branch_rows(ideal, targets, signs, wrist_3, slack)
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +164,6 @@ class _Flip:
     theta234: Floats
     outward: Floats
     up: Floats
-    is_duplicate: Flags
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,15 +171,13 @@ class _Lift:
     theta2: Floats
     theta3: Floats
     exists: Flags
-    #: The root that decides the elbow, or that which vanishes where it is folded [m].
-    smaller: Floats
 
 
-def _pan(ideal: IdealArm, targets: TargetPoses, sign: int, slack: float) -> _Pan:
+def _pan(ideal: IdealArm, targets: TargetPoses, sign: int) -> _Pan:
     r = targets.rotation
     px, py, pz = (p - ideal.d6 * z for p, z in zip(targets.position, r[2::3], strict=True))
     d4 = ideal.d4
-    root, exists = _root(px * px + py * py - d4 * d4, slack)
+    root, exists = _root(px * px + py * py - d4 * d4)
     outward = sign * root
     s1, c1 = d4 * px + outward * py, outward * px - d4 * py
     length = np.maximum(np.sqrt(s1 * s1 + c1 * c1), 1e-300)  # 0 on the axis, out of reach
@@ -215,13 +192,13 @@ def _pan(ideal: IdealArm, targets: TargetPoses, sign: int, slack: float) -> _Pan
     )
 
 
-def _flip(ideal: IdealArm, targets: TargetPoses, pan: _Pan, sign: int, wrist_3: float) -> _Flip:
+def _flip(ideal: IdealArm, targets: TargetPoses, pan: _Pan, sign: int) -> _Flip:
     r11, r12, r13, r21, r22, r23, r31, r32, _ = targets.rotation
     s1, c1 = pan.sin, pan.cos
     along_x, along_y, c5 = s1 * r11 - c1 * r21, s1 * r12 - c1 * r22, s1 * r13 - c1 * r23
     s5 = np.sqrt(along_x * along_x + along_y * along_y)
     straight = s5 < WRIST_SINGULAR
-    theta6_straight = wrist_3 + ideal.offsets[5]
+    theta6_straight = ideal.offsets[5]
     safe = np.where(straight, 1.0, s5)
     s6 = np.where(straight, np.sin(theta6_straight), -sign * along_y / safe)
     c6 = np.where(straight, np.cos(theta6_straight), sign * along_x / safe)
@@ -234,15 +211,14 @@ def _flip(ideal: IdealArm, targets: TargetPoses, pan: _Pan, sign: int, wrist_3: 
         np.arctan2(s234, c234),
         pan.outward - ideal.d5 * s234,
         pan.up + ideal.d5 * c234,
-        straight & (sign < 0),
     )
 
 
-def _lift(ideal: IdealArm, flip: _Flip, sign: int, slack: float) -> _Lift:
+def _lift(ideal: IdealArm, flip: _Flip, sign: int) -> _Lift:
     a2, a3 = ideal.a2, ideal.a3
     square = flip.outward * flip.outward + flip.up * flip.up
-    folded, not_too_near = _root(square - (a2 - a3) ** 2, slack)
-    stretched, not_too_far = _root((a2 + a3) ** 2 - square, slack)
+    folded, not_too_near = _root(square - (a2 - a3) ** 2)
+    stretched, not_too_far = _root((a2 + a3) ** 2 - square)
     f2, s2 = folded * folded, stretched * stretched
     c3 = (f2 - s2) / (f2 + s2)
     s3 = 2.0 * sign * folded * stretched / (f2 + s2)
@@ -253,23 +229,9 @@ def _lift(ideal: IdealArm, flip: _Flip, sign: int, slack: float) -> _Lift:
         ),
         2.0 * np.arctan2(sign * stretched, folded),
         not_too_near & not_too_far,
-        np.minimum(folded, stretched),
     )
 
 
-def _root(square: Floats, slack: float) -> tuple[Floats, Flags]:
+def _root(square: Floats) -> tuple[Floats, Flags]:
     """Return the root that is not negative, and whether there is one."""
-    exists = square >= -max(slack, FLANGE_ROUNDING)
-    square = np.maximum(square, 0.25 * slack)
-    return np.sqrt(np.where(square < MERGED_ROOTS, 0.0, square)), exists
-
-
-def _is_second_root(sign: int, root: Floats) -> Flags:
-    """Tell where both signs are the same root and this is the second."""
-    return root == 0.0 if sign < 0 else np.zeros(len(root), dtype=np.bool_)
-
-
-def wrap_rows(angles: Floats) -> Floats:
-    """Return the angles within (-pi, pi]."""
-    angles = angles - tau * np.rint(angles / tau)
-    return np.where(angles <= -pi, pi, angles)
+    return np.sqrt(np.where(square < MERGED_ROOTS, 0.0, square)), square >= -FLANGE_ROUNDING

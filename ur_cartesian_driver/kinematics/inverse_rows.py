@@ -21,21 +21,17 @@ from math import tau
 import numpy as np
 
 from ur_cartesian_driver.kinematics.chain import Arm, ChainFramesOf, jacobian_at
-from ur_cartesian_driver.kinematics.closed_form import root_slack
 from ur_cartesian_driver.kinematics.closed_form_rows import (
-    all_branch_rows,
     branch_rows,
     BRANCHES,
     BranchMeasures,
-    BranchSolution,
     Flags,
     Floats,
     ideal_branch_measures,
     TargetPoses,
-    wrap_rows,
 )
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
-from ur_cartesian_driver.kinematics.inverse import MIN_DAMPING, MISFIT_FACTORS, nearest, solutions
+from ur_cartesian_driver.kinematics.inverse import MIN_DAMPING, nearest
 from ur_cartesian_driver.motion.pose import pose_from_row
 from ur_cartesian_driver.motion.primitive import Joints
 from ur_cartesian_driver.motion.vectors import vector6
@@ -58,17 +54,6 @@ _LIMIT_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BranchSolutions:
-    """All solutions of many poses."""
-
-    #: (n, 8, 6) [rad], within (-pi, pi]; NaN where there is none. The second index is the branch
-    #: of :class:`Posture`; next to a singularity of a calibrated arm it is only a place.
-    q: Floats
-    #: (n, 8) which of them there are. Where branches meet only one of them.
-    exists: Flags
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class PathSolution:
     """The joint positions of an arm that follows a path."""
 
@@ -86,69 +71,6 @@ def branch_measures(arm: Arm, q: Floats) -> BranchMeasures:
     return ideal_branch_measures(ideal_arm_of(arm), q)
 
 
-# --- All branches ----------------------------------------------------------------------------
-
-
-def all_solutions(arm: Arm, poses: Floats, wrist_3: float = 0.0) -> BranchSolutions:
-    """
-    Return all solutions of each pose, whatever the limits are: those of ``solutions``.
-
-    Where two singularities of a calibrated arm meet it may have more than eight; then eight.
-
-    :param poses: (n, 7).
-    :param wrist_3: what wrist 3 is to show where the axes 4 and 6 are one line [rad].
-    """
-    q = np.full((len(poses), len(BRANCHES), 6), np.nan)
-    exists = np.zeros((len(poses), len(BRANCHES)), dtype=np.bool_)
-    for begin in range(0, len(poses), _BLOCK):
-        rows = slice(begin, begin + _BLOCK)
-        q[rows], exists[rows] = _branches(arm, poses[rows], wrist_3)
-    q[~exists] = np.nan
-    return BranchSolutions(q=q, exists=exists)
-
-
-def _branches(arm: Arm, poses: Floats, wrist_3: float) -> tuple[Floats, Flags]:
-    targets = TargetPoses.of(poses)
-    found = list(all_branch_rows(ideal_arm_of(arm), targets, wrist_3))
-    q = np.stack([branch.q.T for branch in found], axis=1)
-    exists = np.stack([branch.exists & ~branch.is_duplicate for branch in found], axis=1)
-    if arm.calibrated:
-        sound = _is_reliable(arm, targets, q, found)
-        for i in range(len(BRANCHES)):
-            rows = np.flatnonzero(sound & exists[:, i])
-            refined, exact = refine(arm, targets.rows(rows), q[rows, i])
-            sound[rows] &= exact & (
-                _max_joint_change(refined - q[rows, i]) < _MAX_CALIBRATION_SHIFT
-            )
-            q[rows, i] = refined
-        for row in np.flatnonzero(~sound):
-            q[row], exists[row] = _search_single(arm, poses[row], wrist_3)
-    return wrap_rows(q), exists
-
-
-def _is_reliable(arm: Arm, targets: TargetPoses, q: Floats, found: list[BranchSolution]) -> Flags:
-    """Tell of which poses the ideal arm's branches are certain to be the real one's."""
-    ideal = ideal_arm_of(arm)
-    sound: Flags = np.logical_or.reduce([branch.exists for branch in found])
-    possible = all_branch_rows(ideal, targets, slack=root_slack(ideal, MISFIT_FACTORS[0]))
-    for i, (branch, doubtful) in enumerate(zip(found, possible, strict=True)):
-        straight = np.abs(ideal_branch_measures(ideal, q[:, i]).wrist) < _AMBIGUOUS_SEPARATION
-        certain = branch.exists & (branch.separation > _AMBIGUOUS_SEPARATION) & ~straight
-        sound = sound & (certain | ~doubtful.exists)
-    return sound
-
-
-def _search_single(arm: Arm, pose: Floats, wrist_3: float) -> tuple[Floats, Flags]:
-    """Put the solutions of a single pose into the places of their branches, if these are free."""
-    q, exists = np.full((len(BRANCHES), 6), np.nan), np.zeros(len(BRANCHES), dtype=np.bool_)
-    single = solutions(arm, pose_from_row(pose), (0.0,) * 5 + (wrist_3,))[: len(BRANCHES)]
-    found = np.array(single).reshape(-1, 6)
-    for solution, branch in zip(found, branch_measures(arm, found).branch, strict=True):
-        slot = int(branch) if not exists[branch] else int(np.flatnonzero(~exists)[0])
-        q[slot], exists[slot] = solution, True
-    return q, exists
-
-
 # --- Along a path ----------------------------------------------------------------------------
 
 
@@ -163,7 +85,7 @@ def solve_path(
 
     :param poses: (n, 7).
     :param q_start: from where the first row is reached [rad].
-    :param over_gaps: False ends the search at the first row without solution: of a calibrated arm
+    :param skip_gaps: False ends the search at the first row without solution: of a calibrated arm
         each such row takes some milliseconds.
     """
     q = np.full((len(poses), 6), np.nan)
