@@ -13,14 +13,14 @@ from dataclasses import dataclass
 from math import nan
 
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import Accel, Twist, Vector3
+from geometry_msgs.msg import Accel, Twist
 
 from ur_cartesian_driver.action import FollowCartesianTrajectory
 from ur_cartesian_driver.motion.events import Outcome, Progress
 from ur_cartesian_driver.motion.pose import Pose, pose_error, rotate
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.vectors import subtract6, Vector6
 from ur_cartesian_driver.msg import CartesianTrajectoryPoint
-from ur_cartesian_driver.ros.message_fields import duration_message, pose_message
+from ur_cartesian_driver.ros.message_fields import duration_message, pose_message, vector_message
 
 _NAN6: Vector6 = (nan,) * 6
 
@@ -57,8 +57,8 @@ def feedback_message(
     message.error = _point(
         0.0,
         pose_error(desired, actual),
-        _difference(desired_twist, actual_twist),
-        _difference(desired_acceleration, actual_acceleration),
+        subtract6(desired_twist, actual_twist),
+        subtract6(desired_acceleration, actual_acceleration),
     )
 
     message.point_index = progress.waypoint
@@ -73,39 +73,28 @@ def feedback_message(
 
 def result_message(outcome: Outcome) -> FollowCartesianTrajectory.Result:
     """Return the result message of an outcome."""
-    message = FollowCartesianTrajectory.Result()
-    message.error_code = int(outcome.code)
-    message.error_string = outcome.text
-    message.report = list(outcome.report)
-    return message
+    return FollowCartesianTrajectory.Result(
+        error_code=int(outcome.code), error_string=outcome.text, report=list(outcome.report)
+    )
 
 
 def _point(
     time: float, pose: Pose, twist: Vector6, acceleration: Vector6
 ) -> CartesianTrajectoryPoint:
-    vx, vy, vz, wx, wy, wz = twist
     return CartesianTrajectoryPoint(
         time_from_start=duration_message(time),
         pose=pose_message(pose),
-        twist=Twist(linear=Vector3(x=vx, y=vy, z=vz), angular=Vector3(x=wx, y=wy, z=wz)),
+        twist=Twist(linear=vector_message(twist[:3]), angular=vector_message(twist[3:])),
         acceleration=_accel(acceleration),
         jerk=_accel(_NAN6),
     )
 
 
 def _accel(values: Vector6) -> Accel:
-    ax, ay, az, ex, ey, ez = values
-    return Accel(linear=Vector3(x=ax, y=ay, z=az), angular=Vector3(x=ex, y=ey, z=ez))
+    return Accel(linear=vector_message(values[:3]), angular=vector_message(values[3:]))
 
 
 def _rotate(T_frame_base: Pose, twist: Vector6) -> Vector6:
     """Return a twist (or acceleration) along the axes of the goal's frame, which stands still."""
-    vx, vy, vz, wx, wy, wz = twist
     q = T_frame_base.quaternion
-    return (*rotate(q, (vx, vy, vz)), *rotate(q, (wx, wy, wz)))
-
-
-def _difference(a: Vector6, b: Vector6) -> Vector6:
-    u0, u1, u2, u3, u4, u5 = a
-    v0, v1, v2, v3, v4, v5 = b
-    return (u0 - v0, u1 - v1, u2 - v2, u3 - v3, u4 - v4, u5 - v5)
+    return (*rotate(q, twist[:3]), *rotate(q, twist[3:]))

@@ -10,9 +10,10 @@ from math import nan
 from typing import Any
 
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PoseStamped, Transform, TransformStamped, WrenchStamped
+from geometry_msgs.msg import PoseStamped, Transform, TransformStamped, Wrench, WrenchStamped
 import numpy as np
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 
 from ur_cartesian_driver.driver import DriverStatus as DriverState
 from ur_cartesian_driver.motion.pose import conjugate, rotate
@@ -36,22 +37,20 @@ def joint_state_message(state: RobotState, names: tuple[str, ...], stamp: Time) 
 
     Efforts are left out where the robot does not report them.
     """
-    message = JointState()
-    message.header.stamp = stamp
-    message.name = list(names)
-    message.position = list(state.actual_q)
-    message.velocity = list(state.actual_qd)
-    message.effort = list(state.joint_torque or ())
-    return message
+    return JointState(
+        header=Header(stamp=stamp),
+        name=list(names),
+        position=list(state.actual_q),
+        velocity=list(state.actual_qd),
+        effort=list(state.joint_torque or ()),
+    )
 
 
 def tcp_pose_message(state: RobotState, base: str, stamp: Time) -> PoseStamped:
     """Return the measured pose of the active TCP in the robot's base."""
-    message = PoseStamped()
-    message.header.stamp = stamp
-    message.header.frame_id = base
-    message.pose = pose_message(state.actual_tcp_pose)
-    return message
+    return PoseStamped(
+        header=Header(stamp=stamp, frame_id=base), pose=pose_message(state.actual_tcp_pose)
+    )
 
 
 def wrench_message(state: RobotState, tcp: str, stamp: Time) -> WrenchStamped:
@@ -61,25 +60,26 @@ def wrench_message(state: RobotState, tcp: str, stamp: Time) -> WrenchStamped:
     The robot reports them at the TCP, but along the axes of its base.
     """
     to_tcp = conjugate(state.actual_tcp_pose.quaternion)
-    fx, fy, fz, tx, ty, tz = state.actual_tcp_wrench
-    message = WrenchStamped()
-    message.header.stamp = stamp
-    message.header.frame_id = tcp
-    message.wrench.force = vector_message(rotate(to_tcp, (fx, fy, fz)))
-    message.wrench.torque = vector_message(rotate(to_tcp, (tx, ty, tz)))
-    return message
+    wrench = state.actual_tcp_wrench
+    return WrenchStamped(
+        header=Header(stamp=stamp, frame_id=tcp),
+        wrench=Wrench(
+            force=vector_message(rotate(to_tcp, wrench[:3])),
+            torque=vector_message(rotate(to_tcp, wrench[3:])),
+        ),
+    )
 
 
 def tcp_transform(state: RobotState, base: str, tcp: str, stamp: Time) -> TransformStamped:
     """Return the measured pose of the active TCP as a transform for tf."""
-    message = TransformStamped(child_frame_id=tcp)
-    message.header.stamp = stamp
-    message.header.frame_id = base
-    message.transform = Transform(
-        translation=vector_message(state.actual_tcp_pose.position),
-        rotation=quaternion_message(state.actual_tcp_pose.quaternion),
+    return TransformStamped(
+        header=Header(stamp=stamp, frame_id=base),
+        child_frame_id=tcp,
+        transform=Transform(
+            translation=vector_message(state.actual_tcp_pose.position),
+            rotation=quaternion_message(state.actual_tcp_pose.quaternion),
+        ),
     )
-    return message
 
 
 def status_message(
@@ -125,7 +125,8 @@ def safety_mode_message(state: RobotState | None) -> SafetyModeMessage:
 
 def io_states_message(signals: Signals, stamp: Time) -> IOStates:
     """Return all inputs and outputs."""
-    message = IOStates(
+    return IOStates(
+        header=Header(stamp=stamp),
         standard_digital_inputs=list(signals.inputs.standard),
         standard_digital_outputs=list(signals.outputs.standard),
         configurable_digital_inputs=list(signals.inputs.configurable),
@@ -137,13 +138,12 @@ def io_states_message(signals: Signals, stamp: Time) -> IOStates:
         analog_outputs=_values(signals.analog_outputs),
         analog_output_domains=_domains(signals.analog_outputs),
     )
-    message.header.stamp = stamp
-    return message
 
 
 def tool_data_message(signals: Signals, stamp: Time) -> ToolData:
     """Return the state of the tool connector and the payload."""
-    message = ToolData(
+    return ToolData(
+        header=Header(stamp=stamp),
         analog_inputs=_values(signals.tool_analog_inputs),
         analog_input_domains=_domains(signals.tool_analog_inputs),
         output_voltage=signals.tool_voltage,
@@ -153,13 +153,12 @@ def tool_data_message(signals: Signals, stamp: Time) -> ToolData:
         payload=signals.payload,
         payload_center_of_gravity=vector_message(signals.payload_cog),
     )
-    message.header.stamp = stamp
-    return message
 
 
 def servo_state_message(report: ServoReport, stamp: Time) -> ServoState:
     """Return the state of the set-point stream."""
-    message = ServoState(
+    return ServoState(
+        header=Header(stamp=stamp),
         state=int(report.activity),
         setpoints_sent=report.setpoints_sent,
         setpoints_done=report.setpoints_done,
@@ -174,8 +173,6 @@ def servo_state_message(report: ServoReport, stamp: Time) -> ServoState:
         repeats=report.repeats,
         skipped=report.skipped,
     )
-    message.header.stamp = stamp
-    return message
 
 
 def _values(channels: Sequence[AnalogChannel]) -> list[float]:
