@@ -27,7 +27,24 @@ DEFAULT_ACCELERATION = 1.4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MoveJ:
+class _Move:
+    """What all motions to a target have."""
+
+    target: Target
+    velocity: float = DEFAULT_VELOCITY
+    acceleration: float = DEFAULT_ACCELERATION
+    blend_radius: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _MoveNear(_Move):
+    """A motion with ``q_near``, which selects the joint solution of a pose target."""
+
+    q_near: Joints | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoveJ(_MoveNear):
     """
     Straight line in joint space.
 
@@ -35,73 +52,47 @@ class MoveJ:
     instead of velocity [rad/s] and acceleration [rad/s^2] of the leading axis.
     """
 
-    target: Target
-    q_near: Joints | None = None
-    velocity: float = DEFAULT_VELOCITY
-    acceleration: float = DEFAULT_ACCELERATION
     duration: float = 0.0
-    blend_radius: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MoveL:
+class MoveL(_MoveNear):
     """
     Straight line of the tool; velocity [m/s] and acceleration [m/s^2] of the tool.
 
     A joint target means the pose it leads to. ``q_near`` travels along, the robot ignores it.
     """
 
-    target: Target
-    q_near: Joints | None = None
-    velocity: float = DEFAULT_VELOCITY
-    acceleration: float = DEFAULT_ACCELERATION
     duration: float = 0.0
-    blend_radius: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MoveP:
+class MoveP(_MoveNear):
     """Straight line at constant tool speed, blended by circular fillets; takes no duration."""
 
-    target: Target
-    q_near: Joints | None = None
-    velocity: float = DEFAULT_VELOCITY
-    acceleration: float = DEFAULT_ACCELERATION
-    blend_radius: float = 0.0
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MoveC:
+class MoveC(_Move):
     """Circular arc through ``via`` to ``target``; takes no duration."""
 
-    target: Target
     via: Target
-    velocity: float = DEFAULT_VELOCITY
-    acceleration: float = DEFAULT_ACCELERATION
-    blend_radius: float = 0.0
     mode: ArcMode = ArcMode.UNCONSTRAINED
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OptimoveJ:
+class OptimoveJ(_MoveNear):
     """Joint motion with limited jerk; velocity and acceleration are fractions in (0, 1]."""
 
-    target: Target
-    q_near: Joints | None = None
     velocity: float = 0.3
     acceleration: float = 0.3
-    blend_radius: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OptimoveL:
+class OptimoveL(_MoveNear):
     """Straight tool motion with limited jerk; velocity and acceleration in (0, 1]."""
 
-    target: Target
-    q_near: Joints | None = None
     velocity: float = 0.3
     acceleration: float = 0.3
-    blend_radius: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
