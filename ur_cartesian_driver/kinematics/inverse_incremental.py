@@ -19,7 +19,7 @@ from ur_cartesian_driver.kinematics.chain import Arm, ChainFrames, jacobian_at
 from ur_cartesian_driver.kinematics.ideal_arm import ideal_arm_of
 from ur_cartesian_driver.motion.pose import Pose, rotation_from_quaternion
 from ur_cartesian_driver.motion.primitive import Joints
-from ur_cartesian_driver.motion.vectors import Vector3
+from ur_cartesian_driver.motion.vectors import add6, Vector3, vector6
 
 #: An error of metres and radians whose square is below this leaves one of 1e-10 after the next
 #: step, as long as the arm is not singular to the same degree.
@@ -93,5 +93,5 @@ def _newton_step(q: Joints, frames: ChainFrames, error: list[float]) -> Joints:
     jacobian = jacobian_at(frames, frames.position)
     normal = jacobian.T @ jacobian
     normal.flat[::7] += _DAMPING
-    a, b, c, d, e, f = np.linalg.solve(normal, jacobian.T @ np.array(error)).tolist()
-    return (q[0] + a, q[1] + b, q[2] + c, q[3] + d, q[4] + e, q[5] + f)
+    change = np.linalg.solve(normal, jacobian.T @ np.array(error))
+    return add6(q, vector6(change.tolist()))

@@ -199,7 +199,7 @@ def _joints(row: Floats) -> Joints:
 # --- The calibrated arm ----------------------------------------------------------------------
 
 
-def refine(arm: Arm, targets: TargetPoses, q: Floats, steps: int = _STEPS) -> tuple[Floats, Flags]:
+def refine(arm: Arm, targets: TargetPoses, q: Floats) -> tuple[Floats, Flags]:
     """
     Return the joint positions that Newton's method finds from ``q``, and which are exact.
 
@@ -210,13 +210,13 @@ def refine(arm: Arm, targets: TargetPoses, q: Floats, steps: int = _STEPS) -> tu
     q = q.copy()
     exact = np.zeros(len(q), dtype=np.bool_)
     active = np.arange(len(q))
-    for step in range(steps + 1):
+    for step in range(_STEPS + 1):
         frames = arm.frames_rows(q[active])
         errors, facing = _errors(frames, targets)
         squares = np.einsum('in,in->n', errors, errors)
         done = facing & (squares < _EXACT)
         exact[active[done]] = True
-        if step == steps or done.all():
+        if step == _STEPS or done.all():
             break
         change = _newton(frames, errors, squares)
         change[done] = 0.0

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 from ur_cartesian_driver.kinematics.chain import Arm
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.motion.vectors import Vector6, vector6, ZERO6
+from ur_cartesian_driver.motion.vectors import add_scaled6, ZERO6
 
 
 def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState:
@@ -27,7 +27,7 @@ def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState
     leading = max(map(abs, state.target_qd))
     if leading == 0.0:
         return state
-    q = _extrapolate(state.actual_q, state.target_qd, 0.5 * leading / deceleration)
+    q = add_scaled6(state.actual_q, state.target_qd, 0.5 * leading / deceleration)
     # By the change of the pose: an arm whose calibration is unknown is off its model anyway.
     T_flange_tcp_now = arm.forward(state.actual_q).inverse() @ state.actual_tcp_pose
     T_base_tcp = arm.forward(q) @ T_flange_tcp_now
@@ -42,7 +42,3 @@ def predict_stop(state: RobotState, arm: Arm, deceleration: float) -> RobotState
         actual_tcp_twist=ZERO6,
         target_tcp_twist=ZERO6,
     )
-
-
-def _extrapolate(q: Vector6, qd: Vector6, time: float) -> Vector6:
-    return vector6(x + v * time for x, v in zip(q, qd, strict=True))

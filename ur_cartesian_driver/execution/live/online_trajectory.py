@@ -106,8 +106,6 @@ class OnlineTrajectoryGenerator:
         self.angular: Vector3 = ZERO3
         #: Why the arm does not go to its target, as a clause; empty: it does.
         self.blocked = ''
-        #: Speed over allowed speed of the fastest joint if that slowed the tool down, else 1.
-        self.joint_speed_ratio = 1.0
         self._arm = arm
         self._T_tcp_flange = T_flange_tcp.inverse()
         self._target: Pose | None = None
@@ -161,7 +159,6 @@ class OnlineTrajectoryGenerator:
 
         :param dt: nominal time to it [s].
         """
-        self.joint_speed_ratio = 1.0
         # The speed of the last cycle was chosen for its length; less time cannot undo it.
         change, self._dt = max(dt, self._dt), dt
         if self.blocked and self._is_target_new and self.at_rest:
@@ -229,7 +226,6 @@ class OnlineTrajectoryGenerator:
         allowed = self.limits.joint_velocity
         fastest = max([abs(b - a) / (dt * v) for a, b, v in zip(self.q, q, allowed, strict=True)])
         if fastest > 1.0:
-            self.joint_speed_ratio = fastest
             linear, angular = scale(linear, 1.0 / fastest), scale(angular, 1.0 / fastest)
             pose, q_slow = self._next_pose(linear, angular, dt)
             q = q_slow or q

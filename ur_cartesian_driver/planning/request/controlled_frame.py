@@ -19,7 +19,7 @@ from ur_cartesian_driver.motion.goal import ArcMode, Goal, Segment, SegmentType,
 from ur_cartesian_driver.motion.pose import IDENTITY, normalize, Pose, rotate
 from ur_cartesian_driver.motion.rigid_body import acceleration_at, shift_reference_point, twist_at
 from ur_cartesian_driver.motion.state import RobotState
-from ur_cartesian_driver.motion.vectors import Vector6
+from ur_cartesian_driver.motion.vectors import add, Vector6
 from ur_cartesian_driver.planning.options import PlanningOptions
 from ur_cartesian_driver.planning.request.goal_fields import (
     is_spline,
@@ -192,8 +192,5 @@ def _retarget_segment(segment: Segment, point: Waypoint, T_controlled_tcp: Pose)
     if segment.via is None:
         return segment
     offset = rotate(normalize(point.pose.quaternion), T_controlled_tcp.position)
-    x, y, z = segment.via.position
-    via = Pose(
-        (x + offset[0], y + offset[1], z + offset[2]), (segment.via @ T_controlled_tcp).quaternion
-    )
+    via = Pose(add(segment.via.position, offset), (segment.via @ T_controlled_tcp).quaternion)
     return replace(segment, via=via)

@@ -71,10 +71,8 @@ def check_segment_numbers(goal: Goal, options: PlanningOptions) -> None:
 def check_tolerance_numbers(goal: Goal, options: PlanningOptions) -> None:
     """Refuse tolerances that are not finite."""
     for name, tolerance in named_tolerances(goal):
-        check_finite(f'{name}.position_error', tolerance.position)
-        check_finite(f'{name}.orientation_error', tolerance.orientation)
-        check_finite(f'{name}.twist_error', tolerance.twist)
-        check_finite(f'{name}.acceleration_error', tolerance.acceleration)
+        for field in ('position', 'orientation', 'twist', 'acceleration'):
+            check_finite(f'{name}.{field}_error', getattr(tolerance, field))
     check_finite('goal_time_tolerance', (goal.goal_time_tolerance,))
 
 

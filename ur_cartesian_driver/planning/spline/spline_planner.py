@@ -192,7 +192,9 @@ def plan_stop(state: SplineState, arm: Arm, deceleration: float) -> Spline:
     for _ in range(_TRIES):
         T = round(T, 6)
         target = np.array(state.q) + 0.5 * T * v + T**2 / 12.0 * a
-        piece = Spline(target=_six(target), velocities=ZERO6, accelerations=ZERO6, duration=T)
+        piece = Spline(
+            target=vector6(target.tolist()), velocities=ZERO6, accelerations=ZERO6, duration=T
+        )
         q, qd, _ = _rows_of(state, piece)
         joint = _joint_outside_range(arm, q)
         if joint is None and (np.abs(qd) <= speed * (1.0 + 1e-9)).all():
@@ -361,10 +363,6 @@ def _precision(polynomials: JointPolynomials) -> str:
 def _tightest_remark(path: SplinePath) -> str:
     point, tightest_margin = min(path.tightest_margin.items(), key=lambda item: item[1].normalized)
     return f'tightest margin: {tightest_margin} of the segment to point {point}'
-
-
-def _six(values: Floats) -> Vector6:
-    return vector6(values.tolist())
 
 
 def stretch_times(goal: Goal, factor: float) -> Goal:
